@@ -1,0 +1,43 @@
+"""Helicopter models from hover to forward flight: symbolic equations in, exact linear families and LPV models out.
+
+Everything is loaded when first used: `import symheli` brings in neither CasADi nor a plotting library.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from symheli.flight import Excitation, Flight, fly
+    from symheli.helicopter import Helicopter
+    from symheli.linearize import linearize
+    from symheli.lpv import LFT, FlightRecord, LinearFamily, LinearModel, LPVStateSpace, Scheduling, Signal
+    from symheli.sweep import sweep
+    from symheli.trim import TrimPoint, trim
+
+_HOME = {
+    "Helicopter": "symheli.helicopter",
+    "trim": "symheli.trim",
+    "TrimPoint": "symheli.trim",
+    "linearize": "symheli.linearize",
+    "sweep": "symheli.sweep",
+    **dict.fromkeys(("fly", "Flight", "Excitation"), "symheli.flight"),
+    **dict.fromkeys(("LFT", "FlightRecord", "LinearFamily", "LinearModel", "LPVStateSpace", "Scheduling", "Signal"), "symheli.lpv"),
+    **dict.fromkeys(("SymheliError", "InputError", "UnknownNameError", "TrimError", "ExcitationError"), "symheli.errors"),
+}
+
+__all__ = sorted(_HOME)
+__version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'symheli' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -1,0 +1,53 @@
+"""What can go wrong, by name: every message says what was expected, what came and what to try."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+
+class SymheliError(Exception):
+    """Root of every error this project raises on purpose."""
+
+
+class InputError(SymheliError, ValueError):
+    """A value, shape, unit or file that cannot be used as given."""
+
+
+class UnknownNameError(InputError):
+    """A name that is not among the known ones; the message lists the nearest."""
+
+    def __init__(self, kind: str, name: object, known: Iterable[str]):
+        known = [str(k) for k in known]
+        near = difflib.get_close_matches(str(name), known, n=3, cutoff=0.4)
+        hint = f"did you mean {' or '.join(repr(str(n)) for n in near)}?" if near else "known: " + ", ".join(known)
+        super().__init__(f"unknown {kind} {str(name)!r}; {hint}")
+
+
+class TrimError(SymheliError):
+    """No equilibrium was found; `result` holds the best point and the residual of every equation."""
+
+    def __init__(self, message: str, result: Any = None):
+        super().__init__(message)
+        self.result = result
+
+
+class ExcitationError(SymheliError):
+    """The data cannot determine what was asked of them; `report` says which direction is missing."""
+
+    def __init__(self, message: str, report: Any = None):
+        super().__init__(message)
+        self.report = report
+
+
+class CertificateError(SymheliError):
+    """A certificate contradicts another result it must agree with."""
+
+
+class SolverError(SymheliError):
+    """A numerical solver is missing, or is not one of the supported ones."""
+
+
+class CompilerWarning(UserWarning):
+    """Compiled code is not available; the same numbers come out more slowly."""

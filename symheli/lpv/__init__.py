@@ -1,0 +1,36 @@
+"""The value types that every room shares: pure NumPy, no physics, no solver."""
+
+from symheli.lpv.bases import Basis, Piece, PiecewiseLinear, Polynomial, Spline
+from symheli.lpv.flight_record import FlightRecord
+from symheli.lpv.lft import LFT, Block
+from symheli.lpv.linear_family import LinearFamily
+from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.named_vector import NamedVector
+from symheli.lpv.operating_point import OperatingPoint
+from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.signal import Signal, signals
+from symheli.lpv.simulate import simulate
+from symheli.lpv.trim_schedule import TrimSchedule
+
+__all__ = [
+    "LFT",
+    "Basis",
+    "Block",
+    "FlightRecord",
+    "LPVStateSpace",
+    "LinearFamily",
+    "LinearModel",
+    "Matrices",
+    "NamedVector",
+    "OperatingPoint",
+    "Piece",
+    "PiecewiseLinear",
+    "Polynomial",
+    "Scheduling",
+    "Signal",
+    "Spline",
+    "TrimSchedule",
+    "signals",
+    "simulate",
+]

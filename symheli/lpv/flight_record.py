@@ -1,0 +1,193 @@
+"""What was measured in a flight: one time axis, named signals with units, nothing guessed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.signal import Signal, indices, signals
+from symheli.lpv.units import to_si
+
+if TYPE_CHECKING:
+    import pandas
+
+GAP = 1.5
+"""Two samples further apart than this many median steps have a gap between them."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlightRecord:
+    """Samples `values` (n, m) of `signals` at `time` (n,) in s, in SI units and radians.
+
+    NaN marks a missing sample. A time step longer than 1.5 median steps is a gap: `segments()` splits there, and no
+    regressor reaches across. `note` says where the record comes from.
+    """
+
+    time: Array
+    values: Array
+    signals: tuple[Signal, ...]
+    note: str = ""
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "signals", signals(self.signals))
+        object.__setattr__(self, "time", frozen(self.time, "time", (None,)))
+        object.__setattr__(self, "values", frozen(self.values, "values", (len(self.time), len(self.signals)), finite=False))
+        if len(self.time) < 2:
+            raise InputError(f"a record needs at least two samples, got {len(self.time)}")
+        backwards = np.flatnonzero(np.diff(self.time) <= 0)
+        if len(backwards):
+            k = int(backwards[0])
+            raise InputError(
+                f"time must increase: sample {k + 1} is at {self.time[k + 1]:.6g} s after {self.time[k]:.6g} s; sort or drop repeats"
+            )
+        if np.any(np.isinf(self.values)):
+            row, column = (int(i) for i in np.argwhere(np.isinf(self.values))[0])
+            raise InputError(f"{self.signals[column]} is infinite at {self.time[row]:.6g} s; mark missing samples as NaN")
+
+    # --- reading -----------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_arrays(cls, time: object, units: Mapping[str, str], note: str = "", **columns: object) -> FlightRecord:
+        """From one array a signal, all as long as `time` (s); `units` declares the unit of each signal."""
+        values, names = [], []
+        length = len(np.asarray(time))
+        for name, column in columns.items():
+            if name not in units:
+                raise InputError(f"declare the unit of {name!r}: units={{{name!r}: ...}} ('1' where it has none)")
+            factor, unit = to_si(units[name])
+            values.append(factor * frozen(column, name, (length,), finite=False))
+            names.append(Signal(name, unit))
+        return cls(time, np.column_stack(values) if values else np.zeros((length, 0)), tuple(names), note)  # type: ignore[arg-type]
+
+    @classmethod
+    def from_frame(cls, frame: pandas.DataFrame, time: str, units: Mapping[str, str], time_unit: str = "s", note: str = "") -> FlightRecord:
+        """From a pandas DataFrame: `time` names the time column; the columns in `units` are taken and converted to SI."""
+        for name in (time, *units):
+            if name not in frame.columns:
+                raise UnknownNameError("column", name, [str(c) for c in frame.columns])
+        factor, unit = to_si(time_unit)
+        if unit != "s":
+            raise InputError(f"time_unit must be a time, got {time_unit!r}")
+        return cls.from_arrays(factor * frame[time].to_numpy(float), units, note, **{str(n): frame[n].to_numpy(float) for n in units})
+
+    @classmethod
+    def from_csv(
+        cls, path: str | os.PathLike[str], time: str | None, units: Mapping[str, str], dt: float | None = None, time_unit: str = "s"
+    ) -> FlightRecord:
+        """From a CSV file with a header line. A file without a time column (`time=None`) needs the sample period `dt` (s)."""
+        from symheli.logs.csv import read_csv
+
+        return cls._from_table(*read_csv(path, time, units, dt, time_unit), path)
+
+    @classmethod
+    def from_xplane(cls, path: str | os.PathLike[str], dt: float | None = None) -> FlightRecord:
+        """From an X-Plane Data.txt: body velocities, rates and attitude in SI, sticks in -1..1; see `symheli.logs.xplane`."""
+        from symheli.logs.xplane import read_xplane
+
+        return cls._from_table(*read_xplane(path, dt), path)
+
+    @classmethod
+    def from_ulog(cls, path: str | os.PathLike[str], topics: Mapping[str, tuple[str, str, str]], dt: float) -> FlightRecord:
+        """From a PX4 ULog: {signal: (topic, field, unit)}, resampled to `dt` (s); needs pyulog (extra "logs")."""
+        from symheli.logs.ulog import read_ulog
+
+        return cls._from_table(*read_ulog(path, topics, dt), path)
+
+    @classmethod
+    def from_mat(cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str]) -> FlightRecord:
+        """From a MATLAB file (v7.2 or older) with one vector a signal."""
+        from symheli.logs.mat import read_mat
+
+        return cls._from_table(*read_mat(path, time, units), path)
+
+    @classmethod
+    def _from_table(cls, time: Array, columns: Mapping[str, Array], units: Mapping[str, str], path: str | os.PathLike[str]) -> FlightRecord:
+        return cls.from_arrays(time, units, os.path.basename(os.fspath(path)), **columns)
+
+    # --- looking -----------------------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.values[:, indices([name], self.signals, "signal")[0]]
+
+    def columns(self, names: Iterable[str]) -> Array:
+        """The named signals side by side, (n, len(names))."""
+        return self.values[:, indices(names, self.signals, "signal")]
+
+    @property
+    def dt(self) -> float:
+        """Sample period (s): the median step. Raises `InputError` where the steps inside a segment vary by more than 1 %."""
+        steps = np.diff(self.time)
+        dt = float(np.median(steps))
+        inside = steps[steps <= GAP * dt]
+        if np.ptp(inside) > 0.01 * dt:
+            raise InputError(
+                f"sampling is irregular (steps {inside.min():.4g} to {inside.max():.4g} s); resample first: record.resample({dt:.3g})"
+            )
+        return dt
+
+    def segments(self) -> tuple[slice, ...]:
+        """Index ranges without a gap between them, in order."""
+        steps = np.diff(self.time)
+        cuts = [0, *(np.flatnonzero(steps > GAP * np.median(steps)) + 1).tolist(), len(self)]
+        return tuple(slice(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True))
+
+    def derivative(self, name: str) -> Array:
+        """Central-difference time derivative (n,) of a signal, one-sided at the ends of each segment."""
+        values, out = self[name], np.full(len(self), np.nan)
+        for part in self.segments():
+            if part.stop - part.start > 1:
+                out[part] = np.gradient(values[part], self.time[part])
+        return out
+
+    # --- changing (a new record each time) ---------------------------------------------------------------------
+
+    def between(self, start: float, stop: float) -> FlightRecord:
+        """The samples with start <= time < stop (s)."""
+        return self.rows((self.time >= start) & (self.time < stop))
+
+    def rows(self, keep: object) -> FlightRecord:
+        """The samples at these indices (slice, index array or mask)."""
+        return replace(self, time=self.time[keep], values=self.values[keep])  # type: ignore[index]
+
+    def select(self, names: Sequence[str]) -> FlightRecord:
+        """Only these signals."""
+        index = indices(names, self.signals, "signal")
+        return replace(self, values=self.values[:, index], signals=tuple(self.signals[i] for i in index))
+
+    def with_signals(self, units: Mapping[str, str], **columns: object) -> FlightRecord:
+        """With these signals added, or replaced where the name exists."""
+        other = FlightRecord.from_arrays(self.time, units, **columns)
+        kept = [i for i, s in enumerate(self.signals) if s not in other.signals]
+        return replace(
+            self, values=np.column_stack([self.values[:, kept], other.values]), signals=(*(self.signals[i] for i in kept), *other.signals)
+        )
+
+    def resample(self, dt: float) -> FlightRecord:
+        """Linear interpolation to a uniform step `dt` (s) inside each segment; nothing is invented across gaps."""
+        if not dt > 0:
+            raise InputError(f"dt must be a positive number of seconds, got {dt}")
+        times, values, offset = [], [], None
+        for part in self.segments():
+            old = self.time[part]
+            offset = old[0] if offset is None else offset
+            new = offset + dt * np.arange(np.ceil((old[0] - offset) / dt - 1e-9), np.floor((old[-1] - offset) / dt + 1e-9) + 1)
+            if len(new):
+                times.append(new)
+                values.append(np.column_stack([np.interp(new, old, column) for column in self.values[part].T]))
+        return replace(self, time=np.concatenate(times), values=np.concatenate(values))
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A pandas DataFrame with a "t" column (s) and one column a signal."""
+        import pandas as pd
+
+        return pd.DataFrame({"t": self.time, **{str(s): self.values[:, i] for i, s in enumerate(self.signals)}})

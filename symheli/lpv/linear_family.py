@@ -1,0 +1,138 @@
+"""Linear models along a range of airspeeds, and their element-wise interpolation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.bases import Basis, PiecewiseLinear, Polynomial, Spline
+from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.operating_point import OperatingPoint
+from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.signal import Signal, indices, signals
+from symheli.lpv.trim_schedule import TrimSchedule
+
+Kind = Literal["polynomial", "spline", "linear"]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFamily:
+    """K linear models at increasing `airspeeds` (m/s): A (K, nx, nx), B (K, nx, nu), C (K, ny, nx), D (K, ny, nu).
+
+    `trims` holds the operating point of each. `kinks` maps a name of the physics (a saturation, an edge of a
+    wake) to the airspeeds at which the models change with a corner.
+    """
+
+    airspeeds: Array
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    trims: tuple[OperatingPoint, ...]
+    dt: float | None = None
+    kinks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for group in ("states", "inputs", "outputs"):
+            object.__setattr__(self, group, signals(getattr(self, group)))
+        object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
+        if np.any(np.diff(self.airspeeds) <= 0):
+            raise InputError("airspeeds must increase strictly")
+        K, nx, nu, ny = len(self.airspeeds), len(self.states), len(self.inputs), len(self.outputs)
+        for name, shape in (("A", (K, nx, nx)), ("B", (K, nx, nu)), ("C", (K, ny, nx)), ("D", (K, ny, nu))):
+            object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
+        if len(self.trims) != K:
+            raise InputError(f"expected {K} trims, one an airspeed, got {len(self.trims)}")
+
+    @classmethod
+    def from_models(
+        cls, airspeeds: Sequence[float], models: Sequence[LinearModel], kinks: Mapping[str, tuple[float, ...]] | None = None
+    ) -> LinearFamily:
+        """From linear models with equal names, one an airspeed (m/s), each with its operating point."""
+        first = models[0]
+        return cls(
+            np.asarray(airspeeds, float), *(np.stack([getattr(m, name) for m in models]) for name in "ABCD"),
+            first.states, first.inputs, first.outputs, tuple(m.point for m in models if m.point), first.dt, kinks or {},
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.airspeeds)
+
+    def __getitem__(self, k: int) -> LinearModel:
+        return LinearModel(self.A[k], self.B[k], self.C[k], self.D[k], self.states, self.inputs, self.outputs, self.dt, self.trims[k])
+
+    def select(
+        self, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+    ) -> LinearFamily:
+        """Keep these states (rows and columns of the others are deleted), inputs and outputs, in this order."""
+        return self._map(lambda model: model.select(states, inputs, outputs))
+
+    def residualize(self, states: Sequence[str]) -> LinearFamily:
+        """Remove these states by setting their derivatives to zero (quasi-steady), continuous time only."""
+        if self.dt is not None:
+            raise InputError("residualize continuous models, then discretize")
+        gone = indices(states, self.states, "state")
+        kept = [i for i in range(len(self.states)) if i not in gone]
+        rows = [i for i, y in enumerate(self.outputs) if y not in states]
+
+        def reduce(model: LinearModel) -> LinearModel:
+            A, B, C, D = model.A, model.B, model.C[rows], model.D[rows]
+            ss = A[np.ix_(gone, gone)]
+            if np.linalg.cond(ss) > 1e12:
+                raise InputError(f"cannot residualize {', '.join(states)}: they do not settle (singular dynamics)")
+            X, U = np.linalg.solve(ss, A[np.ix_(gone, kept)]), np.linalg.solve(ss, B[gone])
+            return replace(
+                model, A=A[np.ix_(kept, kept)] - A[np.ix_(kept, gone)] @ X, B=B[kept] - A[np.ix_(kept, gone)] @ U,
+                C=C[:, kept] - C[:, gone] @ X, D=D - C[:, gone] @ U,
+                states=tuple(self.states[i] for i in kept), outputs=tuple(self.outputs[i] for i in rows),
+            )  # fmt: skip
+
+        return self._map(reduce)
+
+    def discretize(self, dt: float) -> LinearFamily:
+        """Zero-order-hold equivalent of each model at sample period `dt` (s)."""
+        return self._map(lambda model: model.discretize(dt))
+
+    def interpolate(self, kind: Kind = "polynomial", degree: int = 3, *, rate: float = math.inf) -> LPVStateSpace:
+        """Element-wise interpolation of every entry of A, B, C, D over airspeed.
+
+        "polynomial": least-squares fit of `degree`; "spline": cubic through the nodes; "linear": straight lines.
+        `.residuals` of the result are fit minus node values. The trim schedule is always the cubic spline (linear
+        below four nodes): its slope is the drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2.
+        """
+        low, high = float(self.airspeeds[0]), float(self.airspeeds[-1])
+        if len(self) < 2:
+            raise InputError("interpolation needs at least two airspeeds")
+        nodes = tuple(float(p) for p in self.airspeeds)
+        basis: Basis
+        if kind == "polynomial":
+            basis = Polynomial(degree, low, high)
+        elif kind == "spline":
+            basis = Spline(nodes)
+        elif kind == "linear":
+            basis = PiecewiseLinear(nodes)
+        else:
+            raise UnknownNameError("interpolation kind", kind, ("polynomial", "spline", "linear"))
+        exact = Matrices(self.A, self.B, self.C, self.D)
+        fitted = Matrices(*(basis.fit(self.airspeeds, M) for M in exact))
+        residuals = Matrices(*(np.tensordot(basis(self.airspeeds), F, axes=1) - M for F, M in zip(fitted, exact, strict=True)))
+        trim_basis = Spline(nodes) if len(self) >= 4 else PiecewiseLinear(nodes)
+        x0 = np.array([[trim.x[s] for s in self.states] for trim in self.trims])
+        u0 = np.array([[trim.u[i] if i in trim.u else 0.0 for i in self.inputs] for trim in self.trims])
+        return LPVStateSpace(
+            basis, *fitted, Scheduling("airspeed", "m/s", low, high, rate), self.states, self.inputs, self.outputs,
+            dt=self.dt, trim=TrimSchedule(trim_basis, x0, u0), residuals=residuals,
+        )  # fmt: skip
+
+    def _map(self, change) -> LinearFamily:
+        return LinearFamily.from_models(self.airspeeds, [change(self[k]) for k in range(len(self))], self.kinks)

@@ -1,0 +1,99 @@
+"""A linear time-invariant model that keeps its names, units and operating point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.signal import cont2discrete
+
+from symheli.errors import InputError
+from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.operating_point import OperatingPoint
+from symheli.lpv.signal import Signal, indices, signals
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """dx/dt = A x + B u, y = C x + D u (dt None) or x(k+1) = A x + B u (dt in s), in deviations from `point`.
+
+    A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) in SI units and radians; `states`, `inputs`, `outputs` are
+    `Signal`s: strings that carry their unit.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    dt: float | None = None
+    point: OperatingPoint | None = None
+
+    def __post_init__(self) -> None:
+        for group in ("states", "inputs", "outputs"):
+            object.__setattr__(self, group, signals(getattr(self, group)))
+        nx, nu, ny = len(self.states), len(self.inputs), len(self.outputs)
+        for name, shape in (("A", (nx, nx)), ("B", (nx, nu)), ("C", (ny, nx)), ("D", (ny, nu))):
+            object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
+        if self.dt is not None and not self.dt > 0:
+            raise InputError(f"dt must be a positive number of seconds or None, got {self.dt}")
+
+    def poles(self) -> np.ndarray:
+        """Eigenvalues of A (nx,), complex; rad/s where continuous."""
+        return np.linalg.eigvals(self.A)
+
+    def is_stable(self) -> bool:
+        """Whether every pole lies strictly inside the stability region."""
+        poles = self.poles()
+        return bool(np.all(poles.real < 0) if self.dt is None else np.all(np.abs(poles) < 1))
+
+    def select(
+        self, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+    ) -> LinearModel:
+        """Keep these states (rows and columns of the others are deleted), inputs and outputs, in this order."""
+        ix = indices(self.states if states is None else states, self.states, "state")
+        iu = indices(self.inputs if inputs is None else inputs, self.inputs, "input")
+        if outputs is None:
+            outputs = [y for y in self.outputs if y not in self.states or self.states.index(y) in ix]
+        iy = indices(outputs, self.outputs, "output")
+        return replace(
+            self,
+            A=self.A[np.ix_(ix, ix)], B=self.B[np.ix_(ix, iu)], C=self.C[np.ix_(iy, ix)], D=self.D[np.ix_(iy, iu)],
+            states=tuple(self.states[i] for i in ix), inputs=tuple(self.inputs[i] for i in iu),
+            outputs=tuple(self.outputs[i] for i in iy),
+        )  # fmt: skip
+
+    def discretize(self, dt: float) -> LinearModel:
+        """Zero-order-hold equivalent at sample period `dt` (s); exact at the samples."""
+        if self.dt is not None:
+            raise InputError(f"the model is already discrete (dt = {self.dt} s)")
+        A, B, C, D, _ = cont2discrete((self.A, self.B, self.C, self.D), dt)
+        return replace(self, A=A, B=B, C=C, D=D, dt=dt)
+
+    def frequency_response(self, omega: object) -> np.ndarray:
+        """G(j omega) (n, ny, nu), complex, at `omega` (n,) in rad/s."""
+        omega = frozen(omega, "omega", (None,))
+        s = 1j * omega if self.dt is None else np.exp(1j * omega * self.dt)
+        pencil = s[:, None, None] * np.eye(len(self.states)) - self.A
+        return self.C @ np.linalg.solve(pencil, np.broadcast_to(self.B, (len(omega), *self.B.shape))) + self.D
+
+    def to_control(self) -> Any:
+        """A python-control `StateSpace` with the same names (dt = 0 where continuous)."""
+        import control
+
+        return control.ss(
+            self.A, self.B, self.C, self.D, self.dt or 0, states=[str(s) for s in self.states],
+            inputs=[str(s) for s in self.inputs], outputs=[str(s) for s in self.outputs],
+        )  # fmt: skip
+
+    @classmethod
+    def from_control(cls, system: Any) -> LinearModel:
+        """From a python-control `StateSpace`; its labels become the names, units are looked up by name."""
+        return cls(
+            system.A, system.B, system.C, system.D, signals(system.state_labels), signals(system.input_labels),
+            signals(system.output_labels), dt=float(system.dt) if system.dt else None,
+        )  # fmt: skip

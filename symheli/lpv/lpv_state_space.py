@@ -1,0 +1,176 @@
+"""A linear parameter-varying model whose every entry is a function of the scheduling parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.bases import Basis, Polynomial
+from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.signal import Signal, indices, signals
+from symheli.lpv.trim_schedule import TrimSchedule
+
+if TYPE_CHECKING:
+    from symheli.lpv.lft import LFT
+
+
+class Matrices(NamedTuple):
+    """A (..., nx, nx), B (..., nx, nu), C (..., ny, nx), D (..., ny, nu)."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LPVStateSpace:
+    """dx/dt = A(p) x + B(p) u, y = C(p) x + D(p) u (dt None), or x(k+1) = A(p(k)) x(k) + ... (dt in s).
+
+    A (n, nx, nx), B (n, nx, nu), C (n, ny, nx), D (n, ny, nu) are coefficients: A(p) = sum_j f_j(p) A_j with
+    the n functions f_j of `basis`. x and u are deviations from the schedule `trim` where there is one.
+    `residuals`, where the model was fitted to a family: fit minus family at its nodes, (K, ...) each.
+    """
+
+    basis: Basis
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    scheduling: Scheduling
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    dt: float | None = None
+    trim: TrimSchedule | None = None
+    residuals: Matrices | None = None
+
+    def __post_init__(self) -> None:
+        for group in ("states", "inputs", "outputs"):
+            object.__setattr__(self, group, signals(getattr(self, group)))
+        n, nx, nu, ny = self.basis.size, len(self.states), len(self.inputs), len(self.outputs)
+        for name, shape in (("A", (n, nx, nx)), ("B", (n, nx, nu)), ("C", (n, ny, nx)), ("D", (n, ny, nu))):
+            object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
+        slack = 1e-9 * (self.scheduling.high - self.scheduling.low)
+        if self.basis.low > self.scheduling.low + slack or self.basis.high < self.scheduling.high - slack:
+            raise InputError(
+                f"the basis covers [{self.basis.low}, {self.basis.high}] but scheduling {self.scheduling.name} "
+                f"ranges over [{self.scheduling.low}, {self.scheduling.high}]"
+            )
+        if self.dt is not None and not self.dt > 0:
+            raise InputError(f"dt must be a positive number of seconds or None, got {self.dt}")
+
+    @classmethod
+    def polynomial(
+        cls, A: Sequence[Any], B: Sequence[Any], C: Sequence[Any], D: Sequence[Any], scheduling: Scheduling,
+        dt: float | None = None, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> LPVStateSpace:  # fmt: skip
+        """From monomial coefficients: A(p) = A[0] + p A[1] + p^2 A[2] + ..., p in physical units.
+
+        The lists may differ in length; each entry is a matrix. Names default to x1.., u1.., y1...
+        """
+        shapes = {}
+        for name, matrices in (("A", A), ("B", B), ("C", C), ("D", D)):
+            if not len(matrices):
+                raise InputError(f"{name}: expected a list of at least one coefficient matrix [{name}0, {name}1, ...]")
+            stack = [frozen(m, f"{name}[{i}]", (None, None)) for i, m in enumerate(matrices)]
+            if len({m.shape for m in stack}) > 1:
+                raise InputError(f"{name}: coefficient matrices differ in shape: {', '.join(str(m.shape) for m in stack)}")
+            shapes[name] = np.stack(stack)
+        basis = Polynomial(max(len(m) for m in shapes.values()) - 1, scheduling.low, scheduling.high)
+        nx, nu, ny = shapes["A"].shape[1], shapes["B"].shape[2], shapes["C"].shape[1]
+        return cls(
+            basis, *(basis.from_monomial(shapes[name]) for name in "ABCD"), scheduling,
+            states=signals(states or [f"x{i + 1}" for i in range(nx)]), inputs=signals(inputs or [f"u{i + 1}" for i in range(nu)]),
+            outputs=signals(outputs or [f"y{i + 1}" for i in range(ny)]), dt=dt,
+        )  # fmt: skip
+
+    def matrices(self, p: object) -> Matrices:
+        """A, B, C, D at p; an axis of p comes first. Raises `InputError` outside the scheduling range."""
+        f = self.basis(self.scheduling.check(p))
+        return Matrices(*(np.tensordot(f, M, axes=1) for M in (self.A, self.B, self.C, self.D)))
+
+    def at(self, p: float) -> LinearModel:
+        """The model frozen at p."""
+        return LinearModel(*self.matrices(float(p)), self.states, self.inputs, self.outputs, dt=self.dt)
+
+    def with_scheduling(self, scheduling: Scheduling) -> LPVStateSpace:
+        """The same model over a narrower range or with another rate limit."""
+        return replace(self, scheduling=scheduling)
+
+    def with_rate(self, rate: float) -> LPVStateSpace:
+        """The same model with |dp/dt| <= rate."""
+        return replace(self, scheduling=self.scheduling.with_rate(rate))
+
+    def select(
+        self, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+    ) -> LPVStateSpace:
+        """Keep these states (rows and columns of the others are deleted), inputs and outputs, in this order."""
+        ix = indices(self.states if states is None else states, self.states, "state")
+        iu = indices(self.inputs if inputs is None else inputs, self.inputs, "input")
+        if outputs is None:
+            outputs = [y for y in self.outputs if y not in self.states or self.states.index(y) in ix]
+        iy = indices(outputs, self.outputs, "output")
+
+        def keep(A: Array, B: Array, C: Array, D: Array) -> Matrices:
+            return Matrices(A[:, ix][:, :, ix], B[:, ix][:, :, iu], C[:, iy][:, :, ix], D[:, iy][:, :, iu])
+
+        kept = keep(self.A, self.B, self.C, self.D)
+        return replace(
+            self, A=kept.A, B=kept.B, C=kept.C, D=kept.D,
+            states=tuple(self.states[i] for i in ix), inputs=tuple(self.inputs[i] for i in iu),
+            outputs=tuple(self.outputs[i] for i in iy), trim=self.trim and self.trim.select(ix, iu),
+            residuals=self.residuals and keep(*self.residuals),
+        )  # fmt: skip
+
+    def feedback(self, gains: Mapping[tuple[str, str], float]) -> LPVStateSpace:
+        """Close u_i = gain * y_j + (new u_i) for each {(input, output): gain}.
+
+        The outputs used must not depend on p or on u directly (C_j constant, D_j = 0): then every entry stays
+        in the basis. Raises `InputError` otherwise.
+        """
+        K = np.zeros((len(self.inputs), len(self.outputs)))
+        for (u, y), gain in gains.items():
+            K[indices([u], self.inputs, "input")[0], indices([y], self.outputs, "output")[0]] = float(gain)
+        used = np.flatnonzero(np.any(K, axis=0))
+        nodes = np.linspace(self.scheduling.low, self.scheduling.high, 4 * self.basis.size + 1)
+        C, D = self.matrices(nodes)[2:]
+        if np.ptp(C[:, used], axis=0).max(initial=0) > 1e-12 * (1 + np.abs(C).max()) or np.abs(D[:, used]).max(initial=0) > 0:
+            raise InputError("feedback needs outputs that are constant combinations of the states without feedthrough")
+        KC = K[:, used] @ C[0, used]
+        return replace(self, A=self.A + self.B @ KC, C=self.C + self.D @ KC, trim=None, residuals=None)
+
+    def discretize(self, dt: float, *, degree: int | None = None, nodes: int = 41) -> LPVStateSpace:
+        """Zero-order-hold equivalent at each of `nodes` frozen p, fitted element-wise by a polynomial of `degree`.
+
+        `degree` defaults to that of the basis (needed where the basis is no polynomial). The misfit at the nodes
+        is in `.residuals`: the exponential of a polynomial is no polynomial.
+        """
+        if self.dt is not None:
+            raise InputError(f"the model is already discrete (dt = {self.dt} s)")
+        if degree is None:
+            if not isinstance(self.basis, Polynomial):
+                raise InputError("give `degree`: the discrete entries are fitted by polynomials")
+            degree = self.basis.degree
+        low, high = self.scheduling.low, self.scheduling.high
+        # Chebyshev-Lobatto nodes: the fit stays close to the best one between them too
+        p = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(nodes) / (nodes - 1))
+        frozen_models = [self.at(value).discretize(dt) for value in p]
+        exact = Matrices(*(np.stack([getattr(m, name) for m in frozen_models]) for name in "ABCD"))
+        basis = Polynomial(degree, low, high)
+        fitted = Matrices(*(basis.fit(p, M) for M in exact))
+        misfit = Matrices(*(np.tensordot(basis(p), F, axes=1) - E for F, E in zip(fitted, exact, strict=True)))
+        return replace(self, basis=basis, A=fitted.A, B=fitted.B, C=fitted.C, D=fitted.D, dt=dt, residuals=misfit)
+
+    def to_lft(self) -> LFT:
+        """The equivalent linear fractional transformation (polynomial dependence only), not yet reduced."""
+        from symheli.lpv.lft import LFT
+
+        return LFT.from_polynomial(self)

@@ -1,0 +1,56 @@
+"""A signal is a name that knows its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from symheli.errors import InputError, UnknownNameError
+
+UNITS = {
+    **dict.fromkeys(("u", "v", "w", "airspeed", "airspeed_command", "u_w", "v_w", "w_w"), "m/s"),
+    **dict.fromkeys(("p", "q", "r"), "rad/s"),
+    **dict.fromkeys(("phi", "theta", "psi", "a1", "b1", "d_lon", "d_lat", "d_col", "d_ped"), "rad"),
+    **dict.fromkeys(("x_n", "x_e", "x_d"), "m"),
+    "Om": "rad/s",
+    "om_i": "rad",
+}
+"""Units of the signals every room knows (body axes x forward, y right, z down; SI and radians)."""
+
+
+class Signal(str):
+    """A signal name (it compares, hashes and prints as that string) with its `unit`.
+
+    Without `unit` the unit of a well-known name is used, "1" for any other name.
+    """
+
+    unit: str
+    __slots__ = ("unit",)
+
+    def __new__(cls, name: str, unit: str | None = None) -> Signal:
+        self = super().__new__(cls, name)
+        self.unit = unit or getattr(name, "unit", None) or UNITS.get(name, "1")
+        return self
+
+    def __getnewargs__(self) -> tuple[str, str]:
+        return str(self), self.unit
+
+
+def signals(names: Iterable[str], units: Mapping[str, str] | None = None) -> tuple[Signal, ...]:
+    """A tuple of `Signal`s; `units` overrides the known unit by name. Repeated names raise `InputError`."""
+    out = tuple(Signal(n, (units or {}).get(n)) for n in names)
+    if len(set(out)) != len(out):
+        twice = sorted({n for n in out if out.count(n) > 1})
+        raise InputError(f"signal names must differ; repeated: {', '.join(twice)}")
+    return out
+
+
+def indices(wanted: Iterable[str], known: Sequence[str], kind: str) -> list[int]:
+    """Position of each wanted name among the known ones; raises `UnknownNameError`."""
+    if isinstance(wanted, str):
+        wanted = (wanted,)
+    out = []
+    for name in wanted:
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+        out.append(list(known).index(name))
+    return out
