@@ -9,25 +9,47 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from symheli.flight import Excitation, Flight, fly
+    from symheli.airspeed_sweep import sweep
+    from symheli.equilibrium import TrimPoint, trim
+    from symheli.errors import ExcitationError, InputError, SymheliError, TrimError, UnknownNameError
+    from symheli.flight import AirspeedSchedule, Excitation, fly
     from symheli.helicopter import Helicopter
-    from symheli.linearize import linearize
+    from symheli.linearization import linearize
     from symheli.lpv import LFT, FlightRecord, LinearFamily, LinearModel, LPVStateSpace, Scheduling, Signal
-    from symheli.sweep import sweep
-    from symheli.trim import TrimPoint, trim
 
 _HOME = {
     "Helicopter": "symheli.helicopter",
-    "trim": "symheli.trim",
-    "TrimPoint": "symheli.trim",
-    "linearize": "symheli.linearize",
-    "sweep": "symheli.sweep",
-    **dict.fromkeys(("fly", "Flight", "Excitation"), "symheli.flight"),
+    "trim": "symheli.equilibrium",
+    "TrimPoint": "symheli.equilibrium",
+    "linearize": "symheli.linearization",
+    "sweep": "symheli.airspeed_sweep",
+    **dict.fromkeys(("fly", "AirspeedSchedule", "Excitation"), "symheli.flight"),
     **dict.fromkeys(("LFT", "FlightRecord", "LinearFamily", "LinearModel", "LPVStateSpace", "Scheduling", "Signal"), "symheli.lpv"),
     **dict.fromkeys(("SymheliError", "InputError", "UnknownNameError", "TrimError", "ExcitationError"), "symheli.errors"),
 }
 
-__all__ = sorted(_HOME)
+__all__ = [
+    "LFT",
+    "AirspeedSchedule",
+    "Excitation",
+    "ExcitationError",
+    "FlightRecord",
+    "Helicopter",
+    "InputError",
+    "LPVStateSpace",
+    "LinearFamily",
+    "LinearModel",
+    "Scheduling",
+    "Signal",
+    "SymheliError",
+    "TrimError",
+    "TrimPoint",
+    "UnknownNameError",
+    "fly",
+    "linearize",
+    "sweep",
+    "trim",
+]
 __version__ = "0.1.0"
 
 

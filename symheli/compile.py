@@ -1,0 +1,88 @@
+"""CasADi functions as machine code where a C compiler is there, kept by content; the virtual machine otherwise."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+import warnings
+from pathlib import Path
+
+import casadi
+
+from symheli.errors import CompilerWarning
+
+FLAGS = ("-O3", "-march=native", "-ffp-contract=off", "-fPIC", "-shared")
+"""Flags given to the compiler; contraction is off so that compiled and interpreted numbers agree to rounding."""
+
+
+def cache_directory() -> Path:
+    """Where compiled functions are kept: $SYMHELI_CACHE, else symheli in $XDG_CACHE_HOME or ~/.cache."""
+    given = os.environ.get("SYMHELI_CACHE")
+    return Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symheli"
+
+
+@functools.cache
+def compiler() -> str | None:
+    """Path of the C compiler ($CC, else cc, gcc or clang), None where there is none or SYMHELI_COMPILE=0."""
+    if os.environ.get("SYMHELI_COMPILE") == "0":
+        return None
+    for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
+        if name and (path := shutil.which(name)):
+            return path
+    return None
+
+
+@functools.cache
+def _warn_once(reason: str) -> None:
+    warnings.warn(
+        f"{reason}: the CasADi virtual machine is used, several times slower, with the same numbers", CompilerWarning, stacklevel=4
+    )
+
+
+def compiled(function: casadi.Function) -> casadi.Function:
+    """The same function as machine code, or unchanged (with one `CompilerWarning`) where that is not possible.
+
+    The library is kept in `cache_directory()` under a hash of its C code, compiler, flags and processor, and written
+    under a temporary name first: no half-written library is ever loaded.
+    """
+    cc = compiler()
+    if cc is None:
+        _warn_once(
+            "no C compiler is used (install gcc or clang, or set CC)" if os.environ.get("SYMHELI_COMPILE") != "0" else "SYMHELI_COMPILE=0"
+        )
+        return function
+    with tempfile.TemporaryDirectory(prefix="symheli-") as scratch:
+        generator = casadi.CodeGenerator("symheli_code.c")
+        generator.add(function)
+        source = generator.dump()
+        key = hashlib.sha256("\n".join((source, cc, *FLAGS, platform.processor(), platform.machine(), _cpu())).encode()).hexdigest()[:32]
+        library = cache_directory() / f"{function.name()}-{key}.so"
+        try:
+            if not library.is_file():
+                library.parent.mkdir(parents=True, exist_ok=True)
+                code, built = Path(scratch) / "code.c", Path(scratch) / "code.so"
+                code.write_text(source)
+                subprocess.run([cc, *FLAGS, str(code), "-o", str(built), "-lm"], check=True, capture_output=True, timeout=300)
+                with tempfile.NamedTemporaryFile(dir=library.parent, delete=False) as target:
+                    target.write(built.read_bytes())
+                os.replace(target.name, library)
+            return casadi.external(function.name(), str(library))
+        except (OSError, subprocess.SubprocessError, RuntimeError) as error:
+            detail = error.stderr.decode(errors="replace")[-300:] if isinstance(error, subprocess.CalledProcessError) else str(error)
+            _warn_once(f"compiling {function.name()} failed ({detail.strip()})")
+            return function
+
+
+@functools.cache
+def _cpu() -> str:
+    """Model and features of this processor: -march=native code must not travel to another one."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.platform()
+    return "\n".join(sorted({line for line in lines if line.startswith(("model name", "flags", "Features"))}))

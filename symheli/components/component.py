@@ -1,0 +1,67 @@
+"""What every part of the airframe answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+from symheli.lpv.signal import Signal
+
+
+class Motion(NamedTuple):
+    """Motion of the body through the air: velocity of the c.g. relative to the air u_a v_a w_a (m/s), body rates p q r
+    (rad/s), rotor speed Om relative to the body (rad/s), air density rho (kg/m^3)."""
+
+    u_a: Any
+    v_a: Any
+    w_a: Any
+    p: Any
+    q: Any
+    r: Any
+    Om: Any
+    rho: Any
+
+
+@dataclass
+class Flow:
+    """Flow quantities made by components evaluated earlier, by name, and the inflow solver of the rotors.
+
+    `inflow(c0, c1, ct_max, mu2, mu_z, efficiency)` returns lam0 (see `symheli.inflow.solve`).
+    """
+
+    inflow: Callable[..., Any]
+    values: dict[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.values[name]
+
+
+@dataclass
+class Effect:
+    """What a part does: force X Y Z (N) and moment L M N (N m) about the c.g. in body axes, the derivatives of its own
+    states, the torque it takes from the main shaft (N m, referred to the main rotor), the flow it makes, and switching
+    functions whose sign changes mark a corner of the model."""
+
+    force: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
+    moment: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
+    rates: Mapping[str, Any] = field(default_factory=dict)
+    shaft_torque: Any = 0.0
+    flow: Mapping[str, Any] = field(default_factory=dict)
+    switches: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Component:
+    """A part of the airframe: a pure function and what it must be given.
+
+    `parameters` {name: unit} come from the vehicle file; `states` are its own; it may use the flow in `needs` and makes
+    the flow in `makes`. `evaluate(parameters, motion, controls, own, flow)` returns an `Effect`.
+    """
+
+    evaluate: Callable[[SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect]
+    parameters: Mapping[str, str]
+    states: tuple[Signal, ...] = ()
+    needs: tuple[str, ...] = ()
+    makes: tuple[str, ...] = ()

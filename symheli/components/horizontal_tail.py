@@ -1,0 +1,31 @@
+"""Horizontal tail in the main-rotor wake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.symbolic import absolute, clip
+
+
+def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
+    """Lift Z_ht = -0.5 rho S_ht (C_La |u_a| w_ht + |w_ht| w_ht), limited to 0.5 rho S_ht (u_a^2 + w_ht^2); M_ht = Z_ht l_ht.
+
+        w_ht = w_a + l_ht q - K_lam V_imr
+
+    Source: G15, horizontal tail; the sign is the stabilising one, the printed + contradicts the text.
+    """
+    w = motion.w_a + par.arm * motion.q - flow["w_wake"]
+    scale = 0.5 * motion.rho * par.area
+    free, limit = -scale * (par.lift_slope * absolute(motion.u_a) + absolute(w)) * w, scale * (motion.u_a**2 + w**2)
+    lift = clip(free, -limit, limit, par.smoothing)
+    return Effect(
+        force=(0.0, 0.0, lift),
+        moment=(0.0, lift * par.arm, 0.0),
+        switches={"horizontal tail stalls": limit - absolute(free), "horizontal tail flow": w},
+    )
+
+
+COMPONENT = Component(evaluate, parameters={"area": "m^2", "lift_slope": "1/rad", "arm": "m"}, needs=("w_wake",))

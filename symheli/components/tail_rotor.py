@@ -1,0 +1,64 @@
+"""Tail rotor, geared to the main shaft, in the main-rotor wake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+from types import SimpleNamespace
+from typing import Any
+
+from symheli import inflow
+from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.rotor import Disc, profile_torque_coefficient
+from symheli.symbolic import absolute, sqrt
+
+
+def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
+    """Side force Y_tr = -f_t rho (Om_tr R_tr)^2 pi R_tr^2 C_T(d_ped, mu_tr, mu_z_tr), its moments, shaft torque and wash `V_itr`.
+
+        v_tr = v_a - l_tr r + h_tr p,  w_tr = w_a + l_tr q - K_lam V_imr,  f_t = 1 - (3/4) S_vf/(pi R_tr^2)
+
+    Source: G15, tail rotor, with the full inflow solution in place of its linearization about a trim
+    pitch. `d_ped` is the total blade pitch (rad).
+    """
+    disc = Disc(par.radius, par.chord, 2, par.gear_ratio * motion.Om, motion.rho)
+    v_tr = motion.v_a - par.arm * motion.r + par.height * motion.p
+    w_tr = motion.w_a + par.arm * motion.q - flow["w_wake"]
+    mu2 = (motion.u_a**2 + w_tr**2) / disc.tip_speed**2
+    mu_z = v_tr / disc.tip_speed
+    blockage = 1 - 0.75 * par.fin_area / (pi * par.radius**2)
+
+    c0, c1 = inflow.thrust_line(controls["d_ped"], mu2, mu_z, par.lift_slope, disc.solidity)
+    lam0 = flow.inflow(c0, c1, par.ct_max, mu2, mu_z, par.inflow_efficiency)
+    ct = inflow.thrust_coefficient(lam0, c0, c1, par.ct_max)
+    side = -blockage * disc.force_scale * ct
+    torque = (ct * (lam0 - mu_z) + profile_torque_coefficient(mu2, par.profile_drag, disc.solidity)) * disc.force_scale * par.radius
+    return Effect(
+        force=(0.0, side, 0.0),
+        moment=(side * par.height, 0.0, -side * par.arm),
+        shaft_torque=par.gear_ratio * torque,
+        flow={"V_itr": lam0 * disc.tip_speed, "Y_tr": side, "Q_tr": torque},
+        switches={
+            "tail rotor stall": par.ct_max - absolute(c0 - c1 * lam0),
+            "tail rotor vortex_ring": inflow.vortex_ring(sqrt(absolute(ct) / (2 * par.inflow_efficiency) + 1e-20), mu2, mu_z),
+        },
+    )
+
+
+COMPONENT = Component(
+    evaluate,
+    parameters={
+        "radius": "m",
+        "chord": "m",
+        "lift_slope": "1/rad",
+        "profile_drag": "1",
+        "ct_max": "1",
+        "gear_ratio": "1",
+        "arm": "m",
+        "height": "m",
+        "fin_area": "m^2",
+        "inflow_efficiency": "1",
+    },
+    needs=("w_wake",),
+    makes=("V_itr", "Y_tr", "Q_tr"),
+)

@@ -1,0 +1,38 @@
+"""Main-rotor wake over the tail."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.symbolic import clip, maximum, where
+
+
+def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
+    """Downwash at the tail `w_wake` = K_lam V_imr (m/s).
+
+        g_i = (l_tr - R_mr - R_tr)/h_tr, g_f = (l_tr - R_mr + R_tr)/h_tr, chi = u_a/(V_imr - w_a)
+        K_lam = 0 where V_imr <= w_a or chi <= g_i, 1.5 where chi >= g_f, else 1.5 (chi - g_i)/(g_f - g_i)
+
+    Source: G15, wake intensity factor. `smoothing` rounds both corners (in units of K_lam).
+    """
+    g_i = (par.tail_arm - par.rotor_radius - par.tail_radius) / par.tail_height
+    g_f = (par.tail_arm - par.rotor_radius + par.tail_radius) / par.tail_height
+    down = motion.w_a - flow["V_imr"]
+    chi = motion.u_a / maximum(-down, 1e-3)  # guarded: where the flow goes up through the disc the wake is above the tail
+    share = clip(1.5 * (chi - g_i) / (g_f - g_i), 0.0, 1.5, par.smoothing)
+    k_lam = where(down < 0, share, 0.0)
+    return Effect(
+        flow={"w_wake": k_lam * flow["V_imr"], "K_lam": k_lam},
+        switches={"wake reaches the tail": chi - g_i, "tail fully in the wake": chi - g_f},
+    )
+
+
+COMPONENT = Component(
+    evaluate,
+    parameters={"rotor_radius": "m", "tail_radius": "m", "tail_arm": "m", "tail_height": "m"},
+    needs=("V_imr",),
+    makes=("w_wake", "K_lam"),
+)

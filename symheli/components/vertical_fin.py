@@ -1,0 +1,39 @@
+"""Vertical fin in the flow of main and tail rotor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.symbolic import absolute, clip, sqrt
+
+
+def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
+    """Side force Y_vf = -0.5 rho S_vf (C_La V_inf_tr + |v_vf|) v_vf, limited to 0.5 rho S_vf (V_inf_tr^2 + v_vf^2).
+
+        v_vf = v_a - eps_vf V_itr - l_tr r,  w_tr = w_a + l_tr q - K_lam V_imr,  V_inf_tr = sqrt(u_a^2 + w_tr^2)
+        N_vf = -Y_vf l_tr,  L_vf = Y_vf h_tr
+
+    Source: G15, vertical fin.
+    """
+    w_tr = motion.w_a + par.arm * motion.q - flow["w_wake"]
+    speed2 = motion.u_a**2 + w_tr**2
+    speed = sqrt(speed2 + 1e-12)
+    v = motion.v_a - par.tail_rotor_wash * flow["V_itr"] - par.arm * motion.r
+    scale = 0.5 * motion.rho * par.area
+    free, limit = -scale * (par.lift_slope * speed + absolute(v)) * v, scale * (speed2 + v**2)
+    side = clip(free, -limit, limit, par.smoothing)
+    return Effect(
+        force=(0.0, side, 0.0),
+        moment=(side * par.height, 0.0, -side * par.arm),
+        switches={"fin stalls": limit - absolute(free), "fin side flow": v},
+    )
+
+
+COMPONENT = Component(
+    evaluate,
+    parameters={"area": "m^2", "lift_slope": "1/rad", "tail_rotor_wash": "1", "arm": "m", "height": "m"},
+    needs=("w_wake", "V_itr"),
+)

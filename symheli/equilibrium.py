@@ -1,0 +1,216 @@
+"""Equilibria: the attitude, flapping and controls that hold a steady flight condition."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import root
+
+from symheli.errors import InputError, TrimError
+from symheli.helicopter import Helicopter
+from symheli.lpv.named_vector import NamedVector
+from symheli.lpv.operating_point import OperatingPoint
+from symheli.lpv.signal import Signal
+
+TOLERANCE = 1e-9
+"""Largest residual of any equation at a trim, in its SI unit."""
+
+
+@dataclass(frozen=True)
+class FlightCondition:
+    """What is asked of a trim.
+
+    airspeed (m/s), climb_rate (m/s, up), turn_rate (rad/s, to the right), sideslip (rad, of the horizontal airspeed, from
+    the right), wind (north, east, down as seen by a nose pointing north, m/s), acceleration (m/s^2, horizontal, along the nose's
+    heading: a quasi-steady point of an accelerating flight, 0 for an equilibrium).
+    """
+
+    airspeed: float
+    climb_rate: float = 0.0
+    turn_rate: float = 0.0
+    sideslip: float = 0.0
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    acceleration: float = 0.0
+
+    def __post_init__(self) -> None:
+        values = [self.airspeed, self.climb_rate, self.turn_rate, self.sideslip, self.acceleration, *self.wind]
+        if not all(math.isfinite(v) for v in values):
+            raise InputError(f"a flight condition needs finite numbers, got {self}")
+        if self.airspeed < 0:
+            raise InputError(f"airspeed must be >= 0 m/s, got {self.airspeed}; rearward flight is sideslip = pi")
+        if abs(self.climb_rate) > self.airspeed:
+            raise InputError(f"|climb_rate| = {abs(self.climb_rate)} m/s exceeds the airspeed of {self.airspeed} m/s")
+        if self.turn_rate and any(self.wind):
+            raise InputError("a turn in wind is not steady; trim it in still air")
+
+    @property
+    def air_velocity(self) -> np.ndarray:
+        """Velocity through the air, forward right down with respect to the heading (3,), m/s."""
+        level = math.sqrt(max(self.airspeed**2 - self.climb_rate**2, 0.0))
+        return np.array([level * math.cos(self.sideslip), level * math.sin(self.sideslip), -self.climb_rate])
+
+
+@dataclass(frozen=True)
+class TrimPoint(OperatingPoint):
+    """An operating point with the flight condition it answers and how well.
+
+    residual: of every equation by state name, in the unit of its derivative. on_stops: inputs at or beyond their travel.
+    vortex_ring: momentum theory promises no accuracy here. wind: body axes, m/s.
+    """
+
+    condition: FlightCondition
+    residual: NamedVector
+    wind: NamedVector
+    on_stops: tuple[str, ...]
+    vortex_ring: bool
+
+    @property
+    def success(self) -> bool:
+        """Every residual, recomputed, below `TOLERANCE`."""
+        return bool(np.all(np.abs(self.residual.array) < TOLERANCE))
+
+    def __str__(self) -> str:
+        worst = max(zip(np.abs(self.residual.array), self.residual.signals, strict=True))
+        notes = [f"{'/'.join(self.on_stops)} on the stop"] if self.on_stops else []
+        notes += ["vortex ring: no accuracy promised"] if self.vortex_ring else []
+        status = "trimmed" if self.success else "NOT trimmed"
+        return f"{status} at {self.airspeed:g} m/s (largest residual {worst[0]:.1e} in d{worst[1]}/dt){'; ' if notes else ''}{'; '.join(notes)}"
+
+
+def trim(
+    heli: Helicopter, airspeed: float, *, climb_rate: float = 0.0, turn_rate: float = 0.0, sideslip: float = 0.0,
+    wind: Sequence[float] = (0.0, 0.0, 0.0), acceleration: float = 0.0, start: TrimPoint | None = None, throw: bool = True,
+) -> TrimPoint:  # fmt: skip
+    """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.
+
+    Newton's method (MINPACK hybrj) with the exact Jacobian from `start` or a hover guess; where that fails, by continuation from
+    hover. Success is judged on the recomputed residual of every equation. Raises `TrimError` carrying the best point;
+    with throw=False that point is returned instead.
+    """
+    condition = FlightCondition(
+        float(airspeed), float(climb_rate), float(turn_rate), float(sideslip),
+        (float(wind[0]), float(wind[1]), float(wind[2])), float(acceleration),
+    )  # fmt: skip
+    problem = _Problem(heli, condition)
+    best = problem.solve(problem.guess() if start is None else problem.unknowns_of(start))
+    if not best.success:
+        best = min((best, _continue_from_hover(heli, condition)), key=lambda point: float(np.abs(point.residual.array).max()))
+    if throw and not best.success:
+        table = ", ".join(f"d{s}/dt {r:.2e}" for s, r in zip(best.residual.signals, best.residual.array, strict=True))
+        stops = f"; on the stop: {', '.join(best.on_stops)}" if best.on_stops else ""
+        raise TrimError(
+            f"no trim at {condition}: residuals {table}{stops}. Try a nearer condition as `start`, or throw=False for the best point", best
+        )
+    return best
+
+
+def _continue_from_hover(heli: Helicopter, condition: FlightCondition, steps: int = 12) -> TrimPoint:
+    point: TrimPoint | None = None
+    for share in np.linspace(0.0, 1.0, steps + 1):
+        stage = FlightCondition(
+            share * condition.airspeed, share * condition.climb_rate, share * condition.turn_rate, condition.sideslip,
+            (share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]), share * condition.acceleration,
+        )  # fmt: skip
+        problem = _Problem(heli, stage)
+        point = problem.solve(problem.guess() if point is None else problem.unknowns_of(point))
+    assert point is not None  # noqa: S101
+    return point
+
+
+class _Problem:
+    """Unknowns phi theta a1 b1 (om_i) and the four inputs against the equations of motion."""
+
+    def __init__(self, heli: Helicopter, condition: FlightCondition):
+        self.heli, self.condition = heli, condition
+        self.own = [s for s in heli.states[8:] if s != "Om"]
+        self.equations = [i for i, s in enumerate(heli.states) if s not in ("phi", "theta", "om_i")]
+        self.free = [heli.states.index(Signal(s)) for s in ("phi", "theta", *self.own)]
+
+    def guess(self) -> np.ndarray:
+        mass = self.heli.vehicle.sections["body"]["mass"].value
+        start = dict.fromkeys(self.own, 0.0)
+        if "om_i" in start:
+            drivetrain = self.heli.vehicle.values("drivetrain")
+            # throttle that holds about 130 W/kg of rotor and profile power, typical of a small helicopter in hover
+            start["om_i"] = min(130.0 * mass / drivetrain["max_power"], 0.9) / drivetrain["governor_ki"]
+        return np.array([0.07, 0.0, *start.values(), 0.0, 0.0, 0.1, 0.25])
+
+    def unknowns_of(self, point: TrimPoint) -> np.ndarray:
+        return np.concatenate([point.x.array[self.free], point.u.array])
+
+    def state(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Full state, input, and wind in body axes."""
+        phi, theta = z[0], z[1]
+        x = np.zeros(len(self.heli.states))
+        x[self.free] = z[: len(self.free)]
+        if "Om" in self.heli.states:
+            x[self.heli.states.index(Signal("Om"))] = self.heli.nominal_speed
+        R = _heading_to_body(phi, theta)
+        wind = R @ np.array(self.condition.wind)
+        x[:3] = R @ self.condition.air_velocity + wind
+        x[3:6] = R @ np.array([0.0, 0.0, self.condition.turn_rate])
+        return x, z[len(self.free) :], wind
+
+    def residual(self, z: np.ndarray) -> np.ndarray:
+        x, u, wind = self.state(z)
+        xdot = np.array(self.heli.compiled("rhs")(x, u, wind)).ravel()
+        xdot[:3] -= _heading_to_body(z[0], z[1]) @ np.array([self.condition.acceleration, 0.0, 0.0])
+        return xdot
+
+    def jacobian(self, z: np.ndarray) -> np.ndarray:
+        x, u, wind = self.state(z)
+        A, B, E = (np.array(m) for m in self.heli.compiled("jacobian")(x, u, wind))
+        air, climb = self.condition.air_velocity, np.array([0.0, 0.0, self.condition.turn_rate])
+        push = np.array([self.condition.acceleration, 0.0, 0.0])
+        columns = []
+        for position, index in enumerate(self.free):
+            dx = np.zeros(len(x))
+            dx[index] = 1.0
+            change = np.zeros(len(x))
+            if position < 2:
+                dR = _heading_to_body(z[0], z[1], derivative=position)
+                dwind = dR @ np.array(self.condition.wind)
+                dx[:3], dx[3:6] = dR @ air + dwind, dR @ climb
+                change = E @ dwind
+                change[:3] -= dR @ push
+            columns.append(A @ dx + change)
+        return np.column_stack([*columns, B])[self.equations]
+
+    def solve(self, start: np.ndarray) -> TrimPoint:
+        found = root(lambda z: self.residual(z)[self.equations], start, jac=self.jacobian, method="hybr", options={"xtol": 1e-14})
+        z = found.x
+        for _ in range(3):  # polish: plain Newton from a nearby point
+            J = self.jacobian(z)
+            if not np.all(np.isfinite(J)) or np.linalg.cond(J) > 1e14:
+                break
+            better = z - np.linalg.solve(J, self.residual(z)[self.equations])
+            if np.abs(self.residual(better)).max() >= np.abs(self.residual(z)).max():
+                break
+            z = better
+        return self.point(z)
+
+    def point(self, z: np.ndarray) -> TrimPoint:
+        heli = self.heli
+        x, u, wind = self.state(z)
+        xdot = np.array(heli.compiled("rhs")(x, u, wind)).ravel()
+        switches = heli.switches(x, u, wind)
+        return TrimPoint(
+            NamedVector(heli.states, x), NamedVector(heli.inputs, u), NamedVector(heli.states, xdot), self.condition.airspeed,
+            condition=self.condition, residual=NamedVector(heli.states, self.residual(z)), wind=NamedVector(heli.wind, wind),
+            on_stops=tuple(str(s) for s, value, limit in zip(heli.inputs, u, heli.travel, strict=True) if abs(value) >= limit),
+            vortex_ring=any(value > 0 for name, value in switches.items() if name.endswith("vortex ring")),
+        )  # fmt: skip
+
+
+def _heading_to_body(phi: float, theta: float, derivative: int | None = None) -> np.ndarray:
+    """Rotation (3, 3) from forward-right-down axes of the heading to body axes; derivative 0: by phi, 1: by theta."""
+    cp, sp, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
+    roll, pitch = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]]), np.array([[ct, 0, -st], [0, 1, 0], [st, 0, ct]])
+    if derivative == 0:
+        roll = np.array([[0, 0, 0], [0, -sp, cp], [0, -cp, -sp]])
+    elif derivative == 1:
+        pitch = np.array([[-st, 0, -ct], [0, 0, 0], [ct, 0, -st]])
+    return roll @ pitch

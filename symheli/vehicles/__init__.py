@@ -1,0 +1,1 @@
+"""Airframes, one TOML file each."""
