@@ -1,0 +1,37 @@
+"""Flight records in, LPV models out: recursive, batch and instrumental-variable estimates of input-output models with moving coefficients.
+
+    arx = LPVARX(outputs=("q", "theta"), inputs=("d_lon",), scheduling="airspeed", na=2, nb=1, delay=1, basis=Polynomial(2, 0.0, 13.0))
+    model = fit(arx, record, method="ls")
+    model.score(record, horizon=1), model.score(record, horizon=50), model.score(record)  # one step flatters: report all three
+
+Units are those of the record: SI and radians.
+"""
+
+from identification.coefficients import Coefficients, CoefficientValues
+from identification.estimate import fit
+from identification.excitation import ExcitationReport, excitation_report
+from identification.history import History
+from identification.instrumental_variables import Instruments
+from identification.model import LPVARXModel
+from identification.prediction import fit_percent
+from identification.recursive_least_squares import RecursiveLeastSquares, RLSInfo, RLSState
+from identification.structure import LPVARX, Term
+from symheli.lpv import Polynomial
+
+__all__ = [
+    "LPVARX",
+    "CoefficientValues",
+    "Coefficients",
+    "ExcitationReport",
+    "History",
+    "Instruments",
+    "LPVARXModel",
+    "Polynomial",
+    "RLSInfo",
+    "RLSState",
+    "RecursiveLeastSquares",
+    "Term",
+    "excitation_report",
+    "fit",
+    "fit_percent",
+]

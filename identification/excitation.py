@@ -1,0 +1,140 @@
+"""Whether a record can determine a structure: rank, spectrum, and what is missing in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.regressors import Regression, as_records, stacked
+from identification.structure import LPVARX
+from symheli.errors import ExcitationError
+from symheli.lpv import FlightRecord
+from symheli.lpv.arrays import Array
+
+RANK_TOLERANCE = 1e-11
+"""A direction with a singular value below this fraction of the largest is lost to rounding (columns scaled to length 1)."""
+
+DISTINCT_TOLERANCE = 1e-6
+"""Two scheduling values closer than this fraction of the range count as one."""
+
+BINS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationReport:
+    """How well the scheduled regressors of a record determine the coefficients of a structure.
+
+    `singular_values` (n,) of the regressor matrix with columns scaled to length 1, largest first; `condition` their
+    ratio; `rank` how many exceed 1e-11 of the largest; `distinct` scheduling values found against `needed`;
+    `occupancy` samples in each of the bins with `edges` (unit of p) over the range of the basis; `weakest` the
+    direction (n,) the data determine worst, in scaled regressors. `reason` is empty where the data suffice.
+    """
+
+    names: tuple[str, ...]
+    samples: int
+    rank: int
+    singular_values: Array
+    condition: float
+    distinct: int
+    needed: int
+    edges: Array
+    occupancy: Array
+    weakest: Array
+    scheduling: str
+    reason: str
+
+    @property
+    def sufficient(self) -> bool:
+        """Whether every coefficient is determined."""
+        return not self.reason
+
+    @property
+    def worst_direction(self) -> str:
+        """The combination of scaled regressors the data determine worst, its largest parts first."""
+        return direction_in_words(self.weakest, self.names)
+
+    def require(self) -> None:
+        """Raises `ExcitationError` with the reason unless the data suffice."""
+        if self.reason:
+            raise ExcitationError(self.reason, self)
+
+    def __str__(self) -> str:
+        full = max(int(self.occupancy.max(initial=0)), 1)
+        bars = [
+            f"  {a:9.3g} .. {b:<9.3g} {int(n):7d} {'#' * round(40 * int(n) / full)}"
+            for a, b, n in zip(self.edges[:-1], self.edges[1:], self.occupancy, strict=True)
+        ]
+        return "\n".join(
+            [
+                f"excitation: {'sufficient' if self.sufficient else 'NOT sufficient: ' + self.reason}",
+                f"  regressors {len(self.names)}, samples {self.samples}, rank {self.rank}, scaled condition {self.condition:.3g}",
+                f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}",
+                f"  worst determined: {self.worst_direction}",
+                f"  samples over {self.scheduling}:",
+                *bars,
+            ]
+        )
+
+
+def excitation_report(arx: LPVARX, records: FlightRecord | Iterable[FlightRecord]) -> ExcitationReport:
+    """Can these records determine this structure? A value with the answer; nothing is raised for poor data."""
+    return excitation_of(arx, stacked(arx, as_records(records)))
+
+
+def excitation_of(arx: LPVARX, data: Regression) -> ExcitationReport:
+    """The same for regressors already built."""
+    names, n = arx.regressor_names, arx.n_regressors
+    values, directions = spectrum(data.phi)
+    rank = int(np.sum(values > RANK_TOLERANCE * max(values[0], 1e-300)))
+    distinct, needed = distinct_values(data.p, arx.basis.high - arx.basis.low), arx.basis.distinct_values
+    occupancy, edges = np.histogram(data.p, bins=BINS, range=(arx.basis.low, arx.basis.high))
+    weakest = directions[-1]
+    reason = ""
+    if len(data.phi) < n:
+        reason = (
+            f"{len(data.phi)} usable samples cannot determine {n} coefficients an output; "
+            f"record longer, or lower na, nb or the size of the basis ({data.dropped} samples had no complete regressor)"
+        )
+    elif distinct < needed:
+        reason = (
+            f"{arx.scheduling} takes {distinct} distinct values and {arx.basis} needs {needed}; "
+            f"let {arx.scheduling} visit more values, or choose a smaller basis (a polynomial of degree {distinct - 1} at most)"
+        )
+    elif rank < n:
+        reason = (
+            f"the regressors have rank {rank} of {n}: the data do not determine {direction_in_words(weakest, names)}; "
+            f"excite the inputs more richly while {arx.scheduling} moves, or lower na, nb or the size of the basis"
+        )
+    return ExcitationReport(
+        names, len(data.phi), rank, values, values[0] / values[-1] if values[-1] > 0 else np.inf, distinct, needed,
+        edges, occupancy, weakest, arx.scheduling, reason,
+    )  # fmt: skip
+
+
+def column_scale(matrix: Array) -> Array:
+    """Length of each column, 1 where it is zero."""
+    scale = np.linalg.norm(matrix, axis=0)
+    return np.where(scale > 0, scale, 1.0)
+
+
+def spectrum(phi: Array) -> tuple[Array, Array]:
+    """Singular values (n,), padded with zeros, and right singular vectors (n, n) of `phi` with columns of length 1."""
+    n = phi.shape[1]
+    R = np.linalg.qr(phi / column_scale(phi), mode="r") if len(phi) else np.zeros((0, n))
+    _, values, directions = np.linalg.svd(R, full_matrices=True)
+    return np.pad(values, (0, n - len(values))), directions
+
+
+def distinct_values(p: Array, width: float) -> int:
+    """Number of scheduling values further apart than rounding, `width` the range of the basis."""
+    return 0 if len(p) == 0 else 1 + int(np.sum(np.diff(np.sort(p)) > DISTINCT_TOLERANCE * width))
+
+
+def direction_in_words(direction: Array, names: tuple[str, ...], parts: int = 3) -> str:
+    """Its largest entries, such as "0.71 u(k-1) f0(p(k-1)) - 0.70 u(k-2) f0(p(k-2))"."""
+    largest = [i for i in np.argsort(-np.abs(direction), kind="stable")[:parts] if abs(direction[i]) > 0.05]
+    sign = np.sign(direction[largest[0]])
+    text = " ".join(f"{'+' if sign * direction[i] >= 0 else '-'} {abs(direction[i]):.2f} {names[i]}" for i in largest)
+    return text.removeprefix("+ ") + (" + ..." if np.sum(np.abs(direction) > 0.05) > parts else "")

@@ -1,0 +1,103 @@
+"""Instrumental variables: closed-loop noise does not reach the external excitation, so that decides what to believe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.excitation import RANK_TOLERANCE, column_scale, direction_in_words, spectrum
+from identification.least_squares import least_squares
+from identification.regressors import Regression, basis_values, regressor_rows
+from identification.structure import LPVARX
+from symheli.errors import ExcitationError, InputError
+from symheli.lpv import FlightRecord
+from symheli.lpv.arrays import Array
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """External excitation `signals`, over the last `window` s at no more than `lags` lags each."""
+
+    signals: tuple[str, ...]
+    window: float = 1.0
+    lags: int = 24
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "signals", (self.signals,) if isinstance(self.signals, str) else tuple(self.signals))
+        if not self.signals:
+            raise InputError('method="iv" needs instruments=("name", ...): the external excitation added to the stabilised inputs')
+        if not (np.isfinite(self.window) and self.window > 0) or self.lags < 1:
+            raise InputError(f"instruments need a window > 0 s and at least one lag, got {self.window} s and {self.lags}")
+
+    @classmethod
+    def of(cls, value: Sequence[str] | Instruments) -> Instruments:
+        """Names, or the options themselves."""
+        return value if isinstance(value, Instruments) else cls(value)  # type: ignore[arg-type]
+
+    def at(self, dt: float, first: int) -> tuple[int, ...]:
+        """The lags in samples, from `first` (the delay of the inputs) on, evenly over the window."""
+        last = max(first + 1, round(self.window / dt))
+        return tuple(int(i) for i in np.unique(np.round(np.linspace(first, last, min(self.lags, last - first + 1)))))
+
+
+def instrumental_variables(arx: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Instruments) -> Array:
+    """theta (n, ny) by two-stage least squares with more instruments than unknowns.
+
+    Each instrument is an excitation signal r(k-l) times f(p); offsets, and the increment of p, instrument themselves (p is taken as free
+    of the noise). Stage one projects the regressors on the instruments (QR), stage two is least squares with what is left of
+    them. Consistent whatever colours the noise, provided it is independent of r and p.
+
+    Raises `ExcitationError` where the instruments do not determine every coefficient.
+    Source: Soderstrom and Stoica (1989), System Identification, ch. 8; Ljung (1999), sec. 15.3.
+    """
+    W = np.vstack([_instrument_rows(arx, record, instruments) for record in records])[data.rows]
+    known = np.isfinite(W).all(axis=1)
+    W, phi, y = W[known], data.phi[known], data.y[known]
+    n = phi.shape[1]
+    if W.shape[1] < n or len(W) < W.shape[1]:
+        raise ExcitationError(
+            f"{W.shape[1]} instruments on {len(W)} samples cannot determine {n} coefficients an output: there must be at least as many "
+            f"instruments as coefficients and more samples than both; name more signals, or change the window or lags of Instruments"
+        )
+    scale = column_scale(phi)
+    Q = _range(W)
+    first_stage = Q.T @ (phi / scale)
+    values, directions = spectrum(first_stage)
+    if values[-1] <= RANK_TOLERANCE * values[0]:
+        missing = direction_in_words(directions[-1], arx.regressor_names)
+        raise ExcitationError(
+            f"the instruments {', '.join(instruments.signals)} leave undetermined: {missing}; "
+            f"excite more inputs, name more instruments or widen their window"
+        )
+    return least_squares(first_stage, Q.T @ y) / scale[:, None]
+
+
+def _instrument_rows(arx: LPVARX, record: FlightRecord, instruments: Instruments) -> Array:
+    """Instruments (n, m) of every sample of a record, NaN where one is missing."""
+    r, p = record.columns(instruments.signals), record[arx.scheduling]
+    f, y, u = basis_values(arx, p), record.columns(arx.outputs), record.columns(arx.inputs)
+    at_lag = arx.scheduling_at == "lag"
+    n, parts = len(record), []
+    for lag in instruments.at(record.dt, arx.delay):
+        block = np.full((n, r.shape[1] * f.shape[1]), np.nan)
+        for part in record.segments():
+            here, then = slice(min(part.start + lag, part.stop), part.stop), slice(part.start, max(part.stop - lag, part.start))
+            functions = f[then] if at_lag else f[here]
+            block[here] = (r[then][:, :, None] * functions[:, None, :]).reshape(len(functions), -1)
+        parts.append(block)
+    offsets = np.full((n, (arx.offset + arx.offset_rate) * f.shape[1]), np.nan)
+    for part in record.segments():
+        if part.stop - part.start > arx.memory:
+            offsets[part.start + arx.memory : part.stop] = regressor_rows(
+                arx, y[part], u[part], p[part], f[part], kinds=("offset", "increment")
+            )
+    return np.hstack([*parts, offsets])
+
+
+def _range(W: Array) -> Array:
+    """Orthonormal basis of the columns of W, dependent ones dropped."""
+    Q, R = np.linalg.qr(W / column_scale(W))
+    U, values, _ = np.linalg.svd(R)
+    return Q @ U[:, values > RANK_TOLERANCE * values[0]]

@@ -1,0 +1,57 @@
+"""Systems with known coefficients, simulated by a loop that shares no code with the estimators."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification import LPVARX, Coefficients, Polynomial
+from symheli.lpv import FlightRecord
+
+
+def flown(arx, A, B, p, u, *, c=None, d=None, noise=0.0, seed=0, dt=0.1):
+    """A record of y(k) = -sum A_i(p) y(k-i) + sum B_j(p) u(k-delay-j) + c(p) + d(p)(p(k)-p(k-1)) + noise, from callables of p."""
+    rng = np.random.default_rng(seed)
+    n, ny = len(p), arx.ny
+    y = np.zeros((n, ny))
+    y[: arx.memory] = rng.normal(size=(arx.memory, ny))
+    for k in range(arx.memory, n):
+        at = (lambda lag, k=k: p[k - lag]) if arx.scheduling_at == "lag" else (lambda lag, k=k: p[k])
+        y[k] = -sum((A[i - 1](at(i)) @ y[k - i] for i in arx.output_lags), np.zeros(ny))
+        y[k] += sum((B[j](at(lag)) @ u[k - lag] for j, lag in enumerate(arx.input_lags)), np.zeros(ny))
+        y[k] += c(at(1)) if c else 0.0
+        y[k] += d(at(1)) * (p[k] - p[k - 1]) if d else 0.0
+        y[k] += noise * rng.normal(size=ny)
+    columns = dict(zip((*arx.outputs, *arx.inputs, arx.scheduling), np.column_stack([y, u, p]).T, strict=True))
+    return FlightRecord.from_arrays(dt * np.arange(n), dict.fromkeys(columns, "1"), **columns)
+
+
+class Truth:
+    """A structure with random coefficients small enough to be stable, and records of it."""
+
+    def __init__(self, arx, seed=0, size=0.45):
+        self.arx, rng = arx, np.random.default_rng(seed)
+        n, ny, nu = arx.basis.size, arx.ny, arx.nu
+        A = rng.uniform(-1, 1, (arx.na, n, ny, ny)) * size / max(arx.na * ny, 1) / n
+        B = rng.uniform(-1, 1, (len(arx.input_lags), n, ny, nu))
+        c = rng.uniform(-1, 1, (n, ny)) * arx.offset
+        d = rng.uniform(-1, 1, (n, ny)) * arx.offset_rate
+        self.coefficients = Coefficients(arx.basis, tuple(arx.input_lags), A, B, c, d)
+        self.theta = self.coefficients.theta(arx)
+
+    def record(self, p, *, noise=0.0, seed=1):
+        arx, of = self.arx, self.coefficients
+        u = np.random.default_rng(seed).normal(size=(len(p), arx.nu))
+        A = [lambda q, i=i: of.at(q).A[i] for i in range(arx.na)]
+        B = [lambda q, j=j: of.at(q).B[j] for j in range(len(arx.input_lags))]
+        return flown(arx, A, B, p, u, c=lambda q: of.at(q).c, d=lambda q: of.at(q).d, noise=noise, seed=seed)
+
+
+def moving(n=700):
+    """A scheduling signal (n,) that sweeps 0-13 with two frequencies."""
+    k = np.arange(n)
+    return 6.5 + 3.5 * np.sin(0.11 * k) + 2.9 * np.sin(0.37 * k + 1.0)
+
+
+def structure(**over):
+    usual = dict(outputs=("y",), inputs=("u",), scheduling="p", na=2, nb=2, delay=1, basis=Polynomial(2, 0.0, 13.0))
+    return LPVARX(**{**usual, **over})
