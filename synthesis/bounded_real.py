@@ -1,0 +1,183 @@
+"""The bounded real lemma for LPV models as a cone program, one block per Bernstein coefficient.
+
+Continuous time, V = x' P(p) x, for |dp/dt| <= rate:
+
+    [A'P + PA + nu dP/dp + C'C   PB + C'D ]
+    [B'P + D'C                   D'D - g I]  < 0,   nu = -rate, +rate,   g = gamma^2,
+
+discrete time, P+ = P(p(k+1)), |p(k+1) - p(k)| <= rate dt:
+
+    [A'P+A - P + C'C   A'P+B + C'D      ]
+    [B'P+A + D'C       B'P+B + D'D - g I]  < 0.
+
+Source: Wu, Yang, Packard and Becker, "Induced L2-norm control for LPV systems with bounded parameter variation
+rates", Int. J. Robust and Nonlinear Control 6 (1996), theorem 3.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from synthesis.bernstein import composition, elevation_matrix, product_weights, restriction
+from synthesis.cells import Cell, Strip
+from synthesis.cone_program import ConeProgram
+from synthesis.symmetric import basis, svec
+
+Array = np.ndarray
+
+
+class Blocks(NamedTuple):
+    """LMI blocks F = sum_j linear[., j] P_(first + j) + constant - g diag(0, I), svec'd along the last axis.
+
+    `linear` (m, d + 1, n (n + 1)/2, L), `constant` (m, L), of matrices (N, N) with L = N (N + 1)/2; `first` is the index
+    of the first coefficient of P involved.
+    """
+
+    first: int
+    linear: Array
+    constant: Array
+
+
+def continuous_blocks(cells: Sequence[Cell], knots: Array, degree: int, rate: float, extra: int) -> Iterator[Blocks]:
+    """The blocks of every cell for both signs of the rate; `extra` raises the degree of the Bernstein form."""
+    for cell in cells:
+        A, B, dM = _common_degree(cell.piece.A, cell.piece.B, cell)
+        E = basis(A.shape[1])
+        lyapunov = E @ A[:, None]
+        coupling = E @ B[:, None]
+        operator = svec(_bordered(lyapunov + np.swapaxes(lyapunov, -1, -2), coupling))
+        direct = svec(_bordered(E, np.zeros((*E.shape[:2], B.shape[2]))))
+        output = _output_terms(cell)
+        d = max(degree + dM, len(output) - 1) + extra
+        a, b, width = _local(cell, knots)
+        here = restriction(degree, a, b)
+        up = elevation_matrix(degree + dM, d)
+        product = np.einsum("qm,mik,kj->qij", up, product_weights(dM, degree), here)
+        linear = np.einsum("mij,ivl->mjvl", product, operator)
+        constant = elevation_matrix(len(output) - 1, d) @ svec(output)
+        slope = _slope(degree, here, (b - a) * width)
+        slope = elevation_matrix(len(slope) - 1, d) @ slope
+        for nu in (-rate, rate) if rate > 0 else (0.0,):
+            drift = nu * slope[:, :, None, None] * direct
+            yield Blocks(cell.segment * degree, linear + drift, constant)
+
+
+def discrete_blocks(strips: Sequence[Strip], knots: Array, degree: int, extra: int, ends_only: bool) -> Iterator[Blocks]:
+    """The blocks of every strip; `ends_only` keeps those on its two border lines."""
+    for strip in strips:
+        cell = strip.cell
+        A, B, dM = _common_degree(cell.piece.A, cell.piece.B, cell)
+        M = np.concatenate([A, B], axis=2)
+        E = basis(A.shape[1])
+        inner = E @ M[:, None]
+        pairs = np.einsum("rik,iab,kvac->rvbc", product_weights(dM, dM), M, inner, optimize=True)
+        operator = svec(0.5 * (pairs + np.swapaxes(pairs, -1, -2)))
+        direct = svec(_bordered(E, np.zeros((*E.shape[:2], B.shape[2]))))
+        output = _output_terms(cell)
+        d = max(degree + 2 * dM, len(output) - 1) + extra
+        a, b, _ = _local(cell, knots)
+        here = elevation_matrix(degree, d) @ restriction(degree, a, b)
+        constant = elevation_matrix(len(output) - 1, d) @ svec(output)
+        low, high = knots[strip.next_segment], knots[strip.next_segment + 1]
+        corners = [[(q - low) / (high - low) for q in pair] for pair in strip.corners]
+        after = composition(degree, corners)
+        up = elevation_matrix(degree + 2 * dM, d)
+        now = here[:, :, None, None] * direct
+        levels = sorted({0, degree}) if ends_only else range(degree + 1)
+        for k in levels:
+            linear = np.einsum("qm,mri,ij,rvl->qjvl", up, product_weights(2 * dM, degree), after[:, k], operator, optimize=True)
+            if strip.next_segment == cell.segment:
+                yield Blocks(cell.segment * degree, linear - now, constant)
+            else:
+                first = min(strip.next_segment, cell.segment)
+                count = (abs(strip.next_segment - cell.segment) + 1) * degree + 1
+                wide = np.zeros((len(linear), count, *linear.shape[2:]))
+                start, own = (strip.next_segment - first) * degree, (cell.segment - first) * degree
+                wide[:, start : start + degree + 1] += linear
+                wide[:, own : own + degree + 1] -= now
+                yield Blocks(first * degree, wide, constant)
+
+
+def assemble(blocks: Sequence[Blocks], states: int, inputs: int, unknowns: int, margin: float, floor: float) -> ConeProgram:
+    """minimise g subject to every block <= -margin diag(I, 0) and every coefficient of P >= floor I.
+
+    Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability.
+    """
+    N, nv = states + inputs, states * (states + 1) // 2
+    columns = unknowns * nv
+    eye, zero = np.eye(states), np.zeros((states, inputs))
+    gain = -svec(np.block([[0 * eye, zero], [zero.T, np.eye(inputs)]])) if inputs else svec(eye)
+    back_off = margin * svec(np.block([[eye, zero], [zero.T, np.zeros((inputs, inputs))]])) if inputs else 0 * gain
+    parts, right, sizes = [], [], []
+    for block in blocks:
+        m, count, _, L = block.linear.shape
+        rows = np.moveaxis(block.linear, 3, 1).reshape(m * L, count * nv)
+        parts.append((rows, block.first * nv))
+        right.append((-block.constant - back_off).ravel())
+        sizes += [N] * m
+    heights = [len(rows) for rows, _ in parts]
+    tops = np.concatenate([[0], np.cumsum(heights)]).astype(int)
+    data, index, pointer = [], [], []
+    for (rows, left), top in zip(parts, tops[:-1], strict=True):
+        where = np.nonzero(rows)
+        data.append(rows[where])
+        index.append(where[0] + top)
+        pointer.append(where[1] + left)
+    height = int(tops[-1])
+    lmi = sparse.coo_matrix((np.concatenate(data), (np.concatenate(index), np.concatenate(pointer))), shape=(height, columns)).tocsc()
+    objective = sparse.csc_matrix(np.tile(gain, height // len(gain))[:, None])
+    positive = -sparse.identity(columns, format="csc")
+    identities = np.tile(svec(eye), unknowns)
+    if inputs:
+        A = sparse.bmat([[lmi, objective], [positive, None]], format="csc")
+        b = np.concatenate([*right, -floor * identities])
+        c = np.append(np.zeros(columns), 1.0)
+    else:
+        A = sparse.bmat([[lmi, objective], [positive, None], [-positive, None]], format="csc")
+        b = np.concatenate([*right, 0 * identities, identities])
+        c = np.append(np.zeros(columns), -1.0)
+        sizes += [states] * unknowns
+    return ConeProgram(c, A, b, tuple(sizes + [states] * unknowns))
+
+
+def _common_degree(A: Array, B: Array, cell: Cell) -> tuple[Array, Array, int]:
+    A, B = (_restrict(M, cell) for M in (A, B))
+    d = max(len(A), len(B)) - 1
+    return _raise(A, d), _raise(B, d), d
+
+
+def _raise(M: Array, degree: int) -> Array:
+    return np.tensordot(elevation_matrix(len(M) - 1, degree), M, axes=1)
+
+
+def _restrict(M: Array, cell: Cell) -> Array:
+    width = cell.piece.high - cell.piece.low
+    a, b = (cell.low - cell.piece.low) / width, (cell.high - cell.piece.low) / width
+    return np.tensordot(restriction(len(M) - 1, a, b), M, axes=1)
+
+
+def _local(cell: Cell, knots: Array) -> tuple[float, float, float]:
+    low, high = float(knots[cell.segment]), float(knots[cell.segment + 1])
+    return (cell.low - low) / (high - low), (cell.high - low) / (high - low), high - low
+
+
+def _slope(degree: int, here: Array, width: float) -> Array:
+    """Bernstein coefficients (degree, columns) of dP/dp over the cell."""
+    return np.zeros((1, here.shape[1])) if degree == 0 else degree * np.diff(here, axis=0) / width
+
+
+def _bordered(top: Array, side: Array) -> Array:
+    corner = np.zeros((*side.shape[:-2], side.shape[-1], side.shape[-1]))
+    return np.concatenate([np.concatenate([top, side], axis=-1), np.concatenate([np.swapaxes(side, -1, -2), corner], axis=-1)], axis=-2)
+
+
+def _output_terms(cell: Cell) -> Array:
+    """Bernstein coefficients of [C D]'[C D] over the cell."""
+    C, D = (_restrict(M, cell) for M in (cell.piece.C, cell.piece.D))
+    d = max(len(C), len(D)) - 1
+    Y = np.concatenate([_raise(C, d), _raise(D, d)], axis=2)
+    return np.einsum("rik,iab,kac->rbc", product_weights(d, d), Y, Y)

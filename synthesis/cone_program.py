@@ -1,0 +1,173 @@
+"""Semidefinite programs in conic form, and the solvers that take them.
+
+    minimise c' x  subject to  b - A x in a product of positive semidefinite cones (vectors as in `symmetric`).
+
+Clarabel and SCS are called directly; CVXOPT, MOSEK, SDPA and COPT, where installed, through cvxpy. Whatever a solver
+answers is a candidate: nothing is believed before it is verified.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from symheli.errors import InputError, SolverError
+from synthesis.symmetric import basis, length
+
+Array = np.ndarray
+
+
+class Answer(Enum):
+    """What the solver says of the program."""
+
+    SOLVED = "the solver reports a solution"
+    INFEASIBLE = "the solver reports that no solution exists"
+    FAILED = "the solver stopped without an answer"
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Which solver, and when it stops.
+
+    `name` as cvxpy spells it; `tolerance` on residuals and gap (relative); `iterations` 0 keeps 200 for interior points
+    and 20000 for SCS; `time_limit` in s.
+    """
+
+    name: str = "CLARABEL"
+    tolerance: float = 1e-8
+    iterations: int = 0
+    time_limit: float = 120.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", str(self.name).upper())
+        if not 0 < self.tolerance < 1 or self.iterations < 0 or not self.time_limit > 0:
+            raise InputError("expected 0 < tolerance < 1, iterations >= 0 and time_limit > 0 s")
+        if self.name not in installed_solvers():
+            raise SolverError(f"solver {self.name!r} is not available; installed here: {', '.join(installed_solvers())}")
+
+    @property
+    def version(self) -> str:
+        """Version of the installed package."""
+        return importlib.metadata.version(_PACKAGES[self.name])
+
+
+_PACKAGES = {"CLARABEL": "clarabel", "SCS": "scs", "CVXOPT": "cvxopt", "MOSEK": "mosek", "SDPA": "sdpa-python", "COPT": "coptpy"}
+
+
+def installed_solvers() -> tuple[str, ...]:
+    """Semidefinite solvers that can be used here, in the order of preference."""
+
+    def there(package: str) -> bool:
+        try:
+            importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            return False
+        return True
+
+    return tuple(name for name, package in _PACKAGES.items() if there(package))
+
+
+@dataclass(frozen=True, eq=False)
+class ConeProgram:
+    """minimise c' x subject to b - A x in the product of semidefinite cones of `sizes`."""
+
+    c: Array
+    A: sparse.csc_matrix
+    b: Array
+    sizes: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A solver's answer and point `x`, None where it gave none; `seconds` of solving, `message` in the solver's words."""
+
+    answer: Answer
+    x: Array | None
+    seconds: float
+    message: str
+
+
+def solve(program: ConeProgram, solver: Solver) -> Candidate:
+    """The solver's candidate. Never raises for a failed solve: that is an answer."""
+    method: Callable[[ConeProgram, Solver], tuple[Answer, Any, str]] = {"CLARABEL": _clarabel, "SCS": _scs}.get(solver.name, _cvxpy)
+    start = time.perf_counter()
+    answer, x, message = method(program, solver)
+    x = None if x is None else np.asarray(x, dtype=float)
+    if x is not None and not np.all(np.isfinite(x)):
+        x = None
+    return Candidate(answer, x, time.perf_counter() - start, message)
+
+
+def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
+    import clarabel
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_iter = solver.iterations or 200
+    settings.time_limit = solver.time_limit
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = solver.tolerance
+    cones = [clarabel.PSDTriangleConeT(n) for n in program.sizes]
+    n = len(program.c)
+    solution = clarabel.DefaultSolver(sparse.csc_matrix((n, n)), program.c, program.A, program.b, cones, settings).solve()
+    word = str(solution.status)
+    if "PrimalInfeasible" in word:
+        return Answer.INFEASIBLE, None, word
+    # a point that ran out of iterations or progress may still pass the verification
+    return (Answer.SOLVED if "Solved" in word else Answer.FAILED), solution.x, word
+
+
+def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
+    import scs
+
+    # the same vectors: SCS stacks the lower triangle by columns, which is the upper one by rows; reorder
+    order = np.concatenate([[], *(_scs_order(n) + start for n, start in zip(program.sizes, _starts(program.sizes), strict=True))]).astype(int)
+    data = {"A": program.A.tocsr()[order].tocsc(), "b": program.b[order], "c": program.c}
+    engine = scs.SCS(
+        data, {"s": list(program.sizes)}, verbose=False, eps_abs=max(solver.tolerance, 1e-9), eps_rel=max(solver.tolerance, 1e-9),
+        max_iters=solver.iterations or 20000, time_limit_secs=solver.time_limit,
+    )  # fmt: skip
+    solution = engine.solve()
+    word = str(solution["info"]["status"])
+    if word.startswith("infeasible"):
+        return Answer.INFEASIBLE, None, word
+    return (Answer.SOLVED if word.startswith("solved") else Answer.FAILED), solution["x"], word
+
+
+def _starts(sizes: tuple[int, ...]) -> Array:
+    return np.concatenate([[0], np.cumsum([length(n) for n in sizes])[:-1]])
+
+
+def _scs_order(n: int) -> Array:
+    place = np.zeros((n, n), dtype=int)
+    columns, rows = np.tril_indices(n)
+    place[rows, columns] = place[columns, rows] = np.arange(length(n))
+    return np.concatenate([place[j:, j] for j in range(n)])
+
+
+def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
+    import cvxpy as cp
+
+    x = cp.Variable(len(program.c))
+    s = program.b - program.A @ x
+    constraints, start = [], 0
+    for n, group in groupby(program.sizes):
+        expand = basis(n).reshape(length(n), n * n).T
+        for _ in group:
+            constraints.append(cp.reshape(expand @ s[start : start + length(n)], (n, n), order="C") >> 0)
+            start += length(n)
+    problem = cp.Problem(cp.Minimize(program.c @ x), constraints)
+    try:
+        problem.solve(solver=solver.name)
+    except cp.error.SolverError as error:
+        return Answer.FAILED, None, str(error)
+    if problem.status in ("infeasible", "infeasible_inaccurate"):
+        return Answer.INFEASIBLE, None, problem.status
+    return (Answer.SOLVED if problem.status == "optimal" else Answer.FAILED), x.value, str(problem.status)

@@ -1,0 +1,40 @@
+"""Symmetric matrices as vectors: the upper triangle column by column, off-diagonal entries times sqrt(2)."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+Array = np.ndarray
+
+
+def length(n: int) -> int:
+    """Number of entries n (n + 1) / 2."""
+    return n * (n + 1) // 2
+
+
+@lru_cache(maxsize=64)
+def _indices(n: int) -> tuple[Array, Array, Array]:
+    columns, rows = np.tril_indices(n)
+    return rows, columns, np.where(rows == columns, 1.0, math.sqrt(2.0))
+
+
+def svec(M: Array) -> Array:
+    """Vectors (..., n (n + 1) / 2) of symmetric matrices (..., n, n); <M, N> = svec(M) . svec(N)."""
+    rows, columns, weight = _indices(M.shape[-1])
+    return M[..., rows, columns] * weight
+
+
+def smat(v: Array, n: int) -> Array:
+    """Matrices (..., n, n) from vectors (..., n (n + 1) / 2)."""
+    rows, columns, weight = _indices(n)
+    out = np.zeros((*v.shape[:-1], n, n))
+    out[..., rows, columns] = out[..., columns, rows] = v / weight
+    return out
+
+
+def basis(n: int) -> Array:
+    """The matrices (n (n + 1) / 2, n, n) with smat(v) = sum_i v_i basis_i."""
+    return smat(np.eye(length(n)), n)
