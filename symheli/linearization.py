@@ -19,7 +19,7 @@ def linearize(heli: Helicopter, point: TrimPoint, *, inputs: Sequence[str] | Non
     `inputs` defaults to the four controls; gust velocities u_w v_w w_w (body axes, m/s) may be named too. A point that is
     not an equilibrium is refused with `InputError` unless `allow_accelerating`.
     """
-    if not allow_accelerating and not np.all(np.abs(point.residual.array) < TOLERANCE):
+    if not allow_accelerating and not np.all(np.abs(point.xdot.array) < TOLERANCE):
         raise InputError(f"linearize needs an equilibrium: {point}; pass allow_accelerating=True for a model about a trajectory point")
     if point.x.signals != heli.states:
         raise InputError(

@@ -52,7 +52,13 @@ class _Flight:
     """Everything of a flight that does not depend on the noise."""
 
     def __init__(
-        self, heli: Helicopter, schedule: AirspeedSchedule, dt: float, excitation: Excitation | None, wind: np.ndarray, autopilot: Autopilot | None
+        self,
+        heli: Helicopter,
+        schedule: AirspeedSchedule,
+        dt: float,
+        excitation: Excitation | None,
+        wind: np.ndarray,
+        autopilot: Autopilot | None,
     ):
         self.heli, self.wind, self.schedule, self.excitation = heli, wind, schedule, excitation
         self.per_sample = math.ceil(dt / CONTROL_PERIOD - 1e-9)
@@ -95,7 +101,9 @@ class _Flight:
         point = trim(self.heli, speed, acceleration=acceleration, wind=tuple(self.wind), start=start, throw=False)  # type: ignore[arg-type]
         miss = np.abs(point.residual.array[:6]).max()
         if miss > REFERENCE_MISS:
-            raise TrimError(f"no quasi-steady reference at {speed:.1f} m/s, {acceleration:.1f} m/s^2 (misses by {miss:.2g} SI): fly gentler", point)
+            raise TrimError(
+                f"no quasi-steady reference at {speed:.1f} m/s, {acceleration:.1f} m/s^2 (misses by {miss:.2g} SI): fly gentler", point
+            )
         return point
 
     def run(self, noise: np.ndarray) -> FlightRecord:

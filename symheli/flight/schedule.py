@@ -30,7 +30,9 @@ class AirspeedSchedule:
             raise InputError(f"airspeeds and holds must be >= 0, accelerations > 0; got {self}")
 
     @classmethod
-    def transition(cls, low: float = 0.0, high: float = 13.0, acceleration: float = 3.0, hold: float = 3.0, laps: int = 1) -> AirspeedSchedule:
+    def transition(
+        cls, low: float = 0.0, high: float = 13.0, acceleration: float = 3.0, hold: float = 3.0, laps: int = 1
+    ) -> AirspeedSchedule:
         """low -> high -> low (m/s), `laps` times, with this peak acceleration (m/s^2), held `hold` s at each end."""
         return cls((high, low) * laps, (acceleration,) * (2 * laps), (hold,) * (2 * laps), low)
 
