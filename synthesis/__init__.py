@@ -1,0 +1,30 @@
+"""Guarantees for LPV models: certified gains and stability, each with a proof that is verified after the solver.
+
+No solver is loaded by importing this package.
+"""
+
+from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
+from synthesis.cone_program import Solver, installed_solvers
+from synthesis.frozen import FrozenGain, frozen_gain
+from synthesis.l2_gain import Relaxation, l2_gain, stability
+from synthesis.lower_bound import LowerBound, Search, lower_bound
+from synthesis.lyapunov import SplineLyapunov
+
+__all__ = [
+    "Attempt",
+    "Certificate",
+    "FrozenGain",
+    "LowerBound",
+    "Relaxation",
+    "Search",
+    "Seconds",
+    "Solver",
+    "SplineLyapunov",
+    "Status",
+    "Trajectory",
+    "frozen_gain",
+    "installed_solvers",
+    "l2_gain",
+    "lower_bound",
+    "stability",
+]

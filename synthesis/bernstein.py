@@ -23,7 +23,7 @@ def blossom(arguments: Sequence[Any]) -> Array:
 
     blossom(t, ..., t) gives the value at t; blossom(a, .., b, ..) the coefficients over [a, b].
     """
-    weights = [1 + 0 * arguments[0]] if len(arguments) else [1.0]
+    weights: list[Any] = [1]
     for t in arguments:
         stay, move = [(1 - t) * w for w in weights], [t * w for w in weights]
         weights = [stay[0], *(s + m for s, m in zip(stay[1:], move[:-1], strict=True)), move[-1]]
@@ -44,6 +44,8 @@ def composition(degree: int, corners: Sequence[Sequence[Any]]) -> Array:
     for choice in cartesian(cartesian((0, 1), (0, 1)), repeat=degree):
         i, k = sum(e for e, _ in choice), sum(f for _, f in choice)
         out[i][k] = out[i][k] + blossom([corners[e][f] for e, f in choice])
+    if degree == 0:
+        return np.array(out)
     return np.array([[out[i][k] / (comb(degree, i) * comb(degree, k)) for k in range(degree + 1)] for i in range(degree + 1)])
 
 
