@@ -1,0 +1,42 @@
+"""Opening a log: whether it is there, and whether it is text."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from symheli.errors import InputError
+
+Table = tuple[np.ndarray, dict[str, np.ndarray], dict[str, str]]
+"""time (n,) in s, columns by name, unit of each column."""
+
+
+def existing(path: str | os.PathLike[str]) -> Path:
+    """The path of a file that exists and is not empty; raises `InputError` otherwise."""
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"{file}: there is no such file")
+    if file.stat().st_size == 0:
+        raise InputError(f"{file}: the file is empty")
+    return file
+
+
+def text(path: str | os.PathLike[str]) -> str:
+    """The content of a text file; raises `InputError` for a binary one."""
+    file = existing(path)
+    data = file.read_bytes()
+    if b"\0" in data:
+        raise InputError(f"{file}: expected a text file, this one is binary (it contains zero bytes)")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def positive(dt: float, name: str = "dt") -> float:
+    """A sample period in s; raises `InputError` unless finite and positive."""
+    if not (np.isfinite(dt) and dt > 0):
+        raise InputError(f"{name} must be a positive number of seconds, got {dt}")
+    return float(dt)

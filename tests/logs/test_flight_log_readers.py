@@ -1,0 +1,213 @@
+"""Logs in, SI out; what cannot be read says why."""
+
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from scipy.spatial.transform import Rotation
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.logs.xplane import body_velocity
+from symheli.lpv import FlightRecord
+
+DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
+HEADER = "   Vtrue,_ktas |   ____Q,rad/s |   pitch,__deg |   _roll,__deg |   hding,_true |   ___vX,__m/s |   ___vY,__m/s |   ___vZ,__m/s | "
+
+
+def real(name):
+    """A real log beside the project; the test is skipped where it is not there."""
+    path = DATA / name
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    return path
+
+
+def write(tmp_path, *lines, name="Data.txt"):
+    path = tmp_path / name
+    path.write_text("\n".join(lines))
+    return path
+
+
+def row(*values):
+    return " | ".join(f"{v:12.5f}" for v in values) + " | "
+
+
+# --- X-Plane ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "lengths"), [("Forward.txt", [4, 935]), ("Data.txt", [602])])
+def test_a_real_xplane_log_splits_at_its_headers_and_comes_out_in_si(name, lengths):
+    path = real(f"xplane/{name}")
+    record = FlightRecord.from_xplane(path, dt=0.1)
+    assert [s.stop - s.start for s in record.segments()] == lengths
+    assert {"u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "airspeed", "stick_lon"} <= set(record.signals)
+    # attitudes in rad and speeds in m/s of a flying helicopter
+    assert np.abs(record["theta"]).max() < 1.6
+    assert 10 < record["airspeed"].max() < 40
+    with pytest.raises(InputError, match=r"dX against vX.* suggest dt = 0\.(09[5-9]|10[0-3])"):
+        FlightRecord.from_xplane(path)
+
+
+def test_pitch_rate_and_pitch_of_a_real_log_agree_on_the_sample_period():
+    record = FlightRecord.from_xplane(real("xplane/Forward.txt"), dt=0.1)
+    inside = record.segments()[1]
+    slope = np.polyfit(record.derivative("theta")[inside], record["q"][inside], 1)[0]
+    assert slope == pytest.approx(1.0, abs=0.05)  # wings level on this flight; the step jitters by 10 % about 0.1 s
+
+
+def test_body_velocity_is_the_published_rotation():
+    rng = np.random.default_rng(0)
+    earth, (phi, theta, psi) = rng.normal(size=3), rng.uniform(-1, 1, 3)
+    expected = Rotation.from_euler("ZYX", [psi, theta, phi]).inv().apply(earth)
+    np.testing.assert_allclose(body_velocity(*earth, phi, theta, psi), expected, atol=1e-14)
+
+
+def test_nose_east_and_flying_east_is_forward_speed_in_metres_per_second(tmp_path):
+    path = write(tmp_path, "", HEADER, *[row(10, 0.1, 0, 0, 90, 5, 0, 0)] * 3)
+    record = FlightRecord.from_xplane(path, dt=0.1)
+    np.testing.assert_allclose(record["u"], 5.0, atol=1e-12)
+    np.testing.assert_allclose(record["v"], 0.0, atol=1e-12)
+    np.testing.assert_allclose(record["airspeed"], 10 * 1852 / 3600)
+    assert record.signals[record.signals.index("psi")].unit == "rad"
+
+
+def test_sessions_with_other_columns_keep_their_own_and_the_cut_row_goes(tmp_path):
+    other = "   ____Q,rad/s |   thro1,_part |   thro1,_part | "
+    path = write(
+        tmp_path, HEADER, *[row(10, 0.1, 0, 0, 90, 5, 0, 0)] * 4, "", HEADER, "", other, *[row(0.2, 0.5, 0.6)] * 5, row(0.2, 0.5)[:-3]
+    )
+    record = FlightRecord.from_xplane(path, dt=0.1)
+    assert [s.stop - s.start for s in record.segments()] == [4, 5]
+    assert np.isnan(record["u"][4:]).all()
+    assert np.isnan(record["throttle"][:4]).all()
+    np.testing.assert_allclose(record["throttle"][4:], 0.5)
+    np.testing.assert_allclose(record["throttle_actual"][4:], 0.6)
+    np.testing.assert_allclose(record["q"], [0.1] * 4 + [0.2] * 5)
+
+
+def test_the_clock_of_a_log_is_used_where_it_has_one_and_degrees_a_second_are_converted(tmp_path):
+    header = "   _totl,_time |   ____Q,deg/s | "
+    path = write(tmp_path, header, *[row(t, 180.0) for t in (7.0, 7.1, 7.2, 7.2, 7.3)])
+    record = FlightRecord.from_xplane(path)
+    np.testing.assert_allclose(record.time, [0, 0.1, 0.2, 0.3], atol=1e-9)  # the repeated instant is dropped
+    np.testing.assert_allclose(record["q"], np.pi)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "is empty"),
+        (b"\x00\x01\x02|,", "binary"),
+        (b"hello\nworld\n", "not an X-Plane log"),
+        (row(1, 2).encode(), "not an X-Plane log"),
+        (HEADER.encode(), "no whole row"),
+        ((HEADER + "\n" + row(1, 2) + "\n" + row(*range(8))).encode(), "line 2: expected 8 fields"),
+        ((HEADER + "\n" + row(*range(8)).replace("3.0", "x.0")).encode(), "line 2: expected numbers"),
+    ],
+)
+def test_a_spoilt_xplane_log_says_what_is_wrong(tmp_path, content, message):
+    path = tmp_path / "Data.txt"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        FlightRecord.from_xplane(path, dt=0.1)
+
+
+# --- CSV -------------------------------------------------------------------------------------------------------------------
+
+
+def test_csv_columns_come_in_their_units_and_empty_cells_are_missing(tmp_path):
+    path = write(tmp_path, "t_ms,theta,junk", "0,90,a", "10,,b", "20,45,c")
+    record = FlightRecord.from_csv(path, time="t_ms", units={"theta": "deg"}, time_unit="ms")
+    np.testing.assert_allclose(record.time, [0, 0.01, 0.02])
+    np.testing.assert_allclose(record["theta"], [np.pi / 2, np.nan, np.pi / 4])
+
+
+def test_the_real_trex_flight_is_read_without_a_time_column():
+    path = real("trex550/trex550_flight_clean.csv")
+    record = FlightRecord.from_csv(path, time=None, units={"q_radps": "rad/s", "theta_rad": "rad", "u_mps": "m/s"}, dt=0.0084)
+    assert len(record) == 13622
+    assert record.dt == pytest.approx(0.0084)
+    assert np.isfinite(record.values).all()
+
+
+@pytest.mark.parametrize(
+    ("lines", "options", "message"),
+    [
+        (["t,q", "0,1", "1,fast"], dict(time="t"), "row 2: expected a number, got 'fast'"),
+        (["t,q"], dict(time="t"), "no rows"),
+        (["t,q", "0,1", ",2"], dict(time="t"), "the time is missing in row 2"),
+        (["t,q", "0,1", "0,2"], dict(time="t"), "time must increase"),
+        (["t,q", "0,1", "1,2"], dict(time=None), "one of the two"),
+        (["t,q", "0,1", "1,2"], dict(time=None, dt=-1.0), "positive"),
+        (["t,q", "0,1", "1,2"], dict(time="t", time_unit="m"), "time_unit"),
+        (["t,q", "0,1", "1,2,3,4"], dict(time="t"), "not a table"),
+        (["t,qq", "0,1"], dict(time="t"), "did you mean 'qq'"),
+    ],
+)
+def test_a_spoilt_csv_says_what_is_wrong(tmp_path, lines, options, message):
+    path = write(tmp_path, *lines, name="log.csv")
+    with pytest.raises(InputError, match=message):
+        FlightRecord.from_csv(path, units={"q": "rad/s"}, **options)
+
+
+def test_a_missing_file_is_an_input_error(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        FlightRecord.from_csv(tmp_path / "nowhere.csv", time="t", units={"q": "rad/s"})
+
+
+# --- MATLAB and ULog -------------------------------------------------------------------------------------------------------
+
+
+def test_mat_vectors_of_either_orientation_and_inside_structs(tmp_path):
+    path = tmp_path / "log.mat"
+    savemat(path, {"t": np.arange(4.0)[:, None], "log": {"theta": np.full((1, 4), 180.0)}})
+    record = FlightRecord.from_mat(path, time="t", units={"log.theta": "deg"})
+    np.testing.assert_allclose(record["log.theta"], np.pi)
+    with pytest.raises(UnknownNameError, match=r"unknown variable 'log\.thta'"):
+        FlightRecord.from_mat(path, time="t", units={"log.thta": "deg"})
+
+
+def test_a_spoilt_mat_file_says_what_is_wrong(tmp_path):
+    path = tmp_path / "log.mat"
+    path.write_bytes(b"nonsense" * 40)
+    with pytest.raises(InputError, match="not a MATLAB file"):
+        FlightRecord.from_mat(path, time="t", units={"q": "rad/s"})
+    savemat(path, {"t": np.arange(4.0), "q": np.arange(5.0), "M": np.eye(3)})
+    with pytest.raises(InputError, match="has 5 samples, the time 't' has 4"):
+        FlightRecord.from_mat(path, time="t", units={"q": "rad/s"})
+    with pytest.raises(InputError, match="to be a vector"):
+        FlightRecord.from_mat(path, time="t", units={"M": "1"})
+
+
+def test_ulog_topics_of_different_rates_meet_on_one_grid(tmp_path, monkeypatch):
+    slow = np.delete(np.arange(0, 3_000_000, 100_000), slice(12, 20)) + 40_000  # us; silent from 1.14 to 2.04 s
+
+    class FakeULog:
+        def __init__(self, path):
+            fast = np.arange(0, 3_000_000, 4_000)
+            self.data_list = [
+                types.SimpleNamespace(name="rates", data={"timestamp": fast, "xyz[1]": 1e-6 * fast}),
+                types.SimpleNamespace(name="air", data={"timestamp": slow, "speed": 2e-6 * slow}),
+            ]
+
+    monkeypatch.setitem(sys.modules, "pyulog", types.SimpleNamespace(ULog=FakeULog))
+    path = write(tmp_path, "anything", name="log.ulg")
+    topics = {"q": ("rates", "xyz[1]", "deg/s"), "airspeed": ("air", "speed", "m/s")}
+    record = FlightRecord.from_ulog(path, topics, dt=0.02)
+    assert record.dt == pytest.approx(0.02)
+    instants = record.time + 0.04  # time counts from the first common instant
+    np.testing.assert_allclose(record["q"], np.deg2rad(instants), atol=1e-9)
+    silent = (instants > 1.141) & (instants < 2.039)
+    np.testing.assert_allclose(record["airspeed"][~silent], 2 * instants[~silent], atol=1e-9)
+    assert np.isnan(record["airspeed"][silent]).all()
+    with pytest.raises(UnknownNameError, match="unknown topic 'rate'"):
+        FlightRecord.from_ulog(path, {"q": ("rate", "xyz[1]", "deg/s")}, dt=0.02)
+
+
+def test_without_pyulog_the_message_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyulog", None)
+    with pytest.raises(InputError, match=r"symheli\[logs\]"):
+        FlightRecord.from_ulog(write(tmp_path, "x", name="log.ulg"), {"q": ("rates", "xyz[1]", "rad/s")}, dt=0.02)
