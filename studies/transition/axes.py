@@ -1,0 +1,90 @@
+"""Two-input identification of the longitudinal-vertical and the lateral-directional motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+import symheli
+from identification import LPVARX, LPVARXModel, Polynomial, fit
+from studies.transition.flights import TOP
+from symheli import FlightRecord, Helicopter, LinearModel
+
+SCHEDULING = "airspeed_command"
+HORIZON = 1.0
+"""Seconds ahead at which predictions are judged."""
+
+FROZEN_SPEEDS = (2.0, 7.0, 12.0)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What is identified: outputs from inputs; `mode` names the rotor mode it must find and the outputs with a pass mark."""
+
+    name: str
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    mode: str
+    marks: Mapping[str, tuple[float, float]]
+    """{output: (noise-free, 30 dB)} fit in percent, 1 s ahead."""
+
+    def structure(self, order: int = 3, degree: int = 2, offset: bool = True) -> LPVARX:
+        """LPV-ARX of this axis at 50 Hz: `order` lags of everything, polynomial of `degree` in the commanded airspeed."""
+        basis = Polynomial(degree, 0.0, TOP)
+        return LPVARX(self.outputs, self.inputs, SCHEDULING, order, order, 1, basis, offset=offset, offset_rate=offset)
+
+
+LONGITUDINAL = Axis(
+    "longitudinal-vertical", ("u", "w", "q", "theta"), ("d_lon", "d_col"), "pitch/flap", {"q": (90.0, 80.0), "theta": (90.0, 80.0)}
+)
+LATERAL = Axis("lateral-directional", ("v", "p", "r", "phi"), ("d_lat", "d_ped"), "roll/flap", {"p": (85.0, 80.0)})
+LATERAL_WITH_COLLECTIVE = Axis("lateral-directional, other inputs measured", LATERAL.outputs, ("d_lat", "d_ped", "d_lon", "d_col"), "roll/flap", LATERAL.marks)
+ALL = Axis(
+    "all axes (MIMO)", ("u", "v", "w", "p", "q", "r", "phi", "theta"), ("d_lon", "d_lat", "d_col", "d_ped"), "roll/flap",
+    {"q": (90.0, 80.0), "theta": (90.0, 80.0), "p": (85.0, 80.0)},
+)  # fmt: skip
+AXES = (LONGITUDINAL, LATERAL)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Fit in percent of each output one step ahead, 1 s ahead and in free run, and the miss of the frozen rotor mode
+    (percent of its magnitude) at each of `FROZEN_SPEEDS`."""
+
+    one_step: dict[str, float]
+    one_second: dict[str, float]
+    free_run: dict[str, float]
+    mode_miss: dict[float, float]
+
+
+def rotor_mode(model: LinearModel, name: str) -> complex:
+    """The eigenvalue (rad/s) of the pitch/flap or roll/flap mode of the exact linear model: the two fastest oscillations."""
+    fast = sorted((z for z in model.poles() if z.imag > 8), key=abs)
+    return complex(fast[0] if name == "pitch/flap" else fast[-1])
+
+
+def mode_misses(heli: Helicopter, model: LPVARXModel, mode: str) -> dict[float, float]:
+    """Distance of the identified model's nearest eigenvalue to the exact rotor mode, percent of its magnitude, at frozen airspeeds."""
+    misses = {}
+    for speed in FROZEN_SPEEDS:
+        exact = rotor_mode(symheli.linearize(heli, symheli.trim(heli, speed)), mode)
+        z = model.at(speed).poles().astype(complex)
+        s = np.log(z[np.abs(z) > 1e-12]) / model.dt
+        misses[speed] = float(100 * np.abs(s - exact).min() / abs(exact))
+    return misses
+
+
+def scores(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord) -> Scores:
+    """Judge `model` on a record it has not seen."""
+
+    def named(horizon: int | None) -> dict[str, float]:
+        return {str(name): float(value) for name, value in model.score(test, horizon).items()}
+
+    return Scores(named(1), named(round(HORIZON / model.dt)), named(None), mode_misses(heli, model, axis.mode))
+
+
+def identify(axis: Axis, training: FlightRecord, method: str = "rls", order: int = 3, degree: int = 2) -> LPVARXModel:
+    """Fit `axis` to a training flight."""
+    return fit(axis.structure(order, degree), training, method=method)  # type: ignore[arg-type]

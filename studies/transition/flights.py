@@ -1,0 +1,59 @@
+"""The flights of the study: where the data come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, fly
+from symheli.flight import Autopilot, gain_scheduled_lqr
+
+TOP = 13.0
+"""Upper end of the transition, m/s (Budiyono & Sutarto: 0 <= p <= 13 m/s)."""
+
+AMPLITUDE = {"d_lon": 0.012, "d_lat": 0.012, "d_col": 0.010, "d_ped": 0.020}
+"""Multisine amplitude of each input, rad: an eighth of the cyclic travel, less of the others."""
+
+ACCELERATIONS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5, 3.0, 1.5, 4.0, 3.0, 2.0, 3.5)
+"""Peak accelerations of the ramps of the training flight, m/s^2."""
+
+NOISE_DB = 30.0
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """Seeds and lengths that make the flights of one run; `noise_db` None flies without sensor noise."""
+
+    seed: int = 0
+    dt: float = 0.02
+    ramps: int = len(ACCELERATIONS)
+    noise_db: float | None = None
+
+    def noisy(self, db: float = NOISE_DB) -> FlightPlan:
+        """The same flights with sensor noise."""
+        return replace(self, noise_db=db)
+
+    def training(self, heli: Helicopter, autopilot: Autopilot) -> FlightRecord:
+        """Ramps between random airspeeds of [0, 13] m/s at 1.5 to 4 m/s^2, multisines on all four inputs."""
+        schedule = AirspeedSchedule.varied(0.0, TOP, ACCELERATIONS[: self.ramps], 1.5, seed=1000 + self.seed)
+        return self._fly(heli, schedule, autopilot, 2000)
+
+    def test(self, heli: Helicopter, autopilot: Autopilot, acceleration: float = 3.2) -> FlightRecord:
+        """A transition no fit has seen: hover, 13 m/s, hover at 3.2 m/s^2, other multisines, other noise."""
+        return self._fly(heli, AirspeedSchedule.transition(0.0, TOP, acceleration, hold=2.0), autopilot, 3000)
+
+    def _fly(self, heli: Helicopter, schedule: AirspeedSchedule, autopilot: Autopilot, offset: int) -> FlightRecord:
+        seed = offset + self.seed
+        excitation = Excitation(AMPLITUDE, "multisine", (0.1, 5.0), seed)
+        return fly(heli, schedule, dt=self.dt, excitation=excitation, noise_db=self.noise_db, seed=seed, autopilot=autopilot)
+
+
+def autopilot_for(heli: Helicopter, dt: float = 0.02) -> Autopilot:
+    """The gain-scheduled LQR all flights of the study share."""
+    return gain_scheduled_lqr(heli, 0.0, TOP, dt)
+
+
+def spread(record: FlightRecord, names: tuple[str, ...]) -> np.ndarray:
+    """Standard deviation of each named signal."""
+    return record.columns(names).std(axis=0)
