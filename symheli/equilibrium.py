@@ -86,7 +86,7 @@ def trim(
 ) -> TrimPoint:  # fmt: skip
     """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.
 
-    Newton's method (MINPACK hybrj) with the exact Jacobian from `start` or a hover guess; where that fails, by continuation from
+    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start` or a hover guess; where that fails, by continuation from
     hover. Success is judged on the recomputed residual of every equation. Raises `TrimError` carrying the best point;
     with throw=False that point is returned instead.
     """
@@ -156,13 +156,13 @@ class _Problem:
 
     def residual(self, z: np.ndarray) -> np.ndarray:
         x, u, wind = self.state(z)
-        xdot = np.array(self.heli.compiled("rhs")(x, u, wind)).ravel()
+        xdot = self.heli.numeric("rhs")(x, u, wind)[0]
         xdot[:3] -= _heading_to_body(z[0], z[1]) @ np.array([self.condition.acceleration, 0.0, 0.0])
         return xdot
 
     def jacobian(self, z: np.ndarray) -> np.ndarray:
         x, u, wind = self.state(z)
-        A, B, E = (np.array(m) for m in self.heli.compiled("jacobian")(x, u, wind))
+        A, B, E = self.heli.numeric("jacobian")(x, u, wind)
         air, climb = self.condition.air_velocity, np.array([0.0, 0.0, self.condition.turn_rate])
         push = np.array([self.condition.acceleration, 0.0, 0.0])
         columns = []
@@ -180,22 +180,31 @@ class _Problem:
         return np.column_stack([*columns, B])[self.equations]
 
     def solve(self, start: np.ndarray) -> TrimPoint:
-        found = root(lambda z: self.residual(z)[self.equations], start, jac=self.jacobian, method="hybr", options={"xtol": 1e-14})
-        z = found.x
-        for _ in range(3):  # polish: plain Newton from a nearby point
+        """Newton's method from `start`; MINPACK's hybrid method where it stops descending, then Newton again."""
+        z = self.newton(start)
+        if np.abs(self.residual(z)).max() >= TOLERANCE:
+            found = root(lambda z: self.residual(z)[self.equations], start, jac=self.jacobian, method="hybr", options={"xtol": 1e-14})
+            z = min((z, self.newton(found.x)), key=lambda z: float(np.abs(self.residual(z)).max()))
+        return self.point(z)
+
+    def newton(self, z: np.ndarray, steps: int = 12) -> np.ndarray:
+        """Full Newton steps while the largest residual falls."""
+        size = np.abs(self.residual(z)).max()
+        for _ in range(steps):
             J = self.jacobian(z)
             if not np.all(np.isfinite(J)) or np.linalg.cond(J) > 1e14:
                 break
             better = z - np.linalg.solve(J, self.residual(z)[self.equations])
-            if np.abs(self.residual(better)).max() >= np.abs(self.residual(z)).max():
+            miss = np.abs(self.residual(better)).max()
+            if not miss < size:
                 break
-            z = better
-        return self.point(z)
+            z, size = better, miss
+        return z
 
     def point(self, z: np.ndarray) -> TrimPoint:
         heli = self.heli
         x, u, wind = self.state(z)
-        xdot = np.array(heli.compiled("rhs")(x, u, wind)).ravel()
+        xdot = heli.numeric("rhs")(x, u, wind)[0]
         switches = heli.switches(x, u, wind)
         return TrimPoint(
             NamedVector(heli.states, x), NamedVector(heli.inputs, u), NamedVector(heli.states, xdot), self.condition.airspeed,

@@ -17,8 +17,9 @@ from symheli.components import Flow, Motion
 from symheli.drivetrain import ideal_governor, pi_governor
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.signal import Signal, signals
+from symheli.numeric import Numeric
 from symheli.rigid_body import GRAVITY, body_to_earth, euler_rates, gravity_euler, quaternion_rates, rotation, translation
-from symheli.symbolic import SX, Function, column, jacobian
+from symheli.symbolic import SX, Function, column, dense, jacobian
 from symheli.vehicle import Vehicle, load_vehicle
 
 PRINTED = ("lateral_flapping", "fuselage_downwash", "rotor_reaction")
@@ -162,10 +163,14 @@ class Helicopter:
         return self._function("jacobian", build, ["A", "B", "E"])
 
     def compiled(self, name: Literal["rhs", "flight_rhs", "jacobian", "diagnostics"]) -> Function:
-        """One of the functions above as machine code where a C compiler is there: the same numbers, faster, numbers only."""
-        kept = self.__dict__.setdefault("_compiled", {})
+        """One of the functions as machine code where a C compiler is there: the same numbers, faster, numbers only."""
+        return self.numeric(name).function
+
+    def numeric(self, name: Literal["rhs", "flight_rhs", "jacobian", "diagnostics"]) -> Numeric:
+        """The compiled function as a fast call on NumPy arrays."""
+        kept = self.__dict__.setdefault("_numeric", {})
         if name not in kept:
-            kept[name] = compiled(getattr(self, name))
+            kept[name] = Numeric(compiled(getattr(self, name)))
         return kept[name]
 
     @cached_property
@@ -175,7 +180,7 @@ class Helicopter:
         total = self._euler(x, u, w, inflow.solve)[1]
         values = {**total.flow, **{f"switch: {k}": v for k, v in total.switches.items()}}
         names = [name.replace(": ", "_").replace(" ", "_") for name in values]
-        return Function("diagnostics", [x, u, w], list(values.values()), ["x", "u", "wind"], names)
+        return Function("diagnostics", [x, u, w], [dense(v) for v in values.values()], ["x", "u", "wind"], names)
 
     @cached_property
     def switch_names(self) -> tuple[str, ...]:
@@ -184,8 +189,8 @@ class Helicopter:
 
     def switches(self, x: object, u: object, wind: object = (0.0, 0.0, 0.0)) -> dict[str, float]:
         """Value of every switching function at a point."""
-        values = self.compiled("diagnostics")(x=x, u=u, wind=wind)
-        return {name.removeprefix("switch_").replace("_", " "): float(v) for name, v in values.items() if name.startswith("switch_")}
+        values = zip(self.diagnostics.name_out(), self.numeric("diagnostics")(x, u, wind), strict=True)
+        return {name.removeprefix("switch_").replace("_", " "): float(v[0]) for name, v in values if name.startswith("switch_")}
 
     # --- the sum of the parts ----------------------------------------------------------------------------------
 

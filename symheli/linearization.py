@@ -25,7 +25,7 @@ def linearize(heli: Helicopter, point: TrimPoint, *, inputs: Sequence[str] | Non
         raise InputError(
             f"the point has states {', '.join(point.x.signals)}, the helicopter {', '.join(heli.states)}: trim this helicopter"
         )
-    A, B, E = (np.array(block) for block in heli.compiled("jacobian")(point.x.array, point.u.array, point.wind.array))
+    A, B, E = heli.numeric("jacobian")(point.x.array, point.u.array, point.wind.array)
     names = (*heli.inputs, *heli.wind)
     columns = indices(heli.inputs if inputs is None else inputs, names, "input")
     B = np.hstack([B, E])[:, columns]

@@ -73,9 +73,14 @@ def clip(x: Any, low: Any, high: Any, smoothing: float = 0.0) -> Any:
 
 def column(values: Any) -> Any:
     """Scalars stacked into one column expression."""
-    return casadi.vertcat(*values)
+    return dense(casadi.vertcat(*values))
 
 
 def jacobian(expression: Any, variable: Any) -> Any:
     """Dense Jacobian d expression/d variable (n, m) by algorithmic differentiation."""
     return casadi.densify(casadi.jacobian(expression, variable))
+
+
+def dense(expression: Any) -> Any:
+    """The expression with structural zeros written out."""
+    return casadi.densify(casadi.SX(expression))

@@ -17,6 +17,7 @@ from symheli.helicopter import Helicopter
 from symheli.integrate import runge_kutta
 from symheli.lpv.flight_record import FlightRecord
 from symheli.lpv.signal import UNITS, Signal
+from symheli.numeric import Numeric
 
 MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 CONTROL_PERIOD = 0.02  # s; slower sampling still flies at about this period
@@ -63,7 +64,7 @@ class _Flight:
         self.heli, self.wind, self.schedule, self.excitation = heli, wind, schedule, excitation
         self.per_sample = math.ceil(dt / CONTROL_PERIOD - 1e-9)
         self.control_dt = dt / self.per_sample
-        self.step = runge_kutta(heli, self.control_dt, math.ceil(self.control_dt / INTEGRATION_STEP - 1e-9))
+        self.step = Numeric(runge_kutta(heli, self.control_dt, math.ceil(self.control_dt / INTEGRATION_STEP - 1e-9)))
         self.samples = math.floor(schedule.duration / dt) * self.per_sample
         self.time = self.control_dt * np.arange(self.samples)
         self.speed, self.rate = schedule(self.time)
@@ -118,7 +119,7 @@ class _Flight:
             states[k, noisy] += noise[k]
             command = self.u0[k] - gains[k] @ (states[k] - self.x0[k])[seen] + self.added[k]
             inputs[k] = np.clip(command, -travel, travel)
-            flight = np.asarray(self.step(flight, inputs[k], self.wind)).ravel()
+            flight = self.step(flight, inputs[k], self.wind)[0]
             if not np.all(np.isfinite(flight)) or abs(states[k, 7]) > 1.4 or abs(states[k, 6]) > 1.4:
                 raise SymheliError(
                     f"the flight was lost at {self.time[k]:.2f} s near {self.speed[k]:.1f} m/s: less excitation, noise or acceleration, please"
