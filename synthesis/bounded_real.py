@@ -25,7 +25,7 @@ from scipy import sparse
 from synthesis.bernstein import composition, elevation_matrix, product_weights, restriction
 from synthesis.cells import Cell, Strip
 from synthesis.cone_program import ConeProgram
-from synthesis.symmetric import basis, svec
+from synthesis.symmetric import basis, smat, svec
 
 Array = np.ndarray
 
@@ -34,12 +34,22 @@ class Blocks(NamedTuple):
     """LMI blocks F = sum_j linear[., j] P_(first + j) + constant - g diag(0, I), svec'd along the last axis.
 
     `linear` (m, d + 1, n (n + 1)/2, L), `constant` (m, L), of matrices (N, N) with L = N (N + 1)/2; `first` is the index
-    of the first coefficient of P involved.
+    of the first coefficient of P involved. `likely`: expected to be among the binding ones.
     """
 
     first: int
     linear: Array
     constant: Array
+    likely: bool = True
+
+    def values(self, P: Array, N: int) -> Array:
+        """F (m, N, N) with g = 0 at the coefficients P (k, n (n + 1)/2) of the whole spline."""
+        here = P[self.first : self.first + self.linear.shape[1]]
+        return smat(np.einsum("mjvl,jv->ml", self.linear, here) + self.constant, N)
+
+    def keep(self, which: Array) -> Blocks:
+        """Only these of the m blocks."""
+        return self._replace(linear=self.linear[which], constant=self.constant[which])
 
 
 def continuous_blocks(cells: Sequence[Cell], knots: Array, degree: int, rate: float, extra: int) -> Iterator[Blocks]:
@@ -66,10 +76,15 @@ def continuous_blocks(cells: Sequence[Cell], knots: Array, degree: int, rate: fl
             yield Blocks(cell.segment * degree, linear + drift, constant)
 
 
-def discrete_blocks(strips: Sequence[Strip], knots: Array, degree: int, extra: int, ends_only: bool) -> Iterator[Blocks]:
-    """The blocks of every strip; `ends_only` keeps those on its two border lines."""
+def discrete_blocks(strips: Sequence[Strip], knots: Array, degree: int, extra: int) -> Iterator[Blocks]:
+    """The blocks of every strip. Likely to bind: the border lines of the widest cell of each segment and piece."""
+    widest: dict[tuple[int, float], float] = {}
+    for cell in (strip.cell for strip in strips):
+        place = (cell.segment, cell.piece.low)
+        widest[place] = max(widest.get(place, 0.0), cell.high - cell.low)
     for strip in strips:
         cell = strip.cell
+        wide_cell = cell.high - cell.low >= 0.5 * widest[cell.segment, cell.piece.low]
         A, B, dM = _common_degree(cell.piece.A, cell.piece.B, cell)
         M = np.concatenate([A, B], axis=2)
         E = basis(A.shape[1])
@@ -87,19 +102,15 @@ def discrete_blocks(strips: Sequence[Strip], knots: Array, degree: int, extra: i
         after = composition(degree, corners)
         up = elevation_matrix(degree + 2 * dM, d)
         now = here[:, :, None, None] * direct
-        levels = sorted({0, degree}) if ends_only else range(degree + 1)
-        for k in levels:
-            linear = np.einsum("qm,mri,ij,rvl->qjvl", up, product_weights(2 * dM, degree), after[:, k], operator, optimize=True)
-            if strip.next_segment == cell.segment:
-                yield Blocks(cell.segment * degree, linear - now, constant)
-            else:
-                first = min(strip.next_segment, cell.segment)
-                count = (abs(strip.next_segment - cell.segment) + 1) * degree + 1
-                wide = np.zeros((len(linear), count, *linear.shape[2:]))
-                start, own = (strip.next_segment - first) * degree, (cell.segment - first) * degree
-                wide[:, start : start + degree + 1] += linear
-                wide[:, own : own + degree + 1] -= now
-                yield Blocks(first * degree, wide, constant)
+        for k in range(degree + 1):
+            after_k = np.einsum("qm,mri,ij,rvl->qjvl", up, product_weights(2 * dM, degree), after[:, k], operator, optimize=True)
+            first = min(strip.next_segment, cell.segment)
+            count = (abs(strip.next_segment - cell.segment) + 1) * degree + 1
+            linear = np.zeros((len(after_k), count, *after_k.shape[2:]))
+            start, own = (strip.next_segment - first) * degree, (cell.segment - first) * degree
+            linear[:, start : start + degree + 1] += after_k
+            linear[:, own : own + degree + 1] -= now
+            yield Blocks(first * degree, linear, constant, wide_cell and k in (0, degree))
 
 
 def assemble(blocks: Sequence[Blocks], states: int, inputs: int, unknowns: int, margin: float, floor: float) -> ConeProgram:

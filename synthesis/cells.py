@@ -69,10 +69,3 @@ def strips(pieces: Sequence[ModelPiece], knots: Array, step: float) -> tuple[Str
             corners = tuple((inside(p - step), inside(p + step)) for p in (cell.low, cell.high))
             out.append(Strip(cell, segment, corners))  # type: ignore[arg-type]
     return tuple(out)
-
-
-def lean_strips(pieces: Sequence[ModelPiece], knots: Array, step: float) -> tuple[Strip, ...]:
-    """One strip a cell, P continued beyond its segment by one `step`: enough for a solver, not for a proof."""
-    return tuple(
-        Strip(c, c.segment, ((c.low - step, c.low + step), (c.high - step, c.high + step))) for c in cells(pieces, knots)
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from functools import partial
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from synthesis.bounded_real import Blocks, assemble, continuous_blocks, discrete_blocks
-from synthesis.cells import cells, lean_strips, strips
+from synthesis.cells import cells, strips
 from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
 from synthesis.cone_program import Answer, Candidate, Solver, solve
 from synthesis.frozen import frozen_gain, least_damped
@@ -22,12 +22,17 @@ from synthesis.lyapunov import SplineLyapunov, graded_knots
 from synthesis.pieces import ModelPiece, model_pieces
 from synthesis.scaling import Scaling, scaling
 from synthesis.symmetric import smat
-from synthesis.verify import examine, holds_on_grid, proven
+from synthesis.verify import Claim, examine, holds_on_grid, proven
 
 Array = np.ndarray
 
 INFLATION = 1e-6
 """gamma^2 is raised by this fraction above what P admits in floating point, so that an exact proof has room."""
+
+VIOLATED = 1e-8
+"""A block left out of the program joins it when its largest eigenvalue (scaled) exceeds this."""
+ROUNDS = 12
+"""Most rounds of adding violated blocks; what then remains violated only makes the recomputed gain larger."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +116,7 @@ def l2_gain(
         return _certificate(lpv, rate, solver, None, math.inf, frozen.gamma, Status.GROWING, below.trajectory, bounds)
     problem = _problem(lpv, rate, below.gamma, with_gain=True)
     best = _search(problem, relaxation, solver, relaxation.accept * below.gamma)
-    return _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds)
+    return _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds, relaxation.elevation)
 
 
 def stability(
@@ -129,7 +134,7 @@ def stability(
         return _certificate(lpv, rate, solver, None, math.nan, math.nan, Status.UNSTABLE, at_rest, 0.0)
     problem = _problem(lpv, rate, 1.0, with_gain=False)
     best = _search(problem, relaxation, solver, math.inf)
-    return _certificate(lpv, rate, solver, (problem, best), math.nan, math.nan, None, None, 0.0)
+    return _certificate(lpv, rate, solver, (problem, best), math.nan, math.nan, None, None, 0.0, relaxation.elevation)
 
 
 def _check(lpv: LPVStateSpace, rate: float | None, *, with_gain: bool) -> float:
@@ -171,15 +176,15 @@ def _search(problem: _Problem, relaxation: Relaxation, solver: Solver, accept: f
         if len(knots) in tried:
             continue
         tried.add(len(knots))
-        for lean, margin in _tries(problem, relaxation, knots, degree):
-            result = _attempt(problem, relaxation, solver, knots, degree, margin, lean)
+        for margin in relaxation.margins:
+            result = _attempt(problem, relaxation, solver, knots, degree, margin)
             spent += np.array(result.seconds)
             attempts += result.attempts
             if result.lyapunov is not None and (best.lyapunov is None or result.gamma < best.gamma):
                 best = result
             elif best.lyapunov is None:
                 best = best._replace(answer=result.answer)
-            if result.lyapunov is not None or (result.answer is Answer.INFEASIBLE and not lean):
+            if result.lyapunov is not None or result.answer is Answer.INFEASIBLE:
                 break
         if best.lyapunov is not None and not best.gamma > accept:
             break
@@ -200,43 +205,59 @@ def _knots(problem: _Problem, relaxation: Relaxation, segments: int, degree: int
     return graded_knots(low, high, segments, relaxation.grading, breaks, shortest=2.5 * problem.step)
 
 
-def _tries(problem: _Problem, relaxation: Relaxation, knots: Array, degree: int) -> list[tuple[bool, float]]:
-    if problem.lpv.dt is None or degree == 0 or problem.rate == 0:
-        return [(False, margin) for margin in relaxation.margins]
-    lean = [(True, margin) for margin in relaxation.margins] if len(knots) > 2 else []
-    return [*lean, (False, relaxation.margins[-1])]
-
-
-def _blocks(problem: _Problem, relaxation: Relaxation, knots: Array, degree: int, lean: bool) -> Sequence[Blocks]:
+def _blocks(problem: _Problem, relaxation: Relaxation, knots: Array, degree: int) -> list[Blocks]:
     if problem.lpv.dt is None:
         rate = problem.scaled_rate if degree else 0.0
         return list(continuous_blocks(cells(problem.scaled, knots), knots, degree, rate, relaxation.elevation))
-    step = problem.step if degree else 0.0
-    regions = lean_strips(problem.scaled, knots, step) if lean else strips(problem.scaled, knots, step)
-    return list(discrete_blocks(regions, knots, degree, relaxation.elevation, ends_only=lean))
+    regions = strips(problem.scaled, knots, problem.step if degree else 0.0)
+    return list(discrete_blocks(regions, knots, degree, relaxation.elevation))
 
 
-def _attempt(
-    problem: _Problem, relaxation: Relaxation, solver: Solver, knots: Array, degree: int, margin: float, lean: bool
-) -> _Result:  # fmt: skip
-    clock = [time.perf_counter()]
-    n, unknowns = len(problem.lpv.states), (len(knots) - 1) * degree + 1
-    blocks = _blocks(problem, relaxation, knots, degree, lean)
-    program = assemble(blocks, n, len(problem.lpv.inputs), unknowns, margin, relaxation.floor)
-    clock.append(time.perf_counter())
-    candidate = solve(program, solver)
-    clock.append(time.perf_counter())
-    gamma, lyapunov, conditioning = _verified(problem, candidate, knots, degree, unknowns)
-    clock.append(time.perf_counter())
-    words = f"{candidate.message}, {'verified' if lyapunov is not None else 'not verified'}"
+def _attempt(problem: _Problem, relaxation: Relaxation, solver: Solver, knots: Array, degree: int, margin: float) -> _Result:
+    start = time.perf_counter()
+    unknowns = (len(knots) - 1) * degree + 1
+    blocks = _blocks(problem, relaxation, knots, degree)
+    candidate, rounds = _solve_by_rounds(problem, relaxation, solver, blocks, unknowns, margin)
+    solved = time.perf_counter()
+    gamma, lyapunov, conditioning = _verified(problem, candidate, knots, degree, unknowns, relaxation.elevation)
+    seconds = Seconds(solved - start - candidate.seconds, candidate.seconds, time.perf_counter() - solved)
+    words = f"{candidate.message} ({rounds} round(s)), {'verified' if lyapunov is not None else 'not verified'}"
     if problem.with_gain and lyapunov is not None:
         words += f", gamma {gamma:.6g}"
     attempt = Attempt(len(knots) - 1, degree, margin, words, gamma)
-    return _Result(gamma, lyapunov, conditioning, candidate.answer, Seconds(*np.diff(clock)), (attempt,))
+    return _Result(gamma, lyapunov, conditioning, candidate.answer, seconds, (attempt,))
+
+
+def _solve_by_rounds(
+    problem: _Problem, relaxation: Relaxation, solver: Solver, blocks: list[Blocks], unknowns: int, margin: float
+) -> tuple[Candidate, int]:  # fmt: skip
+    """Solve with the blocks likely to bind, add those that came out violated, and so on: far fewer blocks in all."""
+    n, m = len(problem.lpv.states), len(problem.lpv.inputs)
+    active = [np.full(len(block.constant), block.likely) for block in blocks]
+    seconds, rounds = 0.0, 0
+    while True:
+        rounds += 1
+        chosen = [block.keep(which) for block, which in zip(blocks, active, strict=True) if which.any()]
+        candidate = solve(assemble(chosen, n, m, unknowns, margin, relaxation.floor), solver)
+        seconds += candidate.seconds
+        if candidate.x is None or rounds == ROUNDS:
+            break
+        P, level = candidate.x[:-1].reshape(unknowns, -1), candidate.x[-1]
+        target = np.diag(np.concatenate([np.zeros(n), np.full(m, level)])) if problem.with_gain else -level * np.eye(n)
+        added = 0
+        for block, which in zip(blocks, active, strict=True):
+            if which.all():
+                continue
+            new = ~which & (np.linalg.eigvalsh(block.values(P, n + m) - target)[:, -1] > VIOLATED)
+            which |= new
+            added += int(new.sum())
+        if not added:
+            break
+    return replace(candidate, seconds=seconds), rounds
 
 
 def _verified(
-    problem: _Problem, candidate: Candidate, knots: Array, degree: int, unknowns: int
+    problem: _Problem, candidate: Candidate, knots: Array, degree: int, unknowns: int, elevation: int
 ) -> tuple[float, SplineLyapunov | None, float]:  # fmt: skip
     """The gain that P itself admits, whatever the solver said; None where P proves nothing."""
     nothing = math.inf, None, math.inf
@@ -247,7 +268,8 @@ def _verified(
     P = SplineLyapunov(knots, degree, units.to_physical(scaled))
     # judged as it is stored: from the physical matrices back to scaled units
     back = SplineLyapunov(knots, degree, units.to_scaled(P.coefficients))
-    findings = examine(problem.scaled, back, problem.scaled_rate if problem.lpv.dt is None else problem.rate, problem.lpv.dt)
+    rate = problem.scaled_rate if problem.lpv.dt is None else problem.rate
+    findings = examine(Claim(problem.scaled, back, rate, problem.lpv.dt, elevation))
     if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
         return nothing
     gamma = units.channel * math.sqrt(findings.g * (1 + INFLATION)) if problem.with_gain else math.nan
@@ -258,7 +280,7 @@ def _verified(
 
 def _certificate(
     lpv: LPVStateSpace, rate: float, solver: Solver, found: tuple[_Problem, _Result] | None, lower: float, frozen: float,
-    status: Status | None, worst: Trajectory | None, bounds: float,
+    status: Status | None, worst: Trajectory | None, bounds: float, elevation: int = 0,
 ) -> Certificate:  # fmt: skip
     kind = "stability" if math.isnan(lower) else "l2 gain"
     named = f"{solver.name} {solver.version}, tolerance {solver.tolerance:g}"
@@ -275,24 +297,11 @@ def _certificate(
     gamma = best.gamma if verified else nothing
     proof = None
     if best.lyapunov is not None:
-        proof = _Proof(problem.pieces, best.lyapunov, rate, lpv.dt, gamma)
+        proof = partial(proven, Claim(problem.pieces, best.lyapunov, rate, lpv.dt, elevation), gamma)
     return Certificate(
         kind, gamma, lower, frozen, status, verified, best.lyapunov, rate, _hypotheses(lpv, rate, best.lyapunov, kind), named,
         best.seconds._replace(bounds=bounds), best.conditioning, best.attempts, worst, lpv.scheduling.unit, proof,
     )  # fmt: skip
-
-
-class _Proof(NamedTuple):
-    """What the exact verification needs; calling it decides."""
-
-    pieces: tuple[ModelPiece, ...]
-    lyapunov: SplineLyapunov
-    rate: float
-    dt: float | None
-    gamma: float
-
-    def __call__(self) -> bool:
-        return proven(self.pieces, self.lyapunov, self.rate, self.dt, self.gamma)
 
 
 def _hypotheses(lpv: LPVStateSpace, rate: float, P: SplineLyapunov | None, kind: str) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ Nothing here is shared with the assembly of the cone program: an error there can
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -34,11 +34,30 @@ class Findings(NamedTuple):
     conditioning: float
 
 
-def lmi_polynomials(pieces: Sequence[ModelPiece], P: SplineLyapunov, rate: float, dt: float | None, number: Number) -> Iterator[Array]:
+class Claim(NamedTuple):
+    """What is to be verified: the pieces of the model, P, the rate (units of p per second) and dt (s, None: continuous).
+
+    `elevation` raises the degree of the Bernstein forms, which brings their coefficients closer to the values.
+    """
+
+    pieces: tuple[ModelPiece, ...]
+    P: SplineLyapunov
+    rate: float
+    dt: float | None
+    elevation: int = 0
+
+
+def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Array]:
     """Bernstein coefficients (a + 1, b + 1, N, N) of every block over the whole range, with g = 0.
 
     `number` turns a double into the arithmetic of the proof.
     """
+    for F in _polynomials(claim, number):
+        yield elevate(F, (F.shape[0] - 1 + claim.elevation, F.shape[1] - 1))
+
+
+def _polynomials(claim: Claim, number: Number) -> Iterator[Array]:
+    pieces, P, rate, dt, _ = claim
     convert = np.frompyfunc(number, 1, 1)
 
     def exact(values: Array) -> Array:
@@ -110,14 +129,15 @@ def _stack(top: list[Array], side: list[Array], corner: list[Array]) -> Array:
     return np.concatenate([upper, lower], axis=-2)
 
 
-def examine(pieces: Sequence[ModelPiece], P: SplineLyapunov, rate: float, dt: float | None) -> Findings:
+def examine(claim: Claim) -> Findings:
     """Floating point: eigenvalues of every coefficient, and the least g by Schur complement. Pass scaled data."""
+    P = claim.P
     n = P.coefficients.shape[1]
     values = np.linalg.eigvalsh(P.coefficients)
     positive = bool(np.all(values[:, 0] > _rounding(n) * np.abs(values).max()))
     conditioning = float(np.max(values[:, -1] / values[:, 0])) if positive else math.inf
     decreasing, g = True, 0.0
-    for F in lmi_polynomials(pieces, P, rate, dt, float):
+    for F in lmi_polynomials(claim, float):
         F = F.reshape(-1, *F.shape[-2:])
         top = F[:, :n, :n]
         eigenvalues = np.linalg.eigvalsh(top)
@@ -163,19 +183,19 @@ def holds_on_grid(lpv: LPVStateSpace, P: SplineLyapunov, rate: float, gamma: flo
     return True
 
 
-def proven(pieces: Sequence[ModelPiece], P: SplineLyapunov, rate: float, dt: float | None, gamma: float) -> bool:
+def proven(claim: Claim, gamma: float) -> bool:
     """Exact rational arithmetic over the whole interval: P > 0 and every block < 0 with g = gamma^2 (NaN: stability).
 
     The doubles of the pieces, of P, of rate and of gamma are taken as the rationals they are. Uses python-flint where
     installed, else the (slower) fractions of the standard library.
     """
-    number = rational()
+    number, P = rational(), claim.P
     n = P.coefficients.shape[1]
     for coefficient in P.coefficients:
         if not positive_definite(np.array([[number(float(v)) for v in row] for row in coefficient], dtype=object)):
             return False
     g = None if math.isnan(gamma) else number(gamma) * number(gamma)
-    for F in lmi_polynomials(pieces, P, rate, dt, number):
+    for F in lmi_polynomials(claim, number):
         for M in F.reshape(-1, *F.shape[-2:]):
             M = -M
             if g is None:
