@@ -40,7 +40,9 @@ LONGITUDINAL = Axis(
     "longitudinal-vertical", ("u", "w", "q", "theta"), ("d_lon", "d_col"), "pitch/flap", {"q": (90.0, 80.0), "theta": (90.0, 80.0)}
 )
 LATERAL = Axis("lateral-directional", ("v", "p", "r", "phi"), ("d_lat", "d_ped"), "roll/flap", {"p": (85.0, 80.0)})
-LATERAL_WITH_COLLECTIVE = Axis("lateral-directional, other inputs measured", LATERAL.outputs, ("d_lat", "d_ped", "d_lon", "d_col"), "roll/flap", LATERAL.marks)
+LATERAL_WITH_COLLECTIVE = Axis(
+    "lateral-directional, other inputs measured", LATERAL.outputs, ("d_lat", "d_ped", "d_lon", "d_col"), "roll/flap", LATERAL.marks
+)
 ALL = Axis(
     "all axes (MIMO)", ("u", "v", "w", "p", "q", "r", "phi", "theta"), ("d_lon", "d_lat", "d_col", "d_ped"), "roll/flap",
     {"q": (90.0, 80.0), "theta": (90.0, 80.0), "p": (85.0, 80.0)},

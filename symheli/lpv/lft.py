@@ -103,7 +103,7 @@ class LFT:
 
         M(delta) = M22 + sum_i delta^i M21 M11^(i-1) M12, so the order is the rank of the block Hankel matrix of
         its Markov parameters, and the singular vectors realize it (Ho-Kalman). Singular values below `tolerance`
-        times the largest count as zero.
+        times the largest count as zero, as does dependence below `tolerance` times the entry itself.
         """
         if len(self.blocks) != 1:
             raise InputError("exact reduction is for one scheduling parameter; this LFT has " + str(len(self.blocks)))
@@ -123,6 +123,8 @@ class LFT:
                 M21=np.zeros((rows, 0)),
                 blocks=(Block(self.blocks[0].scheduling, 0),),
             )
+        # what is below rounding of the constant part of an entry is not dependence on the parameter
+        markov = [np.where(np.abs(M) > tolerance * np.abs(self.M22), M, 0.0) for M in markov]
         # states and channels of different size: balance rows and columns so that the rank is judged entry by entry
         size = np.abs(np.stack(markov)).max(axis=0)
         row_scale, column_scale = _equilibrate(size)

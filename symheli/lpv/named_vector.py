@@ -26,6 +26,9 @@ class NamedVector(Mapping[str, float]):
             raise UnknownNameError("signal", name, self.signals)
         return float(self.array[self.signals.index(name)])  # type: ignore[arg-type]
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.signals)
 
