@@ -1,0 +1,51 @@
+"""symheli certify: a proven gain of the lateral loop while the airspeed changes at a bounded rate."""
+
+from __future__ import annotations
+
+import argparse
+
+from studies.commands import options
+from studies.output import Output, progress
+
+HELP = "proven gain and stability of the lateral loop for a rate of airspeed"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Rate, range and channel."""
+    options.vehicle(parser)
+    parser.add_argument(
+        "--rate", type=options.rate, default=3.0, metavar="M/S^2", help="largest |dV/dt|, m/s^2, or inf (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--airspeeds", type=options.number, nargs=2, default=(0.0, 13.0), metavar=("LOW", "HIGH"), help="range, m/s (default: 0 13)"
+    )
+    parser.add_argument(
+        "--channel", choices=("gust", "inputs"), default="gust", help="lateral gust, or disturbances at the inputs, -> r, phi"
+    )
+    parser.add_argument("--stability", action="store_true", help="stability only, no gain")
+    parser.add_argument("--rigorous", action="store_true", help="verify once more in exact rational arithmetic")
+
+
+def run(arguments: argparse.Namespace) -> Output:
+    """Build the loop, prove, verify; exit status 1 where nothing could be proven."""
+    import synthesis
+    from studies.lateral_loop import HOLD, lateral_loop
+
+    low, high = arguments.airspeeds
+    progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
+    loop = lateral_loop(options.helicopter(arguments), low, high, arguments.channel)
+    progress(f"searching a Lyapunov function for |dV/dt| <= {arguments.rate:g} m/s^2")
+    certify = synthesis.stability if arguments.stability else synthesis.l2_gain
+    cert = certify(loop, rate=arguments.rate)
+    exact = None
+    if arguments.rigorous:
+        progress("verifying in rational arithmetic")
+        exact = cert.verify(rigorous=True)
+    head = f"lateral loop of {arguments.vehicle}, d_lat = {HOLD:g} phi, {low:g} to {high:g} m/s, {arguments.channel} -> r, phi (SI)"
+    text = f"{head}\n{cert}" + ("" if exact is None else f"\n  exact verification: {'passed' if exact else 'not passed'}")
+    data = {
+        "loop": head, "kind": cert.kind, "rate": cert.rate, "gamma": cert.gamma, "lower": cert.lower, "frozen": cert.frozen,
+        "status": cert.status.name, "verified": cert.verified, "exact": exact, "hypotheses": cert.hypotheses, "solver": cert.solver,
+        "seconds": cert.seconds._asdict(),
+    }  # fmt: skip
+    return Output(text, data, status=0 if cert.verified and exact is not False else 1)

@@ -1,0 +1,80 @@
+"""symheli doctor: what is installed, and what it means for the work."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import tempfile
+from importlib.metadata import PackageNotFoundError, version
+
+from studies.output import Output, columns
+
+HELP = "versions, C compiler, solvers, cache: what works on this computer"
+
+REQUIRED = ("casadi", "sympy", "numpy", "scipy", "control", "cvxpy", "clarabel")
+OPTIONAL = {
+    "matplotlib": "figures of the study",
+    "jinja2": "report of the study",
+    "pandas": "reading CSV logs, data frames",
+    "pyulog": "reading PX4 logs",
+    "python-flint": "fast exact verification of certificates",
+    "scs": "a second solver to cross-check",
+    "slycot": "more of python-control",
+}
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """No options of its own."""
+
+
+def run(arguments: argparse.Namespace) -> Output:
+    """Look, and exit with 1 where something required is missing."""
+    from symheli.compile import cache_directory, compiler
+    from synthesis import installed_solvers
+
+    required, optional = {n: _version(n) for n in REQUIRED}, {n: _version(n) for n in OPTIONAL}
+    cc, cache, problem = compiler(), cache_directory(), _unwritable(str(cache_directory()))
+    solvers = installed_solvers()
+    rows = [["python", platform.python_version(), ""], *([n, v or "MISSING", "required"] for n, v in required.items())]
+    rows += [[n, v or "not installed", OPTIONAL[n]] for n, v in optional.items()]
+    if cc:
+        compiling = f"C compiler: {cc}; models run as machine code"
+    elif os.environ.get("SYMHELI_COMPILE") == "0":
+        compiling = (
+            "C compiler: switched off by SYMHELI_COMPILE=0; models run in the CasADi virtual machine, several times slower, same numbers"
+        )
+    else:
+        compiling = (
+            "C compiler: none found; models run in the CasADi virtual machine, several times slower, same numbers (install gcc or set CC)"
+        )
+    text = "\n".join(
+        (
+            columns(rows, left=3),
+            compiling,
+            f"solvers for matrix inequalities: {', '.join(solvers) or 'NONE'}",
+            f"cache of compiled models: {cache} ({problem or 'writable'})",
+        )
+    )
+    missing = [n for n, v in required.items() if v is None]
+    data = {
+        "python": platform.python_version(), "required": required, "optional": optional, "compiler": cc, "solvers": solvers,
+        "cache": str(cache), "cache_writable": not problem, "missing": missing,
+    }  # fmt: skip
+    return Output(text, data, status=1 if missing or not solvers else 0)
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _unwritable(folder: str) -> str:
+    try:
+        os.makedirs(folder, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder):
+            return ""
+    except OSError as error:
+        return f"NOT writable, models run uncompiled: {error.strerror}; set SYMHELI_CACHE to a folder that is"

@@ -1,0 +1,40 @@
+"""symheli export: the model for other programs, as C code or as a MATLAB file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from studies.commands import options
+from studies.output import Output
+
+HELP = "C code of the equations of motion, or a MATLAB file of the linear family"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """What, of which helicopter, to where."""
+    parser.add_argument("format", choices=("c", "mat"), help="c: equations of motion and header; mat: linear models along airspeed")
+    options.vehicle(parser)
+    parser.add_argument("--out", type=Path, metavar="PATH", help="file to write (default: NAME_rhs.c or NAME_family.mat)")
+    parser.add_argument(
+        "--airspeeds", type=options.number, nargs=2, default=(0.0, 13.0), metavar=("LOW", "HIGH"), help="of the family, m/s (default: 0 13)"
+    )
+    parser.add_argument(
+        "--points", type=options.at_least_one, default=14, metavar="N", help="airspeeds of the family (default: %(default)s)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> Output:
+    """Write the file(s) and say which."""
+    heli = options.helicopter(arguments)
+    name = Path(arguments.vehicle).stem
+    if arguments.format == "c":
+        from studies.export_c import write_c
+
+        written = write_c(heli, arguments.out or Path(f"{name}_rhs.c"))
+    else:
+        from studies.export_mat import write_mat
+
+        low, high = arguments.airspeeds
+        written = write_mat(heli, low, high, arguments.points, arguments.out or Path(f"{name}_family.mat"))
+    return Output("\n".join(f"wrote {path}" for path in written), {"written": written})

@@ -1,0 +1,119 @@
+"""Options that several verbs share."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from symheli import Helicopter
+    from symheli.equilibrium import TrimPoint
+
+
+def vehicle(parser: argparse.ArgumentParser, governor: str = "ideal") -> None:
+    """--vehicle and --governor."""
+    parser.add_argument("--vehicle", default="xcell60", metavar="NAME", help="packaged airframe or TOML file (default: %(default)s)")
+    parser.add_argument("--governor", choices=("ideal", "pi"), default=governor, help="rotor speed held exactly, or engine and governor")
+
+
+def condition(parser: argparse.ArgumentParser) -> None:
+    """The steady flight to trim."""
+    parser.add_argument("--airspeed", type=number, default=0.0, metavar="M/S", help="true airspeed, m/s (default: hover)")
+    parser.add_argument("--climb-rate", type=number, default=0.0, metavar="M/S", help="m/s, up")
+    parser.add_argument("--turn-rate", type=number, default=0.0, metavar="RAD/S", help="rad/s, to the right")
+    parser.add_argument("--sideslip-deg", type=number, default=0.0, metavar="DEG", help="degrees, airspeed from the right")
+
+
+def helicopter(arguments: argparse.Namespace) -> Helicopter:
+    """The helicopter of --vehicle and --governor."""
+    from symheli import Helicopter
+
+    return Helicopter.load(arguments.vehicle, governor=arguments.governor)
+
+
+def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
+    """The helicopter and its trim at the flight condition of the options."""
+    from symheli import trim
+
+    heli = helicopter(arguments)
+    point = trim(
+        heli, arguments.airspeed, climb_rate=arguments.climb_rate, turn_rate=arguments.turn_rate,
+        sideslip=math.radians(arguments.sideslip_deg),
+    )  # fmt: skip
+    return heli, point
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    value = _float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a finite number, got {text!r}")
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number > 0."""
+    value = number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"expected a number > 0, got {text!r}")
+    return value
+
+
+def rate(text: str) -> float:
+    """A number >= 0, or inf."""
+    value = _float(text)
+    if not value >= 0:
+        raise argparse.ArgumentTypeError(f"expected a number >= 0 or inf, got {text!r}")
+    return value
+
+
+def fraction(text: str) -> float:
+    """A number in (0, 1]."""
+    value = number(text)
+    if not 0 < value <= 1:
+        raise argparse.ArgumentTypeError(f"expected a fraction in (0, 1], got {text!r}")
+    return value
+
+
+def count(text: str) -> int:
+    """A whole number >= 0."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"expected a whole number >= 0, got {text!r}")
+    return int(text)
+
+
+def at_least_one(text: str) -> int:
+    """A whole number >= 1."""
+    value = count(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number >= 1, got {text!r}")
+    return value
+
+
+def names(text: str) -> tuple[str, ...]:
+    """a,b,c"""
+    found = tuple(part.strip() for part in text.split(","))
+    if not all(found):
+        raise argparse.ArgumentTypeError(f"expected names with commas between them, got {text!r}")
+    return found
+
+
+def unit(text: str) -> tuple[str, str]:
+    """name=unit"""
+    name, sign, value = text.partition("=")
+    if not (name and sign and value):
+        raise argparse.ArgumentTypeError(f"expected name=unit such as q=deg/s, got {text!r}")
+    return name, value
+
+
+def _float(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"expected a number, got {text!r}") from error
+
+
+def named(vector: Any) -> dict[str, dict[str, Any]]:
+    """{name: {value, unit}} of a named vector."""
+    return {str(s): {"value": float(v), "unit": s.unit} for s, v in zip(vector.signals, vector.array, strict=True)}

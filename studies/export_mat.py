@@ -1,0 +1,50 @@
+"""The linear family as a MATLAB file."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+import symheli
+from studies.files import write_bytes
+from symheli import Helicopter, LinearFamily, Signal
+from symheli.errors import InputError
+
+README = (
+    "dx/dt = A(:,:,k) dx + B(:,:,k) du, dy = C(:,:,k) dx + D(:,:,k) du about x0(:,k), u0(:,k) at airspeeds(k) m/s; "
+    "SI units and radians, body axes x forward y right z down; states, inputs, outputs name the rows and columns, units beside them"
+)
+
+
+def write_mat(heli: Helicopter, low: float, high: float, points: int, path: Path) -> tuple[Path, ...]:
+    """Sweep `points` airspeeds from `low` to `high` m/s and write the family to `path`."""
+    if not (0 <= low < high and points >= 2):
+        raise InputError(f"expected 0 <= LOW < HIGH and at least two points, got {low:g} to {high:g} m/s in {points}")
+    family = symheli.sweep(heli, np.linspace(low, high, points))  # type: ignore[arg-type]
+    return (write_bytes(path, content(family, f"{heli.vehicle.title}, {heli.governor} governor; {heli.vehicle.source}")),)
+
+
+def content(family: LinearFamily, title: str) -> bytes:
+    """The bytes of a version 5 MAT file (MATLAB, Octave, scipy.io.loadmat)."""
+    from scipy.io import savemat
+
+    arrays = {name: np.moveaxis(getattr(family, name), 0, -1) for name in "ABCD"}
+    labels = {
+        key: cells
+        for group in ("states", "inputs", "outputs")
+        for key, cells in ((group, _cells(getattr(family, group))), (f"{group}_units", _cells([s.unit for s in getattr(family, group)])))
+    }
+    trims = {
+        "x0": np.column_stack([[t.x[s] for s in family.states] for t in family.trims]),
+        "u0": np.column_stack([[t.u[s] for s in family.inputs] for t in family.trims]),
+    }
+    kinks = np.array(sorted(v for found in family.kinks.values() for v in found))
+    buffer = io.BytesIO()
+    savemat(buffer, {"airspeeds": family.airspeeds, "title": title, "readme": README, "kink_airspeeds": kinks, **arrays, **labels, **trims})
+    return buffer.getvalue()
+
+
+def _cells(names: list[str] | tuple[Signal, ...]) -> np.ndarray:
+    return np.array([str(n) for n in names], dtype=object)

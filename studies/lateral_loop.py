@@ -1,0 +1,30 @@
+"""The lateral loop whose gain depends on how fast the airspeed may change."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+import symheli
+from symheli import Helicopter, LPVStateSpace
+
+STATES = ("v", "p", "r", "phi", "b1")
+OUTPUTS = ("r", "phi")
+CHANNELS = {"gust": ("v_w",), "inputs": ("d_lat", "d_ped")}
+HOLD = -0.02
+"""Attitude hold d_lat = HOLD phi, rad per rad."""
+
+
+def lateral_loop(
+    heli: Helicopter, low: float = 0.0, high: float = 13.0, channel: Literal["gust", "inputs"] = "gust", degree: int = 3, points: int = 27
+) -> LPVStateSpace:
+    """v p r phi b1 from `low` to `high` m/s under attitude hold, element-wise polynomials of `degree` through `points` airspeeds.
+
+    channel "gust": lateral gust v_w (m/s) -> r (rad/s), phi (rad); "inputs": disturbances added to d_lat, d_ped (rad) -> the same.
+    """
+    disturbances = CHANNELS[channel]
+    inputs = tuple(dict.fromkeys(("d_lat", *disturbances)))
+    family = symheli.sweep(heli, np.linspace(low, high, points), inputs=inputs)  # type: ignore[arg-type]
+    model = family.select(STATES, inputs).interpolate("polynomial", degree)
+    return model.feedback({("d_lat", "phi"): HOLD}).select(inputs=disturbances, outputs=OUTPUTS)

@@ -1,0 +1,69 @@
+"""Opening a log of any known format, with the signals that are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.logs.files import existing
+from symheli.lpv import FlightRecord
+from symheli.lpv.signal import UNITS
+
+Format = Literal["xplane", "csv", "mat"]
+TIMES = ("t", "time")
+"""Columns taken as the time where none is named."""
+
+
+def format_of(path: Path) -> Format:
+    """By extension, then by content: a MATLAB file, an X-Plane log ("name,unit |" in its first line), else a table."""
+    existing(path)
+    if path.suffix.lower() == ".mat":
+        return "mat"
+    if path.suffix.lower() == ".ulg":
+        raise InputError(f"{path}: PX4 logs need topics; read it in Python with FlightRecord.from_ulog and write a CSV with to_frame()")
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if head.startswith(b"MATLAB"):
+        return "mat"
+    first = next((line for line in head.splitlines() if line.strip()), b"")
+    return "xplane" if b"|" in first and b"," in first.split(b"|")[0] else "csv"
+
+
+def read(
+    path: Path, signals: Sequence[str], *, format: Format, dt: float | None, time: str | None, units: Mapping[str, str]
+) -> FlightRecord:
+    """The record, on a uniform step where `dt` (s) says so.
+
+    X-Plane logs declare their units. Elsewhere `units` declares those of `signals`; the names every room knows (u, q, theta,
+    ...) are SI unless declared otherwise. `time` and `dt` together resample. Raises `InputError`.
+    """
+    if format == "xplane":
+        return FlightRecord.from_xplane(path, dt)
+    declared = {name: units.get(name) or UNITS.get(name) or _undeclared(name) for name in signals}
+    for name in units:
+        if name not in declared:
+            raise UnknownNameError("signal in --units", name, declared)
+    if format == "mat":
+        record = FlightRecord.from_mat(path, time or "t", declared)
+    else:
+        column = time or _time_column(path, dt)
+        record = FlightRecord.from_csv(path, column, declared, dt if column is None else None)
+        time = column
+    return record.resample(dt) if dt is not None and time is not None else record
+
+
+def _undeclared(name: str) -> str:
+    raise InputError(f"the unit of {name!r} is not known: --units {name}=UNIT, such as rad, deg/s, m/s, or 1 where it has none")
+
+
+def _time_column(path: Path, dt: float | None) -> str | None:
+    if dt is not None:
+        return None
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        header = [name.strip().strip('"') for name in file.readline().split(",")]
+    for name in TIMES:
+        if name in header:
+            return name
+    raise InputError(f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample period with --dt")
