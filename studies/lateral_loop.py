@@ -23,8 +23,10 @@ def lateral_loop(
 
     channel "gust": lateral gust v_w (m/s) -> r (rad/s), phi (rad); "inputs": disturbances added to d_lat, d_ped (rad) -> the same.
     """
-    disturbances = CHANNELS[channel]
-    inputs = tuple(dict.fromkeys(("d_lat", *disturbances)))
-    family = symheli.sweep(heli, np.linspace(low, high, points), inputs=inputs)  # type: ignore[arg-type]
-    model = family.select(STATES, inputs).interpolate("polynomial", degree)
-    return model.feedback({("d_lat", "phi"): HOLD}).select(inputs=disturbances, outputs=OUTPUTS)
+    family = symheli.sweep(heli, np.linspace(low, high, points), inputs=("d_lat", "d_ped", "v_w"))  # type: ignore[arg-type]
+    return close(family.select(STATES, ("d_lat", "d_ped", "v_w")).interpolate("polynomial", degree), channel)
+
+
+def close(lateral: LPVStateSpace, channel: Literal["gust", "inputs"]) -> LPVStateSpace:
+    """Attitude hold around any lateral model (continuous or sampled) that has the channel's inputs and the outputs r and phi."""
+    return lateral.feedback({("d_lat", "phi"): HOLD}).select(inputs=CHANNELS[channel], outputs=OUTPUTS)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, fly
 from symheli.flight import Autopilot, gain_scheduled_lqr
 
@@ -43,17 +41,17 @@ class FlightPlan:
         """A transition no fit has seen: hover, 13 m/s, hover at 3.2 m/s^2, other multisines, other noise."""
         return self._fly(heli, AirspeedSchedule.transition(0.0, TOP, acceleration, hold=2.0), autopilot, 3000)
 
-    def _fly(self, heli: Helicopter, schedule: AirspeedSchedule, autopilot: Autopilot, offset: int) -> FlightRecord:
+    def gentle(self, heli: Helicopter, autopilot: Autopilot, ramps: int = 10) -> FlightRecord:
+        """Slow ramps (1 m/s^2) with long holds and lower frequencies: what the barely damped slow modes need to be seen."""
+        schedule = AirspeedSchedule.varied(0.0, TOP, (1.0,) * ramps, 4.0, seed=4000 + self.seed)
+        return self._fly(heli, schedule, autopilot, 5000, lowest=0.03)
+
+    def _fly(self, heli: Helicopter, schedule: AirspeedSchedule, autopilot: Autopilot, offset: int, lowest: float = 0.1) -> FlightRecord:
         seed = offset + self.seed
-        excitation = Excitation(AMPLITUDE, "multisine", (0.1, 5.0), seed)
+        excitation = Excitation(AMPLITUDE, "multisine", (lowest, 5.0), seed)
         return fly(heli, schedule, dt=self.dt, excitation=excitation, noise_db=self.noise_db, seed=seed, autopilot=autopilot)
 
 
 def autopilot_for(heli: Helicopter, dt: float = 0.02) -> Autopilot:
     """The gain-scheduled LQR all flights of the study share."""
     return gain_scheduled_lqr(heli, 0.0, TOP, dt)
-
-
-def spread(record: FlightRecord, names: tuple[str, ...]) -> np.ndarray:
-    """Standard deviation of each named signal."""
-    return record.columns(names).std(axis=0)

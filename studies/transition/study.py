@@ -1,0 +1,204 @@
+"""The main job: from the helicopter's equations to certified gains, on the baseline and on the identified model."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from identification import LPVARXModel
+from studies.transition import axes, guarantees
+from studies.transition.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis, Scores
+from studies.transition.baseline import Baseline, build_baseline
+from studies.transition.comparison import Comparison, FrozenComparison, compare, compare_frozen
+from studies.transition.flights import FlightPlan, autopilot_for
+from studies.transition.guarantees import Bound
+from studies.transition.paper_experiment import PERIOD, Experiment, run_experiment
+from studies.transition.recovery import Recovery, recover
+from symheli import FlightRecord, Helicopter
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is done: the whole study, or a look (`quick`)."""
+
+    ramps: int = 12
+    gentle_ramps: int = 10
+    gust_rates: tuple[float, ...] = (0.0, 0.1, 1.0, 3.0, 4.0, math.inf)
+    gust_segments: tuple[int, ...] = (16,)
+    servo_rates: tuple[float, ...] = (0.0, 3.0, math.inf)
+    servo_segments: tuple[int, ...] = (8,)
+
+    @classmethod
+    def look(cls) -> Effort:
+        """Shorter flights, fewer certificates of a simpler form."""
+        return cls(6, 4, (0.0, 3.0, math.inf), (8,), (0.0, math.inf), (4,))
+
+
+@dataclass
+class Study:
+    """Everything a run found, stage by stage; what is not reached yet is None or empty."""
+
+    vehicle: str
+    quick: bool
+    seed: int
+    heli: Helicopter | None = None
+    baseline: Baseline | None = None
+    experiments: list[Experiment] = field(default_factory=list)
+    recoveries: list[Recovery] = field(default_factory=list)
+    flights: dict[str, FlightRecord] = field(default_factory=dict)
+    models: dict[str, LPVARXModel] = field(default_factory=dict)
+    scores: dict[tuple[str, str], Scores] = field(default_factory=dict)
+    """Keys (axis name, "noise-free" or "30 dB")."""
+    comparisons: dict[tuple[str, str], Comparison] = field(default_factory=dict)
+    frozen: dict[str, FrozenComparison] = field(default_factory=dict)
+    bounds: list[Bound] = field(default_factory=list)
+    exact_frozen: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    complete: bool = False
+
+    def summary(self) -> str:
+        """The short table printed at the end."""
+        from studies.transition.summary import summary
+
+        return summary(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every number of the report with its unit."""
+        from studies.transition.results import to_dict
+
+        return to_dict(self)
+
+
+def run_study(vehicle: str = "xcell60", out: Path | str = "study", quick: bool = False, seed: int = 0) -> Study:
+    """Run every stage, write results.json after each, and report.html with its figures into `out` at the end.
+
+    Progress goes to standard error. An interrupted run leaves the results of its finished stages; files are whole or absent.
+    """
+    from studies.transition.report import write_report, write_results
+
+    out = Path(out)
+    study = Study(vehicle, quick, seed)
+    effort = Effort.look() if quick else Effort()
+    for title, stage in _stages(study, effort):
+        with _shown(title, study.seconds):
+            stage()
+        write_results(study, out)
+    study.complete = True
+    with _shown("Writing figures and report", study.seconds):
+        write_report(study, out)
+    return study
+
+
+def _stages(study: Study, effort: Effort) -> Iterator[tuple[str, Any]]:
+    yield "Model and baseline: trim, linearize, interpolate, LFT", lambda: _baseline(study)
+    yield "The paper's experiment, open and closed loop", lambda: _paper(study)
+    yield "Exact recovery of A(p), B(p)", lambda: _recovery(study)
+    yield "Flying the transitions", lambda: _fly(study, effort)
+    yield "Identifying and scoring", lambda: _identify(study)
+    yield "Comparing with the baseline", lambda: _compare(study)
+    yield "Proving gains of the gust loop (baseline, continuous)", lambda: _prove_gust(study, effort)
+    yield "Proving gains of the servo loop (baseline and identified, 50 Hz)", lambda: _prove_servo(study, effort)
+
+
+@contextmanager
+def _shown(title: str, seconds: dict[str, float]) -> Iterator[None]:
+    """Title while it runs, time when done."""
+    live = sys.stderr.isatty()
+    print(f"  {title} ...", end="" if live else "\n", file=sys.stderr, flush=True)
+    begin = time.perf_counter()
+    yield
+    seconds[title] = time.perf_counter() - begin
+    print(f"\r  {title} ... {seconds[title]:.1f} s" if live else f"    {seconds[title]:.1f} s", file=sys.stderr, flush=True)
+
+
+def _need(thing: Any) -> Any:
+    assert thing is not None, "stages run in order"  # noqa: S101
+    return thing
+
+
+def _baseline(study: Study) -> None:
+    study.heli = Helicopter.load(study.vehicle, governor="ideal")
+    study.baseline = build_baseline(study.heli)
+
+
+def _paper(study: Study) -> None:
+    family = _need(study.baseline).nodes
+    study.experiments = [run_experiment(family, closed, study.seed) for closed in (False, True)]
+
+
+def _recovery(study: Study) -> None:
+    study.recoveries = [recover(_need(study.baseline).nodes, period, seed=study.seed) for period in (0.02, PERIOD)]
+
+
+def _fly(study: Study, effort: Effort) -> None:
+    heli = _need(study.heli)
+    autopilot = autopilot_for(heli)
+    clean = FlightPlan(study.seed, ramps=effort.ramps)
+    for name, plan in (("noise-free", clean), ("30 dB", clean.noisy())):
+        study.flights[f"training, {name}"] = plan.training(heli, autopilot)
+        study.flights[f"test, {name}"] = plan.test(heli, autopilot)
+    study.flights["gentle"] = clean.gentle(heli, autopilot, effort.gentle_ramps)
+
+
+def _identify(study: Study) -> None:
+    heli = _need(study.heli)
+    for noise in ("noise-free", "30 dB"):
+        training, test = study.flights[f"training, {noise}"], study.flights[f"test, {noise}"]
+        for axis in (LONGITUDINAL, LATERAL, LATERAL_WITH_COLLECTIVE, ALL):
+            # MIMO by batch least squares: the same numbers as the recursion, which is shown on the two-input axes
+            model = axes.identify(axis, training, "rls" if axis in AXES else "ls")
+            study.models[f"{axis.name}, {noise}"] = model
+            study.scores[axis.name, noise] = axes.scores(heli, axis, model, test)
+    study.models["lateral, gentle"] = axes.identify(LATERAL, study.flights["gentle"], "rls", order=2)
+
+
+def _compare(study: Study) -> None:
+    lpv = _need(study.baseline).lpv
+    baselines = {
+        "baseline, cubic": (lpv["polynomial 3"], True),
+        "baseline, cubic, trim drift left out": (lpv["polynomial 3"], False),
+        "baseline, spline": (lpv["spline"], True),
+    }
+    for noise in ("noise-free", "30 dB"):
+        for axis in AXES:
+            identified = {name: study.models[f"{which.name}, {noise}"] for name, which in _rivals(axis).items()}
+            study.comparisons[axis.name, noise] = compare(axis, identified, baselines, study.flights[f"test, {noise}"])
+    for axis in AXES:
+        speeds = [0.5, 1.0, 2.0, 3.0, 4.0, 5.5, 7.0, 8.5, 10.0, 11.5, 12.5]
+        study.frozen[axis.name] = compare_frozen(
+            _need(study.heli), axis, study.models[f"{axis.name}, noise-free"], lpv["polynomial 3"], speeds
+        )
+
+
+def _rivals(axis: Axis) -> dict[str, Axis]:
+    rivals = {"LPV-ARX, two inputs": axis}
+    if axis is LATERAL:
+        rivals["LPV-ARX, other inputs measured"] = LATERAL_WITH_COLLECTIVE
+    return rivals | {"LPV-ARX, MIMO": ALL}
+
+
+def _prove_gust(study: Study, effort: Effort) -> None:
+    family = _need(study.baseline).nodes
+    study.exact_frozen["gust"] = guarantees.exact_frozen_gain(family, sampled=False)
+    loop = guarantees.gust_loop(family)
+    study.bounds += guarantees.stability_bounds("baseline", "gust", loop, effort.gust_rates, effort.gust_segments)
+    study.bounds += guarantees.bounds("baseline", "gust", loop, effort.gust_rates, effort.gust_segments)
+
+
+def _prove_servo(study: Study, effort: Effort) -> None:
+    family = _need(study.baseline).nodes
+    study.exact_frozen["servo"] = guarantees.exact_frozen_gain(family, sampled=True)
+    loops = {
+        "baseline": guarantees.servo_loop(guarantees.sampled_baseline(family)),
+        "identified, gentle flight": guarantees.servo_loop(study.models["lateral, gentle"].to_state_space()),
+        "identified, aggressive flight": guarantees.servo_loop(study.models[f"{LATERAL.name}, noise-free"].to_state_space()),
+    }
+    for name, loop in loops.items():
+        study.bounds += guarantees.stability_bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments)
+        study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments)
