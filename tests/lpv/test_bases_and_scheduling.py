@@ -1,0 +1,98 @@
+"""Functions of the scheduling parameter, and the parameter itself."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.interpolate import BPoly, CubicSpline
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv import PiecewiseLinear, Polynomial, Scheduling, Spline
+from symheli.lpv.units import to_si
+
+NODES = (0.0, 1.0, 3.0, 7.0, 13.0)
+BASES = [Polynomial(4, 0.0, 13.0), Spline(NODES), PiecewiseLinear(NODES)]
+
+
+def test_polynomials_are_orthonormal_over_the_range():
+    basis = Polynomial(5, 0.0, 13.0)
+    x, weights = np.polynomial.legendre.leggauss(12)
+    f = basis(6.5 + 6.5 * x)
+    np.testing.assert_allclose(f.T * weights / 2 @ f, np.eye(6), atol=1e-13)
+
+
+def test_monomial_coefficients_go_back_and_forth():
+    basis, given = Polynomial(3, 2.0, 9.0), np.array([[1.0, -2.0], [0.5, 0.0], [0.0, 3.0], [0.1, 0.2]])
+    inside = basis.from_monomial(given)
+    np.testing.assert_allclose(basis.to_monomial(inside), given, atol=1e-12)
+    p = np.linspace(2, 9, 7)
+    np.testing.assert_allclose(basis(p) @ inside, np.polynomial.polynomial.polyval(p, given).T, atol=1e-11)
+
+
+@pytest.mark.parametrize("basis", BASES, ids=lambda b: type(b).__name__)
+def test_derivatives_agree_with_differences(basis):
+    p, h = np.array([0.5, 2.2, 5.0, 11.9]), 1e-5
+    np.testing.assert_allclose(basis(p, 1), (basis(p + h) - basis(p - h)) / (2 * h), atol=1e-8)
+
+
+@pytest.mark.parametrize("basis", BASES, ids=lambda b: type(b).__name__)
+def test_bernstein_pieces_are_the_functions(basis):
+    for piece in basis.pieces():
+        p = np.linspace(piece.low, piece.high, 6)
+        for j in range(basis.size):
+            np.testing.assert_allclose(BPoly(piece.bernstein[j][:, None], [piece.low, piece.high])(p), basis(p)[:, j], atol=1e-11)
+
+
+def test_spline_is_the_cubic_spline_through_values():
+    values = np.sin(NODES)
+    p = np.linspace(0, 13, 40)
+    np.testing.assert_allclose(Spline(NODES)(p) @ values, CubicSpline(NODES, values)(p), atol=1e-12)
+    np.testing.assert_allclose(PiecewiseLinear(NODES)(p) @ values, np.interp(p, NODES, values), atol=1e-12)
+
+
+@pytest.mark.parametrize("basis", BASES, ids=lambda b: type(b).__name__)
+def test_fit_recovers_coefficients_and_counts_its_nodes(basis):
+    rng = np.random.default_rng(0)
+    coefficients, p = rng.standard_normal((basis.size, 2, 3)), np.linspace(0, 13, 30)
+    np.testing.assert_allclose(basis.fit(p, np.tensordot(basis(p), coefficients, 1)), coefficients, atol=1e-10)
+    with pytest.raises(InputError, match=rf"needs {basis.size} distinct nodes, got 2"):
+        basis.fit([1.0, 2.0, 2.0], np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Polynomial(-1, 0, 1), "degree must be an integer"),
+        (lambda: Polynomial(2, 5.0, 5.0), "low < high"),
+        (lambda: Spline((0.0, 1.0, 2.0)), "at least 4 strictly increasing"),
+        (lambda: PiecewiseLinear((0.0, 0.0)), "strictly increasing"),
+        (lambda: Polynomial(1, 0, 1).from_monomial([1, 2, 3]), "degree 2 does not fit"),
+        (lambda: Polynomial(1, 0, 1)(1.1), "declare the basis over the whole range"),
+        (lambda: Scheduling("p", "1", 1.0, 0.0), "low < high"),
+        (lambda: Scheduling("p", "1", 0.0, 1.0, -1.0), "rate must be >= 0"),
+        (lambda: Scheduling("p", "1", 0.0, math.nan), "finite"),
+    ],
+)
+def test_what_cannot_be_is_refused_when_made(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_scheduling_knows_middle_radius_and_rate():
+    p = Scheduling("airspeed", "m/s", 2.0, 12.0)
+    assert (p.middle, p.radius, p.rate) == (7.0, 5.0, math.inf)
+    assert p.with_rate(3.0).rate == 3.0
+    np.testing.assert_array_equal(p.check([2.0, 12.0 + 1e-9]), [2.0, 12.0 + 1e-9])  # rounding passes
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "si"),
+    [("deg", math.pi / 180, "rad"), ("kt", 1852 / 3600, "m/s"), ("ft", 0.3048, "m"), ("rpm", math.pi / 30, "rad/s"), ("ms", 1e-3, "s")],
+)
+def test_units_convert_to_si(unit, factor, si):
+    assert to_si(unit) == (pytest.approx(factor, rel=1e-15), si)
+
+
+def test_a_misspelt_unit_gets_the_nearest():
+    with pytest.raises(UnknownNameError, match="did you mean 'deg/s'"):
+        to_si("deg/sec")

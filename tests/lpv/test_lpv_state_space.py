@@ -1,0 +1,103 @@
+"""LPV models: evaluation, feedback, sampling and response."""
+
+import numpy as np
+import pytest
+from families import SPEED, random_lpv, stacked
+from scipy.integrate import solve_ivp
+
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace, Scheduling, simulate
+
+
+def stable(dt=None):
+    A0, A1 = np.array([[0.0, 1.0], [-4.0, -1.0]]), np.array([[0.0, 0.0], [-0.5, -0.1]])
+    return LPVStateSpace.polynomial(A=[A0, A1], B=[[[0.0], [1.0]]], C=[np.eye(2)], D=[np.zeros((2, 1))], scheduling=SPEED, dt=dt)
+
+
+def test_powers_of_p_are_in_physical_units():
+    lpv, whole = random_lpv(3)
+    p = 9.3
+    np.testing.assert_allclose(stacked(lpv.at(p)), sum(M * p**i for i, M in enumerate(whole)), atol=1e-12)
+
+
+def test_many_p_at_once_are_the_frozen_models_one_by_one():
+    lpv, _ = random_lpv(2)
+    p = np.linspace(0, 13, 5)
+    np.testing.assert_allclose(lpv.matrices(p).B[3], lpv.at(p[3]).B, atol=1e-14)
+
+
+def test_outside_the_range_is_refused_with_both_ranges():
+    with pytest.raises(InputError, match=r"spans \[14, 14\] m/s but the model holds on \[0, 13\]"):
+        random_lpv(1)[0].at(14.0)
+    with pytest.raises(InputError, match="the basis covers"):
+        random_lpv(1)[0].with_scheduling(Scheduling("airspeed", "m/s", 0.0, 20.0))
+
+
+def test_feedback_closes_the_loop_at_every_p():
+    lpv = stable()
+    closed = lpv.feedback({("u1", "y2"): -3.0})
+    for p in (0.0, 5.0, 13.0):
+        model = lpv.at(p)
+        np.testing.assert_allclose(closed.at(p).A, model.A + model.B @ [[0.0, -3.0]], atol=1e-13)
+    with pytest.raises(InputError, match="feedback needs outputs"):
+        random_lpv(1)[0].feedback({("u1", "y1"): 1.0})
+
+
+def test_sampled_model_is_the_hold_equivalent_at_the_nodes_up_to_its_residuals():
+    lpv = stable()
+    discrete = lpv.discretize(0.02, degree=4)
+    assert discrete.dt == 0.02
+    for p in (0.0, 3.3, 13.0):
+        miss = np.abs(discrete.at(p).A - lpv.at(p).discretize(0.02).A).max()
+        assert miss < 1e-9  # the exponential of this polynomial, fitted to degree 4
+    assert np.abs(discrete.residuals.A).max() < 1e-9
+
+
+def test_simulation_agrees_with_an_ode_solver_and_converges_with_the_step():
+    lpv = stable()
+
+    def speed(t):
+        return 6.5 - 6.5 * np.cos(0.8 * t)
+
+    def drive(t):
+        return np.sin(2.0 * t)
+
+    def rhs(t, x):
+        model = lpv.at(float(np.clip(speed(t), 0, 13)))
+        return model.A @ x + model.B[:, 0] * drive(t)
+
+    end = 4.0
+    exact = solve_ivp(rhs, (0, end), [1.0, 0.0], rtol=1e-10, atol=1e-12).y[:, -1]
+    errors = []
+    for n in (400, 800):
+        t = np.arange(n + 1) * end / n
+        middle = np.minimum(t + 0.5 * end / n, end)  # p and u are held: their values at the middle of the step are second order
+        x, _ = simulate(lpv, speed(middle), drive(middle)[:, None], [1.0, 0.0], dt=end / n)
+        errors.append(np.abs(x[-1] - exact).max())
+    assert errors[1] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.2)
+
+
+def test_simulation_with_constant_p_is_exact_and_a_drift_is_added_as_a_rate():
+    lpv, dt, n = stable(), 0.1, 30
+    u = np.random.default_rng(0).standard_normal((n, 1))
+    x, y = simulate(lpv, np.full(n, 4.0), u, dt=dt)
+    model, state = lpv.at(4.0).discretize(dt), np.zeros(2)
+    for k in range(n):
+        np.testing.assert_allclose(x[k], state, atol=1e-12)
+        state = model.A @ state + model.B @ u[k]
+    np.testing.assert_allclose(y, x)
+    pushed, _ = simulate(lpv, np.full(n, 4.0), np.zeros((n, 1)), dt=dt, drift=np.tile([0.0, 1.0], (n, 1)))
+    forced, _ = simulate(lpv, np.full(n, 4.0), np.ones((n, 1)), dt=dt)  # B = [0, 1]
+    np.testing.assert_allclose(pushed, forced, atol=1e-12)
+    with pytest.raises(InputError, match="sample period dt"):
+        simulate(lpv, np.full(n, 4.0), u)
+
+
+def test_matrices_of_unequal_shape_are_refused():
+    with pytest.raises(InputError, match="differ in shape"):
+        LPVStateSpace.polynomial(A=[np.eye(2), np.eye(3)], B=[np.ones((2, 1))], C=[np.eye(2)], D=[np.zeros((2, 1))], scheduling=SPEED)
+    with pytest.raises(InputError, match="at least one coefficient"):
+        LPVStateSpace.polynomial(A=[], B=[np.ones((2, 1))], C=[np.eye(2)], D=[np.zeros((2, 1))], scheduling=SPEED)
+    with pytest.raises(InputError, match="positive number of seconds"):
+        stable(dt=-0.1)

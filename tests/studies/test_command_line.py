@@ -1,0 +1,314 @@
+"""What a user types, what comes back, and how it fails."""
+
+import ctypes
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+import symheli
+from studies import cli
+from studies.commands import study as study_command
+from studies.output import as_json
+from symheli.errors import SymheliError
+
+DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
+TREX_UNITS = ("--units", "q_radps=rad/s", "theta_rad=rad", "lon=1", "u_mps=m/s", "v_mps=m/s")
+
+
+@pytest.fixture
+def run(capsys):
+    """Status, stdout and stderr of one command line."""
+
+    def call(*arguments):
+        status = cli.main([str(a) for a in arguments])
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def answer(run):
+    """What a program reads from a command that succeeds."""
+
+    def call(*arguments):
+        status, out, err = run(*arguments, "--json")
+        assert status == 0, err
+        return json.loads(out)
+
+    return call
+
+
+def test_vehicles_are_listed_with_title_and_source(run, answer):
+    assert "MIT X-Cell .60 SE" in run("vehicles")[1]
+    assert all(v["source"] for v in answer("vehicles")["vehicles"])
+
+
+def test_trim_prints_the_numbers_of_the_library_with_units(run, answer):
+    got = answer("trim", "--airspeed", "5", "--climb-rate", "-1", "--governor", "pi")
+    point = symheli.trim(symheli.Helicopter.load("xcell60"), 5.0, climb_rate=-1.0)
+    assert got["inputs"]["d_col"] == {"value": pytest.approx(point.u["d_col"], rel=1e-9), "unit": "rad"}
+    status, out, _ = run("trim", "--sideslip-deg", "10", "--airspeed", "4")
+    assert status == 0
+    assert "theta" in out
+    assert "deg" in out
+
+
+def test_linearize_prints_matrices_with_names_and_poles(run, answer, ideal):
+    got = answer("linearize", "--airspeed", "5")
+    lin = symheli.linearize(ideal, symheli.trim(ideal, 5.0))
+    np.testing.assert_allclose(got["A"], lin.A, atol=1e-9)
+    assert got["states"] == list(lin.states)
+    assert {"real", "imag"} == set(got["poles_rad_per_s"][0])
+    assert "damping ratio" in run("linearize")[1]
+
+
+def test_doctor_says_what_works_here(run, answer, monkeypatch, tmp_path):
+    status, out, _ = run("doctor")
+    assert status == 0
+    assert "C compiler" in out
+    blocked = tmp_path / "file"
+    blocked.touch()
+    monkeypatch.setenv("SYMHELI_CACHE", str(blocked / "cache"))
+    got = answer("doctor")
+    assert got["cache_writable"] is False
+    assert "CLARABEL" in got["solvers"]
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_exported_c_code_computes_the_same_derivatives(run, tmp_path, ideal):
+    path = tmp_path / "deep" / "heli.c"
+    assert run("export", "c", "--out", path)[0] == 0
+    header = path.with_suffix(".h").read_text()
+    for index, name in enumerate(ideal.states):
+        assert f"#define RHS_X_{name} {index} /* {name.unit} */" in header
+    check = tmp_path / "check.c"
+    check.write_text('#include "deep/heli.h"\nint sizes[] = {RHS_SZ_ARG, RHS_SZ_RES, RHS_SZ_IW, RHS_SZ_W, RHS_N_X, RHS_N_U};\n')
+    library = tmp_path / "heli.so"
+    subprocess.run(["cc", "-shared", "-fPIC", "-Wall", "-Werror", str(check), "-c", "-o", str(tmp_path / "check.o")], check=True)
+    subprocess.run(["cc", "-O1", "-shared", "-fPIC", str(path), str(check), "-o", str(library), "-lm"], check=True)
+    code = ctypes.CDLL(str(library))
+    sz_arg, sz_res, sz_iw, sz_w, nx, nu = (ctypes.c_int * 6).in_dll(code, "sizes")
+    point = symheli.trim(ideal, 6.0)
+    x, u, wind = point.x.array + 0.01, point.u.array + 0.0, np.zeros(3)
+    assert (nx, nu) == (len(x), len(u))
+    out = np.zeros(nx)
+    double = ctypes.POINTER(ctypes.c_double)
+    arg = (double * sz_arg)(*(np.ascontiguousarray(v).ctypes.data_as(double) for v in (x, u, wind)))
+    res = (double * sz_res)(out.ctypes.data_as(double))
+    assert code.rhs(arg, res, (ctypes.c_int * max(sz_iw, 1))(), (ctypes.c_double * max(sz_w, 1))(), 0) == 0
+    np.testing.assert_allclose(out, ideal.numeric("rhs")(x, u, wind)[0], rtol=1e-12, atol=1e-12)
+
+
+def test_exported_mat_file_is_the_family(run, tmp_path, ideal):
+    path = tmp_path / "family.mat"
+    status, out, _ = run("export", "mat", "--out", path, "--airspeeds", 2, 8, "--points", 3)
+    assert status == 0
+    assert str(path) in out
+    got = loadmat(path, simplify_cells=True)
+    family = symheli.sweep(ideal, [2.0, 5.0, 8.0])
+    np.testing.assert_allclose(got["airspeeds"], family.airspeeds)
+    np.testing.assert_allclose(got["A"][:, :, 1], family.A[1], atol=1e-9)
+    np.testing.assert_allclose(got["x0"][:, 2], family.trims[2].x.array, atol=1e-9)
+    assert list(got["states"]) == list(family.states)
+    assert list(got["inputs_units"]) == ["rad"] * 4
+
+
+def test_certify_brackets_the_gain_of_a_frozen_loop(answer):
+    got = answer("certify", "--rate", 0, "--airspeeds", 4, 9)
+    assert got["verified"]
+    assert got["frozen"] <= got["lower"] * (1 + 1e-6)
+    assert got["lower"] <= got["gamma"] * (1 + 1e-6)
+
+
+# --- identify --------------------------------------------------------------------------------------------------------------
+
+
+def scheduled_csv(path, n=900, noise=0.0):
+    """y(k) = (0.9 - 0.05 p) y(k-1) + (0.2 + 0.02 p) u(k-1), p a slow sine, time in ms."""
+    rng = np.random.default_rng(0)
+    p, u, y = 5 + 4 * np.sin(2 * np.pi * np.arange(n) / 300), rng.standard_normal(n), np.zeros(n)
+    for k in range(1, n):
+        y[k] = (0.9 - 0.05 * p[k - 1]) * y[k - 1] + (0.2 + 0.02 * p[k - 1]) * u[k - 1] + noise * rng.standard_normal()
+    rows = [f"{0.05 * k:.3f},{np.degrees(y[k]):.12g},{u[k]:.12g},{p[k]:.12g}" for k in range(n)]
+    path.write_text("\n".join(["t,y,u,p", *rows]))
+    return path
+
+
+STRUCTURE = ("--na", 1, "--nb", 1, "--degree", 1, "--no-offset", "--outputs", "y", "--inputs", "u", "--scheduling", "p")
+UNITS = ("--units", "y=deg", "u=1", "p=m/s")
+
+
+def test_identify_recovers_a_scheduled_model_from_a_table(run, answer, tmp_path):
+    log = scheduled_csv(tmp_path / "log.csv")
+    got = answer("identify", log, *STRUCTURE, *UNITS)
+    A = got["models"]["LPV, degree 1"]["coefficients"]["A"]
+    np.testing.assert_allclose(np.ravel(A), [-0.9, 0.05], atol=1e-8)  # the file has 12 digits
+    assert got["scheduling_pays"] == {"y": True}
+    assert got["read"]["dt"] == pytest.approx(0.05)
+    assert got["read"]["signals"] == {"y": "rad", "u": "1", "p": "m/s"}
+    status, out, _ = run("identify", log, *STRUCTURE, *UNITS)
+    assert status == 0
+    assert "scheduling pays" in out
+    assert "excitation: sufficient" in out
+
+
+def test_identify_says_where_scheduling_does_not_pay(run, tmp_path):
+    log = tmp_path / "log.csv"
+    rng = np.random.default_rng(1)
+    u, y = rng.standard_normal(600), np.zeros(600)
+    for k in range(1, 600):
+        y[k] = 0.8 * y[k - 1] + u[k - 1] + 0.3 * rng.standard_normal()
+    log.write_text("\n".join(["y,u,p", *(f"{a},{b},{c}" for a, b, c in zip(y, u, rng.uniform(0, 5, 600), strict=True))]))
+    status, out, _ = run("identify", log, "--dt", 0.1, *STRUCTURE, *UNITS)
+    assert status == 0
+    assert "scheduling does NOT pay" in out
+
+
+def test_identify_cuts_decimates_smooths_and_fits_lti_models(answer, tmp_path):
+    log = scheduled_csv(tmp_path / "log.csv")
+    options = ("--start", 5, "--stop", 35, "--decimate", 2, "--smooth-scheduling", 0.5, "--train", 0.5, "--scheduling-at", "now")
+    got = answer("identify", log, *STRUCTURE, *UNITS, *options)
+    assert got["read"]["samples"] == 300
+    assert got["read"]["rows_outside_start_stop"] == 300
+    assert got["read"]["dt"] == pytest.approx(0.1)
+    assert got["read"]["held_out_samples"] == 150
+    alone = answer("identify", log, "--outputs", "y", "--inputs", "u", "--degree", 0, "--train", 1, *UNITS[:3])
+    assert list(alone["models"]) == ["LTI"]
+    assert alone["models"]["LTI"]["fit_percent"]["held_out"] is None
+
+
+def test_identify_reads_matlab_files_by_content(answer, tmp_path):
+    from scipy.io import savemat
+
+    table = np.genfromtxt(scheduled_csv(tmp_path / "log.csv"), delimiter=",", names=True)
+    savemat(tmp_path / "log.mat", {name: table[name] for name in table.dtype.names})
+    (tmp_path / "log.mat").rename(tmp_path / "flight")
+    got = answer("identify", tmp_path / "flight", *STRUCTURE, *UNITS)
+    assert got["read"]["format"] == "mat"
+    assert got["scheduling_pays"]["y"]
+
+
+def test_an_xplane_log_needs_one_short_line(run):
+    log = DATA / "xplane" / "Forward.txt"
+    if not log.exists():
+        pytest.skip(f"{log} is not here")
+    status, out, _ = run("identify", log, "--dt", 0.1)
+    assert status == 0
+    assert "segments: 2, of 4, 935" in out
+    assert "does NOT pay" in out
+
+
+def test_a_real_flight_is_identified_and_scheduling_does_not_pay(answer):
+    log = DATA / "trex550" / "trex550_flight_clean.csv"
+    if not log.exists():
+        pytest.skip(f"{log} is not here")
+    structure = ("--na", 2, "--nb", 3, "--degree", 1, "--decimate", 4, "--start", 31, "--scheduling-from", "u_mps,v_mps")
+    got = answer("identify", log, "--dt", 0.0084, "--outputs", "q_radps,theta_rad", "--inputs", "lon", *structure, *TREX_UNITS)
+    assert got["scheduling_pays"] == {"q_radps": False, "theta_rad": False}
+    assert got["read"]["scheduling_range"][1] < 8.2
+    fit = got["models"]["LTI"]["fit_percent"]["held_out"]
+    assert fit["one step"]["theta_rad"] > 95  # one step flatters
+    assert fit["1 s"]["theta_rad"] < 60
+
+
+# --- failure ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["trim", "--vehicle", "xcel60"], "did you mean 'xcell60'?"),
+        (["trim", "--airspeed", "-1"], "airspeed must be >= 0"),
+        (["trim", "--airspeed", "90"], "no trim at"),
+        (["identify", "nowhere.csv"], "there is no such file"),
+        (["export", "c", "--out", "model.cpp"], "ends in .c"),
+        (["export", "mat", "--airspeeds", "5", "2"], "LOW < HIGH"),
+    ],
+)
+def test_a_failure_is_one_sentence_and_status_1(run, arguments, sentence):
+    status, out, err = run(*arguments)
+    assert status == 1
+    assert out == ""
+    assert sentence in err
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ([], "--outputs"),
+        (["--outputs", "y", "--inputs", "u"], "name the scheduling signal"),
+        (["--outputs", "y", "--inputs", "u", "--scheduling", "p"], "the unit of 'y' is not known: --units y=UNIT"),
+        ([*STRUCTURE, *UNITS, "z=1"], "unknown signal in --units 'z'"),
+        ([*STRUCTURE, "--units", "y=deg", "u=1", "p=knots"], "unknown unit 'knots'"),
+        ([*STRUCTURE, *UNITS, "--scheduling-from", "u,y"], "not both"),
+        ([*STRUCTURE, *UNITS, "--start", "99"], "the record goes from 0 to 44.95 s"),
+        ([*STRUCTURE, *UNITS, "--decimate", "600"], "leaves fewer than two"),
+        ([*STRUCTURE, *UNITS, "--train", "0.0001"], "samples to fit"),
+        ([*STRUCTURE, *UNITS, "--degree", "12", "--stop", "1"], "cannot determine"),
+        ([*STRUCTURE, *UNITS, "--time", "tt"], "unknown column 'tt'"),
+    ],
+)
+def test_identify_says_what_is_missing(run, tmp_path, options, sentence):
+    status, _, err = run("identify", scheduled_csv(tmp_path / "log.csv"), *options)
+    assert status == 1
+    assert sentence in err
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["trim", "--airspeed", "fast"], ["identify", "log", "--units", "q"], ["export", "pdf"]])
+def test_wrong_usage_is_status_2(run, arguments):
+    assert run(*arguments)[0] == 2
+
+
+def test_help_and_version_succeed(run):
+    assert run("--version")[1].strip() == f"symheli {symheli.__version__}"
+    for verb in cli.VERBS:
+        assert run(verb, "--help")[0] == 0
+
+
+def test_interruption_says_what_was_kept(run, monkeypatch):
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study_command, "run", interrupted)
+    status, _, err = run("study", "--out", "some/folder")
+    assert status == 130
+    assert "what was finished is in some/folder" in err
+
+
+def test_a_full_disk_is_a_sentence_and_leaves_the_old_file(tmp_path, monkeypatch):
+    import errno
+    import os
+
+    from studies.files import write_text
+
+    target = write_text(tmp_path / "report.html", "old")
+
+    def full(handle):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(SymheliError, match="the disk is full"):
+        write_text(target, "new")
+    assert target.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_json_is_strict_and_keeps_what_is_not_finite():
+    got = json.loads(
+        as_json({"a": np.array([1.0, np.inf]), "b": float("nan"), "c": 1 + 2j, "d": (np.int64(3), None, True), "e": Path("x")})
+    )
+    assert got == {"a": [1.0, "inf"], "b": "nan", "c": {"real": 1.0, "imag": 2.0}, "d": [3, None, True], "e": "x"}
+
+
+def test_the_command_line_starts_without_heavy_libraries():
+    heavy = "('casadi', 'cvxpy', 'pandas', 'matplotlib')"
+    code = f"import sys; from studies import cli; cli.parser(); print([m for m in {heavy} if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
