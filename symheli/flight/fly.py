@@ -22,7 +22,7 @@ from symheli.numeric import Numeric
 MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 CONTROL_PERIOD = 0.02  # s; slower sampling still flies at about this period
 REFERENCE_MISS = 0.3  # m/s^2 or rad/s^2; what feedback makes up for
-INTEGRATION_STEP = 0.005  # s; Runge-Kutta error per flight stays below 1e-6 of each state (see tests)
+INTEGRATION_STEP = 0.005  # s; the error over a flight stays below 1e-5 of each state's peak (see tests)
 
 
 def fly(
@@ -122,7 +122,8 @@ class _Flight:
             flight = self.step(flight, inputs[k], self.wind)[0]
             if not np.all(np.isfinite(flight)) or abs(states[k, 7]) > 1.4 or abs(states[k, 6]) > 1.4:
                 raise SymheliError(
-                    f"the flight was lost at {self.time[k]:.2f} s near {self.speed[k]:.1f} m/s: less excitation, noise or acceleration, please"
+                    f"the flight was lost at {self.time[k]:.2f} s near {self.speed[k]:.1f} m/s: "
+                    "less excitation, noise or acceleration, please"
                 )
         return self._record(states, inputs, air)
 
