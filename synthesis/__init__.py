@@ -6,9 +6,10 @@ No solver is loaded by importing this package.
 from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
 from synthesis.cone_program import Solver, installed_solvers
 from synthesis.frozen import FrozenGain, frozen_gain
-from synthesis.l2_gain import Relaxation, l2_gain, stability
+from synthesis.l2_gain import l2_gain, stability
 from synthesis.lower_bound import LowerBound, Search, lower_bound
 from synthesis.lyapunov import SplineLyapunov
+from synthesis.proof_search import Relaxation
 
 __all__ = [
     "Attempt",

@@ -152,7 +152,7 @@ def assemble(blocks: Sequence[Blocks], states: int, inputs: int, unknowns: int, 
         b = np.concatenate([*right, 0 * identities, identities])
         c = np.append(np.zeros(columns), -1.0)
         sizes += [states] * unknowns
-    return ConeProgram(c, A, b, tuple(sizes + [states] * unknowns))
+    return ConeProgram(c, sparse.csc_matrix(A), b, tuple(sizes + [states] * unknowns))
 
 
 def _common_degree(A: Array, B: Array, cell: Cell) -> tuple[Array, Array, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +38,7 @@ def cells(pieces: Sequence[ModelPiece], knots: Array, cuts: Sequence[float] = ()
     low, high = float(knots[0]), float(knots[-1])
     points = sorted({*map(float, knots), *(q.low for q in pieces[1:]), *(c for c in cuts if low < c < high)})
     out, j = [], 0
-    for a, b in zip(points[:-1], points[1:], strict=True):
+    for a, b in pairwise(points):
         while pieces[j].high < b:
             j += 1
         out.append(Cell(a, b, pieces[j], int(np.searchsorted(knots, a, side="right") - 1)))

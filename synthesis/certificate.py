@@ -116,7 +116,8 @@ class Certificate:
             P = self.lyapunov
             lines.append(f"  V = x'P(p)x, degree {P.degree} on {P.segments} segment(s), condition number {self.conditioning:.2g}")
         s = self.seconds
-        lines.append(f"  {self.solver}; build {s.build:.2f} s, solve {s.solve:.2f} s, verify {s.verify:.2f} s, lower bounds {s.bounds:.2f} s")
+        stages = f"build {s.build:.2f} s, solve {s.solve:.2f} s, verify {s.verify:.2f} s, lower bounds {s.bounds:.2f} s"
+        lines.append(f"  {self.solver}; {stages}")
         lines += [f"  tried: {a.segments} segments of degree {a.degree}, margin {a.margin:.0e}: {a.answer}" for a in self.attempts[:-1]]
         lines += [f"  - {sentence}" for sentence in self.hypotheses]
         return "\n".join(lines)

@@ -8,6 +8,7 @@ answers is a candidate: nothing is believed before it is verified.
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 import time
 from collections.abc import Callable
@@ -107,8 +108,7 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
 
 
 def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
-    import clarabel
-
+    clarabel: Any = importlib.import_module("clarabel")  # its stubs hide the classes
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_iter = solver.iterations or 200
@@ -128,7 +128,8 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     import scs
 
     # the same vectors: SCS stacks the lower triangle by columns, which is the upper one by rows; reorder
-    order = np.concatenate([[], *(_scs_order(n) + start for n, start in zip(program.sizes, _starts(program.sizes), strict=True))]).astype(int)
+    starts = np.cumsum([0, *(length(n) for n in program.sizes)])
+    order = np.concatenate([_scs_order(n) + start for n, start in zip(program.sizes, starts[:-1], strict=True)])
     data = {"A": program.A.tocsr()[order].tocsc(), "b": program.b[order], "c": program.c}
     engine = scs.SCS(
         data, {"s": list(program.sizes)}, verbose=False, eps_abs=max(solver.tolerance, 1e-9), eps_rel=max(solver.tolerance, 1e-9),
@@ -141,10 +142,6 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     return (Answer.SOLVED if word.startswith("solved") else Answer.FAILED), solution["x"], word
 
 
-def _starts(sizes: tuple[int, ...]) -> Array:
-    return np.concatenate([[0], np.cumsum([length(n) for n in sizes])[:-1]])
-
-
 def _scs_order(n: int) -> Array:
     place = np.zeros((n, n), dtype=int)
     columns, rows = np.tril_indices(n)
@@ -154,6 +151,7 @@ def _scs_order(n: int) -> Array:
 
 def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     import cvxpy as cp
+    from cvxpy.error import SolverError as CvxpyError
 
     x = cp.Variable(len(program.c))
     s = program.b - program.A @ x
@@ -166,7 +164,7 @@ def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     problem = cp.Problem(cp.Minimize(program.c @ x), constraints)
     try:
         problem.solve(solver=solver.name)
-    except cp.error.SolverError as error:
+    except CvxpyError as error:
         return Answer.FAILED, None, str(error)
     if problem.status in ("infeasible", "infeasible_inaccurate"):
         return Answer.INFEASIBLE, None, problem.status

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import linalg
 from scipy.optimize import minimize_scalar
 
 from symheli.lpv import LPVStateSpace
@@ -40,11 +39,12 @@ def frozen_gain(lpv: LPVStateSpace, *, points: int = 61, tolerance: float = 1e-8
     best = max(found, key=lambda f: f.gamma)
     for k in _peaks([f.gamma for f in found])[:3]:
         a, b = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
-        result = minimize_scalar(
-            lambda p: -norm(*lpv.matrices(float(p)), lpv.dt, tolerance)[0], bounds=(a, b), method="bounded", options={"xatol": 1e-6 * (b - a)}
-        )
-        gain, omega = norm(*lpv.matrices(float(result.x)), lpv.dt, tolerance)  # type: ignore[attr-defined]
-        best = max(best, FrozenGain(gain, float(result.x), omega), key=lambda f: f.gamma)  # type: ignore[attr-defined]
+        result: Any = minimize_scalar(
+            lambda p: -norm(*lpv.matrices(float(p)), lpv.dt, tolerance)[0],
+            bounds=(a, b), method="bounded", options={"xatol": 1e-6 * (b - a)},
+        )  # fmt: skip
+        gain, omega = norm(*lpv.matrices(float(result.x)), lpv.dt, tolerance)
+        best = max(best, FrozenGain(gain, float(result.x), omega), key=lambda f: f.gamma)
     return best
 
 
@@ -61,12 +61,12 @@ def norm(A: Array, B: Array, C: Array, D: Array, dt: float | None = None, tolera
     """H-infinity norm and the frequency (rad/s) of its peak; (inf, nan) where a pole is not strictly stable."""
     if min(B.shape[1], C.shape[0]) == 0:
         return 0.0, 0.0
-    poles = linalg.eigvals(A)
+    poles = np.linalg.eigvals(A)
     if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
         return math.inf, math.nan
     if dt is not None:
         A, B, C, D = _to_continuous(A, B, C, D)
-        poles = linalg.eigvals(A)
+        poles = np.linalg.eigvals(A)
 
     def gains(omega: Array) -> Array:
         responses = C @ np.linalg.solve(1j * omega[:, None, None] * np.eye(len(A)) - A, np.broadcast_to(B, (len(omega), *B.shape))) + D
@@ -100,7 +100,7 @@ def _crossings(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
     RD, RB = np.linalg.solve(R, D.T @ C), np.linalg.solve(R, B.T)
     F = A + B @ RD
     H = np.block([[F, B @ RB], [-C.T @ (C + D @ RD), -F.T]])
-    values = linalg.eigvals(H)
+    values = np.linalg.eigvals(H)
     on_axis = np.abs(values.real) <= 1e-7 * (1e-3 * np.abs(values).max() + np.abs(values))
     omega = np.unique(np.abs(values[on_axis].imag))
     return np.concatenate([[0.0], omega]) if len(omega) and np.any(omega > 0) else omega

@@ -5,95 +5,23 @@ from __future__ import annotations
 import math
 import time
 from functools import partial
-from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
-from synthesis.bounded_real import Blocks, assemble, continuous_blocks, discrete_blocks
-from synthesis.cells import cells, strips
-from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
-from synthesis.cone_program import Answer, Candidate, Solver, solve
+from synthesis.certificate import Certificate, Seconds, Status, Trajectory
+from synthesis.cone_program import Answer, Solver
 from synthesis.frozen import frozen_gain, least_damped
-from synthesis.lower_bound import Search, lower_bound
-from synthesis.lyapunov import SplineLyapunov, graded_knots
-from synthesis.pieces import ModelPiece, model_pieces
-from synthesis.scaling import Scaling, scaling
-from synthesis.symmetric import smat
-from synthesis.verify import Claim, examine, holds_on_grid, proven
-
-Array = np.ndarray
-
-INFLATION = 1e-6
-"""gamma^2 is raised by this fraction above what P admits in floating point, so that an exact proof has room."""
-
-VIOLATED = 1e-8
-"""A block left out of the program joins it when its largest eigenvalue (scaled) exceeds this."""
-ROUNDS = 12
-"""Most rounds of adding violated blocks; what then remains violated only makes the recomputed gain larger."""
-
-
-@dataclass(frozen=True)
-class Relaxation:
-    """The form of P(p) and of the LMIs.
-
-    P is a continuous spline of `degree` (None: 3 in continuous, 2 in discrete time) on K segments, K from `segments` in
-    turn until the bound is proven and gamma <= `accept` times the lower bound. Knots low + (high - low)(k/K)^`grading`.
-    `elevation` raises the Bernstein degree of the LMIs. `margins`: state blocks are held below -margin I in scaled
-    coordinates, tried in turn. `floor`: P >= floor I.
-    """
-
-    degree: int | None = None
-    segments: tuple[int, ...] = (8, 16, 32)
-    grading: float = 2.0
-    elevation: int = 0
-    margins: tuple[float, ...] = (1e-6, 1e-4)
-    floor: float = 1e-6
-    accept: float = 1.05
-
-    def __post_init__(self) -> None:
-        if self.degree is not None and self.degree not in (0, 1, 2, 3, 4):
-            raise InputError(f"degree of P must be 0 .. 4, got {self.degree}")
-        if not self.segments or min(self.segments) < 1:
-            raise InputError(f"segments must be a tuple of integers >= 1, got {self.segments}")
-        if self.grading < 1 or self.elevation < 0 or self.floor < 0 or not self.margins or min(self.margins) < 0 or self.accept < 1:
-            raise InputError("expected grading >= 1, elevation >= 0, floor >= 0, margins >= 0 and accept >= 1")
-
-
-class _Problem(NamedTuple):
-    """What every attempt shares: the model in physical and in scaled units."""
-
-    lpv: LPVStateSpace
-    rate: float
-    pieces: tuple[ModelPiece, ...]
-    scaled: tuple[ModelPiece, ...]
-    units: Scaling
-    with_gain: bool
-
-    @property
-    def scaled_rate(self) -> float:
-        return self.rate * self.units.time
-
-    @property
-    def step(self) -> float:
-        """Largest change of p in one sample."""
-        return self.rate * (self.lpv.dt or 0.0)
-
-
-class _Result(NamedTuple):
-    gamma: float
-    lyapunov: SplineLyapunov | None
-    conditioning: float
-    answer: Answer
-    seconds: Seconds
-    attempts: tuple[Attempt, ...]
+from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
+from synthesis.lyapunov import SplineLyapunov
+from synthesis.proof_search import Problem, Relaxation, Result, prove, scaled_problem
+from synthesis.verify import Claim, proven
 
 
 def l2_gain(
     lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
-    search: Search | None = Search(),
+    search: Search | None = THOROUGH,
 ) -> Certificate:  # fmt: skip
     """Certified upper bound of the L2 gain of `lpv` over every p(t) in range with |dp/dt| <= `rate`.
 
@@ -114,17 +42,19 @@ def l2_gain(
     bounds = time.perf_counter() - start
     if math.isinf(below.gamma):
         return _certificate(lpv, rate, solver, None, math.inf, frozen.gamma, Status.GROWING, below.trajectory, bounds)
-    problem = _problem(lpv, rate, below.gamma, with_gain=True)
-    best = _search(problem, relaxation, solver, relaxation.accept * below.gamma)
+    problem = scaled_problem(lpv, rate, below.gamma, with_gain=True)
+    best = prove(problem, relaxation, solver, relaxation.accept * below.gamma)
     return _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds, relaxation.elevation)
 
 
 def stability(
-    lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL"
-) -> Certificate:
+    lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    search: Search | None = THOROUGH,
+) -> Certificate:  # fmt: skip
     """Proof that dx/dt = A(p) x (or x(k+1) = A(p) x) decays for every p(t) in range with |dp/dt| <= `rate`.
 
-    As `l2_gain`, without channels: `.verified` is the answer, `.gamma`, `.lower` and `.frozen` are NaN.
+    As `l2_gain`, without channels: `.verified` is the answer, `.gamma`, `.lower` and `.frozen` are NaN. Where no proof is
+    found, `search` looks for a trajectory along which the state grows.
     """
     rate = _check(lpv, rate, with_gain=False)
     relaxation, solver = relaxation or Relaxation(), _solver(solver)
@@ -132,15 +62,20 @@ def stability(
     if margin <= 0:
         at_rest = Trajectory(np.zeros(1), np.array([p]))
         return _certificate(lpv, rate, solver, None, math.nan, math.nan, Status.UNSTABLE, at_rest, 0.0)
-    problem = _problem(lpv, rate, 1.0, with_gain=False)
-    best = _search(problem, relaxation, solver, math.inf)
-    return _certificate(lpv, rate, solver, (problem, best), math.nan, math.nan, None, None, 0.0, relaxation.elevation)
+    problem = scaled_problem(lpv, rate, 1.0, with_gain=False)
+    best = prove(problem, relaxation, solver, math.inf)
+    start = time.perf_counter()
+    worst = None if best.lyapunov is not None else growing_trajectory(lpv, rate, search)
+    status = Status.GROWING if worst is not None else None
+    bounds = time.perf_counter() - start
+    return _certificate(lpv, rate, solver, (problem, best), math.nan, math.nan, status, worst, bounds, relaxation.elevation)
 
 
 def _check(lpv: LPVStateSpace, rate: float | None, *, with_gain: bool) -> float:
     if not isinstance(lpv, LPVStateSpace):
         raise InputError(
-            f"expected an LPVStateSpace, got {type(lpv).__name__}; make one with LPVStateSpace.polynomial(...) or LinearFamily.interpolate()"
+            f"expected an LPVStateSpace, got {type(lpv).__name__}; make one with LPVStateSpace.polynomial(...) "
+            "or LinearFamily.interpolate()"
         )
     rate = lpv.scheduling.rate if rate is None else float(rate)
     if not rate >= 0:
@@ -156,151 +91,23 @@ def _solver(solver: Solver | str) -> Solver:
     return solver if isinstance(solver, Solver) else Solver(solver)
 
 
-def _problem(lpv: LPVStateSpace, rate: float, gain: float, *, with_gain: bool) -> _Problem:
-    if not with_gain:
-        lpv = replace(lpv, B=lpv.B[:, :, :0], C=lpv.C[:, :0], D=lpv.D[:, :0, :0], inputs=(), outputs=(), trim=None, residuals=None)
-    units, pieces = scaling(lpv, gain), model_pieces(lpv)
-    scaled = tuple(piece.scaled(units.left, units.right, units.channel, units.time) for piece in pieces)
-    return _Problem(lpv, rate, pieces, scaled, units, with_gain)
-
-
-def _search(problem: _Problem, relaxation: Relaxation, solver: Solver, accept: float) -> _Result:
-    """Finer and finer P until the bound is good enough; the best verified one."""
-    best = _Result(math.inf, None, math.inf, Answer.FAILED, Seconds(), ())
-    spent, attempts = np.zeros(4), []
-    degree = _degree(problem, relaxation)
-    sizes = relaxation.segments if degree else (1,)
-    tried: set[int] = set()
-    for segments in sizes:
-        knots = _knots(problem, relaxation, segments, degree)
-        if len(knots) in tried:
-            continue
-        tried.add(len(knots))
-        for margin in relaxation.margins:
-            result = _attempt(problem, relaxation, solver, knots, degree, margin)
-            spent += np.array(result.seconds)
-            attempts += result.attempts
-            if result.lyapunov is not None and (best.lyapunov is None or result.gamma < best.gamma):
-                best = result
-            elif best.lyapunov is None:
-                best = best._replace(answer=result.answer)
-            if result.lyapunov is not None or result.answer is Answer.INFEASIBLE:
-                break
-        if best.lyapunov is not None and not best.gamma > accept:
-            break
-    return best._replace(seconds=Seconds(*map(float, spent)), attempts=tuple(attempts))
-
-
-def _degree(problem: _Problem, relaxation: Relaxation) -> int:
-    if math.isinf(problem.rate) or relaxation.degree == 0:
-        return 0
-    return relaxation.degree or (3 if problem.lpv.dt is None else 2)
-
-
-def _knots(problem: _Problem, relaxation: Relaxation, segments: int, degree: int) -> Array:
-    low, high = problem.pieces[0].low, problem.pieces[-1].high
-    breaks = [piece.low for piece in problem.pieces[1:]]
-    if degree == 0 or 2.5 * problem.step >= high - low:
-        return np.array([low, high])
-    return graded_knots(low, high, segments, relaxation.grading, breaks, shortest=2.5 * problem.step)
-
-
-def _blocks(problem: _Problem, relaxation: Relaxation, knots: Array, degree: int) -> list[Blocks]:
-    if problem.lpv.dt is None:
-        rate = problem.scaled_rate if degree else 0.0
-        return list(continuous_blocks(cells(problem.scaled, knots), knots, degree, rate, relaxation.elevation))
-    regions = strips(problem.scaled, knots, problem.step if degree else 0.0)
-    return list(discrete_blocks(regions, knots, degree, relaxation.elevation))
-
-
-def _attempt(problem: _Problem, relaxation: Relaxation, solver: Solver, knots: Array, degree: int, margin: float) -> _Result:
-    start = time.perf_counter()
-    unknowns = (len(knots) - 1) * degree + 1
-    blocks = _blocks(problem, relaxation, knots, degree)
-    candidate, rounds = _solve_by_rounds(problem, relaxation, solver, blocks, unknowns, margin)
-    solved = time.perf_counter()
-    gamma, lyapunov, conditioning = _verified(problem, candidate, knots, degree, unknowns, relaxation.elevation)
-    seconds = Seconds(solved - start - candidate.seconds, candidate.seconds, time.perf_counter() - solved)
-    words = f"{candidate.message} ({rounds} round(s)), {'verified' if lyapunov is not None else 'not verified'}"
-    if problem.with_gain and lyapunov is not None:
-        words += f", gamma {gamma:.6g}"
-    attempt = Attempt(len(knots) - 1, degree, margin, words, gamma)
-    return _Result(gamma, lyapunov, conditioning, candidate.answer, seconds, (attempt,))
-
-
-def _solve_by_rounds(
-    problem: _Problem, relaxation: Relaxation, solver: Solver, blocks: list[Blocks], unknowns: int, margin: float
-) -> tuple[Candidate, int]:  # fmt: skip
-    """Solve with the blocks likely to bind, add those that came out violated, and so on: far fewer blocks in all."""
-    n, m = len(problem.lpv.states), len(problem.lpv.inputs)
-    active = [np.full(len(block.constant), block.likely) for block in blocks]
-    seconds, rounds = 0.0, 0
-    while True:
-        rounds += 1
-        chosen = [block.keep(which) for block, which in zip(blocks, active, strict=True) if which.any()]
-        candidate = solve(assemble(chosen, n, m, unknowns, margin, relaxation.floor), solver)
-        seconds += candidate.seconds
-        if candidate.x is None or rounds == ROUNDS:
-            break
-        P, level = candidate.x[:-1].reshape(unknowns, -1), candidate.x[-1]
-        target = np.diag(np.concatenate([np.zeros(n), np.full(m, level)])) if problem.with_gain else -level * np.eye(n)
-        added = 0
-        for block, which in zip(blocks, active, strict=True):
-            if which.all():
-                continue
-            new = ~which & (np.linalg.eigvalsh(block.values(P, n + m) - target)[:, -1] > VIOLATED)
-            which |= new
-            added += int(new.sum())
-        if not added:
-            break
-    return replace(candidate, seconds=seconds), rounds
-
-
-def _verified(
-    problem: _Problem, candidate: Candidate, knots: Array, degree: int, unknowns: int, elevation: int
-) -> tuple[float, SplineLyapunov | None, float]:  # fmt: skip
-    """The gain that P itself admits, whatever the solver said; None where P proves nothing."""
-    nothing = math.inf, None, math.inf
-    if candidate.x is None:
-        return nothing
-    n, units = len(problem.lpv.states), problem.units
-    scaled = smat(candidate.x[:-1].reshape(unknowns, -1), n)
-    P = SplineLyapunov(knots, degree, units.to_physical(scaled))
-    # judged as it is stored: from the physical matrices back to scaled units
-    back = SplineLyapunov(knots, degree, units.to_scaled(P.coefficients))
-    rate = problem.scaled_rate if problem.lpv.dt is None else problem.rate
-    findings = examine(Claim(problem.scaled, back, rate, problem.lpv.dt, elevation))
-    if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
-        return nothing
-    gamma = units.channel * math.sqrt(findings.g * (1 + INFLATION)) if problem.with_gain else math.nan
-    if not holds_on_grid(problem.lpv, P, problem.rate, gamma, units.right):
-        return nothing
-    return gamma, P, findings.conditioning
-
-
 def _certificate(
-    lpv: LPVStateSpace, rate: float, solver: Solver, found: tuple[_Problem, _Result] | None, lower: float, frozen: float,
+    lpv: LPVStateSpace, rate: float, solver: Solver, found: tuple[Problem, Result] | None, lower: float, frozen: float,
     status: Status | None, worst: Trajectory | None, bounds: float, elevation: int = 0,
 ) -> Certificate:  # fmt: skip
+    """The certificate of what was `found` (None: nothing was tried); `status` None where the search for P decides."""
     kind = "stability" if math.isnan(lower) else "l2 gain"
-    named = f"{solver.name} {solver.version}, tolerance {solver.tolerance:g}"
-    nothing = math.nan if kind == "stability" else math.inf
-    if found is None:
-        assert status is not None  # noqa: S101 - ours
-        return Certificate(
-            kind, nothing, lower, frozen, status, False, None, rate, _hypotheses(lpv, rate, None, kind), named, Seconds(bounds=bounds),
-            math.inf, (), worst, lpv.scheduling.unit,
-        )  # fmt: skip
-    problem, best = found
-    verified = best.lyapunov is not None
-    status = Status.PROVEN if verified else Status.INFEASIBLE if best.answer is Answer.INFEASIBLE else Status.FAILED
-    gamma = best.gamma if verified else nothing
+    best = found[1] if found else Result(math.inf, None, math.inf, Answer.FAILED, Seconds(), ())
+    if status is None:
+        status = Status.PROVEN if best.lyapunov else Status.INFEASIBLE if best.answer is Answer.INFEASIBLE else Status.FAILED
+    gamma = math.nan if kind == "stability" else best.gamma
     proof = None
-    if best.lyapunov is not None:
-        proof = partial(proven, Claim(problem.pieces, best.lyapunov, rate, lpv.dt, elevation), gamma)
+    if found and best.lyapunov is not None:
+        proof = partial(proven, Claim(found[0].pieces, best.lyapunov, rate, lpv.dt, elevation), gamma)
     return Certificate(
-        kind, gamma, lower, frozen, status, verified, best.lyapunov, rate, _hypotheses(lpv, rate, best.lyapunov, kind), named,
-        best.seconds._replace(bounds=bounds), best.conditioning, best.attempts, worst, lpv.scheduling.unit, proof,
+        kind, gamma, lower, frozen, status, best.lyapunov is not None, best.lyapunov, rate, _hypotheses(lpv, rate, best.lyapunov, kind),
+        f"{solver.name} {solver.version}, tolerance {solver.tolerance:g}", best.seconds._replace(bounds=bounds), best.conditioning,
+        best.attempts, worst, lpv.scheduling.unit, proof,
     )  # fmt: skip
 
 

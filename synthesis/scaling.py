@@ -44,7 +44,7 @@ def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
     A = np.asarray(balanced)
     time = 1.0
     if lpv.dt is None:
-        fastest = np.abs(linalg.eigvals(A))
+        fastest = np.abs(np.linalg.eigvals(A))
         time = 1.0 / float(np.median(fastest)) if np.median(fastest) > 0 else 1.0
     X = _lyapunov(A, lpv.dt is None)
     root = np.eye(n) if X is None else linalg.inv(linalg.cholesky(X / np.exp(np.linalg.slogdet(X)[1] / n)))
@@ -59,7 +59,7 @@ def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
 
 def _lyapunov(A: Array, continuous: bool) -> Array | None:
     eye = np.eye(len(A))
-    poles = linalg.eigvals(A)
+    poles = np.linalg.eigvals(A)
     if not np.all(poles.real < 0 if continuous else np.abs(poles) < 1):
         return None
     X = linalg.solve_continuous_lyapunov(A.T, -eye) if continuous else linalg.solve_discrete_lyapunov(A.T, eye)
