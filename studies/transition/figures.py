@@ -1,0 +1,254 @@
+"""The figures of the report: functions from results to matplotlib figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.transition.axes import AXES, LONGITUDINAL
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from studies.transition.study import Study
+
+INK, BLUE, ORANGE, GREEN, RED, GREY = "#1b1f24", "#0b61a4", "#d9730d", "#2e7d32", "#b3261e", "#8a949e"
+DEGREES = 180 / math.pi
+
+
+def figures(study: Study) -> Iterator[tuple[str, str, Figure]]:
+    """(name, caption, figure) of everything the study has reached."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    style = {
+        "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": GREY, "axes.labelcolor": INK,
+        "axes.titlesize": 9.5, "axes.titlelocation": "left", "legend.frameon": False, "legend.fontsize": 8, "lines.linewidth": 1.3,
+        "axes.grid": True, "grid.color": "#e6e9ec", "grid.linewidth": 0.6, "svg.hashsalt": "symheli", "figure.constrained_layout.use": True,
+    }  # fmt: skip
+    with matplotlib.rc_context(style):
+        if study.baseline:
+            yield "trim", "Trim along the transition. Dotted lines: corners of the model.", trim(study)
+            yield (
+                "interpolation",
+                "Entries of A(p): exact linearizations (dots) and their interpolations. M_u and M_w jump where the tail loses its lift: no polynomial follows.",
+                entries(study),
+            )
+        for e in study.experiments:
+            yield (
+                f"convergence-{e.loop}",
+                f"Counterpart of the paper's figures 1, 3 and 5, {e.loop} loop: the 12 parameters of each output as the recursion runs, each divided by the largest final value of its coefficient function.",
+                convergence(e),
+            )
+            yield (
+                f"outputs-{e.loop}",
+                f"Counterpart of the paper's figures 2, 4 and 6, {e.loop} loop: system and one-step prediction on a fresh record; below, the error. Triangles: the largest errors (spikes).",
+                outputs(e),
+            )
+        if study.flights:
+            yield "flights", "The flight that is identified, and the transition that judges (noise-free).", flights(study)
+        for axis in AXES:
+            c = study.comparisons.get((axis.name, "noise-free"))
+            if c:
+                yield f"prediction-{axis.name}", f"{axis.name}: 1 s ahead on the unseen transition (noise-free).", prediction(c)
+        for f in study.frozen.values():
+            yield (
+                f"frozen-{f.axis.name}",
+                f"{f.axis.name} with airspeed held: poles from hover (pale) to 12.5 m/s (dark), response at 7 m/s, nu-gap to the exact model.",
+                frozen(f),
+            )
+        if study.bounds:
+            yield (
+                "gain-against-rate",
+                "What the rate is worth: proven L2 gain of the gust loop against permitted acceleration. Triangles: no bound can be smaller. The LFT's assumption (p as fast as it likes) proves nothing.",
+                gain_curve(study),
+            )
+
+
+def _subplots(rows: int, columns: int, width: float, height: float, **options: Any) -> tuple[Figure, np.ndarray]:
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False, **options)
+    return figure, axes
+
+
+def _kinks(ax: Any, study: Study) -> None:
+    for speeds in study.baseline.between.kinks.values():  # type: ignore[union-attr]
+        for speed in speeds:
+            ax.axvline(speed, color=GREY, linewidth=0.8, linestyle=":")
+
+
+def trim(study: Study) -> Figure:
+    """Attitude and controls against airspeed."""
+    family = study.baseline.nodes  # type: ignore[union-attr]
+    figure, axes = _subplots(1, 4, 11, 2.4, sharex=True)
+    for ax, name, where in zip(axes[0], ("theta", "phi", "d_col", "d_ped"), ("x", "x", "u", "u"), strict=True):
+        ax.plot(family.airspeeds, [DEGREES * getattr(t, where)[name] for t in family.trims], color=BLUE)
+        ax.set_title(f"{name} (deg)")
+        ax.set_xlabel("airspeed (m/s)")
+        _kinks(ax, study)
+    return figure
+
+
+def entries(study: Study) -> Figure:
+    """Four entries of A: exact and interpolated."""
+    b = study.baseline
+    assert b is not None  # noqa: S101
+    figure, axes = _subplots(1, 4, 11, 2.8)
+    fine = np.linspace(b.nodes.airspeeds[0], b.nodes.airspeeds[-1], 400)
+    cubic, sextic, spline = (b.lpv[k].matrices(fine).A for k in ("polynomial 3", "polynomial 6", "spline"))
+    for ax, (row, column, title) in zip(axes[0], (("q", "u", "M_u"), ("q", "w", "M_w"), ("v", "v", "Y_v"), ("r", "v", "N_v")), strict=True):
+        i, j = b.nodes.states.index(row), b.nodes.states.index(column)  # type: ignore[arg-type]
+        ax.plot(b.between.airspeeds, b.between.A[:, i, j], ".", color=INK, markersize=3, label="exact")
+        ax.plot(fine, cubic[:, i, j], color=BLUE, label="cubic")
+        ax.plot(fine, sextic[:, i, j], color=GREEN, label="degree 6", linewidth=1)
+        ax.plot(fine, spline[:, i, j], color=ORANGE, label="spline", linewidth=1)
+        ax.set_title(f"{title} ({'1/(m s)' if row in 'qr' else '1/s'})")
+        ax.set_xlabel("airspeed (m/s)")
+        _kinks(ax, study)
+    axes[0][0].legend()
+    return figure
+
+
+def convergence(e: Any) -> Figure:
+    """Parameters over time, one panel an output."""
+    figure, axes = _subplots(1, 3, 11, 2.8, sharex=True)
+    for ax, c in zip(axes[0], e.channels, strict=True):
+        powers = 13.0 ** np.tile(np.arange(3), 4)  # a coefficient of p^k counts by its contribution at 13 m/s
+        shown = c.parameters * powers
+        size = np.abs(shown[-1].reshape(4, 3)).max(axis=1).repeat(3)
+        for k, name in enumerate(c.parameter_names):
+            ax.plot(
+                c.time,
+                shown[:, k] / size[k],
+                color=(BLUE, ORANGE, GREEN, RED)[k // 3],
+                linestyle=("-", "--", ":")[k % 3],
+                label=name,
+                linewidth=1,
+            )
+        ax.set_ylim(-2.5, 2.5)
+        ax.set_title(f"{c.output} (settled after {c.settled_after:.0f} s)")
+        ax.set_xlabel("time (s)")
+    axes[0][0].set_ylabel("parameter, scaled")
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside right center", ncols=1)
+    return figure
+
+
+def outputs(e: Any) -> Figure:
+    """System and one-step prediction over the fresh record, with the error below."""
+    figure, axes = _subplots(2, 3, 11, 3.8, sharex=True, height_ratios=(2, 1))
+    for column, c in enumerate(e.channels):
+        guess = c.model.predict(e.test, 1)[:, 0]
+        top, bottom = axes[0][column], axes[1][column]
+        top.plot(e.test.time, e.test[c.output], color=INK, label="system", linewidth=1)
+        top.plot(e.test.time, guess, color=ORANGE, label="model, one step", linewidth=0.9, linestyle="--")
+        bottom.plot(e.test.time, e.test[c.output] - guess, color=RED, linewidth=0.8)
+        for t, _ in c.spikes:
+            k = int(np.argmin(np.abs(e.test.time - t)))
+            bottom.plot(t, e.test[c.output][k] - guess[k], "v", color=INK, markersize=4)
+        top.set_title(f"{c.output}: one step {c.fits['one step']:.0f} %, 1 s {c.fits['1 s']:.0f} %, free run {c.fits['free run']:.0f} %")
+        bottom.set_xlabel("time (s)")
+    axes[0][0].legend(loc="upper right")
+    axes[1][0].set_ylabel("error")
+    return figure
+
+
+def flights(study: Study) -> Figure:
+    """Airspeed, attitude and inputs of training and test."""
+    figure, axes = _subplots(3, 2, 11, 4.6, sharex="col", width_ratios=(2.2, 1))
+    for column, name in enumerate(("training, noise-free", "test, noise-free")):
+        record = study.flights[name]
+        axes[0][column].plot(record.time, record["airspeed"], color=BLUE, label="airspeed")
+        axes[0][column].plot(record.time, record["airspeed_command"], color=ORANGE, linestyle="--", label="command", linewidth=1)
+        axes[0][column].set_title(f"{name.split(',')[0]}: airspeed (m/s)")
+        for signal, colour in (("theta", BLUE), ("phi", ORANGE)):
+            axes[1][column].plot(record.time, DEGREES * record[signal], color=colour, label=signal, linewidth=0.9)
+        axes[1][column].set_title("attitude (deg)")
+        for signal, colour in (("d_lon", BLUE), ("d_lat", ORANGE), ("d_col", GREEN), ("d_ped", RED)):
+            axes[2][column].plot(record.time, DEGREES * record[signal], color=colour, label=signal, linewidth=0.6)
+        axes[2][column].set_title("inputs (deg)")
+        axes[2][column].set_xlabel("time (s)")
+    for row in axes:
+        row[1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def prediction(c: Any) -> Figure:
+    """1 s ahead predictions of each output."""
+    figure, axes = _subplots(len(c.axis.outputs), 1, 11, 1.55 * len(c.axis.outputs), sharex=True)
+    chosen = [p for p in c.predictors if p.name in ("LPV-ARX, two inputs", "LPV-ARX, other inputs measured", "baseline, cubic")]
+    for k, (ax, output) in enumerate(zip(axes[:, 0], c.axis.outputs, strict=True)):
+        ax.plot(c.record.time, c.record[output], color=INK, label="flight", linewidth=1.5)
+        for p, colour in zip(chosen, (BLUE, GREEN, ORANGE) if len(chosen) == 3 else (BLUE, ORANGE), strict=True):
+            ax.plot(c.record.time, p.one_second_series[:, k], color=colour, linewidth=1, label=f"{p.name}: {p.one_second[output]:.0f} %")
+        unit = c.record.signals[c.record.signals.index(output)].unit
+        low, high = c.record[output].min(), c.record[output].max()
+        ax.set_ylim(low - 0.4 * (high - low), high + 0.4 * (high - low))
+        ax.set_ylabel(f"{output} ({unit})")
+        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes[-1, 0].set_xlabel("time (s)")
+    return figure
+
+
+def frozen(f: Any) -> Figure:
+    """Poles, frequency response and nu-gap."""
+    figure, axes = _subplots(1, 3, 11, 3.2)
+    shade = np.linspace(0.25, 1.0, len(f.airspeeds))
+    for name, stack, colour, marker in (
+        ("exact", f.exact_poles, INK, "o"),
+        ("baseline", f.baseline_poles, ORANGE, "+"),
+        ("identified", f.identified_poles, BLUE, "x"),
+    ):
+        for k, poles in enumerate(stack):
+            shown = poles[(poles.imag >= 0) & (poles.real > -12) & (poles.imag < 30)]
+            face = "none" if marker == "o" else colour
+            axes[0][0].scatter(shown.real, shown.imag, s=18, marker=marker, color=colour, facecolors=face if marker == "o" else None, alpha=shade[k], linewidths=0.9, label=name if k == len(stack) - 1 else None)  # fmt: skip
+    axes[0][0].axvline(0, color=GREY, linewidth=0.8)
+    axes[0][0].set_xlabel("real (rad/s)")
+    axes[0][0].set_title("poles, imaginary part (rad/s)")
+    axes[0][0].legend(loc="upper left")
+    for name, colour in (("exact", INK), ("baseline", ORANGE), ("identified", BLUE)):
+        if name in f.responses:
+            axes[0][1].loglog(
+                f.omega,
+                f.responses[name],
+                color=colour,
+                label=name,
+                linestyle="--" if name == "baseline" else "-",
+                linewidth=2.4 if name == "exact" else 1.2,
+            )
+    axes[0][1].set_title(f"{'|q/d_lon|' if f.axis is LONGITUDINAL else '|p/d_lat|'} at 7 m/s (1/s)")
+    axes[0][1].set_xlabel("frequency (rad/s)")
+    axes[0][1].legend()
+    axes[0][2].plot(f.airspeeds, f.gap_baseline, "+-", color=ORANGE, label="baseline")
+    axes[0][2].plot(f.airspeeds, f.gap_identified, "x-", color=BLUE, label="identified")
+    axes[0][2].set_ylim(0, 1.05)
+    axes[0][2].set_title("nu-gap to the exact model (1: the slow modes differ in stability)")
+    axes[0][2].set_xlabel("airspeed (m/s)")
+    axes[0][2].legend()
+    return figure
+
+
+def gain_curve(study: Study) -> Figure:
+    """Gain against rate with its bracket."""
+    figure, axes = _subplots(1, 1, 7.5, 3.4)
+    ax = axes[0][0]
+    gust = [b for b in study.bounds if b.channel == "gust" and b.certificate.kind == "l2 gain" and math.isfinite(b.rate)]
+    place = [max(b.rate, 0.03) for b in gust]
+    proven = [b.certificate.gamma if b.certificate.verified else np.nan for b in gust]
+    lower = [b.certificate.lower for b in gust]
+    ax.fill_between(place, lower, proven, color=BLUE, alpha=0.08)
+    ax.plot(place, proven, "o-", color=BLUE, label="proven on the whole interval")
+    ax.plot(place, lower, "^--", color=ORANGE, label="lower bound (a trajectory attains it)")
+    ax.axhline(study.exact_frozen.get("gust", np.nan), color=GREY, linestyle=":", label="frozen gain of the exact models")
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xticks([0.03, 0.1, 1, 3, 4], ["frozen", "0.1", "1", "3", "4"])
+    ax.minorticks_off()
+    ax.set_xlabel("permitted |dV/dt| (m/s^2)")
+    ax.set_ylabel("L2 gain, (rad/s, rad)/(m/s)")
+    ax.legend(loc="upper left")
+    return figure

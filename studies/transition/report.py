@@ -1,0 +1,68 @@
+"""report.html, the figures and results.json: whole files or none."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studies.files import write_bytes, write_text
+from studies.transition import tables
+from studies.transition.axes import AXES
+from studies.transition.results import to_dict
+from symheli.errors import SymheliError
+
+if TYPE_CHECKING:
+    from studies.transition.study import Study
+
+TEMPLATE = "report.html.j2"
+
+
+def write_results(study: Study, out: Path) -> Path:
+    """results.json with everything reached so far."""
+    return write_text(out / "results.json", json.dumps(to_dict(study), indent=1, allow_nan=False) + "\n")
+
+
+def write_report(study: Study, out: Path) -> Path:
+    """figures/*.png, results.json and report.html (self-contained: figures are inside). Raises `SymheliError` where the extra is missing."""
+    try:
+        import jinja2
+        import matplotlib.pyplot as plt
+    except ImportError as error:
+        raise SymheliError(
+            f"the report needs {error.name}: pip install 'symheli[study]'; the numbers are in {out / 'results.json'}"
+        ) from error
+    from studies.transition.figures import figures
+
+    pictures = {}
+    for name, caption, figure in figures(study):
+        stream = io.BytesIO()
+        figure.savefig(stream, format="png", dpi=150)
+        plt.close(figure)
+        write_bytes(out / "figures" / f"{name}.png", stream.getvalue())
+        pictures[name] = {"caption": caption, "data": base64.b64encode(stream.getvalue()).decode("ascii")}
+    write_results(study, out)
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    page = environment.get_template(TEMPLATE).render(study=study, pictures=pictures, axes=AXES, t=tables, **_headline(study))
+    return write_text(out / "report.html", page)
+
+
+def _headline(study: Study) -> dict[str, object]:
+    """The numbers the first paragraph speaks of."""
+    gust = [b for b in study.bounds if b.channel == "gust" and b.certificate.kind == "l2 gain"]
+    proven = [b for b in gust if b.certificate.verified]
+    hypotheses = list(dict.fromkeys(h for b in proven for h in b.certificate.hypotheses))
+    return {
+        "frozen_gain": next((b.certificate.frozen for b in gust), float("nan")),
+        "fastest": max(proven, key=lambda b: b.rate, default=None),
+        "hypotheses": hypotheses,
+        "notes": {name: model.excitation for name, model in study.models.items() if model.excitation is not None},
+    }

@@ -1,0 +1,43 @@
+"""The short table printed when the study is done."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from studies.transition import tables
+from studies.transition.axes import AXES
+
+if TYPE_CHECKING:
+    from studies.transition.study import Study
+
+
+def summary(study: Study) -> str:
+    """Baseline, identification, comparison and guarantees in about forty lines."""
+    if study.baseline is None:
+        return "nothing was finished"
+    b = study.baseline
+    lines = [
+        f"Baseline: LFT of order {b.lft.order}, {b.reduced.order} when reduced, equal to the polynomial family within {b.lft_error:.0e}; "
+        f"{len(b.unfit)} entries no polynomial fits, worst {', '.join(e.name for e in b.unfit[:4])}"
+    ]
+    for r in study.recoveries:
+        lines.append(f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within {r.B_error:.0e}")
+    sections = [_marks(study), *(tables.guarantee(study, channel).text() for channel in ("gust", "servo"))]
+    return "\n".join(lines) + "\n\n" + "\n\n".join(s for s in sections if s) + "\n\n" + "\n".join(tables.verdicts(study))
+
+
+def _marks(study: Study) -> str:
+    table = tables.Table(
+        "Identified on one transition, judged 1 s ahead on another (fit in percent)", ["output", "noise-free", "mark", "30 dB", "mark"]
+    )
+    for axis in AXES:
+        pair = [study.scores.get((axis.name, noise)) for noise in ("noise-free", "30 dB")]
+        if None in pair:
+            return ""
+        for output in axis.outputs:
+            marks = axis.marks.get(output)
+            cells = []
+            for k, score in enumerate(pair):
+                cells += [tables.percent(score.one_second[output]), f">= {marks[k]:.0f}" if marks else ""]  # type: ignore[union-attr]
+            table.rows.append([f"{output} ({axis.name})", *cells])
+    return table.text()

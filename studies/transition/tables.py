@@ -1,0 +1,179 @@
+"""The study's tables as rows of text, shared by the printed summary and the report."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.transition.axes import ALL, FROZEN_SPEEDS, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
+from studies.transition.campaign import MODE_MARK
+from studies.transition.guarantees import Bound, rate_text
+
+if TYPE_CHECKING:
+    from studies.transition.study import Study
+
+
+@dataclass
+class Table:
+    """Heading, column names, rows of text, and remarks below; `bold` marks cells (row, column) that stand out."""
+
+    title: str
+    columns: list[str]
+    rows: list[list[str]] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+    bold: set[tuple[int, int]] = field(default_factory=set)
+
+    def text(self) -> str:
+        """Aligned plain text."""
+        widths = [max(len(row[i]) for row in [self.columns, *self.rows]) for i in range(len(self.columns))]
+        lines = [self.title]
+        for row in [self.columns, *self.rows]:
+            first, *rest = (cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True)))
+            lines.append("  " + "  ".join([first, *rest]))
+        return "\n".join([*lines, *(f"  {remark}" for remark in self.remarks)])
+
+
+def percent(number: float) -> str:
+    """A fit: one decimal, "diverges" where it means nothing."""
+    return "diverges" if not math.isfinite(number) or number < -999 else f"{number:.1f}"
+
+
+def gain(number: float) -> str:
+    """A gain with three digits."""
+    return "none" if math.isinf(number) else "-" if math.isnan(number) else f"{number:.3g}"
+
+
+def interpolation(study: Study) -> Table:
+    """Entries no polynomial fits."""
+    assert study.baseline is not None  # noqa: S101
+    kinds = ["polynomial 2", "polynomial 3", "polynomial 4", "polynomial 6", "spline", "linear"]
+    table = Table(
+        "Entries of A(p), B(p) that no polynomial fits: largest error between the nodes, percent of the entry's range",
+        ["entry", "range (SI)", *kinds],
+    )
+    for entry in study.baseline.unfit:
+        table.rows.append([entry.name, f"{entry.span:.3g}", *(f"{entry.percent[k]:.0f}" for k in kinds)])
+    kinks = sorted((speed, name) for name, speeds in study.baseline.between.kinks.items() for speed in speeds)
+    fitted = len(study.baseline.entries) - len(table.rows)
+    table.remarks.append(f"The other {fitted} varying entries are fitted within 10 % of their range by some degree up to 6.")
+    table.remarks.append(
+        "Corners of the model: "
+        + ", ".join(f"{speed:.2f} m/s ({name})" for speed, name in kinks)
+        + ". No smooth function follows a jump there."
+    )
+    return table
+
+
+def experiment(study: Study) -> Table:
+    """The paper's experiment."""
+    table = Table(
+        "The paper's experiment: pitch cyclic to one output, na = 3, nb = 1, delay 2, quadratic in p, p(k) = 6.5 (1 + sin(pi k/3)) m/s, T = 0.11408 s; fit in percent on a fresh record",
+        ["loop, output", "one step", "1 s ahead", "free run", "parameters settled (s)", "largest one-step error (s; standard deviations)"],
+    )
+    for e in study.experiments:
+        for c in e.channels:
+            time, size = c.spikes[0]
+            table.rows.append(
+                [f"{e.loop}, {c.output}", *(percent(v) for v in c.fits.values()), f"{c.settled_after:.0f}", f"{time:.1f}; {size:.1f}"]
+            )
+    if study.experiments:
+        table.remarks.append(f"A cubic basis is refused: {study.experiments[0].cubic_refused}.")
+    return table
+
+
+def scores(study: Study, noise: str) -> Table:
+    """Identified models on the unseen transition."""
+    table = Table(
+        f"Identified LPV-ARX (order 3, quadratic in p, 50 Hz) on a transition it has not seen, {noise}: fit in percent",
+        ["model, output", "one step", "1 s ahead", "free run", "mark (1 s)"],
+    )
+    for axis in (LONGITUDINAL, LATERAL, LATERAL_WITH_COLLECTIVE, ALL):
+        result = study.scores.get((axis.name, noise))
+        if result is None:
+            continue
+        for output in axis.outputs:
+            mark = axis.marks.get(output)
+            wanted = f"{mark[noise != 'noise-free']:.0f}" if mark and axis in (LONGITUDINAL, LATERAL) else ""
+            table.rows.append([
+                f"{axis.name}: {output}", percent(result.one_step[output]), percent(result.one_second[output]), percent(result.free_run[output]), wanted,
+            ])  # fmt: skip
+    return table
+
+
+def modes(study: Study) -> Table:
+    """Frozen rotor modes."""
+    table = Table(
+        f"Frozen rotor modes: distance of the identified eigenvalue to the exact one, percent of its magnitude (mark {MODE_MARK:g}, noise-free)",
+        ["axis, data", *(f"{v:g} m/s" for v in FROZEN_SPEEDS)],
+    )
+    for (axis, noise), result in study.scores.items():
+        if axis in (LONGITUDINAL.name, LATERAL.name):
+            table.rows.append([f"{axis}, {noise}", *(f"{result.mode_miss[v]:.2f}" for v in FROZEN_SPEEDS)])
+    table.remarks.append("With noise, least squares is biased: the damping of the modes is what suffers (see the identification notes).")
+    return table
+
+
+def comparison(study: Study, axis: Axis, noise: str) -> Table:
+    """Who predicts best, 1 s ahead and in free run."""
+    c = study.comparisons[axis.name, noise]
+    table = Table(
+        f"{axis.name}, {noise}: 1 s ahead / free run on the unseen transition, fit in percent (best 1 s in bold)",
+        ["predictor", *axis.outputs],
+    )
+    for p in c.predictors:
+        table.rows.append([p.name, *(f"{percent(p.one_second[y])} / {percent(p.free_run[y])}" for y in axis.outputs)])
+    for j, y in enumerate(axis.outputs):
+        best = int(np.nanargmax([p.one_second[y] for p in c.predictors]))
+        table.bold.add((best, j + 1))
+    return table
+
+
+def verdicts(study: Study) -> list[str]:
+    """One sentence an output: who wins 1 s ahead, by how much."""
+    out = []
+    for (_, noise), c in study.comparisons.items():
+        identified = [p for p in c.predictors if p.name.startswith("LPV")]
+        baseline = [p for p in c.predictors if "left out" not in p.name and p not in identified]
+        sentences = []
+        for y in c.axis.outputs:
+            one, two = max(identified, key=lambda p: p.one_second[y]), max(baseline, key=lambda p: p.one_second[y])
+            difference = one.one_second[y] - two.one_second[y]
+            who = "level" if abs(difference) < 1 else "the identified model" if difference > 0 else "the baseline"
+            sentences.append(f"{y}: {who}" + ("" if abs(difference) < 1 else f" by {abs(difference):.1f} points"))
+        out.append(f"{c.axis.name}, {noise}, 1 s ahead: " + "; ".join(sentences) + ".")
+    return out
+
+
+def guarantee(study: Study, channel: str) -> Table:
+    """Gain against permitted acceleration."""
+    what = {
+        "gust": "Lateral gust (m/s) to yaw rate and roll (rad/s, rad) under attitude hold, continuous time",
+        "servo": "Disturbances at roll cyclic (0.01 rad) and pedal (0.02 rad) to yaw rate (0.1 rad/s) and roll (0.1 rad), 50 Hz",
+    }[channel]
+    table = Table(what, ["model", "acceleration", "stable", "lower bound", "proven gain", "how"])
+    stable = {(b.model, b.rate): b.certificate for b in study.bounds if b.channel == channel and b.certificate.kind == "stability"}
+    for b in study.bounds:
+        c = b.certificate
+        if b.channel != channel or c.kind != "l2 gain":
+            continue
+        proof = stable.get((b.model, b.rate))
+        growing = math.isinf(c.lower)
+        word = "no: it grows" if growing else "proven" if (proof is not None and proof.verified) or c.verified else "not proven"
+        table.rows.append([
+            b.model, rate_text(b.rate), word, "grows" if growing else gain(c.lower), gain(c.gamma) if c.verified else "none", _how(b),
+        ])  # fmt: skip
+    if channel in study.exact_frozen:
+        table.remarks.append(f"Frozen gain of the exact linearizations at the nodes: {gain(study.exact_frozen[channel])}.")
+    return table
+
+
+def _how(b: Bound) -> str:
+    c = b.certificate
+    if not c.verified:
+        return c.status.value
+    P = c.lyapunov
+    form = "" if P is None else f"P(p) of degree {P.degree} on {P.segments} segment(s), "
+    return f"{form}verified, {sum(c.seconds):.1f} s"
