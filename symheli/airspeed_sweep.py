@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -23,7 +24,7 @@ def sweep(heli: Helicopter, airspeeds: Sequence[float], *, climb_rate: float = 0
     which the linear models have a corner (a wake edge, a limit, a flow reversal). Raises `TrimError`, `InputError`.
     """
     speeds = [float(v) for v in np.atleast_1d(airspeeds)]
-    if not speeds or any(b <= a for a, b in zip(speeds[:-1], speeds[1:], strict=True)):
+    if not speeds or any(b <= a for a, b in pairwise(speeds)):
         raise InputError("sweep needs increasing airspeeds")
     points: list[TrimPoint] = []
     for speed in speeds:

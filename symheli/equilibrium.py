@@ -77,7 +77,7 @@ class TrimPoint(OperatingPoint):
         notes = [f"{'/'.join(self.on_stops)} on the stop"] if self.on_stops else []
         notes += ["vortex ring: no accuracy promised"] if self.vortex_ring else []
         status = "trimmed" if self.success else "NOT trimmed"
-        return f"{status} at {self.airspeed:g} m/s (largest residual {worst[0]:.1e} in d{worst[1]}/dt){'; ' if notes else ''}{'; '.join(notes)}"
+        return "; ".join([f"{status} at {self.airspeed:g} m/s (largest residual {worst[0]:.1e} in d{worst[1]}/dt)", *notes])
 
 
 def trim(
@@ -86,9 +86,9 @@ def trim(
 ) -> TrimPoint:  # fmt: skip
     """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.
 
-    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start` or a hover guess; where that fails, by continuation from
-    hover. Success is judged on the recomputed residual of every equation. Raises `TrimError` carrying the best point;
-    with throw=False that point is returned instead.
+    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start` or a hover guess; where
+    that fails, by continuation from hover. Success is judged on the recomputed residual of every equation. Raises
+    `TrimError` carrying the best point; with throw=False that point is returned instead.
     """
     condition = FlightCondition(
         float(airspeed), float(climb_rate), float(turn_rate), float(sideslip),

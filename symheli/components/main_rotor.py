@@ -30,8 +30,8 @@ def flapping_slopes(mu2: Any, mu: Any, mu_x: Any, lam0: Any, d_col: Any, *, k_mu
 def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
     """Forces and moments of the tilted thrust, flapping dynamics, shaft torque, induced velocity `V_imr` (m/s).
 
-    Source: G15, main rotor thrust, torque, flapping, forces and moments. The sign of db1/dmu_v is + (a hovering rotor looks the same after a
-    turn about its shaft); the printed - is the option "lateral_flapping".
+    Source: G15, main rotor thrust, torque, flapping, forces and moments. The sign of db1/dmu_v is + (a hovering
+    rotor looks the same after a turn about its shaft); the printed - is the option "lateral_flapping".
     """
     disc = Disc(par.radius, par.chord, 2, motion.Om, motion.rho)
     mu_x, mu_y, mu_z = motion.u_a / disc.tip_speed, motion.v_a / disc.tip_speed, motion.w_a / disc.tip_speed

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -139,7 +140,7 @@ class FlightRecord:
         """Index ranges without a gap between them, in order."""
         steps = np.diff(self.time)
         cuts = [0, *(np.flatnonzero(steps > GAP * np.median(steps)) + 1).tolist(), len(self)]
-        return tuple(slice(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True))
+        return tuple(slice(a, b) for a, b in pairwise(cuts))
 
     def derivative(self, name: str) -> Array:
         """Central-difference time derivative (n,) of a signal, one-sided at the ends of each segment."""

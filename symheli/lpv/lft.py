@@ -148,7 +148,8 @@ class LFT:
         """
         if len(self.inputs) != len(other.outputs) or self.dt != other.dt:
             raise InputError(
-                f"series connection needs as many inputs ({len(self.inputs)}) as outputs of the other ({len(other.outputs)}) and one sample period"
+                f"series connection needs as many inputs ({len(self.inputs)}) as outputs of the other ({len(other.outputs)}) "
+                "and one sample period"
             )
         n1, n2, x1, x2 = self.order, other.order, len(self.states), len(other.states)
 

@@ -27,6 +27,7 @@ class Signal(str):
     __slots__ = ("unit",)
 
     def __new__(cls, name: str, unit: str | None = None) -> Signal:
+        """The name, with its unit where given, known or carried by `name`."""
         self = super().__new__(cls, name)
         self.unit = unit or getattr(name, "unit", None) or UNITS.get(name, "1")
         return self

@@ -1,0 +1,43 @@
+"""The table of printed and computed numbers: what the equations determine is met, what is not met stays visible."""
+
+import math
+
+import pytest
+
+from studies.published_numbers import published_numbers, table
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return {row.quantity: row for row in published_numbers()}
+
+
+def test_every_number_the_printed_equations_determine_is_met(rows):
+    determined = [row for row in rows.values() if row.determined]
+    assert len(determined) >= 8
+    assert not [str(row) for row in determined if not row.met]
+
+
+def test_what_is_missed_is_missed_by_what_is_stated(rows):
+    """Neither fitted nor widened: the documentation tells these stories, and must change when they do."""
+    missed = {name for name, row in rows.items() if not row.met}
+    assert {"settling of the stabiliser bar", "pitch in forward flight at 14.5 m/s", "rotor torque in hover, eta_w = 0.9"} <= missed
+    assert {f"Y_v of the tail rotor at {v} m/s" for v in (3, 5, 10, 15, 20, 25)} <= missed
+    # the bar's printed 0.144 s, like the printed tau_e of about 0.1 s, belongs to a Lock number of 1.0; the table says 0.8
+    assert 24 / (1.0 * 167.0) == pytest.approx(0.144, abs=5e-4)
+    assert rows["settling of the stabiliser bar"].computed == pytest.approx(0.1796, abs=5e-5)
+
+
+def test_side_slope_agrees_with_the_linear_model(ideal):
+    """B of v' with respect to d_ped holds the tail rotor alone in hover: fin and wash add little, by a known sign."""
+    import symheli
+    from studies.published_numbers import _side_slope
+
+    point = symheli.trim(ideal, 0.0)
+    lin = symheli.linearize(ideal, point)
+    whole = lin.B[lin.states.index("v"), lin.inputs.index("d_ped")]
+    assert math.isclose(_side_slope(ideal, point, "d_ped"), whole, rel_tol=0.02)
+
+
+def test_the_table_has_a_line_a_number(rows):
+    assert len(table().splitlines()) == len(rows) + 2

@@ -1,0 +1,129 @@
+"""The whole public surface: documented, light to import, and the rooms import one way."""
+
+import ast
+import importlib
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+ROOMS = ("symheli", "identification", "synthesis", "studies")
+PACKAGES = ("symheli", "symheli.lpv", "symheli.flight", "identification", "synthesis")
+SHARED = ("symheli.lpv", "symheli.errors")
+"""What identification and synthesis may see of the model's room."""
+
+
+def sources(room):
+    return sorted((ROOT / room).rglob("*.py"))
+
+
+def imported(path):
+    """Every module a file imports, wherever in it, as dotted names."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path.relative_to(ROOT)}: relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def inside(name, packages):
+    return any(name == package or name.startswith(package + ".") for package in packages)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_name_exists_and_is_documented(package):
+    module = importlib.import_module(package)
+    for name in module.__all__:
+        thing = getattr(module, name)
+        assert inspect.getdoc(thing), f"{package}.{name} has no docstring"
+        if inspect.isclass(thing):
+            for member, value in vars(thing).items():
+                if member.startswith("_") or not (callable(value) or isinstance(value, property | classmethod | staticmethod)):
+                    continue
+                assert inspect.getdoc(getattr(thing, member)), f"{package}.{name}.{member} has no docstring"
+    assert list(module.__all__) == list(dict.fromkeys(module.__all__))
+
+
+def test_importing_the_packages_loads_no_heavy_library():
+    heavy = "('casadi', 'cvxpy', 'matplotlib', 'pandas', 'control', 'sympy')"
+    code = f"import sys, symheli, symheli.lpv, identification, synthesis; print([m for m in {heavy} if m in sys.modules])"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    assert loaded == "[]"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_the_rooms_import_one_way(room):
+    allowed = {
+        "symheli": ("symheli",),
+        "identification": ("identification", *SHARED),
+        "synthesis": ("synthesis", *SHARED),
+        "studies": ROOMS,
+    }[room]
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in sources(room)
+        for name in imported(path)
+        if inside(name, ROOMS) and not inside(name, allowed)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_the_value_types_know_no_physics():
+    """symheli.lpv is what the other rooms see: of its own room it may only use the errors, and the log readers when called."""
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in sources("symheli/lpv")
+        for name in imported(path)
+        if inside(name, ("symheli",)) and not inside(name, (*SHARED, "symheli.logs"))
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_no_import_runs_in_a_circle():
+    """Between files, counting only what is imported when the file is loaded."""
+    files = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): p for room in ROOMS for p in sources(room)}
+    edges = {name: set() for name in files}
+    for name, path in files.items():
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ImportFrom):
+                for alias in node.names:
+                    part = f"{node.module}.{alias.name}"
+                    edges[name].add(part if part in files else node.module)
+    done, trail = set(), []
+
+    def visit(name):
+        if name in trail:
+            pytest.fail("circular import: " + " -> ".join([*trail[trail.index(name) :], name]))
+        if name in done or name not in edges:
+            return
+        trail.append(name)
+        for other in sorted(edges[name]):
+            visit(other)
+        trail.pop()
+        done.add(name)
+
+    for name in sorted(edges):
+        visit(name)
+
+
+@pytest.mark.parametrize("room", [*ROOMS, "tests", "examples", "benchmarks", "docs"])
+def test_no_path_of_somebodys_computer(room):
+    machine = re.compile(r"(?<![\w.])/(?:home|root|Users|work|tmp|mnt|opt)/\w")
+    wrong = [
+        f"{path.relative_to(ROOT)}: {line.strip()}"
+        for path in (ROOT / room).rglob("*")
+        if path.suffix in (".py", ".md", ".toml", ".j2", ".c", ".h")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if machine.search(line)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_examples_run():
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        subprocess.run([sys.executable, str(path)], check=True, capture_output=True, timeout=60)
