@@ -1,6 +1,7 @@
 """The table of printed and computed numbers: what the equations determine is met, what is not met stays visible."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -41,3 +42,15 @@ def test_side_slope_agrees_with_the_linear_model(ideal):
 
 def test_the_table_has_a_line_a_number(rows):
     assert len(table().splitlines()) == len(rows) + 2
+
+
+def test_the_documentation_shows_these_numbers(rows):
+    page = (Path(__file__).resolve().parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
+    lines = {
+        cells[0]: cells for cells in ([c.strip() for c in line.strip("| ").split("|")] for line in page.splitlines()) if len(cells) == 8
+    }
+    for row in rows.values():
+        _, unit, printed, error, computed, _, determined, met = lines[row.quantity]
+        assert (unit, float(printed), float(error)) == (row.unit, row.printed, row.reading_error)
+        assert float(computed) == pytest.approx(row.computed, rel=1e-3)  # four digits are shown
+        assert (determined, met) == tuple("yes" if answer else "no" for answer in (row.determined, row.met))
