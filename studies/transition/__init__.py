@@ -1,0 +1,1 @@
+"""The main job: one transition, from equations to certified gains."""

@@ -48,7 +48,7 @@ class Baseline:
     lft: LFT
     reduced: LFT
     lft_error: float
-    """Largest difference of any entry of the LFT (whole and reduced) to the polynomial family between the nodes, relative to the largest entry."""
+    """Largest difference of any entry of the LFT, whole and reduced, to the polynomial family, relative to the largest entry."""
 
     @property
     def unfit(self) -> list[EntryError]:

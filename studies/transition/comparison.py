@@ -12,7 +12,7 @@ import symheli
 from identification import LPVARXModel, fit_percent
 from studies.transition.axes import HORIZON, SCHEDULING, Axis, rotor_mode
 from symheli import FlightRecord, Helicopter, LPVStateSpace
-from symheli.lpv import nu_gap
+from symheli.lpv import chordal_distance, nu_gap
 from symheli.lpv.arrays import Array
 
 SCALES = {
@@ -30,6 +30,10 @@ SCALES = {
     "theta": 0.3,
 }
 """Sizes (SI) by which channels are scaled before a nu-gap is taken."""
+
+
+FAST = 3.0
+"""Frequency (rad/s) above which the fast modes are compared on their own: the slow modes lie below 1 rad/s."""
 
 
 class BaselinePredictor:
@@ -103,7 +107,7 @@ class Comparison:
 def compare(
     axis: Axis, identified: dict[str, LPVARXModel], baselines: dict[str, tuple[LPVStateSpace, bool]], test: FlightRecord
 ) -> Comparison:
-    """`identified` and `baselines` ({name: (model, with drift)}) predict the outputs of `axis`; all start from what is known at the same sample."""
+    """`identified` and `baselines` ({name: (model, with drift)}) predict the outputs of `axis` from the same samples on."""
     truth, horizon = test.columns(axis.outputs), round(HORIZON / test.dt)
 
     def judged(name: str, one: Array, ahead: Array, free: Array) -> Predictor:
@@ -139,6 +143,9 @@ class FrozenComparison:
     mode_miss_identified: Array
     gap_baseline: Array
     gap_identified: Array
+    fast_baseline: Array
+    fast_identified: Array
+    """Largest chordal distance above `FAST` rad/s, where the slow modes do not decide."""
     omega: Array
     responses: dict[str, Array]
     """|G| (n,) of the first rate output from the first input at 7 m/s: exact, baseline, identified."""
@@ -147,7 +154,7 @@ class FrozenComparison:
 def compare_frozen(heli: Helicopter, axis: Axis, model: LPVARXModel, lpv: LPVStateSpace, airspeeds: Sequence[float]) -> FrozenComparison:
     """Everything at sample period of the identified model, zero-order hold, inputs and outputs of `axis`."""
     poles: dict[str, list[Array]] = {"exact": [], "baseline": [], "identified": []}
-    gaps, misses = {"baseline": [], "identified": []}, {"baseline": [], "identified": []}
+    gaps, fast, misses = ({"baseline": [], "identified": []} for _ in range(3))
     rate = {"longitudinal-vertical": ("q", "d_lon")}.get(axis.name, ("p", "d_lat"))
     omega, responses = np.geomspace(0.3, 0.8 * np.pi / model.dt, 200), {}
     for speed in airspeeds:
@@ -164,14 +171,13 @@ def compare_frozen(heli: Helicopter, axis: Axis, model: LPVARXModel, lpv: LPVSta
             poles[name].append(s)
             if name != "exact":
                 misses[name].append(100 * np.abs(s - mode).min() / abs(mode))
-                gaps[name].append(
-                    nu_gap(
-                        at["exact"], frozen, input_scale=[SCALES[i] for i in axis.inputs], output_scale=[SCALES[y] for y in axis.outputs]
-                    )
-                )
+                scale = {"input_scale": [SCALES[i] for i in axis.inputs], "output_scale": [SCALES[y] for y in axis.outputs]}
+                gaps[name].append(nu_gap(at["exact"], frozen, **scale))
+                fast[name].append(chordal_distance(at["exact"], frozen, omega[omega >= FAST], **scale).max())
             if abs(speed - 7.0) < 0.26:
                 responses[name] = np.abs(frozen.select(inputs=[rate[1]], outputs=[rate[0]]).frequency_response(omega)[:, 0, 0])
     return FrozenComparison(
         axis, np.asarray(airspeeds, float), tuple(poles["exact"]), tuple(poles["baseline"]), tuple(poles["identified"]),
-        np.array(misses["baseline"]), np.array(misses["identified"]), np.array(gaps["baseline"]), np.array(gaps["identified"]), omega, responses,
+        np.array(misses["baseline"]), np.array(misses["identified"]), np.array(gaps["baseline"]), np.array(gaps["identified"]),
+        np.array(fast["baseline"]), np.array(fast["identified"]), omega, responses,
     )  # fmt: skip

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.transition.axes import AXES, LONGITUDINAL
+from studies.transition.axes import LONGITUDINAL
+from studies.transition.comparison import FAST
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,6 +18,22 @@ if TYPE_CHECKING:
 
 INK, BLUE, ORANGE, GREEN, RED, GREY = "#1b1f24", "#0b61a4", "#d9730d", "#2e7d32", "#b3261e", "#8a949e"
 DEGREES = 180 / math.pi
+
+CAPTION = {
+    "trim": "Trim along the transition. Dotted lines: corners of the model.",
+    "interpolation": "Entries of A(p): exact linearizations (dots) and their interpolations. M_u and M_w jump where a limit of the "
+    "horizontal tail or the edge of the wake is crossed (dotted lines): no polynomial follows.",
+    "convergence": "Counterpart of the paper's figures 1, 3 and 5, {} loop: the 12 parameters of each output as the recursion runs, "
+    "each divided by the largest final value of its coefficient function.",
+    "outputs": "Counterpart of the paper's figures 2, 4 and 6, {} loop: system and one-step prediction on a fresh record; below, the "
+    "error. Triangles: the largest errors (spikes).",
+    "flights": "The flight that is identified, and the transition that judges (noise-free).",
+    "prediction": "{}: 1 s ahead on the unseen transition (noise-free).",
+    "frozen": "{} with airspeed held: poles from hover (pale) to 12.5 m/s (dark), response at 7 m/s, nu-gap to the exact model (1 "
+    "where a barely damped slow mode is stable in one and unstable in the other); dotted: the chordal distance above {:g} rad/s, "
+    "where slow modes do not decide.",
+    "gain": "What the rate is worth: proven L2 gain of the gust loop against permitted acceleration. Triangles: no bound can be smaller.",
+}
 
 
 def figures(study: Study) -> Iterator[tuple[str, str, Figure]]:
@@ -31,41 +48,20 @@ def figures(study: Study) -> Iterator[tuple[str, str, Figure]]:
     }  # fmt: skip
     with matplotlib.rc_context(style):
         if study.baseline:
-            yield "trim", "Trim along the transition. Dotted lines: corners of the model.", trim(study)
-            yield (
-                "interpolation",
-                "Entries of A(p): exact linearizations (dots) and their interpolations. M_u and M_w jump where the tail loses its lift: no polynomial follows.",
-                entries(study),
-            )
+            yield "trim", CAPTION["trim"], trim(study)
+            yield "interpolation", CAPTION["interpolation"], entries(study)
         for e in study.experiments:
-            yield (
-                f"convergence-{e.loop}",
-                f"Counterpart of the paper's figures 1, 3 and 5, {e.loop} loop: the 12 parameters of each output as the recursion runs, each divided by the largest final value of its coefficient function.",
-                convergence(e),
-            )
-            yield (
-                f"outputs-{e.loop}",
-                f"Counterpart of the paper's figures 2, 4 and 6, {e.loop} loop: system and one-step prediction on a fresh record; below, the error. Triangles: the largest errors (spikes).",
-                outputs(e),
-            )
+            yield f"convergence-{e.loop}", CAPTION["convergence"].format(e.loop), convergence(e)
+            yield f"outputs-{e.loop}", CAPTION["outputs"].format(e.loop), outputs(e)
         if study.flights:
-            yield "flights", "The flight that is identified, and the transition that judges (noise-free).", flights(study)
-        for axis in AXES:
-            c = study.comparisons.get((axis.name, "noise-free"))
-            if c:
-                yield f"prediction-{axis.name}", f"{axis.name}: 1 s ahead on the unseen transition (noise-free).", prediction(c)
-        for f in study.frozen.values():
-            yield (
-                f"frozen-{f.axis.name}",
-                f"{f.axis.name} with airspeed held: poles from hover (pale) to 12.5 m/s (dark), response at 7 m/s, nu-gap to the exact model.",
-                frozen(f),
-            )
+            yield "flights", CAPTION["flights"], flights(study)
+        for (axis, noise), c in study.comparisons.items():
+            if noise == "noise-free":
+                yield f"prediction-{axis}", CAPTION["prediction"].format(axis), prediction(c)
+        for axis, f in study.frozen.items():
+            yield f"frozen-{axis}", CAPTION["frozen"].format(axis, FAST), frozen(f)
         if study.bounds:
-            yield (
-                "gain-against-rate",
-                "What the rate is worth: proven L2 gain of the gust loop against permitted acceleration. Triangles: no bound can be smaller. The LFT's assumption (p as fast as it likes) proves nothing.",
-                gain_curve(study),
-            )
+            yield "gain-against-rate", CAPTION["gain"], gain_curve(study)
 
 
 def _subplots(rows: int, columns: int, width: float, height: float, **options: Any) -> tuple[Figure, np.ndarray]:
@@ -149,9 +145,10 @@ def outputs(e: Any) -> Figure:
         for t, _ in c.spikes:
             k = int(np.argmin(np.abs(e.test.time - t)))
             bottom.plot(t, e.test[c.output][k] - guess[k], "v", color=INK, markersize=4)
+        top.margins(y=0.18)
         top.set_title(f"{c.output}: one step {c.fits['one step']:.0f} %, 1 s {c.fits['1 s']:.0f} %, free run {c.fits['free run']:.0f} %")
         bottom.set_xlabel("time (s)")
-    axes[0][0].legend(loc="upper right")
+    axes[0][0].legend(loc="upper right", ncols=2)
     axes[1][0].set_ylabel("error")
     return figure
 
@@ -204,8 +201,9 @@ def frozen(f: Any) -> Figure:
     ):
         for k, poles in enumerate(stack):
             shown = poles[(poles.imag >= 0) & (poles.real > -12) & (poles.imag < 30)]
-            face = "none" if marker == "o" else colour
-            axes[0][0].scatter(shown.real, shown.imag, s=18, marker=marker, color=colour, facecolors=face if marker == "o" else None, alpha=shade[k], linewidths=0.9, label=name if k == len(stack) - 1 else None)  # fmt: skip
+            label = name if k == len(stack) - 1 else None
+            face = {"facecolors": "none"} if marker == "o" else {}
+            axes[0][0].scatter(shown.real, shown.imag, 18, colour, marker, alpha=shade[k], linewidths=0.9, label=label, **face)
     axes[0][0].axvline(0, color=GREY, linewidth=0.8)
     axes[0][0].set_xlabel("real (rad/s)")
     axes[0][0].set_title("poles, imaginary part (rad/s)")
@@ -225,8 +223,10 @@ def frozen(f: Any) -> Figure:
     axes[0][1].legend()
     axes[0][2].plot(f.airspeeds, f.gap_baseline, "+-", color=ORANGE, label="baseline")
     axes[0][2].plot(f.airspeeds, f.gap_identified, "x-", color=BLUE, label="identified")
+    axes[0][2].plot(f.airspeeds, f.fast_baseline, "+:", color=ORANGE, label=f"baseline, above {FAST:g} rad/s")
+    axes[0][2].plot(f.airspeeds, f.fast_identified, "x:", color=BLUE, label=f"identified, above {FAST:g} rad/s")
     axes[0][2].set_ylim(0, 1.05)
-    axes[0][2].set_title("nu-gap to the exact model (1: the slow modes differ in stability)")
+    axes[0][2].set_title("nu-gap to the exact model")
     axes[0][2].set_xlabel("airspeed (m/s)")
     axes[0][2].legend()
     return figure
@@ -248,6 +248,8 @@ def gain_curve(study: Study) -> Figure:
     ax.set_yscale("log")
     ax.set_xticks([0.03, 0.1, 1, 3, 4], ["frozen", "0.1", "1", "3", "4"])
     ax.minorticks_off()
+    ticks = [1, 2, 5, 10, 20, 50]
+    ax.set_yticks(ticks, [str(t) for t in ticks])
     ax.set_xlabel("permitted |dV/dt| (m/s^2)")
     ax.set_ylabel("L2 gain, (rad/s, rad)/(m/s)")
     ax.legend(loc="upper left")

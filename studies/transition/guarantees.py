@@ -12,7 +12,7 @@ import synthesis
 from studies.lateral_loop import STATES, close
 from studies.transition.flights import TOP
 from symheli import LinearFamily, LinearModel, LPVStateSpace, Scheduling
-from synthesis import Certificate, Relaxation
+from synthesis import Certificate, Relaxation, Search
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
 """A disturbance of this size (rad) and an output of this size (rad/s, rad) count as 1 on the servo channel; the gust channel is in SI."""
@@ -22,11 +22,10 @@ PERIOD = 0.02
 
 @dataclass(frozen=True)
 class Bound:
-    """One certificate: which model, which channel, continuous or sampled, which range of airspeed."""
+    """One certificate: which model, which channel, permitted acceleration (m/s^2)."""
 
     model: str
     channel: str
-    low: float
     rate: float
     certificate: Certificate
 
@@ -73,24 +72,20 @@ def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
     return max(norm(lateral[k].discretize(PERIOD) if sampled else lateral[k]) for k in range(len(lateral)))
 
 
-def over(lpv: LPVStateSpace, low: float) -> LPVStateSpace:
-    """The same model on [low, 13] m/s."""
-    return lpv.with_scheduling(replace(lpv.scheduling, low=low))
-
-
 def bounds(
     name: str, channel: str, lpv: LPVStateSpace, rates: Sequence[float], segments: tuple[int, ...], low: float = 0.0
 ) -> Iterator[Bound]:
-    """One certificate a rate (m/s^2), computed when asked for."""
-    model = over(lpv, low) if low > lpv.scheduling.low else lpv
+    """One certificate a rate (m/s^2), computed when asked for; `search` sets how hard the lower bound is looked for."""
     for rate in rates:
-        yield Bound(name, channel, low, rate, synthesis.l2_gain(model, rate=rate, relaxation=Relaxation(segments=segments)))
+        certificate = synthesis.l2_gain(lpv, rate=rate, relaxation=Relaxation(segments=segments), search=search)
+        yield Bound(name, channel, rate, certificate)
 
 
 def stability_bounds(name: str, channel: str, lpv: LPVStateSpace, rates: Sequence[float], segments: tuple[int, ...]) -> Iterator[Bound]:
     """Stability alone, one certificate a rate (m/s^2)."""
     for rate in rates:
-        yield Bound(name, channel, lpv.scheduling.low, rate, synthesis.stability(lpv, rate=rate, relaxation=Relaxation(segments=segments)))
+        certificate = synthesis.stability(lpv, rate=rate, relaxation=Relaxation(segments=segments))
+        yield Bound(name, channel, rate, certificate)
 
 
 def rate_text(rate: float) -> str:

@@ -34,6 +34,10 @@ class Channel:
     fits: dict[str, float]
     spikes: tuple[tuple[float, float], ...]
     """(time s, |one-step error| in standard deviations of the error) of the largest errors on the fresh record."""
+    spike_airspeed: float
+    """p (m/s) where the largest error is."""
+    spike_input: float
+    """|d_lon| one or two samples before it, the larger, in standard deviations of d_lon."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +116,10 @@ def _channel(output: str, training: FlightRecord, test: FlightRecord) -> Channel
     sigma = float(np.sqrt(np.nanmean(error**2)))
     largest = np.argsort(np.where(np.isfinite(error), error, -1))[::-1][:3]
     spikes = tuple((float(test.time[i]), float(error[i] / sigma)) for i in largest)
-    return Channel(output, model, history.time, parameters, names, _settling(history.time, theta), fits, spikes)
+    k = int(largest[0])
+    push = float(np.abs(test["d_lon"][max(k - 2, 0) : k]).max() / test["d_lon"].std())
+    settled = _settling(history.time, theta)
+    return Channel(output, model, history.time, parameters, names, settled, fits, spikes, float(test["airspeed"][k]), push)
 
 
 def _settling(time: np.ndarray, theta: np.ndarray) -> float:

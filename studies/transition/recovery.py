@@ -18,7 +18,7 @@ INPUTS = ("d_lon", "d_col")
 
 @dataclass(frozen=True)
 class Recovery:
-    """Largest error of any entry of A(p) and B(p) over the range, and the misfit of the discrete fit itself (not an error of the identification)."""
+    """Largest error of any entry of A(p) and B(p) over the range; the misfit of the discrete fit is no error of the identification."""
 
     period: float
     degree: int

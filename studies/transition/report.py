@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,7 @@ def write_results(study: Study, out: Path) -> Path:
 
 
 def write_report(study: Study, out: Path) -> Path:
-    """figures/*.png, results.json and report.html (self-contained: figures are inside). Raises `SymheliError` where the extra is missing."""
+    """figures/*.png, results.json and report.html (self-contained: figures inside). Raises `SymheliError` without the extra."""
     try:
         import jinja2
         import matplotlib.pyplot as plt
@@ -63,6 +64,8 @@ def _headline(study: Study) -> dict[str, object]:
     return {
         "frozen_gain": next((b.certificate.frozen for b in gust), float("nan")),
         "fastest": max(proven, key=lambda b: b.rate, default=None),
+        "jump": next((b for b in gust if math.isinf(b.rate)), None),
+        "inf": math.inf,
         "hypotheses": hypotheses,
         "notes": {name: model.excitation for name, model in study.models.items() if model.excitation is not None},
     }

@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from studies.transition.axes import HORIZON
+from studies.transition.comparison import FAST
 from studies.transition.paper_experiment import PERIOD
 
 if TYPE_CHECKING:
@@ -106,6 +107,8 @@ def _experiment(e: Experiment) -> dict[str, Any]:
                 "parameters settled after": value(c.settled_after, "s"),
                 "final parameters, powers of p in m/s": dict(zip(c.parameter_names, map(float, c.parameters[-1]), strict=True)),
                 "largest one-step errors": [{"time": value(t, "s"), "standard deviations": value(size, "1")} for t, size in c.spikes],
+                "airspeed at the largest error": value(c.spike_airspeed, "m/s"),
+                "input behind the largest error, in its standard deviations": value(c.spike_input, "1"),
             }
             for c in e.channels
         },
@@ -129,6 +132,9 @@ def _frozen(f: FrozenComparison) -> dict[str, Any]:
             "exact": poles(f.exact_poles), "baseline": poles(f.baseline_poles), "identified": poles(f.identified_poles), "unit": "rad/s",
         },
         f"{f.axis.mode} mode miss": {"baseline": f.mode_miss_baseline.tolist(), "identified": f.mode_miss_identified.tolist(), "unit": "%"},
+        f"largest chordal distance to the exact model above {FAST:g} rad/s": {
+            "baseline": f.fast_baseline.tolist(), "identified": f.fast_identified.tolist(), "unit": "1",
+        },
         "nu-gap to the exact model": {"baseline": f.gap_baseline.tolist(), "identified": f.gap_identified.tolist(), "unit": "1"},
     }  # fmt: skip
 

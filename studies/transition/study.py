@@ -21,6 +21,7 @@ from studies.transition.guarantees import Bound
 from studies.transition.paper_experiment import PERIOD, Experiment, run_experiment
 from studies.transition.recovery import Recovery, recover
 from symheli import FlightRecord, Helicopter
+from synthesis import Search
 
 
 @dataclass(frozen=True)
@@ -33,11 +34,12 @@ class Effort:
     gust_segments: tuple[int, ...] = (16,)
     servo_rates: tuple[float, ...] = (0.0, 3.0, math.inf)
     servo_segments: tuple[int, ...] = (8,)
+    search: Search = field(default_factory=Search)
 
     @classmethod
     def look(cls) -> Effort:
         """Shorter flights, fewer certificates of a simpler form."""
-        return cls(6, 4, (0.0, 3.0, math.inf), (8,), (0.0, math.inf), (4,))
+        return cls(6, 4, (0.0, 3.0, math.inf), (8,), (0.0, math.inf), (4,), Search(levels=6, dwells=5, evaluations=8))
 
 
 @dataclass
@@ -188,7 +190,7 @@ def _prove_gust(study: Study, effort: Effort) -> None:
     study.exact_frozen["gust"] = guarantees.exact_frozen_gain(family, sampled=False)
     loop = guarantees.gust_loop(family)
     study.bounds += guarantees.stability_bounds("baseline", "gust", loop, effort.gust_rates, effort.gust_segments)
-    study.bounds += guarantees.bounds("baseline", "gust", loop, effort.gust_rates, effort.gust_segments)
+    study.bounds += guarantees.bounds("baseline", "gust", loop, effort.gust_rates, effort.gust_segments, effort.search)
 
 
 def _prove_servo(study: Study, effort: Effort) -> None:
@@ -201,4 +203,4 @@ def _prove_servo(study: Study, effort: Effort) -> None:
     }
     for name, loop in loops.items():
         study.bounds += guarantees.stability_bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments)
-        study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments)
+        study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments, effort.search)

@@ -7,7 +7,7 @@ from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.named_vector import NamedVector
-from symheli.lpv.nu_gap import nu_gap
+from symheli.lpv.nu_gap import chordal_distance, nu_gap
 from symheli.lpv.operating_point import OperatingPoint
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import Signal, signals
@@ -32,6 +32,7 @@ __all__ = [
     "Signal",
     "Spline",
     "TrimSchedule",
+    "chordal_distance",
     "nu_gap",
     "signals",
     "simulate",

@@ -41,6 +41,19 @@ def nu_gap(first: LinearModel, second: LinearModel, *, input_scale: object = 1.0
     return float(_chordal(P1, P2).max())
 
 
+def chordal_distance(
+    first: LinearModel, second: LinearModel, omega: object, *, input_scale: object = 1.0, output_scale: object = 1.0
+) -> np.ndarray:
+    """Pointwise chordal distance (n,) in [0, 1] of two models with the same signals at `omega` (n,) rad/s, scaled as in `nu_gap`.
+
+    Its largest value over all frequencies is the nu-gap where the winding-number condition holds; over a band it says how far
+    apart the models are there, whatever their slow modes.
+    """
+    su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
+    sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
+    return _chordal(*(m.frequency_response(omega) * su[None, None, :] / sy[None, :, None] for m in (first, second)))
+
+
 def _winding(P1: np.ndarray, P2: np.ndarray) -> int:
     """Clockwise-negative winding number about 0 of det(I + P2* P1) along the upper unit circle, doubled by symmetry."""
     eye = np.eye(P1.shape[2])
