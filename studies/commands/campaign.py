@@ -11,7 +11,8 @@ HELP = "repeat the identification over many seeds: how much do the numbers scatt
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """How many."""
+    """How many, of which airframe."""
+    parser.add_argument("--vehicle", default="xcell60", metavar="NAME", help="packaged airframe or TOML file (default: %(default)s)")
     parser.add_argument("--seeds", type=at_least_one, default=20, metavar="N", help="number of seeds (default: %(default)s)")
 
 
@@ -19,5 +20,5 @@ def run(arguments: argparse.Namespace) -> Output:
     """Run the campaign; it shows its own progress."""
     from studies.transition.campaign import run_campaign
 
-    result = run_campaign(seeds=arguments.seeds)
+    result = run_campaign(seeds=arguments.seeds, vehicle=arguments.vehicle)
     return Output(result.summary(), result.to_dict())

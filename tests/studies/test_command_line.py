@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -271,6 +272,36 @@ def test_help_and_version_succeed(run):
     assert run("--version")[1].strip() == f"symheli {symheli.__version__}"
     for verb in cli.VERBS:
         assert run(verb, "--help")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "module", "function", "passed"),
+    [
+        (
+            ["study", "--quick", "--seed", "3", "--out", "o"], "study", "run_study",
+            {"vehicle": "xcell60", "out": Path("o"), "quick": True, "seed": 3},
+        ),
+        (["campaign", "--seeds", "4"], "campaign", "run_campaign", {"seeds": 4, "vehicle": "xcell60"}),
+    ],
+)  # fmt: skip
+def test_long_jobs_get_their_options_and_show_their_result(run, monkeypatch, arguments, module, function, passed):
+    given = {}
+
+    class Result:
+        def summary(self):
+            return "a table"
+
+        def to_dict(self):
+            return {"gain": np.float64(2.5)}
+
+    def job(**options):
+        given.update(options)
+        return Result()
+
+    monkeypatch.setitem(sys.modules, f"studies.transition.{module}", SimpleNamespace(**{function: job}))
+    assert run(*arguments)[:2] == (0, "a table\n")
+    assert given == passed
+    assert json.loads(run(*arguments, "--json")[1]) == {"gain": 2.5}
 
 
 def test_interruption_says_what_was_kept(run, monkeypatch):
