@@ -62,7 +62,11 @@ def _weighted(F: Array) -> Array:
 
 def _unweighted(F: Array) -> Array:
     weights = binomials((F.shape[0] - 1, F.shape[1] - 1))
-    return F / (weights if F.dtype == object else weights.astype(float))
+    return _exact_quotient(F, weights) if F.dtype == object else F / weights.astype(float)
+
+
+# the integer 0 of an empty sum must not become the float 0.0
+_exact_quotient = np.frompyfunc(lambda numerator, weight: numerator if numerator == 0 else numerator / weight, 2, 1)
 
 
 def multiply(F: Array, G: Array) -> Array:

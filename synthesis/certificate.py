@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal, NamedTuple
@@ -12,6 +11,7 @@ import numpy as np
 
 from symheli.errors import CertificateError
 from synthesis.lyapunov import SplineLyapunov
+from synthesis.verify import Evidence
 
 Array = np.ndarray
 
@@ -65,6 +65,7 @@ class Certificate:
     lyapunov    V = x' P(p) x, None where there is none
     rate        bound on |dp/dt| in units of p per second (inf: arbitrary; 0: frozen)
     worst       scheduling trajectory behind `lower`, None where p is constant there
+    evidence    the model and units that `verify` uses
     """
 
     kind: Literal["l2 gain", "stability"]
@@ -82,7 +83,7 @@ class Certificate:
     attempts: tuple[Attempt, ...]
     worst: Trajectory | None = None
     unit: str = "1"
-    _proof: Callable[[], bool] | None = field(default=None, repr=False)
+    evidence: Evidence | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         slack = 1 + 1e-6  # frozen and lower are computed to 1e-8, gamma is inflated by 5e-7
@@ -98,18 +99,19 @@ class Certificate:
         return self.gamma / self.lower if self.lower > 0 else math.inf
 
     def verify(self, rigorous: bool = False) -> bool:
-        """Verify once more; `rigorous` in exact rational arithmetic over the whole interval (python-flint makes it fast).
+        """Verify `lyapunov` and `gamma` anew; `rigorous`: in exact rational arithmetic (python-flint makes it fast).
 
         Exact: the doubles of the model's Bernstein coefficients, of P, rate and gamma are taken as the rationals they
-        are, and an LDL' factorisation of every coefficient decides. A failed certificate is never verified.
+        are, and an LDL' factorisation of every coefficient decides. Without a Lyapunov function nothing is verified.
         """
-        if not rigorous or not self.verified or self._proof is None:
-            return self.verified
-        return self._proof()
+        if self.lyapunov is None or self.evidence is None:
+            return False
+        return (self.evidence.exact if rigorous else self.evidence.floating)(self.lyapunov, self.gamma)
 
     def __str__(self) -> str:
-        limit = "arbitrarily fast" if math.isinf(self.rate) else "frozen" if self.rate == 0 else f"at most {self.rate:g} {self.unit}/s"
-        lines = [f"{self.kind} with p {limit}: {self.status.value}"]
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        limit = "arbitrarily fast" if math.isinf(self.rate) else "frozen" if self.rate == 0 else f"at most {self.rate:g}{unit} per second"
+        lines = [f"{self.kind}, p {limit}: {self.status.value}"]
         if self.kind == "l2 gain":
             lines.append(f"  frozen {self.frozen:.6g} <= lower {self.lower:.6g} <= gain <= {self.gamma:.6g}")
         if self.lyapunov is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from functools import partial
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from synthesis.frozen import frozen_gain, least_damped
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
 from synthesis.lyapunov import SplineLyapunov
 from synthesis.proof_search import Problem, Relaxation, Result, prove, scaled_problem
-from synthesis.verify import Claim, proven
 
 
 def l2_gain(
@@ -101,20 +99,19 @@ def _certificate(
     if status is None:
         status = Status.PROVEN if best.lyapunov else Status.INFEASIBLE if best.answer is Answer.INFEASIBLE else Status.FAILED
     gamma = math.nan if kind == "stability" else best.gamma
-    proof = None
-    if found and best.lyapunov is not None:
-        proof = partial(proven, Claim(found[0].pieces, best.lyapunov, rate, lpv.dt, elevation), gamma)
+    evidence = found[0].evidence(elevation) if found else None
     return Certificate(
         kind, gamma, lower, frozen, status, best.lyapunov is not None, best.lyapunov, rate, _hypotheses(lpv, rate, best.lyapunov, kind),
         f"{solver.name} {solver.version}, tolerance {solver.tolerance:g}", best.seconds._replace(bounds=bounds), best.conditioning,
-        best.attempts, worst, lpv.scheduling.unit, proof,
+        best.attempts, worst, lpv.scheduling.unit, evidence,
     )  # fmt: skip
 
 
 def _hypotheses(lpv: LPVStateSpace, rate: float, P: SplineLyapunov | None, kind: str) -> tuple[str, ...]:
     s = lpv.scheduling
-    speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g} {s.unit}/s"
-    out = [f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}] {s.unit}, {speed}"]
+    unit = "" if s.unit == "1" else f" {s.unit}"
+    speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
+    out = [f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}"]
     if lpv.trim is not None:
         out.append("the drift of a moving trim, -x0'(p) dp/dt, is left out: it acts as a further disturbance")
     if P is not None:

@@ -19,7 +19,7 @@ from synthesis.lyapunov import SplineLyapunov, graded_knots
 from synthesis.pieces import ModelPiece, model_pieces
 from synthesis.scaling import Scaling, scaling
 from synthesis.symmetric import smat
-from synthesis.verify import Claim, examine, holds_on_grid
+from synthesis.verify import Evidence
 
 Array = np.ndarray
 
@@ -74,6 +74,10 @@ class Problem(NamedTuple):
     def scaled_rate(self) -> float:
         """Largest change of p per scaled unit of time."""
         return self.rate * self.units.time
+
+    def evidence(self, elevation: int) -> Evidence:
+        """What verifies a P for this problem."""
+        return Evidence(self.lpv, self.pieces, self.units, self.rate, elevation)
 
     @property
     def step(self) -> float:
@@ -196,21 +200,17 @@ def _solve_by_rounds(
 
 def _verified(
     problem: Problem, candidate: Candidate, knots: Array, degree: int, unknowns: int, elevation: int
-) -> tuple[float, SplineLyapunov | None, float]:  # fmt: skip
+) -> tuple[float, SplineLyapunov | None, float]:
     """The gain that P itself admits, whatever the solver said; None where P proves nothing."""
     nothing = math.inf, None, math.inf
     if candidate.x is None:
         return nothing
-    n, units = len(problem.lpv.states), problem.units
-    scaled = smat(candidate.x[:-1].reshape(unknowns, -1), n)
-    P = SplineLyapunov(knots, degree, units.to_physical(scaled))
-    # judged as it is stored: from the physical matrices back to scaled units
-    back = SplineLyapunov(knots, degree, units.to_scaled(P.coefficients))
-    rate = problem.scaled_rate if problem.lpv.dt is None else problem.rate
-    findings = examine(Claim(problem.scaled, back, rate, problem.lpv.dt, elevation))
-    if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
+    scaled = smat(candidate.x[:-1].reshape(unknowns, -1), len(problem.lpv.states))
+    # judged as it is stored, in physical units
+    P = SplineLyapunov(knots, degree, problem.units.to_physical(scaled))
+    evidence = problem.evidence(elevation)
+    least, conditioning = evidence.least_gain(P)
+    gamma = least * math.sqrt(1 + INFLATION)
+    if math.isinf(least) or not evidence.floating(P, gamma):
         return nothing
-    gamma = units.channel * math.sqrt(findings.g * (1 + INFLATION)) if problem.with_gain else math.nan
-    if not holds_on_grid(problem.lpv, P, problem.rate, gamma, units.right):
-        return nothing
-    return gamma, P, findings.conditioning
+    return gamma, P, conditioning

@@ -17,6 +17,7 @@ from synthesis.bernstein import composition, elevate, multiply, restriction, tra
 from synthesis.cells import Cell, Strip, cells, strips
 from synthesis.lyapunov import SplineLyapunov
 from synthesis.pieces import ModelPiece
+from synthesis.scaling import Scaling
 
 Array = np.ndarray
 Number = Callable[[float], Any]
@@ -234,3 +235,37 @@ def positive_definite(M: Array) -> bool:
                 for j in range(k + 1, i + 1):
                     M[i, j] = M[i, j] - factor * M[j, k]
     return True
+
+
+class Evidence(NamedTuple):
+    """A model with a rate, against which any P(p) and gain can be checked.
+
+    `pieces` of the model in physical units, `units` in which its numbers are of order one.
+    """
+
+    lpv: LPVStateSpace
+    pieces: tuple[ModelPiece, ...]
+    units: Scaling
+    rate: float
+    elevation: int
+
+    def least_gain(self, P: SplineLyapunov) -> tuple[float, float]:
+        """(gain that P admits, conditioning of P); inf where P proves nothing, NaN without channels. Floating point."""
+        units = self.units
+        scaled = tuple(piece.scaled(units.left, units.right, units.channel, units.time) for piece in self.pieces)
+        back = SplineLyapunov(P.knots, P.degree, units.to_scaled(P.coefficients))
+        rate = self.rate * units.time if self.lpv.dt is None else self.rate
+        findings = examine(Claim(scaled, back, rate, self.lpv.dt, self.elevation))
+        if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
+            return math.inf, math.inf
+        return (units.channel * math.sqrt(findings.g) if self.lpv.inputs else math.nan), findings.conditioning
+
+    def floating(self, P: SplineLyapunov, gamma: float) -> bool:
+        """Every Bernstein coefficient and a grid of p, in floating point."""
+        least = self.least_gain(P)[0]
+        enough = math.isnan(least) if math.isnan(gamma) else least < gamma
+        return enough and holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right)
+
+    def exact(self, P: SplineLyapunov, gamma: float) -> bool:
+        """The same over the whole interval in rational arithmetic."""
+        return proven(Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation), gamma)

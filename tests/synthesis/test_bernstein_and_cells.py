@@ -1,0 +1,117 @@
+"""The algebra under the LMIs: identities of Bernstein forms, coverage of the band of p and its next value."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from models import lag, random_stable
+
+from synthesis import SplineLyapunov
+from synthesis.bernstein import blossom, composition, elevate, multiply, restriction
+from synthesis.cells import strips
+from synthesis.lyapunov import graded_knots
+from synthesis.pieces import model_pieces
+from synthesis.symmetric import smat, svec
+from synthesis.verify import Claim, lmi_polynomials
+
+
+def value(F, x, s=0.0):
+    a = blossom([x] * (F.shape[0] - 1))
+    b = blossom([s] * (F.shape[1] - 1))
+    return np.einsum("i,k,iknm->nm", a, b, F)
+
+
+def test_products_and_elevations_keep_their_values():
+    rng = np.random.default_rng(0)
+    F, G = rng.standard_normal((4, 2, 2, 3)), rng.standard_normal((3, 3, 3, 2))
+    for x, s in rng.uniform(0, 1, (5, 2)):
+        assert np.allclose(value(multiply(F, G), x, s), value(F, x, s) @ value(G, x, s), atol=1e-12)
+        assert np.allclose(value(elevate(F, (6, 4)), x, s), value(F, x, s), atol=1e-12)
+
+
+def test_restriction_and_composition_are_the_same_polynomial_elsewhere():
+    rng = np.random.default_rng(1)
+    f = rng.standard_normal(4)
+    part = restriction(3, 0.2, 0.7) @ f
+    corners = [[0.1, 0.4], [0.3, 0.9]]
+    both = composition(3, corners) @ f
+    for x, s in rng.uniform(0, 1, (5, 2)):
+        assert blossom([x] * 3) @ part == pytest.approx(blossom([0.2 + 0.5 * x] * 3) @ f)
+        t = (1 - x) * ((1 - s) * 0.1 + s * 0.4) + x * ((1 - s) * 0.3 + s * 0.9)
+        assert blossom([x] * 3) @ both @ blossom([s] * 3) == pytest.approx(blossom([t] * 3) @ f)
+
+
+def test_rational_arithmetic_is_exact():
+    third = Fraction(1, 3)
+    assert list(restriction(1, third, 2 * third) @ np.array([Fraction(0), Fraction(1)], dtype=object)) == [third, 2 * third]
+
+
+def test_vectors_keep_inner_products():
+    rng = np.random.default_rng(2)
+    M, N = (a + np.swapaxes(a, 1, 2) for a in rng.standard_normal((2, 3, 4, 4)))
+    assert np.allclose(np.sum(svec(M) * svec(N), axis=1), np.einsum("kij,kij->k", M, N))
+    assert np.allclose(smat(svec(M), 4), M)
+
+
+def test_model_pieces_give_back_the_model():
+    lpv = random_stable(0)
+    (piece,) = model_pieces(lpv)
+    for x in (0.0, 0.3, 1.0):
+        assert np.allclose(value(piece.A[:, None], x), lpv.at(x).A, atol=1e-13)
+    assert len(piece.C) == 1, "a constant matrix has degree 0"
+
+
+@pytest.mark.parametrize("step", [0.01, 0.07, 0.4, 5.0])
+def test_strips_cover_every_p_and_next_p_inside_the_right_segment(step):
+    knots = graded_knots(0.0, 1.0, 6, 2.0)
+    regions = strips(model_pieces(lag()), knots, step)
+    rng = np.random.default_rng(3)
+    for p, d in zip(rng.uniform(0, 1, 400), rng.uniform(-1, 1, 400), strict=True):
+        after = float(np.clip(p + d * step, 0, 1))
+        hit = []
+        for strip in regions:
+            cell = strip.cell
+            if cell.low <= p <= cell.high:
+                x = (p - cell.low) / (cell.high - cell.low)
+                bottom, top = ((1 - x) * strip.corners[0][f] + x * strip.corners[1][f] for f in (0, 1))
+                if bottom <= after <= top:
+                    hit.append(strip)
+        assert hit, (p, after)
+        assert all(knots[s.next_segment] <= after <= knots[s.next_segment + 1] for s in hit)
+        assert all(knots[s.cell.segment] <= p <= knots[s.cell.segment + 1] for s in hit)
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+def test_lmi_polynomials_are_the_lmi_at_every_point(dt):
+    lpv = random_stable(5, dt=dt)
+    rng = np.random.default_rng(4)
+    coefficients = rng.standard_normal((5, 3, 3))
+    P = SplineLyapunov(np.array([0.0, 0.25, 1.0]), 2, coefficients + np.swapaxes(coefficients, 1, 2))
+    forms = list(lmi_polynomials(Claim(model_pieces(lpv), P, 0.7, dt), float))
+    p = 0.6
+    A, B, C, D = lpv.matrices(p)
+    Y = np.hstack([C, D])
+    if dt is None:
+        assert len(forms) == 4
+        x = (p - 0.25) / 0.75
+        for form, nu in zip(forms[2:], (-0.7, 0.7), strict=True):
+            top = A.T @ P.at(p) + P.at(p) @ A + nu * P.derivative(p)
+            expected = np.block([[top, P.at(p) @ B], [B.T @ P.at(p), np.zeros((2, 2))]]) + Y.T @ Y
+            assert np.allclose(value(form, x), expected, atol=1e-10)
+    else:
+        M, corner = np.hstack([A, B]), np.zeros((5, 5))
+        corner[:3, :3] = P.at(p)
+        regions = strips(model_pieces(lpv), P.knots, 0.07)
+        k = next(i for i, s in enumerate(regions) if s.cell.low < p < s.cell.high)
+        cell = regions[k].cell
+        x, s = (p - cell.low) / (cell.high - cell.low), 0.8
+        after = (1 - s) * (p - 0.07) + s * (p + 0.07)
+        assert np.allclose(value(forms[k], x, s), M.T @ P.at(after) @ M - corner + Y.T @ Y, atol=1e-9)
+
+
+def test_graded_knots_move_onto_breaks_of_the_model_and_keep_their_distance():
+    knots = graded_knots(0.0, 13.0, 8, 2.0, breaks=[6.5, 3.0])
+    assert 3.0 in knots or 6.5 in knots
+    assert np.all(np.diff(knots) > 0)
+    assert knots[1] < 0.3, "graded towards the low end"
+    assert np.diff(graded_knots(0.0, 13.0, 16, 2.0, shortest=0.5)).min() >= 0.5

@@ -1,0 +1,139 @@
+"""No solver, scaling or option makes an unstable plant stable, and no certificate survives tampering."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import lag, random_stable, spring
+
+import synthesis
+from symheli.errors import InputError, SolverError
+from symheli.lpv import LPVStateSpace, Scheduling
+from synthesis import Relaxation, Solver, SplineLyapunov, Status, installed_solvers, l2_gain, stability
+from synthesis.proof_search import prove, scaled_problem
+
+COARSE = Relaxation(segments=(2,), degree=2)
+
+
+def unstable(excess, scale, dt=None):
+    """A pole at `excess` in the middle of the range only (p = 0.5), stable at its ends; states scaled."""
+    A0 = np.array([[excess - 0.25, 1.0], [0.0, -1.0]])
+    A1, A2 = np.diag([1.0, 0.0]), np.diag([-1.0, 0.0])
+    T = np.diag([scale, 1.0])
+    A = [T @ M @ np.linalg.inv(T) for M in (A0, A1, A2)]
+    if dt is not None:
+        A = [np.eye(2) + dt * A[0], dt * A[1], dt * A[2]]
+    return LPVStateSpace.polynomial(
+        A,
+        [T @ np.array([[0.0], [1]])],
+        [np.array([[1.0, 0]]) @ np.linalg.inv(T)],
+        [np.zeros((1, 1))],
+        Scheduling("p", "1", 0.0, 1.0, 0.1),
+        dt=dt,
+    )
+
+
+@pytest.mark.parametrize("solver", installed_solvers())
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
+@pytest.mark.parametrize("excess", [1e-1, 1e-4, 1e-8])
+def test_an_unstable_plant_is_never_called_stable(solver, scale, excess):
+    quick = Solver(solver, iterations=2000 if solver == "SCS" else 0)
+    for dt in (None, 0.1):
+        lpv = unstable(excess, scale, dt)
+        for cert in (stability(lpv, relaxation=COARSE, solver=quick), l2_gain(lpv, relaxation=COARSE, solver=quick, search=None)):
+            assert not cert.verified
+            assert cert.status is Status.UNSTABLE
+            assert not cert.verify()
+            assert not cert.verify(rigorous=True)
+        # and without the look at the frozen poles, the solver and the verification alone
+        for with_gain in (False, True):
+            for rate in (0.0, 0.1):
+                found = prove(scaled_problem(lpv, rate, 1.0, with_gain=with_gain), COARSE, quick, math.inf)
+                assert found.lyapunov is None
+
+
+@pytest.mark.parametrize("solver", installed_solvers())
+def test_a_stable_plant_is_called_stable_by_every_solver(solver):
+    for dt in (None, 0.1):
+        cert = stability(unstable(-0.05, 10.0, dt), 0.05, relaxation=COARSE, solver=solver)
+        assert cert.verified, cert
+        assert cert.verify(rigorous=True)
+        assert cert.solver.startswith(solver)
+
+
+def test_solvers_agree_on_the_gain():
+    gains = [l2_gain(random_stable(1), relaxation=COARSE, solver=name, search=None).gamma for name in installed_solvers()]
+    # SCS, a first-order method, comes close from above: gamma is what its P proves
+    assert max(gains) <= min(gains) * (1 + 2e-3)
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+def test_exact_arithmetic_confirms_a_good_certificate_and_rejects_a_tampered_one(dt):
+    cert = l2_gain(random_stable(2, dt=dt), relaxation=Relaxation(segments=(3,), degree=2), search=None)
+    assert cert.verify()
+    assert cert.verify(rigorous=True)
+    P = cert.lyapunov
+    assert P is not None
+    # at the optimum half a percent is too much to ask; 0.999 of a coefficient breaks a block that binds
+    lower = replace(cert, gamma=0.995 * cert.gamma, frozen=0.0, lower=0.0)
+    worse = replace(cert, lyapunov=SplineLyapunov(P.knots, P.degree, 0.5 * P.coefficients))
+    negative = P.coefficients.copy()
+    negative[2] = -negative[2]
+    for bad in (lower, worse, replace(cert, lyapunov=SplineLyapunov(P.knots, P.degree, negative))):
+        assert not bad.verify()
+        assert not bad.verify(rigorous=True)
+
+
+def test_the_fractions_of_the_standard_library_prove_the_same(monkeypatch):
+    from fractions import Fraction
+
+    import synthesis.verify
+
+    cert = l2_gain(lag(), relaxation=COARSE, search=None)
+    monkeypatch.setattr(synthesis.verify, "rational", lambda: Fraction)
+    assert cert.verify(rigorous=True)
+    assert not replace(cert, gamma=0.9, frozen=0.0, lower=0.0).verify(rigorous=True)
+
+
+def test_an_infeasible_problem_says_so_and_promises_nothing():
+    cert = l2_gain(spring(), math.inf, search=None)
+    assert cert.status is Status.INFEASIBLE
+    assert math.isinf(cert.gamma)
+    assert cert.lyapunov is None
+    assert "may still be stable" in str(cert)
+
+
+def test_a_certificate_reads_like_a_statement():
+    cert = l2_gain(spring(), 0.02, relaxation=COARSE, search=None)
+    text = str(cert)
+    for part in ("proven on the whole interval", "exogenous", "CLARABEL", "degree 2 on 2 segment", "0.02 per second"):
+        assert part in text
+
+
+def test_wrong_input_gets_a_sentence():
+    with pytest.raises(InputError, match="expected an LPVStateSpace, got ndarray"):
+        l2_gain(np.eye(2))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="rate must be >= 0"):
+        l2_gain(lag(), -1.0)
+    with pytest.raises(InputError, match="rate must be >= 0"):
+        l2_gain(lag(), math.nan)
+    with pytest.raises(InputError, match="needs inputs and outputs"):
+        l2_gain(replace(lag(), B=lag().B[:, :, :0], D=lag().D[:, :, :0], inputs=()))
+    with pytest.raises(SolverError, match="installed here: .*CLARABEL"):
+        l2_gain(lag(), solver="GUROBI")
+    with pytest.raises(InputError, match="degree of P"):
+        Relaxation(degree=7)
+    with pytest.raises(InputError, match="expected 0 < tolerance"):
+        Solver(tolerance=2.0)
+
+
+def test_importing_loads_no_solver_and_every_name_is_documented():
+    import inspect
+    import subprocess
+    import sys
+
+    code = "import sys, synthesis; print([m for m in ('cvxpy', 'clarabel', 'scs', 'flint', 'casadi', 'matplotlib') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    for name in synthesis.__all__:
+        assert inspect.getdoc(getattr(synthesis, name)), name
