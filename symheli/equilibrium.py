@@ -131,7 +131,7 @@ class _Problem:
 
     def guess(self) -> np.ndarray:
         mass = self.heli.vehicle.sections["body"]["mass"].value
-        start = dict.fromkeys(self.own, 0.0)
+        start = dict.fromkeys((str(s) for s in self.own), 0.0)
         if "om_i" in start:
             drivetrain = self.heli.vehicle.values("drivetrain")
             # throttle that holds about 130 W/kg of rotor and profile power, typical of a small helicopter in hover

@@ -33,14 +33,20 @@ WIND = signals(("u_w", "v_w", "w_w"))
 INPUTS = signals(("d_lon", "d_lat", "d_col", "d_ped"))
 
 Governor = Literal["pi", "ideal"]
+Triple = tuple[Any, Any, Any]
+
+
+def _triple(entry: Callable[[int], Any]) -> Triple:
+    """A vector from its entries by index."""
+    return entry(0), entry(1), entry(2)
 
 
 @dataclass(frozen=True)
 class _Sum:
     """Everything the parts say at one motion."""
 
-    force: tuple[Any, Any, Any]
-    moment: tuple[Any, Any, Any]
+    force: Triple
+    moment: Triple
     rates: dict[str, Any]
     torque: Any
     added_inertia: Any
@@ -215,7 +221,7 @@ class Helicopter:
         extra = {"printed": self.printed, "smoothing": self.smoothing}
         return {section: SimpleNamespace(**self.vehicle.values(section), **extra) for section in self.vehicle.sections}
 
-    def _sum(self, air: tuple[Any, ...], rates: tuple[Any, ...], own: dict[str, Any], u: Any, solver: Callable[..., Any]) -> _Sum:
+    def _sum(self, air: Triple, rates: Triple, own: dict[str, Any], u: Any, solver: Callable[..., Any]) -> _Sum:
         parameters = self._parameters
         speed = own["Om"] if self.governor == "pi" else self.nominal_speed
         motion = Motion(*air, *rates, Om=speed, rho=self.density)
@@ -239,22 +245,19 @@ class Helicopter:
             if self.governor == "pi"
             else ideal_governor(drivetrain, shaft_torque)
         )
-        force = tuple(sum(effect.force[i] for effect in effects) for i in range(3))
-        moment = [sum(effect.moment[i] for effect in effects) for i in range(3)]
-        moment[2] = moment[2] - drive.torque
+        force = _triple(lambda i: sum(effect.force[i] for effect in effects))
+        moment = _triple(lambda i: sum(effect.moment[i] for effect in effects) - (drive.torque if i == 2 else 0.0))
         rates_of_own = {name: value for effect in effects for name, value in effect.rates.items()} | drive.rates
         switches = {name: value for effect in effects for name, value in effect.switches.items()}
         return _Sum(
-            force, tuple(moment), rates_of_own, shaft_torque, drive.added_inertia, drive.speed_follows_yaw,
+            force, moment, rates_of_own, shaft_torque, drive.added_inertia, drive.speed_follows_yaw,
             {**flow.values, "Q_e": drive.torque}, switches, lam,
         )  # fmt: skip
 
-    def _accelerations(
-        self, x: Any, air: tuple[Any, ...], gravity: tuple[Any, ...], own: dict[str, Any], u: Any, solver: Callable[..., Any]
-    ) -> Any:
+    def _accelerations(self, x: Any, air: Triple, gravity: Triple, own: dict[str, Any], u: Any, solver: Callable[..., Any]) -> Any:
         """(u' v' w' p' q' r'), derivatives of the own states, and the sum."""
         body = self._parameters["body"]
-        velocity, rates = tuple(x[i] for i in range(3)), tuple(x[i] for i in range(3, 6))
+        velocity, rates = _triple(lambda i: x[i]), _triple(lambda i: x[3 + i])
         total = self._sum(air, rates, own, u, solver)
         linear = translation(*velocity, *rates, gravity, total.force, body.mass)
         angular = rotation(*rates, total.moment, body.Ixx, body.Iyy, body.Izz, total.added_inertia)
@@ -267,17 +270,17 @@ class Helicopter:
         return {str(s): x[first + i] for i, s in enumerate(self._own_states)}
 
     def _euler(self, x: Any, u: Any, wind: Any, solver: Callable[..., Any]) -> tuple[Any, _Sum]:
-        air = tuple(x[i] - wind[i] for i in range(3))
+        air = _triple(lambda i: x[i] - wind[i])
         phi, theta = x[6], x[7]
         accelerations, own, total = self._accelerations(x, air, gravity_euler(phi, theta), self._own(x, 8), u, solver)
         attitude = euler_rates(phi, theta, x[3], x[4], x[5])[:2]
         return column([*accelerations, *attitude, *own]), total
 
     def _quaternion(self, x: Any, u: Any, wind: Any) -> Any:
-        quaternion = [x[i] for i in range(6, 10)]
+        quaternion = (x[6], x[7], x[8], x[9])
         R = body_to_earth(*quaternion)
-        air = tuple(x[i] - sum(R[j][i] * wind[j] for j in range(3)) for i in range(3))
-        gravity = tuple(R[2][i] * GRAVITY for i in range(3))
+        air = _triple(lambda i: x[i] - sum(R[j][i] * wind[j] for j in range(3)))
+        gravity = _triple(lambda i: R[2][i] * GRAVITY)
         accelerations, own, _ = self._accelerations(x, air, gravity, self._own(x, 13), u, inflow.solve)
         position = [sum(R[j][i] * x[i] for i in range(3)) for j in range(3)]
         return column([*accelerations, *quaternion_rates(*quaternion, x[3], x[4], x[5]), *position, *own])

@@ -25,9 +25,9 @@ class Numeric:
         self._results = [np.zeros(function.size_out(i), order="F") for i in range(function.n_out())]
         buffer, self._evaluate = function.buffer()
         for i, array in enumerate(self._arguments):
-            buffer.set_arg(i, memoryview(array.T.reshape(-1)))  # column by column
+            buffer.set_arg(i, memoryview(array.T.reshape(-1)))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(self._results):
-            buffer.set_res(i, memoryview(array.T.reshape(-1)))  # column by column
+            buffer.set_res(i, memoryview(array.T.reshape(-1)))  # type: ignore[call-arg, arg-type]
         self._buffer = buffer
         self._columns = [array.shape[1] == 1 for array in self._arguments]
 

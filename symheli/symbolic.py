@@ -10,8 +10,9 @@ from typing import Any
 
 import casadi
 import numpy as np
+from casadi import SX, Function
 
-SX, Function = casadi.SX, casadi.Function
+__all__ = ["SX", "Function", "absolute", "clip", "column", "cos", "dense", "jacobian", "maximum", "minimum", "sin", "sqrt", "tan", "where"]
 
 _SYMBOLIC = (casadi.SX, casadi.MX, casadi.DM)
 

@@ -171,9 +171,11 @@ def compare_frozen(heli: Helicopter, axis: Axis, model: LPVARXModel, lpv: LPVSta
             poles[name].append(s)
             if name != "exact":
                 misses[name].append(100 * np.abs(s - mode).min() / abs(mode))
-                scale = {"input_scale": [SCALES[i] for i in axis.inputs], "output_scale": [SCALES[y] for y in axis.outputs]}
-                gaps[name].append(nu_gap(at["exact"], frozen, **scale))
-                fast[name].append(chordal_distance(at["exact"], frozen, omega[omega >= FAST], **scale).max())
+                sizes = [SCALES[i] for i in axis.inputs], [SCALES[y] for y in axis.outputs]
+                gaps[name].append(nu_gap(at["exact"], frozen, input_scale=sizes[0], output_scale=sizes[1]))
+                fast[name].append(
+                    chordal_distance(at["exact"], frozen, omega[omega >= FAST], input_scale=sizes[0], output_scale=sizes[1]).max()
+                )
             if abs(speed - 7.0) < 0.26:
                 responses[name] = np.abs(frozen.select(inputs=[rate[1]], outputs=[rate[0]]).frequency_response(omega)[:, 0, 0])
     return FrozenComparison(

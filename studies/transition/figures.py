@@ -41,7 +41,7 @@ def figures(study: Study) -> Iterator[tuple[str, str, Figure]]:
     import matplotlib
 
     matplotlib.use("Agg")
-    style = {
+    style: dict[Any, Any] = {
         "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": GREY, "axes.labelcolor": INK,
         "axes.titlesize": 9.5, "axes.titlelocation": "left", "legend.frameon": False, "legend.fontsize": 8, "lines.linewidth": 1.3,
         "axes.grid": True, "grid.color": "#e6e9ec", "grid.linewidth": 0.6, "svg.hashsalt": "symheli", "figure.constrained_layout.use": True,

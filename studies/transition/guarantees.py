@@ -73,7 +73,7 @@ def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
 
 
 def bounds(
-    name: str, channel: str, lpv: LPVStateSpace, rates: Sequence[float], segments: tuple[int, ...], low: float = 0.0
+    name: str, channel: str, lpv: LPVStateSpace, rates: Sequence[float], segments: tuple[int, ...], search: Search
 ) -> Iterator[Bound]:
     """One certificate a rate (m/s^2), computed when asked for; `search` sets how hard the lower bound is looked for."""
     for rate in rates:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,9 @@ def recover(family: LinearFamily, period: float = 0.02, degree: int = 3, samples
     rng = np.random.default_rng(seed)
     p, u = rng.uniform(0.0, TOP, samples), 0.02 * rng.standard_normal((samples, len(INPUTS)))
     x, _ = simulate(plant, p, u)
-    columns = {name: x[:, i] for i, name in enumerate(STATES)} | {name: u[:, i] for i, name in enumerate(INPUTS)} | {"airspeed": p}
+    columns: dict[str, Any] = (
+        {name: x[:, i] for i, name in enumerate(STATES)} | {name: u[:, i] for i, name in enumerate(INPUTS)} | {"airspeed": p}
+    )
     record = FlightRecord.from_arrays(period * np.arange(samples), {n: UNITS[n] for n in columns}, **columns)
     arx = LPVARX(STATES, INPUTS, "airspeed", 1, 1, 1, Polynomial(degree, 0.0, TOP), scheduling_at="lag")
     found = fit(arx, record, method="rls").to_state_space()

@@ -60,4 +60,4 @@ class Excitation:
 
     def _chirp(self, time: np.ndarray, i: int, rng: np.random.Generator) -> np.ndarray:
         shifted = np.mod(time + i * self.period / max(len(self.amplitude), 1), self.period)
-        return np.asarray(chirp(shifted, self.band[0], self.period, self.band[1], phi=-90.0))
+        return np.asarray(chirp(shifted, self.band[0], self.period, self.band[1], phi=-90))

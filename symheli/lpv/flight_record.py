@@ -55,7 +55,7 @@ class FlightRecord:
     # --- reading -----------------------------------------------------------------------------------------------
 
     @classmethod
-    def from_arrays(cls, time: object, units: Mapping[str, str], note: str = "", **columns: object) -> FlightRecord:
+    def from_arrays(cls, time: object, units: Mapping[str, str], note: str = "", **columns: Any) -> FlightRecord:
         """From one array a signal, all as long as `time` (s); `units` declares the unit of each signal."""
         values, names = [], []
         length = len(np.asarray(time))
@@ -165,7 +165,7 @@ class FlightRecord:
         index = indices(names, self.signals, "signal")
         return replace(self, values=self.values[:, index], signals=tuple(self.signals[i] for i in index))
 
-    def with_signals(self, units: Mapping[str, str], **columns: object) -> FlightRecord:
+    def with_signals(self, units: Mapping[str, str], **columns: Any) -> FlightRecord:
         """With these signals added, or replaced where the name exists."""
         other = FlightRecord.from_arrays(self.time, units, **columns)
         kept = [i for i, s in enumerate(self.signals) if s not in other.signals]

@@ -56,12 +56,13 @@ class LinearFamily:
 
     @classmethod
     def from_models(
-        cls, airspeeds: Sequence[float], models: Sequence[LinearModel], kinks: Mapping[str, tuple[float, ...]] | None = None
+        cls, airspeeds: Sequence[float] | Array, models: Sequence[LinearModel], kinks: Mapping[str, tuple[float, ...]] | None = None
     ) -> LinearFamily:
         """From linear models with equal names, one an airspeed (m/s), each with its operating point."""
         first = models[0]
         return cls(
-            np.asarray(airspeeds, float), *(np.stack([getattr(m, name) for m in models]) for name in "ABCD"),
+            np.asarray(airspeeds, float), np.stack([m.A for m in models]), np.stack([m.B for m in models]),
+            np.stack([m.C for m in models]), np.stack([m.D for m in models]),
             first.states, first.inputs, first.outputs, tuple(m.point for m in models if m.point), first.dt, kinks or {},
         )  # fmt: skip
 

@@ -49,7 +49,7 @@ class LinearModel:
     def is_stable(self) -> bool:
         """Whether every pole lies strictly inside the stability region."""
         poles = self.poles()
-        return bool(np.all(poles.real < 0) if self.dt is None else np.all(np.abs(poles) < 1))
+        return bool(np.all(np.real(poles) < 0) if self.dt is None else np.all(np.abs(poles) < 1))
 
     def select(
         self, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
@@ -71,7 +71,7 @@ class LinearModel:
         """Zero-order-hold equivalent at sample period `dt` (s); exact at the samples."""
         if self.dt is not None:
             raise InputError(f"the model is already discrete (dt = {self.dt} s)")
-        A, B, C, D, _ = cont2discrete((self.A, self.B, self.C, self.D), dt)
+        A, B, C, D = cont2discrete((self.A, self.B, self.C, self.D), dt)[:4]  # type: ignore[index]
         return replace(self, A=A, B=B, C=C, D=D, dt=dt)
 
     def frequency_response(self, omega: object) -> np.ndarray:

@@ -87,7 +87,8 @@ class LPVStateSpace:
         basis = Polynomial(max(len(m) for m in shapes.values()) - 1, scheduling.low, scheduling.high)
         nx, nu, ny = shapes["A"].shape[1], shapes["B"].shape[2], shapes["C"].shape[1]
         return cls(
-            basis, *(basis.from_monomial(shapes[name]) for name in "ABCD"), scheduling,
+            basis, basis.from_monomial(shapes["A"]), basis.from_monomial(shapes["B"]), basis.from_monomial(shapes["C"]),
+            basis.from_monomial(shapes["D"]), scheduling,
             states=signals(states or [f"x{i + 1}" for i in range(nx)]), inputs=signals(inputs or [f"u{i + 1}" for i in range(nu)]),
             outputs=signals(outputs or [f"y{i + 1}" for i in range(ny)]), dt=dt,
         )  # fmt: skip
