@@ -70,7 +70,7 @@ def test_hover_derivatives_meet_their_closed_forms(ideal):
 
 
 def test_short_period_and_cyclic_gain(ideal):
-    x, u, d = hover_with_thrust_equal_to_weight(ideal)
+    x, u, _ = hover_with_thrust_equal_to_weight(ideal)
     A, B, _ = (np.array(m) for m in ideal.compiled("jacobian")(x, u, np.zeros(3)))
     q, p, a1, b1 = (ideal.states.index(s) for s in ("q", "p", "a1", "b1"))
     assert math.sqrt(A[q, a1]) == pytest.approx(14.64, abs=0.005)
