@@ -131,8 +131,10 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     starts = np.cumsum([0, *(length(n) for n in program.sizes)])
     order = np.concatenate([_scs_order(n) + start for n, start in zip(program.sizes, starts[:-1], strict=True)])
     data = {"A": program.A.tocsr()[order].tocsc(), "b": program.b[order], "c": program.c}
+    # a first-order method: the gain is recomputed from P afterwards, and more digits cost minutes
+    tolerance = max(solver.tolerance, 1e-5)
     engine = scs.SCS(
-        data, {"s": list(program.sizes)}, verbose=False, eps_abs=max(solver.tolerance, 1e-9), eps_rel=max(solver.tolerance, 1e-9),
+        data, {"s": list(program.sizes)}, verbose=False, eps_abs=tolerance, eps_rel=tolerance,
         max_iters=solver.iterations or 20000, time_limit_secs=solver.time_limit,
     )  # fmt: skip
     solution = engine.solve()

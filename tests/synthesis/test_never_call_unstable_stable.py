@@ -24,21 +24,15 @@ def unstable(excess, scale, dt=None):
     A = [T @ M @ np.linalg.inv(T) for M in (A0, A1, A2)]
     if dt is not None:
         A = [np.eye(2) + dt * A[0], dt * A[1], dt * A[2]]
-    return LPVStateSpace.polynomial(
-        A,
-        [T @ np.array([[0.0], [1]])],
-        [np.array([[1.0, 0]]) @ np.linalg.inv(T)],
-        [np.zeros((1, 1))],
-        Scheduling("p", "1", 0.0, 1.0, 0.1),
-        dt=dt,
-    )
+    B, C = T @ np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]]) @ np.linalg.inv(T)
+    return LPVStateSpace.polynomial(A, [B], [C], [np.zeros((1, 1))], Scheduling("p", "1", 0.0, 1.0, 0.1), dt=dt)
 
 
 @pytest.mark.parametrize("solver", installed_solvers())
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
 @pytest.mark.parametrize("excess", [1e-1, 1e-4, 1e-8])
 def test_an_unstable_plant_is_never_called_stable(solver, scale, excess):
-    quick = Solver(solver, iterations=2000 if solver == "SCS" else 0)
+    quick = Solver(solver, iterations=100 if solver == "SCS" else 0)
     for dt in (None, 0.1):
         lpv = unstable(excess, scale, dt)
         for cert in (stability(lpv, relaxation=COARSE, solver=quick), l2_gain(lpv, relaxation=COARSE, solver=quick, search=None)):
@@ -63,9 +57,10 @@ def test_a_stable_plant_is_called_stable_by_every_solver(solver):
 
 
 def test_solvers_agree_on_the_gain():
-    gains = [l2_gain(random_stable(1), relaxation=COARSE, solver=name, search=None).gamma for name in installed_solvers()]
-    # SCS, a first-order method, comes close from above: gamma is what its P proves
-    assert max(gains) <= min(gains) * (1 + 2e-3)
+    quick = [Solver(name, iterations=2000 if name == "SCS" else 0) for name in installed_solvers()]
+    gains = [l2_gain(random_stable(1), relaxation=COARSE, solver=solver, search=None).gamma for solver in quick]
+    # SCS, a first-order method, stops early and comes close from above: gamma is what its P proves
+    assert max(gains) <= min(gains) * (1 + 1e-2)
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])
@@ -120,7 +115,7 @@ def test_wrong_input_gets_a_sentence():
         l2_gain(lag(), math.nan)
     with pytest.raises(InputError, match="needs inputs and outputs"):
         l2_gain(replace(lag(), B=lag().B[:, :, :0], D=lag().D[:, :, :0], inputs=()))
-    with pytest.raises(SolverError, match="installed here: .*CLARABEL"):
+    with pytest.raises(SolverError, match="installed here: CLARABEL"):
         l2_gain(lag(), solver="GUROBI")
     with pytest.raises(InputError, match="degree of P"):
         Relaxation(degree=7)
