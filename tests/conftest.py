@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
+import studies  # noqa: F401  first: it asks for one BLAS thread, and threads that wait for each other cost minutes on a busy machine
+
+import pytest  # isort: skip
 
 import symheli
 

@@ -202,8 +202,7 @@ def frozen(f: Any) -> Figure:
         for k, poles in enumerate(stack):
             shown = poles[(poles.imag >= 0) & (poles.real > -12) & (poles.imag < 30)]
             label = name if k == len(stack) - 1 else None
-            face = {"facecolors": "none"} if marker == "o" else {}
-            axes[0][0].scatter(shown.real, shown.imag, 18, colour, marker, alpha=shade[k], linewidths=0.9, label=label, **face)
+            axes[0][0].plot(shown.real, shown.imag, marker, color=colour, markersize=4.5, fillstyle="none", alpha=shade[k], label=label)
     axes[0][0].axvline(0, color=GREY, linewidth=0.8)
     axes[0][0].set_xlabel("real (rad/s)")
     axes[0][0].set_title("poles, imaginary part (rad/s)")
