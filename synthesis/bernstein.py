@@ -62,7 +62,7 @@ def _weighted(F: Array) -> Array:
 
 def _unweighted(F: Array) -> Array:
     weights = binomials((F.shape[0] - 1, F.shape[1] - 1))
-    return _exact_quotient(F, weights) if F.dtype == object else F / weights.astype(float)
+    return np.asarray(_exact_quotient(F, weights)) if F.dtype == object else F / weights.astype(float)
 
 
 # the integer 0 of an empty sum must not become the float 0.0

@@ -44,26 +44,32 @@ class SplineLyapunov:
         """Bernstein coefficients (d + 1, n, n) on segment j."""
         return self.coefficients[j * self.degree : (j + 1) * self.degree + 1]
 
-    def at(self, p: float) -> Array:
-        """P at p, shape (n, n)."""
+    def at(self, p: float | Array) -> Array:
+        """P at p, shape p.shape + (n, n). Raises `InputError` outside the knots."""
         j, t = self._locate(p)
-        return np.tensordot(blossom([t] * self.degree), self.segment(j), axes=1)
+        return self._sum(self.coefficients, self.degree, j * self.degree, t)
 
-    def derivative(self, p: float) -> Array:
-        """dP/dp at p (per unit of p), the right-hand one at a knot, shape (n, n)."""
+    def derivative(self, p: float | Array) -> Array:
+        """dP/dp at p (per unit of p), the right-hand one at a knot, shape p.shape + (n, n)."""
+        j, t = self._locate(p)
         if self.degree == 0:
-            return np.zeros(self.coefficients.shape[1:])
-        j, t = self._locate(p)
-        slopes = self.degree * np.diff(self.segment(j), axis=0) / (self.knots[j + 1] - self.knots[j])
-        return np.tensordot(blossom([t] * (self.degree - 1)), slopes, axes=1)
+            return np.zeros((*np.shape(t), *self.coefficients.shape[1:]))
+        widths = np.repeat(np.diff(self.knots), self.degree)[:, None, None]
+        return self._sum(self.degree * np.diff(self.coefficients, axis=0) / widths, self.degree - 1, j * self.degree, t)
 
-    def _locate(self, p: float) -> tuple[int, float]:
+    @staticmethod
+    def _sum(coefficients: Array, degree: int, first: Array, t: Array) -> Array:
+        weights = blossom([t] * degree)
+        return sum(((w * np.ones_like(t))[..., None, None] * coefficients[first + i] for i, w in enumerate(weights)), np.zeros(()))
+
+    def _locate(self, p: float | Array) -> tuple[Array, Array]:
+        p = np.asarray(p, dtype=float)
         slack = 1e-9 * (self.knots[-1] - self.knots[0])
-        if not self.knots[0] - slack <= p <= self.knots[-1] + slack:
-            raise InputError(f"p = {p:.4g} lies outside [{self.knots[0]:.4g}, {self.knots[-1]:.4g}]")
-        j = int(np.clip(np.searchsorted(self.knots, p, side="right") - 1, 0, self.segments - 1))
+        if p.size and (p.min() < self.knots[0] - slack or p.max() > self.knots[-1] + slack):
+            raise InputError(f"p spans [{p.min():.4g}, {p.max():.4g}], P is known on [{self.knots[0]:.4g}, {self.knots[-1]:.4g}]")
+        j = np.clip(np.searchsorted(self.knots, p, side="right") - 1, 0, self.segments - 1)
         t = (p - self.knots[j]) / (self.knots[j + 1] - self.knots[j])
-        return j, float(np.clip(t, 0.0, 1.0))
+        return j, np.clip(t, 0.0, 1.0)
 
 
 def graded_knots(low: float, high: float, segments: int, grading: float, breaks: Sequence[float] = (), shortest: float = 0.0) -> Array:

@@ -163,24 +163,28 @@ def holds_on_grid(lpv: LPVStateSpace, P: SplineLyapunov, rate: float, gamma: flo
     """
     low, high = lpv.scheduling.low, lpv.scheduling.high
     grid = np.unique(np.concatenate([np.linspace(low, high, points), P.knots]))
-    with_gain = not math.isnan(gamma)
+    A, B, C, D = lpv.matrices(grid)
+    now = P.at(grid)
+    if np.linalg.eigvalsh(transform.T @ now @ transform).min() <= 0:
+        return False
     bounded = P.degree > 0 and math.isfinite(rate)
-    for p, A, B, C, D in zip(grid, *lpv.matrices(grid), strict=True):
-        now = P.at(p)
-        if lpv.dt is None:
-            moves = [A.T @ now + now @ A + nu * P.derivative(p) for nu in ((-rate, rate) if bounded else (0.0,))]
-            sides, corners = [now @ B] * len(moves), [np.zeros((B.shape[1], B.shape[1]))] * len(moves)
-        else:
-            step = rate * lpv.dt if bounded else 0.0
-            after = [P.at(q) for q in np.clip([p - step, p, p + step], low, high)]
-            moves, sides, corners = [A.T @ Q @ A - now for Q in after], [A.T @ Q @ B for Q in after], [B.T @ Q @ B for Q in after]
-        for top, side, corner in zip(moves, sides, corners, strict=True):
-            M = transform.T @ top @ transform
-            if with_gain:
-                M = np.block([[transform.T @ (top + C.T @ C) @ transform, transform.T @ (side + C.T @ D)],
-                              [(side + C.T @ D).T @ transform, corner + D.T @ D - gamma**2 * np.eye(len(corner))]])  # fmt: skip
-            if np.linalg.eigvalsh(0.5 * (M + M.T))[-1] >= 0 or np.linalg.eigvalsh(transform.T @ now @ transform)[0] <= 0:
-                return False
+    outer = np.concatenate([C, D], 2)
+    M = np.concatenate([A, B], 2)
+    widen = np.zeros((A.shape[1], B.shape[2]))
+    state, inputs = np.concatenate([np.eye(len(widen)), widen], 1), np.concatenate([widen.T, np.eye(B.shape[2])], 1)
+    if lpv.dt is None:
+        slopes = [nu * P.derivative(grid) for nu in ((-rate, rate) if bounded else (0.0,))]
+        moves = [state.T @ now @ M + transpose(M) @ now @ state + state.T @ slope @ state for slope in slopes]
+    else:
+        step = rate * lpv.dt if bounded else 0.0
+        after = [P.at(np.clip(grid + side, low, high)) for side in (-step, 0.0, step)]
+        moves = [transpose(M) @ Q @ M - state.T @ now @ state for Q in after]
+    whole = np.block([[transform, widen], [widen.T, np.eye(B.shape[2])]])
+    for move in moves:
+        F = move if math.isnan(gamma) else move + transpose(outer) @ outer - gamma**2 * inputs.T @ inputs
+        F = whole.T @ F @ whole
+        if np.linalg.eigvalsh(0.5 * (F + transpose(F))).max() >= 0:
+            return False
     return True
 
 

@@ -52,6 +52,6 @@ def lateral():
     B = -k[:, :, :1] * np.array([1, 1, 1, 0, 1.0])[:, None]
     powers = np.linalg.lstsq(np.vander(V, 4, increasing=True), np.concatenate([k, B], 2).reshape(14, -1), rcond=None)[0].reshape(4, 5, 6)
     return LPVStateSpace.polynomial(
-        powers[:, :, :5], powers[:, :, 5:], [np.eye(5)[[2, 3]]], [np.zeros((2, 1))], Scheduling("airspeed", "m/s", 0.0, 13.0, 1.0),
-        states=["v", "p", "r", "phi", "b1"], inputs=["v_w"], outputs=["r", "phi"],
+        list(powers[:, :, :5]), list(powers[:, :, 5:]), [np.eye(5)[[2, 3]]], [np.zeros((2, 1))], 
+        Scheduling("airspeed", "m/s", 0.0, 13.0, 1.0), states=["v", "p", "r", "phi", "b1"], inputs=["v_w"], outputs=["r", "phi"],
     )  # fmt: skip
