@@ -87,6 +87,11 @@ def scores(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord)
     return Scores(named(1), named(round(HORIZON / model.dt)), named(None), mode_misses(heli, model, axis.mode))
 
 
+def instruments(axis: Axis) -> tuple[str, ...]:
+    """The excitation signals of the axis's inputs, as a record names them."""
+    return tuple(f"e_{name}" for name in axis.inputs)
+
+
 def identify(axis: Axis, training: FlightRecord, method: str = "rls", order: int = 3, degree: int = 2) -> LPVARXModel:
-    """Fit `axis` to a training flight."""
-    return fit(axis.structure(order, degree), training, method=method)  # type: ignore[arg-type]
+    """Fit `axis` to a training flight; "iv" takes the excitation of its inputs as instruments."""
+    return fit(axis.structure(order, degree), training, method=method, instruments=instruments(axis) if method == "iv" else ())  # type: ignore[arg-type]

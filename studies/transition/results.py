@@ -70,6 +70,9 @@ def to_dict(study: Study) -> dict[str, Any]:
         }
         for (axis, noise), s in study.scores.items()
     }
+    out["rotor mode miss at 30 dB, order 2"] = {
+        f"{axis}, {method}": named(misses, "%") for (axis, method), misses in study.noisy_modes.items()
+    }
     out["comparison"] = {f"{axis}, {noise}": _comparison(c) for (axis, noise), c in study.comparisons.items()}
     out["frozen comparison"] = {name: _frozen(f) for name, f in study.frozen.items()}
     out["frozen gain of the exact models"] = {

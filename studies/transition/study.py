@@ -57,6 +57,8 @@ class Study:
     models: dict[str, LPVARXModel] = field(default_factory=dict)
     scores: dict[tuple[str, str], Scores] = field(default_factory=dict)
     """Keys (axis name, "noise-free" or "30 dB")."""
+    noisy_modes: dict[tuple[str, str], dict[float, float]] = field(default_factory=dict)
+    """Mode misses (percent, by airspeed) of order-2 models of the noisy flight: keys (axis name, method)."""
     comparisons: dict[tuple[str, str], Comparison] = field(default_factory=dict)
     frozen: dict[str, FrozenComparison] = field(default_factory=dict)
     bounds: list[Bound] = field(default_factory=list)
@@ -157,6 +159,10 @@ def _identify(study: Study) -> None:
             model = axes.identify(axis, training, "rls" if axis in AXES else "ls")
             study.models[f"{axis.name}, {noise}"] = model
             study.scores[axis.name, noise] = axes.scores(heli, axis, model, test)
+    for axis in AXES:
+        for method in ("ls", "iv"):
+            model = axes.identify(axis, study.flights["training, 30 dB"], method, order=2)
+            study.noisy_modes[axis.name, method] = axes.mode_misses(heli, model, axis.mode)
     study.models["lateral, gentle"] = axes.identify(LATERAL, study.flights["gentle"], "rls", order=2)
 
 

@@ -124,7 +124,12 @@ def modes(study: Study) -> Table:
     for (axis, noise), result in study.scores.items():
         if axis in (LONGITUDINAL.name, LATERAL.name):
             table.rows.append([f"{axis}, {noise}", *(f"{result.mode_miss[v]:.2f}" for v in FROZEN_SPEEDS)])
-    table.remarks.append("With noise, least squares is biased: the damping of the modes is what suffers (see the identification notes).")
+    words = {"ls": "least squares", "iv": "instrumental variables"}
+    for (axis, method), misses in study.noisy_modes.items():
+        table.rows.append([f"{axis}, 30 dB, order 2, {words[method]}", *(f"{misses[v]:.2f}" for v in FROZEN_SPEEDS)])
+    table.remarks.append(
+        "Noise fed back through the autopilot biases least squares; more lags hide it, the excitation as instrument removes it."
+    )
     return table
 
 
@@ -216,5 +221,5 @@ def findings(study: Study) -> list[str]:
                 if c.verified
                 else "not stable at every frozen airspeed: nothing can be proven"
             )
-            out.append(f"The loop around the model {name}, is {verdict}.")
+            out.append(f"Attitude hold around the {name.replace('identified, ', 'model of the ')}: {verdict}.")
     return out

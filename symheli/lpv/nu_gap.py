@@ -55,11 +55,11 @@ def chordal_distance(
 
 
 def _winding(P1: np.ndarray, P2: np.ndarray) -> int:
-    """Clockwise-negative winding number about 0 of det(I + P2* P1) along the upper unit circle, doubled by symmetry."""
+    """Clockwise turns about 0 of det(I + P2* P1) along the unit circle (upper half, doubled by symmetry): zeros less poles outside it."""
     eye = np.eye(P1.shape[2])
     f = np.linalg.det(eye + np.conj(np.swapaxes(P2, 1, 2)) @ P1)
     turns = np.sum(np.angle(f[1:] / f[:-1])) / np.pi  # both half circles: 2 x sum / (2 pi)
-    return round(float(turns))
+    return -round(float(turns))
 
 
 def _chordal(P1: np.ndarray, P2: np.ndarray) -> np.ndarray:

@@ -1,0 +1,42 @@
+"""Medians of repeated runs, interleaved so that a drifting machine treats both sides alike."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable
+
+
+def medians(candidates: dict[str, Callable[[], object]], seconds: float) -> dict[str, float]:
+    """Median time of one call of each, in s, over about `seconds` of interleaved runs each."""
+    spent: dict[str, list[float]] = {name: [] for name in candidates}
+    for call in candidates.values():
+        call()
+    end = time.perf_counter() + seconds * len(candidates)
+    while time.perf_counter() < end or min(len(t) for t in spent.values()) < 3:
+        for name, call in candidates.items():
+            begin = time.perf_counter()
+            call()
+            spent[name].append(time.perf_counter() - begin)
+    return {name: statistics.median(times) for name, times in spent.items()}
+
+
+def arguments(description: str) -> argparse.Namespace:
+    """--quick and --json, as every benchmark has them."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--quick", action="store_true", help="shorter runs, under 40 s")
+    parser.add_argument("--json", action="store_true", help="print each ratio by name")
+    return parser.parse_args()
+
+
+def show(options: argparse.Namespace, times: dict[str, float], ratios: dict[str, float]) -> None:
+    """A table of medians and ratios, or the ratios as JSON."""
+    if options.json:
+        print(json.dumps(ratios, indent=1))
+        return
+    for name, value in times.items():
+        print(f"{name:60s}{1e6 * value:14.2f} us")
+    for name, value in ratios.items():
+        print(f"{name:60s}{value:14.2f} x")

@@ -1,0 +1,60 @@
+"""The nu-gap against closed forms and its defining properties."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from symheli import InputError, LinearModel
+from symheli.lpv import chordal_distance, nu_gap, signals
+
+
+def model(A, B, C, D, dt=0.1):
+    return LinearModel(A, B, C, D, signals([f"x{i}" for i in range(len(A))]), signals(["u"]), signals(["y"]), dt=dt)
+
+
+def gain(k):
+    return model(np.array([[0.5]]), np.zeros((1, 1)), np.zeros((1, 1)), np.array([[k]]))
+
+
+def pole(a, b=1.0):
+    return model(np.array([[a]]), np.array([[b]]), np.array([[1.0]]), np.zeros((1, 1)))
+
+
+def test_two_gains_are_as_far_apart_as_their_points_on_the_sphere():
+    a, b = 0.5, 3.0
+    assert nu_gap(gain(a), gain(b)) == pytest.approx(abs(a - b) / np.sqrt((1 + a**2) * (1 + b**2)), rel=1e-12)
+
+
+def test_distance_is_zero_to_itself_and_symmetric():
+    one, two = pole(0.9, 0.3), pole(0.8, 0.5)
+    assert nu_gap(one, one) == pytest.approx(0, abs=1e-9)
+    assert nu_gap(one, two) == pytest.approx(nu_gap(two, one), rel=1e-9)
+
+
+def test_a_slightly_stable_and_a_slightly_unstable_pole_are_close_for_feedback():
+    """High gain at low frequency: both look like an integrator; the open-loop difference would be unbounded."""
+    assert nu_gap(pole(0.999), pole(1.001)) < 0.05
+
+
+def test_a_stable_and_a_far_unstable_plant_of_small_gain_are_as_far_as_can_be():
+    assert nu_gap(pole(0.5, 0.01), pole(1.5, 0.01)) == 1.0
+
+
+def test_scaling_channels_is_the_same_as_scaling_the_models():
+    assert nu_gap(pole(0.9, 3.0), pole(0.8, 5.0), input_scale=0.1, output_scale=2.0) == pytest.approx(
+        nu_gap(pole(0.9, 3.0 * 0.1 / 2.0), pole(0.8, 5.0 * 0.1 / 2.0)), rel=1e-12
+    )
+
+
+def test_chordal_distance_never_exceeds_the_gap():
+    omega = np.geomspace(0.01, 30, 50)
+    one, two = pole(0.9, 0.3), pole(0.8, 0.5)
+    assert chordal_distance(one, two, omega).max() <= nu_gap(one, two) * (1 + 1e-6)
+
+
+def test_models_that_cannot_be_compared_are_refused():
+    with pytest.raises(InputError, match="sample period"):
+        nu_gap(pole(0.9), model(np.array([[0.9]]), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)), dt=0.2))
+    with pytest.raises(InputError, match="unit circle"):
+        nu_gap(pole(1.0), pole(0.5))

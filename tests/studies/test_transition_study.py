@@ -1,0 +1,150 @@
+"""The main job's stages: what each must find, on the default seed."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import synthesis
+from studies.transition import axes, guarantees
+from studies.transition.axes import LATERAL, LONGITUDINAL
+from studies.transition.baseline import build_baseline
+from studies.transition.comparison import compare
+from studies.transition.flights import FlightPlan, autopilot_for
+from studies.transition.paper_experiment import OUTPUTS, run_experiment
+from studies.transition.recovery import recover
+
+
+@pytest.fixture(scope="module")
+def baseline(ideal):
+    return build_baseline(ideal)
+
+
+@pytest.fixture(scope="module")
+def flown(ideal):
+    """{noise: (training, test)}"""
+    autopilot = autopilot_for(ideal)
+    plans = {"noise-free": FlightPlan(0), "30 dB": FlightPlan(0).noisy()}
+    return {name: (plan.training(ideal, autopilot), plan.test(ideal, autopilot)) for name, plan in plans.items()}
+
+
+def test_the_lft_is_the_polynomial_family_and_reduction_keeps_it(baseline):
+    assert baseline.lft_error < 1e-12
+    assert baseline.reduced.order < baseline.lft.order
+
+
+def test_entries_that_no_polynomial_fits_are_named(baseline):
+    names = [e.name for e in baseline.unfit]
+    assert "M_u" in names
+    assert "Y_v" not in names
+    m_u = next(e for e in baseline.entries if e.name == "M_u")
+    assert all(25 < m_u.percent[f"polynomial {d}"] < 50 for d in (2, 3, 4, 5, 6))
+
+
+def test_more_degrees_fit_smooth_entries_better(baseline):
+    y_v = next(e for e in baseline.entries if e.name == "N_v")
+    assert y_v.percent["polynomial 6"] < y_v.percent["polynomial 2"]
+
+
+@pytest.mark.parametrize("period", [0.02, 0.11408])
+def test_order_one_model_gives_the_discrete_system_back(baseline, period):
+    found = recover(baseline.nodes, period)
+    assert max(found.A_error, found.B_error) < 1e-9
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_papers_experiment_runs_and_a_cubic_is_refused_with_the_reason(baseline, closed):
+    e = run_experiment(baseline.nodes, closed)
+    assert tuple(c.output for c in e.channels) == OUTPUTS
+    assert "3 distinct values" in e.cubic_refused
+    assert "needs 4" in e.cubic_refused
+    assert len(np.unique(np.round(e.training["airspeed"], 9))) == 3
+    for c in e.channels:
+        assert c.parameters.shape[1] == 12
+        assert c.fits["one step"] > c.fits["1 s"]  # one step flatters
+
+
+@pytest.mark.parametrize("axis", [LONGITUDINAL, LATERAL], ids=lambda a: a.mode)
+@pytest.mark.parametrize("noise", ["noise-free", "30 dB"])
+def test_identified_models_meet_their_marks_on_a_transition_they_have_not_seen(ideal, flown, axis, noise):
+    training, test = flown[noise]
+    result = axes.scores(ideal, axis, axes.identify(axis, training, "ls"), test)
+    for output, marks in axis.marks.items():
+        assert result.one_second[output] >= marks[noise != "noise-free"]
+    if noise == "noise-free":
+        assert max(result.mode_miss.values()) < 3.0
+
+
+def test_instruments_find_the_modes_that_noise_hides_from_least_squares(ideal, flown):
+    training = flown["30 dB"][0]
+    ls, iv = (axes.mode_misses(ideal, axes.identify(LONGITUDINAL, training, m, order=2), LONGITUDINAL.mode) for m in ("ls", "iv"))
+    assert min(ls.values()) > 5
+    assert max(iv.values()) < 3
+
+
+def test_recursion_and_batch_give_the_same_model(flown):
+    training, test = flown["noise-free"]
+    rls, ls = (axes.identify(LONGITUDINAL, training, m) for m in ("rls", "ls"))
+    # condition number 1e5 of the regressors times rounding, on predictions
+    np.testing.assert_allclose(rls.predict(test, 1)[10:], ls.predict(test, 1)[10:], rtol=1e-8, atol=1e-9)
+
+
+def test_a_moving_trim_needs_its_drift(baseline, flown):
+    """Without -x0'(p) dp/dt the full-state baseline loses forward speed within a second."""
+    lpv = baseline.lpv["polynomial 3"]
+    test = flown["noise-free"][1]
+    c = compare(LONGITUDINAL, {}, {"with": (lpv, True), "without": (lpv, False)}, test)
+    good, bad = c.predictors
+    assert good.one_second["u"] > 90 > 80 > bad.one_second["u"]
+
+
+def test_gust_loop_is_proven_for_slow_airspeed_and_grows_when_it_may_jump(baseline):
+    loop = guarantees.gust_loop(baseline.nodes)
+    slow = synthesis.l2_gain(loop, rate=1.0, relaxation=synthesis.Relaxation(segments=(8,)), search=None)
+    assert slow.verified
+    assert slow.verify(rigorous=True)
+    assert slow.frozen == pytest.approx(guarantees.exact_frozen_gain(baseline.nodes, sampled=False), rel=0.01)
+    assert slow.frozen < slow.gamma < 2.7
+    jump = synthesis.l2_gain(loop, rate=math.inf)
+    assert not jump.verified
+    assert math.isinf(jump.lower)
+
+
+def test_an_interrupted_study_leaves_whole_results_of_its_finished_stages(tmp_path, monkeypatch):
+    from studies.transition import study
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study, "_recovery", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        study.run_study(out=tmp_path, quick=True)
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert not results["complete"]
+    assert results["baseline"]["LFT order"]["value"] == 45
+    assert "open" in results["paper experiment"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.json"]
+
+
+@pytest.mark.slow
+def test_the_quick_study_writes_a_self_contained_report(tmp_path):
+    from studies.transition.study import run_study
+
+    study = run_study(out=tmp_path, quick=True)
+    page = (tmp_path / "report.html").read_text()
+    assert "http" not in page.replace("http-equiv", "")
+    assert page.count("data:image/png;base64,") == len(list((tmp_path / "figures").iterdir())) > 10
+    assert json.loads((tmp_path / "results.json").read_text())["complete"]
+    assert "proven" in study.summary()
+
+
+@pytest.mark.slow
+def test_marks_hold_for_twenty_other_seeds():
+    from studies.transition.campaign import run_campaign
+
+    campaign = run_campaign(seeds=20)
+    print(campaign.summary())
+    assert campaign.passed, campaign.summary()
