@@ -1,11 +1,16 @@
-"""One recursive update that yields the coefficients, TIMO (54 regressors, 4 outputs): square-root RLS here against covariance RLS in NumPy."""
+"""One recursive update that yields the coefficients (two inputs, four outputs): square-root RLS against covariance RLS in NumPy."""
 
 from __future__ import annotations
 
-import numpy as np
-from timing import arguments, medians, show
+import sys
+from pathlib import Path
 
-from identification import LPVARX, Polynomial, RecursiveLeastSquares
+import numpy as np
+
+sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scripts named like the packages they measure
+
+from benchmarks.timing import arguments, medians, show  # noqa: E402
+from identification import LPVARX, Polynomial, RecursiveLeastSquares  # noqa: E402
 
 CALLS = 100
 
