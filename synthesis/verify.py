@@ -47,6 +47,11 @@ class Claim(NamedTuple):
     dt: float | None
     elevation: int = 0
 
+    @property
+    def meaningful(self) -> bool:
+        """False where a P that varies meets a p that may jump in continuous time: dV/dt has no bound then."""
+        return self.dt is not None or self.P.degree == 0 or math.isfinite(self.rate)
+
 
 def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Array]:
     """Bernstein coefficients (a + 1, b + 1, N, N) of every block over the whole range, with g = 0.
@@ -59,6 +64,7 @@ def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Array]:
 
 def _polynomials(claim: Claim, number: Number) -> Iterator[Array]:
     pieces, P, rate, dt, _ = claim
+    assert claim.meaningful  # noqa: S101 - checked by the callers
     convert = np.frompyfunc(number, 1, 1)
 
     def exact(values: Array) -> Array:
@@ -68,7 +74,7 @@ def _polynomials(claim: Claim, number: Number) -> Iterator[Array]:
         for cell in cells(pieces, P.knots):
             yield from _continuous(cell, P, rate, number, exact)
     else:
-        step = rate * dt if P.degree and math.isfinite(rate) else 0.0
+        step = rate * dt if P.degree else 0.0
         for strip in strips(pieces, P.knots, step):
             yield _discrete(strip, P, number, exact)
 
@@ -80,7 +86,7 @@ def _continuous(cell: Cell, P: SplineLyapunov, rate: float, number: Number, exac
     still = multiply(transpose(A), Pc)
     still, side = [still, transpose(still), multiply(transpose(C), C)], [multiply(Pc, B), multiply(transpose(C), D)]
     corner = [multiply(transpose(D), D)]
-    if P.degree == 0 or rate == 0 or not math.isfinite(rate):
+    if P.degree == 0 or rate == 0:
         yield _stack(still, side, corner)
         return
     slope = P.degree * (Pc[1:] - Pc[:-1]) / ((b - a) * width)
@@ -133,6 +139,8 @@ def _stack(top: list[Array], side: list[Array], corner: list[Array]) -> Array:
 def examine(claim: Claim) -> Findings:
     """Floating point: eigenvalues of every coefficient, and the least g by Schur complement. Pass scaled data."""
     P = claim.P
+    if not claim.meaningful:
+        return Findings(False, False, math.inf, math.inf)
     n = P.coefficients.shape[1]
     values = np.linalg.eigvalsh(P.coefficients)
     positive = bool(np.all(values[:, 0] > _rounding(n) * np.abs(values).max()))
@@ -167,16 +175,16 @@ def holds_on_grid(lpv: LPVStateSpace, P: SplineLyapunov, rate: float, gamma: flo
     now = P.at(grid)
     if np.linalg.eigvalsh(transform.T @ now @ transform).min() <= 0:
         return False
-    bounded = P.degree > 0 and math.isfinite(rate)
+    moving = P.degree > 0 and rate > 0
     outer = np.concatenate([C, D], 2)
     M = np.concatenate([A, B], 2)
     widen = np.zeros((A.shape[1], B.shape[2]))
     state, inputs = np.concatenate([np.eye(len(widen)), widen], 1), np.concatenate([widen.T, np.eye(B.shape[2])], 1)
     if lpv.dt is None:
-        slopes = [nu * P.derivative(grid) for nu in ((-rate, rate) if bounded else (0.0,))]
+        slopes = [nu * P.derivative(grid) for nu in ((-rate, rate) if moving else (0.0,))]
         moves = [state.T @ now @ M + transpose(M) @ now @ state + state.T @ slope @ state for slope in slopes]
     else:
-        step = rate * lpv.dt if bounded else 0.0
+        step = min(rate * lpv.dt, high - low) if moving else 0.0
         after = [P.at(np.clip(grid + side, low, high)) for side in (-step, 0.0, step)]
         moves = [transpose(M) @ Q @ M - state.T @ now @ state for Q in after]
     whole = np.block([[transform, widen], [widen.T, np.eye(B.shape[2])]])
@@ -195,6 +203,8 @@ def proven(claim: Claim, gamma: float) -> bool:
     installed, else the (slower) fractions of the standard library.
     """
     number, P = rational(), claim.P
+    if not claim.meaningful:
+        return False
     n = P.coefficients.shape[1]
     for coefficient in P.coefficients:
         if not positive_definite(np.array([[number(float(v)) for v in row] for row in coefficient], dtype=object)):

@@ -55,8 +55,8 @@ class Steps(NamedTuple):
         return out
 
 
-def steps(lpv: LPVStateSpace, time: Array, p: Array, longest: float) -> Steps:
-    """The model along straight lines between the corners (`time`, `p`), in steps of at most `longest` s.
+def steps(lpv: LPVStateSpace, time: Array, p: Array, longest: float, split: int = 1) -> Steps:
+    """The model along straight lines between the corners (`time`, `p`), in steps of at most `longest` s, each cut in `split`.
 
     Continuous: fourth-order Magnus exponentials, exact where p rests (Hairer, Lubich and Wanner, IV.7). Discrete: its
     own samples at multiples of dt.
@@ -71,7 +71,7 @@ def steps(lpv: LPVStateSpace, time: Array, p: Array, longest: float) -> Steps:
     for t0, t1, q0, q1 in zip(time[:-1], time[1:], p[:-1], p[1:], strict=True):
         if t1 - t0 <= 1e-12 * max(longest, 1e-300):
             continue
-        count = max(1, math.ceil((t1 - t0) / longest))
+        count = split * max(1, math.ceil((t1 - t0) / longest))
         h = (t1 - t0) / count
         starts += [t0 + h * np.arange(count)]
         widths += [np.full(count, h)]

@@ -132,3 +132,21 @@ def test_importing_loads_no_solver_and_every_name_is_documented():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
     for name in synthesis.__all__:
         assert inspect.getdoc(getattr(synthesis, name)), name
+
+
+@pytest.mark.parametrize("dt", [None, 0.2])
+def test_a_varying_p_of_v_proves_nothing_when_p_may_jump(dt):
+    cert = l2_gain(spring() if dt is None else spring().discretize(dt), 0.02, relaxation=COARSE, search=None)
+    assert cert.verify()
+    evidence = cert.evidence
+    assert evidence is not None
+    jumping = replace(cert, evidence=evidence._replace(rate=math.inf))
+    assert not jumping.verify()
+    assert not jumping.verify(rigorous=True)
+
+
+def test_a_model_without_response_has_no_gain():
+    cert = l2_gain(replace(lag(), C=0 * lag().C), 1.0, relaxation=COARSE)
+    assert cert.frozen == 0.0
+    # zero is approached: gamma is what the solver's gap leaves, in units of the input
+    assert cert.gamma < 1e-2
