@@ -82,12 +82,13 @@ class TrimPoint(OperatingPoint):
 
 def trim(
     heli: Helicopter, airspeed: float, *, climb_rate: float = 0.0, turn_rate: float = 0.0, sideslip: float = 0.0,
-    wind: Sequence[float] = (0.0, 0.0, 0.0), acceleration: float = 0.0, start: TrimPoint | None = None, throw: bool = True,
+    wind: Sequence[float] = (0.0, 0.0, 0.0), acceleration: float = 0.0, start: TrimPoint | None = None,
+    throw: bool = True, continuation: bool = True,
 ) -> TrimPoint:  # fmt: skip
     """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.
 
     Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start` or a hover guess; where
-    that fails, by continuation from hover. Success is judged on the recomputed residual of every equation. Raises
+    that fails, by `continuation` from hover. Success is judged on the recomputed residual of every equation. Raises
     `TrimError` carrying the best point; with throw=False that point is returned instead.
     """
     condition = FlightCondition(
@@ -96,7 +97,7 @@ def trim(
     )  # fmt: skip
     problem = _Problem(heli, condition)
     best = problem.solve(problem.guess() if start is None else problem.unknowns_of(start))
-    if not best.success:
+    if continuation and not best.success:
         best = min((best, _continue_from_hover(heli, condition)), key=lambda point: float(np.abs(point.residual.array).max()))
     if throw and not best.success:
         table = ", ".join(f"d{s}/dt {r:.2e}" for s, r in zip(best.residual.signals, best.residual.array, strict=True))

@@ -29,9 +29,9 @@ CAPTION = {
     "error. Triangles: the largest errors (spikes).",
     "flights": "The flight that is identified, and the transition that judges (noise-free).",
     "prediction": "{}: 1 s ahead on the unseen transition (noise-free).",
-    "frozen": "{} with airspeed held: poles from hover (pale) to 12.5 m/s (dark), response at 7 m/s, nu-gap to the exact model (1 "
-    "where a barely damped slow mode is stable in one and unstable in the other); dotted: the chordal distance above {:g} rad/s, "
-    "where slow modes do not decide.",
+    "frozen": "{} with airspeed held: poles from hover (pale) to 12.5 m/s (dark), response at 7 m/s, nu-gap to the exact model "
+    "(1: a mode is stable in one and unstable in the other); dotted: the chordal distance above {:g} rad/s, where slow modes do not "
+    "decide. Identified poles without a counterpart belong to lags the plant does not need.",
     "gain": "What the rate is worth: proven L2 gain of the gust loop against permitted acceleration. Triangles: no bound can be smaller.",
 }
 
@@ -192,7 +192,7 @@ def prediction(c: Any) -> Figure:
 
 def frozen(f: Any) -> Figure:
     """Poles, frequency response and nu-gap."""
-    figure, axes = _subplots(1, 3, 11, 3.2)
+    figure, axes = _subplots(1, 3, 12, 3.2)
     shade = np.linspace(0.25, 1.0, len(f.airspeeds))
     for name, stack, colour, marker in (
         ("exact", f.exact_poles, INK, "o"),
@@ -227,7 +227,7 @@ def frozen(f: Any) -> Figure:
     axes[0][2].set_ylim(0, 1.05)
     axes[0][2].set_title("nu-gap to the exact model")
     axes[0][2].set_xlabel("airspeed (m/s)")
-    axes[0][2].legend()
+    axes[0][2].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 

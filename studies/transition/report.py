@@ -40,7 +40,7 @@ def write_report(study: Study, out: Path) -> Path:
     pictures = {}
     for name, caption, figure in figures(study):
         stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=150)
+        figure.savefig(stream, format="png", dpi=130)
         plt.close(figure)
         write_bytes(out / "figures" / f"{name}.png", stream.getvalue())
         pictures[name] = {"caption": caption, "data": base64.b64encode(stream.getvalue()).decode("ascii")}

@@ -99,7 +99,7 @@ class _Flight:
 
     def _reference(self, speed: float, acceleration: float, start: TrimPoint | None) -> TrimPoint:
         """The best quasi-steady point: where the wake factor jumps (flow reversing through the disc) none is exact."""
-        point = trim(self.heli, speed, acceleration=acceleration, wind=tuple(self.wind), start=start, throw=False)  # type: ignore[arg-type]
+        point = trim(self.heli, speed, acceleration=acceleration, wind=tuple(self.wind), start=start, throw=False, continuation=False)  # type: ignore[arg-type]
         miss = np.abs(point.residual.array[:6]).max()
         if miss > REFERENCE_MISS:
             raise TrimError(
