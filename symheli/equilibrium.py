@@ -82,7 +82,7 @@ class TrimPoint(OperatingPoint):
 
 def trim(
     heli: Helicopter, airspeed: float, *, climb_rate: float = 0.0, turn_rate: float = 0.0, sideslip: float = 0.0,
-    wind: Sequence[float] = (0.0, 0.0, 0.0), acceleration: float = 0.0, start: TrimPoint | None = None,
+    wind: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0), acceleration: float = 0.0, start: TrimPoint | None = None,
     throw: bool = True, continuation: bool = True,
 ) -> TrimPoint:  # fmt: skip
     """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 import symheli
 from identification import LPVARXModel, fit_percent
@@ -14,6 +13,7 @@ from studies.transition.axes import HORIZON, SCHEDULING, Axis, rotor_mode
 from symheli import FlightRecord, Helicopter, LPVStateSpace
 from symheli.lpv import chordal_distance, nu_gap
 from symheli.lpv.arrays import Array
+from symheli.lpv.exponential import expm
 
 SCALES = {
     "d_lon": 0.05,

@@ -67,7 +67,7 @@ def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
             model.inputs,
             model.outputs,
         )
-        return float(control.system_norm((servo_loop(one) if sampled else close(one, "gust")).at(0.0).to_control(), p="inf"))
+        return float(control.system_norm((servo_loop(one) if sampled else close(one, "gust")).at(0.0).to_control(), p="inf"))  # type: ignore[arg-type]
 
     lateral = family.select(STATES, ["d_lat", "d_ped"] if sampled else ["d_lat", "v_w"])
     return max(norm(lateral[k].discretize(PERIOD) if sampled else lateral[k]) for k in range(len(lateral)))

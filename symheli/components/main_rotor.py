@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
-from symheli import inflow
 from symheli.components.component import Component, Effect, Flow, Motion
-from symheli.components.rotor import Disc, profile_torque_coefficient
+from symheli.components.rotor import Disc, load
 from symheli.lpv.signal import Signal
 from symheli.symbolic import absolute, sqrt
 
@@ -39,11 +38,7 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     mu = sqrt(mu2 + 1e-20)
     d_col = controls["d_col"]
 
-    c0, c1 = inflow.thrust_line(d_col, mu2, mu_z, par.lift_slope, disc.solidity)
-    lam0 = flow.inflow(c0, c1, par.ct_max, mu2, mu_z, par.inflow_efficiency)
-    ct = inflow.thrust_coefficient(lam0, c0, c1, par.ct_max)
-    thrust = ct * disc.force_scale
-    torque = (ct * (lam0 - mu_z) + profile_torque_coefficient(mu2, par.profile_drag, disc.solidity)) * disc.force_scale * par.radius
+    lam0, ct, thrust, torque, stall, ring = load(disc, par, d_col, mu2, mu_z, flow)
 
     a1, b1 = own["a1"], own["b1"]
     tau = 16 / (par.bar_lock_number * motion.Om)
@@ -63,10 +58,7 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
         rates=rates,
         shaft_torque=torque,
         flow={"V_imr": lam0 * disc.tip_speed, "lam0": lam0, "C_T": ct, "T_mr": thrust, "Q_mr": torque},
-        switches={
-            "main rotor stall": par.ct_max - absolute(c0 - c1 * lam0),
-            "vortex_ring": inflow.vortex_ring(sqrt(absolute(ct) / (2 * par.inflow_efficiency) + 1e-20), mu2, mu_z),
-        },
+        switches={"main rotor stall": stall, "vortex_ring": ring},
     )
 
 

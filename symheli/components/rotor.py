@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+from symheli import inflow
+from symheli.components.component import Flow
+from symheli.symbolic import absolute, sqrt
 
 
 @dataclass(frozen=True)
@@ -36,3 +41,37 @@ class Disc:
 def profile_torque_coefficient(mu2: Any, profile_drag: Any, solidity: Any) -> Any:
     """(C_D0 sigma/8)(1 + 7/3 mu^2), dimensionless. Source: G15, main rotor torque."""
     return profile_drag * solidity / 8 * (1 + 7 / 3 * mu2)
+
+
+class Load(NamedTuple):
+    """What a rotor does along and about its shaft: inflow ratio lam0 and C_T (dimensionless), thrust (N), torque (N m), and the
+    switching functions of blade stall (thrust limit) and vortex ring."""
+
+    lam0: Any
+    ct: Any
+    thrust: Any
+    torque: Any
+    stall: Any
+    vortex_ring: Any
+
+
+def load(disc: Disc, par: SimpleNamespace, pitch: Any, mu2: Any, mu_z: Any, flow: Flow) -> Load:
+    """Thrust and torque of a rotor of collective `pitch` (rad) in flow of advance ratio^2 `mu2` and axial ratio `mu_z`.
+
+        C_Q = C_T (lam0 - mu_z) + (C_D0 sigma/8)(1 + 7/3 mu^2),  Q = C_Q rho (Om R)^2 pi R^3
+
+    Source: G15, main rotor thrust and torque; the tail rotor is treated alike.
+    """
+    c0, c1 = inflow.thrust_line(pitch, mu2, mu_z, par.lift_slope, disc.solidity)
+    lam0 = flow.inflow(c0, c1, par.ct_max, mu2, mu_z, par.inflow_efficiency)
+    ct = inflow.thrust_coefficient(lam0, c0, c1, par.ct_max)
+    cq = ct * (lam0 - mu_z) + profile_torque_coefficient(mu2, par.profile_drag, disc.solidity)
+    hover = sqrt(absolute(ct) / (2 * par.inflow_efficiency) + 1e-20)
+    return Load(
+        lam0,
+        ct,
+        ct * disc.force_scale,
+        cq * disc.force_scale * par.radius,
+        par.ct_max - absolute(c0 - c1 * lam0),
+        inflow.vortex_ring(hover, mu2, mu_z),
+    )

@@ -7,10 +7,8 @@ from math import pi
 from types import SimpleNamespace
 from typing import Any
 
-from symheli import inflow
 from symheli.components.component import Component, Effect, Flow, Motion
-from symheli.components.rotor import Disc, profile_torque_coefficient
-from symheli.symbolic import absolute, sqrt
+from symheli.components.rotor import Disc, load
 
 
 def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
@@ -28,20 +26,14 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     mu_z = v_tr / disc.tip_speed
     blockage = 1 - 0.75 * par.fin_area / (pi * par.radius**2)
 
-    c0, c1 = inflow.thrust_line(controls["d_ped"], mu2, mu_z, par.lift_slope, disc.solidity)
-    lam0 = flow.inflow(c0, c1, par.ct_max, mu2, mu_z, par.inflow_efficiency)
-    ct = inflow.thrust_coefficient(lam0, c0, c1, par.ct_max)
-    side = -blockage * disc.force_scale * ct
-    torque = (ct * (lam0 - mu_z) + profile_torque_coefficient(mu2, par.profile_drag, disc.solidity)) * disc.force_scale * par.radius
+    lam0, _, thrust, torque, stall, ring = load(disc, par, controls["d_ped"], mu2, mu_z, flow)
+    side = -blockage * thrust
     return Effect(
         force=(0.0, side, 0.0),
         moment=(side * par.height, 0.0, -side * par.arm),
         shaft_torque=par.gear_ratio * torque,
         flow={"V_itr": lam0 * disc.tip_speed, "Y_tr": side, "Q_tr": torque},
-        switches={
-            "tail rotor stall": par.ct_max - absolute(c0 - c1 * lam0),
-            "tail rotor vortex_ring": inflow.vortex_ring(sqrt(absolute(ct) / (2 * par.inflow_efficiency) + 1e-20), mu2, mu_z),
-        },
+        switches={"tail rotor stall": stall, "tail rotor vortex_ring": ring},
     )
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import expm
 
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.exponential import expm
 from symheli.lpv.lpv_state_space import LPVStateSpace
 
 
