@@ -14,7 +14,7 @@ from studies.transition.comparison import FAST
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from studies.transition.study import Study
+    from studies.transition.outcome import Outcome
 
 INK, BLUE, ORANGE, GREEN, RED, GREY = "#1b1f24", "#0b61a4", "#d9730d", "#2e7d32", "#b3261e", "#8a949e"
 DEGREES = 180 / math.pi
@@ -36,7 +36,7 @@ CAPTION = {
 }
 
 
-def figures(study: Study) -> Iterator[tuple[str, str, Figure]]:
+def figures(study: Outcome) -> Iterator[tuple[str, str, Figure]]:
     """(name, caption, figure) of everything the study has reached."""
     import matplotlib
 
@@ -71,13 +71,13 @@ def _subplots(rows: int, columns: int, width: float, height: float, **options: A
     return figure, axes
 
 
-def _kinks(ax: Any, study: Study) -> None:
+def _kinks(ax: Any, study: Outcome) -> None:
     for speeds in study.baseline.between.kinks.values():  # type: ignore[union-attr]
         for speed in speeds:
             ax.axvline(speed, color=GREY, linewidth=0.8, linestyle=":")
 
 
-def trim(study: Study) -> Figure:
+def trim(study: Outcome) -> Figure:
     """Attitude and controls against airspeed."""
     family = study.baseline.nodes  # type: ignore[union-attr]
     figure, axes = _subplots(1, 4, 11, 2.4, sharex=True)
@@ -89,7 +89,7 @@ def trim(study: Study) -> Figure:
     return figure
 
 
-def entries(study: Study) -> Figure:
+def entries(study: Outcome) -> Figure:
     """Four entries of A: exact and interpolated."""
     b = study.baseline
     assert b is not None  # noqa: S101
@@ -153,7 +153,7 @@ def outputs(e: Any) -> Figure:
     return figure
 
 
-def flights(study: Study) -> Figure:
+def flights(study: Outcome) -> Figure:
     """Airspeed, attitude and inputs of training and test."""
     figure, axes = _subplots(3, 2, 11, 4.6, sharex="col", width_ratios=(2.2, 1))
     for column, name in enumerate(("training, noise-free", "test, noise-free")):
@@ -231,7 +231,7 @@ def frozen(f: Any) -> Figure:
     return figure
 
 
-def gain_curve(study: Study) -> Figure:
+def gain_curve(study: Outcome) -> Figure:
     """Gain against rate with its bracket."""
     figure, axes = _subplots(1, 1, 7.5, 3.4)
     ax = axes[0][0]

@@ -16,17 +16,17 @@ from studies.transition.results import to_dict
 from symheli.errors import SymheliError
 
 if TYPE_CHECKING:
-    from studies.transition.study import Study
+    from studies.transition.outcome import Outcome
 
 TEMPLATE = "report.html.j2"
 
 
-def write_results(study: Study, out: Path) -> Path:
+def write_results(study: Outcome, out: Path) -> Path:
     """results.json with everything reached so far."""
     return write_text(out / "results.json", json.dumps(to_dict(study), indent=1, allow_nan=False) + "\n")
 
 
-def write_report(study: Study, out: Path) -> Path:
+def write_report(study: Outcome, out: Path) -> Path:
     """figures/*.png, results.json and report.html (self-contained: figures inside). Raises `SymheliError` without the extra."""
     try:
         import jinja2
@@ -56,7 +56,7 @@ def write_report(study: Study, out: Path) -> Path:
     return write_text(out / "report.html", page)
 
 
-def _headline(study: Study) -> dict[str, object]:
+def _headline(study: Outcome) -> dict[str, object]:
     """The numbers the first paragraph speaks of."""
     gust = [b for b in study.bounds if b.channel == "gust" and b.certificate.kind == "l2 gain"]
     proven = [b for b in gust if b.certificate.verified]

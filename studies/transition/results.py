@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from studies.transition.baseline import Baseline
     from studies.transition.comparison import Comparison, FrozenComparison
     from studies.transition.guarantees import Bound
+    from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import Experiment
-    from studies.transition.study import Study
 
 
 def value(number: float, unit: str) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def named(numbers: dict[Any, float], unit: str) -> dict[str, Any]:
     return {str(name): value(number, unit) for name, number in numbers.items()}
 
 
-def to_dict(study: Study) -> dict[str, Any]:
+def to_dict(study: Outcome) -> dict[str, Any]:
     """Nested dictionary of what the study has reached."""
     out: dict[str, Any] = {
         "schema": "symheli study 1",

@@ -11,16 +11,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from identification import LPVARXModel
 from studies.transition import axes, guarantees
-from studies.transition.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis, Scores
-from studies.transition.baseline import Baseline, build_baseline
-from studies.transition.comparison import Comparison, FrozenComparison, compare, compare_frozen
+from studies.transition.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
+from studies.transition.baseline import build_baseline
+from studies.transition.comparison import compare, compare_frozen
 from studies.transition.flights import FlightPlan, autopilot_for
-from studies.transition.guarantees import Bound
-from studies.transition.paper_experiment import PERIOD, Experiment, run_experiment
-from studies.transition.recovery import Recovery, recover
-from symheli import FlightRecord, Helicopter
+from studies.transition.outcome import Outcome
+from studies.transition.paper_experiment import PERIOD, run_experiment
+from studies.transition.recovery import recover
+from studies.transition.report import write_report, write_results
+from studies.transition.results import to_dict
+from studies.transition.summary import summary
+from symheli import Helicopter
 from synthesis import Search
 
 
@@ -42,40 +44,15 @@ class Effort:
         return cls(6, 4, (0.0, 3.0, math.inf), (8,), (0.0, math.inf), (4,), Search(levels=6, dwells=5, evaluations=8))
 
 
-@dataclass
-class Study:
-    """Everything a run found, stage by stage; what is not reached yet is None or empty."""
-
-    vehicle: str
-    quick: bool
-    seed: int
-    heli: Helicopter | None = None
-    baseline: Baseline | None = None
-    experiments: list[Experiment] = field(default_factory=list)
-    recoveries: list[Recovery] = field(default_factory=list)
-    flights: dict[str, FlightRecord] = field(default_factory=dict)
-    models: dict[str, LPVARXModel] = field(default_factory=dict)
-    scores: dict[tuple[str, str], Scores] = field(default_factory=dict)
-    """Keys (axis name, "noise-free" or "30 dB")."""
-    noisy_modes: dict[tuple[str, str], dict[float, float]] = field(default_factory=dict)
-    """Mode misses (percent, by airspeed) of order-2 models of the noisy flight: keys (axis name, method)."""
-    comparisons: dict[tuple[str, str], Comparison] = field(default_factory=dict)
-    frozen: dict[str, FrozenComparison] = field(default_factory=dict)
-    bounds: list[Bound] = field(default_factory=list)
-    exact_frozen: dict[str, float] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    complete: bool = False
+class Study(Outcome):
+    """An `Outcome` that can tell what it found."""
 
     def summary(self) -> str:
         """The short table printed at the end."""
-        from studies.transition.summary import summary
-
         return summary(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Every number of the report with its unit."""
-        from studies.transition.results import to_dict
-
         return to_dict(self)
 
 
@@ -84,8 +61,6 @@ def run_study(vehicle: str = "xcell60", out: Path | str = "study", quick: bool =
 
     Progress goes to standard error. An interrupted run leaves the results of its finished stages; files are whole or absent.
     """
-    from studies.transition.report import write_report, write_results
-
     out = Path(out)
     study = Study(vehicle, quick, seed)
     effort = Effort.look() if quick else Effort()

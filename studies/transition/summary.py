@@ -8,10 +8,10 @@ from studies.transition import tables
 from studies.transition.axes import AXES
 
 if TYPE_CHECKING:
-    from studies.transition.study import Study
+    from studies.transition.outcome import Outcome
 
 
-def summary(study: Study) -> str:
+def summary(study: Outcome) -> str:
     """Baseline, identification, comparison and guarantees in about forty lines."""
     if study.baseline is None:
         return "nothing was finished"
@@ -26,7 +26,7 @@ def summary(study: Study) -> str:
     return "\n".join(lines) + "\n\n" + "\n\n".join(s for s in sections if s) + "\n\n" + "\n".join(tables.verdicts(study))
 
 
-def _marks(study: Study) -> str:
+def _marks(study: Outcome) -> str:
     table = tables.Table(
         "Identified on one transition, judged 1 s ahead on another (fit in percent)", ["output", "noise-free", "mark", "30 dB", "mark"]
     )

@@ -14,7 +14,7 @@ from studies.transition.guarantees import Bound, rate_text
 from synthesis import Certificate, Status
 
 if TYPE_CHECKING:
-    from studies.transition.study import Study
+    from studies.transition.outcome import Outcome
 
 
 @dataclass
@@ -47,7 +47,7 @@ def gain(number: float) -> str:
     return "none" if math.isinf(number) else "-" if math.isnan(number) else f"{number:.3g}"
 
 
-def interpolation(study: Study) -> Table:
+def interpolation(study: Outcome) -> Table:
     """Entries no polynomial fits."""
     assert study.baseline is not None  # noqa: S101
     kinds = ["polynomial 2", "polynomial 3", "polynomial 4", "polynomial 6", "spline", "linear"]
@@ -68,7 +68,7 @@ def interpolation(study: Study) -> Table:
     return table
 
 
-def experiment(study: Study) -> Table:
+def experiment(study: Outcome) -> Table:
     """The paper's experiment."""
     table = Table(
         "The paper's experiment: pitch cyclic to one output, na = 3, nb = 1, delay 2, quadratic in p, "
@@ -96,7 +96,7 @@ def experiment(study: Study) -> Table:
     return table
 
 
-def scores(study: Study, noise: str) -> Table:
+def scores(study: Outcome, noise: str) -> Table:
     """Identified models on the unseen transition."""
     table = Table(
         f"Identified LPV-ARX (order 3, quadratic in p, 50 Hz) on a transition it has not seen, {noise}: fit in percent",
@@ -115,7 +115,7 @@ def scores(study: Study, noise: str) -> Table:
     return table
 
 
-def modes(study: Study) -> Table:
+def modes(study: Outcome) -> Table:
     """Frozen rotor modes."""
     table = Table(
         f"Frozen rotor modes: distance of the identified eigenvalue to the exact one, percent (mark {MODE_MARK:g}, noise-free)",
@@ -133,7 +133,7 @@ def modes(study: Study) -> Table:
     return table
 
 
-def comparison(study: Study, axis: Axis, noise: str) -> Table:
+def comparison(study: Outcome, axis: Axis, noise: str) -> Table:
     """Who predicts best, 1 s ahead and in free run."""
     c = study.comparisons[axis.name, noise]
     table = Table(
@@ -148,7 +148,7 @@ def comparison(study: Study, axis: Axis, noise: str) -> Table:
     return table
 
 
-def verdicts(study: Study) -> list[str]:
+def verdicts(study: Outcome) -> list[str]:
     """One sentence an output: who wins 1 s ahead, by how much."""
     out = []
     for (_, noise), c in study.comparisons.items():
@@ -164,7 +164,7 @@ def verdicts(study: Study) -> list[str]:
     return out
 
 
-def guarantee(study: Study, channel: str) -> Table:
+def guarantee(study: Outcome, channel: str) -> Table:
     """Gain against permitted acceleration."""
     what = {
         "gust": "Lateral gust (m/s) to yaw rate and roll (rad/s, rad) under attitude hold, continuous time",
@@ -202,7 +202,7 @@ def _how(b: Bound) -> str:
     return f"{form}verified, {sum(c.seconds):.1f} s"
 
 
-def findings(study: Study) -> list[str]:
+def findings(study: Outcome) -> list[str]:
     """What the numbers of the identification and of the proofs say, in sentences."""
     out = []
     plain, rich = study.scores.get((LATERAL.name, "noise-free")), study.scores.get((LATERAL_WITH_COLLECTIVE.name, "noise-free"))
