@@ -137,11 +137,11 @@ def comparison(study: Outcome, axis: Axis, noise: str) -> Table:
     """Who predicts best, 1 s ahead and in free run."""
     c = study.comparisons[axis.name, noise]
     table = Table(
-        f"{axis.name}, {noise}: 1 s ahead / free run on the unseen transition, fit in percent (best 1 s in bold)",
+        f"{axis.name}, {noise}: one step / 1 s ahead / free run on the unseen transition, fit in percent (best 1 s in bold)",
         ["predictor", *axis.outputs],
     )
     for p in c.predictors:
-        table.rows.append([p.name, *(f"{percent(p.one_second[y])} / {percent(p.free_run[y])}" for y in axis.outputs)])
+        table.rows.append([p.name, *(" / ".join(percent(fit[y]) for fit in (p.one_step, p.one_second, p.free_run)) for y in axis.outputs)])
     for j, y in enumerate(axis.outputs):
         best = int(np.nanargmax([p.one_second[y] for p in c.predictors]))
         table.bold.add((best, j + 1))
