@@ -48,7 +48,6 @@ class _Sum:
     force: Triple
     moment: Triple
     rates: dict[str, Any]
-    torque: Any
     added_inertia: Any
     speed_follows_yaw: float
     flow: dict[str, Any]
@@ -188,11 +187,6 @@ class Helicopter:
         names = [name.replace(": ", "_").replace(" ", "_") for name in values]
         return Function("diagnostics", [x, u, w], [dense(v) for v in values.values()], ["x", "u", "wind"], names)
 
-    @cached_property
-    def switch_names(self) -> tuple[str, ...]:
-        """Names of the switching functions: each sign change is a corner of the model."""
-        return tuple(name.removeprefix("switch_").replace("_", " ") for name in self.diagnostics.name_out() if name.startswith("switch_"))
-
     def switches(self, x: object, u: object, wind: object = (0.0, 0.0, 0.0)) -> dict[str, float]:
         """Value of every switching function at a point."""
         values = zip(self.diagnostics.name_out(), self.numeric("diagnostics")(x, u, wind), strict=True)
@@ -250,7 +244,7 @@ class Helicopter:
         rates_of_own = {name: value for effect in effects for name, value in effect.rates.items()} | drive.rates
         switches = {name: value for effect in effects for name, value in effect.switches.items()}
         return _Sum(
-            force, moment, rates_of_own, shaft_torque, drive.added_inertia, drive.speed_follows_yaw,
+            force, moment, rates_of_own, drive.added_inertia, drive.speed_follows_yaw,
             {**flow.values, "Q_e": drive.torque}, switches, lam,
         )  # fmt: skip
 

@@ -58,7 +58,6 @@ class BaselinePredictor:
         step = expm(stacked * dt)
         self.A, self.x0 = step[:, :nx, :nx], x0
         deviation = record.columns(inputs) - u0
-        # a deviation is from the trim of the moment: expressed in whole states the trim's own change cancels the drift where it is exact
         self.push = np.einsum("kij,kj->ki", step[:, :nx, nx : nx + nu], deviation) + np.einsum("kij,kj->ki", step[:, :nx, nx + nu :], w)
         self.states, self.x = lpv.states, record.columns(lpv.states)
 

@@ -12,6 +12,7 @@ from studies.transition.guarantees import Bound
 from studies.transition.paper_experiment import Experiment
 from studies.transition.recovery import Recovery
 from symheli import FlightRecord, Helicopter
+from synthesis import FrozenGain
 
 
 @dataclass
@@ -34,6 +35,8 @@ class Outcome:
     comparisons: dict[tuple[str, str], Comparison] = field(default_factory=dict)
     frozen: dict[str, FrozenComparison] = field(default_factory=dict)
     bounds: list[Bound] = field(default_factory=list)
+    frozen_peaks: dict[str, FrozenGain] = field(default_factory=dict)
+    """Where the frozen gain of each servo loop is largest."""
     exact_frozen: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     complete: bool = False

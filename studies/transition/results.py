@@ -78,6 +78,10 @@ def to_dict(study: Outcome) -> dict[str, Any]:
     out["frozen gain of the exact models"] = {
         k: value(v, "(rad/s, rad)/(m/s)" if k == "gust" else "1") for k, v in study.exact_frozen.items()
     }
+    out["largest frozen gain of the servo loops"] = {
+        name: {"gain": value(peak.gamma, "1"), "airspeed": value(peak.p, "m/s"), "frequency": value(peak.omega, "rad/s")}
+        for name, peak in study.frozen_peaks.items()
+    }
     out["guarantees"] = [_bound(b) for b in study.bounds]
     return out
 

@@ -23,7 +23,7 @@ from studies.transition.report import write_report, write_results
 from studies.transition.results import to_dict
 from studies.transition.summary import summary
 from symheli import Helicopter
-from synthesis import Search
+from synthesis import Search, frozen_gain
 
 
 @dataclass(frozen=True)
@@ -183,5 +183,6 @@ def _prove_servo(study: Study, effort: Effort) -> None:
         "identified, aggressive flight": guarantees.servo_loop(study.models[f"{LATERAL.name}, noise-free"].to_state_space()),
     }
     for name, loop in loops.items():
+        study.frozen_peaks[name] = frozen_gain(loop)
         study.bounds += guarantees.stability_bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments)
         study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments, effort.search)

@@ -10,7 +10,7 @@ import numpy as np
 
 from studies.transition.axes import ALL, FROZEN_SPEEDS, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
 from studies.transition.campaign import MODE_MARK
-from studies.transition.guarantees import Bound, rate_text
+from studies.transition.guarantees import SIZES, Bound, rate_text
 from synthesis import Certificate, Status
 
 if TYPE_CHECKING:
@@ -88,9 +88,8 @@ def experiment(study: Outcome) -> Table:
     for e in study.experiments:
         for c in e.channels:
             time, size = c.spikes[0]
-            table.rows.append(
-                [f"{e.loop}, {c.output}", *(percent(v) for v in c.fits.values()), f"{c.settled_after:.0f}", f"{time:.1f}; {size:.1f}"]
-            )
+            spike = [f"{size:.1f}", f"{time:.1f}", f"{c.spike_airspeed:.1f}", f"{c.spike_input:.1f}"]
+            table.rows.append([f"{e.loop}, {c.output}", *(percent(v) for v in c.fits.values()), f"{c.settled_after:.0f}", *spike])
     if study.experiments:
         table.remarks.append(f"A cubic basis is refused: {study.experiments[0].cubic_refused}.")
     return table
@@ -168,8 +167,8 @@ def guarantee(study: Outcome, channel: str) -> Table:
     """Gain against permitted acceleration."""
     what = {
         "gust": "Lateral gust (m/s) to yaw rate and roll (rad/s, rad) under attitude hold, continuous time",
-        "servo": "Disturbances at roll cyclic (0.01 rad) and pedal (0.02 rad) to yaw rate (0.1 rad/s) and roll (0.1 rad), 50 Hz",
-    }[channel]
+        "servo": "Disturbances at roll cyclic ({d_lat} rad) and pedal ({d_ped} rad) to yaw rate ({r} rad/s) and roll ({phi} rad), 50 Hz",
+    }[channel].format(**SIZES)
     table = Table(what, ["model", "acceleration", "stable", "lower bound", "proven gain", "how"])
     stable = {(b.model, b.rate): b.certificate for b in study.bounds if b.channel == channel and b.certificate.kind == "stability"}
     for b in study.bounds:
@@ -213,6 +212,9 @@ def findings(study: Outcome) -> list[str]:
             + ", ".join(f"{d:+.0f} points for {y}" for y, d in change.items())
             + "."
         )
+    for name, peak in study.frozen_peaks.items():
+        if math.isfinite(peak.gamma):
+            out.append(f"Servo channel, {name}: the largest frozen gain is at {peak.p:.1f} m/s and {peak.omega:.2g} rad/s.")
     gentle = {b.model: b.certificate for b in study.bounds if b.channel == "servo" and b.rate == 0 and b.certificate.kind == "l2 gain"}
     for name, c in gentle.items():
         if name.startswith("identified"):

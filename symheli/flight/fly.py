@@ -18,6 +18,7 @@ from symheli.integrate import runge_kutta
 from symheli.lpv.flight_record import FlightRecord
 from symheli.lpv.signal import UNITS, Signal
 from symheli.numeric import Numeric
+from symheli.rigid_body import body_to_earth
 
 MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 CONTROL_PERIOD = 0.02  # s; slower sampling still flies at about this period
@@ -61,7 +62,7 @@ class _Flight:
         wind: np.ndarray,
         autopilot: Autopilot | None,
     ):
-        self.heli, self.wind, self.schedule, self.excitation = heli, wind, schedule, excitation
+        self.heli, self.wind = heli, wind
         self.per_sample = math.ceil(dt / CONTROL_PERIOD - 1e-9)
         self.control_dt = dt / self.per_sample
         self.step = Numeric(runge_kutta(heli, self.control_dt, math.ceil(self.control_dt / INTEGRATION_STEP - 1e-9)))
@@ -153,7 +154,5 @@ def _euler_form(flight: np.ndarray, wind: np.ndarray) -> tuple[np.ndarray, float
     theta = math.asin(max(-1.0, min(1.0, 2 * (q0 * q2 - q3 * q1))))
     velocity = flight[:3]
     if wind.any():
-        from symheli.rigid_body import body_to_earth
-
         velocity = velocity - np.array(body_to_earth(q0, q1, q2, q3)).T @ wind
     return np.concatenate([flight[:6], [phi, theta], flight[13:]]), float(np.linalg.norm(velocity))

@@ -113,6 +113,16 @@ def test_gust_loop_is_proven_for_slow_airspeed_and_grows_when_it_may_jump(baseli
     assert math.isinf(jump.lower)
 
 
+def test_every_row_of_the_experiments_table_fills_its_columns(baseline):
+    from studies.transition import tables
+    from studies.transition.outcome import Outcome
+
+    table = tables.experiment(Outcome("xcell60", True, 0, experiments=[run_experiment(baseline.nodes, False)]))
+    assert len(table.rows) == len(OUTPUTS)
+    assert {len(row) for row in table.rows} == {len(table.columns)}
+    assert table.text()
+
+
 def test_an_interrupted_study_leaves_whole_results_of_its_finished_stages(tmp_path, monkeypatch):
     from studies.transition import study
 
