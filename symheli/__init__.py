@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from symheli.helicopter import Helicopter
     from symheli.linearization import linearize
     from symheli.lpv import LFT, FlightRecord, LinearFamily, LinearModel, LPVStateSpace, Scheduling, Signal
+    from symheli.stitched_model import StitchedModel
 
 _HOME = {
     "Helicopter": "symheli.helicopter",
@@ -23,6 +24,7 @@ _HOME = {
     "TrimPoint": "symheli.equilibrium",
     "linearize": "symheli.linearization",
     "sweep": "symheli.airspeed_sweep",
+    "StitchedModel": "symheli.stitched_model",
     **dict.fromkeys(("fly", "AirspeedSchedule", "Excitation"), "symheli.flight"),
     **dict.fromkeys(("LFT", "FlightRecord", "LinearFamily", "LinearModel", "LPVStateSpace", "Scheduling", "Signal"), "symheli.lpv"),
     **dict.fromkeys(("SymheliError", "InputError", "UnknownNameError", "TrimError", "ExcitationError"), "symheli.errors"),
@@ -41,6 +43,7 @@ __all__ = [
     "LinearModel",
     "Scheduling",
     "Signal",
+    "StitchedModel",
     "SymheliError",
     "TrimError",
     "TrimPoint",
