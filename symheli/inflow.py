@@ -6,10 +6,11 @@ from typing import Any
 
 from symheli.symbolic import absolute, clip, maximum, minimum, sqrt, where
 
-NEWTON_STEPS = 6
-"""Steps taken from the bracketing start; the residual is below 1e-14 outside `vortex_ring` (see tests)."""
+HALLEY_STEPS = 3
+"""Steps taken from the bounding start; the residual is below 1e-16 outside `vortex_ring` (see tests)."""
 
 _ROOT_GUARD = 1e-20  # added under the root: its derivative stays finite without flow, its value moves by 1e-10
+_TINY = 1e-60  # keeps a quotient finite where numerator and denominator vanish together
 
 
 def thrust_line(pitch: Any, mu2: Any, mu_z: Any, lift_slope: Any, solidity: Any) -> tuple[Any, Any]:
@@ -46,25 +47,42 @@ def newton_step(lam0: Any, c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, e
 def solve(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -> Any:
     """Inflow ratio lam0 (dimensionless, of the tip speed) on the branch continued from hover.
 
-    The start is an upper bound: the smaller of the axial-flow root (exact for mu = 0) and C_T/(2 eta_w mu); on the
-    branch above mu_z the equation is convex, so Newton descends to the root monotonically; below it, steps are kept
-    between 0 and the start. Negative thrust is the mirror image.
+    Thrust is limited or it is not: the momentum balance at the corner lam = (c0 - C_Tmax)/c1 says which, so that a smooth
+    equation is left. Its start is an upper bound: the smaller of the axial-flow root (exact for mu = 0) and
+    C_T/(2 eta_w mu). Halley's steps (order 3, one root and one quotient each) stay between 0 and that bound. Negative
+    thrust is the mirror image.
     """
     sign = where(c0 >= 0, 1.0, -1.0)
     drive, flow = sign * c0, sign * mu_z
-    below, through = maximum(flow, 0.0), absolute(flow)
-    b = 2 * efficiency * through + c1
-    limited = minimum(drive, ct_max + c1 * below)  # the unlimited line, cut where the stall limit is already reached
-    rest = maximum(limited - c1 * below, 0.0)
-    axial = below + 2 * rest / (b + sqrt(b**2 + 8 * efficiency * rest))
-    forward = drive / (2 * efficiency * sqrt(mu2 + _ROOT_GUARD) + c1)
-    stalled = below + sqrt(ct_max / (2 * efficiency))
-    top = minimum(minimum(axial, forward), stalled)
-    top = where(drive - c1 * top > ct_max, stalled, top)
-    lam = top
-    for _ in range(NEWTON_STEPS):
-        lam = clip(newton_step(lam, drive, c1, ct_max, mu2, flow, efficiency), 0.0, maximum(stalled, top))
+    excess = drive - ct_max
+    balance = 4 * efficiency**2 * excess**2 * (c1**2 * mu2 + (excess - c1 * flow) ** 2) - (ct_max * c1**2) ** 2
+    stalled = minimum(excess, balance) > 0
+    line0, line1 = where(stalled, ct_max, drive), where(stalled, 0.0, c1)
+    below = maximum(flow, 0.0)
+    b = 2 * efficiency * absolute(flow) + line1
+    rest = maximum(line0 - line1 * below, 0.0)
+    axial = below + 2 * rest / (b + sqrt(b**2 + 8 * efficiency * rest + _TINY))
+    forward = line0 / (2 * efficiency * sqrt(mu2 + _ROOT_GUARD) + line1)
+    lam = top = minimum(axial, forward)
+    for _ in range(HALLEY_STEPS):
+        lam = clip(_halley_step(lam, line0, line1, mu2, flow, efficiency), 0.0, top)
     return sign * lam
+
+
+def _halley_step(lam: Any, line0: Any, line1: Any, mu2: Any, flow: Any, efficiency: Any) -> Any:
+    """lam - 2 g g'/(2 g'^2 - g g'') for g = 2 eta_w lam root - (line0 - line1 lam), root = sqrt(mu^2 + (lam - mu_z)^2).
+
+    Numerator and denominator are multiplied by root^4: g' root and g'' root^3 are polynomials in root.
+    """
+    axial = lam - flow
+    square = mu2 + axial**2 + _ROOT_GUARD
+    root = sqrt(square)
+    residual = (2 * efficiency * lam * root - (line0 - line1 * lam)) * root
+    slope = 2 * efficiency * (square + lam * axial) + line1 * root
+    curvature = efficiency * (2 * axial * square + lam * mu2)
+    denominator = slope**2 * square - residual * curvature
+    # in a vortex ring it may vanish; the caller's bounds keep the step finite there
+    return lam - residual * slope * square / where(absolute(denominator) > _TINY, denominator, _TINY)
 
 
 def vortex_ring(lam_hover: Any, mu2: Any, mu_z: Any) -> Any:
