@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from symheli.airspeed_sweep import sweep
+    from symheli.environment import Dryden, Gust, Wind, standard_atmosphere
     from symheli.equilibrium import TrimPoint, trim
     from symheli.errors import ExcitationError, InputError, SymheliError, TrimError, UnknownNameError
-    from symheli.flight import AirspeedSchedule, Excitation, fly
+    from symheli.flight import AirspeedSchedule, Excitation, Sensor, Servo, fly
     from symheli.helicopter import Helicopter
     from symheli.linearization import linearize
     from symheli.lpv import LFT, FlightRecord, LinearFamily, LinearModel, LPVStateSpace, Scheduling, Signal
@@ -25,7 +26,8 @@ _HOME = {
     "linearize": "symheli.linearization",
     "sweep": "symheli.airspeed_sweep",
     "StitchedModel": "symheli.stitched_model",
-    **dict.fromkeys(("fly", "AirspeedSchedule", "Excitation"), "symheli.flight"),
+    **dict.fromkeys(("Dryden", "Gust", "Wind", "standard_atmosphere"), "symheli.environment"),
+    **dict.fromkeys(("fly", "AirspeedSchedule", "Excitation", "Sensor", "Servo"), "symheli.flight"),
     **dict.fromkeys(("LFT", "FlightRecord", "LinearFamily", "LinearModel", "LPVStateSpace", "Scheduling", "Signal"), "symheli.lpv"),
     **dict.fromkeys(("SymheliError", "InputError", "UnknownNameError", "TrimError", "ExcitationError"), "symheli.errors"),
 }
@@ -33,23 +35,29 @@ _HOME = {
 __all__ = [
     "LFT",
     "AirspeedSchedule",
+    "Dryden",
     "Excitation",
     "ExcitationError",
     "FlightRecord",
+    "Gust",
     "Helicopter",
     "InputError",
     "LPVStateSpace",
     "LinearFamily",
     "LinearModel",
     "Scheduling",
+    "Sensor",
+    "Servo",
     "Signal",
     "StitchedModel",
     "SymheliError",
     "TrimError",
     "TrimPoint",
     "UnknownNameError",
+    "Wind",
     "fly",
     "linearize",
+    "standard_atmosphere",
     "sweep",
     "trim",
 ]

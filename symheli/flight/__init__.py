@@ -4,5 +4,7 @@ from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
 from symheli.flight.excitation import Excitation
 from symheli.flight.fly import fly
 from symheli.flight.schedule import AirspeedSchedule
+from symheli.flight.sensor import Sensor
+from symheli.flight.servo import XCELL_SERVOS, Servo, ServoBank
 
-__all__ = ["AirspeedSchedule", "Autopilot", "Excitation", "fly", "gain_scheduled_lqr"]
+__all__ = ["XCELL_SERVOS", "AirspeedSchedule", "Autopilot", "Excitation", "Sensor", "Servo", "ServoBank", "fly", "gain_scheduled_lqr"]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
+from scipy.linalg import block_diag, solve_discrete_are
 
 from symheli.airspeed_sweep import sweep
 from symheli.errors import InputError
+from symheli.flight.servo import Servo
 from symheli.helicopter import Helicopter
-from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.signal import Signal
 
@@ -40,34 +41,53 @@ class Autopilot:
         return (1 - (position - k)) * self.gains[k] + (position - k) * self.gains[k + 1]
 
 
-def gain_scheduled_lqr(heli: Helicopter, low: float, high: float, dt: float, points: int = 14) -> Autopilot:
+SOFTER = (1.0, 0.5, 0.25, 0.125)
+"""Input scales tried in turn, as shares of `INPUT_SCALE`, until the loop with servos and delay is stable."""
+
+
+def gain_scheduled_lqr(
+    heli: Helicopter, low: float, high: float, dt: float, points: int = 14, servos: Mapping[str, Servo] | None = None
+) -> Autopilot:
     """LQR at `points` airspeeds from `low` to `high` (m/s) on the model with quasi-steady flapping, sampled at `dt` (s).
 
-    Each gain is checked on the full model (flapping states, one sample of delay); raises `InputError` where the loop
-    would be unstable there.
+    Each gain is checked on the full model (flapping states, `servos` where given, one sample of delay) and softened until stable
+    there; raises `InputError` where it never is.
     """
     family = sweep(heli, np.linspace(low, high, points))  # type: ignore[arg-type]
     design = family.residualize([s for s in UNMEASURED if s in family.states])
-    states = design.states
-    Q = np.diag([1 / SCALE[s] ** 2 for s in states])
-    R = np.eye(4) / INPUT_SCALE**2
-    gains = []
-    for k in range(len(design)):
-        model = design[k].discretize(dt)
-        P = solve_discrete_are(model.A, model.B, Q, R)
-        gains.append(np.linalg.solve(R + model.B.T @ P @ model.B, model.B.T @ P @ model.A))
-    radius = _closed_loop_radius(family, np.stack(gains), states, dt)
-    if radius >= 1:
-        raise InputError(f"the scheduled LQR is unstable on the full model at dt = {dt} s (eigenvalue {radius:.3f}); sample faster")
-    return Autopilot(family.airspeeds, np.stack(gains), states, dt, radius)
+    designs, plants = [design[k].discretize(dt) for k in range(len(design))], [_plant(family[k], servos, dt) for k in range(len(family))]
+    radius = np.inf
+    for softer in SOFTER:
+        gains = np.stack([_lqr(model, softer * INPUT_SCALE) for model in designs])
+        radius = max(_closed_loop_radius(plant, K, design.states) for plant, K in zip(plants, gains, strict=True))
+        if radius < 1:
+            return Autopilot(family.airspeeds, gains, design.states, dt, radius)
+    raise InputError(f"the scheduled LQR is unstable on the full model at dt = {dt} s (eigenvalue {radius:.3f}); sample faster")
 
 
-def _closed_loop_radius(family: LinearFamily, gains: np.ndarray, states: tuple[Signal, ...], dt: float) -> float:
-    pick = np.array([[float(s == t) for t in family.states] for s in states])
+def _lqr(model: LinearModel, input_scale: float) -> np.ndarray:
+    Q, R = np.diag([1 / SCALE[s] ** 2 for s in model.states]), np.eye(4) / input_scale**2
+    P = solve_discrete_are(model.A, model.B, Q, R)
+    return np.linalg.solve(R + model.B.T @ P @ model.B, model.B.T @ P @ model.A)
 
-    def radius(model: LinearModel, K: np.ndarray) -> float:
-        feedback = -K @ pick
-        delayed = np.block([[model.A, model.B], [feedback, np.zeros((4, 4))]])  # u(k) = -K x(k-1)
-        return float(max(np.abs(np.linalg.eigvals(model.A + model.B @ feedback)).max(), np.abs(np.linalg.eigvals(delayed)).max()))
 
-    return max(radius(family[k].discretize(dt), gains[k]) for k in range(len(family)))
+def _plant(model: LinearModel, servos: Mapping[str, Servo] | None, dt: float) -> LinearModel:
+    """The linear model, behind its servos where there are any, sampled."""
+    if servos is None:
+        return model.discretize(dt)
+    parts = [servos[name].linear(name) for name in model.inputs]
+    A, B, C = (np.asarray(block_diag(*(getattr(part, matrix) for part in parts))) for matrix in "ABC")
+    nx, nu = len(model.states), len(model.inputs)
+    states = (*model.states, *(s for part in parts for s in part.states))
+    return LinearModel(
+        np.block([[model.A, model.B @ C], [np.zeros((len(A), nx)), A]]), np.vstack([np.zeros((nx, nu)), B]),
+        np.eye(len(states)), np.zeros((len(states), nu)), states, model.inputs, states,
+    ).discretize(dt)  # fmt: skip
+
+
+def _closed_loop_radius(plant: LinearModel, K: np.ndarray, measured: tuple[Signal, ...]) -> float:
+    """Largest eigenvalue magnitude of u = -K x, at once and one sample late."""
+    feedback = -K @ np.array([[float(s == t) for t in plant.states] for s in measured])
+    nu = len(feedback)
+    delayed = np.block([[plant.A, plant.B], [feedback, np.zeros((nu, nu))]])  # u(k) = -K x(k-1)
+    return float(max(np.abs(np.linalg.eigvals(plant.A + plant.B @ feedback)).max(), np.abs(np.linalg.eigvals(delayed)).max()))

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from symheli.errors import InputError, UnknownNameError
 
 UNITS = {
-    **dict.fromkeys(("u", "v", "w", "airspeed", "airspeed_command", "u_w", "v_w", "w_w"), "m/s"),
+    **dict.fromkeys(("u", "v", "w", "airspeed", "airspeed_command"), "m/s"),
+    **dict.fromkeys(("u_w", "v_w", "w_w", "wind_n", "wind_e", "wind_d"), "m/s"),
     **dict.fromkeys(("p", "q", "r"), "rad/s"),
     **dict.fromkeys(("phi", "theta", "psi", "a1", "b1", "d_lon", "d_lat", "d_col", "d_ped"), "rad"),
     **dict.fromkeys(("x_n", "x_e", "x_d"), "m"),

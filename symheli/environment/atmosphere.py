@@ -1,0 +1,43 @@
+"""The standard atmosphere up to 20 km."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from symheli.errors import InputError
+
+GRAVITY = 9.80665  # m/s^2, by which the geopotential metre is defined
+GAS_CONSTANT = 287.05287  # J/(kg K), dry air
+HEAT_RATIO = 1.4
+EARTH_RADIUS = 6_356_766.0  # m
+SEA_LEVEL_TEMPERATURE, SEA_LEVEL_PRESSURE = 288.15, 101_325.0  # K, Pa
+LAPSE_RATE, TROPOPAUSE, CEILING = -0.0065, 11_000.0, 20_000.0  # K/m, geopotential m
+
+
+class Air(NamedTuple):
+    """Air at rest: temperature (K), pressure (Pa), density (kg/m^3), speed of sound (m/s)."""
+
+    temperature: float
+    pressure: float
+    density: float
+    speed_of_sound: float
+
+
+def standard_atmosphere(altitude: float, warmer: float = 0.0) -> Air:
+    """The air at a geometric `altitude` above sea level (m, -2000 .. 20000); `warmer` (K) than standard at the same pressure.
+
+    Hydrostatic equation with -6.5 K/km up to 11 km, constant temperature above. Raises `InputError` outside that range.
+    Source: U.S. Standard Atmosphere 1976 (the same as ISO 2533 up to there).
+    """
+    if not (math.isfinite(altitude) and -2000.0 <= altitude <= CEILING):
+        raise InputError(f"altitude: expected -2000 .. {CEILING:.0f} m above sea level, got {altitude}; feet times 0.3048 are metres")
+    height = EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude)
+    low = min(height, TROPOPAUSE)
+    temperature = SEA_LEVEL_TEMPERATURE + LAPSE_RATE * low
+    pressure = SEA_LEVEL_PRESSURE * (temperature / SEA_LEVEL_TEMPERATURE) ** (-GRAVITY / (GAS_CONSTANT * LAPSE_RATE))
+    pressure *= math.exp(-GRAVITY * (height - low) / (GAS_CONSTANT * temperature))
+    temperature += warmer
+    if not temperature > 0:
+        raise InputError(f"warmer: {warmer} K leaves a temperature of {temperature:g} K")
+    return Air(temperature, pressure, pressure / (GAS_CONSTANT * temperature), math.sqrt(HEAT_RATIO * GAS_CONSTANT * temperature))

@@ -1,0 +1,45 @@
+"""The motion of the air over a flight: a steady wind, gusts and turbulence together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.environment.gust import Gust
+from symheli.environment.turbulence import Dryden
+from symheli.errors import InputError
+
+
+@dataclass(frozen=True)
+class Wind:
+    """`steady` wind (north, east, down, m/s) plus `gusts` plus `turbulence` drawn from `seed`.
+
+    Turbulence is laid along north, the heading flights keep: its first component is along the path. The mean wind inside
+    `turbulence` sets its strength only; give it in `steady` too where it shall blow.
+    """
+
+    steady: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gusts: tuple[Gust, ...] = ()
+    turbulence: Dryden | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if len(self.steady) != 3 or not all(math.isfinite(v) for v in self.steady):
+            raise InputError(f"steady: expected a finite wind (north, east, down), m/s, got {self.steady}")
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether it never changes."""
+        return not self.gusts and self.turbulence is None
+
+    def history(self, time: object, airspeed: object) -> np.ndarray:
+        """Wind (n, 3), north east down, m/s, at `time` (n,) s, met at `airspeed` ((n,) or one, m/s)."""
+        time = np.asarray(time, float)
+        total = np.tile(np.array(self.steady, float), (len(time), 1))
+        for gust in self.gusts:
+            total += gust(time)
+        if self.turbulence is not None:
+            total += self.turbulence.history(time, airspeed, self.seed)
+        return total

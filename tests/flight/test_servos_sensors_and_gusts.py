@@ -1,0 +1,144 @@
+"""Between the autopilot and the air: servos, sensors, gusts and turbulence in the loop."""
+
+import numpy as np
+import pytest
+
+import symheli
+from symheli import AirspeedSchedule, fly
+from symheli.environment import Dryden, Gust, Wind
+from symheli.errors import InputError, UnknownNameError
+from symheli.flight import XCELL_SERVOS, Sensor, Servo, ServoBank, gain_scheduled_lqr
+from symheli.flight.sensor import SensorBank
+from symheli.flight.servo import CYCLIC, TAIL
+
+HOVER = AirspeedSchedule((0.5,), (0.5,), (3.0,), lead=0.5)
+INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
+TRAVEL = np.array([0.096, 0.096, 0.183, 0.38])
+
+
+@pytest.fixture(scope="module")
+def behind_servos():
+    return gain_scheduled_lqr(symheli.Helicopter.load("xcell60", governor="ideal"), 0.0, 8.0, 0.02, servos=XCELL_SERVOS)
+
+
+@pytest.mark.parametrize("servo", [CYCLIC, TAIL])
+def test_a_servo_has_the_printed_transfer_function(servo):
+    s = 1j * np.array([0.1, 10.0, 36.0, 100.0, 400.0])
+    wn, z = servo.natural_frequency, servo.damping
+    H = wn**2 / (s**2 + 2 * z * wn * s + wn**2)
+    if servo.zero:
+        H = H * (s / servo.zero + 1) / (s / servo.pole + 1)
+    np.testing.assert_allclose(servo.linear("d_lat").frequency_response(s.imag)[:, 0, 0], H, rtol=1e-12)
+
+
+def test_small_steps_follow_the_linear_servo():
+    fine = {name: Servo(s.natural_frequency, s.damping, s.zero, s.pole) for name, s in XCELL_SERVOS.items()}
+    bank, dt, command = ServoBank(fine, INPUTS, TRAVEL, 0.005), 0.005, np.array([0.01, -0.02, 0.03, 0.05])
+    state, out = bank.init(np.zeros(4)), []
+    for _ in range(60):
+        state, reached = bank.step(state, command)
+        out.append(reached)
+    for i, name in enumerate(INPUTS):
+        model, x = fine[name].linear(name).discretize(dt), np.zeros(3 if fine[name].zero else 2)
+        for k in range(60):
+            x = model.A @ x + model.B[:, 0] * command[i]
+            assert out[k][i] == pytest.approx(float(model.C[0] @ x), abs=1e-14)
+
+
+def test_a_servo_keeps_its_travel_its_rate_and_its_steps():
+    slow = dict.fromkeys(INPUTS, Servo(200.0, 1.0, rate=0.5, steps=10))
+    bank = ServoBank(slow, INPUTS, TRAVEL, 0.005)
+    state, deflections = bank.init(np.zeros(4)), []
+    for _ in range(400):
+        state, reached = bank.step(state, np.full(4, 10.0))
+        deflections.append(reached)
+    deflections = np.array(deflections)
+    assert np.all(np.abs(np.diff(deflections, axis=0)) <= 0.5 * 0.005 * (1 + 1e-9))  # critically damped: no faster than its command
+    np.testing.assert_allclose(deflections[-1], TRAVEL, atol=1e-9)
+    state, _ = bank.step(bank.init(np.zeros(4)), 0.13 * TRAVEL)  # the nearest of the positions 0, 0.2, .. of the travel is 0.2
+    while not np.allclose(state.followed, 0.2 * TRAVEL):
+        before = state.followed
+        state, _ = bank.step(state, 0.13 * TRAVEL)
+        assert np.all(state.followed >= before)
+
+
+def test_a_bank_starts_at_rest():
+    bank = ServoBank({n: Servo(36.0, 0.5, 104.0, 33.0) for n in INPUTS}, INPUTS, TRAVEL, 0.005)
+    _, reached = bank.step(bank.init(0.3 * TRAVEL), 0.3 * TRAVEL)
+    np.testing.assert_allclose(reached, 0.3 * TRAVEL, atol=1e-14)
+
+
+def test_a_sensor_delays_holds_biases_and_rounds():
+    truth = np.arange(20.0)[:, None]
+    bank = SensorBank({"q": Sensor(bias=0.4, period=0.06, delay=0.03, quantum=0.5)}, ("q",), 20, 0.02, seed=0)
+    read = [bank.read(k, truth)[0] for k in range(20)]
+    # two samples late, a new value every third sample, 0.4 rounded to 0.5 on top
+    assert read == [(max(k - 2, 0) // 3) * 3 + 0.5 for k in range(20)]
+
+
+def test_sensor_noise_has_its_size_and_is_held_with_the_reading():
+    bank = SensorBank({"q": Sensor(noise=2.0, period=0.1)}, ("q",), 50_000, 0.02, seed=1)
+    read = np.array([bank.read(k, np.zeros((50_000, 1)))[0] for k in range(50_000)])
+    assert np.all(read.reshape(-1, 5) == read[::5, None])
+    assert read.std() == pytest.approx(2.0, rel=0.03)  # 4 standard errors of 10 000 draws
+
+
+def test_a_flight_behind_servos_stays_in_trim_and_records_both_sides(ideal, behind_servos):
+    record = fly(ideal, AirspeedSchedule((4.0,), (1.0,), (2.0,), start=4.0), servos=XCELL_SERVOS, autopilot=behind_servos)
+    point = symheli.trim(ideal, 4.0)
+    for name in INPUTS:
+        step = 2 * ideal.travel[INPUTS.index(name)] / XCELL_SERVOS[name].steps
+        assert np.abs(record[name] - point.u[name]).max() < 2 * step  # a limit cycle over a step or two of the servo
+        assert f"{name}_command" in record.signals
+    assert np.abs(record["airspeed"] - 4.0).max() < 0.3
+
+
+def test_without_limits_the_deflection_is_the_command_through_the_servo(ideal, behind_servos):
+    fine = {name: Servo(s.natural_frequency, s.damping, s.zero, s.pole) for name, s in XCELL_SERVOS.items()}
+    record = fly(ideal, HOVER, servos=fine, autopilot=behind_servos)
+    model = fine["d_lon"].linear("d_lon").discretize(0.02)
+    x = record["d_lon"][0] * np.linalg.solve(np.eye(3) - model.A, model.B[:, 0])
+    for k in range(len(record)):
+        assert record["d_lon"][k] == pytest.approx(float(model.C[0] @ x), abs=1e-12)
+        x = model.A @ x + model.B[:, 0] * record["d_lon_command"][k]
+
+
+def test_gusts_move_the_helicopter_and_stand_in_the_record(ideal, behind_servos):
+    wind = Wind((2.0, 0.0, 0.0), (Gust((0.0, 3.0, 0.0), 1.5, 1.0),), Dryden(5.0, 15.0), seed=2)
+    record = fly(ideal, HOVER, wind=wind, autopilot=None)
+    calm = fly(ideal, HOVER, wind=(2.0, 0.0, 0.0))
+    np.testing.assert_allclose(record.columns(("wind_n", "wind_e", "wind_d")), wind.history(record.time, record["airspeed_command"]))
+    assert np.abs(record["v"] - calm["v"]).max() > 0.3
+    assert "wind_n" not in calm.signals
+
+
+def test_sensors_reach_the_autopilot_and_the_record(ideal, behind_servos):
+    biased = fly(ideal, HOVER, sensors={"phi": Sensor(bias=0.02)}, autopilot=behind_servos)
+    clean = fly(ideal, HOVER, autopilot=behind_servos)
+    assert biased["phi"][0] == pytest.approx(clean["phi"][0] + 0.02, abs=1e-12)
+    assert biased["d_lat"][0] != clean["d_lat"][0]
+
+
+def test_the_gains_are_softened_until_slow_servos_allow_them(ideal, behind_servos):
+    stiff = gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02)
+    np.testing.assert_array_equal(behind_servos.gains, stiff.gains)  # those of the X-Cell are fast enough
+    slow = gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02, servos=dict.fromkeys(INPUTS, Servo(3.0, 0.5)))
+    assert slow.radius < 1
+    assert np.linalg.norm(slow.gains) < 0.8 * np.linalg.norm(stiff.gains)
+    with pytest.raises(InputError, match="unstable on the full model"):
+        gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02, servos=dict.fromkeys(INPUTS, Servo(0.3, 0.05)))
+
+
+def test_what_cannot_be_flown_is_refused(ideal):
+    with pytest.raises(InputError, match="either noise_db or sensors"):
+        fly(ideal, HOVER, noise_db=30.0, sensors={})
+    with pytest.raises(UnknownNameError, match="measured signal"):
+        fly(ideal, HOVER, sensors={"thta": Sensor()})
+    with pytest.raises(InputError, match="none given for d_lat"):
+        ServoBank({"d_lon": TAIL}, ("d_lon", "d_lat"), TRAVEL[:2], 0.005)
+    with pytest.raises(InputError, match="both given"):
+        Servo(36.0, 0.5, zero=104.0)
+    with pytest.raises(InputError, match="expected a Wind or"):
+        fly(ideal, HOVER, wind=(1.0, 2.0))
+    with pytest.raises(InputError, match="noise"):
+        Sensor(noise=-1.0)
