@@ -1,8 +1,6 @@
 """What a user types, what comes back, and how it fails."""
 
-import ctypes
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +8,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.io import loadmat
 
 import symheli
 from studies import cli
@@ -80,45 +77,6 @@ def test_doctor_says_what_works_here(run, answer, monkeypatch, tmp_path):
     got = answer("doctor")
     assert got["cache_writable"] is False
     assert "CLARABEL" in got["solvers"]
-
-
-@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-def test_exported_c_code_computes_the_same_derivatives(run, tmp_path, ideal):
-    path = tmp_path / "deep" / "heli.c"
-    assert run("export", "c", "--out", path)[0] == 0
-    header = path.with_suffix(".h").read_text()
-    for index, name in enumerate(ideal.states):
-        assert f"#define RHS_X_{name} {index} /* {name.unit} */" in header
-    check = tmp_path / "check.c"
-    check.write_text('#include "deep/heli.h"\nint sizes[] = {RHS_SZ_ARG, RHS_SZ_RES, RHS_SZ_IW, RHS_SZ_W, RHS_N_X, RHS_N_U};\n')
-    library = tmp_path / "heli.so"
-    subprocess.run(["cc", "-shared", "-fPIC", "-Wall", "-Werror", str(check), "-c", "-o", str(tmp_path / "check.o")], check=True)
-    subprocess.run(["cc", "-O1", "-shared", "-fPIC", str(path), str(check), "-o", str(library), "-lm"], check=True)
-    code = ctypes.CDLL(str(library))
-    sz_arg, sz_res, sz_iw, sz_w, nx, nu = (ctypes.c_int * 6).in_dll(code, "sizes")
-    point = symheli.trim(ideal, 6.0)
-    x, u, wind = point.x.array + 0.01, point.u.array + 0.0, np.zeros(3)
-    assert (nx, nu) == (len(x), len(u))
-    out = np.zeros(nx)
-    double = ctypes.POINTER(ctypes.c_double)
-    arg = (double * sz_arg)(*(np.ascontiguousarray(v).ctypes.data_as(double) for v in (x, u, wind)))
-    res = (double * sz_res)(out.ctypes.data_as(double))
-    assert code.rhs(arg, res, (ctypes.c_int * max(sz_iw, 1))(), (ctypes.c_double * max(sz_w, 1))(), 0) == 0
-    np.testing.assert_allclose(out, ideal.numeric("rhs")(x, u, wind)[0], rtol=1e-12, atol=1e-12)
-
-
-def test_exported_mat_file_is_the_family(run, tmp_path, ideal):
-    path = tmp_path / "family.mat"
-    status, out, _ = run("export", "mat", "--out", path, "--airspeeds", 2, 8, "--points", 3)
-    assert status == 0
-    assert str(path) in out
-    got = loadmat(path, simplify_cells=True)
-    family = symheli.sweep(ideal, [2.0, 5.0, 8.0])
-    np.testing.assert_allclose(got["airspeeds"], family.airspeeds)
-    np.testing.assert_allclose(got["A"][:, :, 1], family.A[1], atol=1e-9)
-    np.testing.assert_allclose(got["x0"][:, 2], family.trims[2].x.array, atol=1e-9)
-    assert list(got["states"]) == list(family.states)
-    assert list(got["inputs_units"]) == ["rad"] * 4
 
 
 def test_certify_brackets_the_gain_of_a_frozen_loop(answer):
