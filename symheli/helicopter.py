@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from symheli.numeric import Numeric
 from symheli.rigid_body import GRAVITY, body_to_earth, euler_rates, gravity_euler, quaternion_rates, rotation, translation
 from symheli.symbolic import SX, Function, column, dense, jacobian
 from symheli.vehicle import Vehicle, load_vehicle
+
+if TYPE_CHECKING:
+    from symheli.equations import RightHandSide
 
 PRINTED = ("lateral_flapping", "fuselage_downwash", "rotor_reaction")
 """Options that bring back a sign as printed in G15 where this project decided otherwise; see docs/model.md."""
@@ -167,6 +170,41 @@ class Helicopter:
 
         return self._function("jacobian", build, ["A", "B", "E"])
 
+    @cached_property
+    def implicit(self) -> Function:
+        """(x, u, wind, lam) -> xdot, balance: as `rhs`, with the inflow ratio of each rotor given, and the residual of its
+        momentum balance, which is 0 where lam is the inflow."""
+        lam: list[SX] = []
+
+        def unknown() -> SX:
+            lam.append(SX.sym(f"lam_{len(lam)}"))
+            return lam[-1]
+
+        x, u, w = SX.sym("x", len(self.states)), SX.sym("u", 4), SX.sym("wind", 3)
+        xdot, balance = self.with_inflow(x, u, w, unknown)
+        return Function("implicit", [x, u, w, column(lam)], [xdot, balance], ["x", "u", "wind", "lam"], ["xdot", "balance"])
+
+    def with_inflow(self, x: Any, u: Any, wind: Any, unknown: Callable[[], Any]) -> tuple[Any, Any]:
+        """(xdot, balance) of the Euler form in CasADi or SymPy expressions; `unknown()` makes the inflow ratio of the next rotor.
+
+        `balance` is the residual of each rotor's momentum balance, 0 where the unknown is its inflow ratio.
+        """
+        balance: list[Any] = []
+
+        def solver(*arguments: Any) -> Any:
+            lam = unknown()
+            balance.append(inflow.residual(lam, *arguments))
+            return lam
+
+        xdot, _ = self._euler(x, u, wind, solver)
+        return xdot, column(balance)
+
+    def sympy(self) -> RightHandSide:
+        """The Euler form in SymPy, with symbols for parameters and inflow; see `symheli.equations.RightHandSide`."""
+        from symheli.equations import right_hand_side
+
+        return right_hand_side(self)
+
     def compiled(self, name: Literal["rhs", "flight_rhs", "jacobian", "diagnostics"]) -> Function:
         """One of the functions as machine code where a C compiler is there: the same numbers, faster, numbers only."""
         return self.numeric(name).function
@@ -180,10 +218,12 @@ class Helicopter:
 
     @cached_property
     def diagnostics(self) -> Function:
-        """(x, u, wind) -> every flow quantity and switching function by name (see `Effect`)."""
+        """(x, u, wind) -> every flow quantity and switching function by name (see `Effect`), and the total force X Y Z (N) and
+        moment L M N (N m) of the air and the engine's reaction on the body."""
         x, u, w = SX.sym("x", len(self.states)), SX.sym("u", 4), SX.sym("wind", 3)
         total = self._euler(x, u, w, inflow.solve)[1]
-        values = {**total.flow, **{f"switch: {k}": v for k, v in total.switches.items()}}
+        wrench = dict(zip("XYZLMN", (*total.force, *total.moment), strict=True))
+        values = {**total.flow, **wrench, **{f"switch: {k}": v for k, v in total.switches.items()}}
         names = [name.replace(": ", "_").replace(" ", "_") for name in values]
         return Function("diagnostics", [x, u, w], [dense(v) for v in values.values()], ["x", "u", "wind"], names)
 

@@ -29,19 +29,27 @@ def thrust_coefficient(lam0: Any, c0: Any, c1: Any, ct_max: Any) -> Any:
     return clip(c0 - c1 * lam0, -ct_max, ct_max)
 
 
+def momentum(lam0: Any, mu2: Any, mu_z: Any, efficiency: Any) -> Any:
+    """Thrust coefficient that the momentum of the flow through the disc carries: 2 eta_w lam0 sqrt(mu^2 + (lam0 - mu_z)^2)."""
+    return 2 * efficiency * lam0 * sqrt(mu2 + (lam0 - mu_z) ** 2 + _ROOT_GUARD)
+
+
+def residual(lam0: Any, c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -> Any:
+    """Momentum less blade-element thrust coefficient, dimensionless: 0 where lam0 is the inflow ratio."""
+    return momentum(lam0, mu2, mu_z, efficiency) - thrust_coefficient(lam0, c0, c1, ct_max)
+
+
 def newton_step(lam0: Any, c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -> Any:
-    """One full Newton step on 2 eta_w lam0 sqrt(mu^2 + (lam0 - mu_z)^2) = C_T(lam0).
+    """One full Newton step on the `residual`.
 
     From a root it returns the root, and its derivatives with respect to the other arguments are those of the root
     (implicit function theorem): this is how derivatives are taken, exactly, through the solved inflow.
     """
     root = sqrt(mu2 + (lam0 - mu_z) ** 2 + _ROOT_GUARD)
-    line = c0 - c1 * lam0
-    residual = 2 * efficiency * lam0 * root - clip(line, -ct_max, ct_max)
-    slope = 2 * efficiency * (root + lam0 * (lam0 - mu_z) / root) + where(absolute(line) <= ct_max, c1, 0.0)
+    slope = 2 * efficiency * (root + lam0 * (lam0 - mu_z) / root) + where(absolute(c0 - c1 * lam0) <= ct_max, c1, 0.0)
     # in a vortex ring the slope may vanish; a floor keeps the step finite there
     slope = where(absolute(slope) > 1e-6, slope, 1e-6)
-    return lam0 - residual / slope
+    return lam0 - residual(lam0, c0, c1, ct_max, mu2, mu_z, efficiency) / slope
 
 
 def solve(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The one door to CasADi: functions that take floats, NumPy arrays and CasADi expressions alike.
+"""The one door to CasADi: functions that take floats, NumPy arrays, CasADi and SymPy expressions alike.
 
 The physics is written once with these. Branches are arithmetic (`where`, `minimum`), roots and quotients are guarded
 at their source, so that values and derivatives stay finite in hover and at zero inflow.
@@ -17,48 +17,65 @@ __all__ = ["SX", "Function", "absolute", "clip", "column", "cos", "dense", "jaco
 _SYMBOLIC = (casadi.SX, casadi.MX, casadi.DM)
 
 
-def _symbolic(*values: Any) -> bool:
-    return any(isinstance(v, _SYMBOLIC) for v in values)
+def _library(*values: Any) -> Any:
+    """The library whose expressions these are; SymPy is loaded by whoever made one."""
+    if any(isinstance(v, _SYMBOLIC) for v in values):
+        return casadi
+    if any(hasattr(v, "free_symbols") for v in values):
+        import sympy
+
+        return sympy
+    return np
+
+
+def _is_sympy(library: Any) -> bool:
+    return library.__name__ == "sympy"
 
 
 def sin(x: Any) -> Any:
     """Sine, x in rad."""
-    return casadi.sin(x) if _symbolic(x) else np.sin(x)
+    return _library(x).sin(x)
 
 
 def cos(x: Any) -> Any:
     """Cosine, x in rad."""
-    return casadi.cos(x) if _symbolic(x) else np.cos(x)
+    return _library(x).cos(x)
 
 
 def tan(x: Any) -> Any:
     """Tangent, x in rad."""
-    return casadi.tan(x) if _symbolic(x) else np.tan(x)
+    return _library(x).tan(x)
 
 
 def sqrt(x: Any) -> Any:
     """Square root; the caller keeps x > 0 wherever a derivative is taken."""
-    return casadi.sqrt(x) if _symbolic(x) else np.sqrt(x)
+    return _library(x).sqrt(x)
 
 
 def absolute(x: Any) -> Any:
     """|x|; derivative sign(x), 0 at 0."""
-    return casadi.fabs(x) if _symbolic(x) else np.abs(x)
+    library = _library(x)
+    return library.Abs(x, evaluate=False) if _is_sympy(library) else library.fabs(x)
 
 
 def where(condition: Any, yes: Any, no: Any) -> Any:
     """`yes` where the condition holds, else `no`; both must be finite."""
-    return casadi.if_else(condition, yes, no) if _symbolic(condition, yes, no) else np.where(condition, yes, no)
+    library = _library(condition, yes, no)
+    if library is casadi:
+        return casadi.if_else(condition, yes, no)
+    return np.where(condition, yes, no) if library is np else library.Piecewise((yes, condition), (no, True))
 
 
 def minimum(a: Any, b: Any) -> Any:
     """Smaller of a and b; a tie takes a, in value and derivative."""
-    return where(a <= b, a, b)
+    library = _library(a, b)
+    return library.Min(a, b, evaluate=False) if _is_sympy(library) else where(a <= b, a, b)
 
 
 def maximum(a: Any, b: Any) -> Any:
     """Larger of a and b; a tie takes a, in value and derivative."""
-    return where(a >= b, a, b)
+    library = _library(a, b)
+    return library.Max(a, b, evaluate=False) if _is_sympy(library) else where(a >= b, a, b)
 
 
 def clip(x: Any, low: Any, high: Any, smoothing: float = 0.0) -> Any:
@@ -74,7 +91,8 @@ def clip(x: Any, low: Any, high: Any, smoothing: float = 0.0) -> Any:
 
 def column(values: Any) -> Any:
     """Scalars stacked into one column expression."""
-    return dense(casadi.vertcat(*values))
+    library = _library(*values)
+    return library.Matrix(values) if _is_sympy(library) else dense(casadi.vertcat(*values))
 
 
 def jacobian(expression: Any, variable: Any) -> Any:

@@ -24,15 +24,22 @@ class Motion(NamedTuple):
     rho: Any
 
 
+def _unnamed(symbol: str, value: Any) -> Any:
+    return value
+
+
 @dataclass
 class Flow:
     """Flow quantities made by components evaluated earlier, by name, and the inflow solver of the rotors.
 
-    `inflow(c0, c1, ct_max, mu2, mu_z, efficiency)` returns lam0 (see `symheli.inflow.solve`).
+    `inflow(c0, c1, ct_max, mu2, mu_z, efficiency)` returns lam0 (see `symheli.inflow.solve`). `name(symbol, value)` gives an
+    intermediate value its symbol in the field's notation (LaTeX): where numbers are wanted it returns the value; where the
+    equations are printed it keeps the equation and returns the symbol.
     """
 
     inflow: Callable[..., Any]
     values: dict[str, Any] = field(default_factory=dict)
+    name: Callable[[str, Any], Any] = _unnamed
 
     def __getitem__(self, name: str) -> Any:
         return self.values[name]
@@ -57,7 +64,8 @@ class Component:
     """A part of the airframe: a pure function and what it must be given.
 
     `parameters` {name: unit} come from the vehicle file; `states` are its own; it may use the flow in `needs` and makes
-    the flow in `makes`. `evaluate(parameters, motion, controls, own, flow)` returns an `Effect`.
+    the flow in `makes`. `evaluate(parameters, motion, controls, own, flow)` returns an `Effect`. In print, `subscript` marks its
+    forces and `symbols` {parameter: LaTeX} its parameters; without, their names do.
     """
 
     evaluate: Callable[[SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect]
@@ -65,3 +73,5 @@ class Component:
     states: tuple[Signal, ...] = ()
     needs: tuple[str, ...] = ()
     makes: tuple[str, ...] = ()
+    subscript: str = ""
+    symbols: Mapping[str, str] = field(default_factory=dict)

@@ -17,10 +17,16 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     body down; the printed + V_imr is the option "fuselage_downwash".
     """
     downwash = flow["V_imr"] if "fuselage_downwash" in par.printed else -flow["V_imr"]
-    w = motion.w_a + downwash
-    speed = sqrt(motion.u_a**2 + motion.v_a**2 + w**2 + 1e-12)
+    w = flow.name("w_{fus}", motion.w_a + downwash)
+    speed = flow.name(r"V_\infty", sqrt(motion.u_a**2 + motion.v_a**2 + w**2 + 1e-12))
     scale = -0.5 * motion.rho * speed
     return Effect(force=(scale * par.area_x * motion.u_a, scale * par.area_y * motion.v_a, scale * par.area_z * w))
 
 
-COMPONENT = Component(evaluate, parameters={"area_x": "m^2", "area_y": "m^2", "area_z": "m^2"}, needs=("V_imr",))
+COMPONENT = Component(
+    evaluate,
+    parameters={"area_x": "m^2", "area_y": "m^2", "area_z": "m^2"},
+    needs=("V_imr",),
+    subscript="fus",
+    symbols={"area_x": "S_x", "area_y": "S_y", "area_z": "S_z"},
+)

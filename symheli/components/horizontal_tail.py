@@ -17,9 +17,10 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
 
     Source: G15, horizontal tail; the sign is the stabilising one, the printed + contradicts the text.
     """
-    w = motion.w_a + par.arm * motion.q - flow["w_wake"]
+    w = flow.name("w_{ht}", motion.w_a + par.arm * motion.q - flow["w_wake"])
     scale = 0.5 * motion.rho * par.area
-    free, limit = -scale * (par.lift_slope * absolute(motion.u_a) + absolute(w)) * w, scale * (motion.u_a**2 + w**2)
+    free = flow.name("Z_{free}", -scale * (par.lift_slope * absolute(motion.u_a) + absolute(w)) * w)
+    limit = flow.name("Z_{max}", scale * (motion.u_a**2 + w**2))
     lift = clip(free, -limit, limit, par.smoothing)
     return Effect(
         force=(0.0, 0.0, lift),
@@ -28,4 +29,10 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     )
 
 
-COMPONENT = Component(evaluate, parameters={"area": "m^2", "lift_slope": "1/rad", "arm": "m"}, needs=("w_wake",))
+COMPONENT = Component(
+    evaluate,
+    parameters={"area": "m^2", "lift_slope": "1/rad", "arm": "m"},
+    needs=("w_wake",),
+    subscript="ht",
+    symbols={"area": "S_{ht}", "lift_slope": r"C_{L\alpha,ht}", "arm": "l_{ht}"},
+)

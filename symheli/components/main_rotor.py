@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from symheli.components.component import Component, Effect, Flow, Motion
-from symheli.components.rotor import Disc, load
+from symheli.components.rotor import disc, load
 from symheli.lpv.signal import Signal
 from symheli.symbolic import absolute, sqrt
 
@@ -32,32 +32,35 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     Source: G15, main rotor thrust, torque, flapping, forces and moments. The sign of db1/dmu_v is + (a hovering
     rotor looks the same after a turn about its shaft); the printed - is the option "lateral_flapping".
     """
-    disc = Disc(par.radius, par.chord, 2, motion.Om, motion.rho)
-    mu_x, mu_y, mu_z = motion.u_a / disc.tip_speed, motion.v_a / disc.tip_speed, motion.w_a / disc.tip_speed
-    mu2 = mu_x**2 + mu_y**2
-    mu = sqrt(mu2 + 1e-20)
+    plane = disc(par.radius, par.chord, 2, motion.Om, motion.rho, flow)
+    mu_x = flow.name(r"\mu_x", motion.u_a / plane.tip_speed)
+    mu_y = flow.name(r"\mu_y", motion.v_a / plane.tip_speed)
+    mu_z = flow.name(r"\mu_z", motion.w_a / plane.tip_speed)
+    mu2 = flow.name(r"\mu^2", mu_x**2 + mu_y**2)
+    mu = flow.name(r"\mu", sqrt(mu2 + 1e-20))
     d_col = controls["d_col"]
 
-    lam0, ct, thrust, torque, stall, ring = load(disc, par, d_col, mu2, mu_z, flow)
+    lam0, ct, thrust, torque, stall, ring = load(plane, par, d_col, mu2, mu_z, flow)
 
     a1, b1 = own["a1"], own["b1"]
-    tau = 16 / (par.bar_lock_number * motion.Om)
+    tau = flow.name(r"\tau_e", 16 / (par.bar_lock_number * motion.Om))
     speed_ratio2 = (motion.Om / par.nominal_speed) ** 2
     da1_dmu, da1_dmu_z = flapping_slopes(
-        mu2, mu, mu_x, lam0, d_col, k_mu=par.flapping_fraction, lift_slope=par.lift_slope, solidity=disc.solidity
+        mu2, mu, mu_x, lam0, d_col, k_mu=par.flapping_fraction, lift_slope=par.lift_slope, solidity=plane.solidity
     )
-    db1_dmu_v = -da1_dmu if "lateral_flapping" in par.printed else da1_dmu
+    da1_dmu, da1_dmu_z = flow.name(r"a_{1\mu}", da1_dmu), flow.name(r"a_{1\mu_z}", da1_dmu_z)
+    db1_dmu_v = flow.name(r"b_{1\mu}", -da1_dmu if "lateral_flapping" in par.printed else da1_dmu)
     rates = {
         "a1": -motion.q + (-a1 + da1_dmu * mu_x + da1_dmu_z * mu_z + par.longitudinal_gain * speed_ratio2 * controls["d_lon"]) / tau,
         "b1": -motion.p + (-b1 - db1_dmu_v * mu_y + par.lateral_gain * speed_ratio2 * controls["d_lat"]) / tau,
     }
-    stiffness = par.hub_stiffness + thrust * par.hub_height
+    stiffness = flow.name("K", par.hub_stiffness + thrust * par.hub_height)
     return Effect(
         force=(-thrust * a1, thrust * b1, -thrust),
         moment=(stiffness * b1, stiffness * a1, 0.0),
         rates=rates,
         shaft_torque=torque,
-        flow={"V_imr": lam0 * disc.tip_speed, "lam0": lam0, "C_T": ct, "T_mr": thrust, "Q_mr": torque},
+        flow={"V_imr": lam0 * plane.tip_speed, "lam0": lam0, "C_T": ct, "T_mr": thrust, "Q_mr": torque},
         switches={"main rotor stall": stall, "vortex_ring": ring},
     )
 
@@ -81,4 +84,20 @@ COMPONENT = Component(
     },
     states=(Signal("a1"), Signal("b1")),
     makes=("V_imr", "lam0", "C_T", "T_mr", "Q_mr"),
+    subscript="mr",
+    symbols={
+        "radius": "R_{mr}",
+        "chord": "c_{mr}",
+        "lift_slope": "a_{mr}",
+        "profile_drag": "C_{D0,mr}",
+        "ct_max": "C_{T max,mr}",
+        "hub_height": "h_{mr}",
+        "hub_stiffness": r"K_\beta",
+        "bar_lock_number": r"\gamma_{fb}",
+        "lateral_gain": "B_{nom}",
+        "longitudinal_gain": "A_{nom}",
+        "flapping_fraction": r"K_\mu",
+        "nominal_speed": r"\Omega_{nom}",
+        "inflow_efficiency": r"\eta_w",
+    },
 )

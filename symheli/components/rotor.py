@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -12,30 +11,21 @@ from symheli.components.component import Flow
 from symheli.symbolic import absolute, sqrt
 
 
-@dataclass(frozen=True)
-class Disc:
-    """A rotor disc: radius and chord (m), number of blades, speed Om (rad/s) in air of density rho (kg/m^3)."""
+class Disc(NamedTuple):
+    """A rotor disc: radius (m), tip speed Om R (m/s), solidity sigma = blades c/(pi R) (dimensionless) and the force
+    rho (Om R)^2 pi R^2 (N), which is the thrust at C_T = 1."""
 
     radius: Any
-    chord: Any
-    blades: int
-    Om: Any
-    rho: Any
+    tip_speed: Any
+    solidity: Any
+    force_scale: Any
 
-    @property
-    def tip_speed(self) -> Any:
-        """Om R, m/s."""
-        return self.Om * self.radius
 
-    @property
-    def solidity(self) -> Any:
-        """sigma = blades c/(pi R), dimensionless."""
-        return self.blades * self.chord / (pi * self.radius)
-
-    @property
-    def force_scale(self) -> Any:
-        """rho (Om R)^2 pi R^2, N: thrust = C_T times this."""
-        return self.rho * self.tip_speed**2 * pi * self.radius**2
+def disc(radius: Any, chord: Any, blades: int, Om: Any, rho: Any, flow: Flow) -> Disc:
+    """From radius and chord (m), number of blades, and speed Om (rad/s) in air of density rho (kg/m^3)."""
+    solidity = flow.name(r"\sigma", blades * chord / (pi * radius))
+    tip_speed = flow.name("V_{tip}", Om * radius)
+    return Disc(radius, tip_speed, solidity, rho * tip_speed**2 * pi * radius**2)
 
 
 def profile_torque_coefficient(mu2: Any, profile_drag: Any, solidity: Any) -> Any:
@@ -64,14 +54,14 @@ def load(disc: Disc, par: SimpleNamespace, pitch: Any, mu2: Any, mu_z: Any, flow
     """
     c0, c1 = inflow.thrust_line(pitch, mu2, mu_z, par.lift_slope, disc.solidity)
     lam0 = flow.inflow(c0, c1, par.ct_max, mu2, mu_z, par.inflow_efficiency)
-    ct = inflow.thrust_coefficient(lam0, c0, c1, par.ct_max)
-    cq = ct * (lam0 - mu_z) + profile_torque_coefficient(mu2, par.profile_drag, disc.solidity)
+    ct = flow.name("C_T", inflow.thrust_coefficient(lam0, c0, c1, par.ct_max))
+    cq = flow.name("C_Q", ct * (lam0 - mu_z) + profile_torque_coefficient(mu2, par.profile_drag, disc.solidity))
     hover = sqrt(absolute(ct) / (2 * par.inflow_efficiency) + 1e-20)
     return Load(
         lam0,
         ct,
-        ct * disc.force_scale,
-        cq * disc.force_scale * par.radius,
+        flow.name("T", ct * disc.force_scale),
+        flow.name("Q", cq * disc.force_scale * disc.radius),
         par.ct_max - absolute(c0 - c1 * lam0),
         inflow.vortex_ring(hover, mu2, mu_z),
     )

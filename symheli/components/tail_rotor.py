@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from symheli.components.component import Component, Effect, Flow, Motion
-from symheli.components.rotor import Disc, load
+from symheli.components.rotor import disc, load
 
 
 def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
@@ -19,20 +19,20 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     Source: G15, tail rotor, with the full inflow solution in place of its linearization about a trim
     pitch. `d_ped` is the total blade pitch (rad).
     """
-    disc = Disc(par.radius, par.chord, 2, par.gear_ratio * motion.Om, motion.rho)
-    v_tr = motion.v_a - par.arm * motion.r + par.height * motion.p
-    w_tr = motion.w_a + par.arm * motion.q - flow["w_wake"]
-    mu2 = (motion.u_a**2 + w_tr**2) / disc.tip_speed**2
-    mu_z = v_tr / disc.tip_speed
-    blockage = 1 - 0.75 * par.fin_area / (pi * par.radius**2)
+    plane = disc(par.radius, par.chord, 2, par.gear_ratio * motion.Om, motion.rho, flow)
+    v_tr = flow.name("v_{tr}", motion.v_a - par.arm * motion.r + par.height * motion.p)
+    w_tr = flow.name("w_{tr}", motion.w_a + par.arm * motion.q - flow["w_wake"])
+    mu2 = flow.name(r"\mu^2", (motion.u_a**2 + w_tr**2) / plane.tip_speed**2)
+    mu_z = flow.name(r"\mu_z", v_tr / plane.tip_speed)
+    blockage = flow.name("f_t", 1 - 0.75 * par.fin_area / (pi * par.radius**2))
 
-    lam0, _, thrust, torque, stall, ring = load(disc, par, controls["d_ped"], mu2, mu_z, flow)
+    lam0, _, thrust, torque, stall, ring = load(plane, par, controls["d_ped"], mu2, mu_z, flow)
     side = -blockage * thrust
     return Effect(
         force=(0.0, side, 0.0),
         moment=(side * par.height, 0.0, -side * par.arm),
         shaft_torque=par.gear_ratio * torque,
-        flow={"V_itr": lam0 * disc.tip_speed, "Y_tr": side, "Q_tr": torque},
+        flow={"V_itr": lam0 * plane.tip_speed, "Y_tr": side, "Q_tr": torque},
         switches={"tail rotor stall": stall, "tail rotor vortex_ring": ring},
     )
 
@@ -53,4 +53,17 @@ COMPONENT = Component(
     },
     needs=("w_wake",),
     makes=("V_itr", "Y_tr", "Q_tr"),
+    subscript="tr",
+    symbols={
+        "radius": "R_{tr}",
+        "chord": "c_{tr}",
+        "lift_slope": "a_{tr}",
+        "profile_drag": "C_{D0,tr}",
+        "ct_max": "C_{T max,tr}",
+        "gear_ratio": "n_{tr}",
+        "arm": "l_{tr}",
+        "height": "h_{tr}",
+        "fin_area": "S_{vf}",
+        "inflow_efficiency": r"\eta_w",
+    },
 )

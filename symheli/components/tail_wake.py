@@ -18,12 +18,13 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
 
     Source: G15, wake intensity factor. `smoothing` rounds both corners (in units of K_lam).
     """
-    g_i = (par.tail_arm - par.rotor_radius - par.tail_radius) / par.tail_height
-    g_f = (par.tail_arm - par.rotor_radius + par.tail_radius) / par.tail_height
+    g_i = flow.name("g_i", (par.tail_arm - par.rotor_radius - par.tail_radius) / par.tail_height)
+    g_f = flow.name("g_f", (par.tail_arm - par.rotor_radius + par.tail_radius) / par.tail_height)
     down = motion.w_a - flow["V_imr"]
-    chi = motion.u_a / maximum(-down, 1e-3)  # guarded: where the flow goes up through the disc the wake is above the tail
+    # guarded: where the flow goes up through the disc the wake is above the tail
+    chi = flow.name(r"\chi", motion.u_a / maximum(-down, 1e-3))
     share = clip(1.5 * (chi - g_i) / (g_f - g_i), 0.0, 1.5, par.smoothing)
-    k_lam = where(down < 0, share, 0.0)
+    k_lam = flow.name(r"K_\lambda", where(down < 0, share, 0.0))
     return Effect(
         flow={"w_wake": k_lam * flow["V_imr"], "K_lam": k_lam},
         switches={"wake reaches the tail": chi - g_i, "tail fully in the wake": chi - g_f},
@@ -35,4 +36,5 @@ COMPONENT = Component(
     parameters={"rotor_radius": "m", "tail_radius": "m", "tail_arm": "m", "tail_height": "m"},
     needs=("V_imr",),
     makes=("w_wake", "K_lam"),
+    symbols={"rotor_radius": "R_{mr}", "tail_radius": "R_{tr}", "tail_arm": "l_{tr}", "tail_height": "h_{tr}"},
 )

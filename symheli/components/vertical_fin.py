@@ -18,12 +18,13 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
 
     Source: G15, vertical fin.
     """
-    w_tr = motion.w_a + par.arm * motion.q - flow["w_wake"]
-    speed2 = motion.u_a**2 + w_tr**2
-    speed = sqrt(speed2 + 1e-12)
-    v = motion.v_a - par.tail_rotor_wash * flow["V_itr"] - par.arm * motion.r
+    w_tr = flow.name("w_{tr}", motion.w_a + par.arm * motion.q - flow["w_wake"])
+    speed2 = flow.name(r"V_{\infty,tr}^2", motion.u_a**2 + w_tr**2)
+    speed = flow.name(r"V_{\infty,tr}", sqrt(speed2 + 1e-12))
+    v = flow.name("v_{vf}", motion.v_a - par.tail_rotor_wash * flow["V_itr"] - par.arm * motion.r)
     scale = 0.5 * motion.rho * par.area
-    free, limit = -scale * (par.lift_slope * speed + absolute(v)) * v, scale * (speed2 + v**2)
+    free = flow.name("Y_{free}", -scale * (par.lift_slope * speed + absolute(v)) * v)
+    limit = flow.name("Y_{max}", scale * (speed2 + v**2))
     side = clip(free, -limit, limit, par.smoothing)
     return Effect(
         force=(0.0, side, 0.0),
@@ -36,4 +37,12 @@ COMPONENT = Component(
     evaluate,
     parameters={"area": "m^2", "lift_slope": "1/rad", "tail_rotor_wash": "1", "arm": "m", "height": "m"},
     needs=("w_wake", "V_itr"),
+    subscript="vf",
+    symbols={
+        "area": "S_{vf}",
+        "lift_slope": r"C_{L\alpha,vf}",
+        "tail_rotor_wash": r"\epsilon_{vf}",
+        "arm": "l_{tr}",
+        "height": "h_{tr}",
+    },
 )

@@ -1,0 +1,48 @@
+"""The equations of motion in SymPy, made by the code that makes the CasADi functions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import sympy
+
+if TYPE_CHECKING:
+    from symheli.helicopter import Helicopter
+
+
+@dataclass(frozen=True)
+class RightHandSide:
+    """xdot = f(states, inputs, wind, inflow) with balance(...) = 0 for the inflow ratios, one a rotor, in order of the components.
+
+    `parameters` {symbol: value in SI} names each parameter section.entry; `xdot.subs(rhs.parameters)` puts the numbers in.
+    """
+
+    states: tuple[sympy.Symbol, ...]
+    inputs: tuple[sympy.Symbol, ...]
+    wind: tuple[sympy.Symbol, ...]
+    inflow: tuple[sympy.Symbol, ...]
+    xdot: sympy.Matrix
+    balance: sympy.Matrix
+    parameters: Mapping[sympy.Symbol, float]
+
+
+def right_hand_side(heli: Helicopter) -> RightHandSide:
+    """The Euler form of `heli` in body axes with a symbol for every parameter of its vehicle file; air density is a number."""
+    parameters: dict[sympy.Symbol, float] = {}
+    sections = {}
+    for section, entries in heli.vehicle.sections.items():
+        symbols = {entry: sympy.Symbol(f"{section}.{entry}", real=True) for entry in entries}
+        parameters.update({symbols[entry]: quantity.value for entry, quantity in entries.items()})
+        sections[section] = {entry: quantity._replace(value=symbols[entry]) for entry, quantity in entries.items()}
+    symbolic = replace(heli, vehicle=replace(heli.vehicle, sections=sections))
+    states, inputs, wind = (tuple(sympy.Symbol(str(name), real=True) for name in names) for names in (heli.states, heli.inputs, heli.wind))
+    inflow: list[sympy.Symbol] = []
+
+    def unknown() -> sympy.Symbol:
+        inflow.append(sympy.Symbol(f"lam_{len(inflow)}", real=True))
+        return inflow[-1]
+
+    xdot, balance = symbolic.with_inflow(states, inputs, wind, unknown)
+    return RightHandSide(states, inputs, wind, tuple(inflow), xdot, balance, parameters)
