@@ -6,16 +6,20 @@ No solver is loaded by importing this package.
 from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
 from synthesis.cone_program import Solver, installed_solvers
 from synthesis.frozen import FrozenGain, frozen_gain
+from synthesis.handling_qualities import Bandwidth, bandwidth
 from synthesis.l2_gain import l2_gain, stability
 from synthesis.lower_bound import LowerBound, Search, lower_bound
 from synthesis.lyapunov import SplineLyapunov
+from synthesis.margins import Margins, disk_margin, loop, margins
 from synthesis.proof_search import Relaxation
 
 __all__ = [
     "Attempt",
+    "Bandwidth",
     "Certificate",
     "FrozenGain",
     "LowerBound",
+    "Margins",
     "Relaxation",
     "Search",
     "Seconds",
@@ -23,9 +27,13 @@ __all__ = [
     "SplineLyapunov",
     "Status",
     "Trajectory",
+    "bandwidth",
+    "disk_margin",
     "frozen_gain",
     "installed_solvers",
     "l2_gain",
+    "loop",
     "lower_bound",
+    "margins",
     "stability",
 ]

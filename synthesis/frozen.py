@@ -65,7 +65,7 @@ def norm(A: Array, B: Array, C: Array, D: Array, dt: float | None = None, tolera
     if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
         return math.inf, math.nan
     if dt is not None:
-        A, B, C, D = _to_continuous(A, B, C, D)
+        A, B, C, D = to_continuous(A, B, C, D)
         poles = np.linalg.eigvals(A)
 
     def gains(omega: Array) -> Array:
@@ -81,10 +81,10 @@ def norm(A: Array, B: Array, C: Array, D: Array, dt: float | None = None, tolera
     if best == 0.0:
         return 0.0, 0.0
     for _ in range(50):
-        crossings = _crossings(A, B, C, D, best * (1 + tolerance))
-        if len(crossings) < 2:
+        between = crossings(A, B, C, D, best * (1 + tolerance))
+        if len(between) < 2:
             break
-        middles = 0.5 * (crossings[:-1] + crossings[1:])
+        middles = 0.5 * (between[:-1] + between[1:])
         values = gains(middles)
         if values.max() <= best * (1 + tolerance):
             break
@@ -94,7 +94,7 @@ def norm(A: Array, B: Array, C: Array, D: Array, dt: float | None = None, tolera
     return best, omega
 
 
-def _crossings(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
+def crossings(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
     """Frequencies >= 0 where a singular value of the response equals `level`: imaginary eigenvalues of the Hamiltonian."""
     R = level**2 * np.eye(D.shape[1]) - D.T @ D
     RD, RB = np.linalg.solve(R, D.T @ C), np.linalg.solve(R, B.T)
@@ -106,7 +106,7 @@ def _crossings(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
     return np.concatenate([[0.0], omega]) if len(omega) and np.any(omega > 0) else omega
 
 
-def _to_continuous(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, Array, Array]:
+def to_continuous(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, Array, Array]:
     """The continuous model with the same norm: z = (1 + s)/(1 - s)."""
     n = len(A)
     inverse = np.linalg.inv(A + np.eye(n))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag, solve_discrete_are
+from scipy.linalg import solve_discrete_are
 
 from symheli.airspeed_sweep import sweep
 from symheli.errors import InputError
@@ -73,16 +73,9 @@ def _lqr(model: LinearModel, input_scale: float) -> np.ndarray:
 
 def _plant(model: LinearModel, servos: Mapping[str, Servo] | None, dt: float) -> LinearModel:
     """The linear model, behind its servos where there are any, sampled."""
-    if servos is None:
-        return model.discretize(dt)
-    parts = [servos[name].linear(name) for name in model.inputs]
-    A, B, C = (np.asarray(block_diag(*(getattr(part, matrix) for part in parts))) for matrix in "ABC")
-    nx, nu = len(model.states), len(model.inputs)
-    states = (*model.states, *(s for part in parts for s in part.states))
-    return LinearModel(
-        np.block([[model.A, model.B @ C], [np.zeros((len(A), nx)), A]]), np.vstack([np.zeros((nx, nu)), B]),
-        np.eye(len(states)), np.zeros((len(states), nu)), states, model.inputs, states,
-    ).discretize(dt)  # fmt: skip
+    if servos is not None:
+        model = model.driven_by({name: servos[name].linear(name) for name in model.inputs})
+    return model.discretize(dt)
 
 
 def _closed_loop_radius(plant: LinearModel, K: np.ndarray, measured: tuple[Signal, ...]) -> float:

@@ -1,6 +1,7 @@
 """The value types that every room shares: pure NumPy, no physics, no solver."""
 
 from symheli.lpv.bases import Basis, Piece, PiecewiseLinear, Polynomial, Spline
+from symheli.lpv.delay import pade_delay
 from symheli.lpv.flight_record import FlightRecord
 from symheli.lpv.lft import LFT, Block
 from symheli.lpv.linear_family import LinearFamily
@@ -34,6 +35,7 @@ __all__ = [
     "TrimSchedule",
     "chordal_distance",
     "nu_gap",
+    "pade_delay",
     "signals",
     "simulate",
 ]

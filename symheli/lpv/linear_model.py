@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.signal import cont2discrete
 
 from symheli.errors import InputError
@@ -74,6 +75,39 @@ class LinearModel:
         A, B, C, D = cont2discrete((self.A, self.B, self.C, self.D), dt)[:4]  # type: ignore[index]
         return replace(self, A=A, B=B, C=C, D=D, dt=dt)
 
+    def driven_by(self, actuators: Mapping[str, LinearModel]) -> LinearModel:
+        """This model behind single-input single-output `actuators` {input: model}; the inputs keep their names, C and D their rows.
+
+        Both must be continuous, or discrete with one sample period; `InputError` otherwise.
+        """
+        at = indices(actuators, self.inputs, "input")
+        for name, part in actuators.items():
+            if part.dt != self.dt or len(part.inputs) != 1 or len(part.outputs) != 1:
+                raise InputError(
+                    f"the actuator of {name} needs one input, one output and dt = {self.dt}; "
+                    f"got {len(part.inputs)}, {len(part.outputs)} and {part.dt}"
+                )
+        parts = list(actuators.values())
+        A, B, C, D = (np.asarray(block_diag(*(getattr(part, matrix) for part in parts))) for matrix in "ABCD")
+        direct = np.eye(len(self.inputs))
+        direct[np.ix_(at, at)] = D
+        into = np.zeros((len(A), len(self.inputs)))
+        into[:, at] = B
+        return replace(
+            self,
+            A=np.block([[self.A, self.B[:, at] @ C], [np.zeros((len(A), len(self.A))), A]]),
+            B=np.vstack([self.B @ direct, into]), C=np.hstack([self.C, self.D[:, at] @ C]), D=self.D @ direct,
+            states=(*self.states, *(s for part in parts for s in part.states)), point=None,
+        )  # fmt: skip
+
+    def feedback(self, gains: Mapping[tuple[str, str], float]) -> LinearModel:
+        """Close u_i = gain y_j + (new u_i) for each {(input, output): gain}; no feedthrough from u to the outputs used (`InputError`)."""
+        K = feedback_matrix(gains, self.inputs, self.outputs)
+        if np.abs(K @ self.D).max(initial=0.0) > 0:
+            raise InputError("an output that is fed back depends on an input directly; put an actuator or a delay between")
+        KC = K @ self.C
+        return replace(self, A=self.A + self.B @ KC, C=self.C + self.D @ KC)
+
     def frequency_response(self, omega: object) -> np.ndarray:
         """G(j omega) (n, ny, nu), complex, at `omega` (n,) in rad/s."""
         omega = frozen(omega, "omega", (None,))
@@ -97,3 +131,11 @@ class LinearModel:
             system.A, system.B, system.C, system.D, signals(system.state_labels), signals(system.input_labels),
             signals(system.output_labels), dt=float(system.dt) if system.dt else None,
         )  # fmt: skip
+
+
+def feedback_matrix(gains: Mapping[tuple[str, str], float], inputs: Sequence[str], outputs: Sequence[str]) -> np.ndarray:
+    """K (nu, ny) of u = K y from {(input, output): gain}; raises `UnknownNameError`."""
+    K = np.zeros((len(inputs), len(outputs)))
+    for (u, y), gain in gains.items():
+        K[indices([u], inputs, "input")[0], indices([y], outputs, "output")[0]] = float(gain)
+    return K

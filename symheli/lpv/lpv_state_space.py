@@ -11,7 +11,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Basis, Polynomial
-from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import Signal, indices, signals
 from symheli.lpv.trim_schedule import TrimSchedule
@@ -137,9 +137,7 @@ class LPVStateSpace:
         The outputs used must not depend on p or on u directly (C_j constant, D_j = 0): then every entry stays
         in the basis. Raises `InputError` otherwise.
         """
-        K = np.zeros((len(self.inputs), len(self.outputs)))
-        for (u, y), gain in gains.items():
-            K[indices([u], self.inputs, "input")[0], indices([y], self.outputs, "output")[0]] = float(gain)
+        K = feedback_matrix(gains, self.inputs, self.outputs)
         used = np.flatnonzero(np.any(K, axis=0))
         nodes = np.linspace(self.scheduling.low, self.scheduling.high, 4 * self.basis.size + 1)
         C, D = self.matrices(nodes)[2:]

@@ -79,6 +79,17 @@ def test_doctor_says_what_works_here(run, answer, monkeypatch, tmp_path):
     assert "CLARABEL" in got["solvers"]
 
 
+def test_margins_of_the_hold_and_how_near_the_interpolation_comes(answer, ideal):
+    got = answer("margins", "--airspeeds", 2, 8, "--points", 4)
+    assert [row["airspeed"] for row in got["exact"]] == [2.0, 4.0, 6.0, 8.0]
+    for row, near, gap in zip(got["exact"], got["interpolated"], got["nu_gap"], strict=True):
+        assert row["stable"]
+        assert row["disk_gain"][1] <= row["gain"][1]
+        # the cubic runs through four nodes
+        assert near["phase"] == pytest.approx(row["phase"], rel=1e-6)
+        assert gap < 1e-6
+
+
 def test_certify_brackets_the_gain_of_a_frozen_loop(answer):
     got = answer("certify", "--rate", 0, "--airspeeds", 4, 9)
     assert got["verified"]

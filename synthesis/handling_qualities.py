@@ -1,0 +1,79 @@
+"""Handling qualities in the small: bandwidth and phase delay of the attitude response."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from symheli.errors import InputError
+from symheli.lpv import LinearModel
+
+
+class Bandwidth(NamedTuple):
+    """phase_bandwidth: where 45 deg of phase are left; gain_bandwidth: where 6 dB of gain are left before omega_180, at which the
+    response lags 180 deg (rad/s, inf where the band ends before); phase_delay (s): how fast the phase falls beyond omega_180."""
+
+    phase_bandwidth: float
+    gain_bandwidth: float
+    omega_180: float
+    phase_delay: float
+
+    @property
+    def rate_response(self) -> float:
+        """Bandwidth of a rate response type, rad/s: the smaller one."""
+        return min(self.phase_bandwidth, self.gain_bandwidth)
+
+    @property
+    def attitude_response(self) -> float:
+        """Bandwidth of an attitude response type, rad/s: that of the phase."""
+        return self.phase_bandwidth
+
+
+def bandwidth(model: LinearModel, band: tuple[float, float] = (1.0, 60.0), points: int = 2000) -> Bandwidth:
+    """ADS-33 bandwidth and phase delay of the attitude response `model` (one input, one output: rad per rad of stick).
+
+    `band` (rad/s) is searched; its lower end lies above the phugoid, where attitude already integrates rate (phase near -90 deg);
+    a response of opposite sign is turned round. Put servos and delays into the model first. Raises `InputError`.
+    Source: ADS-33E-PRF (2000), figure 5 (definitions of bandwidth and phase delay).
+    """
+    if len(model.inputs) != 1 or len(model.outputs) != 1:
+        raise InputError(f"bandwidth is that of one attitude to one stick, got {len(model.inputs)} inputs and {len(model.outputs)} outputs")
+    low, high = band
+    if not 0 < low < high:
+        raise InputError(f"band: expected 0 < low < high rad/s, got {band}")
+    top = 2 * high if model.dt is None else min(2 * high, 0.999 * math.pi / model.dt)
+    grid = np.geomspace(low, top, points)
+    values = model.frequency_response(grid)[:, 0, 0]
+    if np.any(values == 0):
+        raise InputError(f"{model.outputs[0]} does not respond to {model.inputs[0]}")
+    phase = np.unwrap(np.angle(values))
+    # within half a turn of the -90 deg of an integrated rate; the sign of the stick is a convention
+    phase += np.pi * np.round((-np.pi / 2 - phase[0]) / np.pi)
+
+    def lag(omega: float) -> float:
+        value = complex(model.frequency_response([omega])[0, 0, 0])
+        near = float(np.interp(omega, grid, phase))
+        angle = math.atan2(value.imag, value.real)
+        return angle + math.pi * round((near - angle) / math.pi)
+
+    def gain(omega: float) -> float:
+        return abs(complex(model.frequency_response([omega])[0, 0, 0]))
+
+    def first(values: np.ndarray, function, level: float, end: float) -> float:
+        below = np.flatnonzero((values[1:] <= level) & (values[:-1] > level) & (grid[1:] <= end * (1 + 1e-9)))
+        if not len(below):
+            return math.inf
+        k = int(below[0])
+        return float(brentq(lambda w: function(w) - level, grid[k], grid[k + 1], xtol=1e-10))  # type: ignore[arg-type]
+
+    omega_180 = first(phase, lag, -math.pi, high)
+    phase_bandwidth = first(phase, lag, -0.75 * math.pi, high)
+    if math.isinf(omega_180):
+        return Bandwidth(phase_bandwidth, math.inf, math.inf, math.nan)
+    gain_bandwidth = first(np.abs(values), gain, 2 * gain(omega_180), omega_180)
+    twice = 2 * omega_180
+    delay = (-math.pi - lag(twice)) / twice if twice <= top else math.nan
+    return Bandwidth(phase_bandwidth, gain_bandwidth, omega_180, delay)
