@@ -15,18 +15,21 @@ from identification.instrumental_variables import Instruments
 from identification.model import LPVARXModel
 from identification.prediction import fit_percent
 from identification.recursive_least_squares import RecursiveLeastSquares, RLSInfo, RLSState
-from identification.structure import LPVARX, Term
-from symheli.lpv import Polynomial
+from identification.structure import LPVARX, Entry, Group, Term
+from symheli.lpv import Polynomial, Product
 
 __all__ = [
     "LPVARX",
     "CoefficientValues",
     "Coefficients",
+    "Entry",
     "ExcitationReport",
+    "Group",
     "History",
     "Instruments",
     "LPVARXModel",
     "Polynomial",
+    "Product",
     "RLSInfo",
     "RLSState",
     "RecursiveLeastSquares",

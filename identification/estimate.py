@@ -7,7 +7,7 @@ from typing import Literal
 
 from identification.excitation import excitation_of
 from identification.instrumental_variables import Instruments, instrumental_variables
-from identification.least_squares import least_squares, residual_covariance
+from identification.least_squares import least_squares_by_group, residual_covariance
 from identification.model import LPVARXModel
 from identification.recursive_least_squares import RecursiveLeastSquares
 from identification.regressors import Regression, as_records, stacked, units_of
@@ -44,19 +44,19 @@ def fit(
     if method != "iv" and instruments:
         raise InputError(f'instruments are for method="iv", not {method!r}')
     outputs, inputs = units_of(structure.outputs, records), units_of(structure.inputs, records)
-    scheduling = units_of([structure.scheduling], records)[0]
+    scheduling = units_of(structure.parameters, records)
     data = stacked(structure, records)
     report = excitation_of(structure, data)
     report.require()
     match method:
         case "ls":
-            theta = least_squares(data.phi, data.y)
-            covariance = residual_covariance(data.phi, data.y, theta)
+            theta = least_squares_by_group(structure, data.phi, data.y)
+            covariance = residual_covariance(structure, data.phi, data.y, theta)
         case "rls":
             theta, covariance = _recursive(structure, data, forgetting)
         case "iv":
             theta = instrumental_variables(structure, records, data, Instruments.of(instruments))
-            covariance = residual_covariance(data.phi, data.y, theta)
+            covariance = residual_covariance(structure, data.phi, data.y, theta)
     return LPVARXModel(
         structure, theta, records[0].dt, outputs, inputs, scheduling, covariance, len(data.phi), data.dropped, method, report
     )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from identification.regressors import Regression, as_records, stacked
-from identification.structure import LPVARX
+from identification.structure import LPVARX, Group
 from symheli.errors import ExcitationError
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
@@ -28,8 +28,9 @@ class ExcitationReport:
 
     `singular_values` (n,) of the regressor matrix with columns scaled to length 1, largest first; `condition` their
     ratio; `rank` how many exceed 1e-11 of the largest; `distinct` scheduling values found against `needed`;
-    `occupancy` samples in each of the bins with `edges` (unit of p) over the range of the basis; `weakest` the
-    direction (n,) the data determine worst, in scaled regressors. `reason` is empty where the data suffice.
+    `occupancy` samples in each of the bins with `edges` (unit of p) over the range of the basis, a row for each of several
+    parameters; `weakest` the direction (n,) the data determine worst, in scaled regressors. `reason` is empty where the data suffice.
+    Where the equations differ in their regressors, this is the report on the worst of them, those of `outputs`.
     """
 
     names: tuple[str, ...]
@@ -44,6 +45,7 @@ class ExcitationReport:
     weakest: Array
     scheduling: str
     reason: str
+    outputs: tuple[str, ...] = ()
 
     @property
     def sufficient(self) -> bool:
@@ -61,21 +63,25 @@ class ExcitationReport:
             raise ExcitationError(self.reason, self)
 
     def __str__(self) -> str:
-        full = max(int(self.occupancy.max(initial=0)), 1)
-        bars = [
-            f"  {a:9.3g} .. {b:<9.3g} {int(n):7d} {'#' * round(40 * int(n) / full)}"
-            for a, b, n in zip(self.edges[:-1], self.edges[1:], self.occupancy, strict=True)
-        ]
         return "\n".join(
             [
                 f"excitation: {'sufficient' if self.sufficient else 'NOT sufficient: ' + self.reason}",
                 f"  regressors {len(self.names)}, samples {self.samples}, rank {self.rank}, scaled condition {self.condition:.3g}",
                 f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}",
                 f"  worst determined: {self.worst_direction}",
-                f"  samples over {self.scheduling}:",
-                *bars,
+                *self._bars(),
             ]
         )
+
+    def _bars(self) -> list[str]:
+        out = []
+        names = self.scheduling.split(", ")
+        for name, edges, occupancy in zip(names, np.atleast_2d(self.edges), np.atleast_2d(self.occupancy), strict=True):
+            full = max(int(occupancy.max(initial=0)), 1)
+            out.append(f"  samples over {name}:")
+            for a, b, n in zip(edges[:-1], edges[1:], occupancy, strict=True):
+                out.append(f"  {a:9.3g} .. {b:<9.3g} {int(n):7d} {'#' * round(40 * int(n) / full)}")
+        return out
 
 
 def excitation_report(arx: LPVARX, records: FlightRecord | Iterable[FlightRecord]) -> ExcitationReport:
@@ -85,11 +91,19 @@ def excitation_report(arx: LPVARX, records: FlightRecord | Iterable[FlightRecord
 
 def excitation_of(arx: LPVARX, data: Regression) -> ExcitationReport:
     """The same for regressors already built."""
-    names, n = arx.regressor_names, arx.n_regressors
-    values, directions = spectrum(data.phi)
+    reports = [_report(arx, data, group) for group in arx.groups]
+    return max(reports, key=lambda report: (not report.sufficient, report.condition))
+
+
+def _report(arx: LPVARX, data: Regression, group: Group) -> ExcitationReport:
+    regressors = arx.regressors(group)
+    names, n = tuple(arx.regressor_names[i] for i in regressors), len(regressors)
+    values, directions = spectrum(data.phi[:, regressors])
     rank = int(np.sum(values > RANK_TOLERANCE * max(values[0], 1e-300)))
-    distinct, needed = distinct_values(data.p, arx.basis.high - arx.basis.low), arx.basis.distinct_values
-    occupancy, edges = np.histogram(data.p, bins=BINS, range=(arx.basis.low, arx.basis.high))
+    ranges, scheduling = arx.basis.ranges, ", ".join(arx.parameters)
+    distinct, needed = distinct_values(data.p, ranges), arx.basis.distinct_values
+    bins = [np.histogram(p, bins=BINS, range=limits) for p, limits in zip(data.p.reshape(len(data.p), -1).T, ranges, strict=True)]
+    occupancy, edges = (np.array(parts[0] if len(ranges) == 1 else parts) for parts in zip(*bins, strict=True))
     weakest = directions[-1]
     reason = ""
     if len(data.phi) < n:
@@ -98,18 +112,19 @@ def excitation_of(arx: LPVARX, data: Regression) -> ExcitationReport:
             f"record longer, or lower na, nb or the size of the basis ({data.dropped} samples had no complete regressor)"
         )
     elif distinct < needed:
+        smaller = f" (a polynomial of degree {distinct - 1} at most)" if len(ranges) == 1 else ""
         reason = (
-            f"{arx.scheduling} takes {distinct} distinct values and {arx.basis} needs {needed}; "
-            f"let {arx.scheduling} visit more values, or choose a smaller basis (a polynomial of degree {distinct - 1} at most)"
+            f"{scheduling} takes {distinct} distinct values and {arx.basis} needs {needed}; "
+            f"let {scheduling} visit more values, or choose a smaller basis{smaller}"
         )
     elif rank < n:
         reason = (
             f"the regressors have rank {rank} of {n}: the data do not determine {direction_in_words(weakest, names)}; "
-            f"excite the inputs more richly while {arx.scheduling} moves, or lower na, nb or the size of the basis"
+            f"excite the inputs more richly while {scheduling} moves, or lower na, nb or the size of the basis"
         )
     return ExcitationReport(
         names, len(data.phi), rank, values, values[0] / values[-1] if values[-1] > 0 else np.inf, distinct, needed,
-        edges, occupancy, weakest, arx.scheduling, reason,
+        edges, occupancy, weakest, scheduling, reason, tuple(arx.outputs[y] for y in group.outputs),
     )  # fmt: skip
 
 
@@ -127,9 +142,14 @@ def spectrum(phi: Array) -> tuple[Array, Array]:
     return np.pad(values, (0, n - len(values))), directions
 
 
-def distinct_values(p: Array, width: float) -> int:
-    """Number of scheduling values further apart than rounding, `width` the range of the basis."""
-    return 0 if len(p) == 0 else 1 + int(np.sum(np.diff(np.sort(p)) > DISTINCT_TOLERANCE * width))
+def distinct_values(p: Array, ranges: Sequence[tuple[float, float]]) -> int:
+    """Number of scheduling points p (m,) or (m, parameters) further apart than rounding, measured by the ranges of the basis."""
+    if len(p) == 0:
+        return 0
+    scaled = p.reshape(len(p), -1) / [high - low for low, high in ranges]
+    if len(ranges) == 1:
+        return 1 + int(np.sum(np.diff(np.sort(scaled[:, 0])) > DISTINCT_TOLERANCE))
+    return len(np.unique(np.round(scaled / DISTINCT_TOLERANCE), axis=0))
 
 
 def direction_in_words(direction: Array, names: tuple[str, ...], parts: int = 3) -> str:

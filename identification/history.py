@@ -29,7 +29,7 @@ class History:
     dt: float
     outputs: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
-    scheduling: Signal
+    scheduling: Signal | tuple[Signal, ...]
     dropped: int
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.excitation import RANK_TOLERANCE, column_scale, direction_in_words, spectrum
 from identification.least_squares import least_squares
-from identification.regressors import Regression, basis_values, regressor_rows
+from identification.regressors import Regression, basis_values, regressor_rows, scheduling_values
 from identification.structure import LPVARX
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FlightRecord
@@ -54,7 +54,18 @@ def instrumental_variables(arx: LPVARX, records: Sequence[FlightRecord], data: R
     """
     W = np.vstack([_instrument_rows(arx, record, instruments) for record in records])[data.rows]
     known = np.isfinite(W).all(axis=1)
-    W, phi, y = W[known], data.phi[known], data.y[known]
+    W = W[known]
+    Q = _range(W) if len(W) else W
+    theta = np.zeros((arx.n_regressors, arx.ny))
+    for group in arx.groups:
+        regressors, outputs = arx.regressors(group), np.array(group.outputs)
+        names = tuple(arx.regressor_names[i] for i in regressors)
+        phi, y = data.phi[known][:, regressors], data.y[known][:, outputs]
+        theta[regressors[:, None], outputs] = _two_stages(phi, y, W, Q, names, instruments)
+    return theta
+
+
+def _two_stages(phi: Array, y: Array, W: Array, Q: Array, names: tuple[str, ...], instruments: Instruments) -> Array:
     n = phi.shape[1]
     if W.shape[1] < n or len(W) < W.shape[1]:
         raise ExcitationError(
@@ -62,11 +73,10 @@ def instrumental_variables(arx: LPVARX, records: Sequence[FlightRecord], data: R
             f"instruments as coefficients and more samples than both; name more signals, or change the window or lags of Instruments"
         )
     scale = column_scale(phi)
-    Q = _range(W)
     first_stage = Q.T @ (phi / scale)
     values, directions = spectrum(first_stage)
     if values[-1] <= RANK_TOLERANCE * values[0]:
-        missing = direction_in_words(directions[-1], arx.regressor_names)
+        missing = direction_in_words(directions[-1], names)
         raise ExcitationError(
             f"the instruments {', '.join(instruments.signals)} leave undetermined: {missing}; "
             f"excite more inputs, name more instruments or widen their window"
@@ -76,18 +86,18 @@ def instrumental_variables(arx: LPVARX, records: Sequence[FlightRecord], data: R
 
 def _instrument_rows(arx: LPVARX, record: FlightRecord, instruments: Instruments) -> Array:
     """Instruments (n, m) of every sample of a record, NaN where one is missing."""
-    r, p = record.columns(instruments.signals), record[arx.scheduling]
+    r, p = record.columns(instruments.signals), scheduling_values(arx, record)
     f, y, u = basis_values(arx, p), record.columns(arx.outputs), record.columns(arx.inputs)
     at_lag = arx.scheduling_at == "lag"
     n, parts = len(record), []
-    for lag in instruments.at(record.dt, arx.delay):
+    for lag in instruments.at(record.dt, arx.input_lags.start):
         block = np.full((n, r.shape[1] * f.shape[1]), np.nan)
         for part in record.segments():
             here, then = slice(min(part.start + lag, part.stop), part.stop), slice(part.start, max(part.stop - lag, part.start))
             functions = f[then] if at_lag else f[here]
             block[here] = (r[then][:, :, None] * functions[:, None, :]).reshape(len(functions), -1)
         parts.append(block)
-    offsets = np.full((n, (arx.offset + arx.offset_rate) * f.shape[1]), np.nan)
+    offsets = np.full((n, (arx.offset + arx.offset_rate * len(arx.parameters)) * f.shape[1]), np.nan)
     for part in record.segments():
         if part.stop - part.start > arx.memory:
             offsets[part.start + arx.memory : part.stop] = regressor_rows(

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from identification.excitation import column_scale
+from identification.structure import LPVARX
 from symheli.lpv.arrays import Array
 
 
@@ -19,7 +20,17 @@ def least_squares(phi: Array, y: Array) -> Array:
     return solve_triangular(R, Q.T @ y) / scale[:, None]
 
 
-def residual_covariance(phi: Array, y: Array, theta: Array) -> Array:
-    """Covariance (ny, ny) of y - phi theta, per degree of freedom left."""
+def least_squares_by_group(arx: LPVARX, phi: Array, y: Array) -> Array:
+    """theta (n_regressors, ny) of a structure, each equation with its own regressors; zero where it has none."""
+    theta = np.zeros((arx.n_regressors, arx.ny))
+    for group in arx.groups:
+        regressors, outputs = arx.regressors(group), np.array(group.outputs)
+        theta[regressors[:, None], outputs] = least_squares(phi[:, regressors], y[:, outputs])
+    return theta
+
+
+def residual_covariance(arx: LPVARX, phi: Array, y: Array, theta: Array) -> Array:
+    """Covariance (ny, ny) of y - phi theta, per degree of freedom left (geometric mean of those of two outputs)."""
     error = y - phi @ theta
-    return error.T @ error / max(len(phi) - phi.shape[1], 1)
+    left = np.sqrt(np.maximum(len(phi) - np.sum(arx.free, axis=0), 1))
+    return error.T @ error / np.outer(left, left)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
+
+import numpy as np
 
 from identification import prediction, realization
 from identification.coefficients import Coefficients
@@ -18,8 +21,9 @@ from symheli.lpv.arrays import Array, frozen
 class LPVARXModel:
     """A structure with its coefficients `theta` (n_regressors, ny) and the sample period `dt` (s) they belong to.
 
-    `outputs`, `inputs`, `scheduling` carry the units of the record. `residual_covariance` (ny, ny) of the one-step
-    residuals, `rows_used` and `rows_dropped` samples of the fit, `method` how it was fitted, `excitation` the report on the data.
+    `outputs`, `inputs`, `scheduling` (several where the structure has) carry the units of the record. `residual_covariance`
+    (ny, ny) of the one-step residuals, `rows_used` and `rows_dropped` samples of the fit, `method` how it was fitted, `excitation`
+    the report on the data.
     """
 
     structure: LPVARX
@@ -27,7 +31,7 @@ class LPVARXModel:
     dt: float
     outputs: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
-    scheduling: Signal
+    scheduling: Signal | tuple[Signal, ...]
     residual_covariance: Array
     rows_used: int
     rows_dropped: int = 0
@@ -38,12 +42,22 @@ class LPVARXModel:
         arx = self.structure
         object.__setattr__(self, "outputs", signals(self.outputs))
         object.__setattr__(self, "inputs", signals(self.inputs))
+        parameters = signals([self.scheduling] if isinstance(self.scheduling, str) else self.scheduling)
+        object.__setattr__(self, "scheduling", parameters[0] if len(parameters) == 1 else parameters)
         object.__setattr__(self, "theta", frozen(self.theta, "theta", (arx.n_regressors, arx.ny)))
         object.__setattr__(self, "residual_covariance", frozen(self.residual_covariance, "residual covariance", (arx.ny, arx.ny)))
-        if self.outputs != arx.outputs or self.inputs != arx.inputs:
-            raise InputError(f"signals {self.outputs} and {self.inputs} are not those of the structure: {arx.outputs} and {arx.inputs}")
+        own, given = (arx.outputs, arx.inputs, arx.parameters), (self.outputs, self.inputs, parameters)
+        if own != given:
+            raise InputError(f"signals {given} are not those of the structure: {own}")
+        if np.any(self.theta[~arx.free]):
+            raise InputError("theta: coefficients that the structure leaves out must be zero")
         if not self.dt > 0:
             raise InputError(f"dt must be a positive number of seconds, got {self.dt}")
+
+    @property
+    def parameters(self) -> tuple[Signal, ...]:
+        """The scheduling parameters, also where there is one."""
+        return (self.scheduling,) if isinstance(self.scheduling, Signal) else self.scheduling
 
     @property
     def coefficients(self) -> Coefficients:
@@ -72,9 +86,12 @@ class LPVARXModel:
         fit = prediction.fit_percent(record.columns(self.outputs), guess)
         return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)
 
-    def at(self, p: float) -> LinearModel:
-        """The discrete model with the scheduling held at p, in observer form; offsets are left out (deviation dynamics)."""
-        return realization.at(self.coefficients, float(p), self.outputs, self.inputs, self.dt)
+    def at(self, p: float | Sequence[float]) -> LinearModel:
+        """The discrete model with the scheduling held at p (one number a parameter), in observer form.
+
+        The offsets are left out: deviation dynamics.
+        """
+        return realization.at(self.coefficients, p, self.outputs, self.inputs, self.dt)
 
     def to_state_space(self, route: Literal["shifted", "direct"] | None = None) -> LPVStateSpace:
         """The discrete LPV model with static dependence on p(k) that responds exactly as this one, however p moves.
@@ -83,11 +100,12 @@ class LPVARXModel:
         na = nb = delay = 1 the states are the outputs. "direct" (for coefficients at "now"): past outputs and inputs as the state,
         not minimal. None chooses the right one, the wrong one raises `InputError`. The offsets c(p) and d(p) are left
         out: the model describes deviations from the moving trim. The range of p is that of the basis, its rate unlimited:
-        `.with_rate(...)`, `.with_scheduling(...)` say more.
+        `.with_rate(...)`, `.with_scheduling(...)` say more. An `LPVStateSpace` has one scheduling parameter: with several
+        `InputError` is raised.
         """
+        basis, p = realization.one_parameter(self.structure.basis), self.parameters[0]
         build = {"shifted": realization.shifted, "direct": realization.direct}[realization.route_for(self.structure, route)]
-        basis = self.structure.basis
-        scheduling = Scheduling(str(self.scheduling), self.scheduling.unit, basis.low, basis.high)
+        scheduling = Scheduling(str(p), p.unit, basis.low, basis.high)
         return build(self.coefficients, scheduling, self.outputs, self.inputs, self.dt)
 
     def _along(self, record: FlightRecord) -> prediction.Recursion:

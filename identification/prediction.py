@@ -31,9 +31,9 @@ class Recursion:
     def along(cls, arx: LPVARX, theta: Array, record: FlightRecord) -> Recursion:
         """The coefficients at every sample of `record`, and all that inputs and scheduling contribute."""
         s = Samples.of(arx, record)
-        n, split = len(record), arx.na * arx.ny * arx.basis.size
+        n, na, split = len(record), len(arx.output_lags), sum(len(t.signals) for t in arx.terms if t.kind == "output") * arx.basis.size
         by_lag = Coefficients.of(arx, theta).A
-        A, known = np.full((n, arx.na, arx.ny, arx.ny), np.nan), np.full((n, arx.ny), np.nan)
+        A, known = np.full((n, na, arx.ny, arx.ny), np.nan), np.full((n, arx.ny), np.nan)
         for part in s.segments:
             rows = slice(part.start + arx.memory, part.stop)
             if rows.start >= rows.stop:

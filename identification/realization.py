@@ -7,7 +7,7 @@ import numpy as np
 from identification.coefficients import Coefficients
 from identification.structure import LPVARX
 from symheli.errors import InputError
-from symheli.lpv import Basis, LinearModel, LPVStateSpace, Matrices, Polynomial, Scheduling, Signal
+from symheli.lpv import Basis, FunctionSpace, LinearModel, LPVStateSpace, Matrices, Polynomial, Scheduling, Signal
 from symheli.lpv.arrays import Array
 
 ROUTES = {"shifted": "lag", "direct": "now"}
@@ -27,6 +27,15 @@ def route_for(arx: LPVARX, route: str | None) -> str:
     )
 
 
+def one_parameter(basis: FunctionSpace) -> Basis:
+    """The basis itself; raises `InputError` where there are several parameters: an `LPVStateSpace` has one."""
+    if isinstance(basis, Basis):
+        return basis
+    raise InputError(
+        f"a state-space model has one scheduling parameter, this one has {basis.dimension}; predict, simulate and at(p) take them all"
+    )
+
+
 def shifted(coefficients: Coefficients, scheduling: Scheduling, outputs: tuple[Signal, ...], inputs: tuple[Signal, ...], dt: float
             ) -> LPVStateSpace:  # fmt: skip
     """Observer form of coefficients taken at the lag; exact for any p(k), order ny max(na, largest input lag).
@@ -35,7 +44,7 @@ def shifted(coefficients: Coefficients, scheduling: Scheduling, outputs: tuple[S
 
     With feedthrough A_i B_0 is a product of two functions of p: it needs a polynomial basis, whose degree doubles.
     """
-    basis, model = coefficients.basis, coefficients
+    basis, model = one_parameter(coefficients.basis), coefficients
     if coefficients.input_lags[:1] == (0,) and coefficients.A.size:
         basis, model = _doubled(coefficients)
     one = _constant(basis)
@@ -52,7 +61,7 @@ def direct(coefficients: Coefficients, scheduling: Scheduling, outputs: tuple[Si
 
     x(k) = [y(k-1) .. y(k-na), u(k-1) .. u(k-L)], L the largest input lag.
     """
-    basis, lags = coefficients.basis, coefficients.input_lags
+    basis, lags = one_parameter(coefficients.basis), coefficients.input_lags
     na, n, ny, nu = *coefficients.A.shape[:3], len(inputs)
     L = max(lags, default=0)
     one, nx = _constant(basis), na * ny + L * nu
@@ -75,9 +84,11 @@ def direct(coefficients: Coefficients, scheduling: Scheduling, outputs: tuple[Si
     return LPVStateSpace(basis, A, B, C, D, scheduling, tuple(states), inputs, outputs, dt)
 
 
-def at(coefficients: Coefficients, p: float, outputs: tuple[Signal, ...], inputs: tuple[Signal, ...], dt: float) -> LinearModel:
+def at(coefficients: Coefficients, p: object, outputs: tuple[Signal, ...], inputs: tuple[Signal, ...], dt: float) -> LinearModel:
     """The model with p held (both structures agree then), in observer form."""
     A, B, _, _ = coefficients.at(p)
+    if A.ndim > 3:
+        raise InputError(f"at: expected one value of p, got {p!r:.80}")
     D = B[0] if coefficients.input_lags[:1] == (0,) else np.zeros((len(outputs), len(inputs)))
     matrices = _companion(A, _by_lag(B, coefficients.input_lags), 1.0, D)
     return LinearModel(*matrices, _state_names(outputs, len(matrices.A) // len(outputs)), inputs, outputs, dt=dt)

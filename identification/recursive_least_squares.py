@@ -88,6 +88,8 @@ class RecursiveLeastSquares:
     floor: float = 1e-3
 
     def __post_init__(self) -> None:
+        if len(self.structure.groups) > 1 or len(self.structure.parameters) > 1:
+            raise InputError('the recursive filter takes one scheduling parameter and the same orders in all equations; fit with "ls"')
         if not 0 < self.forgetting <= 1:
             raise InputError(f"forgetting: expected a factor in (0, 1], got {self.forgetting!r}; 0.99 forgets within 100 samples")
         if not (np.isfinite(self.floor) and self.floor >= 0):
@@ -161,7 +163,7 @@ class RecursiveLeastSquares:
         return History(
             structure=arx, time=record.time, coefficients=coefficients, innovations=innovations, state=state, dt=record.dt,
             outputs=units_of(arx.outputs, [record]), inputs=units_of(arx.inputs, [record]),
-            scheduling=units_of([arx.scheduling], [record])[0], dropped=data.dropped,
+            scheduling=units_of(arx.parameters, [record]), dropped=data.dropped,
         )  # fmt: skip
 
     def _floor_row(self, state: RLSState, peak: Array) -> Array | None:

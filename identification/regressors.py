@@ -17,7 +17,7 @@ from symheli.lpv.arrays import Array
 class Samples:
     """The signals of a structure in one record: y (n, ny), u (n, nu), p (n,), f (n, basis size), and its unbroken `segments`.
 
-    NaN marks what is missing; f is NaN where p is.
+    Several scheduling parameters stand side by side, p (n, parameters). NaN marks what is missing; f is NaN where p is.
     """
 
     y: Array
@@ -29,13 +29,13 @@ class Samples:
     @classmethod
     def of(cls, arx: LPVARX, record: FlightRecord) -> Samples:
         """Raises `UnknownNameError` for a signal the record lacks, `InputError` where p leaves the range of the basis."""
-        p = record[arx.scheduling]
+        p = scheduling_values(arx, record)
         return cls(record.columns(arx.outputs), record.columns(arx.inputs), p, basis_values(arx, p), record.segments())
 
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """y = phi theta + e, one row a usable sample: phi (m, n_regressors), y (m, ny), p (m,), `rows` (m,) in the record.
+    """y = phi theta + e, one row a usable sample: phi (m, n_regressors), y (m, ny), p (m,) or (m, parameters), `rows` (m,) in the record.
 
     `dropped` counts the samples without a complete regressor: the first ones after a start or a gap, and those NaN touches.
     """
@@ -47,10 +47,16 @@ class Regression:
     dropped: int
 
 
+def scheduling_values(arx: LPVARX, record: FlightRecord) -> Array:
+    """p of a record: (n,) for one parameter, (n, parameters) for several."""
+    p = record.columns(arx.parameters)
+    return p[:, 0] if len(arx.parameters) == 1 else p
+
+
 def basis_values(arx: LPVARX, p: Array) -> Array:
     """The basis at each p (n, size), NaN where p is NaN."""
     out = np.full((len(p), arx.basis.size), np.nan)
-    known = np.isfinite(p)
+    known = np.isfinite(p.reshape(len(p), -1)).all(axis=1)
     out[known] = arx.basis(p[known])
     return out
 
@@ -58,9 +64,10 @@ def basis_values(arx: LPVARX, p: Array) -> Array:
 def regressor_rows(arx: LPVARX, y: Array, u: Array, p: Array, f: Array, kinds: Iterable[str] | None = None) -> Array:
     """phi(k) for k = memory .. n-1 of n consecutive samples, shape (n - memory, number of regressors); NaN where a part is missing.
 
-    Only the terms of `kinds` where given. An output enters as -y, so that the coefficients are those of A_i.
+    Only the terms of `kinds` where given. These are the regressors of all equations, each uses its own (`arx.free`). An output
+    enters as -y, so that the coefficients are those of A_i.
     """
-    n, first = len(p), arx.memory
+    n, first, moving = len(p), arx.memory, p.reshape(len(p), -1)
     blocks = []
     for term in arx.terms:
         if kinds is not None and term.kind not in kinds:
@@ -68,13 +75,13 @@ def regressor_rows(arx: LPVARX, y: Array, u: Array, p: Array, f: Array, kinds: I
         now, functions = slice(first - term.lag, n - term.lag), f[first - term.p_lag : n - term.p_lag]
         match term.kind:
             case "output":
-                signal = -y[now]
+                signal = -y[now][:, list(term.signals)]
             case "input":
-                signal = u[now]
+                signal = u[now][:, list(term.signals)]
             case "offset":
                 signal = np.ones((n - first, 1))
             case "increment":
-                signal = (p[first:] - p[now])[:, None]
+                signal = moving[first:] - moving[now]
         blocks.append((signal[:, :, None] * functions[:, None, :]).reshape(n - first, -1))
     return np.hstack(blocks) if blocks else np.zeros((n - first, 0))
 

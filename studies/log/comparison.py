@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from identification import LPVARX, LPVARXModel, Polynomial, fit
+from identification import LPVARX, LPVARXModel, fit
 from symheli.errors import InputError
 from symheli.lpv import FlightRecord
 
@@ -44,8 +44,7 @@ class Comparison:
     @property
     def low_high(self) -> tuple[float, float]:
         """Range of the scheduling the basis covers."""
-        basis = self.scheduled.structure.basis
-        return basis.low, basis.high
+        return self.scheduled.structure.basis.ranges[0]
 
     def verdict(self) -> list[str]:
         """Where scheduling pays and where it does not, in sentences."""
@@ -73,7 +72,7 @@ def compare(structure: LPVARX, training: FlightRecord, test: FlightRecord | None
     """Fit `structure`, and the same with constant coefficients where it has moving ones, by least squares."""
     basis = structure.basis
     structures = {f"LPV, degree {basis.size - 1}": structure} if basis.size > 1 else {}
-    structures["LTI"] = replace(structure, basis=Polynomial(0, basis.low, basis.high))
+    structures["LTI"] = structure.lti()
     return Comparison(tuple(_scored(label, arx, training, test) for label, arx in structures.items()), training, test)
 
 

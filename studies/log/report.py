@@ -15,10 +15,10 @@ from symheli.lpv import FlightRecord
 def facts(log: Path, kind: str, record: FlightRecord, rows: int, outside: int, result: Comparison) -> dict[str, Any]:
     """What was read and used: `rows` in the file, `outside` --start and --stop, and what became of the rest."""
     model, test = result.scheduled, result.test
-    name = model.structure.scheduling
-    seen = result.training[name]
+    scheduling = model.parameters[0]
+    seen = result.training[scheduling]
     low, high = float(np.nanmin(seen)), float(np.nanmax(seen))
-    ahead = np.zeros(0) if test is None else test[name]
+    ahead = np.zeros(0) if test is None else test[scheduling]
     return {
         "log": log.name,
         "format": kind,
@@ -34,8 +34,8 @@ def facts(log: Path, kind: str, record: FlightRecord, rows: int, outside: int, r
         "training_samples": len(result.training),
         "training_samples_without_full_regressor": model.rows_dropped,
         "held_out_samples": len(ahead),
-        "scheduling": str(model.scheduling),
-        "scheduling_unit": model.scheduling.unit,
+        "scheduling": str(scheduling),
+        "scheduling_unit": scheduling.unit,
         "scheduling_range": list(result.low_high),
         "scheduling_range_of_training": [low, high],
         "held_out_samples_beyond_training": int(np.sum((ahead < low) | (ahead > high))),

@@ -1,6 +1,6 @@
 """The value types that every room shares: pure NumPy, no physics, no solver."""
 
-from symheli.lpv.bases import Basis, Piece, PiecewiseLinear, Polynomial, Spline
+from symheli.lpv.bases import Basis, FunctionSpace, Piece, PiecewiseLinear, Polynomial, Product, Spline
 from symheli.lpv.delay import pade_delay
 from symheli.lpv.flight_record import FlightRecord
 from symheli.lpv.lft import LFT, Block
@@ -20,6 +20,7 @@ __all__ = [
     "Basis",
     "Block",
     "FlightRecord",
+    "FunctionSpace",
     "LPVStateSpace",
     "LinearFamily",
     "LinearModel",
@@ -29,6 +30,7 @@ __all__ = [
     "Piece",
     "PiecewiseLinear",
     "Polynomial",
+    "Product",
     "Scheduling",
     "Signal",
     "Spline",

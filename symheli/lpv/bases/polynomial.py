@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
+from typing import ClassVar
 
 import numpy as np
-from numpy.polynomial import legendre
+from numpy.polynomial import chebyshev, legendre
 
-from symheli.errors import InputError
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases.basis import Basis, Piece, check_range
 
@@ -25,6 +26,9 @@ class Polynomial(Basis):
     degree: int
     low: float
     high: float
+
+    GRADED: ClassVar = ("orthonormal", "legendre", "chebyshev", "scaled", "monomial")
+    """Forms whose j-th function is of degree j: these polynomials, P_j(x), T_j(x), x^j with x in [-1, 1], and p^j in physical units."""
 
     def __post_init__(self) -> None:
         check_range(self.low, self.high)
@@ -65,6 +69,23 @@ class Polynomial(Basis):
             coefficients = np.polynomial.Polynomial(power)(shift).coef
             rows[j, : len(coefficients)] = coefficients
         return frozen(rows, "monomial")
+
+    def form(self, name: str) -> Array:
+        """Matrix T (n, n): f_j = sum_i T[j, i] g_i for the forms in `GRADED` and "bernstein" (over [low, high])."""
+        match name:
+            case "orthonormal":
+                return np.eye(self.size)
+            case "legendre":
+                return np.diag(self._norms)
+            case "chebyshev" | "scaled":
+                power = [legendre.leg2poly(row) for row in np.diag(self._norms)]
+                rows = [chebyshev.poly2cheb(r) for r in power] if name == "chebyshev" else power
+                return np.stack([np.pad(r, (0, self.size - len(r))) for r in rows])
+            case "monomial":
+                return self.monomial
+            case "bernstein":
+                return self.pieces()[0].bernstein
+        raise UnknownNameError("form", name, (*self.GRADED, "bernstein"))
 
     def from_monomial(self, coefficients: object) -> Array:
         """Coefficients in this basis (n, ...) of sum_i p^i M_i with M = `coefficients` (at most n, ...), p in physical units."""
