@@ -8,18 +8,23 @@ from synthesis.cone_program import Solver, installed_solvers
 from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.handling_qualities import Bandwidth, bandwidth
 from synthesis.l2_gain import l2_gain, stability
+from synthesis.lft import SCALINGS, BoxGain, LFTCertificate, Multiplier, Trial, frozen_box_gain, lft_gain, lft_stability
 from synthesis.lower_bound import LowerBound, Search, lower_bound
 from synthesis.lyapunov import SplineLyapunov
 from synthesis.margins import Margins, disk_margin, loop, margins
 from synthesis.proof_search import Relaxation
 
 __all__ = [
+    "SCALINGS",
     "Attempt",
     "Bandwidth",
+    "BoxGain",
     "Certificate",
     "FrozenGain",
+    "LFTCertificate",
     "LowerBound",
     "Margins",
+    "Multiplier",
     "Relaxation",
     "Search",
     "Seconds",
@@ -27,11 +32,15 @@ __all__ = [
     "SplineLyapunov",
     "Status",
     "Trajectory",
+    "Trial",
     "bandwidth",
     "disk_margin",
+    "frozen_box_gain",
     "frozen_gain",
     "installed_solvers",
     "l2_gain",
+    "lft_gain",
+    "lft_stability",
     "loop",
     "lower_bound",
     "margins",

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from symheli.lpv import LPVStateSpace
+from symheli.lpv import LinearModel, LPVStateSpace
 
 Array = np.ndarray
 
@@ -31,22 +31,26 @@ class Scaling(NamedTuple):
 
 
 def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
-    """From a Lyapunov solution at mid-range, where P(p) is then near the identity; `gain` is the expected one.
+    """From a Lyapunov solution at mid-range, where P(p) is then near the identity; `gain` is the expected one."""
+    return model_scaling(lpv.at(lpv.scheduling.middle), gain)
+
+
+def model_scaling(model: LinearModel, gain: float) -> Scaling:
+    """The same from one frozen model.
 
     The states are balanced first (Osborne), so that their units do not matter. Falls back to balancing alone where the
-    frozen model at mid-range is not stable.
+    model is not stable.
     """
-    model = lpv.at(lpv.scheduling.middle)
-    n = len(lpv.states)
+    n = len(model.states)
     channel = gain if np.isfinite(gain) and gain > 0 else 1.0
     balanced, factors = linalg.matrix_balance(model.A, permute=False, separate=True)
     D = np.asarray(factors[0], dtype=float)
     A = np.asarray(balanced)
     time = 1.0
-    if lpv.dt is None:
+    if model.dt is None:
         fastest = np.abs(np.linalg.eigvals(A))
         time = 1.0 / float(np.median(fastest)) if np.median(fastest) > 0 else 1.0
-    X = _lyapunov(A, lpv.dt is None)
+    X = _lyapunov(A, model.dt is None)
     root = np.eye(n) if X is None else linalg.inv(linalg.cholesky(X / np.exp(np.linalg.slogdet(X)[1] / n)))
     right = D[:, None] * root
     B, C = linalg.solve(right, model.B), model.C @ right

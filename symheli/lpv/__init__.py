@@ -3,7 +3,7 @@
 from symheli.lpv.bases import Basis, FunctionSpace, Piece, PiecewiseLinear, Polynomial, Product, Spline
 from symheli.lpv.delay import pade_delay
 from symheli.lpv.flight_record import FlightRecord
-from symheli.lpv.lft import LFT, Block
+from symheli.lpv.lft import LFT, Block, HoldError, Truncation, WellPosedness, append, connect, feedback, parallel, series
 from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
@@ -21,6 +21,7 @@ __all__ = [
     "Block",
     "FlightRecord",
     "FunctionSpace",
+    "HoldError",
     "LPVStateSpace",
     "LinearFamily",
     "LinearModel",
@@ -35,9 +36,16 @@ __all__ = [
     "Signal",
     "Spline",
     "TrimSchedule",
+    "Truncation",
+    "WellPosedness",
+    "append",
     "chordal_distance",
+    "connect",
+    "feedback",
     "nu_gap",
     "pade_delay",
+    "parallel",
+    "series",
     "signals",
     "simulate",
 ]

@@ -52,12 +52,17 @@ def test_constant_model_reduces_to_order_zero():
 def test_star_product_multiplies_transfer_functions():
     first, _ = random_lpv(2, nx=3, nu=2, ny=2, seed=1)
     second, _ = random_lpv(1, nx=2, nu=1, ny=2, seed=2)
-    chain = first.to_lft().star(second.to_lft())
+    other, _ = random_lpv(1, nx=2, nu=1, ny=2, seed=2, scheduling=Scheduling("mass", "kg", 0.0, 13.0))
+    chain, shared = first.to_lft().star(other.to_lft()), first.to_lft().star(second.to_lft())
     omega = np.array([0.1, 1.0, 7.0])
-    assert chain.order == first.to_lft().order + second.to_lft().order
+    assert chain.order == shared.order == first.to_lft().order + second.to_lft().order
     for p1, p2 in ((1.0, 12.0), (6.5, 3.0)):
         product = first.at(p1).frequency_response(omega) @ second.at(p2).frequency_response(omega)
         np.testing.assert_allclose(chain.at(p1, p2).frequency_response(omega), product, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(chain.at(mass=p2, airspeed=p1).frequency_response(omega), product, rtol=1e-9, atol=1e-9)
+        # one parameter of both is one block, and has one value
+        same = first.at(p1).frequency_response(omega) @ second.at(p1).frequency_response(omega)
+        np.testing.assert_allclose(shared.at(p1).frequency_response(omega), same, rtol=1e-9, atol=1e-9)
 
 
 def test_series_of_unequal_widths_or_periods_is_refused():

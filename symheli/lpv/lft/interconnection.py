@@ -1,0 +1,73 @@
+"""Systems connected by the names of their signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import chain
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.lft.algebra import append, close
+from symheli.lpv.lft.model import LFT
+from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.signal import Signal
+
+
+def connect(
+    *systems: LFT | LinearModel, inputs: Sequence[str], outputs: Sequence[str], sums: Mapping[str, Mapping[str, float]] | None = None
+) -> LFT:
+    """One system of several: an input takes the output, or the external input, that has its name.
+
+    `sums` gives an input another source, {input: {signal: gain, ...}} with outputs and external `inputs` as signals.
+    `outputs` are outputs of the systems. Units of connected signals must agree. Raises `InputError` where an input is left
+    open, an output name is used twice, or a loop is singular.
+    """
+    whole = append(*systems)
+    given_inputs = list(chain(*(s.inputs for s in systems)))
+    given_outputs = list(chain(*(s.outputs for s in systems)))
+    twice = sorted({str(y) for y in given_outputs if given_outputs.count(y) > 1})
+    if twice:
+        raise InputError(f"several systems have an output called {', '.join(twice)}; rename all but one")
+    sums = dict(sums or {})
+    for name in sums:
+        if name not in given_inputs:
+            raise UnknownNameError("input", name, sorted(set(map(str, given_inputs))))
+    external = [_external(name, given_inputs) for name in inputs]
+    known = [*given_outputs, *external]
+    K, E = np.zeros((len(given_inputs), len(given_outputs))), np.zeros((len(given_inputs), len(external)))
+    for i, u in enumerate(given_inputs):
+        if u not in sums and u not in known:
+            raise InputError(f"nothing feeds the input {u!s}: no output or external input has that name, nor does sums mention it")
+        both = [name for name in (u,) if u not in sums and u in given_outputs and u in external]
+        if both:
+            raise InputError(f"the input {u!s} could be fed by an output or by an external input of that name; say which in sums")
+        for name, gain in sums.get(str(u), {str(u): 1.0}).items():
+            if name not in known:
+                raise UnknownNameError("output or external input", name, sorted(map(str, known)))
+            if name in given_outputs:
+                j = given_outputs.index(name)  # type: ignore[arg-type]
+                K[i, j] += gain
+                if str(u) not in sums:
+                    _same_unit(u, given_outputs[j])
+            else:
+                E[i, external.index(name)] += gain  # type: ignore[arg-type]
+    F = np.zeros((len(outputs), len(given_outputs)))
+    for row, name in enumerate(outputs):
+        if name not in given_outputs:
+            raise UnknownNameError("output", name, sorted(map(str, given_outputs)))
+        F[row, given_outputs.index(name)] = 1.0  # type: ignore[arg-type]
+    return close(whole, K, E, F, external, [given_outputs[given_outputs.index(name)] for name in outputs])  # type: ignore[arg-type]
+
+
+def _external(name: str, inputs: Sequence[Signal]) -> Signal:
+    """The external signal, with the unit of the inputs it feeds."""
+    fed = [u for u in inputs if u == name]
+    for u in fed[1:]:
+        _same_unit(u, fed[0])
+    return Signal(name, fed[0].unit) if fed else Signal(name)
+
+
+def _same_unit(one: Signal, other: Signal) -> None:
+    if one.unit != other.unit:
+        raise InputError(f"{one!s} is in {one.unit} on one side and in {other.unit} on the other; convert with a gain in sums")

@@ -1,0 +1,165 @@
+"""From polynomials in one or several parameters to an LFT, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from math import comb
+from typing import Any
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.bases import Polynomial
+from symheli.lpv.lft.model import LFT, Block
+from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.signal import signals
+
+ROUNDING = 1e-11
+"""Of the size of an entry: a power of the parameter below this is rounding."""
+
+
+def from_lpv(lpv: LPVStateSpace) -> LFT:
+    """M(delta) = M_0 + delta M_1 + ... + delta^d M_d by Horner's rule: order d (nx + nu), exact."""
+    if not isinstance(lpv.basis, Polynomial):
+        raise InputError("an LFT needs polynomial (or rational) dependence; interpolate with kind='polynomial' first")
+    stacked = np.block([[lpv.A, lpv.B], [lpv.C, lpv.D]])
+    if (lpv.basis.low, lpv.basis.high) != (lpv.scheduling.low, lpv.scheduling.high):
+        inner = Polynomial(lpv.basis.degree, lpv.scheduling.low, lpv.scheduling.high)
+        nodes = lpv.scheduling.middle + lpv.scheduling.radius * np.cos(np.pi * (np.arange(inner.size) + 0.5) / inner.size)
+        stacked = inner.fit(nodes, np.tensordot(lpv.basis(nodes), stacked, axes=1))
+    power = Polynomial(lpv.basis.degree, -1.0, 1.0).to_monomial(stacked)
+    coefficients = {(i,): M for i, M in enumerate(power)}
+    return _chains(coefficients, (lpv.scheduling,), lpv.states, lpv.inputs, lpv.outputs, lpv.dt)
+
+
+def from_monomials(
+    A: Mapping[Any, Any], B: Mapping[Any, Any], C: Mapping[Any, Any], D: Mapping[Any, Any], parameters: Sequence[Scheduling],
+    dt: float | None, states: Sequence[str] | None, inputs: Sequence[str] | None, outputs: Sequence[str] | None,
+) -> LFT:  # fmt: skip
+    """See `LFT.polynomial`."""
+    parameters = tuple(parameters)
+    given = {name: _coefficients(name, M, len(parameters)) for name, M in (("A", A), ("B", B), ("C", C), ("D", D))}
+    (nx, _), (_, nu), (ny, _) = given["A"][0], given["B"][0], given["C"][0]
+    for name, shape in (("A", (nx, nx)), ("B", (nx, nu)), ("C", (ny, nx)), ("D", (ny, nu))):
+        if given[name][0] != shape:
+            raise InputError(f"{name}: expected matrices of shape {shape}, got {given[name][0]}")
+    zero = {name: np.zeros(shape) for name, (shape, _) in given.items()}
+    whole = {}
+    for exponents in sorted({e for _, matrices in given.values() for e in matrices}):
+        M = {name: matrices.get(exponents, zero[name]) for name, (_, matrices) in given.items()}
+        whole[exponents] = np.block([[M["A"], M["B"]], [M["C"], M["D"]]])
+    return _chains(
+        _normalised(whole, parameters), parameters, signals(states or [f"x{i + 1}" for i in range(nx)]),
+        signals(inputs or [f"u{i + 1}" for i in range(nu)]), signals(outputs or [f"y{i + 1}" for i in range(ny)]), dt,
+    )  # fmt: skip
+
+
+def _coefficients(name: str, matrices: Mapping[Any, Any], count: int) -> tuple[tuple[int, int], dict[tuple[int, ...], Array]]:
+    """(shape, {exponents: matrix}) after checking both."""
+    if not isinstance(matrices, Mapping) or not matrices:
+        raise InputError(f"{name}: expected {{exponents: matrix}} with at least one entry, such as {{{(0,) * count}: {name}0}}")
+    out = {}
+    for key, M in matrices.items():
+        exponents = tuple(key) if isinstance(key, tuple | list) else (key,)
+        if len(exponents) != count or any(int(e) != e or e < 0 for e in exponents):
+            raise InputError(f"{name}: expected {count} exponent(s) >= 0, one a parameter, got {key!r}")
+        out[tuple(int(e) for e in exponents)] = frozen(M, f"{name}{exponents}", (None, None))
+    if len({M.shape for M in out.values()}) > 1:
+        raise InputError(f"{name}: coefficient matrices differ in shape: {', '.join(str(M.shape) for M in out.values())}")
+    return next(iter(out.values())).shape, out  # type: ignore[return-value]
+
+
+def _normalised(whole: Mapping[tuple[int, ...], Array], parameters: Sequence[Scheduling]) -> dict[tuple[int, ...], Array]:
+    """Coefficients in delta of a polynomial in p = middle + radius delta."""
+    out: dict[tuple[int, ...], Array] = {}
+    for exponents, M in whole.items():
+        for powers in product(*(range(e + 1) for e in exponents)):
+            factor = 1.0
+            for s, e, k in zip(parameters, exponents, powers, strict=True):
+                factor *= comb(e, k) * s.radius**k * s.middle ** (e - k)
+            out[powers] = out.get(powers, np.zeros_like(M)) + factor * M
+    return out
+
+
+def _chains(
+    coefficients: Mapping[tuple[int, ...], Array],
+    parameters: Sequence[Scheduling],
+    states: Any,
+    inputs: Any,
+    outputs: Any,
+    dt: float | None,
+) -> LFT:
+    """One signal delta^a v a monomial a, made from that of the monomial before by one more factor; v is the input of M."""
+    m = len(parameters)
+    zero: tuple[int, ...] = (0,) * m
+    needed: set[tuple[int, ...]] = {zero}
+    for exponents in coefficients:
+        while exponents not in needed:
+            needed.add(exponents)
+            exponents = _before(exponents)[1]
+    # sorted by parameter, so that each has one block
+    chain = sorted(needed - {zero}, key=lambda e: (_before(e)[0], e))
+    rows, width = next(iter(coefficients.values())).shape
+    n = len(chain) * width
+    M11, M12, M21 = np.zeros((n, n)), np.zeros((n, width)), np.zeros((rows, n))
+    for k, exponents in enumerate(chain):
+        here, before = slice(k * width, (k + 1) * width), _before(exponents)[1]
+        if before == zero:
+            M12[here] = np.eye(width)
+        else:
+            j = chain.index(before)
+            M11[here, j * width : (j + 1) * width] = np.eye(width)
+        if exponents in coefficients:
+            M21[:, here] = coefficients[exponents]
+    blocks = tuple(Block(s, width * sum(_before(e)[0] == i for e in chain)) for i, s in enumerate(parameters))
+    return LFT(M11, M12, M21, coefficients.get(zero, np.zeros((rows, width))), blocks, states, inputs, outputs, dt)
+
+
+def _before(exponents: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
+    """(parameter of the last factor, monomial without it)."""
+    i = max(k for k, e in enumerate(exponents) if e)
+    return i, (*exponents[:i], exponents[i] - 1, *exponents[i + 1 :])
+
+
+def powers(lft: LFT) -> list[Array] | None:
+    """Coefficients M_0, M_1, ... of delta for one parameter, None where the dependence is not polynomial."""
+    out, right = [lft.M22], lft.M12
+    for _ in range(2 * lft.order):
+        out.append(lft.M21 @ right)
+        right = lft.M11 @ right
+    size = np.max([np.abs(M) for M in out[: lft.order + 1]], axis=0)
+    # by Cayley and Hamilton `order` zeros in a row are followed by zeros only
+    while len(out) > 1 and np.all(np.abs(out[-1]) <= ROUNDING * size):
+        out.pop()
+    return out if len(out) <= lft.order + 1 else None
+
+
+def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
+    """See `LFT.to_lpv`."""
+    s, nx = lft.scheduling, len(lft.states)
+    exact = powers(lft)
+    if exact is None and degree is None:
+        raise InputError("this LFT depends on its parameter rationally; to_lpv(degree=...) fits polynomials and reports the misfit")
+    if degree is not None and exact is not None and degree < len(exact) - 1:
+        exact = None
+    if exact is not None:
+        degree = len(exact) - 1 if degree is None else degree
+        M = Polynomial(degree, -1.0, 1.0).from_monomial(np.stack(exact))
+        misfit = None
+    else:
+        assert degree is not None  # noqa: S101 - refused above
+        basis = Polynomial(degree, s.low, s.high)
+        nodes = s.middle + s.radius * np.cos(np.pi * (np.arange(8 * (degree + 1)) + 0.5) / (8 * (degree + 1)))
+        values = lft.matrix((nodes[:, None] - s.middle) / s.radius)
+        M = basis.fit(nodes, values)
+        wrong = np.tensordot(basis(nodes), M, axes=1) - values
+        misfit = Matrices(wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:])
+    # the orthonormal polynomials over [-1, 1] in delta are those over [low, high] in p
+    basis = Polynomial(degree, s.low, s.high)
+    return LPVStateSpace(
+        basis, M[:, :nx, :nx], M[:, :nx, nx:], M[:, nx:, :nx], M[:, nx:, nx:], s, lft.states, lft.inputs, lft.outputs, dt=lft.dt,
+        residuals=misfit,
+    )  # fmt: skip

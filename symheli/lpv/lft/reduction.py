@@ -1,0 +1,128 @@
+"""Fewer copies of the parameters, the same model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from symheli.lpv.arrays import Array
+from symheli.lpv.lft.model import LFT, Block, parts
+
+
+def reduce(lft: LFT, tolerance: float) -> LFT:
+    """See `LFT.reduce`."""
+    return _one_parameter(lft, tolerance) if len(lft.blocks) == 1 else _structured(lft, tolerance)
+
+
+def _one_parameter(lft: LFT, tolerance: float) -> LFT:
+    """Minimal order, exactly.
+
+    M(delta) = M22 + sum_i delta^i M21 M11^(i-1) M12, so the order is the rank of the block Hankel matrix of
+    its Markov parameters, and the singular vectors realize it (Ho-Kalman). Singular values below `tolerance`
+    times the largest count as zero, as does dependence below `tolerance` times the entry itself.
+    """
+    n = lft.order
+    rows, columns = lft.M22.shape
+    markov, power = [], lft.M12
+    while len(markov) < 2 * n + 1 and np.abs(power).max(initial=0) > 0:
+        markov.append(lft.M21 @ power)
+        power = lft.M11 @ power
+    depth = len(markov) if np.abs(power).max(initial=0) == 0 else n
+    markov += [np.zeros((rows, columns))] * (2 * depth - len(markov))
+    if depth == 0:
+        return _projected(lft, [np.zeros((n, 0))], [np.zeros((n, 0))])
+    # what is below rounding of the constant part of an entry is not dependence on the parameter
+    markov = [np.where(np.abs(M) > tolerance * np.abs(lft.M22), M, 0.0) for M in markov]
+    # states and channels of different size: balance rows and columns so that the rank is judged entry by entry
+    size = np.abs(np.stack(markov)).max(axis=0)
+    row_scale, column_scale = equilibrate(size)
+    scaled = [row_scale[:, None] * M * column_scale for M in markov]
+    hankel = np.block([[scaled[i + j] for j in range(depth)] for i in range(depth)])
+    shifted = np.block(
+        [[scaled[i + j + 1] if i + j + 1 < len(scaled) else np.zeros((rows, columns)) for j in range(depth)] for i in range(depth)]
+    )
+    U, s, Vt = np.linalg.svd(hankel)
+    r = int(np.sum(s > tolerance * s[0])) if s[0] > 0 else 0
+    root = np.sqrt(s[:r])
+    M11 = (U[:, :r].T @ shifted @ Vt[:r].T) / root[:, None] / root
+    M12 = root[:, None] * Vt[:r, :columns] / column_scale
+    M21 = U[:rows, :r] * root / row_scale[:, None]
+    return replace(lft, M11=M11, M12=M12, M21=M21, blocks=(Block(lft.blocks[0].scheduling, r),))
+
+
+def _structured(lft: LFT, tolerance: float) -> LFT:
+    """Remove what no input reaches and what no output sees, block by block, all blocks together.
+
+    The subspaces of each parameter's copies that words in the M11 blocks reach (and, transposed, see) are the smallest
+    realization for parameters that do not commute; parameters that do may allow fewer still. Source: Cockburn and
+    Morton, "Linear fractional representations of uncertain systems", Automatica 33 (1997).
+    """
+    size = np.abs(lft.M22)
+    for word in (lft.M21 @ lft.M12, lft.M21 @ lft.M11 @ lft.M12):
+        size = np.maximum(size, np.abs(word))
+    row_scale, column_scale = equilibrate(size)
+    while True:
+        seen = _reached(lft.M11.T, (row_scale[:, None] * lft.M21).T, lft.blocks, tolerance)
+        smaller = _projected(lft, seen, seen)
+        reached = _reached(smaller.M11, smaller.M12 * column_scale, smaller.blocks, tolerance)
+        smaller = _projected(smaller, reached, reached)
+        if smaller.order == lft.order:
+            return smaller
+        lft = smaller
+
+
+def _reached(M11: Array, M12: Array, blocks: tuple[Block, ...], tolerance: float) -> list[Array]:
+    """Orthonormal bases (n_i, r_i) of what the inputs reach in each block."""
+    part = parts([block.size for block in blocks])
+    scale = max(float(np.abs(M12).max(initial=0.0)), 1e-300)
+    bases = [_extended(np.zeros((block.size, 0)), M12[here], tolerance * scale) for block, here in zip(blocks, part, strict=True)]
+    reach = max(float(np.abs(M11).max(initial=0.0)), 1e-300)
+    while True:
+        grown = []
+        for i, here in enumerate(part):
+            images = [M11[here, there] @ bases[j] for j, there in enumerate(part)]
+            grown.append(_extended(bases[i], np.hstack(images), tolerance * reach))
+        if all(a.shape == b.shape for a, b in zip(grown, bases, strict=True)):
+            return grown
+        bases = grown
+
+
+def _extended(basis: Array, columns: Array, threshold: float) -> Array:
+    """The basis together with the directions of `columns` it lacks."""
+    rest = columns
+    for _ in range(2):  # twice is enough for orthogonality to rounding
+        rest = rest - basis @ (basis.T @ rest)
+    if min(rest.shape) == 0:
+        return basis
+    U, s, _ = np.linalg.svd(rest, full_matrices=False)
+    return np.hstack([basis, U[:, s > threshold]])
+
+
+def _projected(lft: LFT, left: list[Array], right: list[Array]) -> LFT:
+    """The LFT with copies z_i = right_i z_i', left_i' right_i = I."""
+    L, R = _diagonal(left), _diagonal(right)
+    blocks = tuple(Block(block.scheduling, basis.shape[1]) for block, basis in zip(lft.blocks, right, strict=True))
+    return replace(lft, M11=L.T @ lft.M11 @ R, M12=L.T @ lft.M12, M21=lft.M21 @ R, blocks=blocks)
+
+
+def _diagonal(parts: list[Array]) -> Array:
+    out = np.zeros((sum(p.shape[0] for p in parts), sum(p.shape[1] for p in parts)))
+    i = j = 0
+    for p in parts:
+        out[i : i + p.shape[0], j : j + p.shape[1]] = p
+        i, j = i + p.shape[0], j + p.shape[1]
+    return out
+
+
+def equilibrate(size: Array, sweeps: int = 5) -> tuple[Array, Array]:
+    """Row and column factors that bring the largest entry of each to about one (zero rows and columns keep 1)."""
+    row, column = np.ones(size.shape[0]), np.ones(size.shape[1])
+    for _ in range(sweeps):
+        scaled = row[:, None] * size * column
+        peak = scaled.max(axis=1, initial=0.0)
+        row = np.where(peak > 0, row / np.sqrt(np.where(peak > 0, peak, 1)), row)
+        scaled = row[:, None] * size * column
+        peak = scaled.max(axis=0, initial=0.0)
+        column = np.where(peak > 0, column / np.sqrt(np.where(peak > 0, peak, 1)), column)
+    return row, column

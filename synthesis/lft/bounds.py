@@ -1,0 +1,141 @@
+"""What no gain of an LFT can undercut: frozen models all over the box, and trajectories along straight lines through it."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from scipy.optimize import minimize
+
+from symheli.lpv import LFT, LPVStateSpace, Scheduling
+from symheli.lpv.lft import Block
+from synthesis.certificate import Trajectory
+from synthesis.frozen import FrozenGain, norm
+from synthesis.lower_bound import LowerBound, Search, growing_trajectory, lower_bound
+
+Array = np.ndarray
+
+
+class BoxGain(NamedTuple):
+    """The largest frozen gain `gamma`, the `p` (m,) and frequency `omega` (rad/s) where it occurs; inf where unstable."""
+
+    gamma: float
+    p: tuple[float, ...]
+    omega: float
+
+
+def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
+    """max over the box of the H-infinity norm of the frozen models: a grid, and a local search from its best points.
+
+    Without channels: 0 where every model of the grid is stable.
+    """
+
+    def at(delta: Array) -> BoxGain:
+        delta = np.clip(delta, -1.0, 1.0)
+        M, x = lft.matrix(delta), len(lft.states)
+        gain, omega = norm(M[:x, :x], M[:x, x:], M[x:, :x], M[x:, x:], lft.dt, tolerance)
+        return BoxGain(gain, _physical(lft, delta), omega)
+
+    m = len(lft.blocks)
+    points = {0: 1, 1: 61, 2: 15, 3: 7}.get(m, 3)
+    grid = np.array(list(product(np.linspace(-1.0, 1.0, points), repeat=m)))
+    values = _at_poles(lft, grid)
+    k = int(values.argmax())
+    if math.isinf(values[k]):
+        return BoxGain(math.inf, _physical(lft, grid[k]), math.nan)
+    best = at(grid[k])
+    if m == 0 or best.gamma == 0.0:
+        return best
+    step = 1.0 / (points - 1)
+    for k in _peaks(values, grid, 2 * step)[:3]:
+        simplex = np.vstack([grid[k], *(grid[k] + step * np.where(grid[k] > 0, -1.0, 1.0) * e for e in np.eye(m))])
+        result: Any = minimize(
+            lambda delta: -min(at(delta).gamma, 1e300), grid[k], method="Nelder-Mead", bounds=[(-1.0, 1.0)] * m,
+            options={"initial_simplex": simplex, "maxfev": 30 * m, "xatol": 1e-6, "fatol": 1e-9 * best.gamma},
+        )  # fmt: skip
+        best = max(best, at(result.x), key=lambda f: f.gamma)
+    return best
+
+
+def _at_poles(lft: LFT, grid: Array) -> Array:
+    """For each delta (K, m) the largest gain at the frequencies of the model's own poles, at rest and of D; inf where unstable."""
+    M, x = lft.matrix(grid), len(lft.states)
+    A, B, C, D = M[:, :x, :x], M[:, :x, x:], M[:, x:, :x], M[:, x:, x:]
+    poles = np.linalg.eigvals(A)
+    stable = np.all(poles.real < 0 if lft.dt is None else np.abs(poles) < 1, axis=1)
+    if not stable.all():
+        return np.where(stable, 0.0, math.inf)
+    if min(B.shape[2], C.shape[1]) == 0:
+        return np.zeros(len(grid))
+    if lft.dt is None:
+        s = 1j * np.concatenate([np.zeros((len(grid), 1)), np.abs(poles), np.abs(poles.imag)], axis=1)
+    else:
+        s = np.exp(1j * np.concatenate([np.zeros((len(grid), 1)), np.abs(np.angle(poles)), np.full((len(grid), 1), math.pi)], axis=1))
+    pencil = s[:, :, None, None] * np.eye(x) - A[:, None]
+    response = C[:, None] @ np.linalg.solve(pencil, np.broadcast_to(B[:, None], (*s.shape, *B.shape[1:]))) + D[:, None]
+    gains = np.linalg.svd(response, compute_uv=False)[..., 0].max(axis=1)
+    return np.maximum(gains, np.linalg.svd(D, compute_uv=False)[..., 0])
+
+
+def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBound:
+    """The best lower bound over p that jumps along a line through the box: its diagonals and its axes.
+
+    One parameter: its whole range. `search` None: the frozen gain.
+    """
+    best = LowerBound(frozen.gamma, None)
+    for start, end in _lines(len(lft.blocks)) if search else ():
+        line = cast(LPVStateSpace, along(lft, start, end))  # asked for matrices, scheduling, states and dt, which an LFT has too
+        found = lower_bound(line, math.inf, frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega), search=search)
+        if found.gamma > best.gamma:
+            best = found._replace(trajectory=found.trajectory and _in_box(lft, found.trajectory, start, end))
+        if math.isinf(best.gamma):
+            break
+    return best
+
+
+def box_growing_trajectory(lft: LFT, search: Search | None) -> Trajectory | None:
+    """A p(t) along such a line on which the free state grows, None where none was found."""
+    for start, end in _lines(len(lft.blocks)) if search else ():
+        found = growing_trajectory(cast(LPVStateSpace, along(lft, start, end)), math.inf, search)
+        if found is not None:
+            return _in_box(lft, found, start, end)
+    return None
+
+
+def along(lft: LFT, start: Array, end: Array) -> LFT:
+    """One parameter s in [-1, 1] that moves all the normalised parameters on a straight line from `start` to `end`."""
+    middle, half = np.repeat(0.5 * (start + end), lft.sizes), np.repeat(0.5 * (end - start), lft.sizes)
+    # w = (middle + half s) z
+    loop = np.eye(lft.order) - lft.M11 * middle
+    M11, M12 = np.linalg.solve(loop, lft.M11 * half), np.linalg.solve(loop, lft.M12)
+    M21 = lft.M21 * half + (lft.M21 * middle) @ M11
+    blocks = (Block(Scheduling("line", "1", -1.0, 1.0), lft.order),)
+    return LFT(M11, M12, M21, lft.M22 + (lft.M21 * middle) @ M12, blocks, lft.states, lft.inputs, lft.outputs, lft.dt)
+
+
+def _lines(m: int) -> list[tuple[Array, Array]]:
+    diagonals = [np.array((-1.0, *signs)) for signs in product((-1.0, 1.0), repeat=max(m - 1, 0))]
+    axes = list(np.eye(m)) if m > 1 else []
+    return [(-d, d) for d in (*diagonals, *axes)] if m else []
+
+
+def _in_box(lft: LFT, line: Trajectory, start: Array, end: Array) -> Trajectory:
+    delta = 0.5 * (start + end) + 0.5 * (end - start) * line.p[:, None]
+    p = np.array([s.middle + s.radius * delta[:, i] for i, s in enumerate(lft.parameters)]).T
+    return Trajectory(line.time, p[:, 0] if len(lft.blocks) == 1 else p)
+
+
+def _physical(lft: LFT, delta: Array) -> tuple[float, ...]:
+    return tuple(float(s.middle + s.radius * d) for s, d in zip(lft.parameters, delta, strict=True))
+
+
+def _peaks(values: Array, grid: Array, spacing: float) -> list[int]:
+    """Indices that no neighbour on the grid exceeds, the largest first."""
+    local = []
+    for k, point in enumerate(grid):
+        near = np.abs(grid - point).max(axis=1) < 1.5 * spacing
+        if values[k] >= values[near].max():
+            local.append(k)
+    return sorted(local, key=lambda k: -values[k])

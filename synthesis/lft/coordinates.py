@@ -1,0 +1,103 @@
+"""Coordinates in which the LMI of an LFT has numbers of order one."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from symheli.lpv import LFT
+from symheli.lpv.lft.model import parts
+from synthesis.scaling import Scaling, model_scaling
+
+Array = np.ndarray
+
+
+class Loop(NamedTuple):
+    """dx/dt (or x(k+1)) = A x + Bw w + Bu u, z = Cz x + Dzw w + Dzu u, y = Cy x + Dyw w + Dyu u, w = Delta z."""
+
+    A: Array
+    Bw: Array
+    Bu: Array
+    Cz: Array
+    Dzw: Array
+    Dzu: Array
+    Cy: Array
+    Dyw: Array
+    Dyu: Array
+
+
+class Coordinates(NamedTuple):
+    """`units` of state, output and time; z = right z', w = right w' with left = right^-1 and both commuting with Delta."""
+
+    units: Scaling
+    left: Array
+    right: Array
+
+
+def split(lft: LFT) -> Loop:
+    """The nine matrices of the LFT as it is."""
+    x = len(lft.states)
+    return Loop(
+        lft.M22[:x, :x], lft.M21[:x], lft.M22[:x, x:], lft.M12[:, :x], lft.M11, lft.M12[:, x:],
+        lft.M22[x:, :x], lft.M21[x:], lft.M22[x:, x:],
+    )  # fmt: skip
+
+
+def scaled(lft: LFT, coordinates: Coordinates) -> Loop:
+    """The LFT in these coordinates: outputs divided by the channel, time in its unit, energies keep their ratios."""
+    (left, right, channel, time), L, R = coordinates.units, coordinates.left, coordinates.right
+    loop, root = split(lft), np.sqrt(time)
+    return Loop(
+        time * left @ loop.A @ right, root * left @ loop.Bw @ R, root * left @ loop.Bu,
+        root * L @ loop.Cz @ right, L @ loop.Dzw @ R, L @ loop.Dzu,
+        root * loop.Cy @ right / channel, loop.Dyw @ R / channel, loop.Dyu / channel,
+    )  # fmt: skip
+
+
+def coordinates(lft: LFT, gain: float, *, copies: bool = True) -> Coordinates:
+    """From the model at the middle of the box and an expected `gain`: states by a Lyapunov solution, `copies` of a parameter
+    by balancing what the inputs make of z against what w makes of the outputs (else they stay)."""
+    middle = lft.at(*(s.middle for s in lft.parameters))
+    plain = Coordinates(model_scaling(middle, gain), np.eye(lft.order), np.eye(lft.order))
+    if not copies:
+        return plain
+    loop, n = scaled(lft, plain), lft.order
+    s = _frequencies(loop.A, lft.dt is None)
+    pencil = s[:, None, None] * np.eye(len(loop.A)) - loop.A
+    B, C = np.hstack([loop.Bw, loop.Bu]), np.vstack([loop.Cz, loop.Cy])
+    G = C @ np.linalg.solve(pencil, np.broadcast_to(B, (len(s), *B.shape))) + np.block([[loop.Dzw, loop.Dzu], [loop.Dyw, loop.Dyu]])
+    right = np.zeros((n, n))
+    reach, seen = _spread(G[:, :n, n:], G[:, :n, :n]), _spread(_adjoint(G[:, n:, :n]), _adjoint(G[:, :n, :n]))
+    for part in parts(lft.sizes):
+        right[part, part] = _balancing(reach[part, part], seen[part, part])
+    return Coordinates(plain.units, linalg.inv(right), right)
+
+
+def _frequencies(A: Array, continuous: bool) -> Array:
+    """Points where the loop is looked at, just outside the stability region so that a pole on its border does no harm."""
+    if not continuous:
+        return 1.005 * np.exp(1j * np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 40)]))
+    size = np.abs(np.linalg.eigvals(A)) if len(A) else np.ones(1)
+    omega = np.concatenate([[0.0], np.geomspace(0.3 * max(size.min(), 1e-3 * size.max()), 3 * size.max(), 40)])
+    return 1j * omega + 0.005 * size.max()
+
+
+def _spread(direct: Array, around: Array) -> Array:
+    """Sum over frequencies of H H*, H the direct response and what of it comes around the loop once; a little of everything."""
+    once = direct @ _adjoint(direct)
+    total = np.real(once + around @ once @ _adjoint(around)).sum(axis=0)
+    size = float(np.trace(total)) / max(len(total), 1)
+    return total / size + 1e-6 * np.eye(len(total)) if size > 0 else np.eye(len(total))
+
+
+def _balancing(reach: Array, seen: Array) -> Array:
+    """T with T^-1 reach T^-T = T' seen T, diagonal."""
+    root = linalg.cholesky(reach, lower=True) if len(reach) else reach
+    values, V = linalg.eigh(root.T @ seen @ root) if len(reach) else (np.zeros(0), reach)
+    return root @ V / np.maximum(values, 1e-300) ** 0.25
+
+
+def _adjoint(G: Array) -> Array:
+    return np.conj(np.swapaxes(G, -1, -2))

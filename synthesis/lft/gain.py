@@ -1,0 +1,204 @@
+"""Certified L2 gain and stability of an LFT whose parameters are as fast as they like."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv import LFT
+from synthesis.certificate import Seconds, Status, Trajectory
+from synthesis.cone_program import Answer, Candidate, ConeProgram, Solver, solve
+from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
+from synthesis.lft.certificate import LFTCertificate, Trial
+from synthesis.lft.coordinates import coordinates, scaled
+from synthesis.lft.multipliers import Class, Multiplier, check_scaling, multiplier_class
+from synthesis.lft.program import gain_program, inequality, margin_program, unpack
+from synthesis.lft.proof import Evidence, Quadratic
+from synthesis.lower_bound import THOROUGH, LowerBound, Search
+
+Array = np.ndarray
+
+INFLATION = 1e-6
+"""gamma^2 is raised by this fraction above what the proof admits in floating point, so that an exact check has room."""
+
+MARGINS = (1e-7, 1e-6, 1e-5, 1e-3)
+"""The (x, w) block is held below -margin I in scaled coordinates, tried in turn until the answer is verified."""
+
+NOTHING = 1e-6
+"""A largest margin below this (P <= I, scaled) counts as none: the solver is no more accurate than that."""
+
+
+def lft_gain(
+    lft: LFT, scaling: str = "DG", *, solver: Solver | str = "CLARABEL", search: Search | None = THOROUGH
+) -> LFTCertificate:  # fmt: skip
+    """Certified upper bound of the L2 gain of `lft` over every p(t) in its box, as fast as it likes.
+
+    `scaling`: "small gain", "D", "DG" or "full block", from the most conservative to the least (see `multipliers`). The gain
+    is recomputed from P and the multiplier alone and verified. `search` looks for the worst trajectory (None: the frozen gain
+    is the lower bound). Raises `InputError`, `SolverError`; a failed solve is a certificate with gamma = inf and its reason in
+    `status`. Reduce the LFT first: superfluous copies of a parameter cost time.
+    """
+    solver = _checked(lft, scaling, solver)
+    if not (lft.inputs and lft.outputs):
+        raise InputError(f"a gain needs inputs and outputs, got {len(lft.inputs)} and {len(lft.outputs)}; see lft_stability")
+    start = time.perf_counter()
+    frozen = frozen_box_gain(lft)
+    if math.isinf(frozen.gamma):
+        return _certificate(lft, scaling, solver, None, LowerBound(math.inf, _at_rest(frozen)), math.inf, time.perf_counter() - start)
+    below = box_lower_bound(lft, frozen, search)
+    bounds = time.perf_counter() - start
+    attempt = _Attempt(lft, scaling, solver, below.gamma if math.isfinite(below.gamma) else frozen.gamma)
+    return _certificate(lft, scaling, solver, attempt.gain(), below, frozen.gamma, bounds)
+
+
+def lft_stability(
+    lft: LFT, scaling: str = "DG", *, solver: Solver | str = "CLARABEL", search: Search | None = THOROUGH
+) -> LFTCertificate:  # fmt: skip
+    """Proof that the state decays for every p(t) in the box, as fast as it likes; channels play no part.
+
+    As `lft_gain`: `.verified` is the answer, `.gamma`, `.lower` and `.frozen` are NaN. Where no proof is found, `search` looks
+    for a trajectory along which the state grows.
+    """
+    solver = _checked(lft, scaling, solver)
+    frozen = frozen_box_gain(lft.select(inputs=(), outputs=()))
+    if math.isinf(frozen.gamma):
+        return _certificate(lft, scaling, solver, None, LowerBound(math.nan, _at_rest(frozen)), math.nan, 0.0)
+    found = _Attempt(lft.select(inputs=(), outputs=()), scaling, solver, 1.0).stability()
+    start = time.perf_counter()
+    worst = None if found.proof is not None else box_growing_trajectory(lft, search)
+    return _certificate(lft, scaling, solver, found, LowerBound(math.nan, worst), math.nan, time.perf_counter() - start)
+
+
+class _Attempt:
+    """The cone programs of one LFT and one class of multipliers; what was found and what was tried."""
+
+    def __init__(self, lft: LFT, scaling: str, solver: Solver, gain: float):
+        self.begin = time.perf_counter()
+        self.lft, self.scaling, self.solver = lft, scaling, solver
+        self.sizes = lft.sizes
+        # a small gain means one thing only in the coordinates the LFT has
+        self.evidence = Evidence(lft, coordinates(lft, gain, copies=scaling != "small gain"))
+        self.multipliers: Class = multiplier_class(scaling, self.sizes)
+        self.linear = inequality(scaled(lft, self.evidence.coordinates), self.multipliers, lft.dt is None)
+        self.proof: Quadratic | None = None
+        self.gamma, self.conditioning, self.answer = math.inf, math.inf, Answer.FAILED
+        self.trials: list[Trial] = []
+        self.solving = self.verifying = 0.0
+
+    @property
+    def seconds(self) -> tuple[float, float, float]:
+        """Build, solve and verify, s."""
+        return self.ended - self.begin - self.solving - self.verifying, self.solving, self.verifying
+
+    def gain(self) -> _Attempt:
+        """Minimise the gain; where no answer can be verified, ask for the largest margin of stability."""
+        x, u = len(self.lft.states), len(self.lft.inputs)
+        for margin in MARGINS:
+            candidate = self._solve(gain_program(self.linear, self.multipliers, x, u, margin))
+            self._judge("gain", margin, candidate, (1.0,))
+            self.answer = candidate.answer
+            if self.proof is not None or candidate.answer is Answer.INFEASIBLE:
+                break
+        if self.proof is None:
+            self._largest_margin(10.0 ** np.arange(-2, 10))
+        self.ended = time.perf_counter()
+        return self
+
+    def stability(self) -> _Attempt:
+        """Maximise the margin of stability."""
+        self._largest_margin((1.0,))
+        self.ended = time.perf_counter()
+        return self
+
+    def _largest_margin(self, weights: Array | tuple[float, ...]) -> None:
+        candidate = self._solve(margin_program(self.linear, self.multipliers, len(self.lft.states), len(self.lft.inputs)))
+        margin = math.nan if candidate.x is None else float(candidate.x[-1])
+        self._judge("margin", margin, candidate, weights)
+        if candidate.answer is Answer.SOLVED:
+            self.answer = Answer.INFEASIBLE if margin <= NOTHING else Answer.FAILED
+
+    def _solve(self, program: ConeProgram) -> Candidate:
+        candidate = solve(program, self.solver)
+        self.solving += candidate.seconds
+        return candidate
+
+    def _judge(self, program: str, margin: float, candidate: Candidate, weights: Array | tuple[float, ...]) -> None:
+        """Keep the best multiple of the candidate that can be verified, whatever the solver said of it."""
+        start = time.perf_counter()
+        best = math.inf
+        for weight in weights if candidate.x is not None else ():
+            proof = self._physical(float(weight) * np.asarray(candidate.x))
+            least, conditioning = self.evidence.least_gain(proof)
+            gamma = least * math.sqrt(1 + INFLATION)
+            if math.isinf(least) or not self.evidence.floating(proof, gamma) or gamma >= best:
+                continue
+            self.proof, self.gamma, self.conditioning = proof, gamma, conditioning
+            best = gamma
+        self.verifying += time.perf_counter() - start
+        words = f"{candidate.message}, {'not verified' if self.proof is None else 'verified'}"
+        self.trials.append(Trial(program, margin, words, best))
+
+    def _physical(self, x: Array) -> Quadratic:
+        P, Q, S, R = unpack(x, self.multipliers, len(self.lft.states))
+        units, left, _ = self.evidence.coordinates
+        multiplier = Multiplier(self.scaling, self.sizes, Q, S, R)
+        return Quadratic(units.to_physical(P), multiplier.transformed(left, units.channel**2))
+
+
+def _checked(lft: LFT, scaling: str, solver: Solver | str) -> Solver:
+    if not isinstance(lft, LFT):
+        raise InputError(f"expected an LFT, got {type(lft).__name__}; a polynomial LPVStateSpace becomes one with .to_lft().reduce()")
+    check_scaling(scaling, lft.sizes)
+    if not lft.states:
+        raise InputError("the LFT has no states; its gain is the largest norm of its matrix over the box")
+    return solver if isinstance(solver, Solver) else Solver(solver)
+
+
+def _at_rest(frozen: BoxGain) -> Trajectory:
+    p = np.array([frozen.p])
+    return Trajectory(np.zeros(1), p[:, 0] if p.shape[1] == 1 else p)
+
+
+def _certificate(
+    lft: LFT, scaling: str, solver: Solver, found: _Attempt | None, below: LowerBound, frozen: float, bounds: float
+) -> LFTCertificate:  # fmt: skip
+    """The certificate of what was `found`; None: a frozen model is unstable and nothing was tried."""
+    kind = "stability" if math.isnan(below.gamma) else "l2 gain"
+    proof = found.proof if found else None
+    growing = math.isinf(below.gamma) if kind == "l2 gain" else below.trajectory is not None
+    if proof is not None:
+        status = Status.PROVEN
+    elif found is None:
+        status = Status.UNSTABLE
+    elif growing:
+        status = Status.GROWING
+    else:
+        status = Status.INFEASIBLE if found.answer is Answer.INFEASIBLE else Status.FAILED
+    gamma = math.nan if kind == "stability" else found.gamma if found else math.inf
+    seconds = Seconds(*(found.seconds if found else (0.0, 0.0, 0.0)), bounds)
+    return LFTCertificate(
+        kind, scaling, gamma, below.gamma, frozen, status, proof is not None, proof, _hypotheses(lft, scaling, proof, kind),
+        f"{solver.name} {solver.version}, tolerance {solver.tolerance:g}", seconds, found.conditioning if found else math.inf,
+        tuple(found.trials) if found else (), below.trajectory, found.evidence if found else None,
+    )  # fmt: skip
+
+
+_CLASS = {
+    "small gain": "the parameters together as one full block of norm one, complex and dynamic ones included, in the LFT's own coordinates",
+    "D": "scalings D that commute with the parameters: these may be complex, or operators of norm one",
+    "DG": "scalings D and G: the parameters are real and may jump",
+    "full block": "a full block multiplier, concave in each parameter, positive at the corners of the box",
+}
+
+
+def _hypotheses(lft: LFT, scaling: str, proof: Quadratic | None, kind: str) -> tuple[str, ...]:
+    ranges = ", ".join(f"{s.name} in [{s.low:g}, {s.high:g}]{'' if s.unit == '1' else ' ' + s.unit}" for s in lft.parameters)
+    out = [f"{ranges or 'no parameter'}: exogenous, as fast as it likes; a limit on its rate is not used", f"constant P; {_CLASS[scaling]}"]
+    if proof is not None:
+        out.append("verified in floating point: finitely many matrices; verify(rigorous=True) proves it in exact arithmetic")
+    if kind == "l2 gain":
+        out.append("the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs together")
+    return tuple(out)

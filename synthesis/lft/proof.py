@@ -1,0 +1,155 @@
+"""Is this P and multiplier a proof? Recomputed from the LFT alone, in floating point or in exact rational arithmetic.
+
+Nothing here is shared with the assembly of the cone program: an error there cannot pass here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symheli.lpv import LFT
+from symheli.lpv.lft.model import parts
+from synthesis.lft.coordinates import Coordinates
+from synthesis.lft.multipliers import Multiplier
+from synthesis.verify import positive_definite, rational
+
+Array = np.ndarray
+Number = Callable[[float], Any]
+
+
+class Quadratic(NamedTuple):
+    """V = x'P x and a multiplier, in physical units and in the copies of the parameters the LFT has."""
+
+    P: Array
+    multiplier: Multiplier
+
+
+class Evidence(NamedTuple):
+    """An LFT, and the coordinates in which its numbers are of order one."""
+
+    lft: LFT
+    coordinates: Coordinates
+
+    def least_gain(self, proof: Quadratic) -> tuple[float, float]:
+        """(gain that the proof admits, condition number of P); inf where it proves nothing, NaN without channels."""
+        lft, (units, _, right) = self.lft, self.coordinates
+        E = np.zeros((lft.order + len(lft.states) + len(lft.inputs),) * 2)
+        n, x = lft.order, len(lft.states)
+        root = math.sqrt(units.time)
+        # columns of (w, x, u); energies divided by the channel squared and counted in the unit of time
+        E[:n, :n], E[n : n + x, n : n + x] = right, root * units.right
+        E[n + x :, n + x :] = np.eye(len(lft.inputs))
+        F = E.T @ _left_side(lft, proof, float) @ E / units.channel**2
+        F = 0.5 * (F + F.T)
+        inner, side, corner = F[: n + x, : n + x], F[: n + x, n + x :], F[n + x :, n + x :]
+        if not (self._conditions_hold(proof) and _negative(inner)):
+            return math.inf, math.inf
+        values = np.linalg.eigvalsh(units.to_scaled(proof.P)) if x else np.ones(1)
+        if not len(lft.inputs) or not len(lft.outputs):
+            return math.nan, float(values[-1] / values[0])
+        schur = corner - side.T @ np.linalg.solve(inner, side)
+        g = max(float(np.linalg.eigvalsh(0.5 * (schur + schur.T)).max()), 0.0)
+        return units.channel * math.sqrt(g), float(values[-1] / values[0])
+
+    def floating(self, proof: Quadratic, gamma: float) -> bool:
+        """Eigenvalues, with a margin for rounding."""
+        least = self.least_gain(proof)[0]
+        return math.isnan(least) if math.isnan(gamma) else least < gamma
+
+    def exact(self, proof: Quadratic, gamma: float) -> bool:
+        """LDL' in rationals; the doubles of the LFT, of the proof and of gamma are taken as the rationals they are."""
+        number, n, x = rational(), self.lft.order, len(self.lft.states)
+        if not _structure_holds(proof.multiplier, self.lft):
+            return False
+        F = -_left_side(self.lft, proof, number)
+        if math.isnan(gamma):
+            F = F[: n + x, : n + x]
+        else:
+            for i in range(n + x, len(F)):
+                F[i, i] = F[i, i] + number(gamma) * number(gamma)
+        return all(positive_definite(M) for M in (_exact(proof.P, number), *_conditions(proof.multiplier, number), F))
+
+    def _conditions_hold(self, proof: Quadratic) -> bool:
+        units, right = self.coordinates.units, self.coordinates.right
+        if not _structure_holds(proof.multiplier, self.lft):
+            return False
+        if len(proof.P) and not _negative(-units.to_scaled(proof.P)):
+            return False
+        transforms = [right[part, part] for part in parts(proof.multiplier.sizes)]
+        if proof.multiplier.scaling == "full block":
+            transforms += [right] * 2 ** len(proof.multiplier.sizes)
+        scaled = _conditions(proof.multiplier, float)
+        return all(_negative(-(T.T @ M @ T)) for M, T in zip(scaled, transforms, strict=True))
+
+
+def _left_side(lft: LFT, proof: Quadratic, number: Number) -> Array:
+    """The quadratic form on (w, x, u) with gamma = 0: rows of the LFT are (z, dx/dt or x(k+1), y)."""
+    M11, M12, M21, M22 = (_exact(M, number) for M in (lft.M11, lft.M12, lft.M21, lft.M22))
+    n, x = lft.order, len(lft.states)
+    z = np.concatenate([M11, M12], axis=1)
+    below = np.concatenate([M21, M22], axis=1)
+    move, y = below[:x], below[x:]
+    P = _exact(proof.P, number)
+    Q, S, R = (_exact(M, number) for M in (proof.multiplier.Q, proof.multiplier.S, proof.multiplier.R))
+    F = z.T @ R @ z + y.T @ y
+    cross = S @ z
+    F[:n] = F[:n] + cross
+    F[:, :n] = F[:, :n] + cross.T
+    F[:n, :n] = F[:n, :n] + Q
+    here = slice(n, n + x)
+    if lft.dt is None:
+        slope = P @ move
+        F[here] = F[here] + slope
+        F[:, here] = F[:, here] + slope.T
+    else:
+        F = F + move.T @ P @ move
+        F[here, here] = F[here, here] - P
+    return F
+
+
+def _structure_holds(multiplier: Multiplier, lft: LFT) -> bool:
+    """Exactly: the blocks are those of the LFT, and the multiplier has the form its class promises."""
+    Q, S, R = multiplier.Q, multiplier.S, multiplier.R
+    if multiplier.sizes != lft.sizes or np.any(Q != Q.T) or np.any(R != R.T):
+        return False
+    if multiplier.scaling == "full block":
+        return True
+    owner = np.repeat(np.arange(len(multiplier.sizes)), multiplier.sizes)
+    outside = owner[:, None] != owner[None, :]
+    allowed = np.all(S == -S.T) if multiplier.scaling == "DG" else not np.any(S)
+    scalar = multiplier.scaling != "small gain" or not len(R) or np.array_equal(R, R[0, 0] * np.eye(len(R)))
+    return bool(allowed and scalar and np.array_equal(Q, -R) and not np.any(R[outside]) and not np.any(S[outside]))
+
+
+def _conditions(multiplier: Multiplier, number: Number) -> Iterator[Array]:
+    """What must be positive for the multiplier to hold on the whole box, given its structure."""
+    Q, S, R = (_exact(M, number) for M in (multiplier.Q, multiplier.S, multiplier.R))
+    for part in parts(multiplier.sizes):
+        yield -Q[part, part]
+    if multiplier.scaling == "full block":
+        m = len(multiplier.sizes)
+        for corner in range(2**m):
+            signs = np.repeat([1 if corner >> i & 1 else -1 for i in range(m)], multiplier.sizes)
+            turned = S * signs[:, None]
+            yield Q * signs[:, None] * signs + turned + turned.T + R
+
+
+def _exact(M: Array, number: Number) -> Array:
+    if number is float:
+        return np.array(M, dtype=float)
+    out = np.empty(M.shape, dtype=object)
+    for index, value in np.ndenumerate(M):
+        out[index] = number(float(value))
+    return out
+
+
+def _negative(M: Array) -> bool:
+    """Negative definite by more than rounding can hide."""
+    if not len(M):
+        return True
+    values = np.linalg.eigvalsh(0.5 * (M + M.T))
+    return bool(values[-1] < -20 * len(M) * np.finfo(float).eps * np.abs(values).max())
