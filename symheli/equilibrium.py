@@ -17,6 +17,8 @@ from symheli.lpv.signal import Signal
 
 TOLERANCE = 1e-9
 """Largest residual of any equation at a trim, in its SI unit."""
+ROUNDING = 1e-13
+"""Residual below which another Newton step would only move roundings of accelerations of the size of gravity."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,8 @@ class _Problem:
 
     def __init__(self, heli: Helicopter, condition: FlightCondition):
         self.heli, self.condition = heli, condition
+        self.air, self.turn = condition.air_velocity, np.array([0.0, 0.0, condition.turn_rate])
+        self.wind, self.push = np.array(condition.wind), np.array([condition.acceleration, 0.0, 0.0])
         self.own = [s for s in heli.states[8:] if s != "Om"]
         self.equations = [i for i, s in enumerate(heli.states) if s not in ("phi", "theta", "om_i")]
         self.free = [heli.states.index(Signal(s)) for s in ("phi", "theta", *self.own)]
@@ -144,41 +148,30 @@ class _Problem:
 
     def state(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Full state, input, and wind in body axes."""
-        phi, theta = z[0], z[1]
         x = np.zeros(len(self.heli.states))
         x[self.free] = z[: len(self.free)]
         if "Om" in self.heli.states:
             x[self.heli.states.index(Signal("Om"))] = self.heli.nominal_speed
-        R = _heading_to_body(phi, theta)
-        wind = R @ np.array(self.condition.wind)
-        x[:3] = R @ self.condition.air_velocity + wind
-        x[3:6] = R @ np.array([0.0, 0.0, self.condition.turn_rate])
+        R = _heading_to_body(z[0], z[1])
+        wind = R @ self.wind
+        x[:3] = R @ self.air + wind
+        x[3:6] = R @ self.turn
         return x, z[len(self.free) :], wind
 
     def residual(self, z: np.ndarray) -> np.ndarray:
-        x, u, wind = self.state(z)
-        xdot = self.heli.numeric("rhs")(x, u, wind)[0]
-        xdot[:3] -= _heading_to_body(z[0], z[1]) @ np.array([self.condition.acceleration, 0.0, 0.0])
+        xdot = self.heli.numeric("rhs")(*self.state(z))[0]
+        xdot[:3] -= _heading_to_body(z[0], z[1]) @ self.push
         return xdot
 
     def jacobian(self, z: np.ndarray) -> np.ndarray:
-        x, u, wind = self.state(z)
-        A, B, E = self.heli.numeric("jacobian")(x, u, wind)
-        air, climb = self.condition.air_velocity, np.array([0.0, 0.0, self.condition.turn_rate])
-        push = np.array([self.condition.acceleration, 0.0, 0.0])
-        columns = []
-        for position, index in enumerate(self.free):
-            dx = np.zeros(len(x))
-            dx[index] = 1.0
-            change = np.zeros(len(x))
-            if position < 2:
-                dR = _heading_to_body(z[0], z[1], derivative=position)
-                dwind = dR @ np.array(self.condition.wind)
-                dx[:3], dx[3:6] = dR @ air + dwind, dR @ climb
-                change = E @ dwind
-                change[:3] -= dR @ push
-            columns.append(A @ dx + change)
-        return np.column_stack([*columns, B])[self.equations]
+        A, B, E = self.heli.numeric("jacobian")(*self.state(z))
+        J = np.concatenate([A[:, self.free], B], axis=1)
+        for column in (0, 1):  # the attitude also turns velocity, rates, wind and the demanded acceleration into body axes
+            dR = _heading_to_body(z[0], z[1], derivative=column)
+            dwind = dR @ self.wind
+            J[:, column] += A[:, :3] @ (dR @ self.air + dwind) + A[:, 3:6] @ (dR @ self.turn) + E @ dwind
+            J[:3, column] -= dR @ self.push
+        return J[self.equations]
 
     def solve(self, start: np.ndarray) -> TrimPoint:
         """Newton's method from `start`; MINPACK's hybrid method where it stops descending, then Newton again."""
@@ -190,16 +183,18 @@ class _Problem:
 
     def newton(self, z: np.ndarray, steps: int = 12) -> np.ndarray:
         """Full Newton steps while the largest residual falls."""
-        size = np.abs(self.residual(z)).max()
+        residual = self.residual(z)
         for _ in range(steps):
-            J = self.jacobian(z)
-            if not np.all(np.isfinite(J)) or np.linalg.cond(J) > 1e14:
+            try:
+                better = z - np.linalg.solve(self.jacobian(z), residual[self.equations])
+            except np.linalg.LinAlgError:
                 break
-            better = z - np.linalg.solve(J, self.residual(z)[self.equations])
-            miss = np.abs(self.residual(better)).max()
-            if not miss < size:
+            left = self.residual(better) if np.all(np.isfinite(better)) else np.inf
+            if not np.abs(left).max() < np.abs(residual).max():
                 break
-            z, size = better, miss
+            z, residual = better, left
+            if np.abs(residual).max() < ROUNDING:
+                break
         return z
 
     def point(self, z: np.ndarray) -> TrimPoint:
@@ -218,9 +213,8 @@ class _Problem:
 def _heading_to_body(phi: float, theta: float, derivative: int | None = None) -> np.ndarray:
     """Rotation (3, 3) from forward-right-down axes of the heading to body axes; derivative 0: by phi, 1: by theta."""
     cp, sp, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
-    roll, pitch = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]]), np.array([[ct, 0, -st], [0, 1, 0], [st, 0, ct]])
     if derivative == 0:
-        roll = np.array([[0, 0, 0], [0, -sp, cp], [0, -cp, -sp]])
-    elif derivative == 1:
-        pitch = np.array([[-st, 0, -ct], [0, 0, 0], [ct, 0, -st]])
-    return roll @ pitch
+        return np.array([[0.0, 0.0, 0.0], [cp * st, -sp, cp * ct], [-sp * st, -cp, -sp * ct]])
+    if derivative == 1:
+        return np.array([[-st, 0.0, -ct], [sp * ct, 0.0, -sp * st], [cp * ct, 0.0, -cp * st]])
+    return np.array([[ct, 0.0, -st], [sp * st, cp, sp * ct], [cp * st, -sp, cp * ct]])

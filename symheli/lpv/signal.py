@@ -39,7 +39,10 @@ class Signal(str):
 
 def signals(names: Iterable[str], units: Mapping[str, str] | None = None) -> tuple[Signal, ...]:
     """A tuple of `Signal`s; `units` overrides the known unit by name. Repeated names raise `InputError`."""
-    out = tuple(Signal(n, (units or {}).get(n)) for n in names)
+    if units is None and type(names) is tuple and all(type(n) is Signal for n in names):
+        out = names  # made already: signals never change
+    else:
+        out = tuple(Signal(n, (units or {}).get(n)) for n in names)
     if len(set(out)) != len(out):
         twice = sorted({n for n in out if out.count(n) > 1})
         raise InputError(f"signal names must differ; repeated: {', '.join(twice)}")
