@@ -11,10 +11,8 @@ sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scri
 
 import symheli  # noqa: E402
 from benchmarks.timing import arguments, medians, show  # noqa: E402
-from symheli import inflow  # noqa: E402
 from symheli.integrate import runge_kutta  # noqa: E402
 from symheli.numeric import Numeric  # noqa: E402
-from symheli.rigid_body import gravity_euler  # noqa: E402
 
 CALLS = 200
 
@@ -28,9 +26,7 @@ def main() -> None:
 
     def plain() -> np.ndarray:
         """What a user writes first: the component functions called with floats."""
-        gravity, own = gravity_euler(x[6], x[7]), {"a1": x[8], "b1": x[9]}
-        values, _ = heli._accelerations(list(x), tuple(x[:3]), gravity, own, list(u), inflow.solve)[:2]  # no CasADi
-        return np.array(values, float)
+        return np.array(heli.dynamics.accelerations(list(x), list(u), wind, heli.parameters.array.tolist())[:6], float)  # no CasADi
 
     np.testing.assert_allclose(plain(), fast(x, u, wind)[0][:6], atol=1e-9)
     flight = np.concatenate([x[:6], [1.0, 0, 0, 0], np.zeros(3), x[8:]])

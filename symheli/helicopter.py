@@ -1,25 +1,24 @@
-"""The helicopter: the sum of its parts, as compiled functions of state, input and wind."""
+"""The helicopter: an airframe in air, as compiled functions of state, input and wind."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+import casadi
 import numpy as np
 
 from symheli import inflow
 from symheli.compile import compiled
-from symheli.components import Flow, Motion
-from symheli.drivetrain import ideal_governor, pi_governor
+from symheli.dynamics import INPUTS, Dynamics, Governor, Name
 from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.named_vector import NamedVector
 from symheli.lpv.signal import Signal, signals
 from symheli.numeric import Numeric
-from symheli.rigid_body import GRAVITY, body_to_earth, euler_rates, gravity_euler, quaternion_rates, rotation, translation
-from symheli.symbolic import SX, Function, column, dense, jacobian
+from symheli.symbolic import SX, Function, column
 from symheli.vehicle import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
@@ -28,34 +27,8 @@ if TYPE_CHECKING:
 PRINTED = ("lateral_flapping", "fuselage_downwash", "rotor_reaction")
 """Options that bring back a sign as printed in G15 where this project decided otherwise; see docs/model.md."""
 
-VELOCITY = signals(("u", "v", "w", "p", "q", "r"))
-ATTITUDE = signals(("phi", "theta"))
-QUATERNION = signals(("q0", "q1", "q2", "q3"))
-POSITION = signals(("x_n", "x_e", "x_d"))
 WIND = signals(("u_w", "v_w", "w_w"))
-INPUTS = signals(("d_lon", "d_lat", "d_col", "d_ped"))
-
-Governor = Literal["pi", "ideal"]
-Triple = tuple[Any, Any, Any]
-
-
-def _triple(entry: Callable[[int], Any]) -> Triple:
-    """A vector from its entries by index."""
-    return entry(0), entry(1), entry(2)
-
-
-@dataclass(frozen=True)
-class _Sum:
-    """Everything the parts say at one motion."""
-
-    force: Triple
-    moment: Triple
-    rates: dict[str, Any]
-    added_inertia: Any
-    speed_follows_yaw: float
-    flow: dict[str, Any]
-    switches: dict[str, Any]
-    lam: list[Any]
+DENSITY = Signal("density", "kg/m^3")
 
 
 @dataclass(frozen=True)
@@ -98,17 +71,64 @@ class Helicopter:
         """By the name of a packaged airframe (`symheli.vehicle.vehicles()`) or the path of a vehicle TOML file."""
         return cls(load_vehicle(vehicle), governor, float(density), frozenset(printed), float(smoothing))
 
+    # --- other numbers, same equations -------------------------------------------------------------------------
+
+    @property
+    def parameters(self) -> NamedVector:
+        """Every number of the model by name, in SI: "density", "body.mass", "main_rotor.radius", ..."""
+        return NamedVector(self.dynamics.parameters, np.array(self._values))
+
+    def with_parameters(self, changes: Mapping[str, float]) -> Helicopter:
+        """The same helicopter with other numbers, {"body.mass": 9.0, "density": 1.1} in SI; names as in `parameters`.
+
+        Nothing is built or compiled anew: the compiled functions take the parameters as an argument.
+        """
+        density = changes.get(DENSITY, self.density)
+        vehicle = self.vehicle.with_values({name: value for name, value in changes.items() if name != DENSITY})
+        return self._sharing(replace(self, vehicle=vehicle, density=density))
+
+    def scaled(self, factor: float) -> Helicopter:
+        """The dynamically similar helicopter whose lengths are `factor` N times these, in the same air; see `Vehicle.scaled`.
+
+        Its trim at sqrt(N) times the airspeed is the same in angles, its eigenvalues are N^-0.5 times these.
+        """
+        return self._sharing(replace(self, vehicle=self.vehicle.scaled(factor)))
+
+    def _sharing(self, other: Helicopter) -> Helicopter:
+        other.__dict__.update(dynamics=self.dynamics, _functions=self._functions)
+        return other
+
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """The equations of motion of this arrangement of parts, with every parameter an input."""
+        own = self.vehicle.quantities
+        return Dynamics(
+            self.vehicle.components,
+            {s: {e: q.ref or f"{s}.{e}" for e, q in entries.items()} for s, entries in self.vehicle.sections.items()},
+            (DENSITY, *(Signal(name, q.unit) for name, q in own.items())),
+            self.governor, self.printed, self.smoothing,
+        )  # fmt: skip
+
+    @cached_property
+    def _functions(self) -> dict[str, Function]:
+        """Compiled functions of (x, u, wind, par) by name, filled as they are asked for."""
+        return {}
+
+    @cached_property
+    def _values(self) -> list[float]:
+        return [self.density, *(q.value for q in self.vehicle.quantities.values())]
+
     # --- signals -----------------------------------------------------------------------------------------------
 
     @cached_property
     def states(self) -> tuple[Signal, ...]:
         """States of the Euler form, in order."""
-        return (*VELOCITY, *ATTITUDE, *self._own_states)
+        return self.dynamics.states
 
     @cached_property
     def flight_states(self) -> tuple[Signal, ...]:
         """States of the quaternion form: velocities and rates, quaternion (scalar first), position north east down, the rest."""
-        return (*VELOCITY, *QUATERNION, *POSITION, *self._own_states)
+        return self.dynamics.flight_states
 
     @property
     def inputs(self) -> tuple[Signal, ...]:
@@ -131,44 +151,28 @@ class Helicopter:
         """Commanded rotor speed, rad/s."""
         return self.vehicle.sections["drivetrain"]["nominal_speed"].value
 
-    @cached_property
-    def _own_states(self) -> tuple[Signal, ...]:
-        own = [s for name in self._order for s in self.vehicle.components[name].states]
-        return signals([*own, *(("Om", "om_i") if self.governor == "pi" else ())])
-
     # --- functions ---------------------------------------------------------------------------------------------
 
     @cached_property
     def rhs(self) -> Function:
         """(x, u, wind) -> xdot in Euler form; wind in body axes. Symbolic: call it with numbers or CasADi expressions."""
-        return self._function("rhs", lambda x, u, w: [self._euler(x, u, w, inflow.solve)[0]], ["xdot"])
+        return self.dynamics.function("rhs", self._values)
 
     @cached_property
     def flight_rhs(self) -> Function:
         """(x, u, wind) -> xdot in quaternion form with position; wind in earth axes (north east down)."""
-        return self._function("flight_rhs", lambda x, u, w: [self._quaternion(x, u, w)], ["xdot"], self.flight_states)
+        return self.dynamics.function("flight_rhs", self._values)
 
     @cached_property
     def jacobian(self) -> Function:
-        """(x, u, wind) -> A (nx, nx), B (nx, 4), E (nx, 3): derivatives of xdot, algorithmic, exact through the implicit inflow.
+        """(x, u, wind) -> A (nx, nx), B (nx, 4), E (nx, 3): derivatives of xdot, algorithmic, exact through the implicit inflow."""
+        return self.dynamics.function("jacobian", self._values)
 
-        The inflow enters as a symbol advanced by one Newton step: its derivative there is that of the root. Only then is
-        the solved value put in its place.
-        """
-
-        def build(x: SX, u: SX, w: SX) -> list[SX]:
-            lam = self._euler(x, u, w, inflow.solve)[1].lam
-            symbol = SX.sym("lam", len(lam))
-            position = iter(range(len(lam)))
-
-            def step(*arguments: Any) -> Any:
-                return inflow.newton_step(symbol[next(position)], *arguments)
-
-            xdot = self._euler(x, u, w, step)[0]
-            blocks = [jacobian(xdot, z) for z in (x, u, w)]
-            return Function("J", [x, u, w, symbol], blocks).call([x, u, w, column(lam)], True, False)
-
-        return self._function("jacobian", build, ["A", "B", "E"])
+    @cached_property
+    def diagnostics(self) -> Function:
+        """(x, u, wind) -> every flow quantity and switching function by name (see `Effect`), and the total force X Y Z (N) and
+        moment L M N (N m) of the air and the engine's reaction on the body."""
+        return self.dynamics.function("diagnostics", self._values)
 
     @cached_property
     def implicit(self) -> Function:
@@ -184,10 +188,11 @@ class Helicopter:
         xdot, balance = self.with_inflow(x, u, w, unknown)
         return Function("implicit", [x, u, w, column(lam)], [xdot, balance], ["x", "u", "wind", "lam"], ["xdot", "balance"])
 
-    def with_inflow(self, x: Any, u: Any, wind: Any, unknown: Callable[[], Any]) -> tuple[Any, Any]:
+    def with_inflow(self, x: Any, u: Any, wind: Any, unknown: Callable[[], Any], par: Sequence[Any] | None = None) -> tuple[Any, Any]:
         """(xdot, balance) of the Euler form in CasADi or SymPy expressions; `unknown()` makes the inflow ratio of the next rotor.
 
-        `balance` is the residual of each rotor's momentum balance, 0 where the unknown is its inflow ratio.
+        `balance` is the residual of each rotor's momentum balance, 0 where the unknown is its inflow ratio. `par` has an
+        expression for each of `parameters`, whose values are taken without it.
         """
         balance: list[Any] = []
 
@@ -196,7 +201,7 @@ class Helicopter:
             balance.append(inflow.residual(lam, *arguments))
             return lam
 
-        xdot, _ = self._euler(x, u, wind, solver)
+        xdot, _ = self.dynamics.euler(x, u, wind, self._values if par is None else par, solver)
         return xdot, column(balance)
 
     def sympy(self) -> RightHandSide:
@@ -205,122 +210,27 @@ class Helicopter:
 
         return right_hand_side(self)
 
-    def compiled(self, name: Literal["rhs", "flight_rhs", "jacobian", "diagnostics"]) -> Function:
+    def compiled(self, name: Name) -> Function:
         """One of the functions as machine code where a C compiler is there: the same numbers, faster, numbers only."""
-        return self.numeric(name).function
+        function = self._compiled(name)
+        symbols = [casadi.MX.sym(function.name_in(i), *function.size_in(i)) for i in range(3)]
+        outputs = function.call([*symbols, casadi.DM(self._values)], False, False)
+        return Function(name, symbols, outputs, function.name_in()[:3], function.name_out())
 
-    def numeric(self, name: Literal["rhs", "flight_rhs", "jacobian", "diagnostics"]) -> Numeric:
+    def numeric(self, name: Name) -> Numeric:
         """The compiled function as a fast call on NumPy arrays."""
         kept = self.__dict__.setdefault("_numeric", {})
         if name not in kept:
-            kept[name] = Numeric(compiled(getattr(self, name)))
+            kept[name] = Numeric(self._compiled(name), self._values)
         return kept[name]
 
-    @cached_property
-    def diagnostics(self) -> Function:
-        """(x, u, wind) -> every flow quantity and switching function by name (see `Effect`), and the total force X Y Z (N) and
-        moment L M N (N m) of the air and the engine's reaction on the body."""
-        x, u, w = SX.sym("x", len(self.states)), SX.sym("u", 4), SX.sym("wind", 3)
-        total = self._euler(x, u, w, inflow.solve)[1]
-        wrench = dict(zip("XYZLMN", (*total.force, *total.moment), strict=True))
-        values = {**total.flow, **wrench, **{f"switch: {k}": v for k, v in total.switches.items()}}
-        names = [name.replace(": ", "_").replace(" ", "_") for name in values]
-        return Function("diagnostics", [x, u, w], [dense(v) for v in values.values()], ["x", "u", "wind"], names)
+    def _compiled(self, name: Name) -> Function:
+        if name not in self._functions:
+            self._functions[name] = compiled(self.dynamics.function(name))
+        return self._functions[name]
 
     def switches(self, x: object, u: object, wind: object = (0.0, 0.0, 0.0)) -> dict[str, float]:
         """Value of every switching function at a point."""
-        values = zip(self.diagnostics.name_out(), self.numeric("diagnostics")(x, u, wind), strict=True)
+        function = self.numeric("diagnostics")
+        values = zip(function.function.name_out(), function(x, u, wind), strict=True)
         return {name.removeprefix("switch_").replace("_", " "): float(v[0]) for name, v in values if name.startswith("switch_")}
-
-    # --- the sum of the parts ----------------------------------------------------------------------------------
-
-    @cached_property
-    def _order(self) -> list[str]:
-        """Component sections ordered by the flow they need."""
-        waiting = dict(self.vehicle.components)
-        order: list[str] = []
-        made: set[str] = set()
-        while waiting:
-            ready = [name for name, part in waiting.items() if set(part.needs) <= made]
-            if not ready:
-                lacking = sorted({n for part in waiting.values() for n in part.needs} - made)
-                raise InputError(f"components {', '.join(waiting)} need flow that no component makes: {', '.join(lacking)}")
-            for name in ready:
-                made |= set(waiting.pop(name).makes)
-                order.append(name)
-        return order
-
-    @cached_property
-    def _parameters(self) -> dict[str, SimpleNamespace]:
-        extra = {"printed": self.printed, "smoothing": self.smoothing}
-        return {section: SimpleNamespace(**self.vehicle.values(section), **extra) for section in self.vehicle.sections}
-
-    def _sum(self, air: Triple, rates: Triple, own: dict[str, Any], u: Any, solver: Callable[..., Any]) -> _Sum:
-        parameters = self._parameters
-        speed = own["Om"] if self.governor == "pi" else self.nominal_speed
-        motion = Motion(*air, *rates, Om=speed, rho=self.density)
-        controls = {str(name): u[i] for i, name in enumerate(self.inputs)}
-        lam: list[Any] = []
-
-        def solve(*arguments: Any) -> Any:
-            lam.append(solver(*arguments))
-            return lam[-1]
-
-        flow = Flow(solve)
-        effects = []
-        for section in self._order:
-            effect = self.vehicle.components[section].evaluate(parameters[section], motion, controls, own, flow)
-            flow.values.update(effect.flow)
-            effects.append(effect)
-        shaft_torque = sum(effect.shaft_torque for effect in effects)
-        drivetrain = parameters["drivetrain"]
-        drive = (
-            pi_governor(drivetrain, shaft_torque, own["Om"], own["om_i"])
-            if self.governor == "pi"
-            else ideal_governor(drivetrain, shaft_torque)
-        )
-        force = _triple(lambda i: sum(effect.force[i] for effect in effects))
-        moment = _triple(lambda i: sum(effect.moment[i] for effect in effects) - (drive.torque if i == 2 else 0.0))
-        rates_of_own = {name: value for effect in effects for name, value in effect.rates.items()} | drive.rates
-        switches = {name: value for effect in effects for name, value in effect.switches.items()}
-        return _Sum(
-            force, moment, rates_of_own, drive.added_inertia, drive.speed_follows_yaw,
-            {**flow.values, "Q_e": drive.torque}, switches, lam,
-        )  # fmt: skip
-
-    def _accelerations(self, x: Any, air: Triple, gravity: Triple, own: dict[str, Any], u: Any, solver: Callable[..., Any]) -> Any:
-        """(u' v' w' p' q' r'), derivatives of the own states, and the sum."""
-        body = self._parameters["body"]
-        velocity, rates = _triple(lambda i: x[i]), _triple(lambda i: x[3 + i])
-        total = self._sum(air, rates, own, u, solver)
-        linear = translation(*velocity, *rates, gravity, total.force, body.mass)
-        angular = rotation(*rates, total.moment, body.Ixx, body.Iyy, body.Izz, total.added_inertia)
-        derivatives = dict(total.rates)
-        if "Om" in derivatives:
-            derivatives["Om"] = derivatives["Om"] + total.speed_follows_yaw * angular[2]
-        return (*linear, *angular), [derivatives[s] for s in self._own_states], total
-
-    def _own(self, x: Any, first: int) -> dict[str, Any]:
-        return {str(s): x[first + i] for i, s in enumerate(self._own_states)}
-
-    def _euler(self, x: Any, u: Any, wind: Any, solver: Callable[..., Any]) -> tuple[Any, _Sum]:
-        air = _triple(lambda i: x[i] - wind[i])
-        phi, theta = x[6], x[7]
-        accelerations, own, total = self._accelerations(x, air, gravity_euler(phi, theta), self._own(x, 8), u, solver)
-        attitude = euler_rates(phi, theta, x[3], x[4], x[5])[:2]
-        return column([*accelerations, *attitude, *own]), total
-
-    def _quaternion(self, x: Any, u: Any, wind: Any) -> Any:
-        quaternion = (x[6], x[7], x[8], x[9])
-        R = body_to_earth(*quaternion)
-        air = _triple(lambda i: x[i] - sum(R[j][i] * wind[j] for j in range(3)))
-        gravity = _triple(lambda i: R[2][i] * GRAVITY)
-        accelerations, own, _ = self._accelerations(x, air, gravity, self._own(x, 13), u, inflow.solve)
-        position = [sum(R[j][i] * x[i] for i in range(3)) for j in range(3)]
-        return column([*accelerations, *quaternion_rates(*quaternion, x[3], x[4], x[5]), *position, *own])
-
-    def _function(
-        self, name: str, build: Callable[[SX, SX, SX], list[SX]], outputs: list[str], states: tuple[Signal, ...] | None = None
-    ) -> Function:
-        x, u, w = SX.sym("x", len(states or self.states)), SX.sym("u", 4), SX.sym("wind", 3)
-        return Function(name, [x, u, w], build(x, u, w), ["x", "u", "wind"], outputs)

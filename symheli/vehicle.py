@@ -4,121 +4,102 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
 
-from symheli.components import Component, find
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.units import to_si
+from symheli.lpv.units import dimension
+from symheli.part import Part
+from symheli.plausibility import impossibilities
+from symheli.quantity import Quantity
+from symheli.vehicle_file import VehicleFile
 
-BODY = {"mass": "kg", "Ixx": "kg m^2", "Iyy": "kg m^2", "Izz": "kg m^2"}
-DRIVETRAIN = {"nominal_speed": "rad/s", "inertia": "kg m^2", "max_power": "W", "governor_kp": "s/rad", "governor_ki": "1/rad"}
-CONTROLS = dict.fromkeys(("d_lon", "d_lat", "d_col", "d_ped"), "rad")
-_FIXED = {"body": BODY, "drivetrain": DRIVETRAIN, "controls": CONTROLS}
-
-
-class Quantity(NamedTuple):
-    """A value in SI, its SI unit, and where it was published."""
-
-    value: float
-    unit: str
-    source: str
+LINEAR = ".linear.toml"
+"""How the files of identified linear models end; see `symheli.identified`."""
 
 
 @dataclass(frozen=True)
 class Vehicle:
-    """An airframe: quantities by section and entry, and the component of each remaining section."""
+    """An airframe: quantities by section and entry, and the part that each other section is."""
 
     name: str
     title: str
     source: str
     sections: Mapping[str, Mapping[str, Quantity]]
-    components: Mapping[str, Component]
+    components: Mapping[str, Part]
 
     def values(self, section: str) -> dict[str, float]:
         """{entry: value in SI} of a section."""
         return {entry: quantity.value for entry, quantity in self.sections[section].items()}
 
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """{"section.entry": quantity} of every entry that has a value of its own."""
+        return {f"{s}.{e}": q for s, entries in self.sections.items() for e, q in entries.items() if not q.ref}
+
+    @property
+    def assumed(self) -> list[str]:
+        """Names of the entries that are assumptions."""
+        return [name for name, quantity in self.quantities.items() if quantity.assumed]
+
+    def with_values(self, changes: Mapping[str, float], source: str = "set by hand") -> Vehicle:
+        """The same airframe with other values (SI), {"body.mass": 9.0}; entries that refer to a changed one follow it."""
+        for name, value in changes.items():
+            if name not in self.quantities:
+                raise UnknownNameError("parameter", name, self.quantities)
+            if not isinstance(value, int | float) or not math.isfinite(value):
+                raise InputError(f"{name}: expected a finite number in {self.quantities[name].unit}, got {value!r}")
+        changed = self._map(
+            lambda name, q: q._replace(value=float(changes[name]), source=f"{source}, was {q.value:g}") if name in changes else q
+        )
+        for section, entry, wrong in impossibilities(changed.sections, changed.components):
+            raise InputError(f"{self.title}, {section}.{entry}: {wrong}")
+        return changed
+
+    def scaled(self, factor: float) -> Vehicle:
+        """The Froude-scaled airframe: lengths times `factor` N, masses N^3, times sqrt(N), so that gravity and air density stay.
+
+        The exponent of each entry follows from its unit: mass 3, length 1, time 1/2, so inertias N^5, stiffness N^4,
+        power N^3.5, rotor speed N^-0.5, while angles and ratios stay.
+        """
+        if not (math.isfinite(factor) and factor > 0):
+            raise InputError(f"scaling needs a factor > 0 (length of the copy by length of the original), got {factor}")
+
+        def scale(_: str, q: Quantity) -> Quantity:
+            powers = dimension(q.unit)
+            exponent = 3 * powers.get("kg", 0) + powers.get("m", 0) + powers.get("s", 0) / 2
+            return q._replace(value=q.value * factor**exponent, source=f"{q.source}; Froude-scaled by {factor:g}")
+
+        return replace(self._map(scale), title=f"{self.title}, Froude-scaled by {factor:g}")
+
+    def _map(self, change: Callable[[str, Quantity], Quantity]) -> Vehicle:
+        """Every quantity changed; one that refers to another is changed as the other."""
+        sections = {
+            section: {entry: change(q.ref or f"{section}.{entry}", q) for entry, q in entries.items()}
+            for section, entries in self.sections.items()
+        }
+        return replace(self, sections=sections)
+
 
 def vehicles() -> list[str]:
     """Names of the airframes that come with the package."""
-    return sorted(p.name.removesuffix(".toml") for p in resources.files("symheli.vehicles").iterdir() if p.name.endswith(".toml"))
+    files = [p.name for p in resources.files("symheli.vehicles").iterdir()]
+    return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml") and not name.endswith(LINEAR))
 
 
 def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
-    """Read a packaged airframe by name, or any TOML file by path. Raises `InputError` naming the entry and the unit at fault."""
+    """Read a packaged airframe by name, or any TOML file by path. Raises `InputError` naming file, line, entry and unit."""
     given = os.fspath(name_or_path)
     if given.endswith(".toml"):
         path = Path(given)
         if not path.is_file():
             raise InputError(f"no vehicle file at {given}; packaged airframes: {', '.join(vehicles())}")
-        text, name = path.read_text(encoding="utf-8"), path.stem
+        file, name = VehicleFile(given, path.read_text(encoding="utf-8"), path.parent), path.stem
     else:
         if given not in vehicles():
             raise UnknownNameError("vehicle", given, vehicles())
-        text, name = (resources.files("symheli.vehicles") / f"{given}.toml").read_text(encoding="utf-8"), given
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{given} is not valid TOML: {error}") from error
-    return _Reader(given, text, data).vehicle(name)
-
-
-class _Reader:
-    """Turns the parsed file into quantities, with messages that name entry and line."""
-
-    def __init__(self, path: str, text: str, data: Mapping[str, Any]):
-        self.path, self.lines, self.data = path, text.splitlines(), data
-
-    def vehicle(self, name: str) -> Vehicle:
-        tables = {key: value for key, value in self.data.items() if isinstance(value, dict)}
-        for required in _FIXED:
-            if required not in tables:
-                raise InputError(f"{self.path}: section [{required}] is missing")
-        components = {section: find(table.get("component", section)) for section, table in tables.items() if section not in _FIXED}
-        sections = {}
-        for section in tables:
-            expected = _FIXED.get(section) or components[section].parameters
-            sections[section] = {entry: self.quantity(section, entry, unit) for entry, unit in expected.items()}
-            for entry in tables[section]:
-                if entry not in expected and entry != "component":
-                    raise UnknownNameError(f"entry at {self.where(section, entry)}", entry, expected)
-        return Vehicle(name, self.data.get("title", name), self.data.get("source", ""), sections, components)
-
-    def quantity(self, section: str, entry: str, unit: str) -> Quantity:
-        where = self.where(section, entry)
-        table = self.data[section].get(entry)
-        if table is None:
-            raise InputError(f"{self.path}: [{section}] needs the entry {entry} = {{ value = ..., unit = {unit!r}, source = ... }}")
-        if not isinstance(table, dict):
-            raise InputError(f"{where}: write {{ value = {table}, unit = {unit!r}, source = ... }}: a bare number has no unit")
-        if "ref" in table:
-            other_section, _, other_entry = str(table["ref"]).partition(".")
-            if "ref" in self.data.get(other_section, {}).get(other_entry, {"ref": ""}):
-                raise InputError(f"{where}: ref = {table['ref']!r} must name an entry with a value, as section.entry")
-            return self.quantity(other_section, other_entry, unit)
-        value = table.get("value")
-        if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-            raise InputError(f"{where}: expected a finite number as value, got {value!r}")
-        try:
-            factor, si = to_si(str(table.get("unit")))
-        except UnknownNameError as error:
-            raise InputError(f"{where}: {error}") from error
-        if si != unit:
-            raise InputError(f"{where}: expected a unit that converts to {unit}, got {table.get('unit')}")
-        if not table.get("source"):
-            raise InputError(f"{where}: every number needs a source (or 'assumed')")
-        return Quantity(factor * float(value), unit, str(table["source"]))
-
-    def where(self, section: str, entry: str) -> str:
-        inside = False
-        for number, line in enumerate(self.lines, 1):
-            if line.strip().startswith("["):
-                inside = line.strip() == f"[{section}]"
-            elif inside and line.split("=")[0].strip() == entry:
-                return f"{self.path}, line {number}, {section}.{entry}"
-        return f"{self.path}, {section}.{entry}"
+        file, name = VehicleFile(given, (resources.files("symheli.vehicles") / f"{given}.toml").read_text(encoding="utf-8")), given
+    parts = file.parts()
+    return Vehicle(name, str(file.tables.get("title", name)), str(file.tables.get("source", "")), file.quantities(parts), parts)

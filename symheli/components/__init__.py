@@ -1,6 +1,7 @@
 """The parts of the airframe, one file each: pure functions from motion and controls to forces.
 
-A part is found by the name of its file: a new one is a new file that defines `COMPONENT`, and a section in a vehicle file.
+A part is found by the name of its file: a new one is a new file that defines `COMPONENT`, here or beside the vehicle file, and
+a section in the vehicle file (docs/vehicles.md has an example).
 References: [G15] V. Gavrilets, "Dynamic Model for a Miniature Aerobatic Helicopter", Handbook of Unmanned Aerial Vehicles,
 Springer 2015.
 """
@@ -8,17 +9,40 @@ Springer 2015.
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import pkgutil
+from pathlib import Path
 
 from symheli.components.component import Component, Effect, Flow, Motion
-from symheli.errors import UnknownNameError
+from symheli.errors import InputError, UnknownNameError
 
 __all__ = ["Component", "Effect", "Flow", "Motion", "find"]
 
 
-def find(name: str) -> Component:
-    """The component defined by the file `name`; raises `UnknownNameError`."""
+def find(name: str, folder: Path | None = None) -> Component:
+    """The component of the packaged file `name`, or of a user's "./name.py" relative to `folder` (the file is run).
+
+    Raises `UnknownNameError`, `InputError`.
+    """
+    if name.endswith(".py"):
+        return _from_file((folder or Path()) / name)
     known = [m.name for m in pkgutil.iter_modules(__path__) if m.name not in ("component", "rotor")]
     if name not in known:
         raise UnknownNameError("component", name, known)
     return importlib.import_module(f"{__name__}.{name}").COMPONENT
+
+
+def _from_file(path: Path) -> Component:
+    if not path.is_file():
+        raise InputError(f"no component file at {path}")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None  # noqa: S101, PT018  a .py file has both
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise InputError(f"component file {path} does not run: {type(error).__name__}: {error}") from error
+    component = getattr(module, "COMPONENT", None)
+    if not isinstance(component, Component):
+        raise InputError(f"component file {path} must define COMPONENT = symheli.components.Component(...), got {component!r:.80}")
+    return component

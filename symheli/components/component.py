@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+from symheli.errors import InputError
 from symheli.lpv.signal import Signal
 
 
@@ -47,9 +48,9 @@ class Flow:
 
 @dataclass
 class Effect:
-    """What a part does: force X Y Z (N) and moment L M N (N m) about the c.g. in body axes, the derivatives of its own
-    states, the torque it takes from the main shaft (N m, referred to the main rotor), the flow it makes, and switching
-    functions whose sign changes mark a corner of the model."""
+    """What a part does, in body axes: force X Y Z (N) and moment L M N (N m) about its reference point (the c.g. unless the
+    vehicle places it elsewhere), the derivatives of its own states, the torque it takes from the main shaft (N m, referred
+    to the main rotor), the flow it makes, and switching functions whose sign changes mark a corner of the model."""
 
     force: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
     moment: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
@@ -63,9 +64,10 @@ class Effect:
 class Component:
     """A part of the airframe: a pure function and what it must be given.
 
-    `parameters` {name: unit} come from the vehicle file; `states` are its own; it may use the flow in `needs` and makes
-    the flow in `makes`. `evaluate(parameters, motion, controls, own, flow)` returns an `Effect`. In print, `subscript` marks its
-    forces and `symbols` {parameter: LaTeX} its parameters; without, their names do.
+    `parameters` {name: unit} come from the vehicle file, those in `positive` must be > 0; `states` are its own; it may use
+    the flow in `needs` and makes the flow in `makes`. `evaluate(parameters, motion, controls, own, flow)` returns an `Effect`
+    under these names: where a vehicle has two of a kind or puts one off the c.g., `symheli.part.Part` translates. In print,
+    `subscript` marks its forces and `symbols` {parameter: LaTeX} its parameters; without, their names do.
     """
 
     evaluate: Callable[[SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect]
@@ -73,5 +75,10 @@ class Component:
     states: tuple[Signal, ...] = ()
     needs: tuple[str, ...] = ()
     makes: tuple[str, ...] = ()
+    positive: tuple[str, ...] = ()
     subscript: str = ""
     symbols: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if reserved := {"x", "y", "z"} & set(self.parameters):
+            raise InputError(f"parameters {', '.join(sorted(reserved))}: every part has a place x y z already; choose other names")

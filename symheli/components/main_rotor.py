@@ -84,6 +84,7 @@ COMPONENT = Component(
     },
     states=(Signal("a1"), Signal("b1")),
     makes=("V_imr", "lam0", "C_T", "T_mr", "Q_mr"),
+    positive=("radius", "chord", "lift_slope", "ct_max", "bar_lock_number", "nominal_speed", "inflow_efficiency"),
     subscript="mr",
     symbols={
         "radius": "R_{mr}",

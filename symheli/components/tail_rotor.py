@@ -53,6 +53,7 @@ COMPONENT = Component(
     },
     needs=("w_wake",),
     makes=("V_itr", "Y_tr", "Q_tr"),
+    positive=("radius", "chord", "lift_slope", "ct_max", "gear_ratio", "inflow_efficiency"),
     subscript="tr",
     symbols={
         "radius": "R_{tr}",

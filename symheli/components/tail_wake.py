@@ -36,5 +36,6 @@ COMPONENT = Component(
     parameters={"rotor_radius": "m", "tail_radius": "m", "tail_arm": "m", "tail_height": "m"},
     needs=("V_imr",),
     makes=("w_wake", "K_lam"),
+    positive=("rotor_radius", "tail_radius", "tail_height"),
     symbols={"rotor_radius": "R_{mr}", "tail_radius": "R_{tr}", "tail_arm": "l_{tr}", "tail_height": "h_{tr}"},
 )

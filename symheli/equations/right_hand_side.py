@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import sympy
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class RightHandSide:
     """xdot = f(states, inputs, wind, inflow) with balance(...) = 0 for the inflow ratios, one a rotor, in order of the components.
 
-    `parameters` {symbol: value in SI} names each parameter section.entry; `xdot.subs(rhs.parameters)` puts the numbers in.
+    `parameters` {symbol: value in SI} names each parameter section.entry, and density; `xdot.subs(rhs.parameters)` puts the numbers in.
     """
 
     states: tuple[sympy.Symbol, ...]
@@ -29,14 +29,8 @@ class RightHandSide:
 
 
 def right_hand_side(heli: Helicopter) -> RightHandSide:
-    """The Euler form of `heli` in body axes with a symbol for every parameter of its vehicle file; air density is a number."""
-    parameters: dict[sympy.Symbol, float] = {}
-    sections = {}
-    for section, entries in heli.vehicle.sections.items():
-        symbols = {entry: sympy.Symbol(f"{section}.{entry}", real=True) for entry in entries}
-        parameters.update({symbols[entry]: quantity.value for entry, quantity in entries.items()})
-        sections[section] = {entry: quantity._replace(value=symbols[entry]) for entry, quantity in entries.items()}
-    symbolic = replace(heli, vehicle=replace(heli.vehicle, sections=sections))
+    """The Euler form of `heli` in body axes with a symbol for every one of its `parameters`, air density among them."""
+    parameters = {sympy.Symbol(str(name), real=True): value for name, value in heli.parameters.items()}
     states, inputs, wind = (tuple(sympy.Symbol(str(name), real=True) for name in names) for names in (heli.states, heli.inputs, heli.wind))
     inflow: list[sympy.Symbol] = []
 
@@ -44,5 +38,5 @@ def right_hand_side(heli: Helicopter) -> RightHandSide:
         inflow.append(sympy.Symbol(f"lam_{len(inflow)}", real=True))
         return inflow[-1]
 
-    xdot, balance = symbolic.with_inflow(states, inputs, wind, unknown)
+    xdot, balance = heli.with_inflow(states, inputs, wind, unknown, list(parameters))
     return RightHandSide(states, inputs, wind, tuple(inflow), xdot, balance, parameters)

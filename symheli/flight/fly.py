@@ -19,7 +19,7 @@ from symheli.flight.servo import Servo, ServoBank
 from symheli.helicopter import Helicopter
 from symheli.integrate import runge_kutta
 from symheli.lpv.flight_record import FlightRecord
-from symheli.lpv.signal import UNITS, Signal
+from symheli.lpv.signal import Signal
 from symheli.numeric import Numeric
 from symheli.rigid_body import body_to_earth
 
@@ -147,7 +147,8 @@ class _Flight:
         if not self.steady_air:
             columns |= {name: self.wind[keep, i] for i, name in enumerate(("wind_n", "wind_e", "wind_d"))}
         columns |= {"airspeed": air[keep], "airspeed_command": self.speed[keep]}
-        units = {name: UNITS[name if name in UNITS else name.removeprefix("e_").removesuffix("_command")] for name in columns}
+        known = UNITS | {str(s): s.unit for s in self.heli.states}
+        units = {name: known[name if name in known else name.removeprefix("e_").removesuffix("_command")] for name in columns}
         note = f"{self.heli.vehicle.title}, {self.heli.governor} governor, peak acceleration {np.abs(self.rate).max():.1f} m/s^2"
         return FlightRecord.from_arrays(self.time[keep], units, note, **columns)
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import re
+from collections.abc import Mapping
 
-from symheli.errors import UnknownNameError
+from symheli.errors import InputError, UnknownNameError
 
 _TO_SI: dict[str, tuple[float, str]] = {
     "1": (1.0, "1"), "%": (0.01, "1"), "s": (1.0, "s"), "ms": (1e-3, "s"), "us": (1e-6, "s"), "min": (60.0, "s"),
@@ -22,9 +25,86 @@ _TO_SI: dict[str, tuple[float, str]] = {
     "s/rad": (1.0, "s/rad"), "1/s": (1.0, "1/s"), "V": (1.0, "V"),
 }  # fmt: skip
 
+_BASE = ("kg", "m", "rad", "s", "V")
+_ATOMS: dict[str, dict[str, int]] = {
+    "1": {}, **{base: {base: 1} for base in _BASE},
+    "N": {"kg": 1, "m": 1, "s": -2}, "W": {"kg": 1, "m": 2, "s": -3}, "Pa": {"kg": 1, "m": -1, "s": -2},
+}  # fmt: skip
+
+Dimension = Mapping[str, int]
+"""Exponents of kg, m, rad, s, V; those that are zero are left out. The radian counts as a unit: it tells N m from N m/rad."""
+
 
 def to_si(unit: str) -> tuple[float, str]:
-    """(factor, SI unit) such that value_SI = factor * value. Raises `UnknownNameError`."""
-    if unit not in _TO_SI:
+    """(factor, SI unit) such that value_SI = factor * value. Raises `UnknownNameError`.
+
+    Products, powers and quotients of known units are units too: "slug ft^2", "ft/s^2/rad", "1/(ft s)".
+    """
+    if unit in _TO_SI:
+        return _TO_SI[unit]
+    factor, powers = _parse(unit)
+    return factor, text(powers)
+
+
+def dimension(unit: str) -> Dimension:
+    """The dimension of a unit, {"kg": 1, "m": 2, "s": -2} for N m. Raises `UnknownNameError`."""
+    return dict(_parse(unit)[1])
+
+
+def quotient(unit: str, by: str) -> str:
+    """The SI unit of a quantity in `unit` divided by one in `by`: "m/s^2" by "rad" is "m/s^2/rad"."""
+    return text(_combined(dimension(unit), dimension(by), -1))
+
+
+def text(powers: Dimension) -> str:
+    """A dimension as a unit of kg, m, rad and s: "m/s^2/rad"; "1" without dimension."""
+
+    def name(base: str, power: int) -> str:
+        return base if power == 1 else f"{base}^{power}"
+
+    above = " ".join(name(b, powers[b]) for b in _BASE if powers.get(b, 0) > 0)
+    below = [name(b, -powers[b]) for b in ("kg", "m", "s", "rad", "V") if powers.get(b, 0) < 0]
+    return "/".join([above or "1", *below])
+
+
+def units_of(wanted: Dimension) -> list[str]:
+    """Known units of this dimension."""
+    return [unit for unit in _TO_SI if dimension(unit) == wanted]
+
+
+@functools.cache
+def _parse(unit: str) -> tuple[float, Dimension]:
+    """Factor to SI and dimension. After a / stands one unit or a product in brackets: m/(s rad), m/s/rad, never m/s rad."""
+    if unit in _TO_SI and _TO_SI[unit][1] != unit:  # km/h, rpm: known as a whole
+        factor, si = _TO_SI[unit]
+        return factor, _parse(si)[1]
+    parts = re.split(r"/\s*(\([^()]*\)|[^/()]+)", unit.strip())
+    factor, powers = _product(parts[0], unit)
+    for below, rest in zip(parts[1::2], parts[2::2], strict=True):
+        inner = below.strip().removeprefix("(").removesuffix(")")
+        if rest.strip() or (" " in below.strip() and inner == below.strip()):
+            raise InputError(f"unit {unit!r}: put what follows a / in brackets, as in 1/(m s), or use a second /, as in 1/m/s")
+        other, minus = _product(inner, unit)
+        factor, powers = factor / other, _combined(powers, minus, -1)
+    return factor, powers
+
+
+def _product(part: str, unit: str) -> tuple[float, Dimension]:
+    factor: float = 1.0
+    powers: Dimension = {}
+    for token in part.split():
+        name, caret, exponent = token.partition("^")
+        if name not in _TO_SI or "/" in name or (caret and not re.fullmatch(r"-?\d+", exponent)):
+            raise UnknownNameError("unit", unit, _TO_SI)
+        scale, si = _TO_SI[name]
+        inside = _ATOMS[si] if si in _ATOMS else dimension(si)
+        power = int(exponent or 1)
+        factor, powers = factor * scale**power, _combined(powers, inside, power)
+    if not part.split():
         raise UnknownNameError("unit", unit, _TO_SI)
-    return _TO_SI[unit]
+    return factor, powers
+
+
+def _combined(one: Dimension, other: Dimension, power: int) -> Dimension:
+    total = {base: one.get(base, 0) + power * other.get(base, 0) for base in _BASE}
+    return {base: n for base, n in total.items() if n}

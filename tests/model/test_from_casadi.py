@@ -114,8 +114,6 @@ def test_the_whole_right_hand_side_in_sympy_and_in_50_digits(heli):
 
 def test_right_hand_side_with_symbols_agrees_with_casadi_at_random_states_and_parameters(heli):
     """The same code through SymPy, every parameter a symbol; parameters changed at random in both."""
-    from dataclasses import replace
-
     equations = heli.sympy()
     rng = np.random.default_rng(7)
     function = sympy.lambdify(
@@ -124,11 +122,7 @@ def test_right_hand_side_with_symbols_agrees_with_casadi_at_random_states_and_pa
         cse=True,
     )
     values = {symbol: value * rng.uniform(0.9, 1.1) for symbol, value in equations.parameters.items()}
-    sections = {
-        section: {entry: q._replace(value=values[sympy.Symbol(f"{section}.{entry}", real=True)]) for entry, q in entries.items()}
-        for section, entries in heli.vehicle.sections.items()
-    }
-    changed = replace(heli, vehicle=replace(heli.vehicle, sections=sections))
+    changed = heli.with_parameters({str(symbol): value for symbol, value in values.items()})
     x0 = symheli.trim(heli, 8.0).x.array
     for _ in range(5):
         x, u = x0 + 0.2 * rng.normal(size=len(x0)), rng.uniform(-0.1, 0.2, 4)
