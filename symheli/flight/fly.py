@@ -19,7 +19,7 @@ from symheli.flight.servo import Servo, ServoBank
 from symheli.helicopter import Helicopter
 from symheli.integrate import runge_kutta
 from symheli.lpv.flight_record import FlightRecord
-from symheli.lpv.signal import Signal
+from symheli.lpv.signal import UNITS, Signal
 from symheli.numeric import Numeric
 from symheli.rigid_body import body_to_earth
 
