@@ -16,10 +16,11 @@ from identification.model import LPVARXModel
 from identification.prediction import fit_percent
 from identification.recursive_least_squares import RecursiveLeastSquares, RLSInfo, RLSState
 from identification.structure import LPVARX, Entry, Group, Term
-from symheli.lpv import Polynomial, Product
+from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
 
 __all__ = [
     "LPVARX",
+    "BSpline",
     "CoefficientValues",
     "Coefficients",
     "Entry",
@@ -28,12 +29,15 @@ __all__ = [
     "History",
     "Instruments",
     "LPVARXModel",
+    "PiecewiseLinear",
     "Polynomial",
     "Product",
     "RLSInfo",
     "RLSState",
     "RecursiveLeastSquares",
+    "Spline",
     "Term",
+    "UserFunctions",
     "excitation_report",
     "fit",
     "fit_percent",

@@ -1,6 +1,6 @@
 """The value types that every room shares: pure NumPy, no physics, no solver."""
 
-from symheli.lpv.bases import Basis, FunctionSpace, Piece, PiecewiseLinear, Polynomial, Product, Spline
+from symheli.lpv.bases import Basis, BSpline, FunctionSpace, Piece, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
 from symheli.lpv.delay import pade_delay
 from symheli.lpv.flight_record import FlightRecord
 from symheli.lpv.lft import LFT, Block, HoldError, Truncation, WellPosedness, append, connect, feedback, parallel, series
@@ -17,6 +17,7 @@ from symheli.lpv.trim_schedule import TrimSchedule
 
 __all__ = [
     "LFT",
+    "BSpline",
     "Basis",
     "Block",
     "FlightRecord",
@@ -37,6 +38,7 @@ __all__ = [
     "Spline",
     "TrimSchedule",
     "Truncation",
+    "UserFunctions",
     "WellPosedness",
     "append",
     "chordal_distance",

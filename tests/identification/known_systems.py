@@ -19,9 +19,9 @@ def flown(arx, A, B, p, u, *, c=None, d=None, noise=0.0, seed=0, dt=0.1):
         y[k] = -sum((A[i - 1](at(i)) @ y[k - i] for i in arx.output_lags), np.zeros(ny))
         y[k] += sum((B[j](at(lag)) @ u[k - lag] for j, lag in enumerate(arx.input_lags)), np.zeros(ny))
         y[k] += c(at(1)) if c else 0.0
-        y[k] += d(at(1)) * (p[k] - p[k - 1]) if d else 0.0
+        y[k] += d(at(1)).reshape(ny, -1) @ np.atleast_1d(p[k] - p[k - 1]) if d else 0.0
         y[k] += noise * rng.normal(size=ny)
-    columns = dict(zip((*arx.outputs, *arx.inputs, arx.scheduling), np.column_stack([y, u, p]).T, strict=True))
+    columns = dict(zip((*arx.outputs, *arx.inputs, *arx.parameters), np.column_stack([y, u, p]).T, strict=True))
     return FlightRecord.from_arrays(dt * np.arange(n), dict.fromkeys(columns, "1"), **columns)
 
 
@@ -31,25 +31,37 @@ class Truth:
     def __init__(self, arx, seed=0, size=0.45):
         self.arx, rng = arx, np.random.default_rng(seed)
         n, ny, nu = arx.basis.size, arx.ny, arx.nu
-        A = rng.uniform(-1, 1, (arx.na, n, ny, ny)) * size / max(arx.na * ny, 1) / n
+        na, d_shape = len(arx.output_lags), (n, ny) if arx.basis.dimension == 1 else (n, ny, arx.basis.dimension)
+        A = rng.uniform(-1, 1, (na, n, ny, ny)) * size / max(na * ny, 1) / n
         B = rng.uniform(-1, 1, (len(arx.input_lags), n, ny, nu))
         c = rng.uniform(-1, 1, (n, ny)) * arx.offset
-        d = rng.uniform(-1, 1, (n, ny)) * arx.offset_rate
-        self.coefficients = Coefficients(arx.basis, tuple(arx.input_lags), A, B, c, d)
-        self.theta = self.coefficients.theta(arx)
+        d = rng.uniform(-1, 1, d_shape) * arx.offset_rate
+        self.theta = Coefficients(arx.basis, tuple(arx.input_lags), A, B, c, d).theta(arx)  # zero where an equation lacks a regressor
+        self.coefficients = Coefficients.of(arx, self.theta)
 
     def record(self, p, *, noise=0.0, seed=1):
         arx, of = self.arx, self.coefficients
         u = np.random.default_rng(seed).normal(size=(len(p), arx.nu))
-        A = [lambda q, i=i: of.at(q).A[i] for i in range(arx.na)]
-        B = [lambda q, j=j: of.at(q).B[j] for j in range(len(arx.input_lags))]
-        return flown(arx, A, B, p, u, c=lambda q: of.at(q).c, d=lambda q: of.at(q).d, noise=noise, seed=seed)
+        at = {np.asarray(q).tobytes(): of.at(q) for q in p}
+
+        def now(q):
+            return at[np.asarray(q).tobytes()]
+
+        A = [lambda q, i=i: now(q).A[i] for i in range(len(arx.output_lags))]
+        B = [lambda q, j=j: now(q).B[j] for j in range(len(arx.input_lags))]
+        return flown(arx, A, B, p, u, c=lambda q: now(q).c, d=lambda q: now(q).d, noise=noise, seed=seed)
 
 
 def moving(n=700):
     """A scheduling signal (n,) that sweeps 0-13 with two frequencies."""
     k = np.arange(n)
     return 6.5 + 3.5 * np.sin(0.11 * k) + 2.9 * np.sin(0.37 * k + 1.0)
+
+
+def moving_box(n=700):
+    """Two scheduling signals (n, 2) that fill 0-13 by 0.9-1.3."""
+    k = np.arange(n)
+    return np.column_stack([moving(n), 1.1 + 0.12 * np.sin(0.29 * k) + 0.07 * np.cos(0.053 * k)])
 
 
 def structure(**over):

@@ -7,11 +7,14 @@ import pytest
 from scipy.interpolate import BPoly, CubicSpline
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import PiecewiseLinear, Polynomial, Scheduling, Spline
+from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Scheduling, Spline, UserFunctions
 from symheli.lpv.units import to_si
 
 NODES = (0.0, 1.0, 3.0, 7.0, 13.0)
-BASES = [Polynomial(4, 0.0, 13.0), Spline(NODES), PiecewiseLinear(NODES)]
+BASES = [Polynomial(4, 0.0, 13.0), Spline(NODES), PiecewiseLinear(NODES), BSpline(3, NODES), BSpline(2, NODES)]
+
+
+BOX = Product((Polynomial(2, 0.0, 13.0), Polynomial(3, 0.9, 1.3)))
 
 
 def test_polynomials_are_orthonormal_over_the_range():
@@ -27,6 +30,59 @@ def test_monomial_coefficients_go_back_and_forth():
     np.testing.assert_allclose(basis.to_monomial(inside), given, atol=1e-12)
     p = np.linspace(2, 9, 7)
     np.testing.assert_allclose(basis(p) @ inside, np.polynomial.polynomial.polyval(p, given).T, atol=1e-11)
+
+
+FORMS = {
+    "monomial": lambda p, j: p**j,
+    "scaled": lambda p, j: ((2 * p - 11) / 7) ** j,
+    "legendre": lambda p, j: np.polynomial.legendre.legval((2 * p - 11) / 7, np.eye(5)[j]),
+    "chebyshev": lambda p, j: np.polynomial.chebyshev.chebval((2 * p - 11) / 7, np.eye(5)[j]),
+    "bernstein": lambda p, j: math.comb(4, j) * ((p - 2) / 7) ** j * ((9 - p) / 7) ** (4 - j),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_each_form_of_a_polynomial_is_the_same_polynomial(name):
+    basis, p = Polynomial(4, 2.0, 9.0), np.linspace(2, 9, 11)
+    coefficients = np.random.default_rng(1).normal(size=5)
+    written = basis.form(name).T @ coefficients
+    # 1e-10: monomials on 2-9 m/s cancel by up to 1e5
+    np.testing.assert_allclose(sum(written[j] * FORMS[name](p, j) for j in range(5)), basis(p) @ coefficients, atol=1e-10)
+
+
+@pytest.mark.parametrize("total", [None, 2])
+def test_products_are_products_and_their_forms_are_products_of_forms(total):
+    basis = Product((Polynomial(2, 0.0, 13.0), Polynomial(2, 0.9, 1.3)), total)
+    assert basis.size == (9 if total is None else 6)
+    p = np.random.default_rng(2).uniform([0, 0.9], [13, 1.3], (5, 2))
+    coefficients = np.random.default_rng(3).normal(size=basis.size)
+    by_hand = sum(
+        c * basis.factors[0](p[:, 0])[:, i] * basis.factors[1](p[:, 1])[:, j] for c, (i, j) in zip(coefficients, basis.indices, strict=True)
+    )
+    np.testing.assert_allclose(basis(p) @ coefficients, by_hand, atol=1e-12)
+    monomial = basis.form("monomial").T @ coefficients
+    powers = sum(c * p[:, 0] ** i * p[:, 1] ** j for c, (i, j) in zip(monomial, basis.indices, strict=True))
+    np.testing.assert_allclose(powers, by_hand, atol=1e-9)  # monomials on 0.9-1.3 cancel by up to 1e4
+
+
+def test_products_of_orthonormal_polynomials_are_orthonormal_over_the_box():
+    x, weights = np.polynomial.legendre.leggauss(8)
+    first, second = np.meshgrid(6.5 + 6.5 * x, 1.1 + 0.2 * x, indexing="ij")
+    f = BOX(np.stack([first, second], axis=-1))
+    gramian = np.einsum("a,b,abi,abj->ij", weights / 2, weights / 2, f, f)
+    np.testing.assert_allclose(gramian, np.eye(12), atol=1e-13)
+
+
+def test_b_splines_add_up_to_one_are_local_and_of_degree_one_are_hats():
+    basis, p = BSpline(3, NODES), np.linspace(0, 13, 53)
+    np.testing.assert_allclose(basis(p).sum(axis=1), 1.0, atol=1e-14)
+    assert np.count_nonzero(basis(2.0)) == 4
+    np.testing.assert_allclose(BSpline(1, NODES)(p), PiecewiseLinear(NODES)(p), atol=1e-14)
+
+
+def test_functions_brought_along_are_taken_as_they_are():
+    basis = UserFunctions((np.ones_like, np.sqrt, lambda p: np.exp(-p)), 0.0, 13.0, ("1", "root", "decay"))
+    np.testing.assert_allclose(basis([4.0, 9.0]), [[1, 2, math.exp(-4)], [1, 3, math.exp(-9)]])
 
 
 @pytest.mark.parametrize("basis", BASES, ids=lambda b: type(b).__name__)
@@ -62,6 +118,19 @@ def test_fit_recovers_coefficients_and_counts_its_nodes(basis):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
+        (lambda: BSpline(0, NODES), "degree must be an integer >= 1"),
+        (lambda: BSpline(2, (1.0, 1.0)), "strictly increasing breakpoints"),
+        (lambda: UserFunctions((np.log,), 0.0, 1.0), "function f0: expected finite numbers.*not finite"),
+        (lambda: UserFunctions((), 0.0, 1.0), "at least one callable"),
+        (lambda: UserFunctions((np.cos,), 0.0, 1.0).pieces(), "not known to be piecewise polynomial"),
+        (lambda: UserFunctions((np.cos,), 0.0, 1.0)(0.5, 1), "no known derivative"),
+        (lambda: UserFunctions((np.cos,), 0.0, 1.0).form("monomial"), "has no 'monomial' form"),
+        (lambda: Product((Polynomial(1, 0, 1),)), "at least two"),
+        (lambda: Product((Polynomial(1, 0, 1), BSpline(1, NODES)), total_degree=1), "total_degree is for polynomial"),
+        (lambda: BOX([0.5, 1.0, 2.0]), "expected 2 along the last axis"),
+        (lambda: BOX([0.5, 7.0]), r"scheduling parameter 2 of 2 spans \[7, 7\]"),
+        (lambda: Polynomial(1, 0, 1).form("monomail"), "did you mean 'monomial'"),
+        (lambda: Product((Polynomial(1, 0, 1),) * 2, total_degree=1).form("bernstein"), "mixes degrees"),
         (lambda: Polynomial(-1, 0, 1), "degree must be an integer"),
         (lambda: Polynomial(2, 5.0, 5.0), "low < high"),
         (lambda: Spline((0.0, 1.0, 2.0)), "at least 4 strictly increasing"),

@@ -1,9 +1,11 @@
 """Families of functions of the scheduling parameters."""
 
 from symheli.lpv.bases.basis import Basis, Piece
+from symheli.lpv.bases.bspline import BSpline
 from symheli.lpv.bases.function_space import FunctionSpace
 from symheli.lpv.bases.interpolating import PiecewiseLinear, Spline
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.product import Product
+from symheli.lpv.bases.user_functions import UserFunctions
 
-__all__ = ["Basis", "FunctionSpace", "Piece", "PiecewiseLinear", "Polynomial", "Product", "Spline"]
+__all__ = ["BSpline", "Basis", "FunctionSpace", "Piece", "PiecewiseLinear", "Polynomial", "Product", "Spline", "UserFunctions"]

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from math import comb
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
-from symheli.lpv.bases.basis import Basis, Piece
+from symheli.lpv.arrays import frozen
+from symheli.lpv.bases.piecewise import PiecewisePolynomial
 
 
 @dataclass(frozen=True)
-class Cardinal(Basis):
+class Cardinal(PiecewisePolynomial):
     """Functions f_j with f_j(node_i) = 1 where i = j and 0 elsewhere; see `PiecewiseLinear` and `Spline`."""
 
     nodes: tuple[float, ...]
@@ -47,27 +45,6 @@ class Cardinal(Basis):
     def distinct_values(self) -> int:
         """As many as there are nodes."""
         return self.size
-
-    def _piecewise(self) -> PPoly:
-        raise NotImplementedError
-
-    @cached_property
-    def _functions(self) -> PPoly:
-        return self._piecewise()
-
-    def _values(self, p: Array, derivative: int) -> Array:
-        return np.asarray(self._functions(np.clip(p, self.low, self.high), nu=derivative))
-
-    def pieces(self) -> tuple[Piece, ...]:
-        """One piece between every two nodes."""
-        power = self._functions.c[::-1]  # (degree + 1, segments, functions), ascending powers of p - node
-        d = power.shape[0] - 1
-        out = []
-        for s, (low, high) in enumerate(zip(self.nodes[:-1], self.nodes[1:], strict=True)):
-            scaled = power[:, s, :] * ((high - low) ** np.arange(d + 1))[:, None]
-            bernstein = np.array([sum(comb(k, i) / comb(d, i) * scaled[i] for i in range(k + 1)) for k in range(d + 1)])
-            out.append(Piece(low, high, bernstein.T))
-        return tuple(out)
 
 
 @dataclass(frozen=True)

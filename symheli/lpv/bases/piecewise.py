@@ -1,0 +1,40 @@
+"""What the piecewise polynomial bases have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from functools import cached_property
+from itertools import pairwise
+from math import comb
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+from symheli.lpv.arrays import Array
+from symheli.lpv.bases.basis import Basis, Piece
+
+
+class PiecewisePolynomial(Basis):
+    """A basis whose functions are polynomials between breakpoints."""
+
+    @abstractmethod
+    def _piecewise(self) -> PPoly:
+        """All functions side by side."""
+
+    @cached_property
+    def _functions(self) -> PPoly:
+        return self._piecewise()
+
+    def _values(self, p: Array, derivative: int) -> Array:
+        return np.asarray(self._functions(np.clip(p, self.low, self.high), nu=derivative))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One piece between every two breakpoints."""
+        power = self._functions.c[::-1]  # (degree + 1, segments, functions), ascending powers of p - breakpoint
+        d = power.shape[0] - 1
+        out = []
+        for s, (low, high) in enumerate(pairwise(self._functions.x.tolist())):
+            scaled = power[:, s, :] * ((high - low) ** np.arange(d + 1))[:, None]
+            bernstein = np.array([sum(comb(k, i) / comb(d, i) * scaled[i] for i in range(k + 1)) for k in range(d + 1)])
+            out.append(Piece(low, high, bernstein.T))
+        return tuple(out)
