@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+from symheli.components import unnamed
 from symheli.symbolic import clip, where
 
 
@@ -21,18 +23,19 @@ class Drive(NamedTuple):
     speed_follows_yaw: float = 0.0
 
 
-def pi_governor(par: SimpleNamespace, shaft_torque: Any, Om: Any, om_i: Any) -> Drive:
+def pi_governor(par: SimpleNamespace, shaft_torque: Any, Om: Any, om_i: Any, name: Callable[[str, Any], Any] = unnamed) -> Drive:
     """Throttle d_t = K_p (Om_c - Om) + K_i om_i in [0, 1], Q_e = P_max d_t/Om, Om' = -r' + (Q_e - shaft torque)/I_rot.
 
     `shaft_torque` = Q_mr + n_tr Q_tr (N m). The integrator om_i (rad) stops while the throttle is on a stop and pushed
     further. Conservation of Izz r' + I_rot (Om' + r') asks for -r'; the printed + is the option "rotor_reaction".
     """
-    error = par.nominal_speed - Om
-    wanted = par.governor_kp * error + par.governor_ki * om_i
-    torque = par.max_power * clip(wanted, 0.0, 1.0) / Om
-    winding = where(wanted > 1, where(error > 0, 1.0, 0.0), where(wanted < 0, where(error < 0, 1.0, 0.0), 0.0))
+    error = name("e", par.nominal_speed - Om)
+    wanted = name(r"\delta_w", par.governor_kp * error + par.governor_ki * om_i)
+    throttle = name(r"\delta_t", clip(wanted, 0.0, 1.0))
+    torque = name("Q_e", par.max_power * throttle / Om)
+    winding = (wanted - throttle) * error > 0
     sign = 1.0 if "rotor_reaction" in par.printed else -1.0
-    return Drive(torque, 0.0, {"Om": (torque - shaft_torque) / par.inertia, "om_i": error * (1 - winding)}, sign)
+    return Drive(torque, 0.0, {"Om": (torque - shaft_torque) / par.inertia, "om_i": where(winding, 0.0, error)}, sign)
 
 
 def ideal_governor(par: SimpleNamespace, shaft_torque: Any) -> Drive:

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple
 
 from symheli import inflow
-from symheli.components import Flow, Motion
-from symheli.drivetrain import ideal_governor, pi_governor
+from symheli.components import Flow, Motion, unnamed
+from symheli.drivetrain import Drive, ideal_governor, pi_governor
 from symheli.errors import InputError
 from symheli.lpv.signal import Signal, signals
 from symheli.part import Part
@@ -106,7 +106,7 @@ class Dynamics:
         return Function(name, list(arguments.values()), list(outputs.values()), list(arguments), list(outputs))
 
     def _rhs(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
-        return {"xdot": self.euler(x, u, wind, par, inflow.solve)[0]}
+        return {"xdot": self.euler(x, u, wind, par, self._inflow)[0]}
 
     def _flight_rhs(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
         return {"xdot": self.quaternion(x, u, wind, par)}
@@ -114,7 +114,7 @@ class Dynamics:
     def _jacobian(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
         """The inflow enters as a symbol advanced by one Newton step: its derivative there is that of the root. Only then is the
         solved value put in its place."""
-        lam = self.euler(x, u, wind, par, inflow.solve)[1].lam
+        lam = self.euler(x, u, wind, par, self._inflow)[1].lam
         symbol = SX.sym("lam", len(lam))
         position = iter(range(len(lam)))
 
@@ -128,7 +128,7 @@ class Dynamics:
         return dict(zip(("A", "B", "E"), values, strict=True))
 
     def _diagnostics(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
-        total = self.euler(x, u, wind, par, inflow.solve)[1]
+        total = self.euler(x, u, wind, par, self._inflow)[1]
         wrench = dict(zip("XYZLMN", (*total.force, *total.moment), strict=True))
         values = {**total.flow, **wrench, **{f"switch {k}": v for k, v in total.switches.items()}}
         return {name.replace(" ", "_"): dense(v) for name, v in values.items()}
@@ -149,14 +149,14 @@ class Dynamics:
         R = body_to_earth(*quaternion)
         air = _triple(lambda i: x[i] - sum(R[j][i] * wind[j] for j in range(3)))
         gravity = _triple(lambda i: R[2][i] * GRAVITY)
-        accelerations, own, _ = self._accelerations(x, air, gravity, self._own(x, 13), u, par, inflow.solve)
+        accelerations, own, _ = self._accelerations(x, air, gravity, self._own(x, 13), u, par, self._inflow)
         position = [sum(R[j][i] * x[i] for i in range(3)) for j in range(3)]
         return column([*accelerations, *quaternion_rates(*quaternion, x[3], x[4], x[5]), *position, *own])
 
     def accelerations(self, x: Any, u: Any, wind: Any, par: Any) -> list[Any]:
         """u' v' w' p' q' r' and the derivatives of the own states, Euler form, as a list: no CasADi where the arguments are floats."""
         air = _triple(lambda i: x[i] - wind[i])
-        body, own, _ = self._accelerations(x, air, gravity_euler(x[6], x[7]), self._own(x, 8), u, par, inflow.solve)
+        body, own, _ = self._accelerations(x, air, gravity_euler(x[6], x[7]), self._own(x, 8), u, par, self._inflow)
         return [*body, *own]
 
     def _accelerations(
@@ -194,10 +194,7 @@ class Dynamics:
             flow.values.update(effect.flow)
             effects.append(effect)
         shaft_torque = sum(effect.shaft_torque for effect in effects)
-        if self.governor == "pi":
-            drive = pi_governor(drivetrain, shaft_torque, own["Om"], own["om_i"])
-        else:
-            drive = ideal_governor(drivetrain, shaft_torque)
+        drive = self.drive(drivetrain, shaft_torque, own)
         force = _triple(lambda i: sum(effect.force[i] for effect in effects))
         moment = _triple(lambda i: sum(effect.moment[i] for effect in effects) - (drive.torque if i == 2 else 0.0))
         return Sum(
@@ -207,10 +204,22 @@ class Dynamics:
             {name: value for effect in effects for name, value in effect.switches.items()}, lam,
         )  # fmt: skip
 
+    def drive(
+        self, par: SimpleNamespace, shaft_torque: Any, own: Mapping[str, Any], name: Callable[[str, Any], Any] = unnamed
+    ) -> Drive:  # fmt: skip
+        """Engine torque and rotor speed with this governor; `own` has Om and om_i where it is "pi", `name` is as in `Flow`."""
+        if self.governor == "pi":
+            return pi_governor(par, shaft_torque, own["Om"], own["om_i"], name)
+        return ideal_governor(par, shaft_torque)
+
+    @property
+    def _inflow(self) -> Callable[..., Any]:
+        return inflow.relaxed if "relaxed_inflow" in self.printed else inflow.solve
+
     def _sections(self, par: Any) -> dict[str, SimpleNamespace]:
         """The parameters as the parts read them: `par.radius`."""
         at = {str(name): par[i] for i, name in enumerate(self.parameters)}
-        extra = {"printed": self.printed, "smoothing": self.smoothing}
+        extra = {"printed": self.printed, "smoothing": self.smoothing, "weight": at[self.entries["body"]["mass"]] * GRAVITY}
         return {section: SimpleNamespace(**{e: at[name] for e, name in of.items()}, **extra) for section, of in self.entries.items()}
 
     def _own(self, x: Any, first: int) -> dict[str, Any]:

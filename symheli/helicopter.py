@@ -18,14 +18,12 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.named_vector import NamedVector
 from symheli.lpv.signal import Signal, signals
 from symheli.numeric import Numeric
+from symheli.printed_forms import PRINTED
 from symheli.symbolic import SX, Function, column
 from symheli.vehicle import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
     from symheli.equations import RightHandSide
-
-PRINTED = ("lateral_flapping", "fuselage_downwash", "rotor_reaction")
-"""Options that bring back a sign as printed in G15 where this project decided otherwise; see docs/model.md."""
 
 WIND = signals(("u_w", "v_w", "w_w"))
 DENSITY = Signal("density", "kg/m^3")
@@ -209,6 +207,12 @@ class Helicopter:
         from symheli.equations import right_hand_side
 
         return right_hand_side(self)
+
+    def latex(self, standalone: bool = False) -> str:
+        """Every component's equations and parameters in LaTeX: the body of a document, or with `standalone` all of one."""
+        from symheli.equations import latex
+
+        return latex(self, standalone=standalone)
 
     def compiled(self, name: Name) -> Function:
         """One of the functions as machine code where a C compiler is there: the same numbers, faster, numbers only."""

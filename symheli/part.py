@@ -20,7 +20,7 @@ class Part:
 
     suffix: added to the names of its states, flow and switches; empty for the first of a kind, "_" + section for the others.
     controls: {control of the component: {control of the vehicle: gain}} where they differ. flow: {needed: name it is
-    taken from} where they differ. placed: whether it has an x, y or z.
+    taken from} where they differ. placed: whether it has an x, y or z. given: the component's optional entries it has.
     """
 
     section: str
@@ -29,11 +29,13 @@ class Part:
     controls: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     flow: Mapping[str, str] = field(default_factory=dict)
     placed: bool = False
+    given: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> Mapping[str, str]:
         """{entry: unit} of its numbers."""
-        return {**self.component.parameters, **(PLACE if self.placed else {})}
+        optional = {entry: self.component.optional[entry] for entry in self.given}
+        return {**self.component.parameters, **optional, **(PLACE if self.placed else {})}
 
     @property
     def positive(self) -> tuple[str, ...]:

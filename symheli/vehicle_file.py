@@ -48,7 +48,8 @@ class VehicleFile:
                 suffix = f"_{section}" if names & taken else ""
                 taken |= {f"{name}{suffix}" for name in names}
                 mix, flow = self._controls(section, table), self._flow(section, table, component)
-                parts[section] = Part(section, component, suffix, mix, flow, placed=any(axis in table for axis in PLACE))
+                given = tuple(entry for entry in component.optional if entry in table)
+                parts[section] = Part(section, component, suffix, mix, flow, any(axis in table for axis in PLACE), given)
         return parts
 
     def quantities(self, parts: Mapping[str, Part]) -> dict[str, dict[str, Quantity]]:

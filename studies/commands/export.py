@@ -1,4 +1,4 @@
-"""symheli export: the model for other programs, as C code or as a MATLAB file."""
+"""symheli export: the model for other programs, as C code, a MATLAB file, or equations in print."""
 
 from __future__ import annotations
 
@@ -8,14 +8,20 @@ from pathlib import Path
 from studies.commands import options
 from studies.output import Output
 
-HELP = "C code of the equations of motion, or a MATLAB file of the linear family"
+HELP = "C code of the equations of motion, a MATLAB file of the linear family, or the equations in LaTeX or Markdown"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """What, of which helicopter, to where."""
-    parser.add_argument("format", choices=("c", "mat"), help="c: equations of motion and header; mat: linear models along airspeed")
+    parser.add_argument(
+        "format",
+        choices=("c", "mat", "latex", "markdown"),
+        help="c: equations of motion and header; mat: linear models along airspeed; latex, markdown: every component's equations to read",
+    )
     options.vehicle(parser)
-    parser.add_argument("--out", type=Path, metavar="PATH", help="file to write (default: NAME_rhs.c or NAME_family.mat)")
+    parser.add_argument(
+        "--out", type=Path, metavar="PATH", help="file to write (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md)"
+    )
     parser.add_argument(
         "--airspeeds", type=options.number, nargs=2, default=(0.0, 13.0), metavar=("LOW", "HIGH"), help="of the family, m/s (default: 0 13)"
     )
@@ -32,9 +38,15 @@ def run(arguments: argparse.Namespace) -> Output:
         from studies.export_c import write_c
 
         written = write_c(heli, arguments.out or Path(f"{name}_rhs.c"))
-    else:
+    elif arguments.format == "mat":
         from studies.export_mat import write_mat
 
         low, high = arguments.airspeeds
         written = write_mat(heli, low, high, arguments.points, arguments.out or Path(f"{name}_family.mat"))
+    else:
+        from studies.files import write_text
+        from symheli.equations import markdown
+
+        content, suffix = (heli.latex(standalone=True), "tex") if arguments.format == "latex" else (markdown(heli), "md")
+        written = (write_text(arguments.out or Path(f"{name}_equations.{suffix}"), content),)
     return Output("\n".join(f"wrote {path}" for path in written), {"written": written})

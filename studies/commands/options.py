@@ -12,9 +12,10 @@ if TYPE_CHECKING:
 
 
 def vehicle(parser: argparse.ArgumentParser, governor: str = "ideal") -> None:
-    """--vehicle and --governor."""
+    """--vehicle, --governor and --printed."""
     parser.add_argument("--vehicle", default="xcell60", metavar="NAME", help="packaged airframe or TOML file (default: %(default)s)")
     parser.add_argument("--governor", choices=("ideal", "pi"), default=governor, help="rotor speed held exactly, or engine and governor")
+    parser.add_argument("--printed", type=names, default=(), metavar="A,B", help="forms of the source in place of this project's decisions")
 
 
 def condition(parser: argparse.ArgumentParser) -> None:
@@ -26,10 +27,10 @@ def condition(parser: argparse.ArgumentParser) -> None:
 
 
 def helicopter(arguments: argparse.Namespace) -> Helicopter:
-    """The helicopter of --vehicle and --governor."""
+    """The helicopter of --vehicle, --governor and --printed."""
     from symheli import Helicopter
 
-    return Helicopter.load(arguments.vehicle, governor=arguments.governor)
+    return Helicopter.load(arguments.vehicle, governor=arguments.governor, printed=arguments.printed)
 
 
 def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:

@@ -13,10 +13,10 @@ import importlib.util
 import pkgutil
 from pathlib import Path
 
-from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.component import Component, Effect, Flow, Motion, unnamed
 from symheli.errors import InputError, UnknownNameError
 
-__all__ = ["Component", "Effect", "Flow", "Motion", "find"]
+__all__ = ["Component", "Effect", "Flow", "Motion", "find", "unnamed"]
 
 
 def find(name: str, folder: Path | None = None) -> Component:

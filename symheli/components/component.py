@@ -25,7 +25,8 @@ class Motion(NamedTuple):
     rho: Any
 
 
-def _unnamed(symbol: str, value: Any) -> Any:
+def unnamed(symbol: str, value: Any) -> Any:
+    """The value itself."""
     return value
 
 
@@ -40,7 +41,7 @@ class Flow:
 
     inflow: Callable[..., Any]
     values: dict[str, Any] = field(default_factory=dict)
-    name: Callable[[str, Any], Any] = _unnamed
+    name: Callable[[str, Any], Any] = unnamed
 
     def __getitem__(self, name: str) -> Any:
         return self.values[name]
@@ -64,10 +65,11 @@ class Effect:
 class Component:
     """A part of the airframe: a pure function and what it must be given.
 
-    `parameters` {name: unit} come from the vehicle file, those in `positive` must be > 0; `states` are its own; it may use
-    the flow in `needs` and makes the flow in `makes`. `evaluate(parameters, motion, controls, own, flow)` returns an `Effect`
-    under these names: where a vehicle has two of a kind or puts one off the c.g., `symheli.part.Part` translates. In print,
-    `subscript` marks its forces and `symbols` {parameter: LaTeX} its parameters; without, their names do.
+    `parameters` {name: unit} come from the vehicle file, `optional` ones if they are there, those in `positive` must be > 0;
+    `states` are its own; it may use the flow in `needs` and makes the flow in `makes`. `evaluate(parameters, motion, controls,
+    own, flow)` returns an `Effect` under these names: where a vehicle has two of a kind or puts one off the c.g.,
+    `symheli.part.Part` translates. In print, `subscript` marks its forces and `symbols` {parameter: LaTeX} its parameters;
+    without, their names do.
     """
 
     evaluate: Callable[[SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect]
@@ -76,6 +78,7 @@ class Component:
     needs: tuple[str, ...] = ()
     makes: tuple[str, ...] = ()
     positive: tuple[str, ...] = ()
+    optional: Mapping[str, str] = field(default_factory=dict)
     subscript: str = ""
     symbols: Mapping[str, str] = field(default_factory=dict)
 

@@ -15,13 +15,15 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
 
         w_ht = w_a + l_ht q - K_lam V_imr
 
-    Source: G15, horizontal tail; the sign is the stabilising one, the printed + contradicts the text.
+    Source: G15, horizontal tail; the sign is the stabilising one, the printed + contradicts the text and is the
+    option "horizontal_tail_lift".
     """
     w = flow.name("w_{ht}", motion.w_a + par.arm * motion.q - flow["w_wake"])
     scale = 0.5 * motion.rho * par.area
     free = flow.name("Z_{free}", -scale * (par.lift_slope * absolute(motion.u_a) + absolute(w)) * w)
     limit = flow.name("Z_{max}", scale * (motion.u_a**2 + w**2))
-    lift = clip(free, -limit, limit, par.smoothing)
+    free = -free if "horizontal_tail_lift" in par.printed else free
+    lift = flow.name("Z_{ht}", clip(free, -limit, limit, par.smoothing))
     return Effect(
         force=(0.0, 0.0, lift),
         moment=(0.0, lift * par.arm, 0.0),

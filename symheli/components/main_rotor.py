@@ -30,7 +30,8 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     """Forces and moments of the tilted thrust, flapping dynamics, shaft torque, induced velocity `V_imr` (m/s).
 
     Source: G15, main rotor thrust, torque, flapping, forces and moments. The sign of db1/dmu_v is + (a hovering
-    rotor looks the same after a turn about its shaft); the printed - is the option "lateral_flapping".
+    rotor looks the same after a turn about its shaft); the printed - is the option "lateral_flapping". The options
+    "flapping_sign" (mu^2 sign(mu) is mu^2) and "thrust_limit" (2.5 m g) are printed forms too.
     """
     plane = disc(par.radius, par.chord, 2, motion.Om, motion.rho, flow)
     mu_x = flow.name(r"\mu_x", motion.u_a / plane.tip_speed)
@@ -40,13 +41,21 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     mu = flow.name(r"\mu", sqrt(mu2 + 1e-20))
     d_col = controls["d_col"]
 
-    lam0, ct, thrust, torque, stall, ring = load(plane, par, d_col, mu2, mu_z, flow)
+    ct_max = 2.5 * par.weight / plane.force_scale if "thrust_limit" in par.printed else par.ct_max
+    lam0, ct, thrust, torque, stall, ring = load(plane, par, ct_max, d_col, mu2, mu_z, flow)
 
     a1, b1 = own["a1"], own["b1"]
     tau = flow.name(r"\tau_e", 16 / (par.bar_lock_number * motion.Om))
     speed_ratio2 = (motion.Om / par.nominal_speed) ** 2
     da1_dmu, da1_dmu_z = flapping_slopes(
-        mu2, mu, mu_x, lam0, d_col, k_mu=par.flapping_fraction, lift_slope=par.lift_slope, solidity=plane.solidity
+        mu2,
+        mu,
+        mu if "flapping_sign" in par.printed else mu_x,
+        lam0,
+        d_col,
+        k_mu=par.flapping_fraction,
+        lift_slope=par.lift_slope,
+        solidity=plane.solidity,
     )
     da1_dmu, da1_dmu_z = flow.name(r"a_{1\mu}", da1_dmu), flow.name(r"a_{1\mu_z}", da1_dmu_z)
     db1_dmu_v = flow.name(r"b_{1\mu}", -da1_dmu if "lateral_flapping" in par.printed else da1_dmu)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import pi
 from types import SimpleNamespace
 from typing import Any
 
 from symheli.components.component import Component, Effect, Flow, Motion
-from symheli.components.rotor import disc, load
+from symheli.components.rotor import Load, disc, linear_load, load
+from symheli.errors import InputError
 
 
 def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
@@ -17,17 +18,19 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
         v_tr = v_a - l_tr r + h_tr p,  w_tr = w_a + l_tr q - K_lam V_imr,  f_t = 1 - (3/4) S_vf/(pi R_tr^2)
 
     Source: G15, tail rotor, with the full inflow solution in place of its linearization about a trim
-    pitch. `d_ped` is the total blade pitch (rad).
+    pitch (option "tail_rotor_linear") and mu_tr = sqrt(u_a^2 + w_tr^2)/(Om_tr R_tr) (printed without the root: option
+    "tail_advance_ratio"). `d_ped` is the total blade pitch (rad).
     """
     plane = disc(par.radius, par.chord, 2, par.gear_ratio * motion.Om, motion.rho, flow)
     v_tr = flow.name("v_{tr}", motion.v_a - par.arm * motion.r + par.height * motion.p)
     w_tr = flow.name("w_{tr}", motion.w_a + par.arm * motion.q - flow["w_wake"])
-    mu2 = flow.name(r"\mu^2", (motion.u_a**2 + w_tr**2) / plane.tip_speed**2)
+    speed2 = motion.u_a**2 + w_tr**2
+    mu2 = flow.name(r"\mu^2", (speed2**2 if "tail_advance_ratio" in par.printed else speed2) / plane.tip_speed**2)
     mu_z = flow.name(r"\mu_z", v_tr / plane.tip_speed)
     blockage = flow.name("f_t", 1 - 0.75 * par.fin_area / (pi * par.radius**2))
 
-    lam0, _, thrust, torque, stall, ring = load(plane, par, controls["d_ped"], mu2, mu_z, flow)
-    side = -blockage * thrust
+    lam0, _, thrust, torque, stall, ring = _thrust_law(par)(plane, par, par.ct_max, controls["d_ped"], mu2, mu_z, flow)
+    side = flow.name("Y_{tr}", -blockage * thrust)
     return Effect(
         force=(0.0, side, 0.0),
         moment=(side * par.height, 0.0, -side * par.arm),
@@ -35,6 +38,14 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
         flow={"V_itr": lam0 * plane.tip_speed, "Y_tr": side, "Q_tr": torque},
         switches={"tail rotor stall": stall, "tail rotor vortex_ring": ring},
     )
+
+
+def _thrust_law(par: SimpleNamespace) -> Callable[..., Load]:
+    if "tail_rotor_linear" not in par.printed:
+        return load
+    if not hasattr(par, "trim_pitch"):
+        raise InputError("the printed option tail_rotor_linear needs the entry trim_pitch (rad) of the tail rotor in the vehicle file")
+    return linear_load
 
 
 COMPONENT = Component(
@@ -51,6 +62,7 @@ COMPONENT = Component(
         "fin_area": "m^2",
         "inflow_efficiency": "1",
     },
+    optional={"trim_pitch": "rad"},
     needs=("w_wake",),
     makes=("V_itr", "Y_tr", "Q_tr"),
     positive=("radius", "chord", "lift_slope", "ct_max", "gear_ratio", "inflow_efficiency"),
@@ -66,5 +78,6 @@ COMPONENT = Component(
         "height": "h_{tr}",
         "fin_area": "S_{vf}",
         "inflow_efficiency": r"\eta_w",
+        "trim_pitch": r"\delta_{ped,trim}",
     },
 )

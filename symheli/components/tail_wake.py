@@ -23,8 +23,8 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     down = motion.w_a - flow["V_imr"]
     # guarded: where the flow goes up through the disc the wake is above the tail
     chi = flow.name(r"\chi", motion.u_a / maximum(-down, 1e-3))
-    share = clip(1.5 * (chi - g_i) / (g_f - g_i), 0.0, 1.5, par.smoothing)
-    k_lam = flow.name(r"K_\lambda", where(down < 0, share, 0.0))
+    share = flow.name(r"\kappa", 1.5 * (chi - g_i) / (g_f - g_i))
+    k_lam = flow.name(r"K_\lambda", where(down < 0, clip(share, 0.0, 1.5, par.smoothing), 0.0))
     return Effect(
         flow={"w_wake": k_lam * flow["V_imr"], "K_lam": k_lam},
         switches={"wake reaches the tail": chi - g_i, "tail fully in the wake": chi - g_f},

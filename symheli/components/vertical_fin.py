@@ -25,7 +25,7 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     scale = 0.5 * motion.rho * par.area
     free = flow.name("Y_{free}", -scale * (par.lift_slope * speed + absolute(v)) * v)
     limit = flow.name("Y_{max}", scale * (speed2 + v**2))
-    side = clip(free, -limit, limit, par.smoothing)
+    side = flow.name("Y_{vf}", clip(free, -limit, limit, par.smoothing))
     return Effect(
         force=(0.0, side, 0.0),
         moment=(side * par.height, 0.0, -side * par.arm),

@@ -108,7 +108,7 @@ def test_the_printed_names_stay_for_one_rotor(heli):
     ("section", "message"),
     [
         (WING, "no component file at .*wing.py"),
-        (WING.replace("./wing.py", "wings"), "line 7[0-9], wing.component: unknown component 'wings'"),
+        (WING.replace("./wing.py", "wings"), "line 8[0-9], wing.component: unknown component 'wings'"),
         (AFT_ROTOR.replace("d_lon = -0.5", "d_lno = -0.5"), "aft_rotor.controls: unknown control 'd_lno'; did you mean 'd_lon'"),
         (AFT_ROTOR.replace("-0.5", "nan"), "gain must be a finite number"),
         ("[wake]\ncomponent = 'tail_wake'\nflow = { V_mr = 'V_imr' }", "wake.flow: unknown flow 'V_mr'"),
