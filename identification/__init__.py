@@ -10,35 +10,56 @@ Units are those of the record: SI and radians.
 from identification.coefficients import Coefficients, CoefficientValues
 from identification.estimate import fit
 from identification.excitation import ExcitationReport, excitation_report
+from identification.experiment_design import Experiment, Plan, choose_experiments, compare_experiments
+from identification.frequency_response import FrequencyResponse, frequency_response
 from identification.history import History
 from identification.instrumental_variables import Instruments
 from identification.model import LPVARXModel
+from identification.order_scan import OrderScan, Trial, order_scan
 from identification.prediction import fit_percent
 from identification.recursive_least_squares import RecursiveLeastSquares, RLSInfo, RLSState
+from identification.residuals import ResidualAnalysis, Theil, residual_analysis, theil
 from identification.structure import LPVARX, Entry, Group, Term
+from identification.uncertainty import Band, Uncertainty, uncertainty
 from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
 
 __all__ = [
     "LPVARX",
     "BSpline",
+    "Band",
     "CoefficientValues",
     "Coefficients",
     "Entry",
     "ExcitationReport",
+    "Experiment",
+    "FrequencyResponse",
     "Group",
     "History",
     "Instruments",
     "LPVARXModel",
+    "OrderScan",
     "PiecewiseLinear",
+    "Plan",
     "Polynomial",
     "Product",
     "RLSInfo",
     "RLSState",
     "RecursiveLeastSquares",
+    "ResidualAnalysis",
     "Spline",
     "Term",
+    "Theil",
+    "Trial",
+    "Uncertainty",
     "UserFunctions",
+    "choose_experiments",
+    "compare_experiments",
     "excitation_report",
     "fit",
     "fit_percent",
+    "frequency_response",
+    "order_scan",
+    "residual_analysis",
+    "theil",
+    "uncertainty",
 ]

@@ -1,0 +1,122 @@
+"""Which experiment tells most: candidates compared by the information their records would hold, within limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.excitation import RANK_TOLERANCE
+from identification.regressors import as_records, regression
+from identification.structure import LPVARX
+from symheli.errors import ExcitationError, InputError
+from symheli.lpv import FlightRecord
+from symheli.lpv.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A candidate with its information.
+
+    `information` (n, n) = phi' phi of the regressors, a unit of residual variance each; `bounds` (n,): standard errors it allows
+    for residuals of unit variance (infinite where it leaves a coefficient open). `exceeded`: {signal: largest value} beyond its limit.
+    """
+
+    name: str
+    duration: float
+    information: Array
+    exceeded: Mapping[str, float]
+
+    @property
+    def allowed(self) -> bool:
+        """Whether every limit is kept."""
+        return not self.exceeded
+
+    @property
+    def bounds(self) -> Array:
+        """(n,)"""
+        return standard_errors(self.information)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The chosen experiments in order, and the standard errors (n,) they allow together for residuals of unit variance.
+
+    `gains`: the growth of log det of the information with each, per regressor, from the second on.
+    """
+
+    experiments: tuple[Experiment, ...]
+    gains: tuple[float, ...]
+
+    @property
+    def information(self) -> Array:
+        """(n, n)"""
+        return np.sum([e.information for e in self.experiments], axis=0)
+
+    @property
+    def bounds(self) -> Array:
+        """(n,)"""
+        return standard_errors(self.information)
+
+
+def compare_experiments(structure: LPVARX, candidates: Mapping[str, FlightRecord], limits: Mapping[str, float]) -> tuple[Experiment, ...]:
+    """The information in each candidate's record (simulated, or flown), for a structure whose equations share their regressors.
+
+    `limits` {signal: largest absolute value} in the units of the record. A record that leaves the range of the basis is refused
+    (`InputError`). Order as given.
+    """
+    if len(structure.groups) > 1:
+        raise InputError("compare_experiments needs equations that share their regressors; compare one output at a time")
+    records = dict(zip(candidates, as_records(candidates.values()), strict=True))
+    out = []
+    for name, record in records.items():
+        exceeded = {}
+        for signal, limit in limits.items():
+            top = float(np.nanmax(np.abs(record[signal])))
+            if top > limit:
+                exceeded[signal] = top
+        phi = regression(structure, record).phi
+        out.append(Experiment(name, float(record.time[-1] - record.time[0]), phi.T @ phi, exceeded))
+    return tuple(out)
+
+
+def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
+    """At most `count` allowed experiments, one after the other, each the one that most increases log det of the information per second.
+
+    (A sequential D-optimal design: independent of the units of the coefficients.) Raises `ExcitationError` where none is allowed.
+    Source: Fedorov (1972), Theory of Optimal Experiments; for flight tests Morelli (2012).
+    """
+    if count < 1:
+        raise InputError(f"count: expected at least one experiment, got {count}")
+    left = [e for e in experiments if e.allowed]
+    if not left:
+        worst = "; ".join(f"{e.name}: {', '.join(e.exceeded)}" for e in experiments)
+        raise ExcitationError(f"no candidate keeps its limits ({worst}); lower the amplitudes or widen the limits")
+    scale = np.sqrt(np.maximum(np.max([np.diagonal(e.information) for e in left], axis=0), np.finfo(float).tiny))
+    total, chosen, gains = np.zeros_like(left[0].information), [], []
+    for _ in range(min(count, len(left))):
+        value = {e.name: _logdet((total + e.information) / np.outer(scale, scale)) for e in left}
+        start = _logdet(total / np.outer(scale, scale))
+        best = max(left, key=lambda e: (value[e.name] - start) / e.duration)
+        if chosen:
+            gains.append((value[best.name] - start) / len(scale))
+        chosen.append(best)
+        left.remove(best)
+        total = total + best.information
+    return Plan(tuple(chosen), tuple(gains))
+
+
+def standard_errors(information: Array) -> Array:
+    """sqrt(diag(information^-1)) (n,), infinite for coefficients whose direction the information leaves open."""
+    scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    open_ = values <= RANK_TOLERANCE * values[-1]
+    out = np.sqrt(np.sum(vectors[:, ~open_] ** 2 / values[~open_], axis=1)) / scale
+    return np.where(np.any(np.abs(vectors[:, open_]) > 1e-6, axis=1), np.inf, out)
+
+
+def _logdet(information: Array) -> float:
+    """Log determinant with eigenvalues no lower than what rounding leaves of the largest possible one."""
+    values = np.linalg.eigvalsh(information)
+    return float(np.sum(np.log(np.maximum(values, RANK_TOLERANCE))))

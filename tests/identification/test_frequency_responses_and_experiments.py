@@ -1,0 +1,130 @@
+"""Responses with coherence from records, and which experiment to fly."""
+
+import numpy as np
+import pytest
+from known_systems import moving, structure
+from scipy.signal import lfilter
+
+from identification import choose_experiments, compare_experiments, fit, frequency_response, uncertainty
+from symheli.errors import ExcitationError, InputError
+from symheli.lpv import FlightRecord, LinearModel
+
+DT = 0.02
+
+
+def plant():
+    """Two lightly damped modes, two inputs, cross-coupled."""
+    A = np.array([[0.0, 1, 0, 0], [-16, -1.2, 2, 0], [0, 0, 0, 1], [1, 0, -64, -3.0]])
+    B = np.array([[0.0, 0], [10, 1], [0, 0], [2, 30]])
+    C = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0]])
+    return LinearModel(A, B, C, np.zeros((2, 2)), ("x1", "x2", "x3", "x4"), ("a", "b"), ("y", "z"))
+
+
+def flown(n=12_000, noise=0.0, coupling=0.3, seed=0):
+    rng = np.random.default_rng(seed)
+    u = lfilter([1.0], [1.0, -0.8], rng.standard_normal((n, 2)), axis=0)
+    u[:, 1] += coupling * u[:, 0]
+    model, x, y = plant().discretize(DT), np.zeros(4), np.empty((n, 2))
+    for k in range(n):
+        y[k] = model.C @ x
+        x = model.A @ x + model.B @ u[k]
+    y += noise * y.std(axis=0) * rng.standard_normal(y.shape)
+    return FlightRecord.from_arrays(DT * np.arange(n), dict.fromkeys(("a", "b", "y", "z"), "1"), a=u[:, 0], b=u[:, 1], y=y[:, 0], z=y[:, 1])
+
+
+def test_the_response_of_a_known_plant_comes_back_though_its_inputs_move_together():
+    response = frequency_response(flown(), ("y", "z"), ("a", "b"), window=20.0, band=(1.0, 15.0))
+    truth = plant().discretize(DT).frequency_response(response.omega)
+    error = np.abs(response.G - truth) / np.abs(truth)
+    assert np.median(error[:, 0, 0]) < 0.03
+    assert np.median(error[:, 1, 1]) < 0.03
+    # as uncertain as it says, within a factor: what leaks between windows is no noise
+    assert np.all(response.multiple[:, 0] > 0.9)
+    assert np.all(response.mismatch(plant().discretize(DT))[[0, 1], [0, 1]] < 50)
+    wrong = plant().discretize(DT)
+    wrong = LinearModel(wrong.A, 3 * wrong.B, wrong.C, wrong.D, wrong.states, wrong.inputs, wrong.outputs, wrong.dt)
+    assert np.all(response.mismatch(wrong)[[0, 1], [0, 1]] > 100)
+
+
+def static(noise, seed=0, n=6000):
+    """y = 2 a + b + noise: nothing for a window to smear."""
+    rng = np.random.default_rng(seed)
+    a, b, e = rng.standard_normal((3, n))
+    b += 0.5 * a
+    return FlightRecord.from_arrays(DT * np.arange(n), dict.fromkeys("aby", "1"), a=a, b=b, y=2 * a + b + noise * e)
+
+
+def test_coherence_falls_and_the_random_error_grows_with_noise_as_they_say():
+    r = [frequency_response(static(2.0, seed), ("y",), ("a", "b"), window=5.0) for seed in range(20)]
+    errors = np.array([(np.abs(one.G[:, 0, 0]) / 2 - 1) / one.random_error[:, 0, 0] for one in r])
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(1.0, rel=0.25)  # asymptotic in the number of windows
+    # a with b taken off has the variance 1/(1 + 0.25): 4 x 0.8 against noise of 4
+    assert np.mean([one.coherence[:, 0, 0] for one in r]) == pytest.approx(3.2 / 7.2, abs=0.05)
+    quiet = frequency_response(static(0.1), ("y",), ("a", "b"), window=5.0)
+    assert np.median(quiet.random_error) < 0.2 * np.median(r[0].random_error)
+    assert quiet.multiple.min() > 0.98
+
+
+def test_gaps_are_not_bridged_and_inputs_that_move_together_are_refused():
+    record = flown(6000)
+    values = record.values.copy()
+    values[3000, 0] = np.nan
+    holed = FlightRecord(record.time, values, record.signals)
+    G = frequency_response(holed, ("y",), ("a", "b"), window=10.0, band=(2.0, 6.0)).G
+    assert np.all(np.isfinite(G))
+    same = FlightRecord(record.time, record.values[:, [0, 0, 2, 3]], record.signals)
+    with pytest.raises(ExcitationError, match="move together"):
+        frequency_response(same, ("y",), ("a", "b"), window=10.0)
+    with pytest.raises(ExcitationError, match="shorten the window"):
+        frequency_response(record, ("y",), ("a",), window=500.0)
+    with pytest.raises(InputError, match="no frequency"):
+        frequency_response(record, ("y",), ("a",), window=10.0, band=(0.01, 0.02))
+
+
+def candidate(u, p):
+    n = len(p)
+    y = np.zeros(n)
+    for k in range(2, n):
+        y[k] = (1.2 - 0.02 * p[k - 1]) * y[k - 1] - 0.5 * y[k - 2] + u[k - 1]
+    return FlightRecord.from_arrays(0.1 * np.arange(n), dict.fromkeys("yup", "1"), y=y, u=u, p=p)
+
+
+def candidates(n=800):
+    k, rng = np.arange(n), np.random.default_rng(0)
+    noise = rng.choice([-1.0, 1.0], n)
+    return {
+        "one sine": candidate(np.sin(0.3 * k), moving(n)),
+        "switching, slow p": candidate(noise, np.linspace(5, 6, n)),
+        "switching, moving p": candidate(noise, moving(n)),
+        "switching, too large": candidate(5 * noise, moving(n)),
+    }
+
+
+def test_the_experiment_that_moves_everything_tells_most_and_limits_are_kept():
+    found = compare_experiments(structure(), candidates(), {"u": 2.0})
+    assert [e.name for e in found if not e.allowed] == ["switching, too large"]
+    plan = choose_experiments(found, 2)
+    assert plan.experiments[0].name == "switching, moving p"
+    assert np.all(plan.bounds <= plan.experiments[0].bounds * (1 + 1e-9))  # more data never know less
+    sine = next(e for e in found if e.name == "one sine")
+    assert np.median(sine.bounds) > 5 * np.median(plan.experiments[0].bounds)
+
+
+def test_bounds_are_the_standard_errors_a_fit_reports():
+    records = candidates()
+    (one,) = compare_experiments(structure(), {"x": records["switching, moving p"]}, {})
+    record = records["switching, moving p"]
+    rng = np.random.default_rng(1)
+    noisy = FlightRecord(record.time, record.values + np.array([0.1, 0, 0]) * rng.standard_normal(record.values.shape), record.signals)
+    model = fit(structure(), noisy)
+    white = np.sqrt(np.diagonal(uncertainty(model, noisy).white[0]))
+    scale = np.sqrt(model.residual_covariance[0, 0])
+    np.testing.assert_allclose(one.bounds * scale, white, rtol=0.15)  # the noise moves the regressors a little
+
+
+def test_an_experiment_that_leaves_coefficients_open_says_so_and_none_allowed_is_refused():
+    still = {"constant p": candidate(np.random.default_rng(0).standard_normal(300), np.full(300, 5.0))}
+    (one,) = compare_experiments(structure(), still, {})
+    assert np.all(np.isinf(one.bounds))
+    with pytest.raises(ExcitationError, match="no candidate keeps its limits"):
+        choose_experiments(compare_experiments(structure(), still, {"u": 1e-3}), 1)
