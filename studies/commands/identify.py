@@ -59,9 +59,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Output:
     """Read, prepare, fit, judge."""
     from identification import LPVARX, Polynomial
-    from studies.log import preparing, report
+    from studies.log import report
     from studies.log.comparison import compare, scheduling_range
-    from studies.log.reading import format_of, read
+    from studies.log.reading import COMBINED, format_of, read
+    from symheli.lpv import conditioning
 
     kind = format_of(arguments.log) if arguments.format == "auto" else arguments.format
     outputs, inputs, scheduling = _signals(arguments, kind)
@@ -71,21 +72,21 @@ def run(arguments: argparse.Namespace) -> Output:
     )
     samples = len(record)
     if arguments.scheduling_from:
-        record, scheduling = preparing.with_norm(record, arguments.scheduling_from), preparing.COMBINED
+        record, scheduling = conditioning.with_norm(record, arguments.scheduling_from, COMBINED), COMBINED
     if not scheduling:
         scheduling = "constant"
         record = record.with_signals({scheduling: "1"}, **{scheduling: np.zeros(len(record))})
-    record = preparing.cut(record.select(list(dict.fromkeys([*outputs, *inputs, scheduling]))), arguments.start, arguments.stop)
+    record = conditioning.cut(record.select(list(dict.fromkeys([*outputs, *inputs, scheduling]))), arguments.start, arguments.stop)
     outside = samples - len(record)
     if arguments.smooth_scheduling:
-        record = preparing.smoothed(record, scheduling, arguments.smooth_scheduling)
-    record = preparing.decimated(record, arguments.decimate)
+        record = conditioning.smooth(record, scheduling, arguments.smooth_scheduling)
+    record = conditioning.decimate(record, arguments.decimate)
     basis = Polynomial(arguments.degree, *scheduling_range(record[scheduling], arguments.degree))
     structure = LPVARX(
         outputs, inputs, scheduling, arguments.na, arguments.nb, arguments.delay, basis,
         scheduling_at=arguments.scheduling_at, offset=not arguments.no_offset,
     )  # fmt: skip
-    result = compare(structure, *preparing.split(record, arguments.train))
+    result = compare(structure, *conditioning.split(record, arguments.train))
     found = report.facts(arguments.log, kind, record, samples, outside, result)
     return Output(report.text(found, result), report.data(found, result))
 

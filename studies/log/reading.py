@@ -12,6 +12,8 @@ from symheli.lpv import FlightRecord
 from symheli.lpv.signal import UNITS
 
 Format = Literal["xplane", "csv", "mat"]
+COMBINED = "speed"
+"""The scheduling signal made of --scheduling-from."""
 TIMES = ("t", "time")
 """Columns taken as the time where none is named."""
 

@@ -1,6 +1,7 @@
 """The value types that every room shares: pure NumPy, no physics, no solver."""
 
 from symheli.lpv.bases import Basis, BSpline, FunctionSpace, Piece, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
+from symheli.lpv.conditioning import cut, decimate, low_pass, smooth, split, with_norm
 from symheli.lpv.delay import pade_delay
 from symheli.lpv.flight_record import FlightRecord
 from symheli.lpv.lft import LFT, Block, HoldError, Truncation, WellPosedness, append, connect, feedback, parallel, series
@@ -43,11 +44,17 @@ __all__ = [
     "append",
     "chordal_distance",
     "connect",
+    "cut",
+    "decimate",
     "feedback",
+    "low_pass",
     "nu_gap",
     "pade_delay",
     "parallel",
     "series",
     "signals",
     "simulate",
+    "smooth",
+    "split",
+    "with_norm",
 ]

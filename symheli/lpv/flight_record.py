@@ -109,6 +109,13 @@ class FlightRecord:
         return cls._from_table(*read_mat(path, time, units), path)
 
     @classmethod
+    def from_map(cls, path: str | os.PathLike[str], signal_map: str | os.PathLike[str]) -> FlightRecord:
+        """From any of these logs by a TOML file that says which column is which signal; see `symheli.logs.signal_map`."""
+        from symheli.logs.signal_map import SignalMap
+
+        return SignalMap.load(signal_map).read(path)
+
+    @classmethod
     def _from_table(cls, time: Array, columns: Mapping[str, Array], units: Mapping[str, str], path: str | os.PathLike[str]) -> FlightRecord:
         return cls.from_arrays(time, units, os.path.basename(os.fspath(path)), **columns)
 

@@ -1,0 +1,133 @@
+"""A TOML file that says where a log keeps which signal, in which unit: written once for an aircraft, used for every flight of it.
+
+    format = "csv"          # csv, mat, xplane or ulog; by the log's extension where it is left out
+    time = "time_us"        # time column of csv and mat
+    time_unit = "us"
+    dt = 0.02               # s: resample to (needed for ulog, and for xplane and csv without a time)
+
+    [signals]
+    q = { column = "gyro_y", unit = "deg/s", scale = -1 }
+    airspeed = { column = "pitot", unit = "km/h", offset = 0.4 }
+
+A signal is (scale * column + offset) in `unit`. Columns of a ulog are "topic.field", those of a MATLAB file may reach into a struct
+("log.theta"), those of X-Plane are the names of `symheli.logs.xplane` and need no unit.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.logs.files import text
+from symheli.lpv.flight_record import FlightRecord
+from symheli.lpv.units import to_si
+
+FORMATS = {".csv": "csv", ".mat": "mat", ".ulg": "ulog"}
+KEYS = ("format", "time", "time_unit", "dt", "signals")
+ENTRY = ("column", "unit", "scale", "offset")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where one signal comes from: `column`, its `unit` (None: that of the log), scale * column + offset."""
+
+    column: str
+    unit: str | None
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class SignalMap:
+    """The content of a signal map; `load` reads one, `read` applies it to a log."""
+
+    signals: dict[str, Source]
+    format: str | None = None
+    time: str | None = None
+    time_unit: str = "s"
+    dt: float | None = None
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> SignalMap:
+        """From a TOML file; raises `InputError` naming the file and the entry that is wrong."""
+        try:
+            table = tomllib.loads(text(path))
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"{path} is not valid TOML: {error}") from error
+        for key in table:
+            if key not in KEYS:
+                raise UnknownNameError(f"entry of {path}", key, KEYS)
+        given = table.get("signals")
+        if not isinstance(given, dict) or not given:
+            raise InputError(f'{path}: a [signals] table is needed, such as q = {{ column = "gyro_y", unit = "deg/s" }}')
+        signals = {name: _source(entry, f"{path}, signals.{name}") for name, entry in given.items()}
+        kind, dt = table.get("format"), table.get("dt")
+        if kind is not None and kind not in (*FORMATS.values(), "xplane"):
+            raise UnknownNameError(f"format in {path}", str(kind), (*FORMATS.values(), "xplane"))
+        if dt is not None and not (isinstance(dt, int | float) and math.isfinite(dt) and dt > 0):
+            raise InputError(f"{path}: dt must be a positive number of seconds, got {dt!r}")
+        return cls(signals, kind, table.get("time"), str(table.get("time_unit", "s")), dt)
+
+    def read(self, log: str | os.PathLike[str]) -> FlightRecord:
+        """The record of a log: the mapped signals in SI, on a uniform step where `dt` says so."""
+        kind = self.format or FORMATS.get(Path(log).suffix.lower(), "xplane")
+        record = self._columns(log, kind)
+        units = {name: self._unit(name, source, record) for name, source in self.signals.items()}
+        columns = {}
+        for name, source in self.signals.items():
+            # the record is in SI; scale and offset speak of the declared unit
+            factor = to_si(units[name])[0]
+            columns[name] = source.scale * record[source.column] / factor + source.offset
+        mapped = FlightRecord.from_arrays(record.time, units, record.note, **columns)
+        resample = self.dt is not None and kind in ("csv", "mat") and self.time is not None
+        return mapped.resample(self.dt) if resample else mapped  # type: ignore[arg-type]
+
+    def _columns(self, log: str | os.PathLike[str], kind: str) -> FlightRecord:
+        declared = {s.column: s.unit or "1" for s in self.signals.values()}
+        match kind:
+            case "xplane":
+                return FlightRecord.from_xplane(log, self.dt)
+            case "ulog":
+                if self.dt is None:
+                    raise InputError(f"{log}: the topics of a ULog have their own clocks; give dt (s) in the signal map to resample them")
+                return FlightRecord.from_ulog(log, {column: (*_topic(column), unit) for column, unit in declared.items()}, self.dt)
+            case "mat":
+                if self.time is None:
+                    raise InputError(f"{log}: name the time vector in the signal map: time = ...")
+                return FlightRecord.from_mat(log, self.time, declared)
+        return FlightRecord.from_csv(log, self.time, declared, self.dt if self.time is None else None, self.time_unit)
+
+    def _unit(self, name: str, source: Source, record: FlightRecord) -> str:
+        found = record.signals[record.signals.index(source.column)].unit if source.column in record.signals else None  # type: ignore[arg-type]
+        if source.unit is None:
+            return found or "1"
+        if found is not None and to_si(source.unit)[1] != found:
+            raise InputError(f"signals.{name}: {source.column} comes in {found}, which is no {source.unit}; correct or leave out the unit")
+        return source.unit
+
+
+def _source(entry: Any, where: str) -> Source:
+    if not isinstance(entry, dict) or not isinstance(entry.get("column"), str):
+        raise InputError(f'{where}: expected {{ column = "...", unit = "..." }}, got {entry!r}')
+    for key in entry:
+        if key not in ENTRY:
+            raise UnknownNameError(f"entry of {where}", key, ENTRY)
+    unit = entry.get("unit")
+    if unit is not None:
+        to_si(unit)
+    numbers = [entry.get("scale", 1.0), entry.get("offset", 0.0)]
+    if not all(isinstance(n, int | float) and math.isfinite(n) for n in numbers) or numbers[0] == 0:
+        raise InputError(f"{where}: scale must be a number other than 0 and offset a number, got {numbers}")
+    return Source(entry["column"], unit, float(numbers[0]), float(numbers[1]))
+
+
+def _topic(column: str) -> tuple[str, str]:
+    topic, dot, field = column.partition(".")
+    if not dot:
+        raise InputError(f'{column!r}: a column of a ULog is "topic.field", such as "vehicle_angular_velocity.xyz[1]"')
+    return topic, field
