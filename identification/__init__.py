@@ -17,8 +17,11 @@ from identification.instrumental_variables import Instruments
 from identification.model import LPVARXModel
 from identification.order_scan import OrderScan, Trial, order_scan
 from identification.prediction import fit_percent
-from identification.recursive_least_squares import RecursiveLeastSquares, RLSInfo, RLSState
 from identification.residuals import ResidualAnalysis, Theil, residual_analysis, theil
+from identification.forgetting import Constant, Directional, Forgetting, Variable
+from identification.online import Online
+from identification.recursive_least_squares import RecursiveLeastSquares
+from identification.rls_state import RLSInfo, RLSState
 from identification.structure import LPVARX, Entry, Group, Term
 from identification.uncertainty import Band, Uncertainty, uncertainty
 from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
@@ -29,14 +32,18 @@ __all__ = [
     "Band",
     "CoefficientValues",
     "Coefficients",
+    "Constant",
+    "Directional",
     "Entry",
     "ExcitationReport",
     "Experiment",
+    "Forgetting",
     "FrequencyResponse",
     "Group",
     "History",
     "Instruments",
     "LPVARXModel",
+    "Online",
     "OrderScan",
     "PiecewiseLinear",
     "Plan",
@@ -52,6 +59,7 @@ __all__ = [
     "Trial",
     "Uncertainty",
     "UserFunctions",
+    "Variable",
     "choose_experiments",
     "compare_experiments",
     "excitation_report",

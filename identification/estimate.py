@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Literal
 
 from identification.excitation import excitation_of
+from identification.forgetting import Forgetting
 from identification.instrumental_variables import Instruments, instrumental_variables
 from identification.least_squares import least_squares_by_group, residual_covariance
 from identification.model import LPVARXModel
@@ -24,14 +25,15 @@ def fit(
     records: FlightRecord | Iterable[FlightRecord],
     method: Literal["ls", "rls", "iv"] = "ls",
     *,
-    forgetting: float = 1.0,
+    forgetting: float | Forgetting = 1.0,
     instruments: Sequence[str] | Instruments = (),
 ) -> LPVARXModel:
     """Identify the coefficients of `structure` from one record or several (same sample period and units).
 
     "ls": least squares over all samples. "rls": the same, sample by sample, the older ones weighted by `forgetting` to
-    the power of their age. "iv": instrumental variables, for records flown in closed loop: `instruments` names the external
-    excitation signals (or is an `Instruments` with its window). Noise fed back biases the other two.
+    the power of their age, or as `Constant`, `Variable`, `Directional` say. "iv": instrumental variables, for records flown
+    in closed loop: `instruments` names the external excitation signals (or is an `Instruments` with its window). Noise fed
+    back biases the other two.
 
     Raises `ExcitationError` (with a report) where the data cannot determine every coefficient, `UnknownNameError` for
     signals the record lacks, `InputError` where p leaves the range of the basis or an option does not fit the method.
@@ -62,9 +64,9 @@ def fit(
     )
 
 
-def _recursive(structure: LPVARX, data: Regression, forgetting: float) -> tuple[Array, Array]:
-    rls = RecursiveLeastSquares(structure, forgetting)
-    state = rls.init()
+def _recursive(structure: LPVARX, data: Regression, forgetting: float | Forgetting) -> tuple[Array, Array]:
+    online = RecursiveLeastSquares(structure, forgetting).online()
     for phi, y in zip(data.phi, data.y, strict=True):
-        state, _ = rls.absorb(state, phi, y)
+        online.absorb(phi, y)
+    state = online.state
     return state.solve(), state.residual_covariance

@@ -11,7 +11,7 @@ from symheli.lpv import Signal
 from symheli.lpv.arrays import Array
 
 if TYPE_CHECKING:
-    from identification.recursive_least_squares import RLSState
+    from identification.rls_state import RLSState
 
 
 @dataclass(frozen=True, eq=False)

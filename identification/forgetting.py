@@ -1,0 +1,103 @@
+"""How a recursive estimator lets old samples go, so that it follows what changes and never winds up when nothing excites it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from symheli.errors import InputError
+
+FLOOR = 1e-3
+"""Information that stays on each coefficient, in samples with its regressor at its largest."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A sample k steps old has the weight factor^k; `factor` in (0, 1], 1 forgets nothing.
+
+    `floor` keeps the filter awake when excitation stops: the information on a coefficient never falls below that of `floor`
+    samples with its regressor at its largest. It is fed in coefficient by coefficient, as a measurement saying "as it is now",
+    which moves no coefficient; 0 turns it off. With factor 1 there is nothing to make up for. At the floor the gain is large:
+    noise of a fraction r of the largest regressors moves the coefficients within floor / r^2 samples. Raises `InputError` out of range.
+    """
+
+    factor: float = 1.0
+    floor: float = FLOOR
+
+    def __post_init__(self) -> None:
+        if not 0 < self.factor <= 1:
+            raise InputError(f"forgetting: expected a factor in (0, 1], got {self.factor!r}; 0.99 forgets within 100 samples")
+        check_floor(self.floor)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Memory between `longest` and `shortest` samples, shorter when the innovations outgrow what they usually are.
+
+    The factor is 1 - q / longest, q the power of the innovations over the last `recent` samples against that over the last
+    `usual` (mean over the outputs of a group), held between the two memories. A jump of the plant is forgotten within about
+    `shortest` samples; so is, after an outlier, what came before it. `floor` as for `Constant`. Windows and memories in samples,
+    at least 1. Raises `InputError` out of range.
+    Source: Fortescue, Kershenbaum and Ydstie (1981), Implementation of self-tuning regulators with variable forgetting factors;
+    powers estimated from the innovations as in Paleologu, Benesty and Ciochina (2008), A robust variable forgetting factor
+    recursive least-squares algorithm for system identification.
+    """
+
+    longest: float = 1000.0
+    shortest: float = 50.0
+    recent: float = 20.0
+    usual: float = 1000.0
+    floor: float = FLOOR
+
+    def __post_init__(self) -> None:
+        for name in ("longest", "shortest", "recent", "usual"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 1):
+                raise InputError(f"{name}: expected a number of samples > 1, got {value!r}")
+        if self.shortest > self.longest or self.recent > self.usual:
+            raise InputError(
+                f"expected shortest <= longest and recent <= usual, got {self.shortest} and {self.longest}, {self.recent} and {self.usual}"
+            )
+        check_floor(self.floor)
+
+
+@dataclass(frozen=True)
+class Directional:
+    """The information along each new regressor is multiplied by `factor` before it is taken in; all other directions keep theirs.
+
+    What is not excited is not forgotten, so that nothing winds up. With n regressors about n / (1 - factor) samples are
+    remembered in directions that are excited alike, more in weaker ones: a jump of the plant is followed more slowly there. A
+    sample whose regressors all stay below `quiet` of their largest so far forgets nothing: noise does not wash out what flight
+    has taught (a constant regressor, such as an offset, is never quiet). Raises `InputError` out of range.
+    Source: Cao and Schwartz (2000), A directional forgetting algorithm based on the decomposition of the information matrix; the
+    threshold as in Lai and Bernstein (2024), SIFt-RLS: subspace of information forgetting recursive least squares.
+    """
+
+    factor: float = 0.95
+    quiet: float = 0.01
+
+    def __post_init__(self) -> None:
+        if not 0 < self.factor <= 1:
+            raise InputError(f"forgetting: expected a factor in (0, 1], got {self.factor!r}")
+        if not 0 <= self.quiet < 1:
+            raise InputError(f"quiet: expected a fraction in [0, 1), got {self.quiet!r}")
+
+
+Forgetting = Constant | Variable | Directional
+
+
+def check_floor(floor: float) -> None:
+    """Raises `InputError` unless finite and >= 0."""
+    if not (math.isfinite(floor) and floor >= 0):
+        raise InputError(f"floor: expected a number of samples >= 0, got {floor!r}")
+
+
+def numbers(forgetting: Forgetting) -> tuple[int, float, float, float, float, float, float]:
+    """(kind, factor, lowest, recent, usual, quiet, floor) as the kernel takes them; see rls.h."""
+    match forgetting:
+        case Constant(factor, floor):
+            return 0, factor, factor, 0.0, 0.0, 0.0, floor
+        case Variable(longest, shortest, recent, usual, floor):
+            return 1, 1 - 1 / longest, 1 - 1 / shortest, 1 / recent, 1 / usual, 0.0, floor
+        case Directional(factor, quiet):
+            return 2, factor, factor, 0.0, 0.0, quiet, 0.0

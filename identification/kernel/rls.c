@@ -1,0 +1,472 @@
+/* See rls.h. Rotations after Gentleman (1973), Least squares computations by Givens transformations without square roots. */
+#include "rls.h"
+
+#include <float.h>
+
+#ifdef RLS_SINGLE
+#define EPSILON FLT_EPSILON
+#define LARGEST 1e15f /* a signal beyond this would overflow when squared and summed */
+#define TINY 1e-36f   /* information below this is none */
+#else
+#define EPSILON DBL_EPSILON
+#define LARGEST 1e145
+#define TINY 1e-290
+#endif
+#define LANES 8
+#define REAL(number) ((rls_real)(number))
+#define PRIOR (EPSILON / 16) /* samples with a regressor at its largest that are pretended at first, saying "coefficient 0" */
+#define MILLION 1048576      /* samples are counted in two numbers, each exact in single precision */
+
+/* State: this header, the past (memory + 1 rows of y, u, p, f, newest first), the groups. */
+enum { COUNT, MILLIONS, FILLED, HEADER = LANES };
+/* A group: this header, then the arrays of `group` up to `usual`. */
+enum { WEIGHT, TURN, DETERMINED, STEPS, FACTOR, GROUP_HEADER = LANES };
+
+/* n regressors, m outputs; n + m, n and m rounded up to whole LANES. Row i of the unit triangle starts at the multiple of LANES at or
+   before its diagonal. [R, Z; 0, S] = sqrt(d) triangle. */
+typedef struct {
+    int n, m, wide, tall, high;
+    rls_real *header, *triangle, *d, *theta, *peak, *energy, *fed, *recent, *usual; /* state */
+    rls_real *phi, *x, *s, *gain, *innovation;                                      /* scratch */
+} group;
+
+static int padded(int n) { return (n + LANES - 1) / LANES * LANES; }
+
+static int row_start(int i) { return i / LANES * LANES; }
+
+/* Where row i of a triangle with rows of `wide` columns begins. */
+static int row_offset(int i, int wide)
+{
+    const int blocks = i / LANES;
+    return i * wide - LANES * (LANES * (blocks * (blocks - 1) / 2) + blocks * (i % LANES));
+}
+
+static int row_width(const rls_config *c) { return c->outputs + c->inputs + 1 + c->basis.functions; }
+
+static int past_size(const rls_config *c) { return padded((c->memory + 1) * row_width(c)); }
+
+static group open_group(const rls_config *c, int g, rls_real *state, rls_real *work)
+{
+    group a;
+    a.n = c->group[g].entries * c->basis.functions;
+    a.m = c->group[g].outputs;
+    a.wide = padded(a.n + a.m);
+    a.tall = padded(a.n);
+    a.high = padded(a.m);
+    a.header = state;
+    a.triangle = a.header + GROUP_HEADER;
+    a.d = a.triangle + row_offset(a.n + a.m, a.wide);
+    a.theta = a.d + a.wide;
+    a.peak = a.theta + a.m * a.tall;
+    a.energy = a.peak + a.tall;
+    a.fed = a.energy + a.tall;
+    a.recent = a.fed + a.tall;
+    a.usual = a.recent + a.high;
+    a.phi = work;
+    a.x = a.phi + a.tall;
+    a.s = a.x + a.wide;
+    a.gain = a.s + a.wide;
+    a.innovation = a.gain + a.tall;
+    return a;
+}
+
+static rls_real *end_of_state(const group *a) { return a->usual + a->high; }
+
+static rls_real *end_of_work(const group *a) { return a->innovation + a->high; }
+
+static int groups_state(const rls_config *c) { return HEADER + past_size(c); }
+
+static int groups_work(const rls_config *c) { return padded(rls_regressors(c)) + padded(c->outputs); }
+
+int rls_regressors(const rls_config *c) { return c->entries * c->basis.functions; }
+
+int rls_state_size(const rls_config *c)
+{
+    int size = groups_state(c);
+    for (int g = 0; g < c->groups; g++) {
+        const int n = c->group[g].entries * c->basis.functions, m = c->group[g].outputs, wide = padded(n + m);
+        size += GROUP_HEADER + row_offset(n + m, wide) + wide + (m + 3) * padded(n) + 2 * padded(m);
+    }
+    return size;
+}
+
+int rls_work_size(const rls_config *c)
+{
+    int size = groups_work(c);
+    for (int g = 0; g < c->groups; g++) {
+        const int n = c->group[g].entries * c->basis.functions, m = c->group[g].outputs;
+        size += 2 * padded(n) + 2 * padded(n + m) + padded(m);
+    }
+    return size;
+}
+
+void rls_init(const rls_config *c, rls_real *state, rls_real *work)
+{
+    for (int i = rls_state_size(c) - 1; i >= 0; i--) state[i] = 0;
+    for (int i = rls_work_size(c) - 1; i >= 0; i--) work[i] = 0;
+    state += groups_state(c);
+    for (int g = 0; g < c->groups; g++) {
+        const group a = open_group(c, g, state, work);
+        for (int i = 0; i < a.n + a.m; i++) a.triangle[row_offset(i, a.wide) + i - row_start(i)] = 1;
+        state = end_of_state(&a);
+    }
+}
+
+static inline rls_real absolute(rls_real a) { return a < 0 ? -a : a; }
+
+static inline rls_real dot(const rls_real *restrict a, const rls_real *restrict b, int length)
+{
+    rls_real s[LANES] = {0};
+    for (int k = 0; k < length; k += LANES)
+        for (int j = 0; j < LANES; j++) s[j] += a[k + j] * b[k + j];
+    return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+}
+
+/* For each row i in turn: x <- x - first[i] row, row <- row + gain[i] x. */
+static inline void rotate(rls_real *restrict rows, int stride, int count, rls_real *restrict x, int length, const rls_real *restrict first,
+                          const rls_real *restrict gain)
+{
+    for (int i = 0; i < count; i++) {
+        rls_real *restrict row = rows + i * stride;
+        const rls_real f = first[i], g = gain[i];
+        for (int k = 0; k < length; k++) {
+            const rls_real t = x[k] - f * row[k];
+            x[k] = t;
+            row[k] += g * t;
+        }
+    }
+}
+
+/* The same for one row of which little is kept, where row + gain x would cancel: row <- keep row + gain x. */
+static inline void renew(rls_real *restrict row, rls_real *restrict x, int length, rls_real first, rls_real gain, rls_real keep)
+{
+    for (int k = 0; k < length; k++) {
+        const rls_real r = row[k], t = x[k];
+        x[k] = t - first * r;
+        row[k] = keep * r + gain * t;
+    }
+}
+
+/* Rotate x, of weight 1/w, into rows first .. last - 1, whose information is first multiplied by `kept`. Returns what w has become;
+   s gets R^-T phi in the scale of the triangle. */
+static inline rls_real sweep(const group *a, int first, int last, rls_real kept, rls_real w)
+{
+    rls_real lead[LANES], gain[LANES];
+    for (int start = row_start(first); start < last; start += LANES) {
+        const int length = a->wide - start, rows = last - start < LANES ? last - start : LANES;
+        rls_real *x = a->x + start, *block = a->triangle + row_offset(start, a->wide);
+        int done = first > start ? first - start : 0;
+        for (int i = done; i < rows; i++) {
+            const rls_real f = x[i], d = kept * a->d[start + i], ratio = f / d, sum = w + f * ratio;
+            lead[i] = f;
+            if (f == 0) {
+                gain[i] = 0;
+                a->d[start + i] = d;
+            } else if (sum <= 4 * w && d > TINY) {
+                gain[i] = ratio / sum;
+                a->d[start + i] = d + f * (f / w);
+                w = sum;
+                rotate(block + i * length, length, 1, x, LANES, lead + i, gain + i);
+            } else {
+                const int known = d > TINY;
+                rotate(block + done * length + LANES, length, i - done, x + LANES, length - LANES, lead + done, gain + done);
+                gain[i] = known ? ratio / sum : 1 / f;
+                renew(block + i * length, x, length, f, gain[i], known ? w / sum : 0);
+                block[i * length + i] = 1;
+                a->d[start + i] = (known ? d : 0) + f * (f / w);
+                w = known ? sum : 1 / TINY;
+                done = i + 1;
+            }
+            a->s[start + i] = gain[i];
+        }
+        rotate(block + done * length + LANES, length, rows - done, x + LANES, length - LANES, lead + done, gain + done);
+    }
+    return w;
+}
+
+/* Whether column i of R stands out of the span of those before it, as far as rounding lets us see. */
+static inline int is_known(const group *a, int i) { return a->d[i] > EPSILON * a->energy[i]; }
+
+/* gain <- triangle^-1 s; a coefficient that is not known stays as it is, and the others explain the data without it. */
+static inline void back_substitute(const group *a)
+{
+    for (int k = 0; k < a->tall; k++) a->gain[k] = 0;
+    for (int start = a->tall - LANES; start >= 0; start -= LANES) {
+        const int rows = a->n - start < LANES ? a->n - start : LANES, length = a->wide - start;
+        const rls_real *block = a->triangle + row_offset(start, a->wide);
+        rls_real *g = a->gain + start;
+        for (int i = 0; i < rows; i++) g[i] = a->s[start + i] - dot(block + i * length + LANES, g + LANES, a->tall - start - LANES);
+        for (int i = rows - 1; i >= 0; i--) {
+            if (!is_known(a, start + i)) g[i] = 0;
+            for (int k = 0; k < i; k++) g[k] -= block[k * length + i] * g[i];
+        }
+    }
+}
+
+/* Largest regressors so far. One that is seen for the first time gets its prior: nothing is in its row and column yet. Returns the
+   largest ratio of a regressor to its largest. */
+static inline rls_real new_peaks(const group *a)
+{
+    rls_real loudest = 0;
+    for (int i = 0; i < a->n; i++) {
+        const rls_real size = absolute(a->phi[i]);
+        if (a->peak[i] == 0 && size > 0) a->d[i] = a->energy[i] = a->fed[i] = PRIOR * (size * size);
+        if (size > a->peak[i]) a->peak[i] = size;
+        if (size > loudest * a->peak[i]) loudest = size / a->peak[i];
+    }
+    return loudest;
+}
+
+/* Multiply the information along phi by `factor`, and leave what is known of all other directions: R'DR - (1 - factor) v v' / phi'v with
+   v = R'DR phi. Source: Cao and Schwartz (2000), A directional forgetting algorithm based on the decomposition of the information matrix. */
+static inline void forget_direction(const group *a, rls_real factor)
+{
+    rls_real length2 = 0, share, left = factor;
+    for (int i = 0; i < a->n; i++) {
+        const int start = row_start(i);
+        a->s[i] = dot(a->triangle + row_offset(i, a->wide), a->phi + start, a->tall - start);
+        length2 += a->d[i] * (a->s[i] * a->s[i]);
+    }
+    if (!(length2 > TINY)) return;
+    share = (1 - factor) / length2;
+    for (int k = 0; k < a->wide; k++) a->x[k] = 0;
+    for (int i = a->n - 1; i >= 0; i--) {
+        const int start = row_start(i);
+        const rls_real more = left + share * (a->d[i] * (a->s[i] * a->s[i])), out = share * a->s[i] / left, in = a->d[i] * a->s[i];
+        rls_real *restrict row = a->triangle + row_offset(i, a->wide), *restrict x = a->x + start;
+        for (int k = 0; k < a->wide - start; k++) {
+            const rls_real r = row[k], t = x[k];
+            row[k] = r - out * t;
+            x[k] = t + in * r;
+        }
+        a->d[i] *= left / more;
+        left = more;
+    }
+    for (int i = 0; i < a->n; i++) a->energy[i] -= share * (a->x[i] * a->x[i]);
+}
+
+/* The first innovations say what is not known yet, not what is usual. */
+static inline int is_settled(const rls_forgetting *f, const group *a)
+{
+    const rls_real weight = a->header[WEIGHT];
+    return a->header[STEPS] > 0 || (a->header[DETERMINED] != 0 && (weight >= REAL(2 * a->n) || 2 * weight * (1 - f->factor) >= 1));
+}
+
+/* A sample counts in the usual power no more than tenfold, and what is usual comes down with what is recent: a jump or an outlier does not
+   pass for usual. Source of the variable factor: Fortescue, Kershenbaum and Ydstie (1981), with both powers taken from the innovations. */
+static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a, rls_real loudest)
+{
+    rls_real steps, recent, usual, ratio = 0, factor;
+    if (f->kind == RLS_DIRECTIONAL) return loudest < f->quiet ? 1 : f->factor;
+    if (f->kind == RLS_CONSTANT || !is_settled(f, a)) return f->factor;
+    steps = a->header[STEPS] + 1;
+    if (steps * f->usual <= 2) a->header[STEPS] = steps;
+    recent = steps * f->recent > 1 ? f->recent : 1 / steps;
+    usual = steps * f->usual > 1 ? f->usual : 1 / steps;
+    for (int j = 0; j < a->m; j++) {
+        const rls_real power = a->innovation[j] * a->innovation[j];
+        a->recent[j] += recent * (power - a->recent[j]);
+        if (a->usual[j] == 0) a->usual[j] = power;
+        a->usual[j] += usual * ((power < 10 * a->usual[j] ? power : 10 * a->usual[j]) - a->usual[j]);
+        if (a->usual[j] > 4 * a->recent[j]) a->usual[j] = 4 * a->recent[j];
+        ratio += a->usual[j] > 0 ? a->recent[j] / a->usual[j] : 1;
+    }
+    factor = 1 - (1 - f->factor) * (ratio / REAL(a->m));
+    return factor < f->lowest ? f->lowest : factor > f->factor ? f->factor : factor;
+}
+
+static inline rls_real power(rls_real base, int exponent)
+{
+    rls_real result = 1;
+    for (; exponent > 0; exponent /= 2) {
+        if (exponent % 2) result *= base;
+        base *= base;
+    }
+    return result;
+}
+
+/* Keep coefficient j awake: a measurement that says "as it is now" moves nothing and makes up for what was forgotten. It comes as soon as
+   half is gone, so that the floor holds until the next turn of j, n samples later. */
+static inline void replenish(const rls_forgetting *f, const group *a, int j)
+{
+    const rls_real fastest = f->kind == RLS_VARIABLE ? f->lowest : f->factor;
+    rls_real samples = PRIOR, target;
+    if (f->kind != RLS_DIRECTIONAL && fastest < 1) {
+        const rls_real kept = power(fastest, a->n), floor = 2 * f->floor / (kept > REAL(1e-12) ? kept : REAL(1e-12));
+        if (floor > samples) samples = floor;
+    }
+    target = samples * (a->peak[j] * a->peak[j]);
+    if (2 * a->fed[j] >= target) return;
+    for (int k = 0; k < a->wide; k++) a->x[k] = 0;
+    a->x[j] = 1;
+    for (int k = 0; k < a->m; k++) a->x[a->n + k] = a->theta[k * a->tall + j];
+    sweep(a, j, a->n, 1, 1 / (target - a->fed[j]));
+    a->energy[j] += target - a->fed[j];
+    a->fed[j] = target;
+}
+
+/* Information that is about to underflow is dropped. */
+static inline void drop_underflow(const group *a, int j)
+{
+    rls_real *row = a->triangle + row_offset(j, a->wide);
+    for (int k = 0; k < a->wide - row_start(j); k++) row[k] = absolute(row[k]) < TINY ? 0 : row[k];
+    if (a->d[j] < TINY) a->d[j] = 0;
+    if (j < a->n && a->energy[j] < TINY) a->energy[j] = 0;
+    if (j < a->n && a->fed[j] < TINY) a->fed[j] = 0;
+}
+
+/* Whether every coefficient is known; at first it must also be known from more than what was fed to keep it awake. */
+static inline int is_determined(const group *a)
+{
+    const rls_real beyond = a->header[DETERMINED] == 0 ? 2 : 0;
+    int known = 0;
+    for (int i = 0; i < a->n; i++) known += is_known(a, i) && a->d[i] > beyond * a->fed[i];
+    return known == a->n;
+}
+
+static void learn(const rls_forgetting *f, const group *a, const int *output, const rls_real *y)
+{
+    const int turn = (int)a->header[TURN];
+    rls_real factor, kept, w;
+    for (int j = 0; j < a->m; j++) a->innovation[j] = y[output[j]] - dot(a->phi, a->theta + j * a->tall, a->tall);
+    factor = forgetting_factor(f, a, new_peaks(a));
+    kept = f->kind == RLS_DIRECTIONAL ? 1 : factor;
+    replenish(f, a, turn);
+    if (factor < kept) forget_direction(a, factor);
+    for (int k = 0; k < a->tall; k++) a->x[k] = a->phi[k];
+    for (int k = a->n; k < a->wide; k++) a->x[k] = 0;
+    for (int j = 0; j < a->m; j++) a->x[a->n + j] = y[output[j]];
+    w = sweep(a, 0, a->n, kept, 1);
+    sweep(a, a->n, a->n + a->m, factor, w);
+    for (int k = 0; k < a->tall; k++) {
+        a->energy[k] = kept * a->energy[k] + a->phi[k] * a->phi[k];
+        a->fed[k] *= kept;
+    }
+    back_substitute(a);
+    for (int j = 0; j < a->m; j++)
+        for (int k = 0; k < a->tall; k++) a->theta[j * a->tall + k] += a->innovation[j] * a->gain[k];
+    a->header[DETERMINED] = REAL(is_determined(a));
+    a->header[WEIGHT] = factor * a->header[WEIGHT] + 1;
+    a->header[FACTOR] = factor;
+    a->header[TURN] = REAL(turn + 1 < a->n ? turn + 1 : 0);
+    for (int i = turn; i < a->n + a->m; i += a->n) drop_underflow(a, i);
+}
+
+static int status(const rls_config *c, rls_real *state, rls_real *work)
+{
+    int bits = RLS_DETERMINED;
+    state += groups_state(c);
+    for (int g = 0; g < c->groups; g++) {
+        const group a = open_group(c, g, state, work);
+        if (a.header[DETERMINED] == 0) bits &= ~RLS_DETERMINED;
+        if (a.header[WEIGHT] * EPSILON >= 1) bits |= RLS_SATURATED;
+        state = end_of_state(&a);
+    }
+    return bits;
+}
+
+int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_real *phi, const rls_real *y)
+{
+    rls_real *s = state + groups_state(c), *w = work + groups_work(c), *innovation = work + padded(rls_regressors(c));
+    const int functions = c->basis.functions;
+    for (int g = 0; g < c->groups; g++) {
+        const group a = open_group(c, g, s, w);
+        for (int i = 0; i < c->group[g].entries; i++)
+            for (int k = 0; k < functions; k++) a.phi[i * functions + k] = phi[c->group[g].entry[i] * functions + k];
+        learn(&c->forgetting, &a, c->group[g].output, y);
+        for (int j = 0; j < a.m; j++) innovation[c->group[g].output[j]] = a.innovation[j];
+        s = end_of_state(&a);
+        w = end_of_work(&a);
+    }
+    state[COUNT] += 1;
+    if (state[COUNT] >= REAL(MILLION)) {
+        state[COUNT] = 0;
+        state[MILLIONS] += 1;
+    }
+    return RLS_LEARNT | status(c, state, work);
+}
+
+/* The functions of the basis at p, by Bernstein's form of the piece p lies in. */
+static void evaluate(const rls_basis *b, rls_real p, rls_real *f)
+{
+    int piece = 0;
+    const rls_real *at;
+    rls_real x;
+    while (piece + 1 < b->pieces && p >= b->knot[piece + 1]) piece++;
+    x = (p - b->knot[piece]) / (b->knot[piece + 1] - b->knot[piece]);
+    at = b->bernstein + piece * b->functions * (b->degree + 1);
+    for (int j = 0; j < b->functions; j++, at += b->degree + 1) {
+        rls_real sum = at[0], up = 1;
+        for (int i = 1; i <= b->degree; i++) {
+            up *= x * (REAL(b->degree - i + 1) / REAL(i));
+            sum = sum * (1 - x) + up * at[i];
+        }
+        f[j] = sum;
+    }
+}
+
+static void regressor(const rls_config *c, const rls_real *past, rls_real *phi)
+{
+    const int width = row_width(c), p = c->outputs + c->inputs;
+    for (int i = 0; i < c->entries; i++) {
+        const rls_entry *e = &c->entry[i];
+        const rls_real *then = past + e->lag * width, *f = past + e->p_lag * width + p + 1;
+        const rls_real signal = e->kind == RLS_OUTPUT  ? -then[e->channel]
+                                : e->kind == RLS_INPUT ? then[c->outputs + e->channel]
+                                : e->kind == RLS_OFFSET ? 1
+                                                        : past[p] - then[p];
+        for (int k = 0; k < c->basis.functions; k++) *phi++ = signal * f[k];
+    }
+}
+
+/* 0 usable, 1 missing, 2 refused */
+static int defect(const rls_real *value, int count)
+{
+    int worst = 0;
+    for (int i = 0; i < count; i++) {
+        if (absolute(value[i]) > LARGEST) return 2;
+        if (value[i] != value[i]) worst = 1;
+    }
+    return worst;
+}
+
+int rls_update(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, rls_real p)
+{
+    rls_real *past = state + HEADER;
+    const rls_basis *b = &c->basis;
+    const int width = row_width(c), wrong = defect(y, c->outputs) | defect(u, c->inputs) | defect(&p, 1);
+    const int outside = p < b->knot[0] - b->slack || p > b->knot[b->pieces] + b->slack;
+    if (wrong || outside) {
+        rls_forget_past(state);
+        return status(c, state, work) | (wrong >= 2 || outside ? RLS_REFUSED : 0);
+    }
+    for (int i = (c->memory + 1) * width - 1; i >= width; i--) past[i] = past[i - width];
+    for (int j = 0; j < c->outputs; j++) past[j] = y[j];
+    for (int j = 0; j < c->inputs; j++) past[c->outputs + j] = u[j];
+    past[c->outputs + c->inputs] = p;
+    evaluate(b, p, past + c->outputs + c->inputs + 1);
+    if (state[FILLED] < REAL(c->memory + 1)) state[FILLED] += 1;
+    if (state[FILLED] < REAL(c->memory + 1)) return status(c, state, work);
+    regressor(c, past, work);
+    return rls_absorb(c, state, work, work, y);
+}
+
+void rls_forget_past(rls_real *state) { state[FILLED] = 0; }
+
+void rls_coefficients(const rls_config *c, const rls_real *state, rls_real *theta)
+{
+    const int functions = c->basis.functions;
+    state += groups_state(c);
+    for (int i = rls_regressors(c) * c->outputs - 1; i >= 0; i--) theta[i] = 0;
+    for (int g = 0; g < c->groups; g++) {
+        const rls_group *own = &c->group[g];
+        const int n = own->entries * functions, wide = padded(n + own->outputs), tall = padded(n);
+        const rls_real *from = state + GROUP_HEADER + row_offset(n + own->outputs, wide) + wide;
+        for (int j = 0; j < own->outputs; j++)
+            for (int i = 0; i < n; i++)
+                theta[(own->entry[i / functions] * functions + i % functions) * c->outputs + own->output[j]] = from[j * tall + i];
+        state = from + (own->outputs + 3) * tall + 2 * padded(own->outputs);
+    }
+}
+
+const rls_real *rls_innovation(const rls_config *c, const rls_real *work) { return work + padded(rls_regressors(c)); }

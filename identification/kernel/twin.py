@@ -1,0 +1,361 @@
+"""The kernel in NumPy: the operations of rls.c in the same order on the same memory, for where no compiled one is installed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identification.kernel import configuration as at
+from identification.kernel.configuration import LANES, Configuration, GroupLayout
+from symheli.lpv.arrays import Array
+
+LEARNT, DETERMINED_BIT, SATURATED, REFUSED = 1, 2, 4, 8
+CONSTANT, VARIABLE, DIRECTIONAL = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Numbers that depend on the precision, as in rls.c."""
+
+    epsilon: Any
+    prior: Any
+    largest: Any
+    tiny: Any
+
+    @classmethod
+    def of(cls, real: Any) -> Limits:
+        """`real` is float or np.float32."""
+        epsilon = real(np.finfo(real).eps)
+        single = real is np.float32
+        return cls(epsilon, epsilon / real(16), real(1e15 if single else 1e145), real(1e-36 if single else 1e-290))
+
+
+class View:
+    """The parts of one group in a state and its scratch, by the names they have in rls.c."""
+
+    def __init__(self, layout: GroupLayout, state: Array, work: Array):
+        self.n, self.m, self.wide, self.tall = layout.n, layout.m, layout.triangle.wide, at.padded(layout.n)
+        for memory, parts in ((state, layout.in_state), (work, layout.in_work)):
+            for name, part in parts.items():
+                setattr(self, name, memory[part])
+        self.theta = self.theta.reshape(self.m, self.tall)
+        self.rows = [self.triangle[row] for row in layout.triangle.rows]
+
+    header: Array
+    triangle: Array
+    d: Array
+    theta: Array
+    peak: Array
+    energy: Array
+    fed: Array
+    recent: Array
+    usual: Array
+    phi: Array
+    x: Array
+    s: Array
+    gain: Array
+    innovation: Array
+
+
+class Kernel:
+    """As the compiled `Kernel`, made from a `Configuration`."""
+
+    def __init__(self, configuration: Configuration):
+        self._c = configuration
+        self._real: Any = float if configuration.dtype is np.float64 else configuration.dtype
+        real, (kind, *values) = self._real, configuration.arguments[-1]
+        self._limits, self._kind = Limits.of(real), kind
+        self._factor, self._lowest, self._recent, self._usual, self._quiet, self._floor = map(real, values)
+        self._slack = real(configuration.slack)
+        self._columns = [configuration.columns(layout.group) for layout in configuration.groups]
+
+    def sizes(self) -> tuple[int, int]:
+        """Numbers in the state, numbers of scratch."""
+        return self._c.sizes
+
+    def start(self, state: Array, work: Array) -> None:
+        """Nothing is known."""
+        state[:] = 0
+        work[:] = 0
+        for layout in self._c.groups:
+            view = View(layout, state, work)
+            for i, row in enumerate(view.rows):
+                row[i % LANES] = 1
+
+    def update(self, state: Array, work: Array, y: Array, u: Array, p: float) -> int:
+        """Take in one sample; returns the status bits."""
+        with np.errstate(all="ignore"):
+            return self._update(state, work, y.astype(self._c.dtype), u.astype(self._c.dtype), self._real(p))
+
+    def absorb(self, state: Array, work: Array, phi: Array, y: Array) -> int:
+        """Take in one regressor and the outputs it must explain; returns the status bits."""
+        with np.errstate(all="ignore"):
+            return self._absorb(state, work, phi.astype(self._c.dtype), y.astype(self._c.dtype))
+
+    def run(
+        self, state: Array, work: Array, samples: Array, statuses: Array, innovations: Array | None, coefficients: Array | None
+    ) -> None:
+        """Take in rows [y, u, p]; fills a row of each array for each."""
+        ny, after = self._c.structure.ny, at.padded(self._c.structure.n_regressors)
+        for k, sample in enumerate(samples):
+            statuses[k] = self.update(state, work, sample[:ny], sample[ny:-1], sample[-1])
+            if innovations is not None and statuses[k] & LEARNT:
+                innovations[k] = work[after : after + ny]
+            if coefficients is not None:
+                coefficients[k] = theta(self._c, state)
+
+    def _update(self, state: Array, work: Array, y: Array, u: Array, p: Any) -> int:
+        c, sample = self._c, np.concatenate([y, u, np.array([p], y.dtype)])
+        knots = c.pieces[0]
+        refused = bool((np.abs(sample) > self._limits.largest).any())
+        refused = refused or bool(p < knots[0] - self._slack or p > knots[-1] + self._slack)
+        if refused or np.isnan(sample).any():
+            state[at.FILLED] = 0
+            return self._status(state) | (REFUSED if refused else 0)
+        past = state[c.past].reshape(-1, c.width)
+        past[1:] = past[:-1].copy()
+        past[0, : len(sample)] = sample
+        past[0, len(sample) :] = self._functions(p)
+        state[at.FILLED] = min(state[at.FILLED] + 1, len(past))
+        if state[at.FILLED] < len(past):
+            return self._status(state)
+        return self._absorb(state, work, self._regressor(past), y)
+
+    def _functions(self, p: Any) -> Array:
+        knots, coefficients = self._c.pieces
+        piece = int(np.searchsorted(knots[1:-1], p, side="right"))
+        x = (p - knots[piece]) / (knots[piece + 1] - knots[piece])
+        degree, one = coefficients.shape[2] - 1, knots.dtype.type(1)
+        out, up = coefficients[piece, :, 0].copy(), one
+        for i in range(1, degree + 1):
+            up = up * (x * (knots.dtype.type(degree - i + 1) / knots.dtype.type(i)))
+            out = out * (one - x) + up * coefficients[piece, :, i]
+        return out
+
+    def _regressor(self, past: Array) -> Array:
+        arx = self._c.structure
+        size, p = arx.basis.size, arx.ny + arx.nu
+        out = np.empty((len(self._c.entries), size), past.dtype)
+        for row, (kind, channel, lag, p_lag) in zip(out, self._c.entries.tolist(), strict=True):
+            match at.KINDS[kind]:
+                case "output":
+                    signal = -past[lag, channel]
+                case "input":
+                    signal = past[lag, arx.ny + channel]
+                case "offset":
+                    signal = past.dtype.type(1)
+                case "increment":
+                    signal = past[0, p] - past[lag, p]
+            row[:] = signal * past[p_lag, p + 1 :]
+        return out.reshape(-1)
+
+    def _absorb(self, state: Array, work: Array, phi: Array, y: Array) -> int:
+        after = at.padded(self._c.structure.n_regressors)
+        work[: len(phi)] = phi
+        for layout, columns in zip(self._c.groups, self._columns, strict=True):
+            view, outputs = View(layout, state, work), list(layout.group.outputs)
+            view.phi[: layout.n] = phi[columns]
+            self._learn(view, y[outputs])
+            work[after : after + len(y)][outputs] = view.innovation[: layout.m]
+        state[at.COUNT] += 1
+        if state[at.COUNT] >= at.MILLION:
+            state[at.COUNT] = 0
+            state[at.MILLIONS] += 1
+        return LEARNT | self._status(state)
+
+    def _status(self, state: Array) -> int:
+        bits = DETERMINED_BIT
+        for layout in self._c.groups:
+            header = state[layout.in_state["header"]]
+            if header[at.DETERMINED] == 0:
+                bits &= ~DETERMINED_BIT
+            if header[at.WEIGHT] * self._limits.epsilon >= 1:
+                bits |= SATURATED
+        return bits
+
+    def _learn(self, a: View, y: Array) -> None:
+        n, m = a.n, a.m
+        turn = int(a.header[at.TURN])
+        for j in range(m):
+            a.innovation[j] = y[j] - dot(a.phi, a.theta[j])
+        factor = self._forgetting_factor(a, self._new_peaks(a))
+        kept = self._real(1) if self._kind == DIRECTIONAL else factor
+        self._replenish(a, turn)
+        if factor < kept:
+            self._forget_direction(a, factor)
+        a.x[:] = 0
+        a.x[:n] = a.phi[:n]
+        a.x[n : n + m] = y
+        w = self._sweep(a, 0, n, kept, self._real(1))
+        self._sweep(a, n, n + m, factor, w)
+        a.energy[:] = a.energy * kept + a.phi * a.phi
+        a.fed *= kept
+        known = a.d[: a.n] > a.d.dtype.type(self._limits.epsilon) * a.energy[: a.n]
+        back_substitute(a, known)
+        for j in range(m):
+            a.theta[j] += a.innovation[j] * a.gain
+        beyond = a.d.dtype.type(2 if a.header[at.DETERMINED] == 0 else 0)
+        a.header[at.DETERMINED] = bool(np.all(known & (a.d[:n] > beyond * a.fed[:n])))
+        a.header[at.WEIGHT] = factor * self._real(a.header[at.WEIGHT]) + self._real(1)
+        a.header[at.FACTOR] = factor
+        a.header[at.TURN] = (turn + 1) % n
+        for i in range(turn, n + m, n):
+            self._drop_underflow(a, i)
+
+    def _new_peaks(self, a: View) -> Any:
+        n = a.n
+        size, peak = np.abs(a.phi[:n]), a.peak[:n]
+        fresh = (peak == 0) & (size > 0)
+        prior = a.peak.dtype.type(self._limits.prior) * (size[fresh] * size[fresh])
+        for part in (a.d[:n], a.energy[:n], a.fed[:n]):
+            part[fresh] = prior
+        np.maximum(peak, size, out=peak)
+        known = peak > 0
+        return self._real((size[known] / peak[known]).max(initial=0))
+
+    def _forgetting_factor(self, a: View, loudest: Any) -> Any:
+        real, one = self._real, self._real(1)
+        if self._kind == DIRECTIONAL:
+            return one if loudest < self._quiet else self._factor
+        if self._kind == CONSTANT or not self._is_settled(a):
+            return self._factor
+        steps = real(a.header[at.STEPS]) + one
+        if steps * self._usual <= 2:
+            a.header[at.STEPS] = steps
+        recent = self._recent if steps * self._recent > 1 else one / steps
+        usual = self._usual if steps * self._usual > 1 else one / steps
+        ratio = real(0)
+        for j in range(a.m):
+            power = a.innovation[j] * a.innovation[j]
+            a.recent[j] += recent * (power - a.recent[j])
+            if a.usual[j] == 0:
+                a.usual[j] = power
+            a.usual[j] += usual * (min(power, 10 * a.usual[j]) - a.usual[j])
+            a.usual[j] = min(a.usual[j], 4 * a.recent[j])
+            ratio += real(a.recent[j] / a.usual[j]) if a.usual[j] > 0 else one
+        factor = one - (one - self._factor) * (ratio / real(a.m))
+        return min(max(factor, self._lowest), self._factor)
+
+    def _is_settled(self, a: View) -> bool:
+        weight = a.header[at.WEIGHT]
+        many = weight >= 2 * a.n or 2 * weight * (1 - self._factor) >= 1
+        return bool(a.header[at.STEPS] > 0 or (a.header[at.DETERMINED] != 0 and many))
+
+    def _replenish(self, a: View, j: int) -> None:
+        real = self._real
+        fastest = self._lowest if self._kind == VARIABLE else self._factor
+        samples = self._limits.prior
+        if self._kind != DIRECTIONAL and fastest < 1:
+            samples = max(samples, real(2) * self._floor / max(power(fastest, a.n), real(1e-12)))
+        target, fed = samples * real(a.peak[j] * a.peak[j]), real(a.fed[j])
+        if real(2) * fed >= target:
+            return
+        a.x[:] = 0
+        a.x[j] = 1
+        a.x[a.n : a.n + a.m] = a.theta[:, j]
+        self._sweep(a, j, a.n, real(1), real(1) / (target - fed))
+        a.energy[j] += target - fed
+        a.fed[j] = target
+
+    def _sweep(self, a: View, first: int, last: int, kept: Any, w: Any) -> Any:
+        real, tiny = self._real, self._limits.tiny
+        for i in range(first, last):
+            row, x = a.rows[i], a.x[i // LANES * LANES :]
+            f, d = real(a.x[i]), kept * real(a.d[i])
+            if f == 0:
+                a.s[i], a.d[i] = 0, d
+                continue
+            known = d > tiny
+            ratio = f / d if known else real(0)
+            total = w + f * ratio
+            if known and total <= 4 * w:
+                gain = ratio / total
+                x -= f * row
+                row += gain * x
+                a.d[i], w = d + f * (f / w), total
+            else:
+                gain, keep = (ratio / total, w / total) if known else (real(1) / f, real(0))
+                r, t = row.copy(), x.copy()
+                x[:] = t - f * r
+                row[:] = keep * r + gain * t
+                row[i % LANES] = 1
+                a.d[i] = (d if known else real(0)) + f * (f / w)
+                w = total if known else real(1) / tiny
+            a.s[i] = gain
+        return w
+
+    def _forget_direction(self, a: View, factor: Any) -> None:
+        real, n = self._real, a.n
+        length2, one = real(0), real(1)
+        for i in range(n):
+            start = i // LANES * LANES
+            v = real(dot(a.rows[i][: a.tall - start], a.phi[start:]))
+            a.s[i] = v
+            length2 += real(a.d[i]) * (v * v)
+        if not length2 > self._limits.tiny:
+            return
+        share, left = (one - factor) / length2, factor
+        a.x[:] = 0
+        for i in reversed(range(n)):
+            row, x = a.rows[i], a.x[i // LANES * LANES :]
+            v, d = real(a.s[i]), real(a.d[i])
+            more = left + share * (d * (v * v))
+            r, t = row.copy(), x.copy()
+            row[:] = r - (share * v / left) * t
+            x[:] = t + (d * v) * r
+            a.d[i] = d * (left / more)
+            left = more
+        a.energy[:n] -= a.x.dtype.type(share) * (a.x[:n] * a.x[:n])
+
+    def _drop_underflow(self, a: View, j: int) -> None:
+        tiny = self._limits.tiny
+        row = a.rows[j]
+        row[np.abs(row) < tiny] = 0
+        for part in (a.d, a.energy[: a.n], a.fed[: a.n]):
+            if j < len(part) and part[j] < tiny:
+                part[j] = 0
+
+
+def dot(a: Array, b: Array) -> Any:
+    """Their product, summed as in rls.c: LANES partial sums, then these in pairs."""
+    s = (a * b).reshape(-1, LANES).sum(axis=0)
+    s = s[:4] + s[4:]
+    s = s[:2] + s[2:]
+    return s[0] + s[1]
+
+
+def back_substitute(a: View, known: Array) -> None:
+    """gain <- triangle^-1 s; 0 for a coefficient that is not `known` (n,)."""
+    a.gain[:] = 0
+    for start in range(a.tall - LANES, -1, -LANES):
+        stop = min(start + LANES, a.n)
+        g = a.gain[start:stop]
+        for i in range(start, stop):
+            a.gain[i] = a.s[i] - (dot(a.rows[i][LANES : a.tall - start], a.gain[start + LANES :]) if start + LANES < a.tall else 0)
+        block = np.array([a.rows[i][:LANES] for i in range(start, stop)])
+        for i in range(stop - start - 1, -1, -1):
+            if not known[start + i]:
+                g[i] = 0
+            g[:i] -= block[:i, i] * g[i]
+
+
+def power(base: Any, exponent: int) -> Any:
+    """By repeated squaring."""
+    result = type(base)(1)
+    while exponent:
+        if exponent % 2:
+            result *= base
+        base *= base
+        exponent //= 2
+    return result
+
+
+def theta(c: Configuration, state: Array) -> Array:
+    """Coefficients (n_regressors, ny) in a state, in its precision."""
+    out = np.zeros((c.structure.n_regressors, c.structure.ny), state.dtype)
+    for layout in c.groups:
+        own = state[layout.in_state["theta"]].reshape(layout.m, -1)[:, : layout.n]
+        out[np.ix_(c.columns(layout.group), layout.group.outputs)] = own.T
+    return out

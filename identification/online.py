@@ -1,0 +1,148 @@
+"""The recursive estimator for real time: one memory, changed in place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from identification.kernel import configuration as at
+from identification.kernel import twin
+from identification.kernel.configuration import Configuration
+from identification.rls_state import RLSState
+from symheli.errors import InputError
+from symheli.lpv.arrays import Array
+
+
+class Online:
+    """An estimator at work: `update` changes it in place and copies nothing; `state` is a value to keep, save or go on from.
+
+    Made by `RecursiveLeastSquares.online`. The first update with float64 arrays of the right shape costs microseconds where the
+    kernel is compiled; anything else that is a number works, more slowly.
+    """
+
+    def __init__(self, configuration: Configuration, kernel: Any, state: RLSState):
+        self._configuration, self._kernel, self._start = configuration, kernel, state
+        self._state = state.memory.copy()
+        self._work = np.zeros(configuration.sizes[1], configuration.dtype)
+        self._status, self._learnt = 0, False
+
+    def update(self, y: object, u: object, p: object) -> bool:
+        """Take in y (ny,), u (nu,), p of one instant; True where a complete regressor was there and the coefficients moved.
+
+        A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises `InputError` for wrong shapes,
+        infinite values and p outside the basis; the coefficients are then as before and the lags start afresh.
+        """
+        try:
+            status = self._kernel.update(self._state, self._work, y, u, p)
+        except (TypeError, ValueError, BufferError, AttributeError):
+            arx = self._configuration.structure
+            status = self._kernel.update(
+                self._state, self._work, vector(y, arx.ny, "y"), vector(u, arx.nu, "u"), float(vector(p, 1, "p")[0])
+            )
+        if status & twin.REFUSED:
+            complain(self._configuration, y, u, p)
+        return self._done(status)
+
+    def absorb(self, phi: Array, y: Array) -> bool:
+        """Take in one regressor phi (n,) with the outputs y (ny,) it must explain, float64; the lags are left alone."""
+        return self._done(self._kernel.absorb(self._state, self._work, phi, y))
+
+    def run(self, samples: Array, history: bool = True) -> tuple[Array, Array | None, Array | None]:
+        """Take in rows [y, u, p] (k, ny + nu + 1), p within the basis.
+
+        Returns which of them taught something (k,), and with `history` the innovations (k, ny), NaN elsewhere, and the
+        coefficients after each (k, n, ny).
+        """
+        samples = np.ascontiguousarray(samples, float)
+        arx, k = self._configuration.structure, len(samples)
+        if samples.shape != (k, arx.ny + arx.nu + 1):
+            raise InputError(f"samples: expected shape (any, {arx.ny + arx.nu + 1}), got {samples.shape}")
+        statuses, dtype = np.zeros(k, np.int32), self._configuration.dtype
+        innovations = np.full((k, arx.ny), np.nan, dtype) if history else None
+        coefficients = np.empty((k, arx.n_regressors, arx.ny), dtype) if history else None
+        self._kernel.run(self._state, self._work, samples, statuses, innovations, coefficients)
+        if (refused := np.flatnonzero(statuses & twin.REFUSED)).size:
+            row = samples[refused[0]]
+            complain(self._configuration, row[: arx.ny], row[arx.ny : -1], row[-1])
+        learnt = (statuses & twin.LEARNT).astype(bool)
+        self._learnt = self._learnt or bool(learnt.any())
+        self._status = int(statuses[-1]) if k else self._status
+        return learnt, innovations, coefficients
+
+    def forget_past(self) -> None:
+        """The next update finds no past: after a gap in the data."""
+        self._state[at.FILLED] = 0
+
+    @property
+    def coefficients(self) -> Array:
+        """(n, ny) as they are now: a view of what `update` changes where all outputs share their regressors, else a copy."""
+        if len(self._configuration.groups) > 1:
+            return twin.theta(self._configuration, self._state)
+        layout = self._configuration.groups[0]
+        return self._state[layout.in_state["theta"]].reshape(layout.m, -1)[:, : layout.n].T
+
+    @property
+    def innovation(self) -> Array:
+        """(ny,) y minus its prediction, at the last sample that was learnt."""
+        start = at.padded(self._configuration.structure.n_regressors)
+        return self._work[start : start + self._configuration.structure.ny]
+
+    @property
+    def gain(self) -> Array:
+        """How the coefficients of an output moved per unit of its innovation: (n,), or (n, ny) where outputs have different regressors."""
+        c = self._configuration
+        if len(c.groups) == 1:
+            return self._work[c.groups[0].in_work["gain"]][: c.groups[0].n]
+        out = np.zeros((c.structure.n_regressors, c.structure.ny), c.dtype)
+        for layout in c.groups:
+            out[np.ix_(c.columns(layout.group), layout.group.outputs)] = self._work[layout.in_work["gain"]][: layout.n, None]
+        return out
+
+    @property
+    def determined(self) -> bool:
+        """Whether the data fix every coefficient."""
+        return bool(self._status & twin.DETERMINED_BIT) if self._learnt else self._start.determined
+
+    @property
+    def saturated(self) -> bool:
+        """Whether an ordinary sample is lost to rounding; see `RLSState.saturated`."""
+        return bool(self._status & twin.SATURATED) if self._learnt else self._start.saturated
+
+    @property
+    def state(self) -> RLSState:
+        """What is known now, as a value."""
+        memory = self._state.copy()
+        return RLSState(self._configuration, memory) if self._learnt else self._start.after_idling(memory)
+
+    def _done(self, status: int) -> bool:
+        self._status = status
+        if status & twin.LEARNT:
+            self._learnt = True
+            return True
+        return False
+
+
+def vector(value: object, size: int, name: str) -> Array:
+    """`size` numbers as float64; raises `InputError` for anything else."""
+    try:
+        array = np.atleast_1d(np.asarray(value, dtype=float))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: expected {size} numbers, got {value!r:.80}") from error
+    if array.shape != (size,):
+        raise InputError(f"{name}: expected shape ({size},), got {array.shape}")
+    return np.ascontiguousarray(array)
+
+
+def complain(configuration: Configuration, y: object, u: object, p: object) -> None:
+    """Raises the `InputError` for a sample the kernel refused."""
+    arx = configuration.structure
+    largest = twin.Limits.of(float if configuration.dtype is np.float64 else configuration.dtype).largest
+    for name, array in (("y", vector(y, arx.ny, "y")), ("u", vector(u, arx.nu, "u")), ("p", vector(p, 1, "p"))):
+        if np.isinf(array).any():
+            raise InputError(f"{name} is infinite; mark a missing sample as NaN")
+        if (np.abs(array) > largest).any():
+            raise InputError(
+                f"{name} is {array[np.argmax(np.abs(array))]:.3g}, beyond {largest:.0e}, where squares overflow; check its unit"
+            )
+    arx.basis(p)

@@ -1,0 +1,59 @@
+"""Files that are either whole or not there."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import tempfile
+from pathlib import Path
+
+from symheli.errors import SymheliError
+
+
+def write_text(path: str | os.PathLike[str], content: str) -> Path:
+    """Write `content` as UTF-8; see `write_bytes`."""
+    return write_bytes(path, content.encode("utf-8"))
+
+
+def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
+    """Replace `path` by `content` at once, folders made as needed: a reader sees the old file or the new one, never half of it.
+
+    Raises `SymheliError` where the disk is full or the folder cannot be written; the old file is then still there.
+    """
+    target = Path(path)
+    temporary = ""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, target)
+    except OSError as error:
+        _remove(temporary)
+        raise SymheliError(_reason(target, error, len(content))) from error
+    except BaseException:
+        _remove(temporary)
+        raise
+    return target
+
+
+def _reason(target: Path, error: OSError, size: int) -> str:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return f"{target}: the disk is full, {size / 1024:.0f} KiB are needed; free some space and try again"
+    return f"{target}: cannot be written ({error.strerror or error}); choose another place"
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _remove(path: str) -> None:
+    if path:
+        with contextlib.suppress(OSError):
+            os.unlink(path)
