@@ -33,15 +33,18 @@ class Online:
         A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises `InputError` for wrong shapes,
         infinite values and p outside the basis; the coefficients are then as before and the lags start afresh.
         """
+        c, more = self._configuration, ()
+        if not c.factors:
+            p = vector(p, len(c.structure.parameters), "p")
+            more = (functions(c, p[None, :])[0],)
         try:
-            status = self._kernel.update(self._state, self._work, y, u, p)
-        except (TypeError, ValueError, BufferError, AttributeError):
-            arx = self._configuration.structure
-            status = self._kernel.update(
-                self._state, self._work, vector(y, arx.ny, "y"), vector(u, arx.nu, "u"), float(vector(p, 1, "p")[0])
-            )
+            status = self._kernel.update(self._state, self._work, y, u, p, *more)
+        except (TypeError, ValueError, BufferError):
+            arx = c.structure
+            parts = vector(y, arx.ny, "y"), vector(u, arx.nu, "u"), vector(p, len(arx.parameters), "p")
+            status = self._kernel.update(self._state, self._work, *parts, *more)
         if status & twin.REFUSED:
-            complain(self._configuration, y, u, p)
+            complain(c, y, u, p)
         return self._done(status)
 
     def absorb(self, phi: Array, y: Array) -> bool:
@@ -49,22 +52,25 @@ class Online:
         return self._done(self._kernel.absorb(self._state, self._work, phi, y))
 
     def run(self, samples: Array, history: bool = True) -> tuple[Array, Array | None, Array | None]:
-        """Take in rows [y, u, p] (k, ny + nu + 1), p within the basis.
+        """Take in rows [y, u, p] (k, ny + nu + parameters), p within the basis.
 
         Returns which of them taught something (k,), and with `history` the innovations (k, ny), NaN elsewhere, and the
         coefficients after each (k, n, ny).
         """
         samples = np.ascontiguousarray(samples, float)
         arx, k = self._configuration.structure, len(samples)
-        if samples.shape != (k, arx.ny + arx.nu + 1):
-            raise InputError(f"samples: expected shape (any, {arx.ny + arx.nu + 1}), got {samples.shape}")
+        width = arx.ny + arx.nu + len(arx.parameters)
+        if samples.shape != (k, width):
+            raise InputError(f"samples: expected shape (any, {width}), got {samples.shape}")
+        if not self._configuration.factors:
+            samples = np.hstack([samples, functions(self._configuration, samples[:, arx.ny + arx.nu :])])
         statuses, dtype = np.zeros(k, np.int32), self._configuration.dtype
         innovations = np.full((k, arx.ny), np.nan, dtype) if history else None
         coefficients = np.empty((k, arx.n_regressors, arx.ny), dtype) if history else None
         self._kernel.run(self._state, self._work, samples, statuses, innovations, coefficients)
         if (refused := np.flatnonzero(statuses & twin.REFUSED)).size:
             row = samples[refused[0]]
-            complain(self._configuration, row[: arx.ny], row[arx.ny : -1], row[-1])
+            complain(self._configuration, *np.split(row[:width], [arx.ny, arx.ny + arx.nu]))
         learnt = (statuses & twin.LEARNT).astype(bool)
         self._learnt = self._learnt or bool(learnt.any())
         self._status = int(statuses[-1]) if k else self._status
@@ -96,7 +102,7 @@ class Online:
             return self._work[c.groups[0].in_work["gain"]][: c.groups[0].n]
         out = np.zeros((c.structure.n_regressors, c.structure.ny), c.dtype)
         for layout in c.groups:
-            out[np.ix_(c.columns(layout.group), layout.group.outputs)] = self._work[layout.in_work["gain"]][: layout.n, None]
+            out[np.ix_(c.structure.regressors(layout.group), layout.group.outputs)] = self._work[layout.in_work["gain"]][: layout.n, None]
         return out
 
     @property
@@ -134,15 +140,23 @@ def vector(value: object, size: int, name: str) -> Array:
     return np.ascontiguousarray(array)
 
 
+def functions(configuration: Configuration, p: Array) -> Array:
+    """The basis (k, size) at p (k, parameters), NaN where p is not finite: for functions the kernel cannot evaluate."""
+    basis = configuration.structure.basis
+    out, known = np.full((len(p), basis.size), np.nan), np.isfinite(p).all(axis=1)
+    out[known] = basis(p[known, 0] if basis.dimension == 1 else p[known])
+    return out
+
+
 def complain(configuration: Configuration, y: object, u: object, p: object) -> None:
     """Raises the `InputError` for a sample the kernel refused."""
     arx = configuration.structure
     largest = twin.Limits.of(float if configuration.dtype is np.float64 else configuration.dtype).largest
-    for name, array in (("y", vector(y, arx.ny, "y")), ("u", vector(u, arx.nu, "u")), ("p", vector(p, 1, "p"))):
+    for name, array in (("y", vector(y, arx.ny, "y")), ("u", vector(u, arx.nu, "u")), ("p", vector(p, len(arx.parameters), "p"))):
         if np.isinf(array).any():
             raise InputError(f"{name} is infinite; mark a missing sample as NaN")
         if (np.abs(array) > largest).any():
             raise InputError(
                 f"{name} is {array[np.argmax(np.abs(array))]:.3g}, beyond {largest:.0e}, where squares overflow; check its unit"
             )
-    arx.basis(p)
+    arx.basis(vector(p, len(arx.parameters), "p"))

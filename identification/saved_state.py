@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +58,8 @@ def description(configuration: Configuration) -> dict[str, Any]:
 
 def _fields(value: Any) -> dict[str, str]:
     """Fields that are not at their default: a later version may add one without making old files unreadable."""
-    return {f.name: repr(getattr(value, f.name)) for f in dataclasses.fields(value) if getattr(value, f.name) != f.default}
+    given = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if getattr(value, f.name) != f.default}
+    return {name: re.sub(r" at 0x[0-9a-f]+", "", repr(value)) for name, value in given.items()}  # functions go by their name
 
 
 def _require_same(path: str | os.PathLike[str], part: str, expected: Any, got: Any) -> None:

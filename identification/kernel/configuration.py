@@ -10,7 +10,8 @@ import numpy as np
 
 from identification.forgetting import Forgetting, numbers
 from identification.structure import LPVARX, Group
-from symheli.lpv import Basis
+from symheli.errors import InputError
+from symheli.lpv import Basis, Product
 from symheli.lpv.arrays import Array
 
 LANES = 8
@@ -92,6 +93,31 @@ class GroupLayout:
 
 
 @dataclass(frozen=True, eq=False)
+class Factor:
+    """Functions of one parameter: `knots` (pieces + 1,), `bernstein` (pieces, functions, degree + 1), `slack` for rounding at the ends."""
+
+    knots: Array
+    bernstein: Array
+    slack: float
+
+    @classmethod
+    def of(cls, basis: Basis, dtype: type[np.floating]) -> Factor:
+        """Raises `InputError` where the functions are not piecewise polynomial; lower degrees are raised to the highest."""
+        pieces = basis.pieces()
+        degree = max(piece.bernstein.shape[1] for piece in pieces) - 1
+        knots = np.array([pieces[0].low, *(piece.high for piece in pieces)], dtype)
+        rounding = 4 * float(np.finfo(dtype).eps) * max(abs(basis.low), abs(basis.high))
+        slack = max(1e-9 * (basis.high - basis.low), rounding)
+        return cls(knots, np.array([_raised(piece.bernstein, degree) for piece in pieces], dtype), slack)
+
+    @property
+    def arguments(self) -> tuple:
+        """Functions, degree, pieces, slack, knots, Bernstein coefficients."""
+        pieces, functions, order = self.bernstein.shape
+        return functions, order - 1, pieces, self.slack, self.knots, self.bernstein
+
+
+@dataclass(frozen=True, eq=False)
 class Configuration:
     """A structure, a way of forgetting and a precision, as arrays; see rls.h for their meaning."""
 
@@ -105,21 +131,31 @@ class Configuration:
         return np.array([(KINDS.index(e.kind), e.channel, e.lag, e.p_lag) for e in self.structure.entries], np.int32)
 
     @cached_property
-    def pieces(self) -> tuple[Array, Array]:
-        """Knots (pieces + 1,) and Bernstein coefficients (pieces, functions, degree + 1) of the basis."""
-        return bernstein(self.structure.basis, self.dtype)
-
-    @property
-    def slack(self) -> float:
-        """How far p may leave the range by rounding, in its unit."""
+    def factors(self) -> tuple[Factor, ...]:
+        """Those of the basis, one a scheduling parameter; none where its functions are not piecewise polynomial."""
         basis = self.structure.basis
-        rounding = 4 * float(np.finfo(self.dtype).eps) * max(abs(basis.low), abs(basis.high))
-        return max(1e-9 * (basis.high - basis.low), rounding)
+        factors = basis.factors if isinstance(basis, Product) else (basis,)
+        try:
+            return tuple(Factor.of(factor, self.dtype) for factor in factors if isinstance(factor, Basis))
+        except InputError:
+            return ()
+
+    @cached_property
+    def index(self) -> Array:
+        """(functions, factors): the function of each factor that makes up each of the basis."""
+        basis, count = self.structure.basis, len(self.factors)
+        rows = basis.indices if isinstance(basis, Product) else [(j,) for j in range(basis.size)]
+        return np.array(rows, np.int32)[:, :count].copy()
 
     @property
     def width(self) -> int:
         """Numbers kept of a sample: y, u, p, f(p)."""
-        return self.structure.ny + self.structure.nu + 1 + self.structure.basis.size
+        return self.structure.ny + self.structure.nu + len(self.structure.parameters) + self.structure.basis.size
+
+    @property
+    def sample(self) -> int:
+        """Numbers the kernel takes of a sample: y, u, p, and f(p) where it does not know the functions."""
+        return self.width - (self.structure.basis.size if self.factors else 0)
 
     @property
     def past(self) -> slice:
@@ -145,29 +181,16 @@ class Configuration:
         """Numbers in the state, numbers of scratch."""
         return self.groups[-1].end
 
-    def columns(self, group: Group) -> Array:
-        """Which of all regressors (n,) a group has."""
-        size = self.structure.basis.size
-        return (np.array(group.entries, int)[:, None] * size + np.arange(size)).reshape(-1)
-
     @cached_property
     def arguments(self) -> tuple:
         """What `Kernel` is made from, compiled or not."""
         arx = self.structure
-        knots, coefficients = self.pieces
         groups = tuple((len(g.outputs), np.array(g.outputs, np.int32), len(g.entries), np.array(g.entries, np.int32)) for g in arx.groups)
         return (
-            arx.ny, arx.nu, arx.memory, len(self.entries), self.entries, groups, arx.basis.size, coefficients.shape[2] - 1,
-            coefficients.shape[0], knots, coefficients, self.slack, numbers(self.forgetting),
+            arx.ny, arx.nu, len(arx.parameters), arx.memory, len(self.entries), self.entries, groups, arx.basis.size,
+            tuple(f.arguments for f in self.factors), sum(f.knots.size + f.bernstein.size for f in self.factors), self.index,
+            numbers(self.forgetting),
         )  # fmt: skip
-
-
-def bernstein(basis: Basis, dtype: type[np.floating]) -> tuple[Array, Array]:
-    """Knots (pieces + 1,) and coefficients (pieces, functions, degree + 1); lower degrees are raised to the highest."""
-    pieces = basis.pieces()
-    degree = max(piece.bernstein.shape[1] for piece in pieces) - 1
-    knots = np.array([pieces[0].low, *(piece.high for piece in pieces)], dtype)
-    return knots, np.array([_raised(piece.bernstein, degree) for piece in pieces], dtype)
 
 
 def _raised(coefficients: Array, degree: int) -> Array:

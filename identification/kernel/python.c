@@ -14,9 +14,9 @@
 typedef struct {
     PyObject_HEAD
     rls_config config;
-    int state_size, work_size, regressors;
+    int state_size, work_size, regressors, width; /* width: numbers in a sample */
     void *memory; /* what config points to */
-    rls_real *sample; /* regressors + outputs + inputs numbers, converted from double */
+    rls_real *sample; /* regressors + width numbers, converted from double */
 } Kernel;
 
 /* A contiguous buffer of `count` numbers; count < 0: any. Raises TypeError, ValueError or BufferError. */
@@ -49,73 +49,117 @@ static int copy_numbers(PyObject *from, const char *format, Py_ssize_t count, vo
     return 0;
 }
 
-static Py_ssize_t aligned(Py_ssize_t bytes) { return (bytes + 15) / 16 * 16; }
+/* The next `bytes` of the memory behind *next, aligned for anything. */
+static void *take(char **next, size_t bytes)
+{
+    void *here = *next;
+    *next += (bytes + 15) / 16 * 16;
+    return here;
+}
 
-/* Kernel(outputs, inputs, memory, entries (E, 4), members (E + ny) a group, ny a group, functions, degree, knots, bernstein, slack, forgetting) */
+/* Bytes of memory for a configuration of `factors` with so many numbers in all: an upper bound of what kernel_init takes. */
+static size_t memory_needed(const rls_config *c, Py_ssize_t numbers)
+{
+    const size_t groups = (size_t)c->groups, factors = (size_t)c->basis.factors, entries = (size_t)c->entries;
+    return entries * sizeof(rls_entry) + groups * sizeof(rls_group) + factors * sizeof(rls_factor) + (size_t)numbers * sizeof(rls_real) +
+           ((size_t)c->basis.functions * factors + groups * ((size_t)c->outputs + entries)) * sizeof(int) + 16 * (4 + 2 * factors + 2 * groups);
+}
+
+static int read_groups(rls_config *c, rls_group *group, PyObject *groups, char **next)
+{
+    for (int g = 0; g < c->groups; g++) {
+        PyObject *outputs, *members;
+        int *index;
+        if (!PyArg_ParseTuple(PyTuple_GetItem(groups, g), "iOiO", &group[g].outputs, &outputs, &group[g].entries, &members)) return -1;
+        if (group[g].entries > c->entries || group[g].outputs > c->outputs) {
+            PyErr_SetString(PyExc_ValueError, "groups: more members than there are");
+            return -1;
+        }
+        group[g].output = index = take(next, (size_t)group[g].outputs * sizeof(int));
+        if (copy_numbers(outputs, "i", group[g].outputs, index, "outputs") < 0) return -1;
+        group[g].entry = index = take(next, (size_t)group[g].entries * sizeof(int));
+        if (copy_numbers(members, "i", group[g].entries, index, "members") < 0) return -1;
+    }
+    return 0;
+}
+
+static int read_factors(rls_config *c, rls_factor *factor, PyObject *factors, char **next)
+{
+    for (int i = 0; i < c->basis.factors; i++) {
+        PyObject *knots, *bernstein;
+        double slack;
+        Py_ssize_t count;
+        rls_real *number;
+        if (!PyArg_ParseTuple(PyTuple_GetItem(factors, i), "iiidOO", &factor[i].functions, &factor[i].degree, &factor[i].pieces, &slack, &knots,
+                              &bernstein))
+            return -1;
+        factor[i].slack = (rls_real)slack;
+        count = factor[i].pieces + 1;
+        factor[i].knot = number = take(next, (size_t)count * sizeof(rls_real));
+        if (copy_numbers(knots, FORMAT, count, number, "knots") < 0) return -1;
+        count = (Py_ssize_t)factor[i].pieces * factor[i].functions * (factor[i].degree + 1);
+        factor[i].bernstein = number = take(next, (size_t)count * sizeof(rls_real));
+        if (copy_numbers(bernstein, FORMAT, count, number, "bernstein") < 0) return -1;
+    }
+    return 0;
+}
+
+/* Kernel(outputs, inputs, parameters, memory, entries (E, 4), groups, functions, factors, numbers in them, index (functions, factors),
+   forgetting); a group (outputs, their indices, entries, their indices), a factor (functions, degree, pieces, slack, knots, bernstein) */
 static int kernel_init(PyObject *object, PyObject *args, PyObject *kwargs)
 {
     Kernel *self = (Kernel *)object;
     rls_config *c = &self->config;
-    PyObject *entries, *groups, *knots, *bernstein;
-    double slack, f[6];
-    int kind, pieces;
-    Py_ssize_t bytes, numbers, at;
-    if (kwargs && PyDict_Size(kwargs)) {
-        PyErr_SetString(PyExc_TypeError, "no keywords, please");
+    PyObject *entries, *groups, *factors, *index;
+    double f[6];
+    int kind, entry_count;
+    Py_ssize_t numbers;
+    char *next;
+    rls_entry *entry;
+    rls_group *group;
+    rls_factor *factor;
+    int *product;
+    if ((kwargs && PyDict_Size(kwargs)) || self->memory) {
+        PyErr_SetString(PyExc_TypeError, "a Kernel is made once, without keywords");
         return -1;
     }
-    if (!PyArg_ParseTuple(args, "iiiiOO!iiiOOd(idddddd)", &c->outputs, &c->inputs, &c->memory, &c->entries, &entries, &PyTuple_Type, &groups,
-                          &c->basis.functions, &c->basis.degree, &pieces, &knots, &bernstein, &slack, &kind, f, f + 1, f + 2, f + 3, f + 4,
-                          f + 5))
+    if (!PyArg_ParseTuple(args, "iiiiiOO!iO!nO(idddddd)", &c->outputs, &c->inputs, &c->parameters, &c->memory, &entry_count, &entries,
+                          &PyTuple_Type, &groups, &c->basis.functions, &PyTuple_Type, &factors, &numbers, &index, &kind, f, f + 1, f + 2, f + 3,
+                          f + 4, f + 5))
         return -1;
+    c->entries = entry_count;
     c->groups = (int)PyTuple_Size(groups);
-    c->basis.pieces = pieces;
-    c->basis.slack = (rls_real)slack;
+    c->basis.factors = (int)PyTuple_Size(factors);
     c->forgetting = (rls_forgetting){kind, (rls_real)f[0], (rls_real)f[1], (rls_real)f[2], (rls_real)f[3], (rls_real)f[4], (rls_real)f[5]};
-    numbers = (pieces + 1) + (Py_ssize_t)pieces * c->basis.functions * (c->basis.degree + 1);
-    bytes = aligned(c->entries * (Py_ssize_t)sizeof(rls_entry)) + aligned(c->groups * (Py_ssize_t)sizeof(rls_group)) +
-            aligned(numbers * (Py_ssize_t)sizeof(rls_real)) + (c->outputs + (Py_ssize_t)c->groups * c->entries) * (Py_ssize_t)sizeof(int);
-    self->memory = PyMem_Calloc(1, (size_t)bytes);
+    next = self->memory = PyMem_Calloc(1, memory_needed(c, numbers));
     if (!self->memory) {
         PyErr_NoMemory();
         return -1;
     }
-    char *next = self->memory;
-    rls_entry *entry = (rls_entry *)next;
-    rls_group *group = (rls_group *)(next += aligned(c->entries * (Py_ssize_t)sizeof(rls_entry)));
-    rls_real *number = (rls_real *)(next += aligned(c->groups * (Py_ssize_t)sizeof(rls_group)));
-    int *index = (int *)(next + aligned(numbers * (Py_ssize_t)sizeof(rls_real)));
+    c->entry = entry = take(&next, (size_t)c->entries * sizeof(rls_entry));
+    c->group = group = take(&next, (size_t)c->groups * sizeof(rls_group));
+    c->basis.factor = factor = take(&next, (size_t)c->basis.factors * sizeof(rls_factor));
+    c->basis.index = product = take(&next, (size_t)(c->basis.functions * c->basis.factors) * sizeof(int));
     if (copy_numbers(entries, "i", 4 * c->entries, entry, "entries") < 0) return -1;
-    if (copy_numbers(knots, FORMAT, pieces + 1, number, "knots") < 0) return -1;
-    if (copy_numbers(bernstein, FORMAT, numbers - pieces - 1, number + pieces + 1, "bernstein") < 0) return -1;
-    at = 0;
-    for (int g = 0; g < c->groups; g++) {
-        PyObject *outputs, *members;
-        if (!PyArg_ParseTuple(PyTuple_GetItem(groups, g), "iOiO", &group[g].outputs, &outputs, &group[g].entries, &members)) return -1;
-        if (group[g].entries > c->entries || (at += group[g].outputs) > c->outputs) {
-            PyErr_SetString(PyExc_ValueError, "groups: more members than there are");
-            return -1;
-        }
-        group[g].output = index;
-        if (copy_numbers(outputs, "i", group[g].outputs, index, "outputs") < 0) return -1;
-        index += group[g].outputs;
-        group[g].entry = index;
-        if (copy_numbers(members, "i", group[g].entries, index, "members") < 0) return -1;
-        index += group[g].entries;
-    }
-    c->entry = entry;
-    c->group = group;
-    c->basis.knot = number;
-    c->basis.bernstein = number + pieces + 1;
+    if (copy_numbers(index, "i", c->basis.functions * c->basis.factors, product, "index") < 0) return -1;
+    if (read_groups(c, group, groups, &next) < 0 || read_factors(c, factor, factors, &next) < 0) return -1;
     self->state_size = rls_state_size(c);
     self->work_size = rls_work_size(c);
     self->regressors = rls_regressors(c);
-    self->sample = PyMem_Calloc((size_t)(self->regressors + c->outputs + c->inputs + 1), sizeof(rls_real));
+    self->width = c->outputs + c->inputs + c->parameters + (c->basis.factors ? 0 : c->basis.functions);
+    self->sample = PyMem_Calloc((size_t)(self->regressors + self->width), sizeof(rls_real));
     if (!self->sample) {
         PyErr_NoMemory();
         return -1;
     }
     return 0;
+}
+
+/* A row [y, u, p], or [y, u, p, f] where the functions are the caller's. */
+static int update_row(const rls_config *c, rls_real *state, rls_real *work, const rls_real *row)
+{
+    const rls_real *u = row + c->outputs, *p = u + c->inputs;
+    return rls_update_with(c, state, work, row, u, p, c->basis.factors ? 0 : p + c->parameters);
 }
 
 static void kernel_dealloc(PyObject *object)
@@ -156,24 +200,29 @@ static PyObject *kernel_start(PyObject *object, PyObject *const *args, Py_ssize_
     Py_RETURN_NONE;
 }
 
+/* update(state, work, y, u, p) or, where the functions are the caller's, update(state, work, y, u, p, f); a single p may be a number. */
 static PyObject *kernel_update(PyObject *object, PyObject *const *args, Py_ssize_t count)
 {
     Kernel *self = (Kernel *)object;
     const rls_config *c = &self->config;
-    Py_buffer state, work, y, u;
-    double p;
+    const int given = c->basis.factors == 0, sizes[] = {c->outputs, c->inputs, c->parameters, c->basis.functions};
+    static const char *const names[] = {"y", "u", "p", "f"};
+    Py_buffer state, work, part;
+    rls_real *to = self->sample;
     int status;
-    if (arguments(count, 5) < 0) return NULL;
-    p = PyFloat_AsDouble(args[4]);
-    if (p == -1.0 && PyErr_Occurred()) return NULL;
-    if (open_buffer(args[2], &y, "d", c->outputs, 0, "y") < 0) return NULL;
-    convert(&y, self->sample);
-    PyBuffer_Release(&y);
-    if (open_buffer(args[3], &u, "d", c->inputs, 0, "u") < 0) return NULL;
-    convert(&u, self->sample + c->outputs);
-    PyBuffer_Release(&u);
+    if (arguments(count, 5 + given) < 0) return NULL;
+    for (int i = 0; i < 3 + given; i++) {
+        if (i == 2 && c->parameters == 1 && PyFloat_Check(args[4])) {
+            *to = (rls_real)PyFloat_AsDouble(args[4]);
+        } else {
+            if (open_buffer(args[2 + i], &part, "d", sizes[i], 0, names[i]) < 0) return NULL;
+            convert(&part, to);
+            PyBuffer_Release(&part);
+        }
+        to += sizes[i];
+    }
     if (open_memory(self, args, &state, &work) < 0) return NULL;
-    status = rls_update(c, state.buf, work.buf, self->sample, self->sample + c->outputs, (rls_real)p);
+    status = update_row(c, state.buf, work.buf, self->sample);
     PyBuffer_Release(&state);
     PyBuffer_Release(&work);
     return PyLong_FromLong(status);
@@ -199,12 +248,12 @@ static PyObject *kernel_absorb(PyObject *object, PyObject *const *args, Py_ssize
     return PyLong_FromLong(status);
 }
 
-/* run(state, work, samples (n, ny + nu + 1), statuses (n), innovations (n, ny) or None, coefficients (n, nr, ny) or None) */
+/* run(state, work, samples (n, width), statuses (n), innovations (n, ny) or None, coefficients (n, nr, ny) or None) */
 static PyObject *kernel_run(PyObject *object, PyObject *const *args, Py_ssize_t count)
 {
     Kernel *self = (Kernel *)object;
     const rls_config *c = &self->config;
-    const int ny = c->outputs, width = ny + c->inputs + 1, kept = self->regressors * ny;
+    const int ny = c->outputs, width = self->width, kept = self->regressors * ny;
     Py_buffer state, work, samples, statuses, innovations = {0}, coefficients = {0};
     Py_ssize_t n;
     PyObject *result = NULL;
@@ -225,7 +274,7 @@ static PyObject *kernel_run(PyObject *object, PyObject *const *args, Py_ssize_t 
             const double *from = (const double *)samples.buf + k * width;
             int status;
             for (int i = 0; i < width; i++) own[i] = (rls_real)from[i];
-            status = rls_update(c, state.buf, work.buf, own, own + ny, own[width - 1]);
+            status = update_row(c, state.buf, work.buf, own);
             ((int *)statuses.buf)[k] = status;
             if (innovations.buf && status & RLS_LEARNT)
                 memcpy((rls_real *)innovations.buf + k * ny, rls_innovation(c, work.buf), (size_t)ny * sizeof(rls_real));

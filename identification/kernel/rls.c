@@ -17,7 +17,7 @@
 #define PRIOR (EPSILON / 16) /* samples with a regressor at its largest that are pretended at first, saying "coefficient 0" */
 #define MILLION 1048576      /* samples are counted in two numbers, each exact in single precision */
 
-/* State: this header, the past (memory + 1 rows of y, u, p, f, newest first), the groups. */
+/* State: this header, the past (memory + 1 rows of y, u, p, f(p), newest first), the groups. */
 enum { COUNT, MILLIONS, FILLED, HEADER = LANES };
 /* A group: this header, then the arrays of `group` up to `usual`. */
 enum { WEIGHT, TURN, DETERMINED, STEPS, FACTOR, GROUP_HEADER = LANES };
@@ -41,7 +41,7 @@ static int row_offset(int i, int wide)
     return i * wide - LANES * (LANES * (blocks * (blocks - 1) / 2) + blocks * (i % LANES));
 }
 
-static int row_width(const rls_config *c) { return c->outputs + c->inputs + 1 + c->basis.functions; }
+static int row_width(const rls_config *c) { return c->outputs + c->inputs + c->parameters + c->basis.functions; }
 
 static int past_size(const rls_config *c) { return padded((c->memory + 1) * row_width(c)); }
 
@@ -386,23 +386,38 @@ int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_r
     return RLS_LEARNT | status(c, state, work);
 }
 
-/* The functions of the basis at p, by Bernstein's form of the piece p lies in. */
-static void evaluate(const rls_basis *b, rls_real p, rls_real *f)
+/* One function of a factor at p, by Bernstein's form of the piece p lies in. */
+static rls_real evaluate(const rls_factor *b, int function, rls_real p)
 {
     int piece = 0;
     const rls_real *at;
-    rls_real x;
+    rls_real x, sum, up = 1;
     while (piece + 1 < b->pieces && p >= b->knot[piece + 1]) piece++;
     x = (p - b->knot[piece]) / (b->knot[piece + 1] - b->knot[piece]);
-    at = b->bernstein + piece * b->functions * (b->degree + 1);
-    for (int j = 0; j < b->functions; j++, at += b->degree + 1) {
-        rls_real sum = at[0], up = 1;
-        for (int i = 1; i <= b->degree; i++) {
-            up *= x * (REAL(b->degree - i + 1) / REAL(i));
-            sum = sum * (1 - x) + up * at[i];
-        }
-        f[j] = sum;
+    at = b->bernstein + (piece * b->functions + function) * (b->degree + 1);
+    sum = at[0];
+    for (int i = 1; i <= b->degree; i++) {
+        up *= x * (REAL(b->degree - i + 1) / REAL(i));
+        sum = sum * (1 - x) + up * at[i];
     }
+    return sum;
+}
+
+static void functions_at(const rls_basis *b, const rls_real *p, rls_real *f)
+{
+    for (int j = 0; j < b->functions; j++) {
+        f[j] = 1;
+        for (int i = 0; i < b->factors; i++) f[j] *= evaluate(&b->factor[i], b->index[j * b->factors + i], p[i]);
+    }
+}
+
+static int is_outside(const rls_basis *b, const rls_real *p)
+{
+    for (int i = 0; i < b->factors; i++) {
+        const rls_factor *one = &b->factor[i];
+        if (p[i] < one->knot[0] - one->slack || p[i] > one->knot[one->pieces] + one->slack) return 1;
+    }
+    return 0;
 }
 
 static void regressor(const rls_config *c, const rls_real *past, rls_real *phi)
@@ -410,11 +425,11 @@ static void regressor(const rls_config *c, const rls_real *past, rls_real *phi)
     const int width = row_width(c), p = c->outputs + c->inputs;
     for (int i = 0; i < c->entries; i++) {
         const rls_entry *e = &c->entry[i];
-        const rls_real *then = past + e->lag * width, *f = past + e->p_lag * width + p + 1;
-        const rls_real signal = e->kind == RLS_OUTPUT  ? -then[e->channel]
-                                : e->kind == RLS_INPUT ? then[c->outputs + e->channel]
+        const rls_real *then = past + e->lag * width, *f = past + e->p_lag * width + p + c->parameters;
+        const rls_real signal = e->kind == RLS_OUTPUT   ? -then[e->channel]
+                                : e->kind == RLS_INPUT  ? then[c->outputs + e->channel]
                                 : e->kind == RLS_OFFSET ? 1
-                                                        : past[p] - then[p];
+                                                        : past[p + e->channel] - then[p + e->channel];
         for (int k = 0; k < c->basis.functions; k++) *phi++ = signal * f[k];
     }
 }
@@ -430,25 +445,33 @@ static int defect(const rls_real *value, int count)
     return worst;
 }
 
-int rls_update(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, rls_real p)
+int rls_update_with(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, const rls_real *p,
+                    const rls_real *f)
 {
-    rls_real *past = state + HEADER;
-    const rls_basis *b = &c->basis;
-    const int width = row_width(c), wrong = defect(y, c->outputs) | defect(u, c->inputs) | defect(&p, 1);
-    const int outside = p < b->knot[0] - b->slack || p > b->knot[b->pieces] + b->slack;
+    rls_real *past = state + HEADER, *next = past;
+    const int width = row_width(c), outside = is_outside(&c->basis, p);
+    const int wrong = defect(y, c->outputs) | defect(u, c->inputs) | defect(p, c->parameters) | (f ? defect(f, c->basis.functions) : 0);
     if (wrong || outside) {
         rls_forget_past(state);
         return status(c, state, work) | (wrong >= 2 || outside ? RLS_REFUSED : 0);
     }
     for (int i = (c->memory + 1) * width - 1; i >= width; i--) past[i] = past[i - width];
-    for (int j = 0; j < c->outputs; j++) past[j] = y[j];
-    for (int j = 0; j < c->inputs; j++) past[c->outputs + j] = u[j];
-    past[c->outputs + c->inputs] = p;
-    evaluate(b, p, past + c->outputs + c->inputs + 1);
+    for (int j = 0; j < c->outputs; j++) *next++ = y[j];
+    for (int j = 0; j < c->inputs; j++) *next++ = u[j];
+    for (int j = 0; j < c->parameters; j++) *next++ = p[j];
+    if (f)
+        for (int j = 0; j < c->basis.functions; j++) *next++ = f[j];
+    else
+        functions_at(&c->basis, p, next);
     if (state[FILLED] < REAL(c->memory + 1)) state[FILLED] += 1;
     if (state[FILLED] < REAL(c->memory + 1)) return status(c, state, work);
     regressor(c, past, work);
     return rls_absorb(c, state, work, work, y);
+}
+
+int rls_update(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, const rls_real *p)
+{
+    return rls_update_with(c, state, work, y, u, p, 0);
 }
 
 void rls_forget_past(rls_real *state) { state[FILLED] = 0; }

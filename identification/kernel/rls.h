@@ -13,7 +13,7 @@ typedef float rls_real;
 typedef double rls_real;
 #endif
 
-/* What a regressor multiplies: -y, u, 1 or p(k) - p(k - lag); each times every function of the basis at p(k - p_lag). */
+/* What a regressor multiplies: -y, u, 1 or p(k) - p(k - lag), of signal `channel`; each times every function of the basis at p(k - p_lag). */
 enum { RLS_OUTPUT, RLS_INPUT, RLS_OFFSET, RLS_INCREMENT };
 typedef struct {
     int kind, channel, lag, p_lag;
@@ -25,11 +25,19 @@ typedef struct {
     const int *output, *entry;
 } rls_group;
 
-/* Functions of p, polynomial between `pieces` + 1 knots: bernstein[piece][function][degree + 1]. p may leave the knots by `slack`. */
+/* Functions of one parameter, polynomial between `pieces` + 1 knots: bernstein[piece][function][degree + 1]. The parameter may leave the
+   knots by `slack`. */
 typedef struct {
     int functions, degree, pieces;
     rls_real slack;
     const rls_real *knot, *bernstein;
+} rls_factor;
+
+/* Products of one function of each parameter: index[function][factor]. Without factors the caller provides the functions. */
+typedef struct {
+    int functions, factors;
+    const rls_factor *factor;
+    const int *index;
 } rls_basis;
 
 /* How old samples lose weight.
@@ -46,7 +54,7 @@ typedef struct {
 
 /* `memory` is the largest lag. */
 typedef struct {
-    int outputs, inputs, memory, entries, groups;
+    int outputs, inputs, parameters, memory, entries, groups;
     const rls_entry *entry;
     const rls_group *group;
     rls_basis basis;
@@ -69,7 +77,11 @@ int rls_work_size(const rls_config *c);  /* numbers */
 void rls_init(const rls_config *c, rls_real *state, rls_real *work);
 
 /* One sample y, u, p of the same instant. NaN marks a missing one: nothing is learnt and the lags start afresh. */
-int rls_update(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, rls_real p);
+int rls_update(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, const rls_real *p);
+
+/* The same with the functions f(p) of a basis without factors. */
+int rls_update_with(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, const rls_real *p,
+                    const rls_real *f);
 
 /* A regressor phi (rls_regressors) and the outputs y it must explain, for a caller who keeps the lags. */
 int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_real *phi, const rls_real *y);

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification.kernel import configuration as at
-from identification.kernel.configuration import LANES, Configuration, GroupLayout
+from identification.kernel.configuration import LANES, Configuration, Factor, GroupLayout
 from symheli.lpv.arrays import Array
 
 LEARNT, DETERMINED_BIT, SATURATED, REFUSED = 1, 2, 4, 8
@@ -68,8 +68,7 @@ class Kernel:
         real, (kind, *values) = self._real, configuration.arguments[-1]
         self._limits, self._kind = Limits.of(real), kind
         self._factor, self._lowest, self._recent, self._usual, self._quiet, self._floor = map(real, values)
-        self._slack = real(configuration.slack)
-        self._columns = [configuration.columns(layout.group) for layout in configuration.groups]
+        self._columns = [configuration.structure.regressors(layout.group) for layout in configuration.groups]
 
     def sizes(self) -> tuple[int, int]:
         """Numbers in the state, numbers of scratch."""
@@ -84,10 +83,11 @@ class Kernel:
             for i, row in enumerate(view.rows):
                 row[i % LANES] = 1
 
-    def update(self, state: Array, work: Array, y: Array, u: Array, p: float) -> int:
-        """Take in one sample; returns the status bits."""
+    def update(self, state: Array, work: Array, y: Array, u: Array, p: Any, f: Array | None = None) -> int:
+        """Take in one sample, with the functions f(p) where the configuration has no factors; returns the status bits."""
+        parts = (y, u, np.atleast_1d(p)) if f is None else (y, u, np.atleast_1d(p), f)
         with np.errstate(all="ignore"):
-            return self._update(state, work, y.astype(self._c.dtype), u.astype(self._c.dtype), self._real(p))
+            return self._update(state, work, np.concatenate(parts).astype(self._c.dtype))
 
     def absorb(self, state: Array, work: Array, phi: Array, y: Array) -> int:
         """Take in one regressor and the outputs it must explain; returns the status bits."""
@@ -97,41 +97,38 @@ class Kernel:
     def run(
         self, state: Array, work: Array, samples: Array, statuses: Array, innovations: Array | None, coefficients: Array | None
     ) -> None:
-        """Take in rows [y, u, p]; fills a row of each array for each."""
+        """Take in rows [y, u, p], or [y, u, p, f]; fills a row of each array for each."""
         ny, after = self._c.structure.ny, at.padded(self._c.structure.n_regressors)
         for k, sample in enumerate(samples):
-            statuses[k] = self.update(state, work, sample[:ny], sample[ny:-1], sample[-1])
+            with np.errstate(all="ignore"):
+                statuses[k] = self._update(state, work, sample.astype(self._c.dtype))
             if innovations is not None and statuses[k] & LEARNT:
                 innovations[k] = work[after : after + ny]
             if coefficients is not None:
                 coefficients[k] = theta(self._c, state)
 
-    def _update(self, state: Array, work: Array, y: Array, u: Array, p: Any) -> int:
-        c, sample = self._c, np.concatenate([y, u, np.array([p], y.dtype)])
-        knots = c.pieces[0]
+    def _update(self, state: Array, work: Array, sample: Array) -> int:
+        c, arx = self._c, self._c.structure
+        p = sample[arx.ny + arx.nu :][: len(arx.parameters)]
         refused = bool((np.abs(sample) > self._limits.largest).any())
-        refused = refused or bool(p < knots[0] - self._slack or p > knots[-1] + self._slack)
+        refused = refused or any(is_outside(x, factor) for x, factor in zip(p, c.factors, strict=False))
         if refused or np.isnan(sample).any():
             state[at.FILLED] = 0
             return self._status(state) | (REFUSED if refused else 0)
         past = state[c.past].reshape(-1, c.width)
         past[1:] = past[:-1].copy()
         past[0, : len(sample)] = sample
-        past[0, len(sample) :] = self._functions(p)
+        if c.factors:
+            past[0, len(sample) :] = self._functions(p)
         state[at.FILLED] = min(state[at.FILLED] + 1, len(past))
         if state[at.FILLED] < len(past):
             return self._status(state)
-        return self._absorb(state, work, self._regressor(past), y)
+        return self._absorb(state, work, self._regressor(past), sample[: arx.ny])
 
-    def _functions(self, p: Any) -> Array:
-        knots, coefficients = self._c.pieces
-        piece = int(np.searchsorted(knots[1:-1], p, side="right"))
-        x = (p - knots[piece]) / (knots[piece + 1] - knots[piece])
-        degree, one = coefficients.shape[2] - 1, knots.dtype.type(1)
-        out, up = coefficients[piece, :, 0].copy(), one
-        for i in range(1, degree + 1):
-            up = up * (x * (knots.dtype.type(degree - i + 1) / knots.dtype.type(i)))
-            out = out * (one - x) + up * coefficients[piece, :, i]
+    def _functions(self, p: Array) -> Array:
+        out = np.ones(self._c.structure.basis.size, p.dtype)
+        for x, factor, index in zip(p, self._c.factors, self._c.index.T, strict=True):
+            out *= evaluate(factor, x)[index]
         return out
 
     def _regressor(self, past: Array) -> Array:
@@ -147,8 +144,8 @@ class Kernel:
                 case "offset":
                     signal = past.dtype.type(1)
                 case "increment":
-                    signal = past[0, p] - past[lag, p]
-            row[:] = signal * past[p_lag, p + 1 :]
+                    signal = past[0, p + channel] - past[lag, p + channel]
+            row[:] = signal * past[p_lag, p + len(arx.parameters) :]
         return out.reshape(-1)
 
     def _absorb(self, state: Array, work: Array, phi: Array, y: Array) -> int:
@@ -318,6 +315,25 @@ class Kernel:
                 part[j] = 0
 
 
+def is_outside(p: Any, factor: Factor) -> bool:
+    """Whether p leaves the range of a factor by more than rounding."""
+    slack = p.dtype.type(factor.slack)
+    return bool(p < factor.knots[0] - slack or p > factor.knots[-1] + slack)
+
+
+def evaluate(factor: Factor, p: Any) -> Array:
+    """All functions of a factor at p, by Bernstein's form of the piece p lies in."""
+    knots, coefficients = factor.knots, factor.bernstein
+    piece = int(np.searchsorted(knots[1:-1], p, side="right"))
+    x = (p - knots[piece]) / (knots[piece + 1] - knots[piece])
+    degree, real = coefficients.shape[2] - 1, knots.dtype.type
+    out, up = coefficients[piece, :, 0].copy(), real(1)
+    for i in range(1, degree + 1):
+        up = up * (x * (real(degree - i + 1) / real(i)))
+        out = out * (real(1) - x) + up * coefficients[piece, :, i]
+    return out
+
+
 def dot(a: Array, b: Array) -> Any:
     """Their product, summed as in rls.c: LANES partial sums, then these in pairs."""
     s = (a * b).reshape(-1, LANES).sum(axis=0)
@@ -357,5 +373,5 @@ def theta(c: Configuration, state: Array) -> Array:
     out = np.zeros((c.structure.n_regressors, c.structure.ny), state.dtype)
     for layout in c.groups:
         own = state[layout.in_state["theta"]].reshape(layout.m, -1)[:, : layout.n]
-        out[np.ix_(c.columns(layout.group), layout.group.outputs)] = own.T
+        out[np.ix_(c.structure.regressors(layout.group), layout.group.outputs)] = own.T
     return out

@@ -10,7 +10,7 @@ from identification.kernel import twin
 from identification.kernel.configuration import Configuration
 from identification.online import Online
 from identification.regressors import regression
-from symheli.lpv import Spline
+from symheli.lpv import FlightRecord, Spline
 
 WAYS = (
     1.0,
@@ -25,15 +25,6 @@ STRUCTURES = {
     "spline, current p": structure(basis=Spline((0.0, 2.0, 6.0, 10.0, 13.0)), scheduling_at="now", delay=0, nb=3),
     "nine outputs": structure(outputs=tuple("abcdefghi"), na=1, nb=1, basis=idn.Polynomial(1, 0.0, 13.0)),
 }
-
-
-class Split(idn.LPVARX):
-    """Output a knows its own past and u; b everything: two factors."""
-
-    @property
-    def groups(self):
-        own = tuple(i for i, e in enumerate(self.entries) if e.kind == "input" or e.channel == 0)
-        return idn.Group((0,), own), idn.Group((1,), tuple(range(len(self.entries))))
 
 
 def both(rls):
@@ -67,7 +58,9 @@ def test_c_and_numpy_agree_to_the_last_bit(name, way, precision):
 
 
 def split():
-    return Split(("a", "b"), ("u",), "p", 2, 1, 1, idn.Polynomial(1, 0.0, 13.0))
+    """Output a knows its own past and u; b everything: two factors."""
+    orders = {"a": {"a": 2, "b": 0}, "b": 2}
+    return idn.LPVARX(("a", "b"), ("u",), "p", orders, 1, 1, idn.Polynomial(1, 0.0, 13.0))
 
 
 def test_c_and_numpy_agree_where_outputs_have_different_regressors():
@@ -83,7 +76,7 @@ def test_block_diagonal_estimates_are_those_of_least_squares_output_by_output():
     state = idn.RecursiveLeastSquares(arx).run(record).state
     data = regression(arx, record)
     for j, group in enumerate(arx.groups):
-        columns = state.configuration.columns(group)
+        columns = arx.regressors(group)
         expected = np.linalg.lstsq(data.phi[:, columns], data.y[:, j], rcond=None)[0]
         # two backward stable methods on a problem of condition below 1e3
         np.testing.assert_allclose(state.theta[columns, j], expected, rtol=0, atol=1e-11)
@@ -94,13 +87,48 @@ def test_block_diagonal_estimates_are_those_of_least_squares_output_by_output():
     assert state.residual_covariance[0, 1] == 0.0
 
 
+SQUARES = (np.ones_like, np.square)
+BESIDE = {
+    "two parameters": idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0))), None),
+    "total degree": idn.Product((idn.Polynomial(2, 0.0, 13.0), idn.Polynomial(2, -1.0, 1.0)), 2),
+    "one's own functions": idn.UserFunctions(SQUARES, 0.0, 13.0),
+}
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("name", BESIDE)
+def test_other_bases_give_what_batch_least_squares_gives(name, precision):
+    basis = BESIDE[name]
+    p = ("v", "s")[: basis.dimension]
+    arx = structure(scheduling=p, basis=basis, offset=True, offset_rate=True, na=1)
+    rng = np.random.default_rng(1)
+    k = np.arange(400)
+    columns = {"y": rng.normal(size=400), "u": rng.normal(size=400), "v": moving(400), "s": np.sin(0.53 * k)}
+    record = FlightRecord.from_arrays(0.1 * k, dict.fromkeys(columns, "1"), **columns)
+    rls = idn.RecursiveLeastSquares(arx, precision=precision)
+    history = rls.run(record)
+    data = regression(arx, record)
+    best = np.linalg.lstsq(data.phi, data.y, rcond=None)[0]
+    # predictions of size 1; condition below 1e3, twice the rounding errors of 400 samples
+    tolerance = 1e-10 if precision == "double" else 1e-2
+    np.testing.assert_allclose(data.phi @ history.state.theta, data.phi @ best, rtol=0, atol=tolerance)
+    single = rls.online()
+    for row in np.column_stack([columns[c] for c in ("y", "u", *p)]):
+        single.update(row[:1], row[1:2], row[2] if len(p) == 1 else row[2:])
+    np.testing.assert_array_equal(single.state.memory, history.state.memory)
+    compiled, numpy = both(rls)
+    rows = np.column_stack([columns[c] for c in ("y", "u", *p)])
+    for a, b in zip(compiled.run(rows), numpy.run(rows), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
 def test_basis_in_the_kernel_is_the_basis_of_the_structure():
     """Its Bernstein form against Legendre's recursion and SciPy's splines."""
     for basis in (idn.Polynomial(5, -3.0, 13.0), Spline((0.0, 1.0, 4.0, 9.0, 13.0))):
-        numpy = twin.Kernel(Configuration(structure(basis=basis), idn.Constant(), np.float64))
+        (factor,) = Configuration(structure(basis=basis), idn.Constant(), np.float64).factors
         for p in np.linspace(basis.low, basis.high, 41):
             # Legendre's fifth has Bernstein coefficients of up to 330: a few roundings of those
-            np.testing.assert_allclose(numpy._functions(p), basis(p), rtol=0, atol=1e-12)
+            np.testing.assert_allclose(twin.evaluate(factor, p), basis(p), rtol=0, atol=1e-12)
 
 
 def test_directional_forgetting_is_its_formula():
