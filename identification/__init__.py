@@ -11,16 +11,16 @@ from identification.coefficients import Coefficients, CoefficientValues
 from identification.estimate import fit
 from identification.excitation import ExcitationReport, excitation_report
 from identification.experiment_design import Experiment, Plan, choose_experiments, compare_experiments
+from identification.forgetting import Constant, Directional, Forgetting, Variable
 from identification.frequency_response import FrequencyResponse, frequency_response
 from identification.history import History
 from identification.instrumental_variables import Instruments
 from identification.model import LPVARXModel
+from identification.online import Online
 from identification.order_scan import OrderScan, Trial, order_scan
 from identification.prediction import fit_percent
-from identification.residuals import ResidualAnalysis, Theil, residual_analysis, theil
-from identification.forgetting import Constant, Directional, Forgetting, Variable
-from identification.online import Online
 from identification.recursive_least_squares import RecursiveLeastSquares
+from identification.residuals import ResidualAnalysis, Theil, residual_analysis, theil
 from identification.rls_state import RLSInfo, RLSState
 from identification.structure import LPVARX, Entry, Group, Term
 from identification.uncertainty import Band, Uncertainty, uncertainty
