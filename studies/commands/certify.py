@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import math
+from typing import TYPE_CHECKING
 
 from studies.commands import options
 from studies.output import Output, progress
+
+if TYPE_CHECKING:
+    from synthesis import Certificate, LFTCertificate
 
 HELP = "proven gain and stability of the lateral loop for a rate of airspeed"
 
@@ -22,6 +27,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--channel", choices=("gust", "inputs"), default="gust", help="lateral gust, or disturbances at the inputs, -> r, phi"
     )
+    parser.add_argument("--lft", metavar="TEST", help="a classical LFT test instead: small gain, D, DG or full block; --rate plays no part")
     parser.add_argument("--stability", action="store_true", help="stability only, no gain")
     parser.add_argument("--rigorous", action="store_true", help="verify once more in exact rational arithmetic")
 
@@ -34,9 +40,15 @@ def run(arguments: argparse.Namespace) -> Output:
     low, high = arguments.airspeeds
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
     loop = lateral_loop(options.helicopter(arguments), low, high, arguments.channel)
-    progress(f"searching a Lyapunov function for |dV/dt| <= {arguments.rate:g} m/s^2")
-    certify = synthesis.stability if arguments.stability else synthesis.l2_gain
-    cert = certify(loop, rate=arguments.rate)
+    cert: Certificate | LFTCertificate
+    if arguments.lft:
+        progress(f"LFT test with {arguments.lft} for an airspeed that may jump")
+        test = synthesis.lft_stability if arguments.stability else synthesis.lft_gain
+        cert, rate = test(loop.to_lft().reduce(), arguments.lft), math.inf
+    else:
+        progress(f"searching a Lyapunov function for |dV/dt| <= {arguments.rate:g} m/s^2")
+        certify = synthesis.stability if arguments.stability else synthesis.l2_gain
+        cert, rate = certify(loop, rate=arguments.rate), arguments.rate
     exact = None
     if arguments.rigorous:
         progress("verifying in rational arithmetic")
@@ -44,7 +56,8 @@ def run(arguments: argparse.Namespace) -> Output:
     head = f"lateral loop of {arguments.vehicle}, d_lat = {HOLD:g} phi, {low:g} to {high:g} m/s, {arguments.channel} -> r, phi (SI)"
     text = f"{head}\n{cert}" + ("" if exact is None else f"\n  exact verification: {'passed' if exact else 'not passed'}")
     data = {
-        "loop": head, "kind": cert.kind, "rate": cert.rate, "gamma": cert.gamma, "lower": cert.lower, "frozen": cert.frozen,
+        "loop": head, "kind": cert.kind, "rate": rate, "lft": arguments.lft, "gamma": cert.gamma, "lower": cert.lower,
+        "frozen": cert.frozen,
         "status": cert.status.name, "verified": cert.verified, "exact": exact, "hypotheses": cert.hypotheses, "solver": cert.solver,
         "seconds": cert.seconds._asdict(),
     }  # fmt: skip

@@ -80,14 +80,17 @@ def _at_poles(lft: LFT, grid: Array) -> Array:
 
 
 def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBound:
-    """The best lower bound over p that jumps along a line through the box: its diagonals and its axes.
+    """The best lower bound over p that moves along a line through the box, its diagonals and its axes: jumping, and at rate limits.
 
-    One parameter: its whole range. `search` None: the frozen gain.
+    One parameter: its whole range. A search over jumps alone misses slower waves that are worse, so the limits of the
+    parameters, where they have some, give a second try. `search` None: the frozen gain.
     """
     best = LowerBound(frozen.gamma, None)
-    for start, end in _lines(len(lft.blocks)) if search else ():
+    limits = [s.rate / s.radius for s in lft.parameters if math.isfinite(s.rate) and s.rate > 0]
+    tries = [(*line, rate) for rate in (math.inf, *limits[:1]) for line in _lines(len(lft.blocks))] if search else []
+    for start, end, rate in tries:
         line = cast(LPVStateSpace, along(lft, start, end))  # asked for matrices, scheduling, states and dt, which an LFT has too
-        found = lower_bound(line, math.inf, frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega), search=search)
+        found = lower_bound(line, rate, frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega), search=search)
         if found.gamma > best.gamma:
             best = found._replace(trajectory=found.trajectory and _in_box(lft, found.trajectory, start, end))
         if math.isinf(best.gamma):

@@ -56,22 +56,26 @@ def scaled(lft: LFT, coordinates: Coordinates) -> Loop:
     )  # fmt: skip
 
 
-def coordinates(lft: LFT, gain: float, *, copies: bool = True) -> Coordinates:
-    """From the model at the middle of the box and an expected `gain`: states by a Lyapunov solution, `copies` of a parameter
-    by balancing what the inputs make of z against what w makes of the outputs (else they stay)."""
+def coordinates(lft: LFT, gain: float, *, one: bool = False) -> Coordinates:
+    """From the model at the middle of the box and an expected `gain`: states by a Lyapunov solution, the copies of a parameter
+    by balancing what state noise and inputs make of z against what w makes of state and outputs (`one`: by one number)."""
     middle = lft.at(*(s.middle for s in lft.parameters))
     plain = Coordinates(model_scaling(middle, gain), np.eye(lft.order), np.eye(lft.order))
-    if not copies:
-        return plain
-    loop, n = scaled(lft, plain), lft.order
+    loop, n, x = scaled(lft, plain), lft.order, len(lft.states)
     s = _frequencies(loop.A, lft.dt is None)
-    pencil = s[:, None, None] * np.eye(len(loop.A)) - loop.A
-    B, C = np.hstack([loop.Bw, loop.Bu]), np.vstack([loop.Cz, loop.Cy])
-    G = C @ np.linalg.solve(pencil, np.broadcast_to(B, (len(s), *B.shape))) + np.block([[loop.Dzw, loop.Dzu], [loop.Dyw, loop.Dyu]])
-    right = np.zeros((n, n))
+    pencil = s[:, None, None] * np.eye(x) - loop.A
+    B, C = np.hstack([loop.Bw, np.eye(x), loop.Bu]), np.vstack([loop.Cz, np.eye(x), loop.Cy])
+    G = C @ np.linalg.solve(pencil, np.broadcast_to(B, (len(s), *B.shape)))
+    G[:, :n, :n] += loop.Dzw
+    G[:, :n, n + x :] += loop.Dzu
+    G[:, n + x :, :n] += loop.Dyw
     reach, seen = _spread(G[:, :n, n:], G[:, :n, :n]), _spread(_adjoint(G[:, n:, :n]), _adjoint(G[:, :n, :n]))
-    for part in parts(lft.sizes):
-        right[part, part] = _balancing(reach[part, part], seen[part, part])
+    right = np.zeros((n, n))
+    if one and np.trace(reach) > 0 and np.trace(seen) > 0:
+        right = float(np.trace(reach) / np.trace(seen)) ** 0.25 * np.eye(n)
+    else:
+        for part in parts(lft.sizes):
+            right[part, part] = _balancing(reach[part, part], seen[part, part])
     return Coordinates(plain.units, linalg.inv(right), right)
 
 
@@ -85,17 +89,18 @@ def _frequencies(A: Array, continuous: bool) -> Array:
 
 
 def _spread(direct: Array, around: Array) -> Array:
-    """Sum over frequencies of H H*, H the direct response and what of it comes around the loop once; a little of everything."""
+    """Sum over frequencies of H H*, H the direct response and what of it comes around the loop once."""
     once = direct @ _adjoint(direct)
-    total = np.real(once + around @ once @ _adjoint(around)).sum(axis=0)
-    size = float(np.trace(total)) / max(len(total), 1)
-    return total / size + 1e-6 * np.eye(len(total)) if size > 0 else np.eye(len(total))
+    return np.real(once + around @ once @ _adjoint(around)).sum(axis=0)
 
 
 def _balancing(reach: Array, seen: Array) -> Array:
-    """T with T^-1 reach T^-T = T' seen T, diagonal."""
-    root = linalg.cholesky(reach, lower=True) if len(reach) else reach
-    values, V = linalg.eigh(root.T @ seen @ root) if len(reach) else (np.zeros(0), reach)
+    """T with T^-1 reach T^-T = T' seen T, diagonal; directions that hardly matter are treated as if they did."""
+    if not len(reach):
+        return reach
+    reach, seen = (M + 1e-6 * max(float(np.trace(M)) / len(M), 1e-300) * np.eye(len(M)) for M in (reach, seen))
+    root = linalg.cholesky(reach, lower=True)
+    values, V = linalg.eigh(root.T @ seen @ root)
     return root @ V / np.maximum(values, 1e-300) ** 0.25
 
 

@@ -15,7 +15,7 @@ from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_boun
 from synthesis.lft.certificate import LFTCertificate, Trial
 from synthesis.lft.coordinates import coordinates, scaled
 from synthesis.lft.multipliers import Class, Multiplier, check_scaling, multiplier_class
-from synthesis.lft.program import gain_program, inequality, margin_program, unpack
+from synthesis.lft.program import gain_program, inequality, margin_program, unpack, with_state_channels
 from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.lower_bound import THOROUGH, LowerBound, Search
 
@@ -51,7 +51,7 @@ def lft_gain(
     below = box_lower_bound(lft, frozen, search)
     bounds = time.perf_counter() - start
     attempt = _Attempt(lft, scaling, solver, below.gamma if math.isfinite(below.gamma) else frozen.gamma)
-    return _certificate(lft, scaling, solver, attempt.gain(), below, frozen.gamma, bounds)
+    return _certificate(lft, scaling, solver, attempt.run(), below, frozen.gamma, bounds)
 
 
 def lft_stability(
@@ -66,7 +66,7 @@ def lft_stability(
     frozen = frozen_box_gain(lft.select(inputs=(), outputs=()))
     if math.isinf(frozen.gamma):
         return _certificate(lft, scaling, solver, None, LowerBound(math.nan, _at_rest(frozen)), math.nan, 0.0)
-    found = _Attempt(lft.select(inputs=(), outputs=()), scaling, solver, 1.0).stability()
+    found = _Attempt(lft.select(inputs=(), outputs=()), scaling, solver, 1.0).run()
     start = time.perf_counter()
     worst = None if found.proof is not None else box_growing_trajectory(lft, search)
     return _certificate(lft, scaling, solver, found, LowerBound(math.nan, worst), math.nan, time.perf_counter() - start)
@@ -79,10 +79,14 @@ class _Attempt:
         self.begin = time.perf_counter()
         self.lft, self.scaling, self.solver = lft, scaling, solver
         self.sizes = lft.sizes
-        # a small gain means one thing only in the coordinates the LFT has
-        self.evidence = Evidence(lft, coordinates(lft, gain, copies=scaling != "small gain"))
+        # a small gain means one thing only in the coordinates the LFT has, up to a number
+        self.evidence = Evidence(lft, coordinates(lft, gain, one=scaling == "small gain"))
         self.multipliers: Class = multiplier_class(scaling, self.sizes)
-        self.linear = inequality(scaled(lft, self.evidence.coordinates), self.multipliers, lft.dt is None)
+        loop = scaled(lft, self.evidence.coordinates)
+        if not lft.inputs:
+            loop = with_state_channels(loop)
+        self.inputs = loop.Bu.shape[1]
+        self.linear = inequality(loop, self.multipliers, lft.dt is None)
         self.proof: Quadratic | None = None
         self.gamma, self.conditioning, self.answer = math.inf, math.inf, Answer.FAILED
         self.trials: list[Trial] = []
@@ -93,32 +97,23 @@ class _Attempt:
         """Build, solve and verify, s."""
         return self.ended - self.begin - self.solving - self.verifying, self.solving, self.verifying
 
-    def gain(self) -> _Attempt:
+    def run(self) -> _Attempt:
         """Minimise the gain; where no answer can be verified, ask for the largest margin of stability."""
-        x, u = len(self.lft.states), len(self.lft.inputs)
+        x = len(self.lft.states)
         for margin in MARGINS:
-            candidate = self._solve(gain_program(self.linear, self.multipliers, x, u, margin))
+            candidate = self._solve(gain_program(self.linear, self.multipliers, x, self.inputs, margin))
             self._judge("gain", margin, candidate, (1.0,))
             self.answer = candidate.answer
             if self.proof is not None or candidate.answer is Answer.INFEASIBLE:
                 break
         if self.proof is None:
-            self._largest_margin(10.0 ** np.arange(-2, 10))
+            candidate = self._solve(margin_program(self.linear, self.multipliers, x, self.inputs))
+            margin = math.nan if candidate.x is None else float(candidate.x[-1])
+            self._judge("margin", margin, candidate, 10.0 ** np.arange(-2, 10))
+            if candidate.answer is Answer.SOLVED:
+                self.answer = Answer.INFEASIBLE if margin <= NOTHING else Answer.FAILED
         self.ended = time.perf_counter()
         return self
-
-    def stability(self) -> _Attempt:
-        """Maximise the margin of stability."""
-        self._largest_margin((1.0,))
-        self.ended = time.perf_counter()
-        return self
-
-    def _largest_margin(self, weights: Array | tuple[float, ...]) -> None:
-        candidate = self._solve(margin_program(self.linear, self.multipliers, len(self.lft.states), len(self.lft.inputs)))
-        margin = math.nan if candidate.x is None else float(candidate.x[-1])
-        self._judge("margin", margin, candidate, weights)
-        if candidate.answer is Answer.SOLVED:
-            self.answer = Answer.INFEASIBLE if margin <= NOTHING else Answer.FAILED
 
     def _solve(self, program: ConeProgram) -> Candidate:
         candidate = solve(program, self.solver)
@@ -133,10 +128,11 @@ class _Attempt:
             proof = self._physical(float(weight) * np.asarray(candidate.x))
             least, conditioning = self.evidence.least_gain(proof)
             gamma = least * math.sqrt(1 + INFLATION)
-            if math.isinf(least) or not self.evidence.floating(proof, gamma) or gamma >= best:
+            if gamma >= best or not self.evidence.floating(proof, gamma):
                 continue
-            self.proof, self.gamma, self.conditioning = proof, gamma, conditioning
-            best = gamma
+            self.proof, self.gamma, self.conditioning, best = proof, gamma, conditioning, gamma
+            if math.isnan(gamma):  # stability alone: one multiple is as good as another
+                break
         self.verifying += time.perf_counter() - start
         words = f"{candidate.message}, {'not verified' if self.proof is None else 'verified'}"
         self.trials.append(Trial(program, margin, words, best))

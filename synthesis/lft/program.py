@@ -51,6 +51,12 @@ def inequality(loop: Loop, multipliers: Class, continuous: bool) -> Linear:
     return Linear(y.T @ y, np.concatenate([lyapunov, static]), len(P))
 
 
+def with_state_channels(loop: Loop) -> Loop:
+    """Noise on every state as the input, the state as the output: a gain from one to the other exists where the loop is stable."""
+    x, w = len(loop.A), loop.Bw.shape[1]
+    return loop._replace(Bu=np.eye(x), Dzu=np.zeros((w, x)), Cy=np.eye(x), Dyw=np.zeros((x, w)), Dyu=np.zeros((x, x)))
+
+
 def gain_program(linear: Linear, multipliers: Class, states: int, inputs: int, margin: float) -> ConeProgram:
     """Minimise gamma^2 with the (x, w) block below -margin I. Unknowns: P, multiplier, gamma^2."""
     size = len(linear.constant)

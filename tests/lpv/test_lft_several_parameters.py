@@ -150,6 +150,19 @@ def test_polynomials_come_back_from_their_lft():
     assert lpv.to_lft().to_lpv(degree=5).basis.size == 6
 
 
+def test_kinematic_rows_of_the_helicopter_do_not_count_as_dependence(ideal):
+    """Their rounding in the cubic fit, 1e-16 where the entry is one, was once scaled up to a dependence of size one."""
+    import symheli
+
+    family = symheli.sweep(ideal, np.linspace(0, 13, 14)).select(["v", "p", "r", "phi", "b1"], ["d_lat", "d_ped"])
+    lft = family.interpolate("polynomial", 3).to_lft()
+    assert lft.truncate(order=lft.reduce().order).error < 1e-10
+    assert lft.reduce().to_lpv().basis == Polynomial(3, 0.0, 13.0)
+    cut = lft.truncate(0.05)
+    assert cut.lft.order < lft.reduce().order
+    assert cut.error <= min(0.05, cut.bound)
+
+
 def test_rational_dependence_becomes_a_polynomial_only_on_request_and_with_its_misfit():
     inverse = reciprocal(MASS)
     with pytest.raises(InputError, match="rationally"):

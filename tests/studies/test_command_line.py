@@ -97,6 +97,18 @@ def test_certify_brackets_the_gain_of_a_frozen_loop(answer):
     assert got["lower"] <= got["gamma"] * (1 + 1e-6)
 
 
+def test_certify_with_an_lft_test_lets_the_airspeed_jump(answer, run):
+    got = answer("certify", "--lft", "DG", "--airspeeds", 5.5, 7.5, "--stability")
+    assert got["verified"]
+    assert got["rate"] == "inf"
+    status, out, _ = run("certify", "--lft", "small gain", "--stability")
+    assert status == 1
+    assert "no certificate exists" in out
+    status, _, err = run("certify", "--lft", "DGG")
+    assert status == 1
+    assert "did you mean 'DG'" in err
+
+
 # --- identify --------------------------------------------------------------------------------------------------------------
 
 

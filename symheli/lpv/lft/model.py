@@ -219,7 +219,7 @@ class LFT:
     def reduce(self, tolerance: float = 1e-12) -> LFT:
         """The same model with fewer copies of the parameters: minimal for one parameter, structured Kalman for several.
 
-        What is below `tolerance` of the size of an entry counts as rounding.
+        What is below `tolerance` of the size that its row and column give an entry counts as rounding.
         """
         from symheli.lpv.lft.reduction import reduce
 

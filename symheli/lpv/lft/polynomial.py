@@ -13,12 +13,13 @@ from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Polynomial
 from symheli.lpv.lft.model import LFT, Block
+from symheli.lpv.lft.reduction import significant
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import signals
 
 ROUNDING = 1e-11
-"""Of the size of an entry: a power of the parameter below this is rounding."""
+"""A power of the parameter whose coefficients are below this, rows and columns scaled to one, is rounding."""
 
 
 def from_lpv(lpv: LPVStateSpace) -> LFT:
@@ -130,9 +131,9 @@ def powers(lft: LFT) -> list[Array] | None:
     for _ in range(2 * lft.order):
         out.append(lft.M21 @ right)
         right = lft.M11 @ right
-    size = np.max([np.abs(M) for M in out[: lft.order + 1]], axis=0)
+    size = np.max(np.abs(out), axis=0)
     # by Cayley and Hamilton `order` zeros in a row are followed by zeros only
-    while len(out) > 1 and np.all(np.abs(out[-1]) <= ROUNDING * size):
+    while len(out) > 1 and not np.any(significant(np.abs(out[-1]), size, ROUNDING)):
         out.pop()
     return out if len(out) <= lft.order + 1 else None
 

@@ -20,7 +20,7 @@ def _one_parameter(lft: LFT, tolerance: float) -> LFT:
 
     M(delta) = M22 + sum_i delta^i M21 M11^(i-1) M12, so the order is the rank of the block Hankel matrix of
     its Markov parameters, and the singular vectors realize it (Ho-Kalman). Singular values below `tolerance`
-    times the largest count as zero, as does dependence below `tolerance` times the entry itself.
+    times the largest count as zero, as does dependence that is not `significant`.
     """
     n = lft.order
     rows, columns = lft.M22.shape
@@ -32,8 +32,8 @@ def _one_parameter(lft: LFT, tolerance: float) -> LFT:
     markov += [np.zeros((rows, columns))] * (2 * depth - len(markov))
     if depth == 0:
         return _projected(lft, [np.zeros((n, 0))], [np.zeros((n, 0))])
-    # what is below rounding of the constant part of an entry is not dependence on the parameter
-    markov = [np.where(np.abs(M) > tolerance * np.abs(lft.M22), M, 0.0) for M in markov]
+    depends = significant(np.abs(np.stack(markov)).max(axis=0), lft.M22, tolerance)
+    markov = [np.where(depends, M, 0.0) for M in markov]
     # states and channels of different size: balance rows and columns so that the rank is judged entry by entry
     size = np.abs(np.stack(markov)).max(axis=0)
     row_scale, column_scale = equilibrate(size)
@@ -113,6 +113,15 @@ def _diagonal(parts: list[Array]) -> Array:
         out[i : i + p.shape[0], j : j + p.shape[1]] = p
         i, j = i + p.shape[0], j + p.shape[1]
     return out
+
+
+def significant(dependence: Array, constant: Array, tolerance: float) -> Array:
+    """Entries whose `dependence` on the parameters is more than `tolerance` of the size their row and column give them.
+
+    That size is one for all after rows and columns are scaled, so units play no part; what is below is rounding.
+    """
+    row, column = equilibrate(np.maximum(np.abs(constant), dependence))
+    return row[:, None] * dependence * column > tolerance
 
 
 def equilibrate(size: Array, sweeps: int = 5) -> tuple[Array, Array]:

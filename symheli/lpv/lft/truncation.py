@@ -11,7 +11,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array
 from symheli.lpv.lft.model import LFT, Block, parts
-from symheli.lpv.lft.reduction import equilibrate, reduce
+from symheli.lpv.lft.reduction import equilibrate, reduce, significant
 
 
 class Truncation(NamedTuple):
@@ -116,8 +116,9 @@ def _kept(lft: LFT, kept: Array) -> LFT:
 
 
 def _dependence(lft: LFT) -> Array:
-    """Largest change of each entry over the box."""
-    return np.abs(lft.matrix(_grid(len(lft.blocks))) - lft.M22).max(axis=0)
+    """Largest change of each entry over the box, none where it is rounding."""
+    change = np.abs(lft.matrix(_grid(len(lft.blocks))) - lft.M22).max(axis=0)
+    return np.where(significant(change, lft.M22, 1e-12), change, 0.0)
 
 
 def _grid(parameters: int) -> Array:
