@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from symheli import AirspeedSchedule, Excitation, FlightRecord, Helicopter, fly
+from symheli import AirspeedSchedule, Dryden, Excitation, FlightRecord, Helicopter, Wind, fly
 from symheli.flight import Autopilot, gain_scheduled_lqr
 
 TOP = 13.0
@@ -18,15 +18,19 @@ ACCELERATIONS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5, 3.0, 1.5, 4.0, 3.0, 2.0, 3.5)
 
 NOISE_DB = 30.0
 
+BREEZE, BREEZE_AT_20FT, ABOVE_GROUND = (-2.0, 1.0, 0.0), 7.7, 20.0
+"""A steady wind (north, east, down, m/s) and the turbulence of a mean wind of 15 kt ("light"), flown 20 m above ground."""
+
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """Seeds and lengths that make the flights of one run; `noise_db` None flies without sensor noise."""
+    """Seeds and lengths that make the flights of one run; `noise_db` None flies without sensor noise, `windy` in the breeze above."""
 
     seed: int = 0
     dt: float = 0.02
     ramps: int = len(ACCELERATIONS)
     noise_db: float | None = None
+    windy: bool = False
 
     def noisy(self, db: float = NOISE_DB) -> FlightPlan:
         """The same flights with sensor noise."""
@@ -49,7 +53,8 @@ class FlightPlan:
     def _fly(self, heli: Helicopter, schedule: AirspeedSchedule, autopilot: Autopilot, offset: int, lowest: float = 0.1) -> FlightRecord:
         seed = offset + self.seed
         excitation = Excitation(AMPLITUDE, "multisine", (lowest, 5.0), seed)
-        return fly(heli, schedule, dt=self.dt, excitation=excitation, noise_db=self.noise_db, seed=seed, autopilot=autopilot)
+        wind = Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed) if self.windy else Wind()
+        return fly(heli, schedule, dt=self.dt, excitation=excitation, noise_db=self.noise_db, seed=seed, wind=wind, autopilot=autopilot)
 
 
 def autopilot_for(heli: Helicopter, dt: float = 0.02) -> Autopilot:

@@ -1,0 +1,31 @@
+"""LPV beside LTI on flights: what the table says is what was flown."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from studies import pays
+from studies.log.comparison import HORIZONS
+from studies.transition.flights import FlightPlan, autopilot_for
+
+
+def test_every_output_of_every_axis_is_judged_and_counted():
+    short = {"short": FlightPlan(ramps=3)}
+    lines = list(pays.where_scheduling_pays(0, "xcell60", short))
+    assert [line.output for line in lines] == [output for axis in pays.AXES for output in axis.outputs]
+    for line in lines:
+        gain = line.lpv["1 s"] - line.lti["1 s"]
+        assert line.pays in (0, 1)
+        assert not line.pays or gain[0] > 1.0
+    text = pays.table(lines)
+    assert text.count("longitudinal-vertical") == 1
+    assert len(pays.data(lines)) == len(lines)
+    # noise-free, degree 2 contains degree 0: in sample and one step ahead it cannot do visibly worse held out
+    assert np.all([line.lpv[HORIZONS[0]][0] > line.lti[HORIZONS[0]][0] - 5 for line in lines])
+
+
+def test_the_breeze_blows_in_the_record(ideal):
+    plan = FlightPlan(ramps=2, windy=True)
+    record = plan.training(ideal, autopilot_for(ideal))
+    assert record["wind_n"].mean() < 0 < record["wind_n"].std()
+    assert "wind_n" not in replace(plan, windy=False).training(ideal, autopilot_for(ideal)).signals
