@@ -12,7 +12,7 @@ from symheli.lpv import simulate
 from synthesis import Relaxation, Search, Status, l2_gain, lower_bound, stability
 
 COARSE = Relaxation(segments=(4,))
-QUICK = Search(levels=6, dwells=7, evaluations=12, steps=80)
+QUICK = Search(levels=6, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=2000)
 
 
 def response(lpv, time, p, u, x, step):

@@ -1,0 +1,85 @@
+"""All trapezoid waves within range and rate on a grid of levels and dwell times: where the search for the worst p(t) starts."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symheli.lpv import LPVStateSpace
+from synthesis.waves import Wave, steps
+
+if TYPE_CHECKING:
+    from synthesis.lower_bound import Search
+
+Array = np.ndarray
+
+
+class WaveFamily:
+    """The waves of a model within `rate`, as coarse as `search` says.
+
+    `slow`: time scale of the slowest mode, s, at most twenty times that of the fastest;
+    `longest`: the longest time step that resolves the fastest mode, s.
+    """
+
+    def __init__(self, lpv: LPVStateSpace, rate: float, search: Search):
+        self.lpv, self.rate, self.search = lpv, rate, search
+        s = lpv.scheduling
+        self.grid = np.linspace(s.low, s.high, search.levels + 1)
+        poles = np.linalg.eigvals(lpv.matrices(self.grid).A)
+        if lpv.dt is not None:
+            poles = np.log(np.where(poles == 0, 1e-12, poles)) / lpv.dt
+        pace = np.abs(poles)
+        self.fast = 2 * math.pi / float(pace.max())
+        self.slow = min(2 * math.pi / max(float(pace.min()), 1e-6), 20 * self.fast)
+        self.longest = 0.5 / float(pace.max())
+
+    @property
+    def longest_period(self) -> float:
+        """No cycle lasts longer, s."""
+        return self.search.cycles * self.slow
+
+    def wave(self, bottom: float, top: float, dwell_bottom: float, dwell_top: float) -> Wave | None:
+        """The wave with ramps as steep as allowed; None where it is too long."""
+        dt = self.lpv.dt
+        ramp = 0.0 if math.isinf(self.rate) else (top - bottom) / self.rate
+        if dt is not None:
+            ramp = math.ceil(ramp / dt - 1e-9) * dt
+            dwell_bottom, dwell_top = (max(1.0, round(d / dt)) * dt for d in (dwell_bottom, dwell_top))
+        wave = Wave(bottom, top, dwell_bottom, dwell_top, ramp)
+        return wave if 0 < wave.period <= self.longest_period else None
+
+    def coarse(self) -> list[Wave]:
+        """The waves on the grid of levels and dwell times, that of the fastest growth first, one a pair of levels."""
+        dwell = np.linspace(0.0, 0.75 * self.slow, self.search.dwells)
+        waits = [[self._transition(p, p, d) for d in dwell] for p in self.grid]
+        rise = [self._ramp(a, b) for a, b in zip(self.grid[:-1], self.grid[1:], strict=True)]
+        fall = [self._ramp(b, a) for a, b in zip(self.grid[:-1], self.grid[1:], strict=True)]
+        found = []
+        for i in range(len(self.grid)):
+            up = down = np.eye(len(self.lpv.states))
+            for j in range(i + 1, len(self.grid)):
+                up, down = rise[j - 1] @ up, down @ fall[j - 1]
+                shortest = self.wave(self.grid[i], self.grid[j], 0.0, dwell[1] if len(dwell) > 1 else self.fast)
+                if shortest is None:
+                    break
+                cycle = (np.array(waits[i]) @ down)[:, None] @ (np.array(waits[j]) @ up)[None]
+                radius = np.abs(np.linalg.eigvals(cycle)).max(axis=-1)
+                period = np.maximum(2 * shortest.ramp + dwell[:, None] + dwell, self.fast / 100)
+                pace = np.log(np.maximum(radius, 1e-300)) / period
+                a, b = np.unravel_index(int(pace.argmax()), pace.shape)
+                wave = self.wave(self.grid[i], self.grid[j], dwell[a], dwell[b])
+                if wave is not None:
+                    found.append((float(pace.max()), wave))
+        return [wave for _, wave in sorted(found, key=lambda pair: -pair[0])]
+
+    def _ramp(self, a: float, b: float) -> Array:
+        return self._transition(a, b, 0.0 if math.isinf(self.rate) else abs(b - a) / self.rate)
+
+    def _transition(self, a: float, b: float, duration: float) -> Array:
+        if self.lpv.dt is not None:
+            duration = math.ceil(duration / self.lpv.dt - 1e-9) * self.lpv.dt
+        if duration <= 0 or duration > self.longest_period:
+            return np.eye(len(self.lpv.states))
+        return steps(self.lpv, np.array([0.0, duration]), np.array([a, b]), duration if a == b else duration / 6).transition

@@ -1,0 +1,128 @@
+"""The search for the worst p(t): exact sensitivities, limits kept to the last digit, and the worst case known in closed form."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import lateral, random_stable, spring
+from scipy.optimize import brentq
+
+from synthesis.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
+from synthesis.certificate import Trajectory
+from synthesis.periodic import Lifted, gain, growth, ratio_from_rest, worst_input
+from synthesis.waves import Wave, steps
+
+
+def bumpy(lpv, period=4.0, nodes=24):
+    s = lpv.scheduling
+    phase = 2 * np.pi * np.arange(nodes + 1) / nodes
+    spacing = period / nodes if lpv.dt is None else lpv.dt * math.ceil(period / (nodes * lpv.dt))
+    return Trajectory(spacing * np.arange(nodes + 1), s.middle + s.radius * (0.5 * np.sin(phase) + 0.2 * np.cos(3 * phase)))
+
+
+@pytest.mark.parametrize("dt", [None, 0.08])
+def test_the_gradient_of_growth_is_its_difference_quotient(dt):
+    lpv = random_stable(3, dt=dt)
+    cycle = bumpy(lpv)
+    direction = np.random.default_rng(1).standard_normal(len(cycle.p))
+    direction[-1] = direction[0]
+    period = cycle.time[-1]
+
+    def score(eps, stretch=0.0):
+        time = cycle.time * (1 + stretch)
+        return growth(steps(lpv, time, cycle.p + eps * direction, period)).value / time[-1]
+
+    found, slope = _gradient(lpv, cycle, GROWTH)
+    assert found.value == pytest.approx(score(0.0) * period)
+    # one-sided differences of 1e-6 inside, central ones of 1e-4 here: 1e-5 of the slope is left
+    assert slope[:-1] @ direction[:-1] == pytest.approx((score(1e-4) - score(-1e-4)) / 2e-4, rel=1e-4)
+    if dt is None:
+        assert slope[-1] == pytest.approx((score(0, 1e-4) - score(0, -1e-4)) / 2e-4, rel=1e-4)
+
+
+@pytest.mark.parametrize("dt", [None, 0.08])
+def test_the_gradient_of_the_gain_is_that_of_the_response_to_its_worst_input(dt):
+    lpv = random_stable(3, dt=dt)
+    cycle = bumpy(lpv)
+    system = steps(lpv, cycle.time, cycle.p, cycle.time[-1])
+    _, angle, v = worst_input(system)
+
+    def value(p):
+        F, G, H, J = Lifted.of(steps(lpv, cycle.time, p, cycle.time[-1]))
+        x = np.linalg.solve(np.exp(1j * angle) * np.eye(len(F)) - F, G @ v.ravel())
+        return math.log(np.linalg.norm(H @ x + J @ v.ravel()) / np.linalg.norm(v))
+
+    direction = np.random.default_rng(1).standard_normal(len(cycle.p))
+    direction[-1] = direction[0]
+    found, slope = _gradient(lpv, cycle, GAIN)
+    assert found.value == pytest.approx(value(cycle.p), rel=1e-9)
+    quotient = (value(cycle.p + 1e-4 * direction) - value(cycle.p - 1e-4 * direction)) / 2e-4
+    assert slope[:-1] @ direction[:-1] == pytest.approx(quotient, rel=1e-4)
+
+
+def test_the_lifted_response_from_rest_is_the_step_by_step_one():
+    lpv = random_stable(4)
+    cycle = bumpy(lpv)
+    system = steps(lpv, cycle.time, cycle.p, cycle.time[-1])
+    v = np.random.default_rng(0).standard_normal((3, len(system.step) * 2))
+    x, energy = np.zeros(3), 0.0
+    for k, vk in enumerate(v.reshape(-1, 2)):
+        z = system.step[k % len(system.step)] @ np.concatenate([x, vk])
+        x, energy = z[:3], energy + z[3:] @ z[3:]
+    assert ratio_from_rest(Lifted.of(system), v, 1)[0] == pytest.approx(math.sqrt(energy) / np.linalg.norm(v), rel=1e-12)
+    assert gain(system).value == pytest.approx(math.log(worst_input(system)[0]), rel=1e-3)
+
+
+def fastest_growth(damping, change):
+    """Largest growth rate of x'' + 2 d x' + (1 + c p) x = 0 over every p(t) in [-1, 1], by the angle of (x, x').
+
+    Where r' = r f(angle, p), angle' = -g(angle, p), the best rate is the one at which the integral over half a turn of
+    max_p (f - rate)/g vanishes.
+    """
+    angle = (np.arange(4000) + 0.5) * np.pi / 4000
+    c, s = np.cos(angle), np.sin(angle)
+    k = np.array([[1 - change], [1 + change]])
+    f, g = s * c * (1 - k) - 2 * damping * s**2, s**2 + k * c**2 + 2 * damping * s * c
+    return brentq(lambda rate: ((f - rate) / g).max(axis=0).sum(), 0.0, 1.0)
+
+
+def test_the_ascent_reaches_the_fastest_pumping_of_a_spring():
+    best = fastest_growth(0.05, 0.6)
+    # the pumping wave, a quarter and a tenth off
+    wave = Wave(-1.0, 1.0, 3.1, 1.1, 0.0)
+    lpv = spring(damping=0.05, change=0.6)
+    cycle, value = ascend(lpv, math.inf, on_nodes(Trajectory(*wave.vertices()), 60, None), GROWTH, 20.0, 40)
+    # a jump of p takes one of sixty nodes
+    assert 0.97 * best < value / cycle.time[-1] < best * (1 + 1e-3)
+
+
+@pytest.mark.parametrize("dt", [None, 0.05])
+def test_the_ascent_keeps_range_and_rate_and_never_loses(dt):
+    lpv = spring() if dt is None else spring().discretize(dt)
+    for rate in (0.1, 1.0):
+        wave = Wave(-0.6, 0.7, 1.0, 0.55, 1.3 / rate)
+        start = on_nodes(Trajectory(*wave.vertices()), 40, dt)
+        for objective in (GROWTH, GAIN):
+            before = _gradient(lpv, start, objective)[0].value
+            cycle, after = ascend(lpv, rate, start, objective, 60.0, 10)
+            scores = [objective.score(v, c.time[-1]) for v, c in ((before, start), (after, cycle))]
+            assert scores[1] >= scores[0]
+            # one rounding of a difference of nodes
+            assert np.all(np.abs(np.diff(cycle.p)) <= rate * np.diff(cycle.time) + 1e-14)
+            assert cycle.p.min() >= -1
+            assert cycle.p.max() <= 1
+            assert cycle.p[0] == cycle.p[-1]
+            if dt is not None:
+                assert cycle.time / dt == pytest.approx(np.round(cycle.time / dt), abs=1e-9)
+
+
+def test_the_search_finds_more_than_the_waves_it_starts_from():
+    from synthesis import Search, lower_bound
+    from synthesis.lower_bound import _Hunt
+
+    search = Search(levels=6, dwells=5, starts=1, nodes=40, evaluations=15, steps=80, samples=20_000)
+    lpv = replace(lateral(), scheduling=lateral().scheduling.with_rate(3.0))
+    hunt = _Hunt(lpv, 3.0, search)
+    waves = max(gain for wave in hunt.family.coarse() if math.isfinite(gain := hunt.gain(Trajectory(*wave.vertices()))))
+    assert lower_bound(lpv, search=search).gamma > 1.02 * waves
