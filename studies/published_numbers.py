@@ -11,9 +11,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import root
 
 import symheli
 from symheli import Helicopter
+from symheli.errors import SymheliError
 from symheli.rigid_body import GRAVITY
 
 SPEEDS = (0.0, 3.0, 5.0, 10.0, 15.0, 20.0, 25.0)
@@ -45,7 +47,7 @@ class PublishedNumber(NamedTuple):
 def published_numbers() -> tuple[PublishedNumber, ...]:
     """Every number, computed now."""
     heli = Helicopter.load("xcell60", governor="ideal")
-    return (*hover(heli), *settling(heli), *trims(heli), *tail_derivatives(heli))
+    return (*hover(heli), *settling(heli), *governor(heli), *trims(heli), *tail_derivatives(heli))
 
 
 def hover(heli: Helicopter) -> tuple[PublishedNumber, ...]:
@@ -61,6 +63,8 @@ def hover(heli: Helicopter) -> tuple[PublishedNumber, ...]:
         return (ct * lam + rotor["profile_drag"] * solidity / 8) * heli.density * tip**2 * area * rotor["radius"]
 
     return (
+        PublishedNumber("tip speed", 125.7, tip, "m/s", 0.05, False),
+        PublishedNumber("largest thrust, of the weight", 2.5, rotor["ct_max"] / ct, "1", 0.05, False),
         PublishedNumber("induced velocity in hover, ideal inflow", 4.2, ideal * tip, "m/s", 0.05, True),
         PublishedNumber("induced velocity in hover, eta_w = 0.9 (fuselage section)", 4.5, lossy * tip, "m/s", 0.15, True),
         PublishedNumber("inflow ratio in hover, ideal inflow", 0.033, ideal, "1", 0.001, True),
@@ -79,13 +83,53 @@ def settling(heli: Helicopter) -> tuple[PublishedNumber, ...]:
         PublishedNumber("Lock number of the main rotor", 3.7, lock, "1", 0.05, True),
         PublishedNumber("settling of the rotor's flapping", 0.039, 24 / (lock * speed), "s", 0.0005, True),
         PublishedNumber("settling of the stabiliser bar", 0.144, 24 / (rotor["bar_lock_number"] * speed), "s", 0.0005, False),
+        PublishedNumber("time constant of the flapping, tau_e", 0.1, 16 / (rotor["bar_lock_number"] * speed), "s", 0.005, False),
+    )
+
+
+def governor(heli: Helicopter) -> tuple[PublishedNumber, ...]:
+    """Rotor speed in hover with the body held: om_i'' = a11 om_i' - a12 om_i; Q0 with ideal inflow, as the text has it."""
+    drive = heli.vehicle.values("drivetrain")
+    momentum = drive["nominal_speed"] * drive["inertia"]
+    frequency = math.sqrt(drive["max_power"] * drive["governor_ki"] / momentum)
+    torque = next(row.computed for row in hover(heli) if row.quantity == "rotor torque in hover, ideal inflow")
+    damping = (3 * torque + drive["max_power"] * drive["governor_kp"]) / momentum / (2 * frequency)
+    return (
+        PublishedNumber("natural frequency of the governor in hover", 1.3, frequency, "rad/s", 0.05, False),
+        PublishedNumber("damping ratio of the governor in hover", 0.63, damping, "1", 0.005, False),
     )
 
 
 def trims(heli: Helicopter) -> tuple[PublishedNumber, ...]:
-    """The attitude of fast forward flight; with the tail's lift as printed (upside down) it would not be this."""
-    theta = math.degrees(symheli.trim(heli, 14.5).x["theta"])
-    return (PublishedNumber("pitch in forward flight at 14.5 m/s", -10.0, theta, "deg", 1.0, False),)
+    """The attitude of fast forward flight, the tail's lift as decided and as printed (upside down); the roll rate at full cyclic."""
+    printed = Helicopter.load("xcell60", governor="ideal", printed=["horizontal_tail_lift"])
+    theta, theta_printed = (math.degrees(symheli.trim(h, 14.5).x["theta"]) for h in (heli, printed))
+    upright, inverted = (np.mean([abs(_roll_rate(heli, side, way)) for side in (1, -1)]) for way in (1, -1))
+    return (
+        PublishedNumber("pitch in forward flight at 14.5 m/s", -10.0, theta, "deg", 1.0, False),
+        PublishedNumber("pitch at 14.5 m/s, horizontal tail as printed", -10.0, theta_printed, "deg", 1.0, False),
+        PublishedNumber("loss of steady roll rate when inverted", 15.0, float(100 * (1 - inverted / upright)), "%", 5.0, False),
+    )
+
+
+def _roll_rate(heli: Helicopter, side: int, way: int) -> float:
+    """Steady roll rate (rad/s) about the c.g. at rest with full lateral cyclic to one `side` (+-1), thrust equal to the weight
+    (`way` 1) or to its opposite (-1), the nose held by the pedal."""
+    weight = heli.vehicle.values("body")["mass"] * GRAVITY
+    p, r, a1, b1 = (heli.states.index(name) for name in ("p", "r", "a1", "b1"))  # type: ignore[arg-type]
+    at = heli.diagnostics.name_out().index("T_mr")
+    cyclic = side * heli.travel[heli.inputs.index("d_lat")]  # type: ignore[arg-type]
+
+    def balance(z: np.ndarray) -> list[float]:
+        x, u = np.zeros(len(heli.states)), np.array([0.0, cyclic, z[3], z[4]])
+        x[[p, a1, b1]] = z[:3]
+        xdot = heli.numeric("rhs")(x, u, 0.0)[0]
+        return [xdot[p], xdot[a1], xdot[b1], heli.numeric("diagnostics")(x, u, 0.0)[at][0] / weight - way, xdot[r]]
+
+    found = root(balance, [3.0 * side, 0.0, 0.0, 0.1 * way, 0.25], tol=1e-10)
+    if not found.success:
+        raise SymheliError(f"no steady roll to the {'right' if side > 0 else 'left'}: {found.message}")
+    return float(found.x[0])
 
 
 def tail_derivatives(heli: Helicopter) -> tuple[PublishedNumber, ...]:

@@ -32,7 +32,7 @@ def test_rigid_body_functions_are_the_derived_equations():
     for _ in range(DRAWS):
         speeds, angles, force, moment, mass, inertia = random_body(rng)
         speeds[6] = -speeds[5]
-        psi, theta, phi = angles
+        _, theta, phi = angles
         coordinates = [0.0, 0.0, 0.0, *angles, 0.0]
         given = [*force, *moment, 0.0, 0.0, GRAVITY, mass, *inertia, 0.1]
         got = accelerations(coordinates, speeds, given)

@@ -79,6 +79,13 @@ def test_flapping_sign_makes_rearward_flight_flap_as_forward_flight():
     assert rearward[0] > rearward[1] + 1e-4  # w > 0: the printed term tilts the disc aft, the decided one forward
 
 
+def test_downwash_pushes_the_fuselage_down_and_as_printed_lifts_it():
+    """In hover, against the rotor alone, whose weight the collective then carries or not: 0.0999 and 0.0967 rad."""
+    collective = [symheli.trim(load(*o, governor="ideal"), 0.0).u["d_col"] for o in ((), ("fuselage_downwash",))]
+    assert collective == [pytest.approx(0.0999, abs=5e-5), pytest.approx(0.0967, abs=5e-5)]
+    assert collective[1] < 0.0985 < collective[0]  # 0.0985: thrust equal to the weight
+
+
 def test_thrust_limit_of_the_text_is_two_and_a_half_times_the_weight():
     """At full collective and full speed of the blades the rotor stalls: 2.5 m g against the 2.65 of the table."""
     for option, expected in (((), 0.0055 * 1.225 * (167 * 0.775) ** 2 * math.pi * 0.775**2), (("thrust_limit",), 2.5 * 8.2 * GRAVITY)):

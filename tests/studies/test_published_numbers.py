@@ -24,6 +24,21 @@ def test_what_is_missed_is_missed_by_what_is_stated(rows):
     missed = {name for name, row in rows.items() if not row.met}
     assert {"settling of the stabiliser bar", "pitch in forward flight at 14.5 m/s", "rotor torque in hover, eta_w = 0.9"} <= missed
     assert {f"Y_v of the tail rotor at {v} m/s" for v in (3, 5, 10, 15, 20, 25)} <= missed
+    # errata of the source: what it states beside the table contradicts the table
+    errata = {
+        "tip speed": 129.4,
+        "largest thrust, of the weight": 2.647,
+        "time constant of the flapping, tau_e": 0.1198,
+        "natural frequency of the governor in hover": 1.588,
+        "damping ratio of the governor in hover": 0.772,
+    }
+    for name, computed in errata.items():
+        assert name in missed
+        assert rows[name].computed == pytest.approx(computed, rel=1e-3)
+    # the roll rate is the cyclic's whichever way up: the tail rotor takes as much on one side as it gives on the other
+    assert abs(rows["loss of steady roll rate when inverted"].computed) < 0.1
+    # the text's -10 deg is what the printed sign of the tail gives, though the text calls the tail stabilising
+    assert rows["pitch at 14.5 m/s, horizontal tail as printed"].met
     # the bar's printed 0.144 s, like the printed tau_e of about 0.1 s, belongs to a Lock number of 1.0; the table says 0.8
     assert 24 / (1.0 * 167.0) == pytest.approx(0.144, abs=5e-4)
     assert rows["settling of the stabiliser bar"].computed == pytest.approx(0.1796, abs=5e-5)
