@@ -5,29 +5,39 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from studies.commands import options
+from studies.commands import estimator, options
 from studies.output import Output
 
-HELP = "C code of the equations of motion, a MATLAB file of the linear family, or the equations in LaTeX or Markdown"
+HELP = "C code of the equations of motion or the recursive estimator, a MATLAB file of the linear family, or the equations in print"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """What, of which helicopter, to where."""
     parser.add_argument(
         "format",
-        choices=("c", "mat", "latex", "markdown"),
-        help="c: equations of motion and header; mat: linear models along airspeed; latex, markdown: every component's equations to read",
+        choices=("c", "estimator", "mat", "latex", "markdown"),
+        help="c: equations of motion and header; estimator: recursive identification for an autopilot; mat: linear models along airspeed; "
+        "latex, markdown: every component's equations to read",
     )
     options.vehicle(parser)
     parser.add_argument(
-        "--out", type=Path, metavar="PATH", help="file to write (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md)"
+        "--out",
+        type=Path,
+        metavar="PATH",
+        help="file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder (estimator)",
     )
     parser.add_argument(
-        "--airspeeds", type=options.number, nargs=2, default=(0.0, 13.0), metavar=("LOW", "HIGH"), help="of the family, m/s (default: 0 13)"
+        "--airspeeds",
+        type=options.number,
+        nargs=2,
+        default=(0.0, 13.0),
+        metavar=("LOW", "HIGH"),
+        help="range, m/s (default: 0 13)",
     )
     parser.add_argument(
         "--points", type=options.at_least_one, default=14, metavar="N", help="airspeeds of the family (default: %(default)s)"
     )
+    estimator.configure(parser)
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -38,6 +48,8 @@ def run(arguments: argparse.Namespace) -> Output:
         from studies.export_c import write_c
 
         written = write_c(heli, arguments.out or Path(f"{name}_rhs.c"))
+    elif arguments.format == "estimator":
+        written = estimator.write(arguments, heli)
     elif arguments.format == "mat":
         from studies.export_mat import write_mat
 
