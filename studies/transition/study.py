@@ -41,7 +41,15 @@ class Effort:
     @classmethod
     def look(cls) -> Effort:
         """Shorter flights, fewer certificates of a simpler form."""
-        return cls(6, 4, (0.0, 3.0, math.inf), (8,), (0.0, math.inf), (4,), Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000))
+        return cls(
+            6,
+            4,
+            (0.0, 3.0, math.inf),
+            (8,),
+            (0.0, math.inf),
+            (4,),
+            Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000),
+        )
 
 
 class Study(Outcome):
