@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("symheli", "identification", "synthesis", "studies")
-PACKAGES = ("symheli", "symheli.lpv", "symheli.environment", "symheli.flight", "identification", "synthesis")
+PACKAGES = ("symheli", "symheli.equations", "symheli.lpv", "symheli.environment", "symheli.flight", "identification", "synthesis")
 SHARED = ("symheli.lpv", "symheli.errors")
 """What identification and synthesis may see of the model's room."""
 
