@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from symheli.errors import ExcitationError, InputError, SymheliError, TrimError, UnknownNameError
     from symheli.flight import AirspeedSchedule, Excitation, Sensor, Servo, fly
     from symheli.helicopter import Helicopter
+    from symheli.identified import identified_model
     from symheli.linearization import linearize
     from symheli.lpv import LFT, FlightRecord, LinearFamily, LinearModel, LPVStateSpace, Scheduling, Signal
     from symheli.stitched_model import StitchedModel
@@ -25,6 +26,7 @@ _HOME = {
     "TrimPoint": "symheli.equilibrium",
     "linearize": "symheli.linearization",
     "sweep": "symheli.airspeed_sweep",
+    "identified_model": "symheli.identified",
     "StitchedModel": "symheli.stitched_model",
     **dict.fromkeys(("Dryden", "Gust", "Wind", "standard_atmosphere"), "symheli.environment"),
     **dict.fromkeys(("fly", "AirspeedSchedule", "Excitation", "Sensor", "Servo"), "symheli.flight"),
@@ -56,6 +58,7 @@ __all__ = [
     "UnknownNameError",
     "Wind",
     "fly",
+    "identified_model",
     "linearize",
     "standard_atmosphere",
     "sweep",

@@ -35,7 +35,7 @@ def sweep(heli: Helicopter, airspeeds: Sequence[float], *, climb_rate: float = 0
 
 def kink_speeds(heli: Helicopter, points: Sequence[TrimPoint]) -> Mapping[str, tuple[float, ...]]:
     """Airspeeds (m/s) between neighbouring trims at which a switching function changes sign, to 1e-6 m/s, by cause."""
-    values = [heli.switches(p.x.array, p.u.array, p.wind.array) for p in points]
+    values = [heli.in_air(p.density).switches(p.x.array, p.u.array, p.wind.array) for p in points]
     kinks: dict[str, tuple[float, ...]] = {}
     for name in values[0]:
         if name.endswith("vortex ring"):  # a flag, not a corner

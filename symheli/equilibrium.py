@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import root
+from scipy.optimize import least_squares, root
 
-from symheli.errors import InputError, TrimError
+from symheli.errors import TrimError
+from symheli.flight_condition import FlightCondition
 from symheli.helicopter import Helicopter
 from symheli.lpv.named_vector import NamedVector
 from symheli.lpv.operating_point import OperatingPoint
 from symheli.lpv.signal import Signal
+from symheli.lpv.units import quotient
 
 TOLERANCE = 1e-9
 """Largest residual of any equation at a trim, in its SI unit."""
@@ -22,45 +24,11 @@ ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
-class FlightCondition:
-    """What is asked of a trim.
-
-    airspeed (m/s), climb_rate (m/s, up), turn_rate (rad/s, to the right), sideslip (rad, of the horizontal airspeed, from
-    the right), wind (north, east, down as seen by a nose pointing north, m/s), acceleration (m/s^2, horizontal, along the nose's
-    heading: a quasi-steady point of an accelerating flight, 0 for an equilibrium).
-    """
-
-    airspeed: float
-    climb_rate: float = 0.0
-    turn_rate: float = 0.0
-    sideslip: float = 0.0
-    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    acceleration: float = 0.0
-
-    def __post_init__(self) -> None:
-        values = [self.airspeed, self.climb_rate, self.turn_rate, self.sideslip, self.acceleration, *self.wind]
-        if not all(math.isfinite(v) for v in values):
-            raise InputError(f"a flight condition needs finite numbers, got {self}")
-        if self.airspeed < 0:
-            raise InputError(f"airspeed must be >= 0 m/s, got {self.airspeed}; rearward flight is sideslip = pi")
-        if abs(self.climb_rate) > self.airspeed:
-            raise InputError(f"|climb_rate| = {abs(self.climb_rate)} m/s exceeds the airspeed of {self.airspeed} m/s")
-        if self.turn_rate and any(self.wind):
-            raise InputError("a turn in wind is not steady; trim it in still air")
-
-    @property
-    def air_velocity(self) -> np.ndarray:
-        """Velocity through the air, forward right down with respect to the heading (3,), m/s."""
-        level = math.sqrt(max(self.airspeed**2 - self.climb_rate**2, 0.0))
-        return np.array([level * math.cos(self.sideslip), level * math.sin(self.sideslip), -self.climb_rate])
-
-
-@dataclass(frozen=True)
 class TrimPoint(OperatingPoint):
     """An operating point with the flight condition it answers and how well.
 
-    residual: of every equation by state name, in the unit of its derivative. on_stops: inputs at or beyond their travel.
-    vortex_ring: momentum theory promises no accuracy here. wind: body axes, m/s.
+    residual: of every equation by state name, in the unit of its derivative. on_stops: inputs at (to 0.1 %) or beyond their travel.
+    vortex_ring: a rotor is where momentum theory promises no accuracy. wind: body axes, m/s. density: of the air, kg/m^3.
     """
 
     condition: FlightCondition
@@ -68,46 +36,89 @@ class TrimPoint(OperatingPoint):
     wind: NamedVector
     on_stops: tuple[str, ...]
     vortex_ring: bool
+    density: float
 
     @property
     def success(self) -> bool:
-        """Every residual, recomputed, below `TOLERANCE`."""
+        """Every residual, recomputed, below `TOLERANCE`: an equilibrium of the equations, whatever deflection it takes."""
         return bool(np.all(np.abs(self.residual.array) < TOLERANCE))
+
+    @property
+    def attainable(self) -> bool:
+        """An equilibrium with every control within its travel: one that can be flown."""
+        return self.success and not self.on_stops
 
     def __str__(self) -> str:
         worst = max(zip(np.abs(self.residual.array), self.residual.signals, strict=True))
-        notes = [f"{'/'.join(self.on_stops)} on the stop"] if self.on_stops else []
+        notes = [_stops(self)] if self.on_stops else []
         notes += ["vortex ring: no accuracy promised"] if self.vortex_ring else []
         status = "trimmed" if self.success else "NOT trimmed"
-        return "; ".join([f"{status} at {self.airspeed:g} m/s (largest residual {worst[0]:.1e} in d{worst[1]}/dt)", *notes])
+        return "; ".join([f"{status} at {self.condition} (largest residual {worst[0]:.1e} in d{worst[1]}/dt)", *notes])
 
 
 def trim(
     heli: Helicopter, airspeed: float, *, climb_rate: float = 0.0, turn_rate: float = 0.0, sideslip: float = 0.0,
-    wind: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0), acceleration: float = 0.0, start: TrimPoint | None = None,
-    throw: bool = True, continuation: bool = True,
+    wind: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0), acceleration: float = 0.0, altitude: float | None = None,
+    start: TrimPoint | None = None, throw: bool = True, continuation: bool = True,
 ) -> TrimPoint:  # fmt: skip
     """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.
 
     Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start` or a hover guess; where
-    that fails, by `continuation` from hover. Success is judged on the recomputed residual of every equation. Raises
-    `TrimError` carrying the best point; with throw=False that point is returned instead.
+    that fails, by `continuation` from hover and from other guesses. Success is judged on the recomputed residual of every
+    equation. A control beyond its travel is no failure (the equations hold; `on_stops` names it, `attainable` is False): what
+    would be needed, and by how much, is worth knowing. Raises `TrimError` carrying the best point; with throw=False that
+    point is returned instead.
     """
     condition = FlightCondition(
         float(airspeed), float(climb_rate), float(turn_rate), float(sideslip),
-        (float(wind[0]), float(wind[1]), float(wind[2])), float(acceleration),
+        (float(wind[0]), float(wind[1]), float(wind[2])), float(acceleration), None if altitude is None else float(altitude),
     )  # fmt: skip
+    heli = heli if altitude is None else heli.at_altitude(float(altitude))
     problem = _Problem(heli, condition)
     best = problem.solve(problem.guess() if start is None else problem.unknowns_of(start))
     if continuation and not best.success:
-        best = min((best, _continue_from_hover(heli, condition)), key=lambda point: float(np.abs(point.residual.array).max()))
+        best = min((best, _continue_from_hover(heli, condition)), key=_miss)
+    if continuation and not best.success:
+        best = min((best, *map(problem.solve, problem.other_guesses())), key=_miss)
+    if continuation and not best.success and np.any(np.abs(best.u.array) > 2 * heli.travel):
+        best = problem.within_travel()  # nobody learns from a blade pitch of several turns
     if throw and not best.success:
-        table = ", ".join(f"d{s}/dt {r:.2e}" for s, r in zip(best.residual.signals, best.residual.array, strict=True))
-        stops = f"; on the stop: {', '.join(best.on_stops)}" if best.on_stops else ""
-        raise TrimError(
-            f"no trim at {condition}: residuals {table}{stops}. Try a nearer condition as `start`, or throw=False for the best point", best
-        )
+        raise TrimError(_failure(heli, best), best)
     return best
+
+
+def _miss(point: TrimPoint) -> float:
+    """Largest residual; infinite where one is no number."""
+    return float(np.nan_to_num(np.abs(point.residual.array), nan=np.inf).max())
+
+
+def _stops(point: TrimPoint) -> str:
+    return "at or beyond the stop: " + ", ".join(f"{name} = {point.u[name]:.3g} rad" for name in point.on_stops)
+
+
+def _failure(heli: Helicopter, best: TrimPoint) -> str:
+    """What the best point misses, equation by equation, the worst first."""
+    misses = sorted(zip(best.residual.array, best.residual.signals, strict=True), key=lambda miss: -abs(miss[0]))
+    table = ", ".join(f"d{s}/dt = {r:.2e} {quotient(s.unit, 's')}" for r, s in misses)
+    return "; ".join(
+        [
+            f"no trim at {best.condition}: the best point leaves {table}",
+            *([_stops(best)] if best.on_stops else []),
+            *_throttle(heli, best),
+            *(["in a vortex ring"] if best.vortex_ring else []),
+            "try a nearer condition as `start`, or throw=False for the best point",
+        ]
+    )
+
+
+def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
+    """What the engine says at a point that is no trim."""
+    if "om_i" not in point.x:
+        return []
+    throttle = heli.vehicle.values("drivetrain")["governor_ki"] * point.x["om_i"]
+    if throttle >= 1:
+        return ["full throttle: the engine lacks power"]
+    return ["throttle closed: the air drives the rotor, whose speed no governor holds"] if throttle <= 0 else []
 
 
 def _continue_from_hover(heli: Helicopter, condition: FlightCondition, steps: int = 12) -> TrimPoint:
@@ -116,6 +127,7 @@ def _continue_from_hover(heli: Helicopter, condition: FlightCondition, steps: in
         stage = FlightCondition(
             share * condition.airspeed, share * condition.climb_rate, share * condition.turn_rate, condition.sideslip,
             (share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]), share * condition.acceleration,
+            condition.altitude,
         )  # fmt: skip
         problem = _Problem(heli, stage)
         point = problem.solve(problem.guess() if point is None else problem.unknowns_of(point))
@@ -142,6 +154,15 @@ class _Problem:
             # throttle that holds about 130 W/kg of rotor and profile power, typical of a small helicopter in hover
             start["om_i"] = min(130.0 * mass / drivetrain["max_power"], 0.9) / drivetrain["governor_ki"]
         return np.array([0.07, 0.0, *start.values(), 0.0, 0.0, 0.1, 0.25])
+
+    def other_guesses(self) -> list[np.ndarray]:
+        """Starts away from hover: nose and bank to either side, the rotor working hard or windmilling."""
+        guesses = []
+        for phi, theta, d_col in ((0.07, -0.4, 0.15), (0.07, 0.4, 0.02), (0.6, 0.0, 0.12), (-0.6, 0.0, 0.12), (0.0, 0.0, -0.02)):
+            guess = self.guess()
+            guess[[0, 1, -2]] = phi, theta, d_col
+            guesses.append(guess)
+        return guesses
 
     def unknowns_of(self, point: TrimPoint) -> np.ndarray:
         return np.concatenate([point.x.array[self.free], point.u.array])
@@ -181,6 +202,14 @@ class _Problem:
             z = min((z, self.newton(found.x)), key=lambda z: float(np.abs(self.residual(z)).max()))
         return self.point(z)
 
+    def within_travel(self) -> TrimPoint:
+        """The point of least residual with controls in their travel and the attitude short of +-80 deg, from the hover guess."""
+        start, n = self.guess(), len(self.free)
+        bound = np.concatenate([np.full(2, 1.4), np.full(n - 2, np.inf), self.heli.travel])
+        start = np.clip(start, -0.9 * bound, 0.9 * bound)
+        found = least_squares(lambda z: self.residual(z)[self.equations], start, self.jacobian, bounds=(-bound, bound), max_nfev=200)
+        return self.point(found.x)
+
     def newton(self, z: np.ndarray, steps: int = 12) -> np.ndarray:
         """Full Newton steps while the largest residual falls."""
         residual = self.residual(z)
@@ -205,8 +234,8 @@ class _Problem:
         return TrimPoint(
             NamedVector(heli.states, x), NamedVector(heli.inputs, u), NamedVector(heli.states, xdot), self.condition.airspeed,
             condition=self.condition, residual=NamedVector(heli.states, self.residual(z)), wind=NamedVector(heli.wind, wind),
-            on_stops=tuple(str(s) for s, value, limit in zip(heli.inputs, u, heli.travel, strict=True) if abs(value) >= limit),
-            vortex_ring=any(value > 0 for name, value in switches.items() if name.endswith("vortex ring")),
+            on_stops=tuple(str(s) for s, value, limit in zip(heli.inputs, u, heli.travel, strict=True) if abs(value) >= 0.999 * limit),
+            vortex_ring=any(value > 0 for name, value in switches.items() if name.endswith("vortex ring")), density=heli.density,
         )  # fmt: skip
 
 

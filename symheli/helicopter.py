@@ -14,6 +14,7 @@ import numpy as np
 from symheli import inflow
 from symheli.compile import compiled
 from symheli.dynamics import INPUTS, Dynamics, Governor, Name
+from symheli.environment import standard_atmosphere
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.named_vector import NamedVector
 from symheli.lpv.signal import Signal, signals
@@ -84,6 +85,14 @@ class Helicopter:
         density = changes.get(DENSITY, self.density)
         vehicle = self.vehicle.with_values({name: value for name, value in changes.items() if name != DENSITY})
         return self._sharing(replace(self, vehicle=vehicle, density=density))
+
+    def in_air(self, density: float) -> Helicopter:
+        """The same helicopter in air of this density, kg/m^3."""
+        return self if density == self.density else self.with_parameters({"density": density})
+
+    def at_altitude(self, altitude: float) -> Helicopter:
+        """The same helicopter in the air of the standard atmosphere at `altitude` (m above sea level)."""
+        return self.in_air(standard_atmosphere(altitude).density)
 
     def scaled(self, factor: float) -> Helicopter:
         """The dynamically similar helicopter whose lengths are `factor` N times these, in the same air; see `Vehicle.scaled`.

@@ -10,14 +10,12 @@ from importlib import resources
 from pathlib import Path
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.identified import ENDING
 from symheli.lpv.units import dimension
 from symheli.part import Part
 from symheli.plausibility import impossibilities
 from symheli.quantity import Quantity
 from symheli.vehicle_file import VehicleFile
-
-LINEAR = ".linear.toml"
-"""How the files of identified linear models end; see `symheli.identified`."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ class Vehicle:
 def vehicles() -> list[str]:
     """Names of the airframes that come with the package."""
     files = [p.name for p in resources.files("symheli.vehicles").iterdir()]
-    return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml") and not name.endswith(LINEAR))
+    return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml") and not name.endswith(ENDING))
 
 
 def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:

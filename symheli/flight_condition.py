@@ -1,0 +1,59 @@
+"""What is asked of a trim: a steady flight."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.errors import InputError
+
+
+@dataclass(frozen=True)
+class FlightCondition:
+    """What is asked of a trim.
+
+    airspeed (m/s, of the whole motion through the air, climb included), climb_rate (m/s, up), turn_rate (rad/s, to the right),
+    sideslip (rad, of the horizontal airspeed, from the right), wind (north, east, down as seen by a nose pointing north, m/s),
+    acceleration (m/s^2, horizontal, along the nose's heading: a quasi-steady point of an accelerating flight, 0 for an
+    equilibrium), altitude (m in the standard atmosphere, None: in the air of the helicopter).
+    """
+
+    airspeed: float
+    climb_rate: float = 0.0
+    turn_rate: float = 0.0
+    sideslip: float = 0.0
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    acceleration: float = 0.0
+    altitude: float | None = None
+
+    def __post_init__(self) -> None:
+        values = [self.airspeed, self.climb_rate, self.turn_rate, self.sideslip, self.acceleration, *self.wind, self.altitude or 0.0]
+        if not all(math.isfinite(v) for v in values):
+            raise InputError(f"a flight condition needs finite numbers, got {self!r}")
+        if self.airspeed < 0:
+            raise InputError(f"airspeed must be >= 0 m/s, got {self.airspeed}; rearward flight is sideslip = pi")
+        if abs(self.climb_rate) > self.airspeed:
+            raise InputError(
+                f"|climb_rate| = {abs(self.climb_rate)} m/s exceeds the airspeed of {self.airspeed} m/s, which includes it: "
+                "straight up is airspeed = climb_rate"
+            )
+        if self.turn_rate and any(self.wind):
+            raise InputError("a turn in wind is not steady; trim it in still air")
+
+    @property
+    def air_velocity(self) -> np.ndarray:
+        """Velocity through the air, forward right down with respect to the heading (3,), m/s."""
+        level = math.sqrt(max(self.airspeed**2 - self.climb_rate**2, 0.0))
+        return np.array([level * math.cos(self.sideslip), level * math.sin(self.sideslip), -self.climb_rate])
+
+    def __str__(self) -> str:
+        words = [f"{self.airspeed:g} m/s"]
+        words += [f"{'climbing' if self.climb_rate > 0 else 'descending'} at {abs(self.climb_rate):g} m/s"] if self.climb_rate else []
+        words += [f"turning at {self.turn_rate:g} rad/s"] if self.turn_rate else []
+        words += [f"sideslip {self.sideslip:g} rad"] if self.sideslip else []
+        words += ["wind ({:g}, {:g}, {:g}) m/s".format(*self.wind)] if any(self.wind) else []
+        words += [f"accelerating at {self.acceleration:g} m/s^2"] if self.acceleration else []
+        words += [f"{self.altitude:g} m above sea level"] if self.altitude is not None else []
+        return ", ".join(words)
