@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from symheli.flight import AirspeedSchedule, Excitation, Sensor, Servo, fly
     from symheli.helicopter import Helicopter
     from symheli.identified import identified_model
+    from symheli.integrate import Trajectory, simulate, simulate_batch
     from symheli.linearization import linearize
     from symheli.lpv import LFT, FlightRecord, LinearFamily, LinearModel, LPVStateSpace, Scheduling, Signal
     from symheli.stitched_model import StitchedModel
@@ -25,6 +26,7 @@ _HOME = {
     "trim": "symheli.equilibrium",
     "TrimPoint": "symheli.equilibrium",
     "linearize": "symheli.linearization",
+    **dict.fromkeys(("simulate", "simulate_batch", "Trajectory"), "symheli.integrate"),
     "sweep": "symheli.airspeed_sweep",
     "identified_model": "symheli.identified",
     "StitchedModel": "symheli.stitched_model",
@@ -53,6 +55,7 @@ __all__ = [
     "Signal",
     "StitchedModel",
     "SymheliError",
+    "Trajectory",
     "TrimError",
     "TrimPoint",
     "UnknownNameError",
@@ -60,6 +63,8 @@ __all__ = [
     "fly",
     "identified_model",
     "linearize",
+    "simulate",
+    "simulate_batch",
     "standard_atmosphere",
     "sweep",
     "trim",

@@ -1,4 +1,4 @@
-"""CasADi functions as machine code where a C compiler is there, kept by content; the virtual machine otherwise."""
+"""CasADi functions and C source as machine code where a C compiler is there, kept by content."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ import casadi
 
 from symheli.errors import CompilerWarning
 
-FLAGS = ("-O3", "-march=native", "-ffp-contract=off", "-fPIC", "-shared")
-"""Flags given to the compiler; contraction is off so that compiled and interpreted numbers agree to rounding."""
+FLAGS = ("-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fPIC", "-shared")
+"""Flags given to the compiler; none changes a number: no contraction, only errno and exception flags are given up."""
 
 
 def cache_directory() -> Path:
@@ -40,42 +40,53 @@ def compiler() -> str | None:
 @functools.cache
 def _warn_once(reason: str) -> None:
     warnings.warn(
-        f"{reason}: the CasADi virtual machine is used, several times slower, with the same numbers", CompilerWarning, stacklevel=4
+        f"{reason}: CasADi's virtual machine and NumPy are used, several times slower, with the same numbers", CompilerWarning, stacklevel=4
     )
 
 
 def compiled(function: casadi.Function) -> casadi.Function:
-    """The same function as machine code, or unchanged (with one `CompilerWarning`) where that is not possible.
+    """The same function as machine code, or unchanged (with one `CompilerWarning`) where that is not possible."""
+    generator = casadi.CodeGenerator("symheli_code.c")
+    generator.add(function)
+    path = library(generator.dump(), function.name())
+    if path is None:
+        return function
+    try:
+        return casadi.external(function.name(), str(path))
+    except RuntimeError as error:
+        _warn_once(f"loading the compiled {function.name()} failed ({str(error).strip()})")
+        return function
 
-    The library is kept in `cache_directory()` under a hash of its C code, compiler, flags and processor, and written
-    under a temporary name first: no half-written library is ever loaded.
+
+def library(source: str, name: str) -> Path | None:
+    """C source as a shared library, or None (with one `CompilerWarning`) where that is not possible.
+
+    It is kept in `cache_directory()` under a hash of source, compiler, flags and processor, and written under a temporary
+    name first: no half-written library is ever loaded.
     """
     cc = compiler()
     if cc is None:
         _warn_once(
             "no C compiler is used (install gcc or clang, or set CC)" if os.environ.get("SYMHELI_COMPILE") != "0" else "SYMHELI_COMPILE=0"
         )
-        return function
-    with tempfile.TemporaryDirectory(prefix="symheli-") as scratch:
-        generator = casadi.CodeGenerator("symheli_code.c")
-        generator.add(function)
-        source = generator.dump()
-        key = hashlib.sha256("\n".join((source, cc, *FLAGS, platform.processor(), platform.machine(), _cpu())).encode()).hexdigest()[:32]
-        library = cache_directory() / f"{function.name()}-{key}.so"
-        try:
-            if not library.is_file():
-                library.parent.mkdir(parents=True, exist_ok=True)
+        return None
+    key = hashlib.sha256("\n".join((source, cc, *FLAGS, platform.processor(), platform.machine(), _cpu())).encode()).hexdigest()[:32]
+    kept = cache_directory() / f"{name}-{key}.so"
+    try:
+        if not kept.is_file():
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix="symheli-") as scratch:
                 code, built = Path(scratch) / "code.c", Path(scratch) / "code.so"
                 code.write_text(source)
                 subprocess.run([cc, *FLAGS, str(code), "-o", str(built), "-lm"], check=True, capture_output=True, timeout=300)
-                with tempfile.NamedTemporaryFile(dir=library.parent, delete=False) as target:
+                with tempfile.NamedTemporaryFile(dir=kept.parent, delete=False) as target:
                     target.write(built.read_bytes())
-                os.replace(target.name, library)
-            return casadi.external(function.name(), str(library))
-        except (OSError, subprocess.SubprocessError, RuntimeError) as error:
-            detail = error.stderr.decode(errors="replace")[-300:] if isinstance(error, subprocess.CalledProcessError) else str(error)
-            _warn_once(f"compiling {function.name()} failed ({detail.strip()})")
-            return function
+            os.replace(target.name, kept)
+        return kept
+    except (OSError, subprocess.SubprocessError) as error:
+        detail = error.stderr.decode(errors="replace")[-300:] if isinstance(error, subprocess.CalledProcessError) else str(error)
+        _warn_once(f"compiling {name} failed ({detail.strip()})")
+        return None
 
 
 @functools.cache

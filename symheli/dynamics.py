@@ -15,7 +15,7 @@ from symheli.errors import InputError
 from symheli.lpv.signal import Signal, signals
 from symheli.part import Part
 from symheli.rigid_body import GRAVITY, body_to_earth, euler_rates, gravity_euler, quaternion_rates, rotation, translation
-from symheli.symbolic import SX, Function, column, dense, jacobian
+from symheli.symbolic import SX, Function, column, dense, jacobian, replaced
 
 VELOCITY = signals(("u", "v", "w", "p", "q", "r"))
 ATTITUDE = signals(("phi", "theta"))
@@ -106,29 +106,32 @@ class Dynamics:
         return Function(name, list(arguments.values()), list(outputs.values()), list(arguments), list(outputs))
 
     def _rhs(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
-        return {"xdot": self.euler(x, u, wind, par, self._inflow)[0]}
+        return {"xdot": self.euler(x, u, wind, par, self.inflow_solver)[0]}
 
     def _flight_rhs(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
-        return {"xdot": self.quaternion(x, u, wind, par)}
+        return {"xdot": self.quaternion(x, u, wind, par, self.inflow_solver)[0]}
 
     def _jacobian(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
-        """The inflow enters as a symbol advanced by one Newton step: its derivative there is that of the root. Only then is the
-        solved value put in its place."""
-        lam = self.euler(x, u, wind, par, self._inflow)[1].lam
+        blocks = self.derived(lambda solver: self.euler(x, u, wind, par, solver), lambda xdot: [jacobian(xdot, z) for z in (x, u, wind)])
+        return dict(zip(("A", "B", "E"), blocks, strict=True))
+
+    def derived(self, form: Callable[[Callable[..., Any]], tuple[SX, Sum]], derive: Callable[[SX], list[SX]]) -> list[SX]:
+        """derive(xdot) of form(solver) -> xdot, sum, `euler` or `quaternion` at a point; exact through the implicit inflow.
+
+        The inflow enters as a symbol advanced by one Newton step: its derivative there is that of the root. Only then is the
+        solved value put in its place.
+        """
+        lam = form(self.inflow_solver)[1].lam
         symbol = SX.sym("lam", len(lam))
         position = iter(range(len(lam)))
 
         def step(*arguments: Any) -> Any:
             return inflow.newton_step(symbol[next(position)], *arguments)
 
-        xdot = self.euler(x, u, wind, par, step)[0]
-        blocks = [jacobian(xdot, z) for z in (x, u, wind)]
-        known = [x, u, wind, *([par] if isinstance(par, SX) else [])]
-        values = Function("J", [*known, symbol], blocks).call([*known, column(lam)], True, False)
-        return dict(zip(("A", "B", "E"), values, strict=True))
+        return replaced(derive(form(step)[0]), symbol, column(lam))
 
     def _diagnostics(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
-        total = self.euler(x, u, wind, par, self._inflow)[1]
+        total = self.euler(x, u, wind, par, self.inflow_solver)[1]
         wrench = dict(zip("XYZLMN", (*total.force, *total.moment), strict=True))
         values = {**total.flow, **wrench, **{f"switch {k}": v for k, v in total.switches.items()}}
         return {name.replace(" ", "_"): dense(v) for name, v in values.items()}
@@ -143,20 +146,20 @@ class Dynamics:
         attitude = euler_rates(phi, theta, x[3], x[4], x[5])[:2]
         return column([*accelerations, *attitude, *own]), total
 
-    def quaternion(self, x: Any, u: Any, wind: Any, par: Any) -> Any:
-        """State derivative in quaternion form, wind in earth axes."""
+    def quaternion(self, x: Any, u: Any, wind: Any, par: Any, solver: Callable[..., Any]) -> tuple[Any, Sum]:
+        """State derivative in quaternion form, wind in earth axes; and the sum of the parts."""
         quaternion = (x[6], x[7], x[8], x[9])
         R = body_to_earth(*quaternion)
         air = _triple(lambda i: x[i] - sum(R[j][i] * wind[j] for j in range(3)))
         gravity = _triple(lambda i: R[2][i] * GRAVITY)
-        accelerations, own, _ = self._accelerations(x, air, gravity, self._own(x, 13), u, par, self._inflow)
+        accelerations, own, total = self._accelerations(x, air, gravity, self._own(x, 13), u, par, solver)
         position = [sum(R[j][i] * x[i] for i in range(3)) for j in range(3)]
-        return column([*accelerations, *quaternion_rates(*quaternion, x[3], x[4], x[5]), *position, *own])
+        return column([*accelerations, *quaternion_rates(*quaternion, x[3], x[4], x[5]), *position, *own]), total
 
     def accelerations(self, x: Any, u: Any, wind: Any, par: Any) -> list[Any]:
         """u' v' w' p' q' r' and the derivatives of the own states, Euler form, as a list: no CasADi where the arguments are floats."""
         air = _triple(lambda i: x[i] - wind[i])
-        body, own, _ = self._accelerations(x, air, gravity_euler(x[6], x[7]), self._own(x, 8), u, par, self._inflow)
+        body, own, _ = self._accelerations(x, air, gravity_euler(x[6], x[7]), self._own(x, 8), u, par, self.inflow_solver)
         return [*body, *own]
 
     def _accelerations(
@@ -213,7 +216,8 @@ class Dynamics:
         return ideal_governor(par, shaft_torque)
 
     @property
-    def _inflow(self) -> Callable[..., Any]:
+    def inflow_solver(self) -> Callable[..., Any]:
+        """How the inflow of a rotor is found: `inflow.solve`, or as printed."""
         return inflow.relaxed if "relaxed_inflow" in self.printed else inflow.solve
 
     def _sections(self, par: Any) -> dict[str, SimpleNamespace]:

@@ -12,7 +12,10 @@ import casadi
 import numpy as np
 from casadi import SX, Function
 
-__all__ = ["SX", "Function", "absolute", "clip", "column", "cos", "dense", "jacobian", "maximum", "minimum", "sin", "sqrt", "tan", "where"]
+__all__ = [
+    "SX", "Function", "absolute", "adjoint_product", "clip", "column", "cos", "dense", "jacobian", "maximum", "minimum", "replaced", "sin",
+    "sqrt", "tan", "tangent_product", "where",
+]  # fmt: skip
 
 _SYMBOLIC = (casadi.SX, casadi.MX, casadi.DM)
 
@@ -98,6 +101,21 @@ def column(values: Any) -> Any:
 def jacobian(expression: Any, variable: Any) -> Any:
     """Dense Jacobian d expression/d variable (n, m) by algorithmic differentiation."""
     return casadi.densify(casadi.jacobian(expression, variable))
+
+
+def tangent_product(expression: Any, variables: list[Any], directions: list[Any]) -> Any:
+    """Change of the expression (n,) when every variable moves along its direction, by forward differentiation, without Jacobians."""
+    return dense(casadi.jtimes(expression, casadi.vertcat(*variables), casadi.vertcat(*directions)))
+
+
+def adjoint_product(expression: Any, variable: Any, weights: Any) -> Any:
+    """weights' (d expression/d variable), as a column (m,), by reverse differentiation."""
+    return dense(casadi.jtimes(expression, variable, weights, True))
+
+
+def replaced(expressions: list[Any], symbol: Any, value: Any) -> list[Any]:
+    """The expressions with `value` in place of `symbol`."""
+    return list(casadi.substitute(expressions, [symbol], [value]))
 
 
 def dense(expression: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Fixed-step integration of the equations of motion, compiled."""
+"""One control interval as a CasADi function, for loops that decide something at every sample."""
 
 from __future__ import annotations
 

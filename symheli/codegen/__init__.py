@@ -1,0 +1,9 @@
+"""From CasADi functions to lists of scalar operations, and from those to C for one flight or many side by side, or NumPy."""
+
+from __future__ import annotations
+
+from symheli.codegen.c_source import Layout, c_function
+from symheli.codegen.evaluate import as_casadi, evaluate
+from symheli.codegen.program import Operation, Program, program
+
+__all__ = ["Layout", "Operation", "Program", "as_casadi", "c_function", "evaluate", "program"]

@@ -1,0 +1,87 @@
+"""A program as C, for one point or for several side by side in vector registers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from symheli.codegen.program import COMPARISONS, Operation, Program
+
+_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=", "and": "&", "or": "|"}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """`width` points in the lanes of vector registers, times `groups` of them interleaved to hide the latency of roots and quotients."""
+
+    width: int = 1
+    groups: int = 1
+
+    @property
+    def lanes(self) -> int:
+        """Points computed at once."""
+        return self.width * self.groups
+
+    @property
+    def prelude(self) -> str:
+        """What every generated source begins with: headers and the type of a scalar for all lanes."""
+        return f"""#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#if defined(__AVX512F__) && defined(__GNUC__) && !defined(__clang__)
+#pragma GCC target("prefer-vector-width=512")
+#endif
+#define LANES {self.lanes}
+typedef double lane[LANES];
+"""
+
+
+def c_function(program: Program, layout: Layout, name: str) -> str:
+    """`static void name(const lane *in0, ..., lane *out0, ...)`: a plain loop over lanes that the compiler turns into vector code.
+
+    Not inlined: the compiler takes a third of the time, and the code is as fast. Each lane goes through the same operations in
+    the same order, whatever the layout: its bits do not depend on its neighbours.
+    """
+    arguments = [f"const lane *restrict in{i}" for i in range(len(program.sizes))] + [
+        f"lane *restrict out{i}" for i in range(len(program.outputs))
+    ]
+    lines = [f"__attribute__((noinline)) static void {name}({', '.join(arguments)})", "{", f"  for (int l = 0; l < {layout.width}; ++l) {{"]
+    groups = range(layout.groups)
+    for k, operation in enumerate(program.operations):
+        if operation.name != "constant":
+            kind = "_Bool" if operation.name in COMPARISONS else "double"
+            lines += [f"    const {kind} {_name(k, g)} = {_expression(program, operation, g, layout.width)};" for g in groups]
+    for i, output in enumerate(program.outputs):
+        for j, a in enumerate(output):
+            lines += [f"    out{i}[{j}][l + {g * layout.width}] = {_operand(program, a, g)};" for g in groups]
+    return "\n".join([*lines, "  }", "}", ""])
+
+
+def _name(position: int, group: int) -> str:
+    return f"{'abcdefgh'[group]}{position}"
+
+
+def _operand(program: Program, position: int, group: int) -> str:
+    o = program.operations[position]
+    return f"({o.value!r})" if o.name == "constant" else _name(position, group)
+
+
+def _expression(program: Program, o: Operation, group: int, width: int) -> str:
+    a = [_operand(program, k, group) for k in o.arguments]
+    if o.name in _INFIX:
+        return f"{a[0]} {_INFIX[o.name]} {a[1]}"
+    match o.name:
+        case "input":
+            return f"in{o.element[0]}[{o.element[1]}][l + {group * width}]"
+        case "neg":
+            return f"-{a[0]}"
+        case "not":
+            return f"!{a[0]}"
+        case "select":
+            return f"{a[0]} ? {a[1]} : {a[2]}"
+        case "number":
+            return f"{a[0]} ? 1.0 : 0.0"
+        case "min":
+            return f"{a[1]} < {a[0]} ? {a[1]} : {a[0]}"
+        case "max":
+            return f"{a[0]} < {a[1]} ? {a[1]} : {a[0]}"
+    return f"{o.name}({a[0]})"  # sqrt, fabs

@@ -1,0 +1,28 @@
+"""Flights from the equations of motion: one at a time or thousands, by three methods, with their derivatives both ways."""
+
+from __future__ import annotations
+
+from symheli.integrate.batch import Batch, simulate_batch
+from symheli.integrate.dopri import DormandPrince
+from symheli.integrate.feedback import Feedback
+from symheli.integrate.radau import Radau
+from symheli.integrate.rk4 import RungeKutta4
+from symheli.integrate.sensitivity import Gradient, gradient, tangent
+from symheli.integrate.simulate import simulate
+from symheli.integrate.step import runge_kutta
+from symheli.integrate.trajectory import Trajectory
+
+__all__ = [
+    "Batch",
+    "DormandPrince",
+    "Feedback",
+    "Gradient",
+    "Radau",
+    "RungeKutta4",
+    "Trajectory",
+    "gradient",
+    "runge_kutta",
+    "simulate",
+    "simulate_batch",
+    "tangent",
+]

@@ -1,0 +1,33 @@
+"""Linear feedback at every sample of a flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from symheli.errors import InputError
+from symheli.helicopter import Helicopter
+from symheli.lpv.arrays import Array, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Feedback:
+    """u(k) - K(k) (x - reference(k)), limited to `travel`: K (n, 4, nx), reference (n, nx) in Euler form, travel (4,) in rad.
+
+    u is what the flight is given: nominal inputs and excitation together. Every flight of a batch shares K and the reference.
+    """
+
+    gains: Array
+    reference: Array
+    travel: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gains", frozen(self.gains, "gains", (None, 4, None)))
+        n, _, nx = self.gains.shape
+        object.__setattr__(self, "reference", frozen(self.reference, "reference", (n, nx)))
+        object.__setattr__(self, "travel", frozen(self.travel, "travel", (4,)))
+
+    def check(self, heli: Helicopter, samples: int) -> None:
+        """Raises `InputError` where it does not fit the helicopter and the length of the flight."""
+        expected = (samples, 4, len(heli.states))
+        if self.gains.shape != expected:
+            raise InputError(f"feedback: expected gains {expected} (samples, inputs, states of the Euler form), got {self.gains.shape}")

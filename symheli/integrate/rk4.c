@@ -1,0 +1,99 @@
+/* Flights by the classical Runge-Kutta method, LANES side by side: NX states, NE of them in Euler form, NP parameters, NK held values.
+   The generated held(u, wind, p, kept) and rates(x, kept, xdot) come before this text. */
+
+struct flights {
+  const double *x0;                                      /* flight, NX */
+  const double *u; long u_flight, u_sample;              /* 4; entries from one flight and sample to the next, 0 where they share it */
+  const double *wind; long wind_flight, wind_sample;     /* 3 */
+  const double *p; long p_flight;                        /* NP */
+  const double *gains, *reference, *travel;              /* sample, 4, NE; sample, NE; 4; gains NULL: no feedback */
+  double *states, *inputs;                               /* flight, kept sample, NX and 4; inputs may be NULL */
+  long samples, substeps, every, skip_start;
+  double step;
+  const volatile int *stop;
+};
+
+static void normalise(lane *x)
+{
+  for (int l = 0; l < LANES; ++l) {
+    const double scale = 1.0 / sqrt(x[6][l] * x[6][l] + x[7][l] * x[7][l] + x[8][l] * x[8][l] + x[9][l] * x[9][l]);
+    for (int i = 6; i < 10; ++i) x[i][l] *= scale;
+  }
+}
+
+static void runge_kutta(lane *x, const lane *kept, double h)
+{
+  lane k[NX], y[NX], sum[NX];
+  rates((const lane *)x, kept, k);
+  for (int i = 0; i < NX; ++i)
+    for (int l = 0; l < LANES; ++l) sum[i][l] = k[i][l], y[i][l] = x[i][l] + h / 2 * k[i][l];
+  for (int stage = 2; stage < 4; ++stage) {
+    const double next = stage == 2 ? h / 2 : h;
+    rates((const lane *)y, kept, k);
+    for (int i = 0; i < NX; ++i)
+      for (int l = 0; l < LANES; ++l) sum[i][l] += 2 * k[i][l], y[i][l] = x[i][l] + next * k[i][l];
+  }
+  rates((const lane *)y, kept, k);
+  for (int i = 0; i < NX; ++i)
+    for (int l = 0; l < LANES; ++l) x[i][l] += h / 6 * (sum[i][l] + k[i][l]);
+  normalise(x);
+}
+
+/* u - K (x - reference) in Euler form, within the travel */
+static void feed_back(const struct flights *f, long sample, const lane *x, lane *u)
+{
+  const double *gains = f->gains + sample * 4 * NE, *reference = f->reference + sample * NE;
+  lane e[NE];
+  for (int l = 0; l < LANES; ++l) {
+    const double q0 = x[6][l], q1 = x[7][l], q2 = x[8][l], q3 = x[9][l], sine = 2 * (q0 * q2 - q3 * q1);
+    for (int j = 0; j < 6; ++j) e[j][l] = x[j][l];
+    e[6][l] = atan2(2 * (q0 * q1 + q2 * q3), 1 - 2 * (q1 * q1 + q2 * q2));
+    e[7][l] = asin(sine < -1 ? -1 : sine > 1 ? 1 : sine);
+    for (int j = 8; j < NE; ++j) e[j][l] = x[j + 5][l];
+  }
+  for (int j = 0; j < NE; ++j)
+    for (int i = 0; i < 4; ++i)
+      for (int l = 0; l < LANES; ++l) u[i][l] -= gains[i * NE + j] * (e[j][l] - reference[j]);
+  for (int i = 0; i < 4; ++i) {
+    const double most = f->travel[i];
+    for (int l = 0; l < LANES; ++l) u[i][l] = u[i][l] < -most ? -most : u[i][l] > most ? most : u[i][l];
+  }
+}
+
+static void load(lane *to, const double *from, long flight, long lanes, long stride, int size)
+{
+  for (int l = 0; l < LANES; ++l) /* the last flight fills the lanes that are left over */
+    for (int i = 0; i < size; ++i) to[i][l] = from[(flight + (l < lanes ? l : lanes - 1)) * stride + i];
+}
+
+static void store(double *to, const lane *from, long flight, long lanes, long stride, int size)
+{
+  for (long l = 0; l < lanes; ++l)
+    for (int i = 0; i < size; ++i) to[(flight + l) * stride + i] = from[i][l];
+}
+
+/* Flies flights first <= i < last; returns 1 where it was stopped. */
+int fly(const struct flights *f, long first, long last)
+{
+  const long kept_samples = f->samples / f->every + 1 - f->skip_start;
+  for (long flight = first; flight < last; flight += LANES) {
+    const long lanes = last - flight < LANES ? last - flight : LANES;
+    lane x[NX], u[4], wind[3], p[NP + 1], kept[NK];
+    load(x, f->x0, flight, lanes, NX, NX);
+    load(p, f->p, flight, lanes, f->p_flight, NP);
+    for (long k = 0;; ++k) {
+      const long slot = k / f->every - f->skip_start;
+      const int keep = k % f->every == 0 && slot >= 0;
+      if (keep) store(f->states + slot * NX, (const lane *)x, flight, lanes, kept_samples * NX, NX);
+      if (k == f->samples) break;
+      if (*f->stop) return 1;
+      load(u, f->u + k * f->u_sample, flight, lanes, f->u_flight, 4);
+      load(wind, f->wind + k * f->wind_sample, flight, lanes, f->wind_flight, 3);
+      if (f->gains) feed_back(f, k, (const lane *)x, u);
+      if (f->inputs && keep) store(f->inputs + slot * 4, (const lane *)u, flight, lanes, kept_samples * 4, 4);
+      held((const lane *)u, (const lane *)wind, (const lane *)p, kept);
+      for (long s = 0; s < f->substeps; ++s) runge_kutta(x, (const lane *)kept, f->step);
+    }
+  }
+  return 0;
+}

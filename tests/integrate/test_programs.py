@@ -1,0 +1,94 @@
+"""Programs: the same bits from NumPy, CasADi's virtual machine and C, whatever lies side by side."""
+
+import ctypes
+
+import casadi
+import numpy as np
+import pytest
+
+from symheli import InputError
+from symheli.codegen import Layout, as_casadi, c_function, evaluate, program
+from symheli.compile import compiler, library
+
+
+def points(heli, count, seed=0):
+    """States far beyond any flight: every branch is taken somewhere."""
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(len(heli.flight_states), count)) * 0.5
+    x[:3] *= 20
+    if heli.governor == "pi":
+        x[15] = 167 + 20 * x[15]
+    u = rng.normal(size=(4, count)) * 0.15
+    x[:, 0] = 0.0  # hover, nothing turning
+    x[6, 0], x[-2 if heli.governor == "pi" else 6, 0] = 1.0, 167.0 if heli.governor == "pi" else 1.0
+    return x, u, rng.normal(size=(3, count)) * 5
+
+
+def test_a_program_is_its_casadi_function_to_rounding(heli):
+    x, u, wind = points(heli, 2000)
+    ours = np.array(evaluate(program(heli.flight_rhs), x, u, wind)[0])
+    theirs = np.array(heli.flight_rhs.map(2000)(x, u, wind))
+    # quotients by constants are products by reciprocals: a few units of 1e-16 in each of a few hundred operations
+    np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-11)
+
+
+def test_the_virtual_machine_gives_the_bits_of_numpy(heli):
+    x, u, wind = points(heli, 500)
+    made = program(heli.flight_rhs)
+    np.testing.assert_array_equal(np.array(as_casadi(made).map(500)(x, u, wind)), np.array(evaluate(made, x, u, wind)[0]))
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("layout", [Layout(), Layout(8), Layout(8, 2)])
+def test_machine_code_gives_the_bits_of_numpy_in_every_layout(ideal, layout):
+    made, lanes = program(ideal.flight_rhs), layout.lanes
+    call = "void call(const lane *x, const lane *u, const lane *wind, lane *xdot) { rhs(x, u, wind, xdot); }\n"
+    code = ctypes.CDLL(str(library(layout.prelude + c_function(made, layout, "rhs") + call, f"test-{lanes}")))
+    x, u, wind = (np.ascontiguousarray(a) for a in points(ideal, lanes, seed=lanes))
+    xdot = np.empty_like(x)
+    code.call(*(ctypes.c_void_p(a.ctypes.data) for a in (x, u, wind, xdot)))
+    np.testing.assert_array_equal(xdot, np.array(evaluate(made, x, u, wind)[0]))
+
+
+def test_held_work_done_once_changes_no_bit(heli):
+    x, u, wind = points(heli, 500)
+    made = program(heli.flight_rhs)
+    held, rest = made.split([0])
+    kept = evaluate(held, u, wind)[0]
+    np.testing.assert_array_equal(np.array(evaluate(rest, x, kept)[0]), np.array(evaluate(made, x, u, wind)[0]))
+    assert len(rest.operations) < len(made.operations)
+
+
+def test_conditions_and_signs_keep_their_meaning():
+    a, b = casadi.SX.sym("a", 3), casadi.SX.sym("b", 1)
+    expressions = [
+        casadi.if_else(casadi.logic_and(a[0] < b, a[1] >= b), a[2], -a[2]),
+        casadi.if_else(casadi.logic_or(a[0] == b, a[1] != b), 1.0, a[2]),
+        casadi.sign(a[0]) + (a[1] < a[2]),
+        casadi.if_else(a[0] <= b, a[0], b),
+        casadi.if_else(a[0] >= b, a[0], b),
+        a[0] / b + a[1] / b,
+        a[2] / 3,
+    ]
+    function = casadi.Function("f", [a, b], [casadi.densify(casadi.vertcat(*expressions))])
+    grid = np.array(np.meshgrid(*[[-2.0, 0.0, 0.5, 3.0]] * 3, [-2.0, 0.5, 4.0])).reshape(4, -1)
+    x, p = grid[:3], grid[3:]
+    whole = program(function)
+    held, rest = whole.split([0])
+    expected = np.array(function.map(grid.shape[1])(x, p))
+    for made in (evaluate(whole, x, p)[0], evaluate(rest, x, evaluate(held, p)[0])[0]):
+        np.testing.assert_allclose(np.array(made), expected, rtol=1e-15)
+
+
+def test_a_function_of_the_mathematical_library_is_refused():
+    a = casadi.SX.sym("a")
+    with pytest.raises(InputError, match=r"wave: CasADi operation \d+ cannot be written"):
+        program(casadi.Function("wave", [a], [casadi.sin(a)]))
+
+
+def test_the_right_hand_side_stays_cheap(ideal):
+    """Roots and quotients set the pace of machine code: 18 and 46 of them once, in 1060 operations."""
+    names = [o.name for o in program(ideal.flight_rhs).operations]
+    assert names.count("sqrt") <= 12
+    assert names.count("div") <= 12
+    assert len(names) < 700
