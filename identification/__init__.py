@@ -8,6 +8,7 @@ Units are those of the record: SI and radians.
 """
 
 from identification.coefficients import Coefficients, CoefficientValues
+from identification.dependence import DependenceReport, dependence_report
 from identification.estimate import fit
 from identification.excitation import ExcitationReport, excitation_report
 from identification.experiment_design import Experiment, Plan, choose_experiments, compare_experiments
@@ -15,12 +16,16 @@ from identification.forgetting import Constant, Directional, Forgetting, Variabl
 from identification.frequency_response import FrequencyResponse, frequency_response
 from identification.history import History
 from identification.instrumental_variables import Instruments
+from identification.lasso import Lasso
 from identification.model import LPVARXModel
 from identification.online import Online
 from identification.order_scan import OrderScan, Trial, order_scan
+from identification.output_error import OutputError
 from identification.prediction import fit_percent
 from identification.recursive_least_squares import RecursiveLeastSquares
+from identification.refined_instruments import Refined
 from identification.residuals import ResidualAnalysis, Theil, residual_analysis, theil
+from identification.ridge import Ridge
 from identification.rls_state import RLSInfo, RLSState
 from identification.structure import LPVARX, Entry, Group, Term
 from identification.uncertainty import Band, Uncertainty, uncertainty
@@ -33,6 +38,7 @@ __all__ = [
     "CoefficientValues",
     "Coefficients",
     "Constant",
+    "DependenceReport",
     "Directional",
     "Entry",
     "ExcitationReport",
@@ -43,8 +49,10 @@ __all__ = [
     "History",
     "Instruments",
     "LPVARXModel",
+    "Lasso",
     "Online",
     "OrderScan",
+    "OutputError",
     "PiecewiseLinear",
     "Plan",
     "Polynomial",
@@ -52,7 +60,9 @@ __all__ = [
     "RLSInfo",
     "RLSState",
     "RecursiveLeastSquares",
+    "Refined",
     "ResidualAnalysis",
+    "Ridge",
     "Spline",
     "Term",
     "Theil",
@@ -62,6 +72,7 @@ __all__ = [
     "Variable",
     "choose_experiments",
     "compare_experiments",
+    "dependence_report",
     "excitation_report",
     "fit",
     "fit_percent",

@@ -2,66 +2,145 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Any, Literal
+
+import numpy as np
 
 from identification.excitation import excitation_of
 from identification.forgetting import Forgetting
-from identification.instrumental_variables import Instruments, instrumental_variables
+from identification.instrumental_variables import Instruments, explained_inputs, instrumental_variables
+from identification.lasso import Lasso, lasso
 from identification.least_squares import least_squares_by_group, residual_covariance
 from identification.model import LPVARXModel
+from identification.output_error import OutputError, output_error
 from identification.recursive_least_squares import RecursiveLeastSquares
+from identification.refined_instruments import Refined, refined_instruments
 from identification.regressors import Regression, as_records, stacked, units_of
+from identification.ridge import Ridge, ridge
 from identification.structure import LPVARX
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import ConvergenceWarning, ExcitationError, InputError, UnknownNameError
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
 
-METHODS = ("ls", "rls", "iv")
+Method = Literal["ls", "rls", "ridge", "lasso", "iv", "riv", "oe"]
+Options = Ridge | Lasso | Refined | OutputError
+METHODS: tuple[str, ...] = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
+OPTIONS: dict[str, type[Options]] = {"ridge": Ridge, "lasso": Lasso, "riv": Refined, "oe": OutputError}
+NOT_SETTLED = {
+    "riv": 'allow more iterations; or the plant is unstable in open loop and has no bounded free run: method "iv" is then the better one',
+    "oe": "allow more evaluations, or fit a smaller structure",
+}
+"""What to try where an iteration stops early."""
+
+PENALISED = ("ridge", "lasso")
+"""Methods whose penalty decides what the data leave open: the excitation report travels with the model and refuses nothing."""
 
 
 def fit(
     structure: LPVARX,
     records: FlightRecord | Iterable[FlightRecord],
-    method: Literal["ls", "rls", "iv"] = "ls",
+    method: Method = "ls",
     *,
     forgetting: float | Forgetting = 1.0,
     instruments: Sequence[str] | Instruments = (),
+    options: Options | None = None,
 ) -> LPVARXModel:
     """Identify the coefficients of `structure` from one record or several (same sample period and units).
 
     "ls": least squares over all samples. "rls": the same, sample by sample, the older ones weighted by `forgetting` to
-    the power of their age, or as `Constant`, `Variable`, `Directional` say. "iv": instrumental variables, for records flown
-    in closed loop: `instruments` names the external excitation signals (or is an `Instruments` with its window). Noise fed
-    back biases the other two.
+    the power of their age, or as `Constant`, `Variable`, `Directional` say. "ridge", "lasso": with a price on coefficients
+    (options `Ridge`, `Lasso`). Noise on the outputs biases all of these.
 
-    Raises `ExcitationError` (with a report) where the data cannot determine every coefficient, `UnknownNameError` for
-    signals the record lacks, `InputError` where p leaves the range of the basis or an option does not fit the method.
+    "iv": instrumental variables: `instruments` names the external excitation signals (or is an `Instruments` with its window):
+    in closed loop what is added to the stabilised inputs, in open loop the inputs. "riv": the same refined with the
+    simulated response (`Refined`); the plant must be stable, and in closed loop it needs `instruments` too. "oe": the closest
+    free run (`OutputError`), from the least-squares or (with `instruments`) instrumental-variables estimate and its refinement;
+    in closed loop coloured noise biases it.
+
+    Raises `ExcitationError` (with a report) where the data cannot determine every coefficient (ridge and lasso: where the
+    penalty does not either), `UnknownNameError` for signals the record lacks, `InputError` where p leaves the range of the
+    basis or an option does not fit the method. Warns (`ConvergenceWarning`) where an iteration does not settle.
     """
     records = as_records(records)
-    if method not in METHODS:
-        raise UnknownNameError("method", method, METHODS)
-    if method != "rls" and forgetting != 1.0:
-        raise InputError(f'forgetting is for method="rls"; {method!r} weighs all samples alike')
-    if method != "iv" and instruments:
-        raise InputError(f'instruments are for method="iv", not {method!r}')
+    _check(method, forgetting, instruments, options)
     outputs, inputs = units_of(structure.outputs, records), units_of(structure.inputs, records)
     scheduling = units_of(structure.parameters, records)
     data = stacked(structure, records)
     report = excitation_of(structure, data)
-    report.require()
-    match method:
-        case "ls":
-            theta = least_squares_by_group(structure, data.phi, data.y)
-            covariance = residual_covariance(structure, data.phi, data.y, theta)
-        case "rls":
+    if method not in PENALISED or len(data.phi) == 0:
+        report.require()
+    chosen = options or (OPTIONS[method]() if method in OPTIONS else None)
+    covariance, details = None, {}
+    match chosen:
+        case Ridge():
+            theta, weights = ridge(structure, data, chosen)
+            details = {"weight": weights.tolist(), "towards": chosen.towards}
+        case Lasso():
+            theta, weights = lasso(structure, data, chosen)
+            details = {"weight": weights.tolist(), "kept": np.count_nonzero(theta, axis=0).tolist()}
+        case Refined():
+            theta, details = _refined(structure, records, data, instruments, chosen)
+        case OutputError():
+            theta, details = _output_error(structure, records, data, instruments, chosen)
+        case _ if method == "rls":
             theta, covariance = _recursive(structure, data, forgetting)
-        case "iv":
+        case _ if method == "iv":
             theta = instrumental_variables(structure, records, data, Instruments.of(instruments))
-            covariance = residual_covariance(structure, data.phi, data.y, theta)
+        case _:
+            theta = least_squares_by_group(structure, data.phi, data.y)
+    if not details.get("converged", True):
+        warnings.warn(f"{method!r} did not settle: {NOT_SETTLED[method]}", ConvergenceWarning, stacklevel=2)
+    if covariance is None:
+        covariance = residual_covariance(structure, data.phi, data.y, theta)
     return LPVARXModel(
-        structure, theta, records[0].dt, outputs, inputs, scheduling, covariance, len(data.phi), data.dropped, method, report
+        structure, theta, records[0].dt, outputs, inputs, scheduling, covariance, len(data.phi), data.dropped, method, report, details
     )
+
+
+def _check(method: str, forgetting: float | Forgetting, instruments: Sequence[str] | Instruments, options: Options | None) -> None:
+    if method not in METHODS:
+        raise UnknownNameError("method", method, METHODS)
+    if method != "rls" and forgetting != 1.0:
+        raise InputError(f'forgetting is for method="rls"; {method!r} weighs all samples alike')
+    if method not in ("iv", "riv", "oe") and instruments:
+        raise InputError(f'instruments are for method="iv", "riv" and "oe", not {method!r}')
+    wanted = OPTIONS.get(method)
+    if options is not None and (wanted is None or not isinstance(options, wanted)):
+        expected = f"{wanted.__name__}(...)" if wanted else "none"
+        raise InputError(f"options of method {method!r}: expected {expected}, got {options!r:.80}")
+
+
+def _start(structure: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Sequence[str] | Instruments) -> Array:
+    if instruments:
+        return instrumental_variables(structure, records, data, Instruments.of(instruments))
+    return least_squares_by_group(structure, data.phi, data.y)
+
+
+def _refined(
+    structure: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Sequence[str] | Instruments, options: Refined
+) -> tuple[Array, dict[str, Any]]:
+    start, exogenous = _start(structure, records, data, instruments), records
+    if instruments:
+        records, exogenous = explained_inputs(structure, records, Instruments.of(instruments))
+    found = refined_instruments(structure, records, exogenous, start, options)
+    return found.theta, {"iterations": found.iterations, "converged": found.converged, "noise": found.noise.tolist()}
+
+
+def _output_error(
+    structure: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Sequence[str] | Instruments, options: OutputError
+) -> tuple[Array, dict[str, Any]]:
+    starts = [_start(structure, records, data, instruments)]
+    try:
+        starts.append(_refined(structure, records, data, instruments, Refined(iterations=10, tolerance=1e-3))[0])
+    except ExcitationError:  # a refinement that fails leaves the first start
+        pass
+    found = output_error(structure, records, starts, options)
+    return found.theta, {
+        "evaluations": found.evaluations, "converged": found.converged, "message": found.message,
+        "simulation_covariance": found.simulation_covariance.tolist(),
+    }  # fmt: skip
 
 
 def _recursive(structure: LPVARX, data: Regression, forgetting: float | Forgetting) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.excitation import RANK_TOLERANCE, column_scale, direction_in_words, spectrum
 from identification.least_squares import least_squares
-from identification.regressors import Regression, basis_values, regressor_rows, scheduling_values
+from identification.regressors import Regression, basis_values, regressor_rows, scheduling_values, units_of
 from identification.structure import LPVARX
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FlightRecord
@@ -52,7 +52,7 @@ def instrumental_variables(arx: LPVARX, records: Sequence[FlightRecord], data: R
     Raises `ExcitationError` where the instruments do not determine every coefficient.
     Source: Soderstrom and Stoica (1989), System Identification, ch. 8; Ljung (1999), sec. 15.3.
     """
-    W = np.vstack([_instrument_rows(arx, record, instruments) for record in records])[data.rows]
+    W = np.vstack([_instrument_rows(arx, record, instruments, arx.input_lags.start) for record in records])[data.rows]
     known = np.isfinite(W).all(axis=1)
     W = W[known]
     Q = _range(W) if len(W) else W
@@ -84,13 +84,38 @@ def _two_stages(phi: Array, y: Array, W: Array, Q: Array, names: tuple[str, ...]
     return least_squares(first_stage, Q.T @ y) / scale[:, None]
 
 
-def _instrument_rows(arx: LPVARX, record: FlightRecord, instruments: Instruments) -> Array:
-    """Instruments (n, m) of every sample of a record, NaN where one is missing."""
+def explained_inputs(
+    arx: LPVARX, records: Sequence[FlightRecord], instruments: Instruments
+) -> tuple[list[FlightRecord], list[FlightRecord]]:
+    """The records, and the same with the inputs replaced by what the instruments explain of them (least squares, lags from 0 on).
+
+    What is explained does not know the noise that feedback carries into the inputs. Inputs are NaN in both where an
+    instrument is missing, so that both break at the same samples.
+    """
+    tables = [_instrument_rows(arx, record, instruments, 0) for record in records]
+    W, u = np.vstack(tables), np.vstack([record.columns(arx.inputs) for record in records])
+    known = np.isfinite(np.column_stack([W, u])).all(axis=1)
+    if known.sum() <= W.shape[1]:
+        raise ExcitationError(f"{W.shape[1]} instruments on {known.sum()} samples explain anything; record longer, or use fewer lags")
+    Q = _range(W[known])
+    explained = np.full_like(u, np.nan)
+    explained[known] = Q @ (Q.T @ u[known])
+    cut, exogenous = [], []
+    for record, part in zip(records, np.split(explained, np.cumsum([len(r) for r in records])[:-1]), strict=True):
+        units = {str(s): s.unit for s in units_of(arx.inputs, [record])}
+        measured = np.where(np.isnan(part), np.nan, record.columns(arx.inputs))
+        cut.append(record.with_signals(units, **dict(zip(arx.inputs, measured.T, strict=True))))
+        exogenous.append(record.with_signals(units, **dict(zip(arx.inputs, part.T, strict=True))))
+    return cut, exogenous
+
+
+def _instrument_rows(arx: LPVARX, record: FlightRecord, instruments: Instruments, first: int) -> Array:
+    """Instruments (n, m) of every sample of a record, from lag `first` on, NaN where one is missing."""
     r, p = record.columns(instruments.signals), scheduling_values(arx, record)
     f, y, u = basis_values(arx, p), record.columns(arx.outputs), record.columns(arx.inputs)
     at_lag = arx.scheduling_at == "lag"
     n, parts = len(record), []
-    for lag in instruments.at(record.dt, arx.input_lags.start):
+    for lag in instruments.at(record.dt, first):
         block = np.full((n, r.shape[1] * f.shape[1]), np.nan)
         for part in record.segments():
             here, then = slice(min(part.start + lag, part.stop), part.stop), slice(part.start, max(part.stop - lag, part.start))

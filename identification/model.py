@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,7 +23,9 @@ class LPVARXModel:
 
     `outputs`, `inputs`, `scheduling` (several where the structure has) carry the units of the record. `residual_covariance`
     (ny, ny) of the one-step residuals, `rows_used` and `rows_dropped` samples of the fit, `method` how it was fitted, `excitation`
-    the report on the data.
+    the report on the data, `details` what the method chose (weights, iterations, ...): plain numbers and lists by name.
+    `covariance` (ny, n_regressors, n_regressors) of the coefficients, an equation at a time as `Uncertainty.covariance`, where somebody
+    put it there; it is carried along, saved and loaded.
     """
 
     structure: LPVARX
@@ -37,6 +39,8 @@ class LPVARXModel:
     rows_dropped: int = 0
     method: str = "ls"
     excitation: ExcitationReport | None = field(default=None, repr=False)
+    details: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    covariance: Array | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         arx = self.structure
@@ -46,6 +50,9 @@ class LPVARXModel:
         object.__setattr__(self, "scheduling", parameters[0] if len(parameters) == 1 else parameters)
         object.__setattr__(self, "theta", frozen(self.theta, "theta", (arx.n_regressors, arx.ny)))
         object.__setattr__(self, "residual_covariance", frozen(self.residual_covariance, "residual covariance", (arx.ny, arx.ny)))
+        if self.covariance is not None:
+            n = arx.n_regressors
+            object.__setattr__(self, "covariance", frozen(self.covariance, "covariance", (arx.ny, n, n)))
         own, given = (arx.outputs, arx.inputs, arx.parameters), (self.outputs, self.inputs, parameters)
         if own != given:
             raise InputError(f"signals {given} are not those of the structure: {own}")

@@ -49,5 +49,9 @@ class SolverError(SymheliError):
     """A numerical solver is missing, or is not one of the supported ones."""
 
 
+class ConvergenceWarning(UserWarning):
+    """An iteration stopped before it settled; the result is its last value, and may be worse than where it started."""
+
+
 class CompilerWarning(UserWarning):
     """Compiled code is not available; the same numbers come out more slowly."""

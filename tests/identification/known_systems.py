@@ -39,7 +39,8 @@ class Truth:
         self.theta = Coefficients(arx.basis, tuple(arx.input_lags), A, B, c, d).theta(arx)  # zero where an equation lacks a regressor
         self.coefficients = Coefficients.of(arx, self.theta)
 
-    def record(self, p, *, noise=0.0, seed=1):
+    def record(self, p, *, noise=0.0, seed=1, noise_seed=None):
+        """A record with random inputs; without a seed of its own the noise repeats the random numbers of the inputs."""
         arx, of = self.arx, self.coefficients
         u = np.random.default_rng(seed).normal(size=(len(p), arx.nu))
         at = {np.asarray(q).tobytes(): of.at(q) for q in p}
@@ -49,7 +50,9 @@ class Truth:
 
         A = [lambda q, i=i: now(q).A[i] for i in range(len(arx.output_lags))]
         B = [lambda q, j=j: now(q).B[j] for j in range(len(arx.input_lags))]
-        return flown(arx, A, B, p, u, c=lambda q: now(q).c, d=lambda q: now(q).d, noise=noise, seed=seed)
+        return flown(
+            arx, A, B, p, u, c=lambda q: now(q).c, d=lambda q: now(q).d, noise=noise, seed=seed if noise_seed is None else noise_seed
+        )
 
 
 def moving(n=700):

@@ -11,8 +11,8 @@ from symheli.lpv import FlightRecord
 GAIN = 0.35
 
 
-def closed_loop(n, *, noise, seed, at="lag"):
-    """A plant, unstable at high p, held by u = r - GAIN y_measured; the noise is on the measurement and so goes round the loop."""
+def closed_loop(n, *, noise, seed, at="lag", a=(1.75, 0.80)):
+    """A plant held by u = r - GAIN y_measured; the noise is on the measurement and so goes round the loop. Unstable at high p."""
     rng = np.random.default_rng(seed)
     k = np.arange(n)
     p = 6.5 + 6.0 * np.sin(0.021 * k)
@@ -23,7 +23,7 @@ def closed_loop(n, *, noise, seed, at="lag"):
         if j >= 2:
             q = p[j - 1] if at == "lag" else p[j]
             q2 = p[j - 2] if at == "lag" else p[j]
-            true[j] = (1.75 + 0.01 * q) * true[j - 1] - (0.80 + 0.004 * q2) * true[j - 2] + (0.5 + 0.02 * q) * u[j - 1]
+            true[j] = (a[0] + 0.01 * q) * true[j - 1] - (a[1] + 0.004 * q2) * true[j - 2] + (0.5 + 0.02 * q) * u[j - 1]
         y[j] = true[j] + e[j]
         u[j] = r[j] - GAIN * y[j]
     return FlightRecord.from_arrays(0.05 * k, dict.fromkeys("yurp", "1"), y=y, u=u, r=r, p=p)

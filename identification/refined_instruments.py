@@ -1,0 +1,132 @@
+"""Refined instrumental variables: the model's own noise-free response instruments, and filters, the next estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.excitation import RANK_TOLERANCE, column_scale, direction_in_words, spectrum
+from identification.least_squares import least_squares
+from identification.stretches import Stretch, contracted, filtered, free_of, stretches
+from identification.structure import LPVARX
+from symheli.errors import ExcitationError, InputError
+from symheli.lpv import FlightRecord
+from symheli.lpv.arrays import Array
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Iterations at most, the relative change of the coefficients that ends them, and the order of the noise model.
+
+    `noise_order` is that of an autoregressive model of the output noise of each output; 0 takes it as white.
+    """
+
+    iterations: int = 40
+    tolerance: float = 1e-6
+    noise_order: int = 0
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1 or self.noise_order < 0 or not self.tolerance > 0:
+            given = f"{self.iterations}, {self.noise_order}, {self.tolerance}"
+            raise InputError(f"expected iterations >= 1, noise_order >= 0 and a tolerance > 0, got {given}")
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """theta (n_regressors, ny), `noise` (ny, noise_order) autoregressive coefficients, and whether the iteration `converged`."""
+
+    theta: Array
+    noise: Array
+    iterations: int
+    converged: bool
+
+
+def refined_instruments(
+    arx: LPVARX, records: Sequence[FlightRecord], exogenous: Sequence[FlightRecord], start: Array, options: Refined
+) -> Refinement:
+    """Iterate from theta `start`: simulate, instrument and filter by the model found so far, solve, until nothing moves.
+
+    With y = x + v, x the noise-free response, A(p) y = B(p) u + A(p) v: filtered by the last A(p)^-1 the noise of the
+    equation is v itself, and by the noise model white. The filter A(p)^-1 moves with p; it is applied to the products of signals and
+    functions of p, which leaves the equation linear in the coefficients whatever the basis and however the outputs are coupled. (The
+    published method filters by the constant part of A alone and so needs a basis with a constant.) Instruments are the same
+    products of the simulated response, so the fixed point is that of the simulation error with white noise.
+
+    `exogenous` are the records whose inputs drive the simulation: the same ones in open loop; in closed loop with the inputs replaced by
+    what the external excitation explains of them (see `explained_inputs`).
+
+    Raises `ExcitationError` where the simulated response does not determine every coefficient.
+    Source: Laurain, Toth, Gilson and Garnier (2010), Refined instrumental variable methods for identification of LPV
+    Box-Jenkins models, Automatica 46, 959-967.
+    """
+    runs, clean = stretches(arx, records, outputs=True), stretches(arx, exogenous, outputs=True)
+    if not runs:
+        raise ExcitationError(f"no unbroken stretch of more than {arx.memory} samples to simulate")
+    theta, noise = start, np.zeros((arx.ny, options.noise_order))
+    row, output = free_of(arx)
+    for iteration in range(1, options.iterations + 1):
+        model = contracted(arx, theta, clean)
+        response = [run.free_run(model) for run in clean]
+        scale = _noise_size(runs, response)
+        parts = [_filtered_equations(run, c, x, model, noise, scale) for run, c, x in zip(runs, clean, response, strict=True)]
+        Z, X, y = (np.concatenate(part) for part in zip(*parts, strict=True))
+        found = np.zeros_like(theta)
+        found[row, output] = _instrumented(arx, Z, X, y)
+        change = np.linalg.norm((found - theta)[row, output] * column_scale(X)) / max(np.linalg.norm(y), 1e-300)
+        theta = found
+        noise = _noise_model(runs, [run.free_run(contracted(arx, theta, clean)) for run in clean], options.noise_order)
+        if change < options.tolerance:
+            return Refinement(theta, noise, iteration, True)
+    return Refinement(theta, noise, options.iterations, False)
+
+
+def _filtered_equations(run: Stretch, clean: Stretch, response: Array, theta: Array, noise: Array, scale: Array) -> tuple[Array, ...]:
+    """Instruments, regressors (rows, free coefficients) and outputs (rows,) of one stretch, whitened."""
+    instruments = clean.with_outputs(response).spread(theta, clean.with_outputs(response).regressors())
+    regressors = run.spread(theta, run.regressors())
+    outputs = filtered(run.lag_coefficients(theta), run.target[:, :, None], np.zeros_like(run.past))
+    return tuple(
+        (_whitened(part, noise) / scale[None, :, None]).reshape(-1, *part.shape[2:][: part.shape[2] > 1])
+        for part in (instruments, regressors, outputs)
+    )
+
+
+def _whitened(signal: Array, noise: Array) -> Array:
+    out = signal.copy()
+    for lag in range(1, noise.shape[1] + 1):
+        out[lag:] += noise[None, :, lag - 1, None] * signal[:-lag]
+    return out[noise.shape[1] :]
+
+
+def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
+    """b with Z'(y - X b) = 0, by the orthonormal factor of the scaled instruments."""
+    scale = column_scale(X)
+    Q, _ = np.linalg.qr(Z / column_scale(Z))
+    square = Q.T @ (X / scale)
+    values, directions = spectrum(square)
+    if values[-1] <= RANK_TOLERANCE * values[0]:
+        row, output = free_of(arx)
+        names = tuple(f"{arx.regressor_names[r]} in {arx.outputs[o]}" for r, o in zip(row, output, strict=True))
+        missing = direction_in_words(directions[-1], names)
+        raise ExcitationError(f"the simulated response leaves undetermined: {missing}; excite the inputs more richly, or lower the orders")
+    return np.linalg.solve(square, Q.T @ y) / scale
+
+
+def _noise_size(runs: Sequence[Stretch], response: Sequence[Array]) -> Array:
+    error = np.concatenate([run.target - x for run, x in zip(runs, response, strict=True)])
+    size = np.sqrt(np.mean(error**2, axis=0))
+    return np.where(size > 0, size, 1.0)
+
+
+def _noise_model(runs: Sequence[Stretch], response: Sequence[Array], order: int) -> Array:
+    """Autoregressive coefficients (ny, order) of what the simulation leaves, v(k) + d_1 v(k-1) + ... = e(k)."""
+    errors = [run.target - x for run, x in zip(runs, response, strict=True)]
+    out = np.zeros((errors[0].shape[1], order))
+    for y in range(len(out) if order else 0):
+        past = np.vstack([np.column_stack([-v[order - i : len(v) - i, y] for i in range(1, order + 1)]) for v in errors])
+        now = np.concatenate([v[order:, y] for v in errors])
+        if np.linalg.matrix_rank(past) == order:
+            out[y] = least_squares(past, now[:, None])[:, 0]
+    return out
