@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.signal import csd, get_window
@@ -104,7 +105,8 @@ def _independent(windows: int) -> float:
 def _spectra(records: Sequence[FlightRecord], names: Sequence[str], n: int, keep: Array) -> tuple[Array, int]:
     """Cross spectral densities (nf, m, m), S[:, a, b] of a with the conjugate of b, and the number of windows averaged."""
     m, hop, total, count = len(names), n // 2, 0.0, 0
-    taper = get_window("hann", n)
+    taper: Any = np.asarray(get_window("hann", n))
+    untouched: Any = False
     for record in records:
         values = record.columns(names)
         for part in record.segments():
@@ -115,7 +117,7 @@ def _spectra(records: Sequence[FlightRecord], names: Sequence[str], n: int, keep
                 piece = piece - piece.mean(axis=0)
                 a, b = np.meshgrid(np.arange(m), np.arange(m), indexing="ij")
                 # csd(x, y) averages conj(X) Y
-                S = csd(piece.T[b], piece.T[a], fs=1 / record.dt, window=taper, nperseg=n, detrend=False, axis=-1)[1]
+                S = csd(piece.T[b], piece.T[a], fs=1 / record.dt, window=taper, nperseg=n, detrend=untouched, axis=-1)[1]
                 total, count = total + np.moveaxis(S, -1, 0)[keep], count + 1
     if not count:
         raise ExcitationError(f"no unbroken stretch of {n} samples; shorten the window or resample the record")

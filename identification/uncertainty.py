@@ -93,8 +93,8 @@ def uncertainty(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecor
         raise InputError(f"{len(data.phi)} usable samples say nothing about the certainty of {arx.n_regressors} coefficients an output")
     runs = _runs(data)
     longest = max(run.stop - run.start for run in runs)
-    lags = min(max(longest // 5, 1), longest - 1) if lags is None else lags
-    if not 0 <= lags < longest:
+    reach = min(max(longest // 5, 1), longest - 1) if lags is None else lags
+    if not 0 <= reach < longest:
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
     error = data.y - data.phi @ model.theta
     covariance, white = (np.zeros((arx.ny, arx.n_regressors, arx.n_regressors)) for _ in range(2))
@@ -106,11 +106,11 @@ def uncertainty(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecor
         D = inverse @ inverse.T / np.outer(scale, scale)
         left = max(len(phi) - len(at), 1)
         for y in group.outputs:
-            place = np.ix_([y], at, at)
-            white[place] = (D * (error[:, y] @ error[:, y] / left))[None]
-            middle = _coloured(phi, error[:, y], runs, lags) * (len(phi) / left) * np.outer(scale, scale)
-            covariance[place] = (D @ middle @ D)[None]
-    return Uncertainty(model, covariance, white, lags)
+            place = (y, at[:, None], at)
+            white[place] = D * (error[:, y] @ error[:, y] / left)
+            middle = _coloured(phi, error[:, y], runs, reach) * (len(phi) / left) * np.outer(scale, scale)
+            covariance[place] = D @ middle @ D
+    return Uncertainty(model, covariance, white, reach)
 
 
 def _coloured(phi: Array, error: Array, runs: list[slice], lags: int) -> Array:

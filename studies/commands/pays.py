@@ -21,4 +21,4 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies import pays
 
     lines = list(pays.where_scheduling_pays(arguments.seeds, arguments.vehicle))
-    return Output(pays.table(lines), pays.data(lines))
+    return Output(pays.table(lines), {"lines": pays.data(lines)})

@@ -48,7 +48,7 @@ def low_pass(record: FlightRecord, cutoff: float, order: int = 4, *, zero_phase:
         raise InputError(f"cutoff: expected a frequency between 0 and {rate / 2:.4g} Hz (half the sampling frequency), got {cutoff}")
     for name in leave:
         record.columns([name])  # raises UnknownNameError with the nearest names
-    sos, out = butter(order, cutoff, fs=rate, output="sos"), record.values.copy()
+    sos, out = np.asarray(butter(order, cutoff, fs=rate, output="sos")), record.values.copy()
     for i, signal in enumerate(record.signals):
         if signal in leave:
             continue
