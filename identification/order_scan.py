@@ -63,14 +63,21 @@ class OrderScan:
     def __str__(self) -> str:
         outputs = self.trials[0].structure.outputs
         head = "  ".join(f"{y:>22s}" for y in outputs)
-        lines = [f"fit in percent: one step / {self.horizon} samples / free run", f"{'na':>3s} {'degree':>6s} {'BIC':>10s}  {head}"]
+        lines = [
+            f"fit in percent: one step / {self.horizon} samples / free run (worse: below -1000, inf: diverges)",
+            f"{'na':>3s} {'degree':>6s} {'BIC':>10s}  {head}",
+        ]
         for t in self.trials:
             if t.refused:
                 lines.append(f"{t.na:3d} {t.degree:6d} {'':>10s}  refused: {t.refused}")
                 continue
-            fits = "  ".join(f"{a:6.1f} /{b:6.1f} /{c:6.1f}" for a, b, c in zip(t.one_step, t.ahead, t.free_run, strict=True))
+            fits = "  ".join(" /".join(map(_cell, three)) for three in zip(t.one_step, t.ahead, t.free_run, strict=True))
             lines.append(f"{t.na:3d} {t.degree:6d} {t.bic:10.0f}  {fits}")
         return "\n".join(lines)
+
+
+def _cell(fit: float) -> str:
+    return f"{fit:6.1f}" if fit > -1000 else f"{'worse':>6s}" if np.isfinite(fit) else f"{'inf':>6s}"
 
 
 def order_scan(

@@ -22,6 +22,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("log", type=Path, metavar="LOG", help="flight log")
     add("--format", choices=("auto", "xplane", "csv", "mat"), default="auto", help="default: by extension and content")
+    add("--map", type=Path, metavar="FILE", help="TOML file that says which column is which signal, in which unit (docs/identify.md)")
     add("--time", metavar="COLUMN", help="time column of a table (default: t or time)")
     add("--dt", type=options.positive, metavar="S", help="sample period, s: of a log without time, or to resample to")
     add(
@@ -43,6 +44,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add("--nb", type=options.count, default=3, metavar="N", help="lags of the inputs (default: %(default)s)")
     add("--delay", type=options.count, default=1, metavar="N", help="first lag of the inputs (default: %(default)s)")
     add("--degree", type=options.count, default=2, metavar="N", help="polynomial degree in p; 0: LTI only (default: %(default)s)")
+    add("--orders", action="store_true", help="compare orders 1 to 4 and degrees 0 to 3 instead")
     add("--no-offset", action="store_true", help="no c(p): outputs are deviations already")
     add("--start", type=options.number, metavar="S", help="leave out what is before, s on the log's clock")
     add("--stop", type=options.number, metavar="S", help="leave out what is after")
@@ -62,14 +64,17 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.log import report
     from studies.log.comparison import compare, scheduling_range
     from studies.log.reading import COMBINED, format_of, read
-    from symheli.lpv import conditioning
+    from symheli.lpv import FlightRecord, conditioning
 
-    kind = format_of(arguments.log) if arguments.format == "auto" else arguments.format
+    kind = "mapped" if arguments.map else format_of(arguments.log) if arguments.format == "auto" else arguments.format
     outputs, inputs, scheduling = _signals(arguments, kind)
     wanted = [*outputs, *inputs, *(arguments.scheduling_from or ((scheduling,) if scheduling else ()))]
-    record = read(
-        arguments.log, list(dict.fromkeys(wanted)), format=kind, dt=arguments.dt, time=arguments.time, units=dict(arguments.units)
-    )
+    if arguments.map:
+        record = FlightRecord.from_map(arguments.log, arguments.map)
+    else:
+        record = read(
+            arguments.log, list(dict.fromkeys(wanted)), format=kind, dt=arguments.dt, time=arguments.time, units=dict(arguments.units)
+        )
     samples = len(record)
     if arguments.scheduling_from:
         record, scheduling = conditioning.with_norm(record, arguments.scheduling_from, COMBINED), COMBINED
@@ -86,9 +91,29 @@ def run(arguments: argparse.Namespace) -> Output:
         outputs, inputs, scheduling, arguments.na, arguments.nb, arguments.delay, basis,
         scheduling_at=arguments.scheduling_at, offset=not arguments.no_offset,
     )  # fmt: skip
-    result = compare(structure, *conditioning.split(record, arguments.train))
+    training, test = conditioning.split(record, arguments.train)
+    if arguments.orders:
+        return _orders(structure, training, test)
+    result = compare(structure, training, test)
     found = report.facts(arguments.log, kind, record, samples, outside, result)
     return Output(report.text(found, result), report.data(found, result))
+
+
+def _orders(structure: Any, training: Any, test: Any) -> Output:
+    """A table of orders and degrees, judged on the held-out part."""
+    from identification import order_scan
+
+    if test is None:
+        raise InputError("--orders judges on held-out samples: let --train leave some")
+    scan = order_scan(structure, training, test, horizon=max(round(1.0 / training.dt), 1))
+    rows = [
+        {
+            "na": t.na, "degree": t.degree, "bic": t.bic, "refused": t.refused,
+            "fit_percent": {"one step": t.one_step, "1 s": t.ahead, "free run": t.free_run},
+        }
+        for t in scan.trials
+    ]  # fmt: skip
+    return Output(f"held out, {scan}", {"outputs": list(structure.outputs), "trials": rows})
 
 
 def _signals(arguments: argparse.Namespace, kind: str) -> tuple[tuple[str, ...], tuple[str, ...], str | None]:

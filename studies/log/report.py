@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from identification import residual_analysis, uncertainty
 from studies.log.comparison import HORIZONS, Comparison, coefficients, percent
 from studies.output import columns
 from symheli.lpv import FlightRecord
@@ -45,9 +46,11 @@ def facts(log: Path, kind: str, record: FlightRecord, rows: int, outside: int, r
 def text(found: dict[str, Any], result: Comparison) -> str:
     """The whole answer for a reader."""
     fit = "fit in percent of the output's own variation (100: perfect, 0: no better than its mean)"
-    return "\n".join(
-        [*_read(found), *_structure(found, result), "", str(result.scheduled.excitation), "", fit, _table(result), "", *result.verdict()]
-    ).rstrip()
+    parts = [
+        *_read(found), *_structure(found, result), "", str(result.scheduled.excitation), "", fit, _table(result), "", *result.verdict(), "",
+        *_certainty(result),
+    ]  # fmt: skip
+    return "\n".join(parts).rstrip()
 
 
 def data(found: dict[str, Any], result: Comparison) -> dict[str, Any]:
@@ -61,7 +64,10 @@ def data(found: dict[str, Any], result: Comparison) -> dict[str, Any]:
     }
     judged = len(result.models) > 1 and result.test is not None
     pays = {str(y): result.pays(str(y)) for y in result.scheduled.outputs} if judged else None
-    return {"read": found, "excitation": _excitation(result), "models": models, "scheduling_pays": pays, "verdict": result.verdict()}
+    return {
+        "read": found, "excitation": _excitation(result), "models": models, "scheduling_pays": pays, "verdict": result.verdict(),
+        "standard_errors": uncertainty(result.scheduled, result.training).standard_errors,
+    }  # fmt: skip
 
 
 def _read(found: dict[str, Any]) -> list[str]:
@@ -87,6 +93,21 @@ def _structure(found: dict[str, Any], result: Comparison) -> list[str]:
         f"  fitted on {trained_low:.4g} to {trained_high:.4g}; {found['held_out_samples_beyond_training']} held-out samples lie beyond",
         f"  model: {', '.join(arx.outputs)} from {', '.join(arx.inputs)}, na {arx.na}, nb {arx.nb}, delay {arx.delay},"
         f" coefficients at {arx.scheduling_at}, {'with' if arx.offset else 'without'} offset",
+    ]
+
+
+def _certainty(result: Comparison) -> list[str]:
+    """What the residuals of the fit say, and how certain its coefficients are."""
+    model = result.scheduled
+    lags = min(25, len(result.training) // 20)
+    known = uncertainty(model, result.training)
+    colour = ", ".join(f"{y} {factor:.1f}" for y, factor in zip(model.outputs, known.colour, strict=True))
+    free = model.structure.free
+    sure = np.abs(model.theta) > 2 * known.standard_errors
+    count = f"{int(np.sum(sure & free))} of {int(free.sum())}"
+    return [
+        f"in sample, {residual_analysis(model, result.training, lags)}",
+        f"coefficients more than two standard errors from zero: {count} (coloured residuals make the errors larger by: {colour})",
     ]
 
 

@@ -125,6 +125,7 @@ def scheduled_csv(path, n=900, noise=0.0):
 
 STRUCTURE = ("--na", 1, "--nb", 1, "--degree", 1, "--no-offset", "--outputs", "y", "--inputs", "u", "--scheduling", "p")
 UNITS = ("--units", "y=deg", "u=1", "p=m/s")
+MAPPED = (("theta", "y", "deg"), ("stick", "u", "1"), ("speed", "p", "m/s"))
 
 
 def test_identify_recovers_a_scheduled_model_from_a_table(run, answer, tmp_path):
@@ -139,6 +140,20 @@ def test_identify_recovers_a_scheduled_model_from_a_table(run, answer, tmp_path)
     assert status == 0
     assert "scheduling pays" in out
     assert "excitation: sufficient" in out
+
+
+def test_identify_reads_by_a_map_and_compares_orders(answer, run, tmp_path):
+    log, signal_map = scheduled_csv(tmp_path / "log.csv"), tmp_path / "aircraft.toml"
+    signal_map.write_text('time = "t"\n[signals]\n' + "".join(f'{n} = {{ column = "{c}", unit = "{u}" }}\n' for n, c, u in MAPPED))
+    got = answer("identify", log, *STRUCTURE[:-6], "--outputs", "theta", "--inputs", "stick", "--scheduling", "speed", "--map", signal_map)
+    np.testing.assert_allclose(np.ravel(got["models"]["LPV, degree 1"]["coefficients"]["A"]), [-0.9, 0.05], atol=1e-8)
+    assert np.shape(got["standard_errors"]) == (4, 1)
+    scan = answer("identify", log, *STRUCTURE, *UNITS, "--orders")
+    best = max((t for t in scan["trials"] if not t["refused"]), key=lambda t: t["fit_percent"]["free run"][0])
+    assert best["degree"] >= 1
+    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--orders", "--train", 1)
+    assert status == 1
+    assert "held-out samples" in error
 
 
 def test_identify_says_where_scheduling_does_not_pay(run, tmp_path):
