@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.excitation import RANK_TOLERANCE
+from identification.excitation import RANK_TOLERANCE, column_scale
 from identification.regressors import as_records, regression
 from identification.structure import LPVARX
 from symheli.errors import ExcitationError, InputError
@@ -19,13 +19,14 @@ from symheli.lpv.arrays import Array
 class Experiment:
     """A candidate with its information.
 
-    `information` (n, n) = phi' phi of the regressors, a unit of residual variance each; `bounds` (n,): standard errors it allows
-    for residuals of unit variance (infinite where it leaves a coefficient open). `exceeded`: {signal: largest value} beyond its limit.
+    `factor` (n, n), upper triangular, with R' R = phi' phi, the information of the regressors (never squared: it would lose half its
+    digits); `bounds` (n,): standard errors it allows for residuals of unit variance (infinite where it leaves a coefficient
+    open). `exceeded`: {signal: largest value} beyond its limit.
     """
 
     name: str
     duration: float
-    information: Array
+    factor: Array
     exceeded: Mapping[str, float]
 
     @property
@@ -36,7 +37,7 @@ class Experiment:
     @property
     def bounds(self) -> Array:
         """(n,)"""
-        return standard_errors(self.information)
+        return standard_errors(self.factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +51,9 @@ class Plan:
     gains: tuple[float, ...]
 
     @property
-    def information(self) -> Array:
-        """(n, n)"""
-        return np.sum([e.information for e in self.experiments], axis=0)
-
-    @property
     def bounds(self) -> Array:
         """(n,)"""
-        return standard_errors(self.information)
+        return standard_errors(_triangle(*(e.factor for e in self.experiments)))
 
 
 def compare_experiments(structure: LPVARX, candidates: Mapping[str, FlightRecord], limits: Mapping[str, float]) -> tuple[Experiment, ...]:
@@ -77,7 +73,7 @@ def compare_experiments(structure: LPVARX, candidates: Mapping[str, FlightRecord
             if top > limit:
                 exceeded[signal] = top
         phi = regression(structure, record).phi
-        out.append(Experiment(name, float(record.time[-1] - record.time[0]), phi.T @ phi, exceeded))
+        out.append(Experiment(name, float(record.time[-1] - record.time[0]), _triangle(phi), exceeded))
     return tuple(out)
 
 
@@ -93,30 +89,36 @@ def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
     if not left:
         worst = "; ".join(f"{e.name}: {', '.join(e.exceeded)}" for e in experiments)
         raise ExcitationError(f"no candidate keeps its limits ({worst}); lower the amplitudes or widen the limits")
-    scale = np.sqrt(np.maximum(np.max([np.diagonal(e.information) for e in left], axis=0), np.finfo(float).tiny))
-    total, chosen, gains = np.zeros_like(left[0].information), [], []
+    scale = np.maximum(np.max([np.linalg.norm(e.factor, axis=0) for e in left], axis=0), np.finfo(float).tiny)
+    total, chosen, gains = np.zeros_like(left[0].factor), [], []
     for _ in range(min(count, len(left))):
-        value = {e.name: _logdet((total + e.information) / np.outer(scale, scale)) for e in left}
-        start = _logdet(total / np.outer(scale, scale))
+        value = {e.name: _logdet(_triangle(total, e.factor) / scale) for e in left}
+        start = _logdet(total / scale)
         best = max(left, key=lambda e: (value[e.name] - start) / e.duration)
         if chosen:
             gains.append((value[best.name] - start) / len(scale))
         chosen.append(best)
         left.remove(best)
-        total = total + best.information
+        total = _triangle(total, best.factor)
     return Plan(tuple(chosen), tuple(gains))
 
 
-def standard_errors(information: Array) -> Array:
-    """sqrt(diag(information^-1)) (n,), infinite for coefficients whose direction the information leaves open."""
-    scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    open_ = values <= RANK_TOLERANCE * values[-1]
-    out = np.sqrt(np.sum(vectors[:, ~open_] ** 2 / values[~open_], axis=1)) / scale
-    return np.where(np.any(np.abs(vectors[:, open_]) > 1e-6, axis=1), np.inf, out)
+def standard_errors(factor: Array) -> Array:
+    """sqrt(diag((R'R)^-1)) (n,) of a factor R (n, n), infinite for coefficients whose direction it leaves open."""
+    scale = column_scale(factor)
+    _, values, directions = np.linalg.svd(factor / scale)
+    open_ = values <= RANK_TOLERANCE * values[0]
+    out = np.sqrt(np.sum((directions[~open_].T / values[~open_]) ** 2, axis=1)) / scale
+    return np.where(np.any(np.abs(directions[open_]) > 1e-6, axis=0), np.inf, out)
 
 
-def _logdet(information: Array) -> float:
-    """Log determinant with eigenvalues no lower than what rounding leaves of the largest possible one."""
-    values = np.linalg.eigvalsh(information)
-    return float(np.sum(np.log(np.maximum(values, RANK_TOLERANCE))))
+def _triangle(*factors: Array) -> Array:
+    """R (n, n) with R' R the sum of F' F of the factors (m, n)."""
+    n = factors[0].shape[1]
+    stacked = np.vstack([*factors, np.zeros((max(n - sum(map(len, factors)), 0), n))])
+    return np.linalg.qr(stacked, mode="r")
+
+
+def _logdet(factor: Array) -> float:
+    """Log determinant of R'R, singular values no lower than what rounding leaves of the largest possible one."""
+    return float(2 * np.sum(np.log(np.maximum(np.linalg.svd(factor, compute_uv=False), RANK_TOLERANCE))))

@@ -13,7 +13,7 @@ from typing import Any
 from studies.output import Output, as_json
 from symheli.errors import SymheliError
 
-VERBS = ("study", "vehicles", "trim", "linearize", "identify", "margins", "certify", "export", "campaign", "pays", "doctor")
+VERBS = ("study", "vehicles", "trim", "linearize", "identify", "margins", "certify", "export", "campaign", "pays", "design", "doctor")
 """Each is the module of that name in `studies.commands`."""
 
 
