@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -13,7 +15,7 @@ from identification.coefficients import Coefficients
 from identification.excitation import ExcitationReport
 from identification.structure import LPVARX
 from symheli.errors import InputError
-from symheli.lpv import FlightRecord, LinearModel, LPVStateSpace, NamedVector, Scheduling, Signal, signals
+from symheli.lpv import FlightRecord, FunctionSpace, LinearModel, LPVStateSpace, NamedVector, Reduction, Scheduling, Signal, signals
 from symheli.lpv.arrays import Array, frozen
 
 
@@ -114,6 +116,29 @@ class LPVARXModel:
         build = {"shifted": realization.shifted, "direct": realization.direct}[realization.route_for(self.structure, route)]
         scheduling = Scheduling(str(p), p.unit, basis.low, basis.high)
         return build(self.coefficients, scheduling, self.outputs, self.inputs, self.dt)
+
+    def reduce(self, order: int, *, input_scale: object = 1.0, output_scale: object = 1.0) -> Reduction[LPVStateSpace]:
+        """The exact realization, reduced to `order` states, with the frozen error it makes; see `symheli.lpv.reduce`."""
+        return self.to_state_space().reduce(order, input_scale=input_scale, output_scale=output_scale)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the model as JSON, every number exact, at once or not at all; see `load`."""
+        from identification import saved_model
+
+        return saved_model.save(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> LPVARXModel:
+        """A saved model, equal to the last bit; one with `UserFunctions` needs its `basis`. Raises `InputError` for any other file."""
+        from identification import saved_model
+
+        return saved_model.load(path, basis)
+
+    def save_mat(self, path: str | os.PathLike[str]) -> Path:
+        """Write coefficients, names and units as a MATLAB file (version 5), with a readme inside."""
+        from identification import saved_model
+
+        return saved_model.save_mat(self, path)
 
     def _along(self, record: FlightRecord) -> prediction.Recursion:
         if abs(record.dt - self.dt) > 0.01 * self.dt:

@@ -11,6 +11,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.named_vector import NamedVector
 from symheli.lpv.nu_gap import chordal_distance, nu_gap
 from symheli.lpv.operating_point import OperatingPoint
+from symheli.lpv.reduction import Reduction, reduce
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import Signal, signals
 from symheli.lpv.simulate import simulate
@@ -34,6 +35,7 @@ __all__ = [
     "PiecewiseLinear",
     "Polynomial",
     "Product",
+    "Reduction",
     "Scheduling",
     "Signal",
     "Spline",
@@ -51,6 +53,7 @@ __all__ = [
     "nu_gap",
     "pade_delay",
     "parallel",
+    "reduce",
     "series",
     "signals",
     "simulate",

@@ -18,6 +18,7 @@ from symheli.lpv.trim_schedule import TrimSchedule
 
 if TYPE_CHECKING:
     from symheli.lpv.lft import LFT
+    from symheli.lpv.reduction import Reduction
 
 
 class Matrices(NamedTuple):
@@ -167,6 +168,12 @@ class LPVStateSpace:
         fitted = Matrices(*(basis.fit(p, M) for M in exact))
         misfit = Matrices(*(np.tensordot(basis(p), F, axes=1) - E for F, E in zip(fitted, exact, strict=True)))
         return replace(self, basis=basis, A=fitted.A, B=fitted.B, C=fitted.C, D=fitted.D, dt=dt, residuals=misfit)
+
+    def reduce(self, order: int, *, nodes: int = 21, input_scale: object = 1.0, output_scale: object = 1.0) -> Reduction[LPVStateSpace]:
+        """`order` states by one projection balanced over p, with the error it makes; see `symheli.lpv.reduce`."""
+        from symheli.lpv.reduction import reduce
+
+        return reduce(self, order, nodes=nodes, input_scale=input_scale, output_scale=output_scale)
 
     def to_lft(self) -> LFT:
         """The equivalent linear fractional transformation (polynomial dependence only), not yet reduced."""

@@ -50,9 +50,8 @@ class Truth:
 
         A = [lambda q, i=i: now(q).A[i] for i in range(len(arx.output_lags))]
         B = [lambda q, j=j: now(q).B[j] for j in range(len(arx.input_lags))]
-        return flown(
-            arx, A, B, p, u, c=lambda q: now(q).c, d=lambda q: now(q).d, noise=noise, seed=seed if noise_seed is None else noise_seed
-        )
+        other = seed if noise_seed is None else noise_seed
+        return flown(arx, A, B, p, u, c=lambda q: now(q).c, d=lambda q: now(q).d, noise=noise, seed=other)
 
 
 def moving(n=700):
