@@ -11,6 +11,9 @@ HALLEY_STEPS = 3
 RELAXATION, RELAXED_STEPS = 0.6, 40
 """Of the printed iteration; 0.4^40 is below rounding."""
 
+SETTLED = 1e-7
+"""A step of this size leaves an error of the order of its cube: the next one is not taken."""
+
 _ROOT_GUARD = 1e-20  # added under the root: its derivative stays finite without flow, its value moves by 1e-10
 _TINY = 1e-60  # keeps a quotient finite where numerator and denominator vanish together
 
@@ -59,8 +62,8 @@ def solve(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -
 
     Thrust is limited or it is not: the momentum balance at the corner lam = (c0 - C_Tmax)/c1 says which, so that a smooth
     equation is left. Its start is an upper bound: the smaller of the axial-flow root (exact for mu = 0) and
-    C_T/(2 eta_w mu). Halley's steps (order 3, one root and one quotient each) stay between 0 and that bound. Negative
-    thrust is the mirror image.
+    C_T/(2 eta_w mu). Halley's steps (order 3, one root and one quotient each) stay between 0 and that bound until one is
+    below `SETTLED`. Negative thrust is the mirror image.
     """
     sign = where(c0 >= 0, 1.0, -1.0)
     drive, flow = sign * c0, sign * mu_z
@@ -73,9 +76,12 @@ def solve(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -
     rest = maximum(line0 - line1 * below, 0.0)
     axial = below + 2 * rest / (b + sqrt(b**2 + 8 * efficiency * rest + _TINY))
     forward = line0 / (2 * efficiency * sqrt(mu2 + _ROOT_GUARD) + line1)
-    lam = top = minimum(axial, forward)
-    for _ in range(HALLEY_STEPS):
-        lam = clip(_halley_step(lam, line0, line1, mu2, flow, efficiency), 0.0, top)
+    previous = top = minimum(axial, forward)
+    lam = clip(_halley_step(top, line0, line1, mu2, flow, efficiency), 0.0, top)
+    for _ in range(HALLEY_STEPS - 1):
+        settled = absolute(lam - previous) <= SETTLED
+        following = clip(_halley_step(lam, line0, line1, mu2, flow, efficiency), 0.0, top)
+        previous, lam = lam, where(settled, lam, following)
     return sign * lam
 
 

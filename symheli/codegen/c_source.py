@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from symheli.codegen.branches import Side, branches
 from symheli.codegen.program import COMPARISONS, Operation, Program
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=", "and": "&", "or": "|"}
@@ -45,15 +46,55 @@ def c_function(program: Program, layout: Layout, name: str) -> str:
         f"lane *restrict out{i}" for i in range(len(program.outputs))
     ]
     lines = [f"__attribute__((noinline)) static void {name}({', '.join(arguments)})", "{", f"  for (int l = 0; l < {layout.width}; ++l) {{"]
-    groups = range(layout.groups)
-    for k, operation in enumerate(program.operations):
-        if operation.name != "constant":
-            kind = "_Bool" if operation.name in COMPARISONS else "double"
-            lines += [f"    const {kind} {_name(k, g)} = {_expression(program, operation, g, layout.width)};" for g in groups]
+    lines += _in_branches(program) if layout.lanes == 1 else _in_line(program, layout)
     for i, output in enumerate(program.outputs):
         for j, a in enumerate(output):
-            lines += [f"    out{i}[{j}][l + {g * layout.width}] = {_operand(program, a, g)};" for g in groups]
+            lines += [f"    out{i}[{j}][l + {g * layout.width}] = {_operand(program, a, g)};" for g in range(layout.groups)]
     return "\n".join([*lines, "  }", "}", ""])
+
+
+def _in_line(program: Program, layout: Layout) -> list[str]:
+    """Every operation in order, both sides of every selection: what vector registers can do."""
+    return [
+        _definition(program, k, g, layout.width)
+        for k, operation in enumerate(program.operations)
+        if operation.name != "constant"
+        for g in range(layout.groups)
+    ]
+
+
+def _in_branches(program: Program) -> list[str]:
+    """For one point alone: operations that only one side of a selection needs are computed only where it is taken."""
+    homes = branches(program)
+    inside: dict[Side, list[int]] = {}
+    for k, operation in enumerate(program.operations):
+        if operation.name != "constant":
+            inside.setdefault(homes[k], []).append(k)
+
+    def written(side: Side) -> list[str]:
+        lines = []
+        for k in inside.get(side, []):
+            if not any((k, taken) in inside for taken in (True, False)):
+                lines.append(_definition(program, k, 0, 1))
+                continue
+            condition, yes, no = (_operand(program, a, 0) for a in program.operations[k].arguments)
+            lines += [
+                f"    double {_name(k, 0)};",
+                f"    if ({condition}) {{",
+                *written((k, True)),
+                f"    {_name(k, 0)} = {yes};",
+                "    } else {",
+            ]
+            lines += [*written((k, False)), f"    {_name(k, 0)} = {no};", "    }"]
+        return lines
+
+    return written(None)
+
+
+def _definition(program: Program, position: int, group: int, width: int) -> str:
+    operation = program.operations[position]
+    kind = "_Bool" if operation.name in COMPARISONS else "double"
+    return f"    const {kind} {_name(position, group)} = {_expression(program, operation, group, width)};"
 
 
 def _name(position: int, group: int) -> str:

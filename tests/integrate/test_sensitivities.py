@@ -14,6 +14,11 @@ METHODS = [RungeKutta4(), DormandPrince(1e3, largest=0.01), Radau()]
 """The adaptive one with equal steps: derivatives are those at the steps taken, and differences must not change them."""
 
 
+@pytest.fixture(params=["ideal", pytest.param("pi", marks=pytest.mark.slow)])  # each governor's derivatives take seconds to compile
+def either(request):
+    return request.getfixturevalue(request.param)
+
+
 def case(heli, method, m=3, n=6):
     rng = np.random.default_rng(1)
     x0, u = manoeuvre(heli, n=n)
@@ -23,10 +28,10 @@ def case(heli, method, m=3, n=6):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_adjoint_and_tangent_agree_to_rounding(heli, method):
+def test_adjoint_and_tangent_agree_to_rounding(either, method):
     """<weights, tangent(d)> = <gradient(weights), d>: two routes through two separately differentiated programs."""
-    flown, (dx0, du, dwind), weights = case(heli, method)
-    change, bar = tangent(heli, flown, dx0, du, dwind), gradient(heli, flown, weights)
+    flown, (dx0, du, dwind), weights = case(either, method)
+    change, bar = tangent(either, flown, dx0, du, dwind), gradient(either, flown, weights)
     forward = np.einsum("knm,knj->mj", change, weights)
     backward = np.einsum("nm,nj->mj", dx0, bar.x0) + np.einsum("knm,knj->mj", du, bar.u) + np.einsum("knm,knj->mj", dwind, bar.wind)
     tolerance = 1e-9 if isinstance(method, Radau) else 1e-13  # the implicit solutions are good to 1e-12; else sums of 1e3 rounded terms
@@ -34,8 +39,8 @@ def test_adjoint_and_tangent_agree_to_rounding(heli, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_tangents_are_the_limit_of_differences_of_flights(heli, method):
-    flown, directions, _ = case(heli, method, m=1)
+def test_tangents_are_the_limit_of_differences_of_flights(either, method):
+    flown, directions, _ = case(either, method, m=1)
     dx0, du, dwind = (d[..., 0] for d in directions)
     q = flown.states[0, 6:10]
     dx0[6:10] -= q * (q @ dx0[6:10])  # along the quaternion there is no other attitude
@@ -44,7 +49,7 @@ def test_tangents_are_the_limit_of_differences_of_flights(heli, method):
         x0 = flown.states[0] + step * dx0
         x0[6:10] /= np.linalg.norm(x0[6:10])
         return simulate(
-            heli, x0, flown.inputs + step * du, flown.wind + step * dwind, dt=0.02, method=method
+            either, x0, flown.inputs + step * du, flown.wind + step * dwind, dt=0.02, method=method
         ).states  # fmt: skip
 
     def central(step):
@@ -52,17 +57,17 @@ def test_tangents_are_the_limit_of_differences_of_flights(heli, method):
 
     richardson = (4 * central(2e-4) - central(4e-4)) / 3
     # rounding 1e-14/2e-4 and truncation (4e-4)^4 times fifth derivatives meet below 1e-9
-    np.testing.assert_allclose(tangent(heli, flown, dx0, du, dwind), richardson, atol=1e-8)
+    np.testing.assert_allclose(tangent(either, flown, dx0, du, dwind), richardson, atol=1e-8)
 
 
-def test_about_a_trim_point_the_transition_matrix_is_the_matrix_exponential(heli):
-    point, n, dt = symheli.trim(heli, 6.0), 25, 0.02
-    model = symheli.linearize(heli, point)
-    flown = simulate(heli, point, np.tile(point.u.array, (n, 1)), dt=dt, method=RungeKutta4(0.001))
+def test_about_a_trim_point_the_transition_matrix_is_the_matrix_exponential(either):
+    point, n, dt = symheli.trim(either, 6.0), 25, 0.02
+    model = symheli.linearize(either, point)
+    flown = simulate(either, point, np.tile(point.u.array, (n, 1)), dt=dt, method=RungeKutta4(0.001))
     h = 1e-6  # of the Euler angles: differences of closed forms, exact to 1e-10
-    basis = np.eye(len(heli.states))
+    basis = np.eye(len(either.states))
     start = np.stack([(flight_state(point.x.array + h * e) - flight_state(point.x.array - h * e)) / (2 * h) for e in basis], axis=1)
-    end, du = tangent(heli, flown, start)[-1], np.zeros((n, 4, 4))
+    end, du = tangent(either, flown, start)[-1], np.zeros((n, 4, 4))
     du[:] = np.eye(4)
 
     def in_euler_form(change):
@@ -70,13 +75,13 @@ def test_about_a_trim_point_the_transition_matrix_is_the_matrix_exponential(heli
 
     block = expm(np.block([[model.A, model.B], [np.zeros((4, len(basis) + 4))]]) * n * dt)[: len(basis)]
     np.testing.assert_allclose(in_euler_form(end), block[:, : len(basis)], atol=2e-8 * np.abs(block).max())
-    np.testing.assert_allclose(in_euler_form(tangent(heli, flown, du=du)[-1]), block[:, len(basis) :], atol=2e-8 * np.abs(block).max())
+    np.testing.assert_allclose(in_euler_form(tangent(either, flown, du=du)[-1]), block[:, len(basis) :], atol=2e-8 * np.abs(block).max())
 
 
-def test_without_a_compiler_derivatives_agree(heli, monkeypatch):
-    flown, directions, weights = case(heli, RungeKutta4(), m=9, n=2)
-    change, bar = tangent(heli, flown, *directions), gradient(heli, flown, weights)
-    plain = without_compiler(monkeypatch, heli)
+def test_without_a_compiler_derivatives_agree(either, monkeypatch):
+    flown, directions, weights = case(either, RungeKutta4(), m=9, n=2)
+    change, bar = tangent(either, flown, *directions), gradient(either, flown, weights)
+    plain = without_compiler(monkeypatch, either)
     np.testing.assert_allclose(tangent(plain, flown, *directions), change, rtol=1e-12, atol=1e-12)
     for ours, theirs in zip(vars(gradient(plain, flown, weights)).values(), vars(bar).values(), strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-11)
