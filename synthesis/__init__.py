@@ -5,14 +5,14 @@ No solver is loaded by importing this package.
 
 from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
 from synthesis.cone_program import Solver, installed_solvers
+from synthesis.forms import Relaxation
 from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.handling_qualities import Bandwidth, bandwidth
 from synthesis.l2_gain import l2_gain, stability
 from synthesis.lft import SCALINGS, BoxGain, LFTCertificate, Multiplier, Trial, frozen_box_gain, lft_gain, lft_stability
 from synthesis.lower_bound import LowerBound, Search, lower_bound
-from synthesis.lyapunov import SplineLyapunov
+from synthesis.lyapunov import MemoryLyapunov, SplineLyapunov
 from synthesis.margins import Margins, disk_margin, loop, margins
-from synthesis.proof_search import Relaxation
 
 __all__ = [
     "SCALINGS",
@@ -24,6 +24,7 @@ __all__ = [
     "LFTCertificate",
     "LowerBound",
     "Margins",
+    "MemoryLyapunov",
     "Multiplier",
     "Relaxation",
     "Search",

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from symheli.errors import CertificateError
-from synthesis.lyapunov import SplineLyapunov
+from synthesis.lyapunov import Lyapunov
 from synthesis.verify import Evidence
 
 Array = np.ndarray
@@ -74,7 +74,7 @@ class Certificate:
     frozen: float
     status: Status
     verified: bool
-    lyapunov: SplineLyapunov | None
+    lyapunov: Lyapunov | None
     rate: float
     hypotheses: tuple[str, ...]
     solver: str
@@ -116,7 +116,7 @@ class Certificate:
             lines.append(f"  frozen {self.frozen:.6g} <= lower {self.lower:.6g} <= gain <= {self.gamma:.6g}")
         if self.lyapunov is not None:
             P = self.lyapunov
-            lines.append(f"  V = x'P(p)x, degree {P.degree} on {P.segments} segment(s), condition number {self.conditioning:.2g}")
+            lines.append(f"  {P.form}, condition number {self.conditioning:.2g}")
         s = self.seconds
         stages = f"build {s.build:.2f} s, solve {s.solve:.2f} s, verify {s.verify:.2f} s, lower bounds {s.bounds:.2f} s"
         lines.append(f"  {self.solver}; {stages}")

@@ -11,10 +11,11 @@ from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from synthesis.certificate import Certificate, Seconds, Status, Trajectory
 from synthesis.cone_program import Answer, Solver
+from synthesis.forms import Problem, Relaxation, scaled_problem
 from synthesis.frozen import frozen_gain, least_damped
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
-from synthesis.lyapunov import SplineLyapunov
-from synthesis.proof_search import Problem, Relaxation, Result, prove, scaled_problem
+from synthesis.lyapunov import Lyapunov
+from synthesis.proof_search import Result, prove
 
 
 def l2_gain(
@@ -107,7 +108,7 @@ def _certificate(
     )  # fmt: skip
 
 
-def _hypotheses(lpv: LPVStateSpace, rate: float, P: SplineLyapunov | None, kind: str) -> tuple[str, ...]:
+def _hypotheses(lpv: LPVStateSpace, rate: float, P: Lyapunov | None, kind: str) -> tuple[str, ...]:
     s = lpv.scheduling
     unit = "" if s.unit == "1" else f" {s.unit}"
     speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
@@ -115,8 +116,7 @@ def _hypotheses(lpv: LPVStateSpace, rate: float, P: SplineLyapunov | None, kind:
     if lpv.trim is not None:
         out.append("the drift of a moving trim, -x0'(p) dp/dt, is left out: it acts as a further disturbance")
     if P is not None:
-        form = "constant P" if P.degree == 0 else f"P a continuous spline of degree {P.degree} on {P.segments} segment(s)"
-        out.append(f"{form}; one LMI per Bernstein coefficient, for every p in the interval and every admissible rate")
+        out.append(f"{P.form}; one LMI per Bernstein coefficient, for every p in the interval and every admissible rate")
         out.append("verified in floating point: every coefficient, and a grid of p; verify(rigorous=True) proves it in exact arithmetic")
     if kind == "l2 gain":
         out.append("the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs together")

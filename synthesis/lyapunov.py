@@ -1,14 +1,16 @@
-"""Parameter-dependent Lyapunov functions V(x, p) = x' P(p) x with P a continuous spline."""
+"""Parameter-dependent Lyapunov functions: V = x' P(p) x, of higher degree in x, or with a memory of where p came from."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from symheli.errors import InputError
 from synthesis.bernstein import blossom
+from synthesis.lag import LagRegion
+from synthesis.symmetric_power import null_matrix, null_weights, power
 
 Array = np.ndarray
 
@@ -19,17 +21,19 @@ class SplineLyapunov:
 
     Segment j has the Bernstein coefficients j d .. (j + 1) d; P is in physical units of the states, V in those of the
     squared output times seconds (samples in discrete time). Degree 0 is one constant P.
+
+    `order` m > 1: V = z' P(p) z with the N monomials z of degree m in the states (see `symmetric_power`), n = N then.
+    `slack` (blocks, null space): what was added to each Bernstein coefficient of -dV/dt to make it definite.
     """
 
     knots: Array
     degree: int
     coefficients: Array
+    order: int = 1
+    slack: Array | None = None
 
     def __post_init__(self) -> None:
-        for name in ("knots", "coefficients"):
-            array = np.array(getattr(self, name), dtype=float)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        _freeze(self, "knots", "coefficients", *(() if self.slack is None else ("slack",)))
         n = self.coefficients.shape[-1]
         expected = (self.segments * self.degree + 1, n, n)
         if self.coefficients.shape != expected:
@@ -39,6 +43,21 @@ class SplineLyapunov:
     def segments(self) -> int:
         """Number of segments K."""
         return len(self.knots) - 1
+
+    @property
+    def form(self) -> str:
+        """The form in words."""
+        P = "constant P" if self.degree == 0 else f"P a continuous spline of degree {self.degree} on {self.segments} segment(s)"
+        return P if self.order == 1 else f"V of degree {2 * self.order} in the states, {P}"
+
+    def in_units(self, T: Array, factor: float = 1.0, time: float = 1.0) -> SplineLyapunov:
+        """factor V as a function of the states z, x = T z, T (n, n), with time in units of `time`."""
+        lifted = power(T, self.order)
+        slack = self.slack
+        if slack is not None:
+            n = len(T)
+            slack = null_weights(factor * time * lifted.T @ null_matrix(slack, n, self.order) @ lifted, n, self.order)
+        return replace(self, coefficients=_congruent(self.coefficients, lifted, factor), slack=slack)
 
     def segment(self, j: int) -> Array:
         """Bernstein coefficients (d + 1, n, n) on segment j."""
@@ -70,6 +89,90 @@ class SplineLyapunov:
         j = np.clip(np.searchsorted(self.knots, p, side="right") - 1, 0, self.segments - 1)
         t = (p - self.knots[j]) / (self.knots[j + 1] - self.knots[j])
         return j, np.clip(t, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class MemoryLyapunov:
+    """V = x' P(p, e) x with the lead e = p - q of p over its own lag q (see `LagRegion`), a spline in both.
+
+    On segment j of the region's knots P has degree `degree` in p; across, in s = (e - lower)/(upper - lower), degree
+    `lead_degree` on the segments between `lead_knots` (from 0 to 1). `coefficients` (K d + 1, L l + 1, n, n).
+    """
+
+    region: LagRegion
+    degree: int
+    lead_knots: Array
+    lead_degree: int
+    coefficients: Array
+
+    order = 1
+    slack = None
+
+    def __post_init__(self) -> None:
+        _freeze(self, "lead_knots", "coefficients")
+        n = self.coefficients.shape[-1]
+        expected = (self.segments * self.degree + 1, (len(self.lead_knots) - 1) * self.lead_degree + 1, n, n)
+        if self.coefficients.shape != expected:
+            raise InputError(f"expected Lyapunov coefficients of shape {expected}, got {self.coefficients.shape}")
+
+    @property
+    def knots(self) -> Array:
+        """Knots in p (K + 1,)."""
+        return self.region.knots
+
+    @property
+    def segments(self) -> int:
+        """Number of segments in p, K."""
+        return len(self.knots) - 1
+
+    @property
+    def form(self) -> str:
+        """The form in words."""
+        across = f"{self.lead_degree} on {len(self.lead_knots) - 1} segment(s) of p - q"
+        return (
+            f"P(p, p - q) of degree {self.degree} on {self.segments} segment(s) of p and {across}, "
+            f"q a lag of p of {self.region.time:g} s: a known state of p, not of the model"
+        )
+
+    def in_units(self, T: Array, factor: float = 1.0, time: float = 1.0) -> MemoryLyapunov:
+        """factor V as a function of the states z, x = T z, T (n, n), with time in units of `time`."""
+        region = replace(self.region, time=self.region.time / time)
+        return replace(self, region=region, coefficients=_congruent(self.coefficients, T, factor))
+
+    def patch(self, j: int, i: int) -> Array:
+        """Bernstein coefficients (d + 1, l + 1, n, n) on segment j in p and i across."""
+        d, l = self.degree, self.lead_degree
+        return self.coefficients[j * d : (j + 1) * d + 1, i * l : (i + 1) * l + 1]
+
+    def at(self, p: float, share: float) -> tuple[Array, Array, Array]:
+        """(P, dP/dp at constant e, dP/de) at p and e = lower + share (upper - lower), per unit of p."""
+        j = min(int(np.searchsorted(self.knots, p, side="right")) - 1, self.segments - 1)
+        i = min(int(np.searchsorted(self.lead_knots, share, side="right")) - 1, len(self.lead_knots) - 2)
+        width, breadth = self.knots[j + 1] - self.knots[j], self.lead_knots[i + 1] - self.lead_knots[i]
+        x, y = (p - self.knots[j]) / width, (share - self.lead_knots[i]) / breadth
+        patch = self.patch(j, i)
+        along, across = blossom([x] * self.degree), blossom([y] * self.lead_degree)
+        steeper, wider = blossom([x] * (self.degree - 1)), blossom([y] * (self.lead_degree - 1))
+        P = np.einsum("i,k,iknm->nm", along, across, patch)
+        in_p = np.einsum("i,k,iknm->nm", steeper, across, self.degree * np.diff(patch, axis=0)) / width
+        in_share = np.einsum("i,k,iknm->nm", along, wider, self.lead_degree * np.diff(patch, axis=1)) / breadth
+        _, height, rise, widening = (float(v) for v in self.region.locate(np.array(p)))
+        return P, in_p - in_share * (rise + share * widening) / height, in_share / height
+
+
+Lyapunov = SplineLyapunov | MemoryLyapunov
+
+
+def _freeze(thing: object, *names: str) -> None:
+    for name in names:
+        array = np.array(getattr(thing, name), dtype=float)
+        array.flags.writeable = False
+        object.__setattr__(thing, name, array)
+
+
+def _congruent(P: Array, T: Array, factor: float) -> Array:
+    M = factor * T.T @ P @ T
+    return 0.5 * (M + np.swapaxes(M, -1, -2))
 
 
 def graded_knots(low: float, high: float, segments: int, grading: float, breaks: Sequence[float] = (), shortest: float = 0.0) -> Array:

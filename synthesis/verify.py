@@ -1,26 +1,22 @@
-"""Is this P(p) a proof? Recomputed from the model and P alone, in floating point or in exact rational arithmetic.
-
-Nothing here is shared with the assembly of the cone program: an error there cannot pass here.
-"""
+"""Is this P a proof? Recomputed from the model and P alone, in floating point or in exact rational arithmetic."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from symheli.lpv import LPVStateSpace
-from synthesis.bernstein import composition, elevate, multiply, restriction, transpose
-from synthesis.cells import Cell, Strip, cells, strips
-from synthesis.lyapunov import SplineLyapunov
+from synthesis.bernstein import transpose
+from synthesis.claim import Claim, Number, lmi_polynomials
+from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.pieces import ModelPiece
 from synthesis.scaling import Scaling
+from synthesis.symmetric_power import generator, monomials
 
 Array = np.ndarray
-Number = Callable[[float], Any]
 
 
 class Findings(NamedTuple):
@@ -35,119 +31,18 @@ class Findings(NamedTuple):
     conditioning: float
 
 
-class Claim(NamedTuple):
-    """What is to be verified: the pieces of the model, P, the rate (units of p per second) and dt (s, None: continuous).
-
-    `elevation` raises the degree of the Bernstein forms, which brings their coefficients closer to the values.
-    """
-
-    pieces: tuple[ModelPiece, ...]
-    P: SplineLyapunov
-    rate: float
-    dt: float | None
-    elevation: int = 0
-
-    @property
-    def meaningful(self) -> bool:
-        """False where a P that varies meets a p that may jump in continuous time: dV/dt has no bound then."""
-        return self.dt is not None or self.P.degree == 0 or math.isfinite(self.rate)
-
-
-def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Array]:
-    """Bernstein coefficients (a + 1, b + 1, N, N) of every block over the whole range, with g = 0.
-
-    `number` turns a double into the arithmetic of the proof.
-    """
-    for F in _polynomials(claim, number):
-        yield elevate(F, (F.shape[0] - 1 + claim.elevation, F.shape[1] - 1))
-
-
-def _polynomials(claim: Claim, number: Number) -> Iterator[Array]:
-    pieces, P, rate, dt, _ = claim
-    assert claim.meaningful  # noqa: S101 - checked by the callers
-    convert = np.frompyfunc(number, 1, 1)
-
-    def exact(values: Array) -> Array:
-        return np.asarray(values, dtype=float) if number is float else np.asarray(convert(values), dtype=object)
-
-    if dt is None:
-        for cell in cells(pieces, P.knots):
-            yield from _continuous(cell, P, rate, number, exact)
-    else:
-        step = rate * dt if P.degree else 0.0
-        for strip in strips(pieces, P.knots, step):
-            yield _discrete(strip, P, number, exact)
-
-
-def _continuous(cell: Cell, P: SplineLyapunov, rate: float, number: Number, exact: Callable[[Array], Array]) -> Iterator[Array]:
-    A, B, C, D = _model(cell, number, exact)
-    a, b, width = _local(cell.low, cell.high, P, cell.segment, number)
-    Pc = _apply(restriction(P.degree, a, b), exact(P.segment(cell.segment)))[:, None]
-    still = multiply(transpose(A), Pc)
-    still, side = [still, transpose(still), multiply(transpose(C), C)], [multiply(Pc, B), multiply(transpose(C), D)]
-    corner = [multiply(transpose(D), D)]
-    if P.degree == 0 or rate == 0:
-        yield _stack(still, side, corner)
-        return
-    slope = P.degree * (Pc[1:] - Pc[:-1]) / ((b - a) * width)
-    for nu in (-number(rate), number(rate)):
-        yield _stack([*still, nu * slope], side, corner)
-
-
-def _discrete(strip: Strip, P: SplineLyapunov, number: Number, exact: Callable[[Array], Array]) -> Array:
-    cell = strip.cell
-    A, B, C, D = _model(cell, number, exact)
-    a, b, _ = _local(cell.low, cell.high, P, cell.segment, number)
-    now = _apply(restriction(P.degree, a, b), exact(P.segment(cell.segment)))[:, None]
-    bottom, top = number(float(P.knots[strip.next_segment])), number(float(P.knots[strip.next_segment + 1]))
-    corners = [[(number(q) - bottom) / (top - bottom) for q in pair] for pair in strip.corners]
-    after = _apply(composition(P.degree, corners), exact(P.segment(strip.next_segment)))
-    left_A, left_B = multiply(transpose(A), after), multiply(transpose(B), after)
-    return _stack(
-        [multiply(left_A, A), -now, multiply(transpose(C), C)],
-        [multiply(left_A, B), multiply(transpose(C), D)],
-        [multiply(left_B, B), multiply(transpose(D), D)],
-    )
-
-
-def _model(cell: Cell, number: Number, exact: Callable[[Array], Array]) -> list[Array]:
-    low, high = number(cell.piece.low), number(cell.piece.high)
-    a, b = (number(cell.low) - low) / (high - low), (number(cell.high) - low) / (high - low)
-    return [_apply(restriction(len(M) - 1, a, b), exact(M))[:, None] for M in (cell.piece.A, cell.piece.B, cell.piece.C, cell.piece.D)]
-
-
-def _local(low: float, high: float, P: SplineLyapunov, segment: int, number: Number) -> tuple[Any, Any, Any]:
-    bottom, top = number(float(P.knots[segment])), number(float(P.knots[segment + 1]))
-    return (number(low) - bottom) / (top - bottom), (number(high) - bottom) / (top - bottom), top - bottom
-
-
-def _apply(weights: Array, coefficients: Array) -> Array:
-    """sum_j weights[..., j] coefficients[j], in any arithmetic."""
-    flat = coefficients.reshape(len(coefficients), -1)
-    return (weights.reshape(-1, weights.shape[-1]) @ flat).reshape(*weights.shape[:-1], *coefficients.shape[1:])
-
-
-def _stack(top: list[Array], side: list[Array], corner: list[Array]) -> Array:
-    every = [*top, *side, *corner]
-    degrees = (max(F.shape[0] for F in every) - 1, max(F.shape[1] for F in every) - 1)
-    sums = [sum((elevate(F, degrees) for F in part[1:]), elevate(part[0], degrees)) for part in (top, side, corner)]
-    upper = np.concatenate([sums[0], sums[1]], axis=-1)
-    lower = np.concatenate([transpose(sums[1]), sums[2]], axis=-1)
-    return np.concatenate([upper, lower], axis=-2)
-
-
 def examine(claim: Claim) -> Findings:
     """Floating point: eigenvalues of every coefficient, and the least g by Schur complement. Pass scaled data."""
     P = claim.P
     if not claim.meaningful:
         return Findings(False, False, math.inf, math.inf)
-    n = P.coefficients.shape[1]
-    values = np.linalg.eigvalsh(P.coefficients)
+    n = P.coefficients.shape[-1]
+    values = np.linalg.eigvalsh(P.coefficients.reshape(-1, n, n))
     positive = bool(np.all(values[:, 0] > _rounding(n) * np.abs(values).max()))
     conditioning = float(np.max(values[:, -1] / values[:, 0])) if positive else math.inf
     decreasing, g = True, 0.0
-    for F in lmi_polynomials(claim, float):
-        F = F.reshape(-1, *F.shape[-2:])
+    for form in lmi_polynomials(claim, float):
+        F = form.block.reshape(-1, *form.block.shape[-2:])
         top = F[:, :n, :n]
         eigenvalues = np.linalg.eigvalsh(top)
         decreasing &= bool(np.all(eigenvalues[:, -1] < -_rounding(n) * np.abs(eigenvalues).max(axis=1)))
@@ -156,7 +51,7 @@ def examine(claim: Claim) -> Findings:
         if F.shape[1] > n:
             side, corner = F[:, :n, n:], F[:, n:, n:]
             schur = corner - np.swapaxes(side, 1, 2) @ np.linalg.solve(top, side)
-            g = max(g, float(np.linalg.eigvalsh(schur).max()))
+            g = max(g, float((np.linalg.eigvalsh(schur)[:, -1] / form.weight.ravel()).max()))
     return Findings(positive, decreasing, g, conditioning)
 
 
@@ -164,13 +59,21 @@ def _rounding(n: int) -> float:
     return 20 * n * np.finfo(float).eps
 
 
-def holds_on_grid(lpv: LPVStateSpace, P: SplineLyapunov, rate: float, gamma: float, transform: Array, points: int = 201) -> bool:
-    """The LMI at `points` values of p (knots too) and the extreme rates, from the model's own matrices; g = gamma^2.
+def holds_on_grid(lpv: LPVStateSpace, P: Lyapunov, rate: float, gamma: float, transform: Array) -> bool:
+    """The LMI at some hundred points and the extreme rates, from the model's own matrices; g = gamma^2.
 
     `transform` (n, n) is a constant change of coordinates for the sake of rounding; gamma NaN tests stability alone.
     """
+    if isinstance(P, MemoryLyapunov):
+        return _holds_with_memory(lpv, P, rate, gamma, transform)
+    if P.order > 1:
+        return _decreases_on_states(lpv, P, rate, transform)
+    return _holds_in_p(lpv, P, rate, gamma, transform)
+
+
+def _holds_in_p(lpv: LPVStateSpace, P: SplineLyapunov, rate: float, gamma: float, transform: Array) -> bool:
     low, high = lpv.scheduling.low, lpv.scheduling.high
-    grid = np.unique(np.concatenate([np.linspace(low, high, points), P.knots]))
+    grid = np.unique(np.concatenate([np.linspace(low, high, 201), P.knots]))
     A, B, C, D = lpv.matrices(grid)
     now = P.at(grid)
     if np.linalg.eigvalsh(transform.T @ now @ transform).min() <= 0:
@@ -196,6 +99,41 @@ def holds_on_grid(lpv: LPVStateSpace, P: SplineLyapunov, rate: float, gamma: flo
     return True
 
 
+def _holds_with_memory(lpv: LPVStateSpace, P: MemoryLyapunov, rate: float, gamma: float, transform: Array) -> bool:
+    low, high = lpv.scheduling.low, lpv.scheduling.high
+    nu = lpv.B.shape[2]
+    whole = np.block([[transform, np.zeros((len(transform), nu))], [np.zeros((nu, len(transform))), np.eye(nu)]])
+    for p in np.unique(np.concatenate([np.linspace(low, high, 41), P.knots])):
+        A, B, C, D = lpv.matrices(float(p))
+        outer = np.concatenate([C, D], 1)
+        lower, height, _, _ = (float(v) for v in P.region.locate(np.array(p)))
+        for share in np.linspace(0.0, 1.0, 9):
+            now, in_p, in_lead = P.at(float(p), float(share))
+            if np.linalg.eigvalsh(transform.T @ now @ transform)[0] <= 0:
+                return False
+            for slope in (-rate, rate):
+                top = A.T @ now + now @ A + slope * in_p + (slope - (lower + share * height) / P.region.time) * in_lead
+                F = np.block([[top, now @ B], [B.T @ now, np.zeros((nu, nu))]])
+                if not math.isnan(gamma):
+                    F = F + outer.T @ outer - gamma**2 * np.diag(np.concatenate([np.zeros(len(A)), np.ones(nu)]))
+                if np.linalg.eigvalsh(whole.T @ F @ whole)[-1] >= 0:
+                    return False
+    return True
+
+
+def _decreases_on_states(lpv: LPVStateSpace, P: SplineLyapunov, rate: float, transform: Array) -> bool:
+    """V > 0 > dV/dt at states in all directions: what the slack cannot change."""
+    directions = transform @ np.random.default_rng(0).standard_normal((lpv.A.shape[1], 400))
+    z = np.array([np.prod(directions[list(factors)], axis=0) for factors in monomials(len(directions), P.order)])
+    grid = np.unique(np.concatenate([np.linspace(lpv.scheduling.low, lpv.scheduling.high, 101), P.knots]))
+    for A, now, slope in zip(generator(lpv.matrices(grid).A, P.order), P.at(grid), P.derivative(grid), strict=True):
+        flow = 2 * np.sum(z * (now @ (A @ z)), axis=0)
+        drift = rate * np.abs(np.sum(z * (slope @ z), axis=0)) if P.degree else 0.0
+        if np.any(np.sum(z * (now @ z), axis=0) <= 0) or np.any(flow + drift >= 0):
+            return False
+    return True
+
+
 def proven(claim: Claim, gamma: float) -> bool:
     """Exact rational arithmetic over the whole interval: P > 0 and every block < 0 with g = gamma^2 (NaN: stability).
 
@@ -203,21 +141,21 @@ def proven(claim: Claim, gamma: float) -> bool:
     installed, else the (slower) fractions of the standard library.
     """
     number, P = rational(), claim.P
-    if not claim.meaningful:
+    if not (claim.meaningful and claim.invariant(number)):
         return False
-    n = P.coefficients.shape[1]
-    for coefficient in P.coefficients:
+    n = P.coefficients.shape[-1]
+    for coefficient in P.coefficients.reshape(-1, n, n):
         if not positive_definite(np.array([[number(float(v)) for v in row] for row in coefficient], dtype=object)):
             return False
     g = None if math.isnan(gamma) else number(gamma) * number(gamma)
-    for F in lmi_polynomials(claim, number):
-        for M in F.reshape(-1, *F.shape[-2:]):
-            M = -M
+    for block, weight in lmi_polynomials(claim, number):
+        for F, factor in zip(block.reshape(-1, *block.shape[-2:]), weight.ravel(), strict=True):
+            M = -F
             if g is None:
                 M = M[:n, :n]
             else:
                 for i in range(n, len(M)):
-                    M[i, i] = M[i, i] + g
+                    M[i, i] = M[i, i] + g * factor
             if not positive_definite(M):
                 return False
     return True
@@ -263,23 +201,29 @@ class Evidence(NamedTuple):
     rate: float
     elevation: int
 
-    def least_gain(self, P: SplineLyapunov) -> tuple[float, float]:
+    def least_gain(self, P: Lyapunov) -> tuple[float, float]:
         """(gain that P admits, conditioning of P); inf where P proves nothing, NaN without channels. Floating point."""
         units = self.units
         scaled = tuple(piece.scaled(units.left, units.right, units.channel, units.time) for piece in self.pieces)
-        back = SplineLyapunov(P.knots, P.degree, units.to_scaled(P.coefficients))
+        back = P.in_units(units.right, units.channel**-2, units.time)
         rate = self.rate * units.time if self.lpv.dt is None else self.rate
         findings = examine(Claim(scaled, back, rate, self.lpv.dt, self.elevation))
         if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
             return math.inf, math.inf
         return (units.channel * math.sqrt(findings.g) if self.lpv.inputs else math.nan), findings.conditioning
 
-    def floating(self, P: SplineLyapunov, gamma: float) -> bool:
+    def floating(self, P: Lyapunov, gamma: float) -> bool:
         """Every Bernstein coefficient and a grid of p, in floating point."""
         least = self.least_gain(P)[0]
         enough = math.isnan(least) if math.isnan(gamma) else least < gamma
-        return enough and holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right)
+        claim = self._claim(P)
+        if not (enough and claim.meaningful and claim.invariant(rational())):
+            return False
+        return holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right)
 
-    def exact(self, P: SplineLyapunov, gamma: float) -> bool:
+    def exact(self, P: Lyapunov, gamma: float) -> bool:
         """The same over the whole interval in rational arithmetic."""
-        return proven(Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation), gamma)
+        return proven(self._claim(P), gamma)
+
+    def _claim(self, P: Lyapunov) -> Claim:
+        return Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation)

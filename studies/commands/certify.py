@@ -10,7 +10,7 @@ from studies.commands import options
 from studies.output import Output, progress
 
 if TYPE_CHECKING:
-    from synthesis import Certificate, LFTCertificate
+    from synthesis import Certificate, LFTCertificate, Relaxation
 
 HELP = "proven gain and stability of the lateral loop for a rate of airspeed"
 
@@ -28,6 +28,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--channel", choices=("gust", "inputs"), default="gust", help="lateral gust, or disturbances at the inputs, -> r, phi"
     )
     parser.add_argument("--lft", metavar="TEST", help="a classical LFT test instead: small gain, D, DG or full block; --rate plays no part")
+    parser.add_argument("--memory", type=options.positive, metavar="S", help="P depends on a lag of the airspeed of S seconds, too")
+    parser.add_argument(
+        "--across", type=options.at_least_one, nargs=2, default=(3, 2), metavar=("L", "D"), help="segments and degree of the memory (3 2)"
+    )
+    parser.add_argument("--order", type=options.at_least_one, default=1, metavar="M", help="V of degree 2M in the states, for --stability")
+    parser.add_argument("--segments", type=options.at_least_one, nargs="+", metavar="K", help="segments of P in airspeed, tried in turn")
+    parser.add_argument("--grading", type=options.positive, metavar="G", help="knots at (k/K)^G of the range (2; with a memory 1.5)")
     parser.add_argument("--stability", action="store_true", help="stability only, no gain")
     parser.add_argument("--rigorous", action="store_true", help="verify once more in exact rational arithmetic")
 
@@ -48,7 +55,7 @@ def run(arguments: argparse.Namespace) -> Output:
     else:
         progress(f"searching a Lyapunov function for |dV/dt| <= {arguments.rate:g} m/s^2")
         certify = synthesis.stability if arguments.stability else synthesis.l2_gain
-        cert, rate = certify(loop, rate=arguments.rate), arguments.rate
+        cert, rate = certify(loop, rate=arguments.rate, relaxation=_relaxation(arguments)), arguments.rate
     exact = None
     if arguments.rigorous:
         progress("verifying in rational arithmetic")
@@ -62,3 +69,13 @@ def run(arguments: argparse.Namespace) -> Output:
         "seconds": cert.seconds._asdict(),
     }  # fmt: skip
     return Output(text, data, status=0 if cert.verified and exact is not False else 1)
+
+
+def _relaxation(arguments: argparse.Namespace) -> Relaxation:
+    from synthesis import Relaxation
+
+    segments, (across, degree) = arguments.segments, arguments.across
+    return Relaxation(
+        segments=tuple(segments) if segments else None, grading=arguments.grading or (1.5 if arguments.memory else 2.0),
+        order=arguments.order, memory=arguments.memory, memory_segments=across, memory_degree=degree,
+    )  # fmt: skip

@@ -1,6 +1,7 @@
 """LPV models the tests share."""
 
 import numpy as np
+from scipy.optimize import brentq
 
 from symheli.lpv import LPVStateSpace, Scheduling
 
@@ -14,6 +15,19 @@ def spring(rate=0.02, damping=0.05, change=0.6):
     """x'' + 2 d x' + (1 + change p) x = u, p in [-1, 1]: frozen stable, pumped up when p switches every quarter period."""
     A = [[[0, 1], [-1, -2 * damping]], [[0, 0], [-change, 0]]]
     return LPVStateSpace.polynomial(A, [[[0.0], [1]]], [[[1.0, 0]]], [[[0.0]]], Scheduling("p", "1", -1.0, 1.0, rate))
+
+
+def fastest_growth(damping, change):
+    """Largest growth rate of x'' + 2 d x' + (1 + c p) x = 0 over every p(t) in [-1, 1], by the angle of (x, x').
+
+    Where r' = r f(angle, p), angle' = -g(angle, p), the best rate is the one at which the integral over half a turn of
+    max_p (f - rate)/g vanishes.
+    """
+    angle = (np.arange(4000) + 0.5) * np.pi / 4000
+    c, s = np.cos(angle), np.sin(angle)
+    k = np.array([[1 - change], [1 + change]])
+    f, g = s * c * (1 - k) - 2 * damping * s**2, s**2 + k * c**2 + 2 * damping * s * c
+    return brentq(lambda rate: ((f - rate) / g).max(axis=0).sum(), -1.0, 1.0)
 
 
 def constant(A, B, C, D, dt=None):

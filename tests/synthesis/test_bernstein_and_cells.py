@@ -9,10 +9,10 @@ from models import lag, random_stable
 from synthesis import SplineLyapunov
 from synthesis.bernstein import blossom, composition, elevate, multiply, restriction
 from synthesis.cells import strips
+from synthesis.claim import Claim, lmi_polynomials
 from synthesis.lyapunov import graded_knots
 from synthesis.pieces import model_pieces
 from synthesis.symmetric import smat, svec
-from synthesis.verify import Claim, lmi_polynomials
 
 
 def value(F, x, s=0.0):
@@ -87,7 +87,7 @@ def test_lmi_polynomials_are_the_lmi_at_every_point(dt):
     rng = np.random.default_rng(4)
     coefficients = rng.standard_normal((5, 3, 3))
     P = SplineLyapunov(np.array([0.0, 0.25, 1.0]), 2, coefficients + np.swapaxes(coefficients, 1, 2))
-    forms = list(lmi_polynomials(Claim(model_pieces(lpv), P, 0.7, dt), float))
+    forms = [form.block for form in lmi_polynomials(Claim(model_pieces(lpv), P, 0.7, dt), float)]
     p = 0.6
     A, B, C, D = lpv.matrices(p)
     Y = np.hstack([C, D])

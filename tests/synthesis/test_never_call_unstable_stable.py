@@ -11,7 +11,8 @@ import synthesis
 from symheli.errors import InputError, SolverError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import Relaxation, Solver, SplineLyapunov, Status, installed_solvers, l2_gain, stability
-from synthesis.proof_search import prove, scaled_problem
+from synthesis.forms import scaled_problem
+from synthesis.proof_search import prove
 
 COARSE = Relaxation(segments=(2,), degree=2)
 

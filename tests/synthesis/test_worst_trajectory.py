@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import lateral, random_stable, spring
-from scipy.optimize import brentq
+from models import fastest_growth, lateral, random_stable, spring
 
 from synthesis.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
 from synthesis.certificate import Trajectory
@@ -72,19 +71,6 @@ def test_the_lifted_response_from_rest_is_the_step_by_step_one():
         x, energy = z[:3], energy + z[3:] @ z[3:]
     assert ratio_from_rest(Lifted.of(system), v, 1)[0] == pytest.approx(math.sqrt(energy) / np.linalg.norm(v), rel=1e-12)
     assert gain(system).value == pytest.approx(math.log(worst_input(system)[0]), rel=1e-3)
-
-
-def fastest_growth(damping, change):
-    """Largest growth rate of x'' + 2 d x' + (1 + c p) x = 0 over every p(t) in [-1, 1], by the angle of (x, x').
-
-    Where r' = r f(angle, p), angle' = -g(angle, p), the best rate is the one at which the integral over half a turn of
-    max_p (f - rate)/g vanishes.
-    """
-    angle = (np.arange(4000) + 0.5) * np.pi / 4000
-    c, s = np.cos(angle), np.sin(angle)
-    k = np.array([[1 - change], [1 + change]])
-    f, g = s * c * (1 - k) - 2 * damping * s**2, s**2 + k * c**2 + 2 * damping * s * c
-    return brentq(lambda rate: ((f - rate) / g).max(axis=0).sum(), 0.0, 1.0)
 
 
 def test_the_ascent_reaches_the_fastest_pumping_of_a_spring():
