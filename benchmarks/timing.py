@@ -7,27 +7,35 @@ import json
 import statistics
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 
-def medians(candidates: dict[str, Callable[[], object]], seconds: float) -> dict[str, float]:
-    """Median time of one call of each, in s, over about `seconds` of interleaved runs each."""
+def medians(
+    candidates: dict[str, Callable[[], object]], seconds: float, clock: Callable[[], float] = time.perf_counter
+) -> dict[str, float]:
+    """Median time of one call of each, in s, over about `seconds` of interleaved runs each.
+
+    `clock` time.thread_time counts what one thread works and not what others keep it from: for work of one thread on a busy machine.
+    """
     spent: dict[str, list[float]] = {name: [] for name in candidates}
     for call in candidates.values():
         call()
     end = time.perf_counter() + seconds * len(candidates)
     while time.perf_counter() < end or min(len(t) for t in spent.values()) < 3:
         for name, call in candidates.items():
-            begin = time.perf_counter()
+            begin = clock()
             call()
-            spent[name].append(time.perf_counter() - begin)
+            spent[name].append(clock() - begin)
     return {name: statistics.median(times) for name, times in spent.items()}
 
 
-def arguments(description: str) -> argparse.Namespace:
-    """--quick and --json, as every benchmark has them."""
+def arguments(description: str, plot: bool = False) -> argparse.Namespace:
+    """--quick and --json, as every benchmark has them; --plot where there is something to draw."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--quick", action="store_true", help="shorter runs, under 40 s")
     parser.add_argument("--json", action="store_true", help="print each ratio by name")
+    if plot:
+        parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the result (needs matplotlib)")
     return parser.parse_args()
 
 
@@ -39,4 +47,4 @@ def show(options: argparse.Namespace, times: dict[str, float], ratios: dict[str,
     for name, value in times.items():
         print(f"{name:60s}{1e6 * value:14.2f} us")
     for name, value in ratios.items():
-        print(f"{name:60s}{value:14.2f} x")
+        print(f"{name:60s}{value:14.2f}")

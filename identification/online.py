@@ -9,6 +9,7 @@ import numpy as np
 from identification.kernel import configuration as at
 from identification.kernel import twin
 from identification.kernel.configuration import Configuration
+from identification.kernel.twin import DETERMINED, LEARNT, REFUSED, SATURATED
 from identification.rls_state import RLSState
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array
@@ -23,9 +24,10 @@ class Online:
 
     def __init__(self, configuration: Configuration, kernel: Any, state: RLSState):
         self._configuration, self._kernel, self._start = configuration, kernel, state
-        self._state = state.memory.copy()
-        self._work = np.zeros(configuration.sizes[1], configuration.dtype)
-        self._status, self._learnt = 0, False
+        self._state, self._work = (aligned(size, configuration.dtype) for size in configuration.sizes)
+        self._state[:] = state.memory
+        self._status = (DETERMINED if state.determined else 0) | (SATURATED if state.saturated else 0)
+        self._views = None if len(configuration.groups) > 1 else _coefficients(configuration, self._state)
 
     def update(self, y: object, u: object, p: object) -> bool:
         """Take in y (ny,), u (nu,), p of one instant; True where a complete regressor was there and the coefficients moved.
@@ -33,23 +35,18 @@ class Online:
         A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises `InputError` for wrong shapes,
         infinite values and p outside the basis; the coefficients are then as before and the lags start afresh.
         """
-        c, more = self._configuration, ()
-        if not c.factors:
-            p = vector(p, len(c.structure.parameters), "p")
-            more = (functions(c, p[None, :])[0],)
         try:
-            status = self._kernel.update(self._state, self._work, y, u, p, *more)
+            self._status = status = self._kernel.update(self._state, self._work, y, u, p)
         except (TypeError, ValueError, BufferError):
-            arx = c.structure
-            parts = vector(y, arx.ny, "y"), vector(u, arx.nu, "u"), vector(p, len(arx.parameters), "p")
-            status = self._kernel.update(self._state, self._work, *parts, *more)
-        if status & twin.REFUSED:
-            complain(c, y, u, p)
-        return self._done(status)
+            self._status = status = self._convert_and_update(y, u, p)
+        if status & REFUSED:
+            complain(self._configuration, y, u, p)
+        return status & LEARNT != 0
 
     def absorb(self, phi: Array, y: Array) -> bool:
         """Take in one regressor phi (n,) with the outputs y (ny,) it must explain, float64; the lags are left alone."""
-        return self._done(self._kernel.absorb(self._state, self._work, phi, y))
+        self._status = self._kernel.absorb(self._state, self._work, phi, y)
+        return True
 
     def run(self, samples: Array, history: bool = True) -> tuple[Array, Array | None, Array | None]:
         """Take in rows [y, u, p] (k, ny + nu + parameters), p within the basis.
@@ -68,13 +65,11 @@ class Online:
         innovations = np.full((k, arx.ny), np.nan, dtype) if history else None
         coefficients = np.empty((k, arx.n_regressors, arx.ny), dtype) if history else None
         self._kernel.run(self._state, self._work, samples, statuses, innovations, coefficients)
-        if (refused := np.flatnonzero(statuses & twin.REFUSED)).size:
+        if (refused := np.flatnonzero(statuses & REFUSED)).size:
             row = samples[refused[0]]
             complain(self._configuration, *np.split(row[:width], [arx.ny, arx.ny + arx.nu]))
-        learnt = (statuses & twin.LEARNT).astype(bool)
-        self._learnt = self._learnt or bool(learnt.any())
         self._status = int(statuses[-1]) if k else self._status
-        return learnt, innovations, coefficients
+        return (statuses & LEARNT).astype(bool), innovations, coefficients
 
     def forget_past(self) -> None:
         """The next update finds no past: after a gap in the data."""
@@ -83,10 +78,7 @@ class Online:
     @property
     def coefficients(self) -> Array:
         """(n, ny) as they are now: a view of what `update` changes where all outputs share their regressors, else a copy."""
-        if len(self._configuration.groups) > 1:
-            return twin.theta(self._configuration, self._state)
-        layout = self._configuration.groups[0]
-        return self._state[layout.in_state["theta"]].reshape(layout.m, -1)[:, : layout.n].T
+        return twin.theta(self._configuration, self._state) if self._views is None else self._views
 
     @property
     def innovation(self) -> Array:
@@ -108,25 +100,38 @@ class Online:
     @property
     def determined(self) -> bool:
         """Whether the data fix every coefficient."""
-        return bool(self._status & twin.DETERMINED_BIT) if self._learnt else self._start.determined
+        return self._status & DETERMINED != 0
 
     @property
     def saturated(self) -> bool:
         """Whether an ordinary sample is lost to rounding; see `RLSState.saturated`."""
-        return bool(self._status & twin.SATURATED) if self._learnt else self._start.saturated
+        return self._status & SATURATED != 0
 
     @property
     def state(self) -> RLSState:
         """What is known now, as a value."""
-        memory = self._state.copy()
-        return RLSState(self._configuration, memory) if self._learnt else self._start.after_idling(memory)
+        memory, knew = self._state.copy(), self._start.memory
+        learnt = memory[at.COUNT] != knew[at.COUNT] or memory[at.MILLIONS] != knew[at.MILLIONS]
+        return RLSState(self._configuration, memory) if learnt else self._start.after_idling(memory)
 
-    def _done(self, status: int) -> bool:
-        self._status = status
-        if status & twin.LEARNT:
-            self._learnt = True
-            return True
-        return False
+    def _convert_and_update(self, y: object, u: object, p: object) -> int:
+        """For anything but float64 arrays, and for functions of p that only Python knows."""
+        c, arx = self._configuration, self._configuration.structure
+        parts = vector(y, arx.ny, "y"), vector(u, arx.nu, "u"), vector(p, len(arx.parameters), "p")
+        more = () if c.factors else functions(c, parts[-1][None, :])
+        return self._kernel.update(self._state, self._work, *parts, *more)
+
+
+def aligned(size: int, dtype: type[np.floating]) -> Array:
+    """Zeros that start at a cache line, where the longest vector registers load fastest."""
+    raw = np.zeros(size * np.dtype(dtype).itemsize + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    return raw[start : start + size * np.dtype(dtype).itemsize].view(dtype)
+
+
+def _coefficients(configuration: Configuration, memory: Array) -> Array:
+    layout = configuration.groups[0]
+    return memory[layout.in_state["theta"]].reshape(layout.m, -1)[:, : layout.n].T
 
 
 def vector(value: object, size: int, name: str) -> Array:

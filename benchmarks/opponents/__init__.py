@@ -1,1 +1,1 @@
-"""The same helicopter as others would write it: by hand in Python, in Numba, in C, and in python-control. No symheli in here."""
+"""As others would write it: the helicopter by hand in Python, Numba, C and python-control, RLS, an LPV analysis. No symheli in here."""

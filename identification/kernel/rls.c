@@ -112,7 +112,7 @@ void rls_init(const rls_config *c, rls_real *state, rls_real *work)
     }
 }
 
-static inline rls_real absolute(rls_real a) { return a < 0 ? -a : a; }
+static inline rls_real absolute(rls_real a) { return a > -a ? a : -a; }
 
 static inline rls_real dot(const rls_real *restrict a, const rls_real *restrict b, int length)
 {
@@ -122,11 +122,27 @@ static inline rls_real dot(const rls_real *restrict a, const rls_real *restrict 
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-/* For each row i in turn: x <- x - first[i] row, row <- row + gain[i] x. */
-static inline void rotate(rls_real *restrict rows, int stride, int count, rls_real *restrict x, int length, const rls_real *restrict first,
-                          const rls_real *restrict gain)
+/* For each row i in turn: x <- x - first[i] row, row <- row + gain[i] x. Four rows at a time save loads and stores of x. */
+static inline void rotate(rls_real *rows, int stride, int count, rls_real *restrict x, int length, const rls_real *first, const rls_real *gain)
 {
-    for (int i = 0; i < count; i++) {
+    int i = 0;
+    for (; i + 4 <= count; i += 4) {
+        rls_real *restrict r0 = rows + i * stride, *restrict r1 = r0 + stride, *restrict r2 = r1 + stride, *restrict r3 = r2 + stride;
+        const rls_real f0 = first[i], f1 = first[i + 1], f2 = first[i + 2], f3 = first[i + 3];
+        const rls_real g0 = gain[i], g1 = gain[i + 1], g2 = gain[i + 2], g3 = gain[i + 3];
+        for (int k = 0; k < length; k++) {
+            rls_real t = x[k] - f0 * r0[k];
+            r0[k] += g0 * t;
+            t -= f1 * r1[k];
+            r1[k] += g1 * t;
+            t -= f2 * r2[k];
+            r2[k] += g2 * t;
+            t -= f3 * r3[k];
+            r3[k] += g3 * t;
+            x[k] = t;
+        }
+    }
+    for (; i < count; i++) {
         rls_real *restrict row = rows + i * stride;
         const rls_real f = first[i], g = gain[i];
         for (int k = 0; k < length; k++) {
@@ -147,73 +163,136 @@ static inline void renew(rls_real *restrict row, rls_real *restrict x, int lengt
     }
 }
 
+/* What x, of weight 1/w[0], does to `rows` rows of a block: lead, the entry each eliminates; gain; the new d; w[i + 1], the weight that is
+   left. 0 where a row must be renewed: then nothing of it is used. */
+static inline int plan(const rls_real *block, int stride, int rows, const rls_real *x, const rls_real *d, rls_real kept, rls_real *lead,
+                       rls_real *gain, rls_real *new_d, rls_real *w)
+{
+    rls_real ratio[LANES], old[LANES];
+    int plain = 1;
+    for (int i = 0; i < rows; i++) {
+        rls_real f = x[i];
+        for (int k = 0; k < i; k++) f -= lead[k] * block[k * stride + i];
+        lead[i] = f;
+    }
+    for (int i = 0; i < rows; i++) {
+        old[i] = kept * d[i];
+        ratio[i] = lead[i] / old[i];
+    }
+    for (int i = 0; i < rows; i++) {
+        w[i + 1] = w[i] + lead[i] * ratio[i];
+        plain &= (w[i + 1] <= 4 * w[i]) & (old[i] > TINY);
+    }
+    for (int i = 0; i < rows; i++) {
+        gain[i] = ratio[i] / w[i + 1];
+        new_d[i] = old[i] + lead[i] * (lead[i] / w[i]);
+    }
+    return plain;
+}
+
+/* The same row by row, where one is new or of little weight: its old content goes, or cancels. Returns the weight that is left. */
+static rls_real renew_rows(const group *a, int start, int first, int rows, rls_real kept, rls_real w)
+{
+    const int length = a->wide - start;
+    rls_real *x = a->x + start, *block = a->triangle + row_offset(start, a->wide);
+    for (int i = first; i < rows; i++) {
+        const rls_real f = x[i], d = kept * a->d[start + i], ratio = f / d, sum = w + f * ratio;
+        rls_real gain = 0, *row = block + i * length;
+        if (f == 0) {
+            a->d[start + i] = d;
+        } else if (sum <= 4 * w && d > TINY) {
+            gain = ratio / sum;
+            a->d[start + i] = d + f * (f / w);
+            w = sum;
+            rotate(row, length, 1, x, length, &f, &gain);
+        } else {
+            const int known = d > TINY;
+            gain = known ? ratio / sum : 1 / f;
+            renew(row, x, length, f, gain, known ? w / sum : 0);
+            row[i] = 1;
+            a->d[start + i] = (known ? d : 0) + f * (f / w);
+            w = known ? sum : 1 / TINY;
+        }
+        a->s[start + i] = gain;
+    }
+    return w;
+}
+
 /* Rotate x, of weight 1/w, into rows first .. last - 1, whose information is first multiplied by `kept`. Returns what w has become;
    s gets R^-T phi in the scale of the triangle. */
 static inline rls_real sweep(const group *a, int first, int last, rls_real kept, rls_real w)
 {
-    rls_real lead[LANES], gain[LANES];
     for (int start = row_start(first); start < last; start += LANES) {
         const int length = a->wide - start, rows = last - start < LANES ? last - start : LANES;
-        rls_real *x = a->x + start, *block = a->triangle + row_offset(start, a->wide);
-        int done = first > start ? first - start : 0;
-        for (int i = done; i < rows; i++) {
-            const rls_real f = x[i], d = kept * a->d[start + i], ratio = f / d, sum = w + f * ratio;
-            lead[i] = f;
-            if (f == 0) {
-                gain[i] = 0;
-                a->d[start + i] = d;
-            } else if (sum <= 4 * w && d > TINY) {
-                gain[i] = ratio / sum;
-                a->d[start + i] = d + f * (f / w);
-                w = sum;
-                rotate(block + i * length, length, 1, x, LANES, lead + i, gain + i);
-            } else {
-                const int known = d > TINY;
-                rotate(block + done * length + LANES, length, i - done, x + LANES, length - LANES, lead + done, gain + done);
-                gain[i] = known ? ratio / sum : 1 / f;
-                renew(block + i * length, x, length, f, gain[i], known ? w / sum : 0);
-                block[i * length + i] = 1;
-                a->d[start + i] = (known ? d : 0) + f * (f / w);
-                w = known ? sum : 1 / TINY;
-                done = i + 1;
-            }
-            a->s[start + i] = gain[i];
+        rls_real lead[LANES], gain[LANES], d[LANES], weight[LANES + 1], *x = a->x + start, *block = a->triangle + row_offset(start, a->wide);
+        int plain = first <= start;
+        weight[0] = w;
+        if (plain && rows == LANES) /* the usual case, with a constant for the compiler */
+            plain = plan(block, length, LANES, x, a->d + start, kept, lead, gain, d, weight);
+        else if (plain)
+            plain = plan(block, length, rows, x, a->d + start, kept, lead, gain, d, weight);
+        if (plain) {
+            rotate(block, length, rows, x, length, lead, gain);
+            for (int i = 0; i < rows; i++) a->d[start + i] = d[i];
+            for (int i = 0; i < rows; i++) a->s[start + i] = gain[i];
+            w = weight[rows];
+        } else {
+            w = renew_rows(a, start, first > start ? first - start : 0, rows, kept, w);
         }
-        rotate(block + done * length + LANES, length, rows - done, x + LANES, length - LANES, lead + done, gain + done);
     }
     return w;
 }
 
 /* Whether column i of R stands out of the span of those before it, as far as rounding lets us see. */
-static inline int is_known(const group *a, int i) { return a->d[i] > EPSILON * a->energy[i]; }
+static inline int is_known(rls_real d, rls_real energy) { return d > EPSILON * energy; }
+
+/* Solve with the triangle of a block of rows: g <- block^-1 g, 0 where a coefficient is not known. */
+static inline void solve_block(const rls_real *block, int stride, int rows, const rls_real *d, const rls_real *energy, rls_real *g)
+{
+    rls_real t[LANES];
+    for (int i = rows - 1; i >= 0; i--) {
+        rls_real sum = g[i];
+        for (int k = rows - 1; k > i; k--) sum -= block[i * stride + k] * t[k];
+        t[i] = is_known(d[i], energy[i]) ? sum : 0;
+    }
+    for (int i = 0; i < rows; i++) g[i] = t[i];
+}
 
 /* gain <- triangle^-1 s; a coefficient that is not known stays as it is, and the others explain the data without it. */
 static inline void back_substitute(const group *a)
 {
     for (int k = 0; k < a->tall; k++) a->gain[k] = 0;
     for (int start = a->tall - LANES; start >= 0; start -= LANES) {
-        const int rows = a->n - start < LANES ? a->n - start : LANES, length = a->wide - start;
-        const rls_real *block = a->triangle + row_offset(start, a->wide);
+        const int rows = a->n - start < LANES ? a->n - start : LANES, length = a->wide - start, right = a->tall - start - LANES;
+        const rls_real *block = a->triangle + row_offset(start, a->wide), *d = a->d + start, *energy = a->energy + start;
         rls_real *g = a->gain + start;
-        for (int i = 0; i < rows; i++) g[i] = a->s[start + i] - dot(block + i * length + LANES, g + LANES, a->tall - start - LANES);
-        for (int i = rows - 1; i >= 0; i--) {
-            if (!is_known(a, start + i)) g[i] = 0;
-            for (int k = 0; k < i; k++) g[k] -= block[k * length + i] * g[i];
-        }
+        for (int i = 0; i < rows; i++) g[i] = a->s[start + i] - dot(block + i * length + LANES, g + LANES, right);
+        if (rows == LANES) /* the usual case, with a constant for the compiler */
+            solve_block(block, length, LANES, d, energy, g);
+        else
+            solve_block(block, length, rows, d, energy, g);
     }
 }
 
-/* Largest regressors so far. One that is seen for the first time gets its prior: nothing is in its row and column yet. Returns the
-   largest ratio of a regressor to its largest. */
-static inline rls_real new_peaks(const group *a)
+/* Largest regressors so far. One that is seen for the first time gets its prior: nothing is in its row and column yet. */
+static inline void new_peaks(const group *a)
+{
+    int fresh = 0;
+    for (int i = 0; i < a->tall; i++) fresh += (a->peak[i] == 0) & (a->phi[i] != 0);
+    for (int i = 0; fresh && i < a->n; i++)
+        if (a->peak[i] == 0) a->d[i] = a->energy[i] = a->fed[i] = PRIOR * (a->phi[i] * a->phi[i]);
+    for (int i = 0; i < a->tall; i++) {
+        const rls_real size = absolute(a->phi[i]);
+        a->peak[i] = size > a->peak[i] ? size : a->peak[i];
+    }
+}
+
+/* The largest ratio of a regressor to its largest. */
+static inline rls_real loudness(const group *a)
 {
     rls_real loudest = 0;
-    for (int i = 0; i < a->n; i++) {
-        const rls_real size = absolute(a->phi[i]);
-        if (a->peak[i] == 0 && size > 0) a->d[i] = a->energy[i] = a->fed[i] = PRIOR * (size * size);
-        if (size > a->peak[i]) a->peak[i] = size;
-        if (size > loudest * a->peak[i]) loudest = size / a->peak[i];
-    }
+    for (int i = 0; i < a->n; i++)
+        if (absolute(a->phi[i]) > loudest * a->peak[i]) loudest = absolute(a->phi[i]) / a->peak[i];
     return loudest;
 }
 
@@ -254,10 +333,10 @@ static inline int is_settled(const rls_forgetting *f, const group *a)
 
 /* A sample counts in the usual power no more than tenfold, and what is usual comes down with what is recent: a jump or an outlier does not
    pass for usual. Source of the variable factor: Fortescue, Kershenbaum and Ydstie (1981), with both powers taken from the innovations. */
-static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a, rls_real loudest)
+static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a)
 {
     rls_real steps, recent, usual, ratio = 0, factor;
-    if (f->kind == RLS_DIRECTIONAL) return loudest < f->quiet ? 1 : f->factor;
+    if (f->kind == RLS_DIRECTIONAL) return loudness(a) < f->quiet ? 1 : f->factor;
     if (f->kind == RLS_CONSTANT || !is_settled(f, a)) return f->factor;
     steps = a->header[STEPS] + 1;
     if (steps * f->usual <= 2) a->header[STEPS] = steps;
@@ -320,7 +399,7 @@ static inline int is_determined(const group *a)
 {
     const rls_real beyond = a->header[DETERMINED] == 0 ? 2 : 0;
     int known = 0;
-    for (int i = 0; i < a->n; i++) known += is_known(a, i) && a->d[i] > beyond * a->fed[i];
+    for (int i = 0; i < a->n; i++) known += is_known(a->d[i], a->energy[i]) & (a->d[i] > beyond * a->fed[i]);
     return known == a->n;
 }
 
@@ -329,7 +408,8 @@ static void learn(const rls_forgetting *f, const group *a, const int *output, co
     const int turn = (int)a->header[TURN];
     rls_real factor, kept, w;
     for (int j = 0; j < a->m; j++) a->innovation[j] = y[output[j]] - dot(a->phi, a->theta + j * a->tall, a->tall);
-    factor = forgetting_factor(f, a, new_peaks(a));
+    new_peaks(a);
+    factor = forgetting_factor(f, a);
     kept = f->kind == RLS_DIRECTIONAL ? 1 : factor;
     replenish(f, a, turn);
     if (factor < kept) forget_direction(a, factor);

@@ -11,7 +11,7 @@ from identification.kernel import configuration as at
 from identification.kernel.configuration import LANES, Configuration, Factor, GroupLayout
 from symheli.lpv.arrays import Array
 
-LEARNT, DETERMINED_BIT, SATURATED, REFUSED = 1, 2, 4, 8
+LEARNT, DETERMINED, SATURATED, REFUSED = 1, 2, 4, 8
 CONSTANT, VARIABLE, DIRECTIONAL = 0, 1, 2
 
 
@@ -85,6 +85,10 @@ class Kernel:
 
     def update(self, state: Array, work: Array, y: Array, u: Array, p: Any, f: Array | None = None) -> int:
         """Take in one sample, with the functions f(p) where the configuration has no factors; returns the status bits."""
+        if (f is None) != bool(self._c.factors) or not all(isinstance(v, np.ndarray) and v.dtype == np.float64 for v in (y, u)):
+            raise TypeError("expected float64 arrays, and the functions only where the kernel does not know them")
+        if y.shape != (self._c.structure.ny,) or u.shape != (self._c.structure.nu,):
+            raise ValueError("wrong number of outputs or inputs")
         parts = (y, u, np.atleast_1d(p)) if f is None else (y, u, np.atleast_1d(p), f)
         with np.errstate(all="ignore"):
             return self._update(state, work, np.concatenate(parts).astype(self._c.dtype))
@@ -163,11 +167,11 @@ class Kernel:
         return LEARNT | self._status(state)
 
     def _status(self, state: Array) -> int:
-        bits = DETERMINED_BIT
+        bits = DETERMINED
         for layout in self._c.groups:
             header = state[layout.in_state["header"]]
             if header[at.DETERMINED] == 0:
-                bits &= ~DETERMINED_BIT
+                bits &= ~DETERMINED
             if header[at.WEIGHT] * self._limits.epsilon >= 1:
                 bits |= SATURATED
         return bits
@@ -177,7 +181,8 @@ class Kernel:
         turn = int(a.header[at.TURN])
         for j in range(m):
             a.innovation[j] = y[j] - dot(a.phi, a.theta[j])
-        factor = self._forgetting_factor(a, self._new_peaks(a))
+        self._new_peaks(a)
+        factor = self._forgetting_factor(a)
         kept = self._real(1) if self._kind == DIRECTIONAL else factor
         self._replenish(a, turn)
         if factor < kept:
@@ -201,21 +206,23 @@ class Kernel:
         for i in range(turn, n + m, n):
             self._drop_underflow(a, i)
 
-    def _new_peaks(self, a: View) -> Any:
+    def _new_peaks(self, a: View) -> None:
         n = a.n
-        size, peak = np.abs(a.phi[:n]), a.peak[:n]
-        fresh = (peak == 0) & (size > 0)
-        prior = a.peak.dtype.type(self._limits.prior) * (size[fresh] * size[fresh])
+        phi, peak = a.phi[:n], a.peak[:n]
+        fresh = (peak == 0) & (phi != 0)
+        prior = a.peak.dtype.type(self._limits.prior) * (phi[fresh] * phi[fresh])
         for part in (a.d[:n], a.energy[:n], a.fed[:n]):
             part[fresh] = prior
-        np.maximum(peak, size, out=peak)
-        known = peak > 0
-        return self._real((size[known] / peak[known]).max(initial=0))
+        np.maximum(peak, np.abs(phi), out=peak)
 
-    def _forgetting_factor(self, a: View, loudest: Any) -> Any:
+    def _loudness(self, a: View) -> Any:
+        known = a.peak > 0
+        return self._real((np.abs(a.phi[known]) / a.peak[known]).max(initial=0))
+
+    def _forgetting_factor(self, a: View) -> Any:
         real, one = self._real, self._real(1)
         if self._kind == DIRECTIONAL:
-            return one if loudest < self._quiet else self._factor
+            return one if self._loudness(a) < self._quiet else self._factor
         if self._kind == CONSTANT or not self._is_settled(a):
             return self._factor
         steps = real(a.header[at.STEPS]) + one

@@ -1,5 +1,7 @@
 """Every way of forgetting stays awake through a long silence, follows a jump, and says what is wrong with its options."""
 
+import functools
+
 import numpy as np
 import pytest
 from known_systems import Truth, moving, structure
@@ -57,13 +59,20 @@ def test_silence_of_exactly_zero_costs_no_time_and_no_digit_underflows():
     assert np.isfinite(memory).all()
 
 
-def error_after_jump(way, after):
+@functools.cache
+def flights():
+    """One plant for 2000 samples, then another for 1000; their coefficients."""
     first, second = Truth(structure(), seed=0), Truth(structure(), seed=1)
-    online = idn.RecursiveLeastSquares(first.arx, way).online()
-    online.run(rows(first.record(moving(2000), noise=0.02)), history=False)
-    settled = np.abs(online.coefficients - first.theta).max()
-    online.run(rows(second.record(moving(after), noise=0.02, seed=3)), history=False)
-    return settled, np.abs(online.coefficients - second.theta).max()
+    return rows(first.record(moving(2000), noise=0.02)), first.theta, rows(second.record(moving(1000), noise=0.02, seed=3)), second.theta
+
+
+def error_after_jump(way, after):
+    before, old, rest, new = flights()
+    online = idn.RecursiveLeastSquares(structure(), way).online()
+    online.run(before, history=False)
+    settled = np.abs(online.coefficients - old).max()
+    online.run(rest[:after], history=False)
+    return settled, np.abs(online.coefficients - new).max()
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -88,7 +97,7 @@ def test_what_never_moves_again_is_remembered_by_directional_forgetting_alone():
     for name, way in (("constant", idn.Constant(0.98, floor=0.0)), ("directional", idn.Directional(0.98))):
         online = idn.RecursiveLeastSquares(truth.arx, way).online()
         online.run(rows(truth.record(moving(400), noise=0.01)), history=False)
-        online.run(rows(truth.record(np.full(2000, 2.0), noise=0.01, seed=4)), history=False)
+        online.run(rows(truth.record(np.full(1000, 2.0), noise=0.01, seed=4)), history=False)
         n = truth.arx.n_regressors
         kept[name] = np.linalg.svd(online.state.factor[:n, :n], compute_uv=False).min()
     assert kept["directional"] > 1.0
