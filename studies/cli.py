@@ -13,7 +13,10 @@ from typing import Any
 from studies.output import Output, as_json
 from symheli.errors import SymheliError
 
-VERBS = ("study", "vehicles", "trim", "linearize", "identify", "margins", "certify", "export", "campaign", "pays", "design", "doctor")
+VERBS = (
+    "study", "vehicles", "trim", "linearize", "derivatives", "envelope", "identify", "margins", "certify", "export", "campaign", "pays",
+    "design", "doctor",
+)  # fmt: skip
 """Each is the module of that name in `studies.commands`."""
 
 

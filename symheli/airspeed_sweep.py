@@ -17,18 +17,25 @@ from symheli.lpv.linear_family import LinearFamily
 _MEANINGLESS = 1e-7  # a switching function that stays below this is zero, not switching
 
 
-def sweep(heli: Helicopter, airspeeds: Sequence[float], *, climb_rate: float = 0.0, inputs: Sequence[str] | None = None) -> LinearFamily:
+def sweep(
+    heli: Helicopter, airspeeds: Sequence[float], *, climb_rate: float = 0.0, inputs: Sequence[str] | None = None,
+    start: LinearFamily | None = None,
+) -> LinearFamily:  # fmt: skip
     """Trim and linearize at each of `airspeeds` (m/s, increasing), each trim started from the one before.
 
-    `inputs` as in `linearize`. `.kinks` of the result lists, by cause, the airspeeds between the first and the last at
-    which the linear models have a corner (a wake edge, a limit, a flow reversal). Raises `TrimError`, `InputError`.
+    `inputs` as in `linearize`. `start`: a family at the same airspeeds whose trims are near, to start from instead. `.kinks` of
+    the result lists, by cause, the airspeeds between the first and the last at which the linear models have a corner (a wake
+    edge, a limit, a flow reversal). Raises `TrimError`, `InputError`.
     """
     speeds = [float(v) for v in np.atleast_1d(airspeeds)]
     if not speeds or any(b <= a for a, b in pairwise(speeds)):
         raise InputError("sweep needs increasing airspeeds")
+    if start and not np.array_equal(start.airspeeds, speeds):
+        raise InputError("the family to start from has other airspeeds")
     points: list[TrimPoint] = []
-    for speed in speeds:
-        points.append(trim(heli, speed, climb_rate=climb_rate, start=points[-1] if points else None))
+    for k, speed in enumerate(speeds):
+        near = start.trims[k] if start else points[-1] if points else None
+        points.append(trim(heli, speed, climb_rate=climb_rate, start=near))  # type: ignore[arg-type]
     models = [linearize(heli, point, inputs=inputs) for point in points]
     return LinearFamily.from_models(speeds, models, kink_speeds(heli, points))
 

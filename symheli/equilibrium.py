@@ -105,6 +105,7 @@ def _failure(heli: Helicopter, best: TrimPoint) -> str:
             f"no trim at {best.condition}: the best point leaves {table}",
             *([_stops(best)] if best.on_stops else []),
             *_throttle(heli, best),
+            *_jumps(heli, best),
             *(["in a vortex ring"] if best.vortex_ring else []),
             "try a nearer condition as `start`, or throw=False for the best point",
         ]
@@ -119,6 +120,13 @@ def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
     if throttle >= 1:
         return ["full throttle: the engine lacks power"]
     return ["throttle closed: the air drives the rotor, whose speed no governor holds"] if throttle <= 0 else []
+
+
+def _jumps(heli: Helicopter, point: TrimPoint) -> list[str]:
+    """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as a trim would step across."""
+    switches = heli.switches(point.x.array, point.u.array, point.wind.array)
+    near = [name.partition("jump ")[2] for name, value in switches.items() if "jump " in name and abs(value) < 0.1]
+    return [f"the equations jump here, {name}: there may be no equilibrium" for name in near]
 
 
 def _continue_from_hover(heli: Helicopter, condition: FlightCondition, steps: int = 12) -> TrimPoint:
@@ -207,7 +215,7 @@ class _Problem:
         start, n = self.guess(), len(self.free)
         bound = np.concatenate([np.full(2, 1.4), np.full(n - 2, np.inf), self.heli.travel])
         start = np.clip(start, -0.9 * bound, 0.9 * bound)
-        found = least_squares(lambda z: self.residual(z)[self.equations], start, self.jacobian, bounds=(-bound, bound), max_nfev=200)
+        found = least_squares(lambda z: self.residual(z)[self.equations], start, self.jacobian, bounds=(-bound, bound), max_nfev=200)  # type: ignore[arg-type]
         return self.point(found.x)
 
     def newton(self, z: np.ndarray, steps: int = 12) -> np.ndarray:
@@ -218,7 +226,7 @@ class _Problem:
                 better = z - np.linalg.solve(self.jacobian(z), residual[self.equations])
             except np.linalg.LinAlgError:
                 break
-            left = self.residual(better) if np.all(np.isfinite(better)) else np.inf
+            left = self.residual(better) if np.all(np.isfinite(better)) else np.full_like(residual, np.inf)
             if not np.abs(left).max() < np.abs(residual).max():
                 break
             z, residual = better, left

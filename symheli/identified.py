@@ -81,10 +81,10 @@ def _model(path: str, data: Mapping[str, Any]) -> IdentifiedModel:
         raise InputError(f"{path}: expected one equation a state in the same order: {', '.join(states)}; got {', '.join(equations)}")
     signals = {name: Signal(name, to_si(unit)[1]) for name, unit in {**states, **inputs}.items()}
     factor = {name: to_si(unit)[0] for name, unit in {**states, **inputs}.items()}
-    raw = {name: table.get("value") if isinstance(table, dict) else table for name, table in data["parameters"].items()}
     parameters = {
         name: read_quantity(f"{path}, parameters.{name}", table, _si(path, name, table)) for name, table in data["parameters"].items()
     }
+    raw = {name: float(table["value"]) for name, table in data["parameters"].items()}
     matrix, theirs = (
         _coefficients(path, equations, list(signals), numbers) for numbers in ({n: q.value for n, q in parameters.items()}, raw)
     )

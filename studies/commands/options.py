@@ -23,7 +23,28 @@ def condition(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--airspeed", type=number, default=0.0, metavar="M/S", help="true airspeed, m/s (default: hover)")
     parser.add_argument("--climb-rate", type=number, default=0.0, metavar="M/S", help="m/s, up")
     parser.add_argument("--turn-rate", type=number, default=0.0, metavar="RAD/S", help="rad/s, to the right")
+    parser.add_argument("--altitude", type=number, metavar="M", help="in the standard atmosphere, m (default: sea-level density)")
     parser.add_argument("--sideslip-deg", type=number, default=0.0, metavar="DEG", help="degrees, airspeed from the right")
+
+
+def span(parser: argparse.ArgumentParser, name: str, default: tuple[float, float], points: int, what: str) -> None:
+    """LOW HIGH N: a range of speeds in m/s with its number of points."""
+    parser.add_argument(
+        name, type=number, nargs=3, action=_Span, default=(*default, points), metavar=("LOW", "HIGH", "N"),
+        help=f"{what}, m/s, and how many (default: {default[0]:g} {default[1]:g} {points})",
+    )  # fmt: skip
+
+
+class _Span(argparse.Action):
+    """Refuses a range that does not increase or has no points."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option_string: str | None = None
+    ) -> None:
+        low, high, points = values
+        if points != int(points) or points < 1 or low > high or (points > 1 and low == high):
+            parser.error(f"argument {option_string}: expected LOW < HIGH and a whole number of points, got {low:g} {high:g} {points:g}")
+        setattr(namespace, self.dest, (low, high, int(points)))
 
 
 def helicopter(arguments: argparse.Namespace) -> Helicopter:
@@ -40,7 +61,7 @@ def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
     heli = helicopter(arguments)
     point = trim(
         heli, arguments.airspeed, climb_rate=arguments.climb_rate, turn_rate=arguments.turn_rate,
-        sideslip=math.radians(arguments.sideslip_deg),
+        sideslip=math.radians(arguments.sideslip_deg), altitude=arguments.altitude,
     )  # fmt: skip
     return heli, point
 

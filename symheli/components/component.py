@@ -51,7 +51,8 @@ class Flow:
 class Effect:
     """What a part does, in body axes: force X Y Z (N) and moment L M N (N m) about its reference point (the c.g. unless the
     vehicle places it elsewhere), the derivatives of its own states, the torque it takes from the main shaft (N m, referred
-    to the main rotor), the flow it makes, and switching functions whose sign changes mark a corner of the model."""
+    to the main rotor), the flow it makes, and switching functions whose sign changes mark a corner of the model (a jump where
+    the name begins with "jump": no equilibrium need exist beside it)."""
 
     force: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
     moment: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)

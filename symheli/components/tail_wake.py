@@ -27,7 +27,7 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     k_lam = flow.name(r"K_\lambda", where(down < 0, clip(share, 0.0, 1.5, par.smoothing), 0.0))
     return Effect(
         flow={"w_wake": k_lam * flow["V_imr"], "K_lam": k_lam},
-        switches={"wake reaches the tail": chi - g_i, "tail fully in the wake": chi - g_f},
+        switches={"wake reaches the tail": chi - g_i, "tail fully in the wake": chi - g_f, "jump as the flow turns at the disc": -down},
     )
 
 

@@ -6,6 +6,7 @@ from symheli.lpv.delay import pade_delay
 from symheli.lpv.flight_record import FlightRecord
 from symheli.lpv.lft import LFT, Block, HoldError, Truncation, WellPosedness, append, connect, feedback, parallel, series
 from symheli.lpv.linear_family import LinearFamily
+from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.named_vector import NamedVector
@@ -27,6 +28,7 @@ __all__ = [
     "HoldError",
     "LPVStateSpace",
     "LinearFamily",
+    "LinearGrid",
     "LinearModel",
     "Matrices",
     "NamedVector",

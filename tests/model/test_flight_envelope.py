@@ -138,3 +138,12 @@ def test_autorotation_and_lack_of_power_are_named(pi):
     with pytest.raises(symheli.TrimError, match="full throttle: the engine lacks power"):
         symheli.trim(pi.with_parameters({"drivetrain.max_power": 300.0}), 0.0)
     assert symheli.trim(symheli.Helicopter(pi.vehicle, "ideal"), 18.0, climb_rate=-16.2).success  # that governor may brake
+
+
+def test_where_the_equations_jump_a_failure_says_so(ideal):
+    """At 20 m/s between 6.9 and 7.05 m/s down the wake factor falls from 1.5 to 0: equilibria on both sides, none between."""
+    above, below = (symheli.trim(ideal, 20.0, climb_rate=rate) for rate in (-6.9, -7.05))
+    assert above.success
+    assert below.success
+    with pytest.raises(symheli.TrimError, match="equations jump here, as the flow turns at the disc"):
+        symheli.trim(ideal, 20.0, climb_rate=-7.0)
