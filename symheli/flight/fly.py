@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from symheli.attitude import flight_state
 from symheli.environment import Wind
 from symheli.errors import InputError, SymheliError
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
@@ -106,7 +107,7 @@ class _Flight:
         measured = [heli.states.index(Signal(s)) for s in MEASURED]
         bank = SensorBank(sensors, MEASURED, self.samples, self.control_dt, seed)
         gains = np.stack([autopilot.gain(p) for p in self.speed])
-        flight = self._quaternion_start()
+        flight = flight_state(self.x0[0])
         servo = self.servos.init(self.u0[0]) if self.servos else None
         truth, states = np.empty((self.samples, len(MEASURED))), np.empty((self.samples, len(heli.states)))
         commands, inputs, air = np.empty((self.samples, 4)), np.empty((self.samples, 4)), np.empty(self.samples)
@@ -131,11 +132,6 @@ class _Flight:
                     "less excitation, noise, gusts or acceleration, please"
                 )
         return self._record(states, inputs, commands, air)
-
-    def _quaternion_start(self) -> np.ndarray:
-        x = self.x0[0]
-        cp, sp, ct, st = np.cos(x[6] / 2), np.sin(x[6] / 2), np.cos(x[7] / 2), np.sin(x[7] / 2)
-        return np.concatenate([x[:6], [cp * ct, sp * ct, cp * st, -sp * st], np.zeros(3), x[8:]])
 
     def _record(self, states: np.ndarray, inputs: np.ndarray, commands: np.ndarray, air: np.ndarray) -> FlightRecord:
         keep = slice(None, None, self.per_sample)
