@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from importlib import resources
+from pathlib import Path
 
 XCELL = (resources.files("symheli.vehicles") / "xcell60.toml").read_text(encoding="utf-8")
 
@@ -19,26 +20,9 @@ def write(folder, *sections, name="mine.toml", **changes):
     return path
 
 
-WING_COMPONENT = '''
-"""A small wing: lift along z, in linear attached flow."""
-
-from symheli.components import Component, Effect
-
-
-def evaluate(par, motion, controls, own, flow):
-    """Z = -0.5 rho S C_La u_a w_a."""
-    return Effect(force=(0.0, 0.0, -0.5 * motion.rho * par.area * par.lift_slope * motion.u_a * motion.w_a))
-
-
-COMPONENT = Component(evaluate, parameters={"area": "m^2", "lift_slope": "1/rad"}, positive=("lift_slope",))
-'''
-
-WING = """
-[wing]
-component = "./wing.py"
-area = { value = 0.3, unit = "m^2", source = "test" }
-lift_slope = { value = 4.5, unit = "1/rad", source = "test" }
-"""
+DOCS = (Path(__file__).resolve().parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
+WING_COMPONENT, WING = (re.findall(rf"```{language}\n(.*?)```", DOCS, re.DOTALL)[0] for language in ("python", "toml"))
+"""The wing of the documentation, so that it is known to work."""
 
 AFT_ROTOR = """
 [aft_rotor]

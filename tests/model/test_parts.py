@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
-from airframes import AFT_ROTOR, FORWARD, WING, WING_COMPONENT, write
+from airframes import AFT_ROTOR, DOCS, FORWARD, WING, WING_COMPONENT, write
 
 import symheli
 
@@ -99,6 +100,14 @@ def test_flow_may_be_taken_from_the_rotor_that_is_named(tmp_path):
     assert float(gain[1][0]) == float(gain[0][0])
 
 
+def test_the_documented_variants_exist(ideal):
+    """The two lines of docs/vehicles.md under "Other numbers"."""
+    copies = {"heli": ideal}
+    exec(re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL)[1], copies)
+    assert copies["heavy"].parameters["body.mass"] == 9.0
+    assert copies["large"].parameters["main_rotor.radius"] == pytest.approx(4 * 0.775)
+
+
 def test_the_printed_names_stay_for_one_rotor(heli):
     assert heli.states[8:10] == ("a1", "b1")
     assert "V_imr" in heli.diagnostics.name_out()
@@ -108,7 +117,7 @@ def test_the_printed_names_stay_for_one_rotor(heli):
     ("section", "message"),
     [
         (WING, "no component file at .*wing.py"),
-        (WING.replace("./wing.py", "wings"), "line 8[0-9], wing.component: unknown component 'wings'"),
+        (WING.replace("./wing.py", "wings"), r"line \d+, wing.component: unknown component 'wings'"),
         (AFT_ROTOR.replace("d_lon = -0.5", "d_lno = -0.5"), "aft_rotor.controls: unknown control 'd_lno'; did you mean 'd_lon'"),
         (AFT_ROTOR.replace("-0.5", "nan"), "gain must be a finite number"),
         ("[wake]\ncomponent = 'tail_wake'\nflow = { V_mr = 'V_imr' }", "wake.flow: unknown flow 'V_mr'"),
