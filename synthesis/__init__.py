@@ -6,19 +6,28 @@ No solver is loaded by importing this package.
 from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
 from synthesis.cone_program import Solver, installed_solvers
 from synthesis.forms import Relaxation
+from synthesis.polynomial import BoxCertificate, BoxLyapunov, PolynomialMatrix, PolynomialStateSpace
 from synthesis.frozen import FrozenGain, frozen_gain
+from synthesis.generalized_h2 import generalized_h2
 from synthesis.handling_qualities import Bandwidth, bandwidth
 from synthesis.l2_gain import l2_gain, stability
 from synthesis.lft import SCALINGS, BoxGain, LFTCertificate, Multiplier, Trial, frozen_box_gain, lft_gain, lft_stability
 from synthesis.lower_bound import LowerBound, Search, lower_bound
 from synthesis.lyapunov import MemoryLyapunov, SplineLyapunov
 from synthesis.margins import Margins, disk_margin, loop, margins
+<<<<<<< HEAD
+=======
+from synthesis.polynomial import BoxCertificate, BoxLyapunov, PolynomialMatrix, PolynomialStateSpace
+from synthesis.proof_search import Relaxation
+>>>>>>> e557ed8 (Several parameters, energy-to-peak gain and decay rate; sums of squares, vertices and grids beside Bernstein coefficients)
 
 __all__ = [
     "SCALINGS",
     "Attempt",
     "Bandwidth",
+    "BoxCertificate",
     "BoxGain",
+    "BoxLyapunov",
     "Certificate",
     "FrozenGain",
     "LFTCertificate",
@@ -26,6 +35,8 @@ __all__ = [
     "Margins",
     "MemoryLyapunov",
     "Multiplier",
+    "PolynomialMatrix",
+    "PolynomialStateSpace",
     "Relaxation",
     "Search",
     "Seconds",
@@ -35,9 +46,11 @@ __all__ = [
     "Trajectory",
     "Trial",
     "bandwidth",
+    "decay_rate",
     "disk_margin",
     "frozen_box_gain",
     "frozen_gain",
+    "generalized_h2",
     "installed_solvers",
     "l2_gain",
     "lft_gain",

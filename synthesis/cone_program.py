@@ -1,6 +1,7 @@
 """Semidefinite programs in conic form, and the solvers that take them.
 
-    minimise c' x  subject to  b - A x in a product of positive semidefinite cones (vectors as in `symmetric`).
+    minimise c' x  subject to  b - A x in a product of positive semidefinite cones (vectors as in `symmetric`), after some
+    rows, where asked for, that are zero.
 
 Clarabel and SCS are called directly; CVXOPT, MOSEK, SDPA and COPT, where installed, through cvxpy. Whatever a solver
 answers is a candidate: nothing is believed before it is verified.
@@ -78,12 +79,13 @@ def installed_solvers() -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class ConeProgram:
-    """minimise c' x subject to b - A x in the product of semidefinite cones of `sizes`."""
+    """minimise c' x subject to b - A x in the product of semidefinite cones of `sizes`; the first `equalities` rows are zero."""
 
     c: Array
     A: sparse.csc_matrix
     b: Array
     sizes: tuple[int, ...]
+    equalities: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +116,8 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     settings.max_iter = solver.iterations or 200
     settings.time_limit = solver.time_limit
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = solver.tolerance
-    cones = [clarabel.PSDTriangleConeT(n) for n in program.sizes]
+    cones = [clarabel.ZeroConeT(program.equalities)] * (program.equalities > 0)
+    cones += [clarabel.PSDTriangleConeT(n) for n in program.sizes]
     n = len(program.c)
     solution = clarabel.DefaultSolver(sparse.csc_matrix((n, n)), program.c, program.A, program.b, cones, settings).solve()
     word = str(solution.status)
@@ -128,13 +131,14 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     import scs
 
     # the same vectors: SCS stacks the lower triangle by columns, which is the upper one by rows; reorder
-    starts = np.cumsum([0, *(length(n) for n in program.sizes)])
-    order = np.concatenate([_scs_order(n) + start for n, start in zip(program.sizes, starts[:-1], strict=True)])
+    starts = program.equalities + np.cumsum([0, *(length(n) for n in program.sizes)])
+    blocks = [_scs_order(n) + start for n, start in zip(program.sizes, starts[:-1], strict=True)]
+    order = np.concatenate([np.arange(program.equalities), *blocks])
     data = {"A": program.A.tocsr()[order].tocsc(), "b": program.b[order], "c": program.c}
     # a first-order method: the gain is recomputed from P afterwards, and more digits cost minutes
     tolerance = max(solver.tolerance, 1e-5)
     engine = scs.SCS(
-        data, {"s": list(program.sizes)}, verbose=False, eps_abs=tolerance, eps_rel=tolerance,
+        data, {"z": program.equalities, "s": list(program.sizes)}, verbose=False, eps_abs=tolerance, eps_rel=tolerance,
         max_iters=solver.iterations or 20000, time_limit_secs=solver.time_limit,
     )  # fmt: skip
     solution = engine.solve()
@@ -157,7 +161,8 @@ def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
 
     x = cp.Variable(len(program.c))
     s = program.b - program.A @ x
-    constraints, start = [], 0
+    start = program.equalities
+    constraints: list[Any] = [s[:start] == 0] if start else []
     for n, group in groupby(program.sizes):
         expand = basis(n).reshape(length(n), n * n).T
         for _ in group:

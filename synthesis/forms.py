@@ -6,11 +6,11 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LPVStateSpace
 from synthesis.bounded_real import Blocks, continuous_blocks, discrete_blocks
 from synthesis.cells import cells, strips
@@ -25,15 +25,23 @@ from synthesis.verify import Evidence
 
 Array = np.ndarray
 
+KINDS = ("bernstein", "sos", "vertices", "grid")
+
 
 @dataclass(frozen=True)
 class Relaxation:
     """The form of P(p) and of the LMIs.
 
+    `kind` is how an LMI is imposed for every p: "bernstein", "sos" (sums of squares), "vertices" or "grid" (proves nothing);
+    docs/relaxations.md says what each promises.
+
     P is a continuous spline of `degree` (None: 3 in continuous, 2 in discrete time) on K segments, K from `segments`
     (None: 16, 32 in continuous, 8, 16 in discrete time) in turn until the bound is proven and gamma <= `accept` times the
     lower bound. Knots low + (high - low)(k/K)^`grading`.
-    `elevation` raises the Bernstein degree of the LMIs. `margins`: state blocks are held below -margin I in scaled
+    `elevation` raises the Bernstein degree of the LMIs, or that of the sums of squares; `subdivision` halves every range that
+    often before the Bernstein coefficients are taken; `points` a parameter in every region for the grid.
+    Several parameters: degree None is 2 in continuous and 1 in discrete time, segments (1,), `total_degree` limits the sum
+    of the degrees. `margins`: state blocks are held below -margin I in scaled
     coordinates, tried in turn. `floor`: P >= floor I.
 
     `order` m > 1: V of degree 2m in the states, for `stability` in continuous time; costs grow with the sixth power of
@@ -53,6 +61,10 @@ class Relaxation:
     memory: float | None = None
     memory_segments: int = 3
     memory_degree: int = 2
+    kind: Literal["bernstein", "sos", "vertices", "grid"] = "bernstein"
+    subdivision: int = 0
+    points: int = 11
+    total_degree: int | None = None
 
     def __post_init__(self) -> None:
         if self.degree is not None and self.degree not in (0, 1, 2, 3, 4):
@@ -65,6 +77,17 @@ class Relaxation:
             raise InputError(f"expected order 1, 2 or 3, and no memory beside an order > 1, got {self.order} and memory {self.memory}")
         if self.memory is not None and not (self.memory > 0 and self.memory_segments >= 1 and self.memory_degree in (1, 2, 3, 4)):
             raise InputError("expected memory > 0 s, memory_segments >= 1 and memory_degree 1 .. 4")
+        if self.kind not in KINDS:
+            raise UnknownNameError("relaxation", self.kind, KINDS)
+        if self.subdivision < 0 or self.points < 2 or (self.total_degree is not None and self.total_degree < 0):
+            raise InputError("expected subdivision >= 0, points >= 2 and total_degree >= 0 or None")
+        if self.needs_box and (self.order > 1 or self.memory is not None):
+            raise InputError("order and memory go with plain Bernstein coefficients: leave kind, subdivision and total_degree alone")
+
+    @property
+    def needs_box(self) -> bool:
+        """Whether this is more than plain Bernstein coefficients for one parameter: see `synthesis.polynomial`."""
+        return self.kind != "bernstein" or self.subdivision > 0 or self.total_degree is not None
 
 
 class Problem(NamedTuple):

@@ -4,24 +4,37 @@ from __future__ import annotations
 
 import math
 import time
+from typing import overload
 
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace
+from symheli.lpv import LFT, LPVStateSpace
 from synthesis.certificate import Certificate, Seconds, Status, Trajectory
 from synthesis.cone_program import Answer, Solver
 from synthesis.forms import Problem, Relaxation, scaled_problem
 from synthesis.frozen import frozen_gain, least_damped
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
 from synthesis.lyapunov import Lyapunov
+from synthesis.polynomial import BoxCertificate, PolynomialStateSpace
+from synthesis.polynomial.analysis import Model, Rate, box_certificate
 from synthesis.proof_search import Result, prove
 
 
+@overload
 def l2_gain(
     lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
-) -> Certificate:  # fmt: skip
+) -> Certificate: ...  # fmt: skip
+@overload
+def l2_gain(
+    lpv: PolynomialStateSpace | LFT, rate: Rate = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    search: Search | None = THOROUGH,
+) -> BoxCertificate: ...  # fmt: skip
+def l2_gain(
+    lpv: Model, rate: Rate = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    search: Search | None = THOROUGH,
+) -> Certificate | BoxCertificate:  # fmt: skip
     """Certified upper bound of the L2 gain of `lpv` over every p(t) in range with |dp/dt| <= `rate`.
 
     `rate` in units of p per second; default the model's own; math.inf: constant P, p may jump; 0: every frozen model.
@@ -29,9 +42,14 @@ def l2_gain(
     between grid points; the gain is recomputed from P alone and verified. `search` looks for the worst trajectory
     (None: the frozen gain is the lower bound). Raises `InputError`, `SolverError`; a failed solve is a certificate
     with gamma = inf and its reason in `status`.
+
+    A model in several parameters (`PolynomialStateSpace`, LFT; `rate` one for all, one each or by name), or a relaxation other
+    than plain Bernstein coefficients, gives a `BoxCertificate`, which answers the same questions.
     """
-    rate = _check(lpv, rate, with_gain=True)
     relaxation, solver = relaxation or Relaxation(), _solver(solver)
+    if not isinstance(lpv, LPVStateSpace) or relaxation.needs_box:
+        return box_certificate(lpv, rate, "l2 gain", relaxation, solver, search)
+    rate = _check(lpv, rate, with_gain=True)
     start = time.perf_counter()
     frozen = frozen_gain(lpv)
     if math.isinf(frozen.gamma):
@@ -46,17 +64,29 @@ def l2_gain(
     return _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds, relaxation.elevation)
 
 
+@overload
 def stability(
     lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
-) -> Certificate:  # fmt: skip
+) -> Certificate: ...  # fmt: skip
+@overload
+def stability(
+    lpv: PolynomialStateSpace | LFT, rate: Rate = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    search: Search | None = THOROUGH,
+) -> BoxCertificate: ...  # fmt: skip
+def stability(
+    lpv: Model, rate: Rate = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    search: Search | None = THOROUGH,
+) -> Certificate | BoxCertificate:  # fmt: skip
     """Proof that dx/dt = A(p) x (or x(k+1) = A(p) x) decays for every p(t) in range with |dp/dt| <= `rate`.
 
     As `l2_gain`, without channels: `.verified` is the answer, `.gamma`, `.lower` and `.frozen` are NaN. Where no proof is
     found, `search` looks for a trajectory along which the state grows.
     """
-    rate = _check(lpv, rate, with_gain=False)
     relaxation, solver = relaxation or Relaxation(), _solver(solver)
+    if not isinstance(lpv, LPVStateSpace) or relaxation.needs_box:
+        return box_certificate(lpv, rate, "stability", relaxation, solver, search)
+    rate = _check(lpv, rate, with_gain=False)
     margin, p = least_damped(lpv)
     if margin <= 0:
         at_rest = Trajectory(np.zeros(1), np.array([p]))
@@ -70,13 +100,8 @@ def stability(
     return _certificate(lpv, rate, solver, (problem, best), math.nan, math.nan, status, worst, bounds, relaxation.elevation)
 
 
-def _check(lpv: LPVStateSpace, rate: float | None, *, with_gain: bool) -> float:
-    if not isinstance(lpv, LPVStateSpace):
-        raise InputError(
-            f"expected an LPVStateSpace, got {type(lpv).__name__}; make one with LPVStateSpace.polynomial(...) "
-            "or LinearFamily.interpolate()"
-        )
-    rate = lpv.scheduling.rate if rate is None else float(rate)
+def _check(lpv: LPVStateSpace, rate: Rate, *, with_gain: bool) -> float:
+    rate = lpv.scheduling.rate if rate is None else float(rate)  # type: ignore[arg-type]
     if not rate >= 0:
         raise InputError(f"rate must be >= 0 {lpv.scheduling.unit}/s (math.inf: as fast as it likes), got {rate}")
     if not lpv.states:

@@ -108,7 +108,7 @@ def test_a_certificate_reads_like_a_statement():
 
 
 def test_wrong_input_gets_a_sentence():
-    with pytest.raises(InputError, match="expected an LPVStateSpace, got ndarray"):
+    with pytest.raises(InputError, match="or an LFT, got ndarray"):
         l2_gain(np.eye(2))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="rate must be >= 0"):
         l2_gain(lag(), -1.0)

@@ -1,0 +1,307 @@
+"""Gains, decay and stability over a box of parameters: search for P, verify, and compare with what no proof can beat."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv import LFT, LinearModel, LPVStateSpace
+from synthesis.certificate import Attempt, Seconds, Status, Trajectory
+from synthesis.cone_program import Answer, Candidate, Solver, solve
+from synthesis.forms import Relaxation
+from synthesis.lower_bound import Search
+from synthesis.lyapunov import graded_knots
+from synthesis.polynomial.bounds import Worst, growing, measure, worst_frozen, worst_moving
+from synthesis.polynomial.certificate import BoxCertificate
+from synthesis.polynomial.inequalities import Demand, Kind
+from synthesis.polynomial.lyapunov import BoxLyapunov
+from synthesis.polynomial.program import Shape, affine_inequalities, assemble
+from synthesis.polynomial.proof import Evidence, Units
+from synthesis.polynomial.regions import Pieces, pieces
+from synthesis.polynomial.state_space import PolynomialStateSpace
+from synthesis.scaling import model_scaling
+from synthesis.symmetric import length, smat
+
+Array = np.ndarray
+Model = LPVStateSpace | PolynomialStateSpace | LFT
+Rate = float | Sequence[float] | Mapping[str, float] | None
+
+DECAY_TOLERANCE = 2e-3
+"""The decay rate is found to this fraction of the frozen one."""
+
+SAMPLES = {1: 17, 2: 7}
+"""Values of each parameter in a region at which the bound of a P is first computed (more parameters: 3)."""
+
+
+def box_certificate(
+    model: Model, rate: Rate, kind: Kind, relaxation: Relaxation, solver: Solver, search: Search | None
+) -> BoxCertificate:  # fmt: skip
+    """The certificate of that kind; see `l2_gain`, `stability`, `generalized_h2` and `decay_rate`."""
+    model = _accepted(model)
+    if relaxation.order > 1 or relaxation.memory is not None:
+        raise InputError("order and memory of V are for l2_gain and stability of one parameter; here V = x'P(p)x")
+    piece = pieces(model)
+    demand = Demand(kind, _rates(piece, rate))
+    _check_channels(piece, kind)
+    start = time.perf_counter()
+    frozen = worst_frozen(piece, measure(demand, piece.dt))
+    sign = 1.0 if kind.endswith("gain") else -1.0
+    report = _Report(piece, demand, relaxation, solver, sign * frozen.value)
+    unstable = math.isinf(frozen.value) if sign > 0 else frozen.value >= 0
+    if unstable:
+        at_rest = Trajectory(np.zeros(1), _alone(np.array([frozen.p])))
+        return report.nothing(Status.UNSTABLE, frozen, at_rest, time.perf_counter() - start)
+    limit = frozen if kind == "stability" else worst_moving(model, demand, frozen, search)
+    bounds = time.perf_counter() - start
+    if math.isinf(limit.value) if sign > 0 else limit.value >= 0:
+        return report.nothing(Status.GROWING, limit, limit.trajectory, bounds)
+    hunt = _Hunt(piece, demand, relaxation, solver, limit.value if sign > 0 else 1.0)
+    best = hunt.decay(sign * limit.value) if kind == "decay rate" else hunt.gain(limit.value)
+    if best.lyapunov is None and kind == "stability":
+        start = time.perf_counter()
+        worst = growing(model, demand, search)
+        bounds += time.perf_counter() - start
+        if worst is not None:
+            return report.nothing(Status.GROWING, frozen, worst, bounds, hunt)
+    return report.found(best, sign * limit.value, limit.trajectory, bounds, hunt)
+
+
+class Found(NamedTuple):
+    """The best P verified (or computed, on a grid) and the bound it gives."""
+
+    lyapunov: BoxLyapunov | None
+    bound: float
+    answer: Answer = Answer.FAILED
+
+
+class _Hunt:
+    """Cone programs of finer and finer P."""
+
+    def __init__(self, model: Pieces, demand: Demand, relaxation: Relaxation, solver: Solver, expected: float):
+        self.model, self.demand, self.relaxation, self.solver = model, demand, relaxation, solver
+        self.evidence = Evidence(model, _units(model, demand.kind, expected), demand)
+        self.scaled, self.scaled_demand = self.evidence.scaled
+        self.attempts: list[Attempt] = []
+        self.spent = np.zeros(3)
+
+    def gain(self, limit: float) -> Found:
+        """The least gain, or any P for stability."""
+        nothing = Found(None, math.nan if self.demand.kind == "stability" else math.inf)
+        best = nothing
+        for shape in self._shapes():
+            for margin in self.relaxation.margins:
+                found = self._attempt(shape, margin, 0.0)
+                if found.lyapunov is None and best.lyapunov is None:
+                    best = nothing._replace(answer=found.answer)
+                elif found.lyapunov is not None and (best.lyapunov is None or found.bound < best.bound):
+                    best = found
+                if found.lyapunov is not None or found.answer is Answer.INFEASIBLE:
+                    break
+            if best.lyapunov is not None and not best.bound > self.relaxation.accept * limit:
+                break
+        return best
+
+    def decay(self, limit: float) -> Found:
+        """The largest decay rate, between 0 and `limit` (1/s), by bisection; each P counts for all that it proves."""
+        best = Found(None, -math.inf)
+        tolerance = DECAY_TOLERANCE * limit
+        for shape in self._shapes():
+            low, high = max(best.bound, 0.0), limit
+            trial = limit - tolerance
+            while True:
+                found = self._attempt(shape, 0.0, trial)
+                if found.lyapunov is not None and found.bound > best.bound:
+                    best = found
+                elif best.lyapunov is None:
+                    best = best._replace(answer=found.answer)
+                # a P that proves less than was asked for: the half below is left, whatever it would have allowed
+                low = max(low, found.bound if found.lyapunov is not None else 0.0)
+                high = high if low >= trial else trial
+                if high - low <= tolerance:
+                    break
+                trial = 0.5 * (low + high)
+            if best.lyapunov is not None and best.bound * self.relaxation.accept >= limit:
+                break
+        return best
+
+    def _shapes(self) -> list[Shape]:
+        """The forms of P to be tried in turn."""
+        model, relaxation, m = self.model, self.relaxation, len(self.model.parameters)
+        default = (3 if m == 1 else 2) if model.dt is None else (2 if m == 1 else 1)
+        degree = default if relaxation.degree is None else relaxation.degree
+        degrees = tuple(0 if model.dt is None and math.isinf(rate) else degree for rate in self.demand.rates)
+        steps = self.demand.steps(model.dt, degrees)
+        out: list[Shape] = []
+        for segments in relaxation.segments or ((4, 8) if m == 1 else (1,)):
+            knots = []
+            for s, breaks, d, step in zip(model.parameters, model.breaks, degrees, steps, strict=True):
+                if d == 0 or 2.5 * step >= s.high - s.low:
+                    knots.append(np.array([s.low, s.high]))
+                else:
+                    grading = relaxation.grading if m == 1 else 1.0
+                    knots.append(graded_knots(s.low, s.high, segments, grading, breaks[1:-1], shortest=2.5 * step))
+            shape = Shape(tuple(knots), degrees, relaxation.total_degree)
+            if not out or shape.counts != out[-1].counts:
+                out.append(shape)
+        return out
+
+    def _attempt(self, shape: Shape, margin: float, alpha: float) -> Found:
+        start = time.perf_counter()
+        kind, n = self.demand.kind, self.model.sizes[0]
+        gains = kind.endswith("gain")
+        demand = self.scaled_demand._replace(shift=self.evidence.in_units(alpha) if alpha else 0.0)
+        inequalities = affine_inequalities(self.scaled, demand, shape, margin, self.relaxation.floor)
+        program = assemble(inequalities, shape, n, self.relaxation, maximise=not gains)
+        built = time.perf_counter()
+        candidate = solve(program, self.solver)
+        solved = time.perf_counter()
+        found = self._judged(candidate, shape)
+        self.spent += np.array([built - start, solved - built, time.perf_counter() - solved])
+        words = f"{candidate.message}, {'no P' if found.lyapunov is None else f'bound {found.bound:.6g}'}"
+        segments = math.prod(len(k) - 1 for k in shape.knots)
+        self.attempts.append(Attempt(segments, max(shape.degrees), margin, words, found.bound))
+        return found
+
+    def _judged(self, candidate: Candidate, shape: Shape) -> Found:
+        """What P itself gives, whatever the solver said."""
+        nothing = Found(None, math.inf, candidate.answer)
+        if candidate.x is None:
+            return nothing
+        n, free = self.model.sizes[0], shape.free
+        values = smat(candidate.x[: free.shape[1] * length(n)].reshape(free.shape[1], -1), n)
+        tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
+        # judged as it is stored, in physical units
+        P = BoxLyapunov(shape.knots, shape.degrees, self.evidence.units.to_physical(tensor))
+        if self.relaxation.kind == "grid":
+            P, bound = self.evidence.sampled(P, self.relaxation.points)
+            return nothing if math.isinf(bound) else Found(P, bound, candidate.answer)
+        least = self.evidence.least(P, SAMPLES.get(len(shape.knots), 3))
+        return nothing if least is None else Found(*least, candidate.answer)
+
+
+@dataclass(frozen=True, eq=False)
+class _Report:
+    """How a certificate is written down."""
+
+    model: Pieces
+    demand: Demand
+    relaxation: Relaxation
+    solver: Solver
+    frozen: float
+
+    def nothing(self, status: Status, limit: Worst, worst: Trajectory | None, bounds: float, hunt: _Hunt | None = None) -> BoxCertificate:
+        """Nothing is proven, and it is known why."""
+        sign = 1.0 if self.demand.kind.endswith("gain") else -1.0
+        return self._made(Found(None, math.inf), sign * limit.value, worst, bounds, hunt, status)
+
+    def found(self, best: Found, limit: float, worst: Trajectory | None, bounds: float, hunt: _Hunt) -> BoxCertificate:
+        """What the hunt brought."""
+        if best.lyapunov is None:
+            status = Status.INFEASIBLE if best.answer in (Answer.INFEASIBLE, Answer.SOLVED) else Status.FAILED
+        else:
+            status = Status.UNPROVEN if self.relaxation.kind == "grid" else Status.PROVEN
+        return self._made(best, limit, worst, bounds, hunt, status)
+
+    def _made(
+        self, best: Found, limit: float, worst: Trajectory | None, bounds: float, hunt: _Hunt | None, status: Status
+    ) -> BoxCertificate:
+        kind = self.demand.kind
+        proven = status is Status.PROVEN
+        nothing = {"stability": math.nan, "decay rate": -math.inf}.get(kind, math.inf)
+        quiet = kind == "stability"
+        return BoxCertificate(
+            kind, self.relaxation.kind, best.bound if proven else nothing, math.nan if quiet else limit,
+            math.nan if quiet else self.frozen, status, proven, best.lyapunov, self._hypotheses(best.lyapunov, status),
+            f"{self.solver.name} {self.solver.version}, tolerance {self.solver.tolerance:g}",
+            Seconds(*map(float, hunt.spent), bounds) if hunt else Seconds(bounds=bounds), tuple(hunt.attempts) if hunt else (),
+            best.bound if status is Status.UNPROVEN else math.nan, worst, hunt.evidence if hunt else None,
+        )  # fmt: skip
+
+    def _hypotheses(self, P: BoxLyapunov | None, status: Status) -> tuple[str, ...]:
+        out = []
+        for s, rate in zip(self.model.parameters, self.demand.rates, strict=True):
+            unit = "" if s.unit == "1" else f" {s.unit}"
+            speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
+            out.append(f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}")
+        if P is not None and status is Status.PROVEN:
+            out.append(f"P of degrees {P.degrees} on {P.segments} segment(s), found by {_FOUND[self.relaxation.kind]}")
+            out.append(
+                "verified in floating point on the whole box, halved where needed; verify(rigorous=True) proves it in exact arithmetic"
+            )
+        if status is Status.UNPROVEN:
+            out.append(f"the inequalities hold at {self.relaxation.points} values of each parameter in every region: no guarantee")
+        out += _MEANING.get(self.demand.kind, ())
+        return tuple(out)
+
+
+_FOUND = {
+    "bernstein": "one LMI per Bernstein coefficient",
+    "sos": "matrix sums of squares",
+    "vertices": "LMIs at the vertices with convexity along every axis",
+}
+_MEANING = {
+    "l2 gain": ("the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs together",),
+    "energy-to-peak gain": ("the gain is from zero initial state, max_t |y(t)| < gamma |u|_2, the Euclidean norm of all outputs",),
+    "decay rate": ("|x(t)| <= c exp(-alpha t) |x(0)| for some c, along every admissible p(t)",),
+}
+
+
+def _accepted(model: Model) -> LPVStateSpace | PolynomialStateSpace:
+    if isinstance(model, LFT):
+        return PolynomialStateSpace.from_lft(model)
+    if not isinstance(model, LPVStateSpace | PolynomialStateSpace):
+        raise InputError(
+            f"expected an LPVStateSpace, a PolynomialStateSpace or an LFT, got {type(model).__name__}; make one with "
+            "LPVStateSpace.polynomial(...), PolynomialStateSpace.polynomial(...) or LinearFamily.interpolate()"
+        )
+    return model
+
+
+def _rates(model: Pieces, rate: Rate) -> tuple[float, ...]:
+    names = [s.name for s in model.parameters]
+    if rate is None:
+        rates = tuple(s.rate for s in model.parameters)
+    elif isinstance(rate, Mapping):
+        for name in rate:
+            if name not in names:
+                raise UnknownNameError("scheduling parameter", name, names)
+        rates = tuple(float(rate.get(s.name, s.rate)) for s in model.parameters)
+    elif isinstance(rate, Sequence):
+        rates = tuple(map(float, rate))
+    else:
+        rates = (float(rate),) * len(names)
+    if len(rates) != len(names) or not all(r >= 0 for r in rates):
+        raise InputError(f"rate must be >= 0 per second, one for all or one for each of {', '.join(names)}, got {rate}")
+    return rates
+
+
+def _check_channels(model: Pieces, kind: Kind) -> None:
+    nx, nu, ny = model.sizes
+    if nx == 0:
+        raise InputError("the model has no states; its gain is the largest norm of D(p)")
+    if kind.endswith("gain") and not (nu and ny):
+        raise InputError(f"a gain needs inputs and outputs, got {nu} and {ny}; use stability() without channels")
+    if kind == "energy-to-peak gain" and model.dt is None and any(np.any(D.coefficients) for _, _, _, D in model.models.values()):
+        raise InputError("the energy-to-peak gain of a continuous model needs D = 0: feedthrough passes peaks of any height")
+
+
+def _units(model: Pieces, kind: Kind, expected: float) -> Units:
+    middle = np.array([[s.middle for s in model.parameters]])
+    A, B, C, D = (M[0] for M in model.at(middle))
+    names = [tuple(f"{letter}{i}" for i in range(n)) for letter, n in zip("xuy", model.sizes, strict=True)]
+    scale = model_scaling(LinearModel(A, B, C, D, *names, dt=model.dt), expected if kind.endswith("gain") else 1.0)  # type: ignore[arg-type]
+    root = math.sqrt(scale.time)
+    if kind == "energy-to-peak gain":
+        # outputs are peaks, not energies
+        return Units(scale.left, scale.right, 1 / root, scale.channel, scale.time, 1.0)
+    return Units(scale.left, scale.right, 1 / root, scale.channel / root, scale.time, scale.channel**2)
+
+
+def _alone(p: Array) -> Array:
+    return p[:, 0] if p.shape[1] == 1 else p

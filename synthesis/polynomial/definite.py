@@ -1,0 +1,93 @@
+"""Is a given polynomial matrix negative definite on its whole box? Bernstein coefficients, halving the box where they do not tell."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from synthesis.polynomial.matrix import PolynomialMatrix
+from synthesis.verify import positive_definite
+
+Array = np.ndarray
+
+CELLS = 4000
+"""Most boxes looked at before giving up: the answer is then "not shown"."""
+
+
+def negative_definite(F: PolynomialMatrix, cells: int = CELLS) -> bool:
+    """Floating point, all boxes of a generation at once; False too where `cells` boxes did not suffice."""
+    m, spent = len(F.box), 0
+    waiting = F.coefficients[None]
+    while len(waiting):
+        spent += len(waiting)
+        if spent > cells or not np.all(np.isfinite(waiting)):
+            return False
+        flat = waiting.reshape(len(waiting), -1, *waiting.shape[-2:])
+        values = np.linalg.eigvalsh(flat)
+        limit = -20 * F.shape[0] * np.finfo(float).eps * np.abs(values).max(axis=2)
+        below = values[..., -1] < limit
+        if not np.all(below.reshape(len(waiting), *waiting.shape[1 : m + 1])[_corners(waiting.shape[1 : m + 1])]):
+            return False
+        waiting = waiting[~below.all(axis=1)]
+        if len(waiting):
+            waiting = _halves(waiting, m)
+    return True
+
+
+def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
+    """The same in the exact arithmetic of the coefficients: an LDL' factorisation of each decides."""
+    waiting, spent = [F], 0
+    while waiting:
+        spent += 1
+        if spent > cells:
+            return False
+        G = waiting.pop()
+        matrices = G.coefficients.reshape(-1, *G.shape)
+        numbers = matrices.astype(float)
+        # where rounded numbers already say no, halving comes before exact work
+        promising = bool(np.all(np.linalg.eigvalsh(numbers)[:, -1] < 0))
+        if promising and all(positive_definite(-M) for M in matrices):
+            continue
+        corners = G.coefficients[tuple(slice(None, None, max(d, 1)) for d in G.degrees)].reshape(-1, *G.shape)
+        if not all(positive_definite(-M) for M in corners):
+            return False
+        curvature = _curvature(numbers.reshape(1, *G.coefficients.shape), len(G.box))[0]
+        if curvature.max() == 0.0:
+            return False
+        waiting += G.split(int(np.argmax(curvature)))
+    return True
+
+
+def _corners(shape: tuple[int, ...]) -> tuple[slice, ...]:
+    return (slice(None), *(slice(None, None, max(n - 1, 1)) for n in shape))
+
+
+def _curvature(c: Array, m: int) -> Array:
+    """(boxes, m): how far the coefficients are from affine along each parameter, which is what halving improves."""
+    out = np.zeros((len(c), m))
+    for i in range(m):
+        if c.shape[i + 1] > 2:
+            out[:, i] = np.abs(np.diff(c, n=2, axis=i + 1)).reshape(len(c), -1).max(axis=1)
+    return out
+
+
+def _halves(c: Array, m: int) -> Array:
+    """Both halves of every box, along the axis in which the coefficients are most curved."""
+    curvature = _curvature(c, m)
+    best = np.argmax(curvature, axis=1)
+    out = []
+    for axis in range(m):
+        mine = c[(best == axis)]
+        if len(mine):
+            out += _bisect(mine, axis + 1)
+    return np.concatenate(out)
+
+
+def _bisect(c: Array, axis: int) -> list[Array]:
+    """de Casteljau at the middle of one axis."""
+    row = np.moveaxis(c, axis, 0)
+    left, right = [row[0]], [row[-1]]
+    while len(row) > 1:
+        row = 0.5 * (row[1:] + row[:-1])
+        left.append(row[0])
+        right.append(row[-1])
+    return [np.moveaxis(np.stack(part), 0, axis) for part in (left, right[::-1])]

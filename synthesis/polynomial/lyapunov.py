@@ -1,0 +1,74 @@
+"""Lyapunov functions V(x, p) = x' P(p) x with P a polynomial, or a continuous spline, in several parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.errors import InputError
+from synthesis.polynomial.matrix import PolynomialMatrix
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class BoxLyapunov:
+    """P of degree d_i in parameter i on each of the K_i segments between `knots[i]`, continuous.
+
+    `coefficients` (K_1 d_1 + 1, ..., K_m d_m + 1, n, n): segment j of parameter i has the Bernstein coefficients
+    j d_i .. (j + 1) d_i along axis i. Physical units of the states. Raises `InputError` for other shapes.
+    """
+
+    knots: tuple[Array, ...]
+    degrees: tuple[int, ...]
+    coefficients: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "knots", tuple(np.array(k, dtype=float) for k in self.knots))
+        array = np.array(self.coefficients, dtype=float)
+        array.flags.writeable = False
+        object.__setattr__(self, "coefficients", array)
+        expected = tuple((len(k) - 1) * d + 1 for k, d in zip(self.knots, self.degrees, strict=True))
+        n = array.shape[-1]
+        if array.shape != (*expected, n, n):
+            raise InputError(f"expected Lyapunov coefficients of shape {(*expected, n, n)}, got {array.shape}")
+
+    @property
+    def segments(self) -> tuple[int, ...]:
+        """Number of segments in each parameter."""
+        return tuple(len(k) - 1 for k in self.knots)
+
+    def segment(self, index: Sequence[int]) -> PolynomialMatrix:
+        """P on one segment of each parameter."""
+        box = tuple((float(k[j]), float(k[j + 1])) for k, j in zip(self.knots, index, strict=True))
+        return PolynomialMatrix(box, self.coefficients[segment_slices(self.degrees, index)])
+
+    def at(self, p: object) -> Array:
+        """P at p (..., m), shape (..., n, n). Raises `InputError` outside the knots."""
+        return self._sum(p, None)
+
+    def derivative(self, p: object, axis: int) -> Array:
+        """dP/dp_axis at p (..., m), the right-hand one at a knot."""
+        return self._sum(p, axis)
+
+    def _sum(self, p: object, axis: int | None) -> Array:
+        p = np.asarray(p, dtype=float)
+        points = p.reshape(-1, len(self.knots))
+        index = np.empty(points.shape, dtype=int)
+        for i, knots in enumerate(self.knots):
+            value, slack = points[:, i], 1e-9 * (knots[-1] - knots[0])
+            if len(value) and (value.min() < knots[0] - slack or value.max() > knots[-1] + slack):
+                raise InputError(f"p spans [{value.min():.4g}, {value.max():.4g}], P is known on [{knots[0]:.4g}, {knots[-1]:.4g}]")
+            index[:, i] = np.clip(np.searchsorted(knots, value, side="right") - 1, 0, len(knots) - 2)
+        out = np.empty((len(points), *self.coefficients.shape[-2:]))
+        for place in np.unique(index, axis=0):
+            P, here = self.segment(place), np.all(index == place, axis=1)
+            out[here] = (P if axis is None else P.derivative(axis))(points[here])
+        return out.reshape(*p.shape[:-1], *out.shape[1:])
+
+
+def segment_slices(degrees: Sequence[int], index: Sequence[int]) -> tuple[slice, ...]:
+    """Which coefficients belong to one segment of each parameter."""
+    return tuple(slice(j * d, (j + 1) * d + 1) for d, j in zip(degrees, index, strict=True))

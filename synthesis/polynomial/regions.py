@@ -1,0 +1,148 @@
+"""The boxes on which an inequality is one polynomial, and the model and P there, in any arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise, product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symheli.lpv import LPVStateSpace, Matrices, Scheduling
+from synthesis.bernstein import composition
+from synthesis.cells import Strip, strips
+from synthesis.pieces import ModelPiece, model_pieces
+from synthesis.polynomial.matrix import Box, PolynomialMatrix
+from synthesis.polynomial.state_space import PolynomialStateSpace
+
+Array = np.ndarray
+Number = Callable[[float], Any]
+
+
+class Pieces(NamedTuple):
+    """A model of one or several parameters, polynomial between the `breaks` of each (most have none inside their range).
+
+    `at(p)` gives the matrices at p (k, m) by the model's own code, for checks.
+    """
+
+    parameters: tuple[Scheduling, ...]
+    breaks: tuple[tuple[float, ...], ...]
+    models: dict[tuple[int, ...], tuple[PolynomialMatrix, ...]]
+    dt: float | None
+    at: Callable[[Array], Matrices]
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Number of states, inputs and outputs."""
+        A, B, C, _ = next(iter(self.models.values()))
+        return A.shape[0], B.shape[1], C.shape[0]
+
+    def scaled(self, left: Array, right: Array, inputs: float, outputs: float, time: float) -> Pieces:
+        """x = right z, dt = time dtau, u and y in the units `inputs` and `outputs`."""
+
+        def change(M: PolynomialMatrix, L: Any, R: Any, factor: float) -> PolynomialMatrix:
+            return PolynomialMatrix(M.box, factor * (L @ M.coefficients @ R))
+
+        _, nu, ny = self.sizes
+        one, two = np.eye(ny), np.eye(nu)
+        models = {
+            key: (
+                change(A, left, right, time), change(B, left, two, time * inputs),
+                change(C, one, right, 1 / outputs), change(D, one, two, inputs / outputs),
+            )
+            for key, (A, B, C, D) in self.models.items()
+        }  # fmt: skip
+        return self._replace(models=models)
+
+
+def pieces(model: LPVStateSpace | PolynomialStateSpace) -> Pieces:
+    """The model in polynomial pieces over its box."""
+    if isinstance(model, PolynomialStateSpace):
+        return Pieces(model.parameters, model.box, {(0,) * len(model.box): (model.A, model.B, model.C, model.D)}, model.dt, model.matrices)
+    parts = model_pieces(model)
+    models = {
+        (k,): tuple(PolynomialMatrix(((piece.low, piece.high),), M) for M in (piece.A, piece.B, piece.C, piece.D))
+        for k, piece in enumerate(parts)
+    }  # fmt: skip
+    breaks = (parts[0].low, *(piece.high for piece in parts))
+    return Pieces((model.scheduling,), (breaks,), models, model.dt, lambda p: model.matrices(p[..., 0]))
+
+
+class Region(NamedTuple):
+    """One strip a parameter: p in a box, inside one piece of the model and one segment of P, and where p(k+1) may be."""
+
+    strips: tuple[Strip, ...]
+    piece: tuple[int, ...]
+
+    @property
+    def box(self) -> tuple[tuple[float, float], ...]:
+        """Range of p."""
+        return tuple((s.cell.low, s.cell.high) for s in self.strips)
+
+    @property
+    def segment(self) -> tuple[int, ...]:
+        """Segment of P, one index a parameter."""
+        return tuple(s.cell.segment for s in self.strips)
+
+    @property
+    def next_segment(self) -> tuple[int, ...]:
+        """Segment of P at p(k+1)."""
+        return tuple(s.next_segment for s in self.strips)
+
+
+def regions(model: Pieces, knots: Sequence[Array], steps: Sequence[float]) -> Iterator[Region]:
+    """All of them: the ranges cut at knots and breaks, and where p moves by at most `steps` a sample, where that leads to."""
+    nothing = np.zeros((1, 0, 0))
+    every = []
+    for breaks, k, step in zip(model.breaks, knots, steps, strict=True):
+        # only the ends of the pieces matter here
+        stretches = [ModelPiece(a, b, nothing, nothing, nothing, nothing) for a, b in pairwise(breaks)]
+        every.append(strips(stretches, k, step))
+    for choice in product(*every):
+        index = [int(np.searchsorted(b, 0.5 * (s.cell.low + s.cell.high)) - 1) for b, s in zip(model.breaks, choice, strict=True)]
+        yield Region(choice, tuple(index))
+
+
+def exact(values: Array, number: Number) -> Array:
+    """The doubles as numbers of the arithmetic."""
+    return np.asarray(values, dtype=float) if number is float else np.asarray(np.frompyfunc(number, 1, 1)(values), dtype=object)
+
+
+def convert(F: PolynomialMatrix, number: Number) -> PolynomialMatrix:
+    """The polynomial with its doubles as numbers of the arithmetic."""
+    box = tuple((number(float(a)), number(float(b))) for a, b in F.box)
+    return PolynomialMatrix(box, exact(F.coefficients, number))
+
+
+def model_on(model: Pieces, region: Region, number: Number) -> tuple[PolynomialMatrix, ...]:
+    """A, B, C, D over the box of the region."""
+    box = _box(region, number)
+    return tuple(convert(M, number).restrict(box) for M in model.models[region.piece])
+
+
+def now(P: PolynomialMatrix, region: Region, number: Number) -> PolynomialMatrix:
+    """P(p) over the box of the region; P in the arithmetic of the proof, on its segment."""
+    return P.restrict(_box(region, number))
+
+
+def successor(P: PolynomialMatrix, region: Region, number: Number, moving: Sequence[bool]) -> PolynomialMatrix:
+    """P(p(k+1)) over the box of p and one [0, 1] a parameter, which runs from the lower to the upper limit of p(k+1)."""
+    m = len(P.box)
+    box, c = _box(region, number), P.coefficients
+    for i, strip in enumerate(region.strips):
+        low, high = P.box[i]
+        corners = [[(number(q) - low) / (high - low) for q in pair] for pair in strip.corners]
+        if not moving[i]:
+            corners = [[pair[0], pair[0]] for pair in corners]
+        T = composition(P.degrees[i], corners)
+        if not moving[i]:
+            T = T[:, :1]
+        # axis i becomes x_i; s_i goes behind the parameters
+        c = np.tensordot(T, c, axes=(2, i))
+        c = np.moveaxis(c, (0, 1), (i, m + i))
+    unit = (number(0.0), number(1.0))
+    return PolynomialMatrix((*box, *(unit,) * m), c)
+
+
+def _box(region: Region, number: Number) -> Box:
+    return tuple((number(a), number(b)) for a, b in region.box)

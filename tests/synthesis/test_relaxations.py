@@ -1,0 +1,246 @@
+"""Whichever relaxation finds P: closed forms, their order, and never a proof of what is not true."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import lag, random_stable, spring
+from test_never_call_unstable_stable import unstable
+
+from symheli.errors import CertificateError, InputError, UnknownNameError
+from symheli.lpv import LFT, Scheduling
+from synthesis import PolynomialStateSpace, Relaxation, Solver, Status, decay_rate, generalized_h2, installed_solvers, l2_gain, stability
+from synthesis.polynomial.analysis import _Hunt
+from synthesis.polynomial.inequalities import Demand
+from synthesis.polynomial.regions import pieces
+
+PROOFS = ("bernstein", "sos", "vertices")
+QUICK = Relaxation(degree=1)
+
+
+def two_lags(rate=(0.5, 2.0), dt=None):
+    """x' = -(1 + 0.3 a + 0.4 b) x + u, |a|, |b| <= 1: slowest at the corner (-1, -1), where it decays at 0.3."""
+    h = 1.0 if dt is None else dt
+    A = {(0, 0): [[-1.0 * h + (dt is not None)]], (1, 0): [[-0.3 * h]], (0, 1): [[-0.4 * h]]}
+    parameters = [Scheduling("a", "1", -1.0, 1.0, rate[0]), Scheduling("b", "1", -1.0, 1.0, rate[1])]
+    return PolynomialStateSpace.polynomial(A, {(0, 0): [[h]]}, {(0, 0): [[1.0]]}, {(0, 0): [[0.0]]}, parameters, dt)
+
+
+def mass_spring(rate=0.1, dt=None, spring=0.3):
+    """x'' + (0.6 + 0.2 d) x' + (1 + 0.3 k) x = u, |k|, |d| <= 1."""
+    A = {(0, 0): np.array([[0, 1.0], [-1, -0.6]]), (1, 0): np.array([[0, 0], [-spring, 0]]), (0, 1): np.array([[0, 0], [0, -0.2]])}
+    if dt is not None:
+        A = {e: dt * M + np.eye(2) * (e == (0, 0)) for e, M in A.items()}
+    parameters = [Scheduling("k", "1", -1.0, 1.0, rate), Scheduling("d", "1", -1.0, 1.0, rate)]
+    return PolynomialStateSpace.polynomial(A, {(0, 0): [[0.0], [dt or 1.0]]}, {(0, 0): [[1.0, 0]]}, {(0, 0): [[0.0]]}, parameters, dt)
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("kind", PROOFS)
+def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
+    """Constant P = 1 proves what the slowest corner attains: gain 1/0.3, peak 1/sqrt(0.6), decay 0.3."""
+    relaxation, model = Relaxation(kind=kind, degree=0), two_lags(dt=dt)
+    slow = 0.3 if dt is None else (1 - 0.03)
+    expected = {
+        l2_gain: 1 / 0.3,
+        generalized_h2: 1 / math.sqrt(0.6) if dt is None else dt / math.sqrt(1 - slow**2),
+        decay_rate: slow if dt is None else -math.log(slow) / dt,
+    }
+    for analysis, value in expected.items():
+        cert = analysis(model, relaxation=relaxation, search=None)
+        assert cert.verified
+        assert cert.verify(rigorous=True)
+        # 5e-7 and more of loosening, the solver's gap, and the margin of the state block
+        assert cert.proven == pytest.approx(value, rel=2e-5)
+        assert cert.frozen == pytest.approx(value, rel=1e-7)
+    assert stability(model, relaxation=relaxation).verify(rigorous=True)
+
+
+def test_sums_of_squares_lie_between_grid_and_bernstein():
+    """The same P: every Bernstein proof is a sum of squares, and what holds in the box holds on the grid."""
+    model = mass_spring()
+    for analysis in (l2_gain, generalized_h2):
+        found = {kind: analysis(model, relaxation=replace(QUICK, kind=kind), search=None) for kind in ("bernstein", "sos", "grid")}
+        # gamma is loosened by 1e-6 .. 1e-5 where it is proven; the grid is the solver's
+        assert found["sos"].gamma <= found["bernstein"].gamma * (1 + 1e-4)
+        assert found["grid"].indicative <= found["sos"].gamma * (1 + 1e-4)
+        assert found["sos"].gamma < found["bernstein"].gamma * 0.998
+        assert found["sos"].verify(rigorous=True)
+
+
+def test_subdivision_and_elevation_bring_bernstein_to_the_sums_of_squares():
+    model = replace(spring(0.3), B=spring().B)
+    one = Relaxation(degree=2, segments=(1,))
+    exact = l2_gain(model, 0.02, relaxation=replace(one, kind="sos"), search=None).gamma
+    plain = l2_gain(model, 0.02, relaxation=one, search=None).gamma
+    cut = l2_gain(model, 0.02, relaxation=replace(one, subdivision=3), search=None).gamma
+    raised = l2_gain(model, 0.02, relaxation=replace(one, elevation=6), search=None).gamma
+    # exact in one parameter: nothing that proves can be better, to the loosening of 1e-4
+    assert exact * (1 - 1e-4) <= cut <= plain * (1 + 1e-4)
+    assert exact * (1 - 1e-4) <= raised <= plain * (1 + 1e-4)
+    # eight parts: the gap falls at least with their width
+    assert cut - exact <= (plain - exact) / 8 + 1e-4 * exact
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dt", [None, 0.1])
+def test_both_routes_to_one_parameter_agree(dt):
+    model = random_stable(1, dt=dt)
+    spline = Relaxation(segments=(2,), degree=2)
+    old = l2_gain(model, relaxation=spline, search=None)
+    # a total degree of 2 on one segment takes the other route with the same P
+    one = l2_gain(model, relaxation=Relaxation(segments=(1,), degree=2), search=None)
+    new = l2_gain(model, relaxation=Relaxation(segments=(1,), degree=2, total_degree=2), search=None)
+    assert new.gamma == pytest.approx(one.gamma, rel=1e-3)
+    if dt is not None:
+        return  # p and p(k+1) make sums of squares in two variables: slow
+    sos = l2_gain(model, relaxation=replace(spline, kind="sos"), search=None)
+    assert sos.frozen == pytest.approx(old.frozen, rel=1e-7)
+    assert sos.frozen <= sos.gamma <= old.gamma * (1 + 1e-4)
+
+
+def test_several_parameters_of_an_lft_or_one_polynomial_alike():
+    A, B = {(0,): [[-1.0]], (1,): [[-1.0]]}, {(0,): [[1.0]]}
+    lft = LFT.polynomial(A, B, {(0,): [[1.0]]}, {(0,): [[0.0]]}, [Scheduling("p", "1", 0.0, 1.0, 1.0)])
+    for model in (lft, PolynomialStateSpace.from_lpv(lag())):
+        assert l2_gain(model, relaxation=QUICK, search=None).gamma == pytest.approx(1.0, rel=5e-6)
+
+
+def test_faster_parameters_cost_and_slower_ones_gain():
+    gains = [l2_gain(mass_spring(rate), relaxation=QUICK, search=None).gamma for rate in (0.0, 0.1, 0.4)]
+    assert gains == sorted(gains)
+    assert l2_gain(mass_spring(), {"k": 0.4, "d": 0.0}, relaxation=QUICK, search=None).gamma <= gains[2] * (1 + 1e-4)
+
+
+def test_a_decay_rate_of_constant_coefficients_is_that_of_the_slowest_mode():
+    model = mass_spring(spring=0.0)
+    cert = decay_rate(model, 0.0, relaxation=replace(QUICK, kind="sos", degree=2), search=None)
+    # 0.2: damping 0.6 - 0.2 at d = -1, halved; exp(-alpha t) to the tolerance of the bisection and the degree of P
+    assert cert.frozen == pytest.approx(0.2, rel=1e-7)
+    assert 0.97 * 0.2 <= cert.alpha <= 0.2
+    assert cert.alpha <= cert.upper
+
+
+def test_the_energy_to_peak_gain_of_an_oscillator():
+    """x'' + 2 d x' + w^2 x = u: the peak of x is 1/sqrt(4 d w^2) for the energy of u (Lyapunov equation by hand)."""
+    model = mass_spring(spring=0.0)
+    cert = generalized_h2(model, {"k": 0.0, "d": 0.0}, relaxation=replace(QUICK, degree=2), search=None)
+    assert cert.frozen == pytest.approx(1 / math.sqrt(2 * 0.4), rel=1e-7)
+    assert cert.frozen <= cert.gamma <= 1.05 * cert.frozen
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", installed_solvers())
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
+@pytest.mark.parametrize("excess", [1e-1, 1e-8])
+def test_no_scaling_makes_an_unstable_plant_proven(solver, scale, excess):
+    """By no relaxation, solver or scaling."""
+    never_proven(solver, scale, excess)
+
+
+@pytest.mark.parametrize("solver", installed_solvers())
+def test_an_unstable_plant_is_never_proven(solver):
+    """Barely unstable, between the ends of the range."""
+    never_proven(solver, 1.0, 1e-8)
+
+
+def never_proven(solver, scale, excess):
+    """First with the look at frozen poles, then by P alone."""
+    quick = Solver(solver, iterations=100 if solver == "SCS" else 0)
+    for dt in (None, 0.1):
+        model = unstable(excess, scale, dt)
+        for kind in (*PROOFS, "grid"):
+            relaxation = Relaxation(kind=kind, degree=1, segments=(1,), points=4, margins=(1e-6,), subdivision=1)
+            for analysis in (l2_gain, generalized_h2, decay_rate, stability):
+                cert = analysis(model, relaxation=relaxation, solver=quick, search=None)
+                assert cert.status is Status.UNSTABLE
+                assert not cert.verified
+            if kind == "grid":
+                continue
+            for demand in (Demand("stability", (0.0,)), Demand("l2 gain", (0.1,)), Demand("energy-to-peak gain", (0.1,))):
+                assert _Hunt(pieces(model), demand, relaxation, quick, 1.0).gain(math.inf).lyapunov is None
+
+
+def test_a_grid_sees_no_instability_between_its_points_and_says_so():
+    """Unstable for p near 0.5, where a grid of two points does not look."""
+    model = unstable(1e-3, 1.0)
+    relaxation = Relaxation(kind="grid", degree=0, points=2)
+    hunt = _Hunt(pieces(model), Demand("l2 gain", (0.1,)), relaxation, Solver(), 1.0)
+    found = hunt.gain(math.inf)
+    assert found.lyapunov is not None
+    assert not hunt.evidence.floating(found.lyapunov, found.bound)
+    assert not hunt.evidence.exact(found.lyapunov, found.bound)
+
+
+@pytest.mark.parametrize("analysis", [l2_gain, generalized_h2, decay_rate, stability])
+def test_a_grid_is_never_a_proof(analysis):
+    cert = analysis(lag(), 1.0, relaxation=Relaxation(kind="grid", degree=1), search=None)
+    assert cert.status is Status.UNPROVEN
+    assert not cert.verified
+    assert not cert.verify()
+    assert not cert.verify(rigorous=True)
+    if analysis is not stability:
+        assert math.isinf(cert.proven)
+        assert cert.indicative == pytest.approx({l2_gain: 1, generalized_h2: math.sqrt(0.5), decay_rate: 1}[analysis], rel=1e-3)
+    with pytest.raises(CertificateError):
+        replace(cert, verified=True, proven=1.0)
+
+
+@pytest.mark.parametrize("dt", [None, 0.2])
+def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
+    model = mass_spring(dt=dt, spring=0.3 if dt is None else 0.1)
+    for analysis in (l2_gain, generalized_h2, decay_rate):
+        cert = analysis(model, relaxation=Relaxation(degree=1 if dt is None else 0), search=None)
+        assert cert.verify()
+        assert cert.verify(rigorous=True)
+        P = cert.lyapunov
+        better = cert.proven * (1.02 if analysis is decay_rate else 0.98)
+        # neither the bound nor P can be moved: negative P, or a bound better than P admits
+        for bad in (
+            replace(cert, verified=False, proven=better),
+            replace(cert, lyapunov=replace(P, coefficients=-P.coefficients)),
+        ):
+            assert not bad.verify()
+            assert not bad.verify(rigorous=True)
+
+
+def test_a_worst_trajectory_is_found_and_its_order_is_kept():
+    model = mass_spring(0.8, spring=0.6)
+    peak = generalized_h2(model, relaxation=QUICK)
+    assert peak.frozen <= peak.lower <= peak.gamma * (1 + 1e-6)
+    slow = decay_rate(spring(damping=0.3), 0.5, relaxation=Relaxation(degree=2, segments=(2,)))
+    assert slow.alpha <= slow.upper < slow.frozen
+    assert slow.worst is not None
+    assert np.abs(np.diff(slow.worst.p)).max() <= 2.0
+
+
+def test_a_certificate_that_contradicts_a_frozen_model_cannot_be_made():
+    cert = decay_rate(two_lags(), relaxation=QUICK, search=None)
+    with pytest.raises(CertificateError, match="frozen value"):
+        replace(cert, proven=1.01 * cert.frozen)
+    gain = l2_gain(two_lags(), relaxation=QUICK, search=None)
+    with pytest.raises(CertificateError, match="frozen value"):
+        replace(gain, proven=0.99 * gain.frozen)
+
+
+def test_growth_along_a_trajectory_is_a_refusal():
+    cert = decay_rate(spring(), math.inf)
+    assert cert.status is Status.GROWING
+    assert cert.worst is not None
+    assert not cert.verified
+
+
+def test_wrong_input_gets_a_sentence():
+    with pytest.raises(UnknownNameError, match="relaxation"):
+        Relaxation(kind="sosp")  # type: ignore[arg-type]
+    with pytest.raises(UnknownNameError, match="scheduling parameter"):
+        l2_gain(two_lags(), {"c": 1.0})
+    with pytest.raises(InputError, match="rate must be >= 0"):
+        decay_rate(two_lags(), [1.0, -1.0])
+    with pytest.raises(InputError, match="needs D = 0"):
+        generalized_h2(random_stable(0))
+    with pytest.raises(InputError, match="or an LFT"):
+        decay_rate(np.eye(2))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="total degree of P needs one segment"):
+        l2_gain(lag(), relaxation=Relaxation(degree=2, segments=(2,), total_degree=2), search=None)
