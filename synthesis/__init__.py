@@ -5,8 +5,8 @@ No solver is loaded by importing this package.
 
 from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
 from synthesis.cone_program import Solver, installed_solvers
+from synthesis.decay_rate import decay_rate
 from synthesis.forms import Relaxation
-from synthesis.polynomial import BoxCertificate, BoxLyapunov, PolynomialMatrix, PolynomialStateSpace
 from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.generalized_h2 import generalized_h2
 from synthesis.handling_qualities import Bandwidth, bandwidth
@@ -15,11 +15,7 @@ from synthesis.lft import SCALINGS, BoxGain, LFTCertificate, Multiplier, Trial, 
 from synthesis.lower_bound import LowerBound, Search, lower_bound
 from synthesis.lyapunov import MemoryLyapunov, SplineLyapunov
 from synthesis.margins import Margins, disk_margin, loop, margins
-<<<<<<< HEAD
-=======
 from synthesis.polynomial import BoxCertificate, BoxLyapunov, PolynomialMatrix, PolynomialStateSpace
-from synthesis.proof_search import Relaxation
->>>>>>> e557ed8 (Several parameters, energy-to-peak gain and decay rate; sums of squares, vertices and grids beside Bernstein coefficients)
 
 __all__ = [
     "SCALINGS",

@@ -107,6 +107,7 @@ def test_several_parameters_of_an_lft_or_one_polynomial_alike():
         assert l2_gain(model, relaxation=QUICK, search=None).gamma == pytest.approx(1.0, rel=5e-6)
 
 
+@pytest.mark.slow
 def test_faster_parameters_cost_and_slower_ones_gain():
     gains = [l2_gain(mass_spring(rate), relaxation=QUICK, search=None).gamma for rate in (0.0, 0.1, 0.4)]
     assert gains == sorted(gains)
@@ -205,6 +206,7 @@ def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
             assert not bad.verify(rigorous=True)
 
 
+@pytest.mark.slow
 def test_a_worst_trajectory_is_found_and_its_order_is_kept():
     model = mass_spring(0.8, spring=0.6)
     peak = generalized_h2(model, relaxation=QUICK)
