@@ -274,13 +274,36 @@ static inline void back_substitute(const group *a)
     }
 }
 
-/* Largest regressors so far. One that is seen for the first time gets its prior: nothing is in its row and column yet. */
-static inline void new_peaks(const group *a)
+static inline rls_real power(rls_real base, int exponent)
+{
+    rls_real result = 1;
+    for (; exponent > 0; exponent /= 2) {
+        if (exponent % 2) result *= base;
+        base *= base;
+    }
+    return result;
+}
+
+/* The information that coefficients are kept awake with, in samples with a regressor at its largest: enough that the floor still stands
+   when half of it and then n samples more are forgotten. */
+static inline rls_real wakefulness(const rls_forgetting *f, int n)
+{
+    const rls_real fastest = f->kind == RLS_VARIABLE ? f->lowest : f->factor;
+    rls_real kept, floor;
+    if (f->kind == RLS_DIRECTIONAL || fastest == 1) return PRIOR;
+    kept = power(fastest, n);
+    floor = 2 * f->floor / (kept > REAL(1e-12) ? kept : REAL(1e-12));
+    return floor > PRIOR ? floor : PRIOR;
+}
+
+/* Largest regressors so far. A coefficient whose regressor is seen for the first time is kept awake from the start, at the 0 it has, lest
+   the first samples make it wild: nothing is in its row and column yet. */
+static inline void new_peaks(const group *a, rls_real samples)
 {
     int fresh = 0;
     for (int i = 0; i < a->tall; i++) fresh += (a->peak[i] == 0) & (a->phi[i] != 0);
     for (int i = 0; fresh && i < a->n; i++)
-        if (a->peak[i] == 0) a->d[i] = a->energy[i] = a->fed[i] = PRIOR * (a->phi[i] * a->phi[i]);
+        if (a->peak[i] == 0) a->d[i] = a->energy[i] = a->fed[i] = samples * (a->phi[i] * a->phi[i]);
     for (int i = 0; i < a->tall; i++) {
         const rls_real size = absolute(a->phi[i]);
         a->peak[i] = size > a->peak[i] ? size : a->peak[i];
@@ -354,27 +377,11 @@ static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a
     return factor < f->lowest ? f->lowest : factor > f->factor ? f->factor : factor;
 }
 
-static inline rls_real power(rls_real base, int exponent)
-{
-    rls_real result = 1;
-    for (; exponent > 0; exponent /= 2) {
-        if (exponent % 2) result *= base;
-        base *= base;
-    }
-    return result;
-}
-
 /* Keep coefficient j awake: a measurement that says "as it is now" moves nothing and makes up for what was forgotten. It comes as soon as
-   half is gone, so that the floor holds until the next turn of j, n samples later. */
-static inline void replenish(const rls_forgetting *f, const group *a, int j)
+   half is gone, n samples after the last turn of j at the earliest. */
+static inline void replenish(const group *a, rls_real samples, int j)
 {
-    const rls_real fastest = f->kind == RLS_VARIABLE ? f->lowest : f->factor;
-    rls_real samples = PRIOR, target;
-    if (f->kind != RLS_DIRECTIONAL && fastest < 1) {
-        const rls_real kept = power(fastest, a->n), floor = 2 * f->floor / (kept > REAL(1e-12) ? kept : REAL(1e-12));
-        if (floor > samples) samples = floor;
-    }
-    target = samples * (a->peak[j] * a->peak[j]);
+    const rls_real target = samples * (a->peak[j] * a->peak[j]);
     if (2 * a->fed[j] >= target) return;
     for (int k = 0; k < a->wide; k++) a->x[k] = 0;
     a->x[j] = 1;
@@ -406,12 +413,13 @@ static inline int is_determined(const group *a)
 static void learn(const rls_forgetting *f, const group *a, const int *output, const rls_real *y)
 {
     const int turn = (int)a->header[TURN];
+    const rls_real samples = wakefulness(f, a->n);
     rls_real factor, kept, w;
     for (int j = 0; j < a->m; j++) a->innovation[j] = y[output[j]] - dot(a->phi, a->theta + j * a->tall, a->tall);
-    new_peaks(a);
+    new_peaks(a, samples);
     factor = forgetting_factor(f, a);
     kept = f->kind == RLS_DIRECTIONAL ? 1 : factor;
-    replenish(f, a, turn);
+    replenish(a, samples, turn);
     if (factor < kept) forget_direction(a, factor);
     for (int k = 0; k < a->tall; k++) a->x[k] = a->phi[k];
     for (int k = a->n; k < a->wide; k++) a->x[k] = 0;

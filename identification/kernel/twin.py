@@ -181,10 +181,11 @@ class Kernel:
         turn = int(a.header[at.TURN])
         for j in range(m):
             a.innovation[j] = y[j] - dot(a.phi, a.theta[j])
-        self._new_peaks(a)
+        samples = self._wakefulness(n)
+        self._new_peaks(a, samples)
         factor = self._forgetting_factor(a)
         kept = self._real(1) if self._kind == DIRECTIONAL else factor
-        self._replenish(a, turn)
+        self._replenish(a, samples, turn)
         if factor < kept:
             self._forget_direction(a, factor)
         a.x[:] = 0
@@ -206,11 +207,11 @@ class Kernel:
         for i in range(turn, n + m, n):
             self._drop_underflow(a, i)
 
-    def _new_peaks(self, a: View) -> None:
+    def _new_peaks(self, a: View, samples: Any) -> None:
         n = a.n
         phi, peak = a.phi[:n], a.peak[:n]
         fresh = (peak == 0) & (phi != 0)
-        prior = a.peak.dtype.type(self._limits.prior) * (phi[fresh] * phi[fresh])
+        prior = a.peak.dtype.type(samples) * (phi[fresh] * phi[fresh])
         for part in (a.d[:n], a.energy[:n], a.fed[:n]):
             part[fresh] = prior
         np.maximum(peak, np.abs(phi), out=peak)
@@ -247,12 +248,15 @@ class Kernel:
         many = weight >= 2 * a.n or 2 * weight * (1 - self._factor) >= 1
         return bool(a.header[at.STEPS] > 0 or (a.header[at.DETERMINED] != 0 and many))
 
-    def _replenish(self, a: View, j: int) -> None:
+    def _wakefulness(self, n: int) -> Any:
         real = self._real
         fastest = self._lowest if self._kind == VARIABLE else self._factor
-        samples = self._limits.prior
-        if self._kind != DIRECTIONAL and fastest < 1:
-            samples = max(samples, real(2) * self._floor / max(power(fastest, a.n), real(1e-12)))
+        if self._kind == DIRECTIONAL or fastest == 1:
+            return self._limits.prior
+        return max(self._limits.prior, real(2) * self._floor / max(power(fastest, n), real(1e-12)))
+
+    def _replenish(self, a: View, samples: Any, j: int) -> None:
+        real = self._real
         target, fed = samples * real(a.peak[j] * a.peak[j]), real(a.fed[j])
         if real(2) * fed >= target:
             return

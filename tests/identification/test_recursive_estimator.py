@@ -61,7 +61,6 @@ def test_degree_five_with_forgetting_and_slow_airspeed_predicts_as_weighted_batc
     assert np.sqrt(np.mean(history.innovations[200:] ** 2)) < 0.15
 
 
-@pytest.mark.xfail(strict=True, reason="the floor holds the wild coefficients of a cold start: one step errs by 1e6 where the noise is 0.1")
 def test_the_default_floor_does_no_harm_on_a_slow_cold_start():
     truth, record = slow_and_cold()
     history = idn.RecursiveLeastSquares(truth.arx, forgetting=0.99).run(record)
