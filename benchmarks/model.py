@@ -1,8 +1,13 @@
-"""One right-hand side of the X-Cell: compiled, in the CasADi virtual machine, and the same component functions on floats."""
+"""Flights, batches and sweeps of the X-Cell against the same work as others would write it (see benchmarks/opponents)."""
 
 from __future__ import annotations
 
+import shutil
 import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,47 +15,212 @@ import numpy as np
 sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scripts named like the packages they measure
 
 import symheli  # noqa: E402
-from benchmarks.timing import arguments, medians, show  # noqa: E402
-from symheli.integrate import runge_kutta  # noqa: E402
+from benchmarks.opponents import scipy_flight  # noqa: E402
+from benchmarks.race import Ratio, present, readable, table  # noqa: E402
+from benchmarks.timing import arguments, medians  # noqa: E402
+from symheli.integrate import RungeKutta4  # noqa: E402
 from symheli.numeric import Numeric  # noqa: E402
 
-CALLS = 200
+DT, STEPS = 0.02, 4  # s; Runge-Kutta steps of 5 ms
+STILL = np.zeros(3)
+FLIGHTS, QUICK_FLIGHTS = 10_000, 128
+RTOL = 5e-10  # of solve_ivp's RK45: over these 30 s 1e-9 leaves 1.3e-5, twice what the Runge-Kutta steps leave, and this 2e-6
+
+C, NUMBA = "C by hand, -O3 -march=native", "Numba"
+
+Fly = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # (x0, inputs (n, 4), wind) -> states (n + 1, 15)
+
+
+@dataclass
+class Race:
+    """What was measured: rows of the tables, the ratios, and what could not be run here."""
+
+    quick: bool
+    tables: list[str] = field(default_factory=list)
+    ratios: list[Ratio] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+class Contestants:
+    """Ways to fly, by name, with the start and the inputs of a recorded transition of 30 s."""
+
+    def __init__(self, race: Race):
+        self.heli = symheli.Helicopter.load("xcell60", governor="ideal")
+        schedule = symheli.AirspeedSchedule.transition(0.0, 13.0, acceleration=3.0, hold=7.3)
+        self.inputs = np.ascontiguousarray(symheli.fly(self.heli, schedule).columns(self.heli.inputs)[:1500])
+        self.x0 = symheli.simulate(self.heli, symheli.trim(self.heli, 0.0), self.inputs[:1], dt=DT).states[0]
+        self.on_the_way = self.symheli(self.x0, self.inputs, STILL)[200]  # after 4 s, accelerating
+        self.compiled: dict[str, Fly] = {}
+        self.numba_batch = None
+        if cc := shutil.which("cc"):
+            from benchmarks.opponents.c_flight import CFlight
+
+            code = CFlight(cc)
+            self.compiled[C] = lambda x, u, wind: code.fly(x, u, wind, DT, STEPS)
+        else:
+            race.notes.append("C by hand: left out, no C compiler")
+        try:
+            from benchmarks.opponents import numba_flight
+
+            self.compiled[NUMBA] = lambda x, u, wind: numba_flight.fly(x, u, wind, DT, STEPS)
+            if not race.quick:
+                self.numba_batch = numba_flight.fly_many
+        except ImportError:
+            race.notes.append("Numba: left out, it is not installed (pip install numba)")
+
+    def symheli(self, x0: np.ndarray, inputs: np.ndarray, wind: np.ndarray) -> np.ndarray:
+        return symheli.simulate(self.heli, x0, inputs, wind, dt=DT).states
+
+
+def right_hand_side(race: Race, who: Contestants) -> None:
+    """One evaluation of the Euler form through three of symheli's own doors."""
+    heli, point, calls = who.heli, symheli.trim(who.heli, 7.0), 200
+    x, u = point.x.array, point.u.array
+    fast, machine, parameters = heli.numeric("rhs"), Numeric(heli.rhs), heli.parameters.array.tolist()
+
+    def plain() -> np.ndarray:
+        """The component functions called with floats, no CasADi."""
+        return np.array(heli.dynamics.accelerations(list(x), list(u), STILL, parameters)[:6], float)
+
+    np.testing.assert_allclose(plain(), fast(x, u, STILL)[0][:6], atol=1e-9)
+    many = {
+        "compiled": lambda: [fast(x, u, STILL) for _ in range(calls)],
+        "virtual machine": lambda: [machine(x, u, STILL) for _ in range(calls)],
+    }
+    times = medians({**many, "NumPy": plain}, 0.5 if race.quick else 5.0, time.thread_time)
+    times |= {name: times[name] / calls for name in many}
+    race.tables.append(
+        table("### One right-hand side of symheli, called from Python", [(n, readable(t)) for n, t in times.items()], ("", "median"))
+    )
+    for name in ("virtual machine", "NumPy"):
+        race.ratios.append(Ratio(f"compiled against {name}", times[name] / times["compiled"]))
+
+
+def fly_one(race: Race, who: Contestants) -> None:
+    """30 s of flight, the states kept every 20 ms; SciPy, a hundred times slower, takes its turns in a group of its own."""
+    rows = []
+
+    def take_turns(flyers: dict[str, Fly], x0: np.ndarray, inputs: np.ndarray, seconds: float) -> dict[str, float]:
+        exact = symheli.simulate(who.heli, x0, inputs, dt=DT, method=RungeKutta4(DT / 64)).states
+        times = medians({name: partial(fly, x0, inputs, STILL) for name, fly in flyers.items()}, seconds, time.thread_time)
+        for name, fly in flyers.items():
+            error = np.abs(fly(x0, inputs, STILL) - exact).max()
+            rows.append((name, f"{len(inputs) * DT:g} s", readable(times[name]), f"{error:.1e}"))
+        return times
+
+    times = take_turns({"symheli.simulate": who.symheli, **who.compiled}, who.x0, who.inputs, 1.0 if race.quick else 10.0)
+    ours = times["symheli.simulate"]
+    if (c := times.get(C)) is not None:
+        race.ratios.append(Ratio("30 s of flight: symheli's time over hand-written C's", ours / c, 1.2, at_most=True))
+    if (numba := times.get(NUMBA)) is not None:
+        race.ratios.append(Ratio("30 s of flight: times faster than Numba", numba / ours, 1.3))
+
+    part, start = who.inputs, who.x0
+    if race.quick:
+        part, start = who.inputs[200:300], who.on_the_way
+        race.notes.append("SciPy and symheli beside it: 2 s of the acceleration in place of 30 s")
+    arrays, floats = "SciPy solve_ivp, state unpacked from NumPy", "SciPy solve_ivp, state unpacked to Python floats"
+    slow = {
+        "symheli.simulate, beside SciPy": who.symheli,
+        arrays: lambda x, u, wind: scipy_flight.fly(x, u, wind, DT, RTOL, unpack=iter),
+        floats: lambda x, u, wind: scipy_flight.fly(x, u, wind, DT, RTOL),
+    }
+    times = take_turns(slow, start, part, 0.0)
+    ours = times["symheli.simulate, beside SciPy"]
+    race.ratios.append(Ratio("30 s of flight: times faster than SciPy on NumPy equations", times[arrays] / ours, 300.0))
+    race.ratios.append(Ratio("30 s of flight: times faster than SciPy on Python floats", times[floats] / ours))
+    race.tables.append(
+        table(
+            "### One flight, Runge-Kutta steps of 5 ms, states every 20 ms",
+            rows,
+            ("", "flight", "median", "largest error of any state (SI)"),
+        )
+    )
+
+
+def fly_many(race: Race, who: Contestants) -> None:
+    """Monte Carlo: 10 s flights from scattered starts, each in its own steady wind; the last states are kept."""
+    count = QUICK_FLIGHTS if race.quick else FLIGHTS
+    if race.quick:
+        race.notes.append(f"batch: {count} flights in place of {FLIGHTS:,}")
+    rng = np.random.default_rng(0)
+    inputs = who.inputs[200:700]
+    starts = who.on_the_way + 0.05 * rng.standard_normal((count, 15)) * (np.arange(15) < 6)
+    winds = rng.standard_normal((count, 3))
+
+    def batch() -> np.ndarray:
+        return symheli.simulate_batch(who.heli, starts, inputs, winds[:, None], dt=DT).final
+
+    def loop(fly: Fly) -> Callable[[], np.ndarray]:
+        return lambda: np.stack([fly(x, inputs, wind)[-1] for x, wind in zip(starts, winds, strict=True)])
+
+    candidates = {"symheli.simulate_batch": batch, "a loop of symheli.simulate": loop(who.symheli)}
+    candidates |= {f"a loop of {name}": loop(fly) for name, fly in who.compiled.items()}
+    if parallel := who.numba_batch:
+        candidates["Numba, prange over the flights"] = lambda: parallel(starts, inputs, winds, DT, STEPS)
+    ends = {name: call() for name, call in candidates.items()}
+    # chaos does not build up in 10 s: what differs is rounding
+    apart = {name: np.abs(end - ends["symheli.simulate_batch"]).max() for name, end in ends.items()}
+    times = medians(candidates, 1.0 if race.quick else 0.0, warm=False)
+    base = times["symheli.simulate_batch"]
+    race.tables.append(
+        table(
+            f"### {count:,} flights of 10 s, Runge-Kutta steps of 5 ms, last states",
+            [(name, readable(t), f"{apart[name]:.1e}") for name, t in times.items()],
+            ("", "median", "largest difference to the batch (SI)"),
+        )
+    )
+    for name, t in times.items():
+        if name != "symheli.simulate_batch":
+            goal = 3.0 if name.startswith("a loop of") else None
+            race.ratios.append(Ratio(f"flights of 10 s: batch against {name}", t / base, goal))
+
+
+def sweep(race: Race, who: Contestants) -> None:
+    """200 trims with their linear models, hover to 13 m/s."""
+    from benchmarks.opponents import python_control_sweep
+
+    speeds = np.linspace(0.0, 13.0, 25 if race.quick else 200)
+    if race.quick:
+        race.notes.append(f"sweep: {len(speeds)} airspeeds in place of 200")
+    candidates = {"symheli.sweep": lambda: symheli.sweep(who.heli, speeds), "python-control": lambda: python_control_sweep.sweep(speeds)}
+    times = medians(candidates, 0.0 if race.quick else 5.0, time.thread_time)
+    family, theirs = symheli.sweep(who.heli, speeds), python_control_sweep.sweep(speeds)
+    trims = max(np.abs(x - t.x.array).max() for (x, _, _), t in zip(theirs, family.trims, strict=True))
+    smooth = [
+        k for k, v in enumerate(speeds) if all(abs(v - kink) > 0.05 for found in family.kinks.values() for kink in found) and v > 0.05
+    ]
+    models = max(np.abs(theirs[k][2].A - family.A[k]).max() for k in smooth)
+    race.tables.append(
+        table(
+            f"### Trim and linear model at {len(speeds)} airspeeds, 0 to 13 m/s",
+            [
+                ("symheli.sweep (exact derivatives, kinks found)", readable(times["symheli.sweep"]), ""),
+                (
+                    "python-control, find_operating_point and linearize",
+                    readable(times["python-control"]),
+                    f"trims {trims:.0e}, A {models:.0e}",
+                ),
+            ],
+            ("", "median", "largest difference to symheli (SI; A away from the kinks)"),
+        )
+    )
+    race.ratios.append(
+        Ratio(
+            "sweep of trims and linear models: times faster than python-control",
+            times["python-control"] / times["symheli.sweep"],
+            200.0,
+        )
+    )
 
 
 def main() -> None:
-    options = arguments(__doc__)
-    heli = symheli.Helicopter.load("xcell60", governor="ideal")
-    point = symheli.trim(heli, 7.0)
-    x, u, wind = point.x.array, point.u.array, np.zeros(3)
-    fast, machine = heli.numeric("rhs"), Numeric(heli.rhs)
-
-    def plain() -> np.ndarray:
-        """What a user writes first: the component functions called with floats."""
-        return np.array(heli.dynamics.accelerations(list(x), list(u), wind, heli.parameters.array.tolist())[:6], float)  # no CasADi
-
-    np.testing.assert_allclose(plain(), fast(x, u, wind)[0][:6], atol=1e-9)
-    flight = np.concatenate([x[:6], [1.0, 0, 0, 0], np.zeros(3), x[8:]])
-    step = Numeric(runge_kutta(heli, 0.02, 4))
-
-    def repeated(call):
-        return lambda: [call() for _ in range(CALLS)]
-
-    times = medians(
-        {
-            "right-hand side, compiled": repeated(lambda: fast(x, u, wind)),
-            "right-hand side, CasADi virtual machine": repeated(lambda: machine(x, u, wind)),
-            "right-hand side, plain Python and NumPy": plain,
-            "20 ms of flight (4 Runge-Kutta steps), compiled": repeated(lambda: step(flight, u, wind)),
-        },
-        1.0 if options.quick else 5.0,
-    )
-    times = {name: t if name.endswith("NumPy") else t / CALLS for name, t in times.items()}
-    base = times["right-hand side, compiled"]
-    ratios = {
-        "compiled against virtual machine": times["right-hand side, CasADi virtual machine"] / base,
-        "compiled against NumPy": times["right-hand side, plain Python and NumPy"] / base,
-    }
-    show(options, times, ratios)
+    options = arguments(__doc__, write=True)
+    race = Race(options.quick)
+    who = Contestants(race)
+    for part in (fly_one, fly_many, sweep, right_hand_side):
+        part(race, who)
+    present("model", options, race.tables, race.ratios, race.notes)
 
 
 if __name__ == "__main__":

@@ -11,14 +11,15 @@ from pathlib import Path
 
 
 def medians(
-    candidates: dict[str, Callable[[], object]], seconds: float, clock: Callable[[], float] = time.perf_counter
+    candidates: dict[str, Callable[[], object]], seconds: float, clock: Callable[[], float] = time.perf_counter, *, warm: bool = True
 ) -> dict[str, float]:
-    """Median time of one call of each, in s, over about `seconds` of interleaved runs each.
+    """Median time of one call of each, in s, over about `seconds` of interleaved runs each and at least three.
 
     `clock` time.thread_time counts what one thread works and not what others keep it from: for work of one thread on a busy machine.
+    `warm`: each is called once before, so that nothing is compiled while the clock runs; without it the caller has done so.
     """
     spent: dict[str, list[float]] = {name: [] for name in candidates}
-    for call in candidates.values():
+    for call in candidates.values() if warm else ():
         call()
     end = time.perf_counter() + seconds * len(candidates)
     while time.perf_counter() < end or min(len(t) for t in spent.values()) < 3:
@@ -29,13 +30,15 @@ def medians(
     return {name: statistics.median(times) for name, times in spent.items()}
 
 
-def arguments(description: str, plot: bool = False) -> argparse.Namespace:
-    """--quick and --json, as every benchmark has them; --plot where there is something to draw."""
+def arguments(description: str | None, plot: bool = False, write: bool = False) -> argparse.Namespace:
+    """--quick and --json, as every benchmark has them; --plot where there is something to draw, --write to keep it in the documentation."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--quick", action="store_true", help="shorter runs, under 40 s")
     parser.add_argument("--json", action="store_true", help="print each ratio by name")
     if plot:
         parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the result (needs matplotlib)")
+    if write:
+        parser.add_argument("--write", action="store_true", help="keep the tables in docs/benchmarks.md")
     return parser.parse_args()
 
 

@@ -79,7 +79,7 @@ def test_numba_flies_the_same_flight(flight, ours):
     x0, inputs, wind = flight
     states = numba_flight.fly(x0, inputs, wind, 0.02, 4)
     np.testing.assert_allclose(states, ours, rtol=1e-10, atol=1e-11)
-    many = numba_flight.fly_many(np.stack([x0, x0]), np.stack([inputs, inputs]), wind, 0.02, 4)
+    many = numba_flight.fly_many(np.stack([x0, x0]), inputs, np.stack([wind, wind]), 0.02, 4)
     np.testing.assert_allclose(many, [ours[-1]] * 2, rtol=1e-10, atol=1e-11)
 
 

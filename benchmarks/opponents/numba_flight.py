@@ -49,9 +49,9 @@ def fly(x0, inputs, wind, dt, steps):
 
 
 @numba.njit(error_model="numpy", fastmath=True, parallel=True)
-def fly_many(x0, inputs, wind, dt, steps):
-    """Last states (m, 15) of m flights from x0 (m, 15), inputs (m, n, 4), on all cores."""
+def fly_many(x0, inputs, winds, dt, steps):
+    """Last states (m, 15) of m flights from x0 (m, 15) in winds (m, 3) under the same inputs (n, 4), on all cores."""
     ends = np.empty((len(x0), 15))
     for j in numba.prange(len(x0)):
-        ends[j] = fly(x0[j], inputs[j], wind, dt, steps)[-1]
+        ends[j] = fly(x0[j], inputs, winds[j], dt, steps)[-1]
     return ends
