@@ -116,7 +116,7 @@ def _triangle(*factors: Array) -> Array:
     """R (n, n) with R' R the sum of F' F of the factors (m, n)."""
     n = factors[0].shape[1]
     stacked = np.vstack([*factors, np.zeros((max(n - sum(map(len, factors)), 0), n))])
-    return np.linalg.qr(stacked, mode="r")
+    return np.asarray(np.linalg.qr(stacked, mode="r"))
 
 
 def _logdet(factor: Array) -> float:

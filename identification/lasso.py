@@ -59,7 +59,7 @@ def lasso_path(X: Array, y: Array) -> tuple[Array, Array]:
     Source: Efron, Hastie, Johnstone and Tibshirani (2004), Annals of Statistics 32, 407-499, with the lasso modification.
     """
     m, n = X.shape
-    R = np.linalg.qr(np.column_stack([X, y]), mode="r")
+    R = np.asarray(np.linalg.qr(np.column_stack([X, y]), mode="r"))
     R, z = R[:, :n] / np.sqrt(m), R[:, n] / np.sqrt(m)
     b, active, barred = np.zeros(n), [], np.zeros(n, dtype=bool)
     price = float(np.abs(R.T @ z).max(initial=0.0))
@@ -116,7 +116,7 @@ def _next_corner(
 
 
 def _depends(R: Array, columns: list[int]) -> bool:
-    T = np.linalg.qr(R[:, columns], mode="r")
+    T = np.asarray(np.linalg.qr(R[:, columns], mode="r"))
     return len(columns) > T.shape[0] or abs(T[-1, -1]) <= RANK_TOLERANCE * np.linalg.norm(R[:, columns[-1]])
 
 

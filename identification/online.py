@@ -94,7 +94,7 @@ class Online:
             return self._work[c.groups[0].in_work["gain"]][: c.groups[0].n]
         out = np.zeros((c.structure.n_regressors, c.structure.ny), c.dtype)
         for layout in c.groups:
-            out[np.ix_(c.structure.regressors(layout.group), layout.group.outputs)] = self._work[layout.in_work["gain"]][: layout.n, None]
+            out[c.structure.regressors(layout.group)[:, None], layout.group.outputs] = self._work[layout.in_work["gain"]][: layout.n, None]
         return out
 
     @property

@@ -52,7 +52,7 @@ def ridge(arx: LPVARX, data: Regression, options: Ridge) -> tuple[Array, Array]:
         problem = _Problem.of(arx, data, group, options)
         for y in outputs:
             weights[y] = problem.cross_validated(y) if options.weight is None else options.weight
-            theta[regressors, y] = problem.solve(weights[y], y)
+            theta[regressors, y] = problem.solve(float(weights[y]), y)
     return theta, weights
 
 

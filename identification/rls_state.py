@@ -95,7 +95,7 @@ class RLSState:
         out, epsilon = self.theta.copy(), float(np.finfo(self.configuration.dtype).eps)
         for layout in self.configuration.groups:
             n, triangle = layout.n, layout.triangle.full(self._part(layout, "triangle").astype(float))
-            where = np.ix_(self.configuration.structure.regressors(layout.group), layout.group.outputs)
+            where = self.configuration.structure.regressors(layout.group)[:, None], layout.group.outputs
             theta = out[where]
             for i in reversed(np.flatnonzero(self._part(layout, "d")[:n] > epsilon * self._part(layout, "energy")[:n])):
                 theta[i] = triangle[i, n:] - triangle[i, i + 1 : n] @ theta[i + 1 :]

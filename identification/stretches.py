@@ -83,9 +83,9 @@ def stretches(arx: LPVARX, records: Sequence[FlightRecord], *, outputs: bool) ->
     found = []
     for record in records:
         s = Samples.of(arx, record)
-        known = np.isfinite(np.column_stack([s.u, s.f, *([s.y] if outputs else [])])).all(axis=1)
+        known = np.isfinite(np.column_stack([s.u, s.f, *([s.y] if outputs else [])])).all(axis=1).tolist()
         for part in s.segments:
-            for whole, group in groupby(range(part.start, part.stop), key=lambda k, known=known: bool(known[k])):
+            for whole, group in groupby(range(part.start, part.stop), key=lambda k, known=known: known[k]):
                 samples = list(group)
                 if whole and len(samples) > arx.memory:
                     keep = slice(samples[0], samples[-1] + 1)

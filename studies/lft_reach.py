@@ -103,7 +103,7 @@ def gains(loop: LPVStateSpace, low: float, high: float) -> dict[str, Any]:
     narrow = on(loop, low, high)
     lft = narrow.to_lft().reduce()
     varying = synthesis.l2_gain(narrow, RATE)
-    certificates = {test: synthesis.lft_gain(lft, test, search=None) for test in synthesis.SCALINGS}
+    certificates: dict[str, Any] = {test: synthesis.lft_gain(lft, test, search=None) for test in synthesis.SCALINGS}
     certificates[f"P(p) at {RATE:g} m/s^2"] = varying
     found = {test: c.gamma if c.verified else c.status.name for test, c in certificates.items()}
     return {**found, "lower bound at that rate": varying.lower, "frozen": varying.frozen}

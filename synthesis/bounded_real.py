@@ -17,7 +17,7 @@ rates", Int. J. Robust and Nonlinear Control 6 (1996), theorem 3.1.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -142,7 +142,7 @@ def assemble(
         pointer.append(place[where[1]])
         top += m * L
     lmi = sparse.coo_matrix((np.concatenate(data), (np.concatenate(index), np.concatenate(pointer))), shape=(top, of_P))
-    parts = [lmi]
+    parts: list[Any] = [lmi]
     if null is not None:
         parts.append(sparse.kron(sparse.identity(len(weights)), sparse.csc_matrix(null.T)))
     A = [sparse.hstack([*parts, sparse.csc_matrix(np.outer(weights, gain).reshape(-1, 1))])]

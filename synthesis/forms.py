@@ -180,6 +180,9 @@ class Quadratic(Form):
 class HigherOrder(Quadratic):
     """V = z' P(p) z with the monomials z of degree `order` in the states: a sum-of-squares proof for each coefficient."""
 
+    states: int
+    order: int
+
     def __init__(self, knots: Array, degree: int, states: int, order: int):
         super().__init__(knots, degree, len(monomials(states, order)))
         matrices = null_matrix(np.eye(null_size(states, order)), states, order)

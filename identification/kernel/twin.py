@@ -384,5 +384,5 @@ def theta(c: Configuration, state: Array) -> Array:
     out = np.zeros((c.structure.n_regressors, c.structure.ny), state.dtype)
     for layout in c.groups:
         own = state[layout.in_state["theta"]].reshape(layout.m, -1)[:, : layout.n]
-        out[np.ix_(c.structure.regressors(layout.group), layout.group.outputs)] = own.T
+        out[c.structure.regressors(layout.group)[:, None], layout.group.outputs] = own.T
     return out

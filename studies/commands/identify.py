@@ -66,14 +66,15 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.log.reading import COMBINED, format_of, read
     from symheli.lpv import FlightRecord, conditioning
 
-    kind = "mapped" if arguments.map else format_of(arguments.log) if arguments.format == "auto" else arguments.format
+    found = format_of(arguments.log) if arguments.format == "auto" and not arguments.map else arguments.format
+    kind = "mapped" if arguments.map else found
     outputs, inputs, scheduling = _signals(arguments, kind)
     wanted = [*outputs, *inputs, *(arguments.scheduling_from or ((scheduling,) if scheduling else ()))]
     if arguments.map:
         record = FlightRecord.from_map(arguments.log, arguments.map)
     else:
         record = read(
-            arguments.log, list(dict.fromkeys(wanted)), format=kind, dt=arguments.dt, time=arguments.time, units=dict(arguments.units)
+            arguments.log, list(dict.fromkeys(wanted)), format=found, dt=arguments.dt, time=arguments.time, units=dict(arguments.units)
         )
     samples = len(record)
     if arguments.scheduling_from:
@@ -95,8 +96,8 @@ def run(arguments: argparse.Namespace) -> Output:
     if arguments.orders:
         return _orders(structure, training, test)
     result = compare(structure, training, test)
-    found = report.facts(arguments.log, kind, record, samples, outside, result)
-    return Output(report.text(found, result), report.data(found, result))
+    facts = report.facts(arguments.log, kind, record, samples, outside, result)
+    return Output(report.text(facts, result), report.data(facts, result))
 
 
 def _orders(structure: Any, training: Any, test: Any) -> Output:
