@@ -29,7 +29,7 @@ class WaveFamily:
         self.grid = np.linspace(s.low, s.high, search.levels + 1)
         poles = np.linalg.eigvals(lpv.matrices(self.grid).A)
         if lpv.dt is not None:
-            poles = np.log(np.where(poles == 0, 1e-12, poles)) / lpv.dt
+            poles = np.log(np.where(poles == 0, 1e-12, poles.astype(complex))) / lpv.dt
         pace = np.abs(poles)
         self.fast = 2 * math.pi / float(pace.max())
         self.slow = min(2 * math.pi / max(float(pace.min()), 1e-6), 20 * self.fast)

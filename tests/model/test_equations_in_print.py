@@ -114,7 +114,7 @@ def test_a_second_rotor_and_a_part_of_ones_own_are_printed_under_their_names(tmp
     heli = symheli.Helicopter.load(write(tmp_path, WING, AFT_ROTOR))
     sections = {section.title: section for section in listing(heli)}
     assert r"Z_{\mathrm{wing}} = - \frac{\mathrm{area} \mathrm{lift\_slope} \rho u_{a} w_{a}}{2}" in sections["Wing"].equations
-    assert sections["Wing"].text == "A small wing: lift along z, in linear attached flow."
+    assert sections["Wing"].text == "wing.py: lift along z, in linear attached flow."
     assert any(e.startswith(r"\dot{a}_{1,\mathrm{aft},\mathrm{rotor}} = ") for e in sections["Aft rotor"].equations)
     total = next(e for e in sections["Rigid body"].equations if e.startswith("Z = "))
     assert r"Z_{\mathrm{mr},\mathrm{aft},\mathrm{rotor}}" in total
