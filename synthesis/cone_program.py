@@ -46,7 +46,7 @@ class Solver:
     name: str = "CLARABEL"
     tolerance: float = 1e-8
     iterations: int = 0
-    time_limit: float = 120.0
+    time_limit: float = 600.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(self.name).upper())

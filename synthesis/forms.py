@@ -37,7 +37,7 @@ class Relaxation:
 
     P is a continuous spline of `degree` (None: 3 in continuous, 2 in discrete time) on K segments, K from `segments`
     (None: 16, 32 in continuous, 8, 16 in discrete time) in turn until the bound is proven and gamma <= `accept` times the
-    lower bound. Knots low + (high - low)(k/K)^`grading`.
+    lower bound. Knots low + (high - low)(k/K)^`grading`. A constant P has no knots, but its LMIs are cut there (None: 8).
     `elevation` raises the Bernstein degree of the LMIs, or that of the sums of squares; `subdivision` halves every range that
     often before the Bernstein coefficients are taken; `points` a parameter in every region for the grid.
     Several parameters: degree None is 2 in continuous and 1 in discrete time, segments (1,), `total_degree` limits the sum
@@ -250,8 +250,8 @@ def forms(problem: Problem, relaxation: Relaxation) -> Iterator[Form]:
     constant = math.isinf(problem.rate) or relaxation.degree == 0
     usual = 2 if relaxation.order > 1 or sampled else 3
     degree = 0 if constant and not remembers else (relaxation.degree or usual)
-    default = (12,) if remembers else (4, 8) if relaxation.order > 1 else (8, 16) if sampled else (16, 32)
-    for segments in (relaxation.segments or default) if degree else (1,):
+    default = (8,) if not degree else (12,) if remembers else (4, 8) if relaxation.order > 1 else (8, 16) if sampled else (16, 32)
+    for segments in relaxation.segments or default:
         knots = _knots(problem, relaxation, segments, degree)
         if remembers:
             region = LagRegion.reached(knots, problem.rate, float(relaxation.memory))  # type: ignore[arg-type]
@@ -267,6 +267,6 @@ def forms(problem: Problem, relaxation: Relaxation) -> Iterator[Form]:
 def _knots(problem: Problem, relaxation: Relaxation, segments: int, degree: int) -> Array:
     low, high = problem.pieces[0].low, problem.pieces[-1].high
     breaks = [piece.low for piece in problem.pieces[1:]]
-    if degree == 0 or 2.5 * problem.step >= high - low:
+    if degree and 2.5 * problem.step >= high - low:
         return np.array([low, high])
-    return graded_knots(low, high, segments, relaxation.grading, breaks, shortest=2.5 * problem.step)
+    return graded_knots(low, high, segments, relaxation.grading, breaks, shortest=2.5 * problem.step if degree else 0.0)

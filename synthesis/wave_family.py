@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
+FINEST = 8
+"""For a slow p the levels are at most this many times closer than asked for."""
+
 
 class WaveFamily:
     """The waves of a model within `rate`, as coarse as `search` says.
@@ -26,14 +29,17 @@ class WaveFamily:
     def __init__(self, lpv: LPVStateSpace, rate: float, search: Search):
         self.lpv, self.rate, self.search = lpv, rate, search
         s = lpv.scheduling
-        self.grid = np.linspace(s.low, s.high, search.levels + 1)
-        poles = np.linalg.eigvals(lpv.matrices(self.grid).A)
+        poles = np.linalg.eigvals(lpv.matrices(np.linspace(s.low, s.high, search.levels + 1)).A)
         if lpv.dt is not None:
             poles = np.log(np.where(poles == 0, 1e-12, poles.astype(complex))) / lpv.dt
         pace = np.abs(poles)
         self.fast = 2 * math.pi / float(pace.max())
         self.slow = min(2 * math.pi / max(float(pace.min()), 1e-6), 20 * self.fast)
         self.longest = 0.5 / float(pace.max())
+        # a slow p covers little of the range in the longest cycle: levels close enough for some steps up and down
+        spacing = min((s.high - s.low) / search.levels, self.rate * self.longest_period / 6)
+        levels = min(math.ceil((s.high - s.low) / spacing), FINEST * search.levels)
+        self.grid = np.linspace(s.low, s.high, levels + 1)
 
     @property
     def longest_period(self) -> float:
