@@ -24,7 +24,7 @@ sys.path[0] = str(ROOT)  # this folder holds scripts named like the packages the
 
 import symheli  # noqa: E402
 from benchmarks.opponents import gridded_lmi  # noqa: E402
-from benchmarks.timing import arguments  # noqa: E402
+from benchmarks.timing import arguments, keep  # noqa: E402
 from studies.lateral_loop import HOLD, OUTPUTS, STATES, lateral_loop  # noqa: E402
 from symheli.flight import XCELL_SERVOS  # noqa: E402
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, pade_delay  # noqa: E402
@@ -190,7 +190,7 @@ def plot(curves: dict[str, list[tuple[int, float]]], path: Path) -> Path | None:
 
 
 def main() -> None:
-    options = arguments(__doc__)
+    options = arguments(__doc__, write=True)
     heli = symheli.Helicopter.load("xcell60", governor="ideal")
     loops = {5: lateral_loop(heli)}
     loops |= {8 + d: behind_servo(heli, d) for d in ((2,) if options.quick else (0, 2, 4))}
@@ -238,11 +238,11 @@ def main() -> None:
     if options.json:
         print(json.dumps({g.name: g.value for g in goals} | ratios, indent=1))
         return
+    lines += [f"{g.name:60s}{g.value:10.3f} x, at most {g.most:g}: {'met' if g.value <= g.most else 'MISSED'}" for g in goals]
+    lines += [f"{name:60s}{value:10.3f}" for name, value in ratios.items()]
     print("\n".join(lines))
-    for g in goals:
-        print(f"{g.name:60s}{g.value:10.3f} x, at most {g.most:g}: {'met' if g.value <= g.most else 'MISSED'}")
-    for name, value in ratios.items():
-        print(f"{name:60s}{value:10.3f}")
+    if options.write:
+        keep("analysis", "\n".join(lines))
     if not options.quick:
         plot(curves, ROOT / "docs" / "analysis-growth.png")
 

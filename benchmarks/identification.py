@@ -21,7 +21,7 @@ import numpy as np
 sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scripts named like the packages they measure
 
 from benchmarks.opponents.covariance_rls import CovarianceRLS, Padasip, TunedCovarianceRLS, padasip_is_installed  # noqa: E402
-from benchmarks.timing import arguments, medians, show  # noqa: E402
+from benchmarks.timing import arguments, keep, lines, medians  # noqa: E402
 from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
 from identification.kernel import compiled_kernel  # noqa: E402
 
@@ -40,7 +40,7 @@ WARM, CALLS = 300, 50
 
 
 def main() -> None:
-    options = arguments(__doc__, plot=True)
+    options = arguments(__doc__, plot=True, write=True)
     times: dict[str, float] = {}
     ratios: dict[str, float] = {}
     notes = [] if compiled_kernel("double") else ["the kernel is not compiled: this is its NumPy twin"]
@@ -54,13 +54,17 @@ def main() -> None:
         notes.append("padasip is not installed (pip install padasip): its ratios are left out")
     cost = costs(0.01 if options.quick else 0.3)
     ratios |= analysis()
-    show(options, times, ratios)
-    if not options.json:
-        print(table(cost))
-        for name, goal in GOALS.items():
-            if name in ratios:
-                print(f"goal {name}: {ratios[name]:.1f}, wanted {goal:g}{'' if ratios[name] >= goal else '  MISSED'}")
-        print(*notes, sep="\n")
+    if options.json:
+        print(json.dumps(ratios, indent=1))
+    else:
+        goals = [
+            f"goal {name}: {ratios[name]:.1f}, wanted {goal:g}{'' if ratios[name] >= goal else '  MISSED'}"
+            for name, goal in GOALS.items() if name in ratios
+        ]  # fmt: skip
+        text = "\n".join([*lines(times, ratios), table(cost), *goals, *notes])
+        print(text)
+        if options.write:
+            keep("identification", text)
     if options.plot:
         draw(cost, options.plot)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scripts named like the packages they measure
 
-from benchmarks.timing import arguments, show  # noqa: E402
+from benchmarks.timing import arguments  # noqa: E402
 from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
 
 CHUNK = 100_000
@@ -57,7 +57,7 @@ def main() -> None:
                     f"{label:28s} {online.state.count:>11d} updates, {spent:6.1f} s, largest error {worst:.2e}, finite, {said}", flush=True
                 )
     if options.json:
-        show(options, {}, found)
+        print(json.dumps(found, indent=1))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import time
 from collections.abc import Callable
@@ -42,12 +41,16 @@ def arguments(description: str | None, plot: bool = False, write: bool = False) 
     return parser.parse_args()
 
 
-def show(options: argparse.Namespace, times: dict[str, float], ratios: dict[str, float]) -> None:
-    """A table of medians and ratios, or the ratios as JSON."""
-    if options.json:
-        print(json.dumps(ratios, indent=1))
-        return
-    for name, value in times.items():
-        print(f"{name:60s}{1e6 * value:14.2f} us")
-    for name, value in ratios.items():
-        print(f"{name:60s}{value:14.2f}")
+def lines(times: dict[str, float], ratios: dict[str, float]) -> list[str]:
+    """A table of medians and ratios."""
+    return [
+        *(f"{name:60s}{1e6 * value:14.2f} us" for name, value in times.items()),
+        *(f"{name:60s}{value:14.2f}" for name, value in ratios.items()),
+    ]
+
+
+def keep(section: str, text: str) -> None:
+    """Put a plain text between the marks of `section` in docs/benchmarks.md."""
+    from benchmarks import race
+
+    race.keep(section, f"```text\n{text}\n```")
