@@ -129,9 +129,10 @@ def output_error(arx: LPVARX, records: Sequence[FlightRecord], starts: Sequence[
     candidates = [problem.start(contracted(arx, theta, runs)) for theta in starts]
     best = min(candidates, key=lambda unknowns: float(np.sum(np.square(problem.residuals(unknowns)))))
     found = least_squares(
-        problem.residuals, best, jac=problem.jacobian, method="trf", x_scale="jac", max_nfev=options.evaluations,
+        problem.residuals, best, jac=problem.jacobian,  # type: ignore[arg-type]
+        method="trf", x_scale="jac", max_nfev=options.evaluations,
         ftol=options.tolerance, xtol=options.tolerance, gtol=options.tolerance,
-    )  # type: ignore[call-overload]  # fmt: skip
+    )  # fmt: skip
     theta = problem.theta(found.x)
     error = np.concatenate([run.target - problem._from(run, i, found.x).free_run(theta) for i, run in enumerate(runs)])
     error = error[np.isfinite(error).all(axis=1)]

@@ -83,7 +83,7 @@ def stretches(arx: LPVARX, records: Sequence[FlightRecord], *, outputs: bool) ->
     found = []
     for record in records:
         s = Samples.of(arx, record)
-        known = np.isfinite(np.column_stack([s.u, s.f, *([s.y] if outputs else [])])).all(axis=1).tolist()
+        known: list[bool] = np.isfinite(np.column_stack([s.u, s.f, *([s.y] if outputs else [])])).all(axis=1).tolist()  # type: ignore[assignment]
         for part in s.segments:
             for whole, group in groupby(range(part.start, part.stop), key=lambda k, known=known: known[k]):
                 samples = list(group)

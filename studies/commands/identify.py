@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.log.reading import COMBINED, format_of, read
     from symheli.lpv import FlightRecord, conditioning
 
-    found = format_of(arguments.log) if arguments.format == "auto" and not arguments.map else arguments.format
+    found: Any = format_of(arguments.log) if arguments.format == "auto" and not arguments.map else arguments.format
     kind = "mapped" if arguments.map else found
     outputs, inputs, scheduling = _signals(arguments, kind)
     wanted = [*outputs, *inputs, *(arguments.scheduling_from or ((scheduling,) if scheduling else ()))]

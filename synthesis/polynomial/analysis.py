@@ -219,7 +219,7 @@ class _Report:
             kind, self.relaxation.kind, best.bound if proven else nothing, math.nan if quiet else limit,
             math.nan if quiet else self.frozen, status, proven, best.lyapunov, self._hypotheses(best.lyapunov, status),
             f"{self.solver.name} {self.solver.version}, tolerance {self.solver.tolerance:g}",
-            Seconds(*map(float, hunt.spent), bounds) if hunt else Seconds(bounds=bounds), tuple(hunt.attempts) if hunt else (),
+            Seconds(*(float(s) for s in (*hunt.spent, bounds))) if hunt else Seconds(bounds=bounds), tuple(hunt.attempts) if hunt else (),
             best.bound if status is Status.UNPROVEN else math.nan, worst, hunt.evidence if hunt else None,
         )  # fmt: skip
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import reduce
 from math import prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -113,17 +113,17 @@ def assemble(inequalities: Sequence[Affine], shape: Shape, states: int, relaxati
         lift = sparse.kron(sparse.csr_matrix(conditions.negative), sparse.identity(length(F.N)), format="csr")
         rows = len(conditions.negative)
         cone.append((lift @ P, np.tile(F.level, rows), (-conditions.negative @ F.constant - F.back_off).ravel()))
-        bend = sparse.kron(sparse.csr_matrix(conditions.positive), sparse.identity(length(F.N)), format="csr")
+        bend: Any = sparse.kron(sparse.csr_matrix(conditions.positive), sparse.identity(length(F.N)), format="csr")
         cone.append((-bend @ P, np.zeros(bend.shape[0]), (conditions.positive @ F.constant).ravel()))
         sizes += [F.N] * (rows + len(conditions.positive))
     parts = [*((P, level, b) for P, level, b, _ in zero), *cone]
-    left = sparse.vstack([P for P, _, _ in parts]) @ reduce_P
+    left: Any = sparse.vstack([P for P, _, _ in parts]) @ reduce_P
     level = sparse.csr_matrix(np.concatenate([level for _, level, _ in parts])[:, None])
     b = np.concatenate([right for _, _, right in parts])
-    A = sparse.hstack([left, level])
+    A: Any = sparse.hstack([left, level])
     equalities = 0
     if zero:
-        gram = sparse.block_diag([maps for *_, maps in zero])
+        gram: Any = sparse.block_diag([maps for *_, maps in zero])
         equalities = gram.shape[0]
         A = sparse.bmat([[A, gram], [None, -sparse.identity(gram.shape[1])]])
         b = np.concatenate([b, np.zeros(gram.shape[1])])

@@ -79,8 +79,8 @@ class PolynomialStateSpace:
         s, d = lpv.scheduling, lpv.basis.degree
         nodes = _nodes(d, s)
         fit = np.linalg.inv(_values(d, nodes, s))
-        matrices = (PolynomialMatrix(((s.low, s.high),), np.tensordot(fit, M, axes=1)) for M in lpv.matrices(nodes))
-        return cls(*matrices, (s,), lpv.states, lpv.inputs, lpv.outputs, lpv.dt)
+        A, B, C, D = (PolynomialMatrix(((s.low, s.high),), np.tensordot(fit, M, axes=1)) for M in lpv.matrices(nodes))
+        return cls(A, B, C, D, (s,), lpv.states, lpv.inputs, lpv.outputs, lpv.dt)
 
     @classmethod
     def from_lft(cls, lft: LFT) -> PolynomialStateSpace:
@@ -129,17 +129,17 @@ class PolynomialStateSpace:
 
         Its rate, per second, is the largest at which no parameter exceeds its own.
         """
-        start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-        half = 0.5 * np.abs(end - start)
+        first, last = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        half = 0.5 * np.abs(last - first)
         rate = min(s.rate / h for s, h in zip(self.parameters, half, strict=True) if h > 0)
         degree = max(sum(d for d, h in zip(M.degrees, half, strict=True) if h > 0) for M in (self.A, self.B, self.C, self.D))
         line = Scheduling("line", "1", -1.0, 1.0, rate)
         nodes = _nodes(degree, line)
-        points = 0.5 * (start + end) + 0.5 * np.multiply.outer(nodes, end - start)
+        points = 0.5 * (first + last) + 0.5 * np.multiply.outer(nodes, last - first)
         basis = Polynomial(degree, -1.0, 1.0)
         low, high = np.array(self.box).T
-        coefficients = [basis.fit(nodes, M) for M in self.matrices(np.clip(points, low, high))]
-        return LPVStateSpace(basis, *coefficients, line, self.states, self.inputs, self.outputs, self.dt)
+        A, B, C, D = (basis.fit(nodes, M) for M in self.matrices(np.clip(points, low, high)))
+        return LPVStateSpace(basis, A, B, C, D, line, self.states, self.inputs, self.outputs, self.dt)
 
 
 def _points(grid: Array) -> Array:
