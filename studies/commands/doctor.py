@@ -30,6 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Output:
     """Look, and exit with 1 where something required is missing."""
+    from identification.kernel import compiled_kernel
     from symheli.compile import cache_directory, compiler
     from synthesis import installed_solvers
 
@@ -48,17 +49,20 @@ def run(arguments: argparse.Namespace) -> Output:
         compiling = (
             "C compiler: none found; models run in the CasADi virtual machine, several times slower, same numbers (install gcc or set CC)"
         )
+    estimator = compiled_kernel("double") is not None
+    said = "machine code" if estimator else "NumPy, the same numbers, many times slower (reinstall with a C compiler: pip install -e .)"
     text = "\n".join(
         (
             columns(rows, left=3),
             compiling,
+            f"recursive estimator: {said}",
             f"solvers for matrix inequalities: {', '.join(solvers) or 'NONE'}",
             f"cache of compiled models: {cache} ({problem or 'writable'})",
         )
     )
     missing = [n for n, v in required.items() if v is None]
     data = {
-        "python": platform.python_version(), "required": required, "optional": optional, "compiler": cc, "solvers": solvers,
+        "python": platform.python_version(), "required": required, "optional": optional, "compiler": cc, "compiled_estimator": estimator, "solvers": solvers,
         "cache": str(cache), "cache_writable": not problem, "missing": missing,
     }  # fmt: skip
     return Output(text, data, status=1 if missing or not solvers else 0)
