@@ -62,7 +62,8 @@ def run(arguments: argparse.Namespace) -> Output:
     )
     missing = [n for n, v in required.items() if v is None]
     data = {
-        "python": platform.python_version(), "required": required, "optional": optional, "compiler": cc, "compiled_estimator": estimator, "solvers": solvers,
+        "python": platform.python_version(), "required": required, "optional": optional, "compiler": cc, "compiled_estimator": estimator,
+        "solvers": solvers,
         "cache": str(cache), "cache_writable": not problem, "missing": missing,
     }  # fmt: skip
     return Output(text, data, status=1 if missing or not solvers else 0)
