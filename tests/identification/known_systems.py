@@ -39,19 +39,22 @@ class Truth:
         self.theta = Coefficients(arx.basis, tuple(arx.input_lags), A, B, c, d).theta(arx)  # zero where an equation lacks a regressor
         self.coefficients = Coefficients.of(arx, self.theta)
 
+    @classmethod
+    def of(cls, arx, theta):
+        """A structure with these coefficients."""
+        truth = cls(arx)
+        truth.theta, truth.coefficients = theta, Coefficients.of(arx, theta)
+        return truth
+
     def record(self, p, *, noise=0.0, seed=1, noise_seed=None):
-        """A record with random inputs; without a seed of its own the noise repeats the random numbers of the inputs."""
-        arx, of = self.arx, self.coefficients
+        """A record with random inputs and white noise in the equations; the noise has a stream of its own."""
+        arx, v = self.arx, self.coefficients.at(np.asarray(p))
         u = np.random.default_rng(seed).normal(size=(len(p), arx.nu))
-        at = {np.asarray(q).tobytes(): of.at(q) for q in p}
-
-        def now(q):
-            return at[np.asarray(q).tobytes()]
-
-        A = [lambda q, i=i: now(q).A[i] for i in range(len(arx.output_lags))]
-        B = [lambda q, j=j: now(q).B[j] for j in range(len(arx.input_lags))]
-        other = seed if noise_seed is None else noise_seed
-        return flown(arx, A, B, p, u, c=lambda q: now(q).c, d=lambda q: now(q).d, noise=noise, seed=other)
+        now = {np.asarray(q).tobytes(): k for k, q in enumerate(p)}
+        A = [lambda q, i=i: v.A[now[np.asarray(q).tobytes()], i] for i in range(len(arx.output_lags))]
+        B = [lambda q, j=j: v.B[now[np.asarray(q).tobytes()], j] for j in range(len(arx.input_lags))]
+        c, d = (lambda q, part=part: part[now[np.asarray(q).tobytes()]] for part in (v.c, v.d))
+        return flown(arx, A, B, p, u, c=c, d=d, noise=noise, seed=(seed, 1) if noise_seed is None else noise_seed)
 
 
 def moving(n=700):

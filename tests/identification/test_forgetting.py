@@ -59,35 +59,82 @@ def test_silence_of_exactly_zero_costs_no_time_and_no_digit_underflows():
     assert np.isfinite(memory).all()
 
 
+SEEDS = range(21 if kernel.compiled_kernel("double") else 1)  # the NumPy twin has the same bits, a hundred times slower
+VARIABLE, SHORT, LONG = idn.Variable(longest=1000, shortest=30), idn.Constant(1 - 1 / 60), idn.Constant(1 - 1 / 1000)
+
+
 @functools.cache
-def flights():
-    """One plant for 2000 samples, then another for 1000; their coefficients."""
-    first, second = Truth(structure(), seed=0), Truth(structure(), seed=1)
-    return rows(first.record(moving(2000), noise=0.02)), first.theta, rows(second.record(moving(1000), noise=0.02, seed=3)), second.theta
+def flight(seed, n, noise, jump=0.0):
+    """`n` samples of a plant, and its coefficients: plant `seed`, or `jump` of the way to another drawn by itself."""
+    old, other = (Truth(structure(), seed=2 * seed + i) for i in (0, 1))
+    plant = Truth.of(old.arx, old.theta + jump * (other.theta - old.theta))
+    return rows(plant.record(moving(n), noise=noise, seed=(seed, n))), plant.theta
 
 
-def error_after_jump(way, after):
-    before, old, rest, new = flights()
-    online = idn.RecursiveLeastSquares(structure(), way).online()
-    online.run(before, history=False)
-    settled = np.abs(online.coefficients - old).max()
-    online.run(rest[:after], history=False)
-    return settled, np.abs(online.coefficients - new).max()
+def errors(way, *, noise=0.02, jump=1.0, louder=1.0, after=250):
+    """Largest error of a coefficient (seeds, 2), settled before the change and `after` samples behind it."""
+    out = []
+    for seed in SEEDS:
+        (before, old), (rest, new) = flight(seed, 2000, noise), flight(seed, after, noise * louder, jump)
+        online = idn.RecursiveLeastSquares(structure(), way).online()
+        online.run(before, history=False)
+        settled = np.abs(online.coefficients - old).max()
+        online.run(rest, history=False)
+        out.append((settled, np.abs(online.coefficients - new).max()))
+    return np.array(out)
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_a_jump_of_the_plant_is_followed(way):
-    settled, followed = error_after_jump(WAYS[way], 1000)
-    assert settled < 0.05
-    assert followed < 0.05
+@pytest.mark.parametrize(
+    ("way", "median", "worst"),
+    [
+        # coefficients jump by 1 to 2. Measured over 21 plants: 0.003 and 0.009 (noise within a window of 100), 0.002 and 0.017
+        ("constant", 0.01, 0.03),
+        ("variable", 0.01, 0.03),
+        # 0.11 and 0.40: a direction is forgotten as often as it is excited, the weak ones slowly
+        ("directional", 0.2, 0.6),
+    ],
+)
+def test_a_jump_of_the_plant_is_followed(way, median, worst):
+    settled, followed = errors(WAYS[way], after=1000).T
+    assert np.max(settled) < 0.03  # measured 0.008 at worst
+    assert np.median(followed) < median
+    assert np.max(followed) < worst
 
 
-def test_variable_forgetting_is_steady_and_quick_at_once():
-    """Before the jump better than a short memory, soon after it better than a long one."""
-    variable = error_after_jump(idn.Variable(longest=1000, shortest=30), 250)
-    short, long = error_after_jump(idn.Constant(1 - 1 / 60), 250), error_after_jump(idn.Constant(1 - 1 / 1000), 250)
-    assert variable[0] < 0.7 * short[0]
-    assert variable[1] < 0.2 * long[1]
+@pytest.mark.parametrize("noise", [0.02, 0.1])
+def test_variable_forgetting_is_as_steady_as_its_longest_memory(noise):
+    """Over plants, inputs and noises: what chance makes of the ratio of powers hardly shortens the memory."""
+    settled, short, long = (errors(way, noise=noise)[:, 0] for way in (VARIABLE, SHORT, LONG))
+    # the ratio is 1 +- 0.23 in steady noise, 1.05 times the forgetting at most: measured 1.01 in the median, 1.04 to 1.07 at worst
+    assert np.median(settled / long) < 1.1
+    assert np.max(settled / long) < 1.2
+    # error goes with the root of forgetting: sqrt(60 / 1000) = 0.25; measured 0.27 in the median, 0.54 at worst, 0.83 with other seeds
+    assert np.median(settled / short) < 0.5
+    assert np.max(settled / short) < 1.1
+
+
+@pytest.mark.parametrize(
+    ("noise", "jump", "median", "worst"),
+    [
+        # a jump that outgrows the noise: measured 0.023 of the long memory's error in the median, 0.16 at worst
+        (0.02, 1.0, 0.05, 0.33),
+        # a third of it in five times the noise: forgetting in proportion to the power, the law helps less (0.38, 0.87) and does not harm
+        (0.1, 0.3, 0.7, 1.1),
+    ],
+)
+def test_variable_forgetting_follows_a_jump_the_better_the_clearer_it_is(noise, jump, median, worst):
+    variable, long = (errors(way, noise=noise, jump=jump)[:, 1] for way in (VARIABLE, LONG))
+    assert np.median(variable / long) < median
+    assert np.max(variable / long) < worst
+
+
+def test_noise_that_doubles_does_not_throw_the_past_away():
+    """The price of a law of power: louder noise looks like another plant. In proportion, the price stays small."""
+    variable, long = (errors(way, jump=0.0, louder=2.0)[:, 1] for way in (VARIABLE, LONG))
+    # power times 4: a memory of 250 instead of 1000, errors twice as large; measured 1.5 in the median (the usual power follows). The worst
+    # coefficient of one instant scatters by as much again: 3.3 on one of 21 plants
+    assert np.median(variable / long) < 2.0
+    assert np.max(variable / long) < 5.0
 
 
 def test_what_never_moves_again_is_remembered_by_directional_forgetting_alone():
