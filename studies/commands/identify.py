@@ -56,12 +56,18 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help="first part of the time to fit, the rest is held out (default: 0.7)",
     )
+    add(
+        "--plot",
+        type=options.picture,
+        metavar="FILE",
+        help="draw measured, one step, 1 s and free run into this .png, .svg or .pdf (needs matplotlib)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
     """Read, prepare, fit, judge."""
     from identification import LPVARX, Polynomial
-    from studies.log import report
+    from studies.log import figure, report
     from studies.log.comparison import compare, scheduling_range
     from studies.log.reading import COMBINED, format_of, read
     from symheli.lpv import FlightRecord, conditioning
@@ -94,10 +100,16 @@ def run(arguments: argparse.Namespace) -> Output:
     )  # fmt: skip
     training, test = conditioning.split(record, arguments.train)
     if arguments.orders:
+        if arguments.plot:
+            raise InputError("--plot draws the fits of one model; --orders compares many")
         return _orders(structure, training, test)
     result = compare(structure, training, test)
     facts = report.facts(arguments.log, kind, record, samples, outside, result)
-    return Output(report.text(facts, result), report.data(facts, result))
+    text, data = report.text(facts, result), report.data(facts, result)
+    if arguments.plot:
+        figure.save(figure.figure(result), arguments.plot)
+        text, data = f"{text}\nwrote {arguments.plot}", {**data, "written": [arguments.plot]}
+    return Output(text, data)
 
 
 def _orders(structure: Any, training: Any, test: Any) -> Output:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from symheli import Helicopter
     from symheli.equilibrium import TrimPoint
+
+PICTURES = (".png", ".svg", ".pdf")
 
 
 def vehicle(parser: argparse.ArgumentParser, governor: str = "ideal") -> None:
@@ -119,6 +122,14 @@ def names(text: str) -> tuple[str, ...]:
     if not all(found):
         raise argparse.ArgumentTypeError(f"expected names with commas between them, got {text!r}")
     return found
+
+
+def picture(text: str) -> Path:
+    """A file that matplotlib knows how to write."""
+    path = Path(text)
+    if path.suffix.lower() not in PICTURES:
+        raise argparse.ArgumentTypeError(f"expected a file that ends in {', '.join(PICTURES)}, got {text!r}")
+    return path
 
 
 def unit(text: str) -> tuple[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,6 +88,11 @@ def scheduling_range(values: np.ndarray, degree: int) -> tuple[float, float]:
     return low - 0.5, high + 0.5
 
 
+def steps(dt: float) -> dict[str, int | None]:
+    """Each of `HORIZONS` in samples of `dt` (s); None is a free run."""
+    return dict(zip(HORIZONS, (1, max(round(1.0 / dt), 1), None), strict=True))
+
+
 def percent(value: float) -> str:
     """A fit in words where it is no number."""
     return "diverges" if np.isneginf(value) else "no data" if np.isnan(value) else f"{value:.1f}" if value > -1e4 else f"{value:.1e}"
@@ -106,8 +110,6 @@ def _scored(label: str, arx: LPVARX, training: FlightRecord, test: FlightRecord 
 
 
 def _scores(model: LPVARXModel, record: FlightRecord) -> dict[str, dict[str, float]]:
-    steps: Iterable[int | None] = (1, max(round(1.0 / model.dt), 1), None)
     return {
-        horizon: {str(name): float(value) for name, value in model.score(record, step).items()}
-        for horizon, step in zip(HORIZONS, steps, strict=True)
+        horizon: {str(name): float(value) for name, value in model.score(record, step).items()} for horizon, step in steps(model.dt).items()
     }

@@ -17,6 +17,7 @@ from symheli.lpv.units import to_si
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""
@@ -157,6 +158,12 @@ class FlightRecord:
                 out[part] = np.gradient(values[part], self.time[part])
         return out
 
+    def plot(self, names: Sequence[str] | None = None) -> Figure:
+        """A figure of these signals (default: all) against time, with units; gaps stay empty. See `symheli.lpv.record_plot`."""
+        from symheli.lpv.record_plot import plot_record
+
+        return plot_record(self, names)
+
     # --- changing (a new record each time) ---------------------------------------------------------------------
 
     def between(self, start: float, stop: float) -> FlightRecord:
@@ -181,7 +188,10 @@ class FlightRecord:
         )
 
     def resample(self, dt: float) -> FlightRecord:
-        """Linear interpolation to a uniform step `dt` (s) inside each segment; nothing is invented across gaps."""
+        """Linear interpolation to a uniform step `dt` (s) inside each segment; nothing is invented across gaps.
+
+        To a longer step: `low_pass` or `decimate` first, or what is faster folds back into what is slower.
+        """
         if not dt > 0:
             raise InputError(f"dt must be a positive number of seconds, got {dt}")
         times, values, offset = [], [], None
@@ -193,6 +203,24 @@ class FlightRecord:
                 times.append(new)
                 values.append(np.column_stack([np.interp(new, old, column) for column in self.values[part].T]))
         return replace(self, time=np.concatenate(times), values=np.concatenate(values))
+
+    def low_pass(self, cutoff: float, order: int = 4, *, zero_phase: bool = False, leave: Sequence[str] = ()) -> FlightRecord:
+        """All signals but those of `leave` through one Butterworth filter with its corner at `cutoff` (Hz); see `symheli.lpv.low_pass`."""
+        from symheli.lpv.conditioning import low_pass
+
+        return low_pass(self, cutoff, order, zero_phase=zero_phase, leave=leave)
+
+    def decimate(self, n: int) -> FlightRecord:
+        """Means of `n` samples in a row, all signals alike; see `symheli.lpv.decimate`."""
+        from symheli.lpv.conditioning import decimate
+
+        return decimate(self, n)
+
+    def split(self, fraction: float) -> tuple[FlightRecord, FlightRecord | None]:
+        """The first `fraction` of the time to fit, the rest to judge (None where nothing rests); see `symheli.lpv.split`."""
+        from symheli.lpv.conditioning import split
+
+        return split(self, fraction)
 
     def to_frame(self) -> pandas.DataFrame:
         """A pandas DataFrame with a "t" column (s) and one column a signal."""

@@ -165,6 +165,17 @@ def test_identify_reads_by_a_map_and_compares_orders(answer, run, tmp_path):
     assert "held-out samples" in error
 
 
+@pytest.mark.parametrize("end", ["png", "svg", "pdf"])
+def test_identify_draws_what_was_measured_and_predicted(run, answer, tmp_path, end):
+    log, picture = scheduled_csv(tmp_path / "log.csv", noise=0.1), tmp_path / f"fits.{end}"
+    got = answer("identify", log, *STRUCTURE, *UNITS, "--plot", picture)
+    assert got["written"] == [str(picture)]
+    assert picture.read_bytes().startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[end])
+    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--plot", picture, "--orders")
+    assert status == 1
+    assert "--plot draws the fits of one model" in error
+
+
 def test_identify_says_where_scheduling_does_not_pay(run, tmp_path):
     log = tmp_path / "log.csv"
     rng = np.random.default_rng(1)
@@ -268,7 +279,17 @@ def test_identify_says_what_is_missing(run, tmp_path, options, sentence):
     assert sentence in err
 
 
-@pytest.mark.parametrize("arguments", [[], ["fly"], ["trim", "--airspeed", "fast"], ["identify", "log", "--units", "q"], ["export", "pdf"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["fly"],
+        ["trim", "--airspeed", "fast"],
+        ["identify", "log", "--units", "q"],
+        ["identify", "log", "--plot", "fits.doc"],
+        ["export", "pdf"],
+    ],
+)
 def test_wrong_usage_is_status_2(run, arguments):
     assert run(*arguments)[0] == 2
 

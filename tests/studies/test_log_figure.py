@@ -1,0 +1,31 @@
+"""The picture of a fit shows what was scored."""
+
+import numpy as np
+import pytest
+
+from identification import LPVARX, Polynomial
+from studies.log.comparison import compare
+from studies.log.figure import COLOURS, figure
+from symheli.lpv import FlightRecord
+
+
+def test_the_picture_holds_the_predictions_that_were_scored():
+    t = 0.05 * np.arange(400)
+    rng = np.random.default_rng(0)
+    u, y = rng.standard_normal(400), np.zeros(400)
+    for k in range(1, 400):
+        y[k] = (0.9 - 0.05 * np.sin(t[k - 1])) * y[k - 1] + u[k - 1] + 0.1 * rng.standard_normal()
+    record = FlightRecord.from_arrays(t, {"y": "rad", "u": "1", "p": "m/s"}, y=y, u=u, p=np.sin(t))
+    training, test = record.split(0.7)
+    result = compare(LPVARX("y", "u", "p", 1, 1, 1, Polynomial(1, -1.0, 1.0)), training, test)
+    drawn, close, scheduling, _ = figure(result).axes
+    lines = {}
+    for line in drawn.lines:
+        lines.setdefault(line.get_color(), []).append(line.get_ydata())
+    model = result.scheduled
+    for horizon, n in (("one step", 1), ("1 s", 20), ("free run", None)):
+        own = [line for line in lines[COLOURS[horizon]] if len(line) == len(test)]
+        np.testing.assert_array_equal(own[0], (model.simulate(test) if n is None else model.predict(test, n))[:, 0])
+    assert drawn.get_title(loc="left").startswith("y (rad): LPV, degree 1 ")
+    assert scheduling.get_title(loc="left") == "p (m/s)"
+    assert close.get_xlim() == pytest.approx((test.time[0], test.time[-1]))
