@@ -20,6 +20,9 @@ SIGNIFICANT = 1e-3
 WORTH = 0.01
 """Of the residual; less than this is not worth another structure, however significant."""
 
+MOST = 0.95
+"""Of the residual; what explains less may not be the whole story."""
+
 ROUNDING = 1e-9
 """A residual below this fraction of the output is rounding: there is nothing left to explain."""
 
@@ -56,6 +59,8 @@ class DependenceReport:
                     f"{other} explains {100 * self.explained[y]:.3g} % of it: the coefficients do NOT depend on p as the structure says; "
                     f'try scheduling_at="{self.other}"'
                 )
+                if self.explained[y] < MOST:
+                    verdict += "; the rest is noise, or dependence on several instants at once, which higher orders come nearer to"
             else:
                 verdict = f"{other} explains {100 * self.explained[y]:.2g} % of it: no sign of another dependence on p"
             lines.append(f"{output}: {what}; {verdict}")

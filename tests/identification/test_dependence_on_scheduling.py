@@ -1,10 +1,13 @@
 """p(k) or p(k - lag): the wrong one leaves a residual, and the report says so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from known_systems import flown, structure
 
 import identification as idn
+from symheli.lpv import FlightRecord
 
 A1, A2, B1 = np.array([-0.9, 0.35, 0.15]), np.array([0.45, -0.2, 0.1]), np.array([0.8, -0.5, 0.3])  # of 1, p, p^2 on [-1, 1]
 
@@ -43,6 +46,44 @@ def test_a_static_model_of_it_leaves_a_residual_and_the_report_says_why(noise):
     assert report.explained[0] > 0.5
     assert report.dynamic == (True,)
     assert 'do NOT depend on p as the structure says; try scheduling_at="lag"' in str(report)
+
+
+def two_states(n=900, coupling=0.0):
+    """x1+ = -a1(p) x1 + (1 + coupling p) x2 + b1(p) u, x2+ = -a2(p) x1, y = x1: every matrix at p(k), stepped as it stands.
+
+    Without coupling, eliminating x2 gives the system of `dynamic`: y(k) depends on p(k-1) and p(k-2) though no matrix knows the past.
+    Source of the remark: Toth, Abbas and Werner (2012), On the state-space realization of LPV input-output models, IEEE Trans. CST 20.
+    """
+    rng = np.random.default_rng(11)
+    p, u = 0.6 * np.sin(0.35 * np.pi * np.arange(n)) + 0.3 * rng.uniform(-1, 1, n), rng.uniform(-1, 1, n)
+    a1, a2, b1 = (np.polynomial.polynomial.polyval(p, c) for c in (A1, A2, B1))
+    x, y = np.zeros(2), np.zeros(n)
+    for k in range(n):
+        y[k] = x[0]
+        x = np.array([[-a1[k], 1.0 + coupling * p[k]], [-a2[k], 0.0]]) @ x + np.array([b1[k], 0.0]) * u[k]
+    return FlightRecord.from_arrays(0.1 * np.arange(n), dict.fromkeys("yup", "1"), y=y, u=u, p=p)
+
+
+def test_a_static_state_space_model_has_dynamic_dependence_as_input_output_model():
+    arx, record = structure(na=2, nb=1, basis=idn.Polynomial(2, -1.0, 1.0)), two_states()
+    found = idn.fit(arx, record).coefficients.monomial()
+    np.testing.assert_allclose(found.A[:, :, 0, 0], [A1, A2], atol=1e-9)
+    np.testing.assert_allclose(found.B[0, :, 0, 0], B1, atol=1e-9)
+    static = idn.dependence_report(idn.fit(replace(arx, scheduling_at="now"), record), record)
+    assert static.residual[0] > 0.05
+    assert static.dynamic == (True,)
+    assert "do NOT depend on p as the structure says" in str(static)
+
+
+def test_where_the_state_is_hidden_behind_moving_coefficients_both_models_leave_a_residual():
+    """With coupling a_2 depends on p(k-1) and p(k-2) together: no structure of one instant a coefficient is exact, and none pretends."""
+    record = two_states(coupling=0.6)
+    for at in ("lag", "now"):
+        arx = structure(na=2, nb=1, basis=idn.Polynomial(2, -1.0, 1.0), scheduling_at=at)
+        report = idn.dependence_report(idn.fit(arx, record), record)
+        assert report.residual[0] > 0.02
+        assert report.dynamic == (True,)
+        assert "dependence on several instants at once" in str(report)
 
 
 def test_the_right_model_of_noisy_data_is_not_suspected():
