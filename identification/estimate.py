@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.excitation import excitation_of
 from identification.forgetting import Forgetting
-from identification.instrumental_variables import Instruments, explained_inputs, instrumental_variables
+from identification.instrumental_variables import Instruments, explained, instrumental_variables
 from identification.lasso import Lasso, lasso
 from identification.least_squares import least_squares_by_group, residual_covariance
 from identification.model import LPVARXModel
@@ -29,7 +29,7 @@ Options = Ridge | Lasso | Refined | OutputError
 METHODS: tuple[str, ...] = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
 OPTIONS: dict[str, type[Options]] = {"ridge": Ridge, "lasso": Lasso, "riv": Refined, "oe": OutputError}
 NOT_SETTLED = {
-    "riv": 'allow more iterations; or the plant is unstable in open loop and has no bounded free run: method "iv" is then the better one',
+    "riv": 'allow more iterations; a plant that is unstable in open loop needs instruments=("name", ...), the external excitation',
     "oe": "allow more evaluations, or fit a smaller structure",
 }
 """What to try where an iteration stops early."""
@@ -55,7 +55,7 @@ def fit(
 
     "iv": instrumental variables: `instruments` names the external excitation signals (or is an `Instruments` with its window):
     in closed loop what is added to the stabilised inputs, in open loop the inputs. "riv": the same refined with the
-    simulated response (`Refined`); the plant must be stable, and in closed loop it needs `instruments` too. "oe": the closest
+    simulated response (`Refined`); in closed loop it needs `instruments` too, and then the plant may be unstable. "oe": the closest
     free run (`OutputError`), from the least-squares or (with `instruments`) instrumental-variables estimate and its refinement;
     in closed loop coloured noise biases it.
 
@@ -121,9 +121,9 @@ def _start(structure: LPVARX, records: Sequence[FlightRecord], data: Regression,
 def _refined(
     structure: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Sequence[str] | Instruments, options: Refined
 ) -> tuple[Array, dict[str, Any]]:
-    start, exogenous = _start(structure, records, data, instruments), records
+    start, exogenous = _start(structure, records, data, instruments), None
     if instruments:
-        records, exogenous = explained_inputs(structure, records, Instruments.of(instruments))
+        records, exogenous = explained(structure, records, Instruments.of(instruments))
     found = refined_instruments(structure, records, exogenous, start, options)
     return found.theta, {"iterations": found.iterations, "converged": found.converged, "noise": found.noise.tolist()}
 

@@ -84,29 +84,27 @@ def _two_stages(phi: Array, y: Array, W: Array, Q: Array, names: tuple[str, ...]
     return least_squares(first_stage, Q.T @ y) / scale[:, None]
 
 
-def explained_inputs(
-    arx: LPVARX, records: Sequence[FlightRecord], instruments: Instruments
-) -> tuple[list[FlightRecord], list[FlightRecord]]:
-    """The records, and the same with the inputs replaced by what the instruments explain of them (least squares, lags from 0 on).
+def explained(arx: LPVARX, records: Sequence[FlightRecord], instruments: Instruments) -> tuple[list[FlightRecord], list[FlightRecord]]:
+    """The records, and the same with inputs and outputs replaced by what the instruments explain of them (least squares, lags from 0 on).
 
-    What is explained does not know the noise that feedback carries into the inputs. Inputs are NaN in both where an
-    instrument is missing, so that both break at the same samples.
+    What is explained does not know the noise that feedback carries round. Both are NaN where an instrument is missing, so that both
+    break at the same samples.
     """
+    names = (*arx.inputs, *arx.outputs)
     tables = [_instrument_rows(arx, record, instruments, 0) for record in records]
-    W, u = np.vstack(tables), np.vstack([record.columns(arx.inputs) for record in records])
-    known = np.isfinite(np.column_stack([W, u])).all(axis=1)
+    W, measured = np.vstack(tables), np.vstack([record.columns(names) for record in records])
+    known = np.isfinite(np.column_stack([W, measured])).all(axis=1)
     if known.sum() <= W.shape[1]:
         raise ExcitationError(f"{W.shape[1]} instruments on {known.sum()} samples explain anything; record longer, or use fewer lags")
     Q = _range(W[known])
-    explained = np.full_like(u, np.nan)
-    explained[known] = Q @ (Q.T @ u[known])
-    cut, exogenous = [], []
-    for record, part in zip(records, np.split(explained, np.cumsum([len(r) for r in records])[:-1]), strict=True):
-        units = {str(s): s.unit for s in units_of(arx.inputs, [record])}
-        measured = np.where(np.isnan(part), np.nan, record.columns(arx.inputs))
-        cut.append(record.with_signals(units, **dict(zip(arx.inputs, measured.T, strict=True))))
-        exogenous.append(record.with_signals(units, **dict(zip(arx.inputs, part.T, strict=True))))
-    return cut, exogenous
+    found = np.full_like(measured, np.nan)
+    found[known] = Q @ (Q.T @ measured[known])
+    units = {str(s): s.unit for s in units_of(names, records)}
+    ends = np.cumsum([len(r) for r in records])[:-1]
+    return tuple(
+        [r.with_signals(units, **dict(zip(names, part.T, strict=True))) for r, part in zip(records, np.split(table, ends), strict=True)]
+        for table in (np.where(known[:, None], measured, np.nan), found)
+    )
 
 
 def _instrument_rows(arx: LPVARX, record: FlightRecord, instruments: Instruments, first: int) -> Array:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from identification.excitation import RANK_TOLERANCE, column_scale, direction_in_words, spectrum
 from identification.least_squares import least_squares
+from identification.observer import Observer
 from identification.stretches import Stretch, contracted, filtered, free_of, stretches
 from identification.structure import LPVARX
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
+
+Filter = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Refinement:
 
 
 def refined_instruments(
-    arx: LPVARX, records: Sequence[FlightRecord], exogenous: Sequence[FlightRecord], start: Array, options: Refined
+    arx: LPVARX, records: Sequence[FlightRecord], exogenous: Sequence[FlightRecord] | None, start: Array, options: Refined
 ) -> Refinement:
     """Iterate from theta `start`: simulate, instrument and filter by the model found so far, solve, until nothing moves.
 
@@ -54,43 +57,57 @@ def refined_instruments(
     published method filters by the constant part of A alone and so needs a basis with a constant.) Instruments are the same
     products of the simulated response, so the fixed point is that of the simulation error with white noise.
 
-    `exogenous` are the records whose inputs drive the simulation: the same ones in open loop; in closed loop with the inputs replaced by
-    what the external excitation explains of them (see `explained_inputs`).
+    In closed loop `exogenous` are the records with inputs and outputs replaced by what the external excitation explains of them (see
+    `explained`): an observer driven by these takes the place of the simulation, and filters, so that the plant may be unstable.
 
-    Raises `ExcitationError` where the simulated response does not determine every coefficient.
+    Raises `ExcitationError` where the response does not determine every coefficient.
     Source: Laurain, Toth, Gilson and Garnier (2010), Refined instrumental variable methods for identification of LPV
     Box-Jenkins models, Automatica 46, 959-967.
     """
-    runs, clean = stretches(arx, records, outputs=True), stretches(arx, exogenous, outputs=True)
+    runs = stretches(arx, records, outputs=True)
     if not runs:
         raise ExcitationError(f"no unbroken stretch of more than {arx.memory} samples to simulate")
-    theta, noise = start, np.zeros((arx.ny, options.noise_order))
+    clean = runs if exogenous is None else stretches(arx, exogenous, outputs=True)
+    theta, noise, size = start, np.zeros((arx.ny, options.noise_order)), _size([run.target - run.regressors() @ start for run in runs])
     row, output = free_of(arx)
     for iteration in range(1, options.iterations + 1):
-        model = contracted(arx, theta, clean)
-        response = [run.free_run(model) for run in clean]
-        scale = _noise_size(runs, response)
-        parts = [_filtered_equations(run, c, x, model, noise, scale) for run, c, x in zip(runs, clean, response, strict=True)]
+        model = contracted(arx, theta, clean) if exogenous is None else theta
+        filters = [_filter(run.lag_coefficients(model), size, simulate=exogenous is None) for run in runs]
+        noise_free = [_response(run, model, by) for run, by in zip(clean, filters, strict=True)]
+        errors = [_error(run, model, by) for run, by in zip(runs, filters, strict=True)]
+        size, noise = _size(errors), _noise_model(errors, options.noise_order)
+        parts = [_equations(run, c, by, noise, size) for run, c, by in zip(runs, noise_free, filters, strict=True)]
         Z, X, y = (np.concatenate(part) for part in zip(*parts, strict=True))
         found = np.zeros_like(theta)
         found[row, output] = _instrumented(arx, Z, X, y)
         change = np.linalg.norm((found - theta)[row, output] * column_scale(X)) / max(np.linalg.norm(y), 1e-300)
         theta = found
-        noise = _noise_model(runs, [run.free_run(contracted(arx, theta, clean)) for run in clean], options.noise_order)
         if change < options.tolerance:
             return Refinement(theta, noise, iteration, True)
     return Refinement(theta, noise, options.iterations, False)
 
 
-def _filtered_equations(run: Stretch, clean: Stretch, response: Array, theta: Array, noise: Array, scale: Array) -> tuple[Array, ...]:
-    """Instruments, regressors (rows, free coefficients) and outputs (rows,) of one stretch, whitened."""
-    instruments = clean.with_outputs(response).spread(theta, clean.with_outputs(response).regressors())
-    regressors = run.spread(theta, run.regressors())
-    outputs = filtered(run.lag_coefficients(theta), run.target[:, :, None], np.zeros_like(run.past))
-    return tuple(
-        (_whitened(part, noise) / scale[None, :, None]).reshape(-1, *part.shape[2:][: part.shape[2] > 1])
-        for part in (instruments, regressors, outputs)
-    )
+def _filter(A: Array, size: Array, *, simulate: bool) -> Filter:
+    """A(p)^-1, or where it may be unstable what an observer leaves of an equation error (n, ny, m)."""
+    if simulate:
+        return lambda error: filtered(A, error, np.zeros((A.shape[2], error.shape[2])))
+    return Observer.of(A, size).innovations
+
+
+def _error(run: Stretch, theta: Array, by: Filter) -> Array:
+    """What the model does not explain of the outputs, (n - memory, ny)."""
+    return by((run.target - run.regressors() @ theta)[:, :, None])[:, :, 0]
+
+
+def _response(run: Stretch, theta: Array, by: Filter) -> Stretch:
+    """The stretch with what the model explains of the outputs."""
+    return run.with_outputs(run.target - _error(run, theta, by))
+
+
+def _equations(run: Stretch, noise_free: Stretch, by: Filter, noise: Array, size: Array) -> tuple[Array, ...]:
+    """Instruments, regressors (rows, free coefficients) and outputs (rows,) of one stretch, filtered and whitened."""
+    signals = noise_free.spread_out(noise_free.regressors()), run.spread_out(run.regressors()), run.target[:, :, None]
+    return tuple((_whitened(by(part), noise) / size[None, :, None]).reshape(-1, *part.shape[2:][: part.shape[2] > 1]) for part in signals)
 
 
 def _whitened(signal: Array, noise: Array) -> Array:
@@ -114,15 +131,13 @@ def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
     return np.linalg.solve(square, Q.T @ y) / scale
 
 
-def _noise_size(runs: Sequence[Stretch], response: Sequence[Array]) -> Array:
-    error = np.concatenate([run.target - x for run, x in zip(runs, response, strict=True)])
-    size = np.sqrt(np.mean(error**2, axis=0))
+def _size(errors: Sequence[Array]) -> Array:
+    size = np.sqrt(np.mean(np.concatenate(errors) ** 2, axis=0))
     return np.where(size > 0, size, 1.0)
 
 
-def _noise_model(runs: Sequence[Stretch], response: Sequence[Array], order: int) -> Array:
-    """Autoregressive coefficients (ny, order) of what the simulation leaves, v(k) + d_1 v(k-1) + ... = e(k)."""
-    errors = [run.target - x for run, x in zip(runs, response, strict=True)]
+def _noise_model(errors: Sequence[Array], order: int) -> Array:
+    """Autoregressive coefficients (ny, order) of what the model leaves, v(k) + d_1 v(k-1) + ... = e(k)."""
     out = np.zeros((errors[0].shape[1], order))
     for y in range(len(out) if order else 0):
         past = np.vstack([np.column_stack([-v[order - i : len(v) - i, y] for i in range(1, order + 1)]) for v in errors])

@@ -69,13 +69,19 @@ class Stretch:
         With phi from the free run this is the derivative of the response with respect to the coefficients (as `free_of` orders
         them); columns of `past` (na ny, m) are responses to initial conditions, appended.
         """
-        row, output = free_of(self.arx)
-        forcing = np.zeros((len(phi), self.arx.ny, len(row) + (0 if past is None else past.shape[1])))
-        forcing[:, output, np.arange(len(row))] = phi[:, row]
+        free = self.spread_out(phi)
+        forcing = free if past is None else np.concatenate([free, np.zeros((*free.shape[:2], past.shape[1]))], axis=2)
         start = np.zeros((self.past.shape[0], forcing.shape[2]))
         if past is not None:
-            start[:, len(row) :] = past
+            start[:, free.shape[2] :] = past
         return filtered(self.lag_coefficients(theta), forcing, start)
+
+    def spread_out(self, phi: Array) -> Array:
+        """Each free coefficient's share of the equations, (n - memory, ny, number of free coefficients), as `free_of` orders them."""
+        row, output = free_of(self.arx)
+        shares = np.zeros((len(phi), self.arx.ny, len(row)))
+        shares[:, output, np.arange(len(row))] = phi[:, row]
+        return shares
 
 
 def stretches(arx: LPVARX, records: Sequence[FlightRecord], *, outputs: bool) -> list[Stretch]:
