@@ -10,16 +10,13 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-import numpy as np
-
-import symheli
 import synthesis
-from studies.lateral_loop import HOLD, lateral_loop
+from studies.lateral_loop import lateral_loop
+from studies.longitudinal_loop import longitudinal_loop
 from studies.output import as_json, columns, progress
 from symheli import Helicopter, LPVStateSpace, Scheduling
 from synthesis import Search, Status
 
-LONGITUDINAL = ("u", "w", "q", "theta", "a1")
 TESTS = ("small gain", "D", "DG")
 """Full blocks are left out: for one parameter they prove what D/G scalings prove, which `tests/synthesis` checks."""
 
@@ -40,14 +37,6 @@ class Reach(NamedTuple):
     low: float
     high: float
     failed: tuple[float, float] | None
-
-
-def longitudinal_loop(heli: Helicopter, low: float = 0.0, high: float = 13.0, degree: int = 3, points: int = 27) -> LPVStateSpace:
-    """u w q theta a1 under attitude hold d_lon = HOLD theta: gusts u_w, w_w (m/s) -> q (rad/s), theta (rad)."""
-    inputs = ("d_lon", "u_w", "w_w")
-    family = symheli.sweep(heli, np.linspace(low, high, points), inputs=inputs)  # type: ignore[arg-type]
-    longitudinal = family.select(LONGITUDINAL, inputs).interpolate("polynomial", degree)
-    return longitudinal.feedback({("d_lon", "theta"): HOLD}).select(inputs=("u_w", "w_w"), outputs=("q", "theta"))
 
 
 def on(loop: LPVStateSpace, low: float, high: float) -> LPVStateSpace:

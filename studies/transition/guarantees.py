@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import synthesis
+from studies.gain_curve import GainCurve
 from studies.lateral_loop import STATES, close
 from studies.transition.flights import TOP
 from symheli import LinearFamily, LinearModel, LPVStateSpace, Scheduling
-from synthesis import Certificate, Relaxation, Search
+from synthesis import Certificate, LFTCertificate, Relaxation, Search
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
 """A disturbance of this size (rad) and an output of this size (rad/s, rad) count as 1 on the servo channel; the gust channel is in SI."""
@@ -20,14 +21,27 @@ SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
 PERIOD = 0.02
 
 
+PLAIN, CONSTANT, MEMORY = "P(p)", "constant P", "P(p, lag)"
+LFT_TESTS = {"LFT full block": "full block", "LFT D/G": "DG", "LFT D": "D", "LFT small gain": "small gain"}
+FORMS = (MEMORY, PLAIN, CONSTANT, *LFT_TESTS)
+"""Forms of a proof, the least conservative first; from `CONSTANT` on they let the airspeed jump."""
+
+MEMORIES = {
+    rate: Relaxation(memory=lag, segments=(8,), grading=1.5, memory_segments=across, memory_degree=3)
+    for rate, lag, across in ((3.0, 0.6, 3), (4.5, 0.6, 3), (6.0, 0.5, 4))
+}
+"""Accelerations (m/s^2) at which a P with a memory is tried, on a coarser mesh than `studies.bracket`, which takes minutes."""
+
+
 @dataclass(frozen=True)
 class Bound:
-    """One certificate: which model, which channel, permitted acceleration (m/s^2)."""
+    """One certificate: which model, which channel, permitted acceleration (m/s^2), which of `FORMS`."""
 
     model: str
     channel: str
     rate: float
-    certificate: Certificate
+    form: str
+    certificate: Certificate | LFTCertificate
 
 
 def scaled(lpv: LPVStateSpace) -> LPVStateSpace:
@@ -76,17 +90,57 @@ def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
 def bounds(
     name: str, channel: str, lpv: LPVStateSpace, rates: Sequence[float], segments: tuple[int, ...], search: Search
 ) -> Iterator[Bound]:
-    """One certificate a rate (m/s^2), computed when asked for; `search` sets how hard the lower bound is looked for."""
+    """One gain a rate (m/s^2), computed when asked for, and stability where no gain is proven and no growth was found.
+
+    `search` sets how hard the lower bound is looked for; among airspeeds that jump, a search that spares nothing is quick.
+    """
+    relaxation = Relaxation(segments=segments)
     for rate in rates:
-        certificate = synthesis.l2_gain(lpv, rate=rate, relaxation=Relaxation(segments=segments), search=search)
-        yield Bound(name, channel, rate, certificate)
+        form = CONSTANT if math.isinf(rate) else PLAIN
+        certificate = synthesis.l2_gain(lpv, rate, relaxation=relaxation, search=Search() if math.isinf(rate) else search)
+        yield Bound(name, channel, rate, form, certificate)
+        if not certificate.verified and math.isfinite(certificate.lower):
+            yield Bound(name, channel, rate, form, synthesis.stability(lpv, rate, relaxation=relaxation, search=None))
 
 
-def stability_bounds(name: str, channel: str, lpv: LPVStateSpace, rates: Sequence[float], segments: tuple[int, ...]) -> Iterator[Bound]:
-    """Stability alone, one certificate a rate (m/s^2)."""
-    for rate in rates:
-        certificate = synthesis.stability(lpv, rate=rate, relaxation=Relaxation(segments=segments))
-        yield Bound(name, channel, rate, certificate)
+def memory_bounds(name: str, channel: str, lpv: LPVStateSpace, known: Sequence[float], search: Search) -> Iterator[Bound]:
+    """Gains by a P with a memory; the lower bound is looked for where it is not `known`."""
+    for rate, relaxation in MEMORIES.items():
+        certificate = synthesis.l2_gain(lpv, rate, relaxation=relaxation, search=None if rate in known else search)
+        yield Bound(name, channel, rate, MEMORY, certificate)
+
+
+def lft_bounds(name: str, channel: str, lpv: LPVStateSpace) -> Iterator[Bound]:
+    """Gains by the LFT tests, which let the airspeed jump; the lower bound is that of `bounds`."""
+    lft = lpv.to_lft().reduce()
+    for form, scaling in LFT_TESTS.items():
+        yield Bound(name, channel, math.inf, form, synthesis.lft_gain(lft, scaling, search=None))
+
+
+LOOPS = {"gust": "Lateral: gust to yaw rate and roll", "longitudinal": "Longitudinal: gusts to pitch rate and pitch"}
+"""Channels whose gain is drawn against acceleration."""
+
+
+def loops(found: Sequence[Bound]) -> dict[str, str]:
+    """Those of `LOOPS` that have bounds."""
+    return {channel: title for channel, title in LOOPS.items() if any(b.channel == channel for b in found)}
+
+
+def proven(b: Bound) -> float:
+    """The gain proven, inf where none is."""
+    return b.certificate.gamma if b.certificate.verified else math.inf
+
+
+def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> GainCurve:
+    """What the bounds of one loop say about its gain."""
+    own = [b for b in found if (b.model, b.channel, b.certificate.kind) == (model, channel, "l2 gain")]
+    flown: dict[float, float] = {}
+    for b in own:
+        flown[b.rate] = max(b.certificate.lower, flown.get(b.rate, 0.0))
+    varying = {form: {b.rate: proven(b) for b in own if b.form == form} for form in (MEMORY, PLAIN)}
+    jumping = {b.form: proven(b) for b in own if math.isinf(b.rate)}
+    unit = "1" if channel == "servo" else "(rad/s, rad)/(m/s)"
+    return GainCurve(title, unit, own[0].certificate.frozen, flown, {form: g for form, g in varying.items() if g}, jumping)
 
 
 def rate_text(rate: float) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from studies.files import write_bytes, write_text
 from studies.transition import tables
 from studies.transition.axes import AXES
+from studies.transition.guarantees import loops
 from studies.transition.results import to_dict
 from symheli.errors import SymheliError
 
@@ -58,13 +59,14 @@ def write_report(study: Outcome, out: Path) -> Path:
 
 def _headline(study: Outcome) -> dict[str, object]:
     """The numbers the first paragraph speaks of."""
-    gust = [b for b in study.bounds if b.channel == "gust" and b.certificate.kind == "l2 gain"]
+    gust = [b for b in study.bounds if (b.model, b.channel, b.certificate.kind) == ("baseline", "gust", "l2 gain")]
     proven = [b for b in gust if b.certificate.verified]
     hypotheses = list(dict.fromkeys(h for b in proven for h in b.certificate.hypotheses))
     return {
+        "loops": list(loops(study.bounds).items()),
         "frozen_gain": next((b.certificate.frozen for b in gust), float("nan")),
-        "fastest": max(proven, key=lambda b: b.rate, default=None),
-        "jump": next((b for b in gust if math.isinf(b.rate)), None),
+        "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),
+        "jump": min((b for b in gust if math.isinf(b.rate)), key=lambda b: (b.certificate.gamma, -b.certificate.lower), default=None),
         "inf": math.inf,
         "hypotheses": hypotheses,
         "notes": {name: model.excitation for name, model in study.models.items() if model.excitation is not None},

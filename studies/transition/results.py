@@ -148,11 +148,12 @@ def _frozen(f: FrozenComparison) -> dict[str, Any]:
 
 def _bound(b: Bound) -> dict[str, Any]:
     c = b.certificate
-    unit = "(rad/s, rad)/(m/s)" if b.channel == "gust" else "1"
+    unit = "1" if b.channel == "servo" else "(rad/s, rad)/(m/s)"
     return {
         "model": b.model,
         "channel": b.channel,
         "kind": c.kind,
+        "form": b.form,
         "permitted acceleration": value(b.rate, "m/s^2"),
         "proven gain": value(c.gamma, unit),
         "lower bound": value(c.lower, unit),

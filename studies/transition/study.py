@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from studies.exact_loop import ExactLateral
+from studies.longitudinal_loop import longitudinal_loop
 from studies.transition import axes, guarantees
 from studies.transition.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
 from studies.transition.baseline import build_baseline
@@ -23,6 +25,7 @@ from studies.transition.report import write_report, write_results
 from studies.transition.results import to_dict
 from studies.transition.summary import summary
 from symheli import Helicopter
+from symheli.lpv.bases import Polynomial
 from synthesis import Search, frozen_gain
 
 
@@ -32,9 +35,13 @@ class Effort:
 
     ramps: int = 12
     gentle_ramps: int = 10
-    gust_rates: tuple[float, ...] = (0.0, 0.1, 1.0, 3.0, 4.0, math.inf)
+    gust_rates: tuple[float, ...] = (0.0, 0.1, 1.0, 3.0, 4.0, 4.5, 7.6, math.inf)
     gust_segments: tuple[int, ...] = (16,)
-    servo_rates: tuple[float, ...] = (0.0, 3.0, math.inf)
+    exact_rates: tuple[float, ...] = (0.0, 1.0, 3.0)
+    longitudinal_rates: tuple[float, ...] = (0.0, 3.0, math.inf)
+    thorough: bool = True
+    """Whether a P with a memory, the exact models and the LFT tests of the servo loops are part of it."""
+    servo_rates: tuple[float, ...] = (0.0, 3.0, 8.0, math.inf)
     servo_segments: tuple[int, ...] = (8,)
     search: Search = field(default_factory=Search)
 
@@ -46,6 +53,9 @@ class Effort:
             4,
             (0.0, 3.0, math.inf),
             (8,),
+            (),
+            (),
+            False,
             (0.0, math.inf),
             (4,),
             Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000),
@@ -89,8 +99,10 @@ def _stages(study: Study, effort: Effort) -> Iterator[tuple[str, Any]]:
     yield "Flying the transitions", lambda: _fly(study, effort)
     yield "Identifying and scoring", lambda: _identify(study)
     yield "Comparing with the baseline", lambda: _compare(study)
-    yield "Proving gains of the gust loop (baseline, continuous)", lambda: _prove_gust(study, effort)
-    yield "Proving gains of the servo loop (baseline and identified, 50 Hz)", lambda: _prove_servo(study, effort)
+    yield "Proving gains of the lateral gust loop (baseline and exact, continuous)", lambda: _prove_gust(study, effort)
+    if effort.longitudinal_rates:
+        yield "Proving gains of the longitudinal gust loop (baseline, continuous)", lambda: _prove_longitudinal(study, effort)
+    yield "Proving gains of the servo loop (exact, baseline and identified, 50 Hz)", lambda: _prove_servo(study, effort)
 
 
 @contextmanager
@@ -178,19 +190,31 @@ def _prove_gust(study: Study, effort: Effort) -> None:
     family = _need(study.baseline).nodes
     study.exact_frozen["gust"] = guarantees.exact_frozen_gain(family, sampled=False)
     loop = guarantees.gust_loop(family)
-    study.bounds += guarantees.stability_bounds("baseline", "gust", loop, effort.gust_rates, effort.gust_segments)
     study.bounds += guarantees.bounds("baseline", "gust", loop, effort.gust_rates, effort.gust_segments, effort.search)
+    study.bounds += guarantees.lft_bounds("baseline", "gust", loop)
+    if effort.thorough:
+        study.bounds += guarantees.memory_bounds("baseline", "gust", loop, effort.gust_rates, effort.search)
+        exact = ExactLateral.of(_need(study.heli)).loop("gust")
+        study.bounds += guarantees.bounds("exact", "gust", exact, effort.exact_rates, effort.gust_segments, effort.search)
+
+
+def _prove_longitudinal(study: Study, effort: Effort) -> None:
+    loop = longitudinal_loop(_need(study.heli))
+    study.bounds += guarantees.bounds("baseline", "longitudinal", loop, effort.longitudinal_rates, effort.gust_segments, effort.search)
+    study.bounds += guarantees.lft_bounds("baseline", "longitudinal", loop)
 
 
 def _prove_servo(study: Study, effort: Effort) -> None:
     family = _need(study.baseline).nodes
     study.exact_frozen["servo"] = guarantees.exact_frozen_gain(family, sampled=True)
-    loops = {
+    loops = {"exact": guarantees.scaled(ExactLateral.of(_need(study.heli)).loop("inputs", guarantees.PERIOD))} if effort.thorough else {}
+    loops |= {
         "baseline": guarantees.servo_loop(guarantees.sampled_baseline(family)),
         "identified, gentle flight": guarantees.servo_loop(study.models["lateral, gentle"].to_state_space()),
         "identified, aggressive flight": guarantees.servo_loop(study.models[f"{LATERAL.name}, noise-free"].to_state_space()),
     }
     for name, loop in loops.items():
         study.frozen_peaks[name] = frozen_gain(loop)
-        study.bounds += guarantees.stability_bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments)
         study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments, effort.search)
+        if effort.thorough and isinstance(loop.basis, Polynomial) and math.isfinite(study.frozen_peaks[name].gamma):
+            study.bounds += guarantees.lft_bounds(name, "servo", loop)

@@ -22,7 +22,8 @@ def summary(study: Outcome) -> str:
     ]
     for r in study.recoveries:
         lines.append(f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within {r.B_error:.0e}")
-    sections = [_marks(study), *(tables.guarantee(study, channel).text() for channel in ("gust", "servo"))]
+    channels = [channel for channel in tables.CHANNELS if any(b.channel == channel for b in study.bounds)]
+    sections = [_marks(study), *(tables.guarantee(study, channel).text() for channel in channels)]
     return "\n".join(lines) + "\n\n" + "\n\n".join(s for s in sections if s) + "\n\n" + "\n".join(tables.verdicts(study))
 
 

@@ -4,7 +4,8 @@ import pytest
 
 import synthesis
 from studies.lateral_loop import lateral_loop
-from studies.lft_reach import about, from_hover, largest, longitudinal_loop, on, proven
+from studies.lft_reach import about, from_hover, largest, on, proven
+from studies.longitudinal_loop import longitudinal_loop
 
 
 def test_the_largest_range_is_found_by_bisection():
