@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from symheli.errors import SymheliError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -111,6 +114,22 @@ def draw(curve: GainCurve, ax: Axes, *, legend: str = "upper left") -> Axes:
     ax.set_ylabel(f"L2 gain, {curve.unit}")
     ax.legend(loc=legend)
     return ax
+
+
+def save(curves: Sequence[GainCurve], path: Path) -> None:
+    """One panel a curve, to `path`; its ending says the format. Raises `SymheliError` without matplotlib."""
+    try:
+        import matplotlib
+    except ImportError as error:
+        raise SymheliError("a figure needs matplotlib: pip install 'symheli[study]'") from error
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(curves), figsize=(2 + 6 * len(curves), 4.5), squeeze=False, layout="constrained")
+    for curve, ax in zip(curves, axes[0], strict=True):
+        draw(curve, ax)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
 
 
 def _jumping(curve: GainCurve, ax: Any, left: float) -> list[str]:

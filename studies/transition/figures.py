@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED, draw
-from studies.transition import guarantees
 from studies.transition.axes import LONGITUDINAL
 from studies.transition.comparison import FAST
+from studies.transition.guarantees import curves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from studies.gain_curve import GainCurve
     from studies.transition.outcome import Outcome
 
 DEGREES = 180 / math.pi
@@ -62,8 +63,8 @@ def figures(study: Outcome) -> Iterator[tuple[str, str, Figure]]:
                 yield f"prediction-{axis}", CAPTION["prediction"].format(axis), prediction(c)
         for axis, f in study.frozen.items():
             yield f"frozen-{axis}", CAPTION["frozen"].format(axis, FAST), frozen(f)
-        if guarantees.loops(study.bounds):
-            yield "gain-against-rate", CAPTION["gain"], gain_curves(study)
+        if found := curves(study.bounds):
+            yield "gain-against-rate", CAPTION["gain"], gain_curves(found)
 
 
 def _subplots(rows: int, columns: int, width: float, height: float, **options: Any) -> tuple[Figure, np.ndarray]:
@@ -233,10 +234,9 @@ def frozen(f: Any) -> Figure:
     return figure
 
 
-def gain_curves(study: Outcome) -> Figure:
-    """Gain against rate: the lateral loop, and beside it the longitudinal one where the study has it."""
-    loops = guarantees.loops(study.bounds)
-    figure, axes = _subplots(1, len(loops), 7.5 if len(loops) == 1 else 11.5, 4.2, width_ratios=(1.5, 1)[: len(loops)])
-    for ax, (channel, title) in zip(axes[0], loops.items(), strict=True):
-        draw(guarantees.gain_curve(study.bounds, "baseline", channel, title), ax)
+def gain_curves(curves: list[GainCurve]) -> Figure:
+    """Gain against rate, one panel a loop."""
+    figure, axes = _subplots(1, len(curves), 7.5 if len(curves) == 1 else 11.5, 4.2, width_ratios=(1.5, 1)[: len(curves)])
+    for ax, curve in zip(axes[0], curves, strict=True):
+        draw(curve, ax)
     return figure

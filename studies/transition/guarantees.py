@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import synthesis
+from identification import LPVARXModel
+from studies.exact_loop import ExactLateral
 from studies.gain_curve import GainCurve
 from studies.lateral_loop import STATES, close
 from studies.transition.flights import TOP
-from symheli import LinearFamily, LinearModel, LPVStateSpace, Scheduling
+from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
+from symheli.lpv.bases import Polynomial
 from synthesis import Certificate, LFTCertificate, Relaxation, Search
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
@@ -58,6 +61,21 @@ def gust_loop(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
 def servo_loop(model: LPVStateSpace) -> LPVStateSpace:
     """Closed loop from disturbances at d_lat and d_ped to r and phi, each in its size, sampled at 50 Hz."""
     return scaled(close(model, "inputs"))
+
+
+def servo_loops(heli: Helicopter, family: LinearFamily, gentle: LPVARXModel, aggressive: LPVARXModel) -> dict[str, LPVStateSpace]:
+    """The servo loop around the exact models, their interpolation, and the models identified on either flight."""
+    return {
+        "exact": scaled(ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD)),
+        "baseline": servo_loop(sampled_baseline(family)),
+        "identified, gentle flight": servo_loop(gentle.to_state_space()),
+        "identified, aggressive flight": servo_loop(aggressive.to_state_space()),
+    }
+
+
+def has_lft(loop: LPVStateSpace) -> bool:
+    """Whether the LFT tests have anything to say: polynomial entries, stable when frozen."""
+    return isinstance(loop.basis, Polynomial) and math.isfinite(synthesis.frozen_gain(loop).gamma)
 
 
 def sampled_baseline(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
@@ -121,9 +139,9 @@ LOOPS = {"gust": "Lateral: gust to yaw rate and roll", "longitudinal": "Longitud
 """Channels whose gain is drawn against acceleration."""
 
 
-def loops(found: Sequence[Bound]) -> dict[str, str]:
-    """Those of `LOOPS` that have bounds."""
-    return {channel: title for channel, title in LOOPS.items() if any(b.channel == channel for b in found)}
+def curves(found: Sequence[Bound]) -> list[GainCurve]:
+    """The gain of the baseline in each of `LOOPS` that has bounds."""
+    return [gain_curve(found, "baseline", c, title) for c, title in LOOPS.items() if any(b.channel == c for b in found)]
 
 
 def proven(b: Bound) -> float:

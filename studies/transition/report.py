@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studies.files import write_bytes, write_text
-from studies.transition import tables
+from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
-from studies.transition.guarantees import loops
+from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
 from symheli.errors import SymheliError
 
@@ -63,7 +63,8 @@ def _headline(study: Outcome) -> dict[str, object]:
     proven = [b for b in gust if b.certificate.verified]
     hypotheses = list(dict.fromkeys(h for b in proven for h in b.certificate.hypotheses))
     return {
-        "loops": list(loops(study.bounds).items()),
+        "curves": curves(study.bounds),
+        "gain_tables": gain_tables.every(study.bounds),
         "frozen_gain": next((b.certificate.frozen for b in gust), float("nan")),
         "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),
         "jump": min((b for b in gust if math.isinf(b.rate)), key=lambda b: (b.certificate.gamma, -b.certificate.lower), default=None),

@@ -82,7 +82,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         name: {"gain": value(peak.gamma, "1"), "airspeed": value(peak.p, "m/s"), "frequency": value(peak.omega, "rad/s")}
         for name, peak in study.frozen_peaks.items()
     }
-    out["guarantees"] = [_bound(b) for b in study.bounds]
+    out["guarantees"] = [bound_to_dict(b) for b in study.bounds]
     return out
 
 
@@ -146,7 +146,8 @@ def _frozen(f: FrozenComparison) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _bound(b: Bound) -> dict[str, Any]:
+def bound_to_dict(b: Bound) -> dict[str, Any]:
+    """One certificate."""
     c = b.certificate
     unit = "1" if b.channel == "servo" else "(rad/s, rad)/(m/s)"
     return {

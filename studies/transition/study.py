@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +15,7 @@ from studies.transition import axes, guarantees
 from studies.transition.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
 from studies.transition.baseline import build_baseline
 from studies.transition.comparison import compare, compare_frozen
+from studies.transition.effort import Effort
 from studies.transition.flights import FlightPlan, autopilot_for
 from studies.transition.outcome import Outcome
 from studies.transition.paper_experiment import PERIOD, run_experiment
@@ -25,41 +24,7 @@ from studies.transition.report import write_report, write_results
 from studies.transition.results import to_dict
 from studies.transition.summary import summary
 from symheli import Helicopter
-from symheli.lpv.bases import Polynomial
-from synthesis import Search, frozen_gain
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much is done: the whole study, or a look (`quick`)."""
-
-    ramps: int = 12
-    gentle_ramps: int = 10
-    gust_rates: tuple[float, ...] = (0.0, 0.1, 1.0, 3.0, 4.0, 4.5, 7.6, math.inf)
-    gust_segments: tuple[int, ...] = (16,)
-    exact_rates: tuple[float, ...] = (0.0, 1.0, 3.0)
-    longitudinal_rates: tuple[float, ...] = (0.0, 3.0, math.inf)
-    thorough: bool = True
-    """Whether a P with a memory, the exact models and the LFT tests of the servo loops are part of it."""
-    servo_rates: tuple[float, ...] = (0.0, 3.0, 8.0, math.inf)
-    servo_segments: tuple[int, ...] = (8,)
-    search: Search = field(default_factory=Search)
-
-    @classmethod
-    def look(cls) -> Effort:
-        """Shorter flights, fewer certificates of a simpler form."""
-        return cls(
-            6,
-            4,
-            (0.0, 3.0, math.inf),
-            (8,),
-            (),
-            (),
-            False,
-            (0.0, math.inf),
-            (4,),
-            Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000),
-        )
+from synthesis import frozen_gain
 
 
 class Study(Outcome):
@@ -207,14 +172,11 @@ def _prove_longitudinal(study: Study, effort: Effort) -> None:
 def _prove_servo(study: Study, effort: Effort) -> None:
     family = _need(study.baseline).nodes
     study.exact_frozen["servo"] = guarantees.exact_frozen_gain(family, sampled=True)
-    loops = {"exact": guarantees.scaled(ExactLateral.of(_need(study.heli)).loop("inputs", guarantees.PERIOD))} if effort.thorough else {}
-    loops |= {
-        "baseline": guarantees.servo_loop(guarantees.sampled_baseline(family)),
-        "identified, gentle flight": guarantees.servo_loop(study.models["lateral, gentle"].to_state_space()),
-        "identified, aggressive flight": guarantees.servo_loop(study.models[f"{LATERAL.name}, noise-free"].to_state_space()),
-    }
-    for name, loop in loops.items():
+    gentle, aggressive = study.models["lateral, gentle"], study.models[f"{LATERAL.name}, noise-free"]
+    for name, loop in guarantees.servo_loops(_need(study.heli), family, gentle, aggressive).items():
+        if name == "exact" and not effort.thorough:
+            continue
         study.frozen_peaks[name] = frozen_gain(loop)
         study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments, effort.search)
-        if effort.thorough and isinstance(loop.basis, Polynomial) and math.isfinite(study.frozen_peaks[name].gamma):
+        if effort.thorough and guarantees.has_lft(loop):
             study.bounds += guarantees.lft_bounds(name, "servo", loop)

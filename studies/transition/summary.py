@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from studies.transition import tables
+from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
 
 if TYPE_CHECKING:
@@ -22,8 +22,7 @@ def summary(study: Outcome) -> str:
     ]
     for r in study.recoveries:
         lines.append(f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within {r.B_error:.0e}")
-    channels = [channel for channel in tables.CHANNELS if any(b.channel == channel for b in study.bounds)]
-    sections = [_marks(study), *(tables.guarantee(study, channel).text() for channel in channels)]
+    sections = [_marks(study), *(table.text() for table in gain_tables.every(study.bounds))]
     return "\n".join(lines) + "\n\n" + "\n\n".join(s for s in sections if s) + "\n\n" + "\n".join(tables.verdicts(study))
 
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from studies.transition.axes import ALL, FROZEN_SPEEDS, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
 from studies.transition.campaign import MODE_MARK
-from studies.transition.guarantees import FORMS, SIZES, Bound, gain_curve, proven, rate_text
-from synthesis import Status
 
 if TYPE_CHECKING:
     from studies.transition.outcome import Outcome
@@ -161,53 +159,6 @@ def verdicts(study: Outcome) -> list[str]:
             sentences.append(f"{y}: {who}" + ("" if abs(difference) < 1 else f" by {abs(difference):.1f} points"))
         out.append(f"{c.axis.name}, {noise}, 1 s ahead: " + "; ".join(sentences) + ".")
     return out
-
-
-CHANNELS = {
-    "gust": "Lateral gust (m/s) to yaw rate and roll (rad/s, rad) under attitude hold, continuous time",
-    "longitudinal": "Longitudinal and vertical gusts (m/s) to pitch rate and pitch (rad/s, rad) under attitude hold, continuous time",
-    "servo": "Disturbances at roll cyclic ({d_lat} rad) and pedal ({d_ped} rad) to yaw rate ({r} rad/s) and roll ({phi} rad), 50 Hz".format(
-        **SIZES
-    ),
-}
-
-
-def guarantee(study: Outcome, channel: str) -> Table:
-    """Gain against permitted acceleration: flown, and proven by each form; tests that let the airspeed jump hold at every acceleration."""
-    own = [b for b in study.bounds if b.channel == channel]
-    gains = [b for b in own if b.certificate.kind == "l2 gain"]
-    forms = [form for form in FORMS if any(b.form == form for b in gains)]
-    table = Table(CHANNELS[channel], ["model", "acceleration", "stable", "frozen", "flown", *forms])
-    for model in dict.fromkeys(b.model for b in gains):
-        jumping = {b.form: b for b in gains if b.model == model and math.isinf(b.rate)}
-        for rate in sorted({b.rate for b in gains if b.model == model}):
-            here = {**jumping, **{b.form: b for b in gains if (b.model, b.rate) == (model, rate)}}
-            now = [b for b in own if (b.model, b.rate) == (model, rate)]
-            flown = max(b.certificate.lower for b in now if b.certificate.kind == "l2 gain")
-            frozen = next(iter(here.values())).certificate.frozen
-            cells = [gain(proven(here[form])) if form in here else "" for form in forms]
-            table.rows.append([
-                model, rate_text(rate), _stable(now, jumping), "unstable" if math.isinf(frozen) else gain(frozen),
-                "grows" if math.isinf(flown) else gain(flown), *cells,
-            ])  # fmt: skip
-    if channel in study.exact_frozen:
-        table.remarks.append(f"Frozen gain of the exact linearizations at the nodes: {gain(study.exact_frozen[channel])}.")
-    table.remarks.append("Flown: the gain of a computed airspeed history, no bound can be smaller; none: nothing proven; blank: not tried.")
-    return table
-
-
-def _stable(now: list[Bound], jumping: dict[str, Bound]) -> str:
-    statuses = {b.certificate.status for b in now}
-    if Status.UNSTABLE in statuses:
-        return "no, even frozen"
-    if any(math.isinf(b.certificate.lower) for b in now):
-        return "no, it grows"
-    return "proven" if any(b.certificate.verified for b in (*now, *jumping.values())) else "not proven"
-
-
-def verdict(study: Outcome, channel: str, title: str) -> str:
-    """One loop's gain against acceleration in words."""
-    return f"{title}: {gain_curve(study.bounds, 'baseline', channel, title).verdict()}"
 
 
 def findings(study: Outcome) -> list[str]:

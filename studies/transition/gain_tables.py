@@ -1,0 +1,54 @@
+"""Gains of the closed loops against permitted acceleration as tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from studies.transition.guarantees import FORMS, SIZES, Bound, proven, rate_text
+from studies.transition.tables import Table, gain
+from synthesis import Status
+
+CHANNELS = {
+    "gust": "Lateral gust (m/s) to yaw rate and roll (rad/s, rad) under attitude hold, continuous time",
+    "longitudinal": "Longitudinal and vertical gusts (m/s) to pitch rate and pitch (rad/s, rad) under attitude hold, continuous time",
+    "servo": "Disturbances at roll cyclic ({d_lat} rad) and pedal ({d_ped} rad) to yaw rate ({r} rad/s) and roll ({phi} rad), 50 Hz".format(
+        **SIZES
+    ),
+}
+
+
+def guarantee(found: Sequence[Bound], channel: str) -> Table:
+    """Gain against permitted acceleration: flown, and proven by each form; tests that let the airspeed jump hold at every acceleration."""
+    own = [b for b in found if b.channel == channel]
+    gains = [b for b in own if b.certificate.kind == "l2 gain"]
+    forms = [form for form in FORMS if any(b.form == form for b in gains)]
+    table = Table(CHANNELS[channel], ["model", "acceleration", "stable", "frozen", "flown", *forms])
+    for model in dict.fromkeys(b.model for b in gains):
+        jumping = {b.form: b for b in gains if b.model == model and math.isinf(b.rate)}
+        for rate in sorted({b.rate for b in gains if b.model == model}):
+            here = {**jumping, **{b.form: b for b in gains if (b.model, b.rate) == (model, rate)}}
+            now = [b for b in own if (b.model, b.rate) == (model, rate)]
+            flown = max(b.certificate.lower for b in now if b.certificate.kind == "l2 gain")
+            frozen = next(iter(here.values())).certificate.frozen
+            cells = [gain(proven(here[form])) if form in here else "" for form in forms]
+            table.rows.append([
+                model, rate_text(rate), _stable(now, jumping), "unstable" if math.isinf(frozen) else gain(frozen),
+                "grows" if math.isinf(flown) else gain(flown), *cells,
+            ])  # fmt: skip
+    table.remarks.append("Flown: the gain of a computed airspeed history, no bound can be smaller; none: nothing proven; blank: not tried.")
+    return table
+
+
+def every(found: Sequence[Bound]) -> list[Table]:
+    """One table a channel that has bounds."""
+    return [guarantee(found, channel) for channel in CHANNELS if any(b.channel == channel for b in found)]
+
+
+def _stable(now: list[Bound], jumping: dict[str, Bound]) -> str:
+    statuses = {b.certificate.status for b in now}
+    if Status.UNSTABLE in statuses:
+        return "no, even frozen"
+    if any(math.isinf(b.certificate.lower) for b in now):
+        return "no, it grows"
+    return "proven" if any(b.certificate.verified for b in (*now, *jumping.values())) else "not proven"

@@ -1,0 +1,55 @@
+"""The curve of gain against permitted acceleration, and the table of it."""
+
+import math
+
+import pytest
+
+from studies.gain_curve import GainCurve, draw, save
+from studies.transition import gain_tables, guarantees
+from symheli import LPVStateSpace, Scheduling
+from synthesis import Search
+
+NOTHING = {"constant P": math.inf, "LFT D/G": math.inf}
+STEEP = GainCurve(
+    "steep", "1", 1.0, {0.0: 1.0, 1.0: 2.0, 3.0: 5.0, 7.0: math.inf, math.inf: math.inf},
+    {"P(p, lag)": {3.0: 6.0}, "P(p)": {0.0: 1.0, 1.0: 7.0, 3.0: 8.0, 7.0: math.inf}}, NOTHING,
+)  # fmt: skip
+FLAT = GainCurve("flat", "1", 1.0, {0.0: 1.0, math.inf: 1.0}, {"P(p)": {0.0: 1.0, 3.0: 1.0}}, {"LFT D/G": 1.0, "LFT D": 1.7})
+
+
+def test_a_proof_for_a_larger_acceleration_counts_for_a_smaller_one():
+    assert STEEP.best == {0.0: 1.0, 1.0: 6.0, 3.0: 6.0}
+    assert STEEP.fastest == (3.0, 6.0)
+
+
+def test_the_words_say_what_is_proven_and_what_grows():
+    assert STEEP.growing == 7.0
+    assert "none can" in STEEP.verdict()
+    assert "at 7 m/s^2 a flown airspeed makes the state grow" in STEEP.verdict()
+    assert FLAT.verdict().startswith("LFT D/G proves 1 for an airspeed that jumps")
+
+
+def test_the_open_region_is_shaded_only_where_no_test_proves_a_gain(tmp_path):
+    plt = pytest.importorskip("matplotlib.pyplot")
+    for curve, words in ((STEEP, {"open", "grows"}), (FLAT, set())):
+        ax = draw(curve, plt.figure().add_subplot())
+        assert {text.get_text() for text in ax.texts} & {"open", "grows"} == words
+        plt.close(ax.figure)
+    save([STEEP, FLAT], tmp_path / "curves.png")
+    assert (tmp_path / "curves.png").stat().st_size > 10_000
+
+
+def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
+    lpv = LPVStateSpace.polynomial([[[-2.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0))
+    quick = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+    found = [
+        *guarantees.bounds("baseline", "gust", lpv, (0.0, 1.0, math.inf), (2,), quick),
+        *guarantees.lft_bounds("baseline", "gust", lpv),
+    ]
+    table = gain_tables.guarantee(found, "gust")
+    assert table.columns[5:] == ["P(p)", "constant P", *guarantees.LFT_TESTS]
+    # a first-order lag with pole -1 at the worst: gain 1 whatever p does, and every test finds it or more
+    assert [row[5:7] for row in table.rows] == [["1", "1"], ["1", "1"], ["", "1"]]
+    assert {row[2] for row in table.rows} == {"proven"}
+    curve = guarantees.gain_curve(found, "baseline", "gust", "lag")
+    assert curve.jumping["LFT D/G"] == pytest.approx(1.0, abs=1e-3)
