@@ -14,7 +14,7 @@ class Effort:
 
     ramps: int = 12
     gentle_ramps: int = 10
-    gust_rates: tuple[float, ...] = (0.0, 0.1, 1.0, 3.0, 4.0, 4.5, 7.6, math.inf)
+    gust_rates: tuple[float, ...] = (0.0, 0.1, 1.0, 3.0, 4.5, 7.6, math.inf)
     gust_segments: tuple[int, ...] = (16,)
     exact_rates: tuple[float, ...] = (0.0, 1.0, 3.0)
     longitudinal_rates: tuple[float, ...] = (0.0, 3.0, math.inf)
