@@ -10,12 +10,18 @@ from pathlib import Path
 
 
 def medians(
-    candidates: dict[str, Callable[[], object]], seconds: float, clock: Callable[[], float] = time.perf_counter, *, warm: bool = True
+    candidates: dict[str, Callable[[], object]],
+    seconds: float,
+    clock: Callable[[], float] = time.perf_counter,
+    *,
+    warm: bool = True,
+    settled: bool = False,
 ) -> dict[str, float]:
     """Median time of one call of each, in s, over about `seconds` of interleaved runs each and at least three.
 
     `clock` time.thread_time counts what one thread works and not what others keep it from: for work of one thread on a busy machine.
     `warm`: each is called once before, so that nothing is compiled while the clock runs; without it the caller has done so.
+    `settled`: each is called once more right before it is timed, and does not pay for the caches and the clock frequency its forerunner left.
     """
     spent: dict[str, list[float]] = {name: [] for name in candidates}
     for call in candidates.values() if warm else ():
@@ -23,6 +29,8 @@ def medians(
     end = time.perf_counter() + seconds * len(candidates)
     while time.perf_counter() < end or min(len(t) for t in spent.values()) < 3:
         for name, call in candidates.items():
+            if settled:
+                call()
             begin = clock()
             call()
             spent[name].append(clock() - begin)

@@ -125,7 +125,7 @@ class RecursiveLeastSquares:
     def _own(self, state: RLSState | None) -> RLSState:
         if state is None:
             return self.init()
-        if len(state.memory) != self.configuration.sizes[0] or state.memory.dtype != self.configuration.dtype:
+        if state.configuration.structure != self.structure or state.memory.dtype != self.configuration.dtype:
             raise InputError("state: it belongs to an estimator with another structure or precision; start with init()")
         return state
 

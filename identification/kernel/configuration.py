@@ -31,7 +31,7 @@ def padded(n: int) -> int:
 
 @dataclass(frozen=True)
 class Triangle:
-    """A unit upper triangle of `order` rows and `wide` columns; row i begins at the multiple of LANES at or before its diagonal."""
+    """A unit upper triangle of that order, in `wide` rows and columns; the rows of a block of LANES begin at its first diagonal."""
 
     order: int
     wide: int
@@ -39,20 +39,20 @@ class Triangle:
     @property
     def size(self) -> int:
         """Numbers it takes."""
-        return sum(self.wide - i // LANES * LANES for i in range(self.order))
+        return self.blocks[-1].stop
 
     @cached_property
-    def rows(self) -> tuple[slice, ...]:
-        """Where each row lies."""
-        ends = np.cumsum([self.wide - i // LANES * LANES for i in range(self.order)]).tolist()
+    def blocks(self) -> tuple[slice, ...]:
+        """Where each block of LANES rows lies, row after row."""
+        ends = np.cumsum([LANES * (self.wide - start) for start in range(0, self.wide, LANES)]).tolist()
         return tuple(slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
 
     def full(self, packed: Array) -> Array:
         """As a square matrix (order, order)."""
-        out = np.zeros((self.order, self.wide), packed.dtype)
-        for i, row in enumerate(self.rows):
-            out[i, i // LANES * LANES :] = packed[row]
-        return out[:, : self.order]
+        out = np.zeros((self.wide, self.wide), packed.dtype)
+        for start, block in zip(range(0, self.wide, LANES), self.blocks, strict=True):
+            out[start : start + LANES, start:] = packed[block].reshape(LANES, -1)
+        return out[: self.order, : self.order]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,10 @@ typedef struct {
     int state_size, work_size, regressors, width; /* width: numbers in a sample */
     void *memory; /* what config points to */
     rls_real *sample; /* regressors + width numbers, converted from double */
+    Py_buffer held[2]; /* state and work of the last call: an estimator comes with the same ones again and again */
 } Kernel;
+
+static PyObject *dtype_name, *float64; /* "dtype" and numpy.dtype("float64") */
 
 /* A contiguous buffer of `count` numbers; count < 0: any. Raises TypeError, ValueError or BufferError. */
 static int open_buffer(PyObject *from, Py_buffer *view, const char *format, Py_ssize_t count, int writable, const char *name)
@@ -34,10 +37,43 @@ static int open_buffer(PyObject *from, Py_buffer *view, const char *format, Py_s
     return -1;
 }
 
-static void convert(const Py_buffer *view, rls_real *to)
+/* The same of `count` doubles, without asking an array for its format where its dtype says it: that takes longer than all the rest. */
+static int open_doubles(PyObject *from, Py_buffer *view, Py_ssize_t count, const char *name)
 {
-    const double *from = view->buf;
-    for (Py_ssize_t i = 0; i < view->len / (Py_ssize_t)sizeof(double); i++) to[i] = (rls_real)from[i];
+    PyObject *dtype = PyObject_GetAttr(from, dtype_name);
+    const int known = dtype == float64;
+    if (!dtype) PyErr_Clear();
+    Py_XDECREF(dtype);
+    if (!known) return open_buffer(from, view, "d", count, 0, name);
+    if (PyObject_GetBuffer(from, view, PyBUF_C_CONTIGUOUS) < 0) return -1;
+    if (view->len == count * (Py_ssize_t)sizeof(double)) return 0;
+    PyErr_Format(PyExc_ValueError, "%s: expected %zd numbers, got %zd", name, count, view->len / (Py_ssize_t)sizeof(double));
+    PyBuffer_Release(view);
+    return -1;
+}
+
+/* `count` doubles into `to`. */
+static int convert(PyObject *from, Py_ssize_t count, rls_real *to, const char *name)
+{
+    Py_buffer view;
+    const double *number;
+    if (open_doubles(from, &view, count, name) < 0) return -1;
+    number = view.buf;
+    for (Py_ssize_t i = 0; i < count; i++) to[i] = (rls_real)number[i];
+    PyBuffer_Release(&view);
+    return 0;
+}
+
+/* The numbers of a writable array, which is held until another comes. */
+static rls_real *hold(Py_buffer *held, PyObject *from, Py_ssize_t count, const char *name)
+{
+    Py_buffer view;
+    if (held->obj != from) {
+        if (open_buffer(from, &view, FORMAT, count, 1, name) < 0) return NULL;
+        if (held->obj) PyBuffer_Release(held);
+        *held = view;
+    }
+    return held->buf;
 }
 
 static int copy_numbers(PyObject *from, const char *format, Py_ssize_t count, void *to, const char *name)
@@ -166,6 +202,8 @@ static void kernel_dealloc(PyObject *object)
 {
     Kernel *self = (Kernel *)object;
     PyTypeObject *type = Py_TYPE(object);
+    for (int i = 0; i < 2; i++)
+        if (self->held[i].obj) PyBuffer_Release(&self->held[i]);
     PyMem_Free(self->memory);
     PyMem_Free(self->sample);
     ((freefunc)PyType_GetSlot(type, Py_tp_free))(object);
@@ -207,45 +245,30 @@ static PyObject *kernel_update(PyObject *object, PyObject *const *args, Py_ssize
     const rls_config *c = &self->config;
     const int given = c->basis.factors == 0, sizes[] = {c->outputs, c->inputs, c->parameters, c->basis.functions};
     static const char *const names[] = {"y", "u", "p", "f"};
-    Py_buffer state, work, part;
-    rls_real *to = self->sample;
-    int status;
+    rls_real *to = self->sample, *state, *work;
     if (arguments(count, 5 + given) < 0) return NULL;
     for (int i = 0; i < 3 + given; i++) {
-        if (i == 2 && c->parameters == 1 && PyFloat_Check(args[4])) {
+        if (i == 2 && c->parameters == 1 && PyFloat_Check(args[4]))
             *to = (rls_real)PyFloat_AsDouble(args[4]);
-        } else {
-            if (open_buffer(args[2 + i], &part, "d", sizes[i], 0, names[i]) < 0) return NULL;
-            convert(&part, to);
-            PyBuffer_Release(&part);
-        }
+        else if (convert(args[2 + i], sizes[i], to, names[i]) < 0)
+            return NULL;
         to += sizes[i];
     }
-    if (open_memory(self, args, &state, &work) < 0) return NULL;
-    status = update_row(c, state.buf, work.buf, self->sample);
-    PyBuffer_Release(&state);
-    PyBuffer_Release(&work);
-    return PyLong_FromLong(status);
+    if (!(state = hold(&self->held[0], args[0], self->state_size, "state"))) return NULL;
+    if (!(work = hold(&self->held[1], args[1], self->work_size, "work"))) return NULL;
+    return PyLong_FromLong(update_row(c, state, work, self->sample));
 }
 
 static PyObject *kernel_absorb(PyObject *object, PyObject *const *args, Py_ssize_t count)
 {
     Kernel *self = (Kernel *)object;
     const rls_config *c = &self->config;
-    Py_buffer state, work, phi, y;
-    int status;
+    rls_real *phi = self->sample, *y = phi + self->regressors, *state, *work;
     if (arguments(count, 4) < 0) return NULL;
-    if (open_buffer(args[2], &phi, "d", self->regressors, 0, "phi") < 0) return NULL;
-    convert(&phi, self->sample);
-    PyBuffer_Release(&phi);
-    if (open_buffer(args[3], &y, "d", c->outputs, 0, "y") < 0) return NULL;
-    convert(&y, self->sample + self->regressors);
-    PyBuffer_Release(&y);
-    if (open_memory(self, args, &state, &work) < 0) return NULL;
-    status = rls_absorb(c, state.buf, work.buf, self->sample, self->sample + self->regressors);
-    PyBuffer_Release(&state);
-    PyBuffer_Release(&work);
-    return PyLong_FromLong(status);
+    if (convert(args[2], self->regressors, phi, "phi") < 0 || convert(args[3], c->outputs, y, "y") < 0) return NULL;
+    if (!(state = hold(&self->held[0], args[0], self->state_size, "state"))) return NULL;
+    if (!(work = hold(&self->held[1], args[1], self->work_size, "work"))) return NULL;
+    return PyLong_FromLong(rls_absorb(c, state, work, phi, y));
 }
 
 /* run(state, work, samples (n, width), statuses (n), innovations (n, ny) or None, coefficients (n, nr, ny) or None) */
@@ -351,6 +374,13 @@ PyMODINIT_FUNC INITIALISE(void)
     if (!right_processor()) {
         PyErr_SetString(PyExc_ImportError, "it was built for another processor; install again, or set SYMHELI_NATIVE=0 when building");
         return NULL;
+    }
+    if (!dtype_name && !(dtype_name = PyUnicode_InternFromString("dtype"))) return NULL;
+    if (!float64) {
+        PyObject *numpy = PyImport_ImportModule("numpy");
+        float64 = numpy ? PyObject_CallMethod(numpy, "dtype", "s", "float64") : NULL;
+        Py_XDECREF(numpy);
+        if (!float64) return NULL;
     }
     module = PyModule_Create(&definition);
     type = module ? PyType_FromSpec(&specification) : NULL;

@@ -17,13 +17,94 @@
 #define PRIOR (EPSILON / 16) /* samples with a regressor at its largest that are pretended at first, saying "coefficient 0" */
 #define MILLION 1048576      /* samples are counted in two numbers, each exact in single precision */
 
+/* LANES numbers side by side. `LANEWISE EACH(a) += EACH(b);` adds them all: as vectors where the compiler has these, else one by one, with
+   the same result. */
+#if defined(__GNUC__) && !defined(RLS_NO_VECTORS)
+typedef rls_real lanes __attribute__((vector_size(LANES * sizeof(rls_real)), aligned(sizeof(rls_real)), may_alias));
+#define LANEWISE
+#define EACH(of) (of)
+#define LANE(of, i) (of)[i]
+#else
+typedef struct {
+    rls_real at[LANES];
+} lanes;
+#define LANEWISE for (int lane = 0; lane < LANES; lane++)
+#define EACH(of) (of).at[lane]
+#define LANE(of, i) (of).at[i]
+#endif
+
+/* Lanes of two vectors, counted through: within registers where the compiler can. */
+#if defined(__has_builtin) && !defined(RLS_NO_VECTORS)
+#if __has_builtin(__builtin_shufflevector)
+#define SHUFFLE __builtin_shufflevector
+#endif
+#endif
+
+static inline lanes *lanes_at(rls_real *numbers) { return (lanes *)numbers; }
+
+static inline const lanes *lanes_of(const rls_real *numbers) { return (const lanes *)numbers; }
+
+/* Each lane becomes the sum of those up to it: neighbours first, then pairs, then fours. */
+static inline void running_sums(lanes *v)
+{
+#ifdef SHUFFLE
+    const lanes none = {0};
+    *v += SHUFFLE(none, *v, 0, 8, 9, 10, 11, 12, 13, 14);
+    *v += SHUFFLE(none, *v, 0, 1, 8, 9, 10, 11, 12, 13);
+    *v += SHUFFLE(none, *v, 0, 1, 2, 3, 8, 9, 10, 11);
+#else
+    for (int step = 1; step < LANES; step *= 2)
+        for (int i = LANES - 1; i >= step; i--) LANE(*v, i) += LANE(*v, i - step);
+#endif
+}
+
+/* The lane before, and `first` before all. */
+static inline void shift(lanes *v, rls_real first)
+{
+#ifdef SHUFFLE
+    const lanes none = {0};
+    *v = SHUFFLE(none + first, *v, 0, 8, 9, 10, 11, 12, 13, 14);
+#else
+    for (int i = LANES - 1; i > 0; i--) LANE(*v, i) = LANE(*v, i - 1);
+    LANE(*v, 0) = first;
+#endif
+}
+
+static inline void transpose(lanes *v)
+{
+#ifdef SHUFFLE
+    lanes a[LANES];
+    for (int i = 0; i < LANES; i += 2) {
+        a[i] = SHUFFLE(v[i], v[i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+        a[i + 1] = SHUFFLE(v[i], v[i + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+    }
+    for (int i = 0; i < LANES; i += 4)
+        for (int j = i; j < i + 2; j++) {
+            v[j] = SHUFFLE(a[j], a[j + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+            v[j + 2] = SHUFFLE(a[j], a[j + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+        }
+    for (int j = 0; j < 4; j++) {
+        const lanes upper = v[j];
+        v[j] = SHUFFLE(upper, v[j + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+        v[j + 4] = SHUFFLE(upper, v[j + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+    }
+#else
+    for (int i = 0; i < LANES; i++)
+        for (int j = 0; j < i; j++) {
+            const rls_real below = LANE(v[i], j);
+            LANE(v[i], j) = LANE(v[j], i);
+            LANE(v[j], i) = below;
+        }
+#endif
+}
+
 /* State: this header, the past (memory + 1 rows of y, u, p, f(p), newest first), the groups. */
 enum { COUNT, MILLIONS, FILLED, HEADER = LANES };
 /* A group: this header, then the arrays of `group` up to `usual`. */
 enum { WEIGHT, TURN, DETERMINED, STEPS, FACTOR, GROUP_HEADER = LANES };
 
-/* n regressors, m outputs; n + m, n and m rounded up to whole LANES. Row i of the unit triangle starts at the multiple of LANES at or
-   before its diagonal. [R, Z; 0, S] = sqrt(d) triangle. */
+/* n regressors, m outputs; n + m, n and m rounded up to whole LANES. The unit triangle has `wide` rows, those beyond n + m empty; LANES of
+   them are a block, whose rows all start at the column of its first diagonal. [R, Z; 0, S] = sqrt(d) triangle. */
 typedef struct {
     int n, m, wide, tall, high;
     rls_real *header, *triangle, *d, *theta, *peak, *energy, *fed, *recent, *usual; /* state */
@@ -32,14 +113,10 @@ typedef struct {
 
 static int padded(int n) { return (n + LANES - 1) / LANES * LANES; }
 
-static int row_start(int i) { return i / LANES * LANES; }
+static int block_start(int i) { return i / LANES * LANES; }
 
-/* Where row i of a triangle with rows of `wide` columns begins. */
-static int row_offset(int i, int wide)
-{
-    const int blocks = i / LANES;
-    return i * wide - LANES * (LANES * (blocks * (blocks - 1) / 2) + blocks * (i % LANES));
-}
+/* Where the block of rows from `start` on begins in a triangle with `wide` columns. */
+static int block_offset(int start, int wide) { return start * wide - start * (start - LANES) / 2; }
 
 static int row_width(const rls_config *c) { return c->outputs + c->inputs + c->parameters + c->basis.functions; }
 
@@ -55,7 +132,7 @@ static group open_group(const rls_config *c, int g, rls_real *state, rls_real *w
     a.high = padded(a.m);
     a.header = state;
     a.triangle = a.header + GROUP_HEADER;
-    a.d = a.triangle + row_offset(a.n + a.m, a.wide);
+    a.d = a.triangle + block_offset(a.wide, a.wide);
     a.theta = a.d + a.wide;
     a.peak = a.theta + a.m * a.tall;
     a.energy = a.peak + a.tall;
@@ -68,6 +145,15 @@ static group open_group(const rls_config *c, int g, rls_real *state, rls_real *w
     a.gain = a.s + a.wide;
     a.innovation = a.gain + a.tall;
     return a;
+}
+
+static rls_real *block_at(const group *a, int start) { return a->triangle + block_offset(start, a->wide); }
+
+/* Entry (i, j) of the triangle, j at or behind the start of the block of row i. */
+static rls_real *entry(const group *a, int i, int j)
+{
+    const int start = block_start(i);
+    return block_at(a, start) + (i - start) * (a->wide - start) + j - start;
 }
 
 static rls_real *end_of_state(const group *a) { return a->usual + a->high; }
@@ -85,7 +171,7 @@ int rls_state_size(const rls_config *c)
     int size = groups_state(c);
     for (int g = 0; g < c->groups; g++) {
         const int n = c->group[g].entries * c->basis.functions, m = c->group[g].outputs, wide = padded(n + m);
-        size += GROUP_HEADER + row_offset(n + m, wide) + wide + (m + 3) * padded(n) + 2 * padded(m);
+        size += GROUP_HEADER + block_offset(wide, wide) + wide + (m + 3) * padded(n) + 2 * padded(m);
     }
     return size;
 }
@@ -107,170 +193,200 @@ void rls_init(const rls_config *c, rls_real *state, rls_real *work)
     state += groups_state(c);
     for (int g = 0; g < c->groups; g++) {
         const group a = open_group(c, g, state, work);
-        for (int i = 0; i < a.n + a.m; i++) a.triangle[row_offset(i, a.wide) + i - row_start(i)] = 1;
+        for (int i = 0; i < a.wide; i++) *entry(&a, i, i) = 1;
+        for (int i = a.n + a.m; i < a.wide; i++) a.d[i] = 1;
         state = end_of_state(&a);
     }
 }
 
 static inline rls_real absolute(rls_real a) { return a > -a ? a : -a; }
 
-static inline rls_real dot(const rls_real *restrict a, const rls_real *restrict b, int length)
+/* For each of `count` rows a: a'b in LANES partial sums, from the last column on. */
+static inline void partial_sums(const rls_real *rows, int stride, int count, const rls_real *b, int length, lanes *sums)
 {
-    rls_real s[LANES] = {0};
-    for (int k = 0; k < length; k += LANES)
-        for (int j = 0; j < LANES; j++) s[j] += a[k + j] * b[k + j];
-    return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
+    for (int k = length - LANES; k >= 0; k -= LANES)
+        for (int i = 0; i < count; i++) LANEWISE EACH(sums[i]) += EACH(*lanes_of(b + k)) * EACH(*lanes_of(rows + i * stride + k));
 }
 
-/* For each row i in turn: x <- x - first[i] row, row <- row + gain[i] x. Four rows at a time save loads and stores of x. */
-static inline void rotate(rls_real *rows, int stride, int count, rls_real *restrict x, int length, const rls_real *first, const rls_real *gain)
+/* a'b for each of `count` rows a of a matrix, LANES at most; 0 for the rest of LANES. */
+static inline void times(const rls_real *rows, int stride, int count, const rls_real *b, int length, rls_real *result)
 {
+    const lanes none = {0};
+    lanes s[LANES];
     int i = 0;
-    for (; i + 4 <= count; i += 4) {
-        rls_real *restrict r0 = rows + i * stride, *restrict r1 = r0 + stride, *restrict r2 = r1 + stride, *restrict r3 = r2 + stride;
-        const rls_real f0 = first[i], f1 = first[i + 1], f2 = first[i + 2], f3 = first[i + 3];
-        const rls_real g0 = gain[i], g1 = gain[i + 1], g2 = gain[i + 2], g3 = gain[i + 3];
-        for (int k = 0; k < length; k++) {
-            rls_real t = x[k] - f0 * r0[k];
-            r0[k] += g0 * t;
-            t -= f1 * r1[k];
-            r1[k] += g1 * t;
-            t -= f2 * r2[k];
-            r2[k] += g2 * t;
-            t -= f3 * r3[k];
-            r3[k] += g3 * t;
-            x[k] = t;
-        }
+    for (int j = 0; j < LANES; j++) s[j] = none;
+    if (count == LANES) /* usual numbers, as constants for the compiler */
+        partial_sums(rows, stride, LANES, b, length, s);
+    else {
+        for (; i + 4 <= count; i += 4) partial_sums(rows + i * stride, stride, 4, b, length, s + i);
+        for (; i < count; i++) partial_sums(rows + i * stride, stride, 1, b, length, s + i);
     }
-    for (; i < count; i++) {
-        rls_real *restrict row = rows + i * stride;
-        const rls_real f = first[i], g = gain[i];
-        for (int k = 0; k < length; k++) {
-            const rls_real t = x[k] - f * row[k];
-            x[k] = t;
-            row[k] += g * t;
-        }
-    }
+    transpose(s);
+    for (int half = LANES / 2; half > 0; half /= 2)
+        for (int j = 0; j < half; j++) LANEWISE EACH(s[j]) += EACH(s[j + half]);
+    *lanes_at(result) = s[0];
 }
 
-/* The same for one row of which little is kept, where row + gain x would cancel: row <- keep row + gain x. */
-static inline void renew(rls_real *restrict row, rls_real *restrict x, int length, rls_real first, rls_real gain, rls_real keep)
+/* LANES columns of a block of rows: for each row i in turn x <- x - lead[i] row, row <- row + gain[i] x. */
+static inline void rotate(rls_real *block, int stride, rls_real *x, const rls_real *lead, const rls_real *gain)
+{
+    lanes t = *lanes_of(x);
+    for (int i = 0; i < LANES; i++) {
+        lanes row = *lanes_of(block + i * stride);
+        LANEWISE EACH(t) -= lead[i] * EACH(row);
+        LANEWISE EACH(row) += gain[i] * EACH(t);
+        *lanes_at(block + i * stride) = row;
+    }
+    *lanes_at(x) = t;
+}
+
+/* What x becomes by that, the block left as it is. */
+static inline void reduce(const rls_real *block, int stride, lanes *x, const rls_real *lead)
+{
+    for (int i = 0; i < LANES; i++) LANEWISE EACH(*x) -= lead[i] * EACH(*lanes_of(block + i * stride));
+}
+
+/* A row of which little is kept, where row + gain x would cancel: row <- keep row + gain x. */
+static inline void renew(rls_real *restrict row, rls_real *restrict x, int length, rls_real lead, rls_real gain, rls_real keep)
 {
     for (int k = 0; k < length; k++) {
         const rls_real r = row[k], t = x[k];
-        x[k] = t - first * r;
+        x[k] = t - lead * r;
         row[k] = keep * r + gain * t;
     }
 }
 
-/* What x, of weight 1/w[0], does to `rows` rows of a block: lead, the entry each eliminates; gain; the new d; w[i + 1], the weight that is
-   left. 0 where a row must be renewed: then nothing of it is used. */
-static inline int plan(const rls_real *block, int stride, int rows, const rls_real *x, const rls_real *d, rls_real kept, rls_real *lead,
-                       rls_real *gain, rls_real *new_d, rls_real *w)
+/* A measurement of so much weight, and one over it. */
+typedef struct {
+    rls_real inverse, value;
+} weight;
+
+/* The entry of x that each row of a block eliminates, 0 from row `rows` on. */
+static inline void eliminate(const rls_real *block, int stride, int rows, const lanes *x, rls_real *lead)
 {
-    rls_real ratio[LANES], old[LANES];
-    int plain = 1;
-    for (int i = 0; i < rows; i++) {
-        rls_real f = x[i];
-        for (int k = 0; k < i; k++) f -= lead[k] * block[k * stride + i];
+    lanes t = *x;
+    for (int i = 0; i < LANES; i++) {
+        const rls_real f = LANE(t, i);
         lead[i] = f;
+        LANEWISE EACH(t) -= f * EACH(*lanes_of(block + i * stride));
     }
-    for (int i = 0; i < rows; i++) {
-        old[i] = kept * d[i];
-        ratio[i] = lead[i] / old[i];
-    }
-    for (int i = 0; i < rows; i++) {
-        w[i + 1] = w[i] + lead[i] * ratio[i];
-        plain &= (w[i + 1] <= 4 * w[i]) & (old[i] > TINY);
-    }
-    for (int i = 0; i < rows; i++) {
-        gain[i] = ratio[i] / w[i + 1];
-        new_d[i] = old[i] + lead[i] * (lead[i] / w[i]);
-    }
-    return plain;
+    for (int i = rows; i < LANES; i++) lead[i] = 0;
 }
 
-/* The same row by row, where one is new or of little weight: its old content goes, or cancels. Returns the weight that is left. */
-static rls_real renew_rows(const group *a, int start, int first, int rows, rls_real kept, rls_real w)
+/* What that does to a block of rows: d, and the gain. 0 where a row may have to be renewed: then nothing has changed. */
+static inline int weigh(const rls_real *leads, rls_real *d, rls_real kept, weight *w, rls_real *gain)
+{
+    const lanes lead = *lanes_of(leads);
+    lanes old = *lanes_of(d), ratio, sum, over;
+    rls_real least = 1, value;
+    LANEWISE EACH(old) *= kept;
+    for (int i = 0; i < LANES; i++) least = LANE(old, i) < least ? LANE(old, i) : least;
+    LANEWISE EACH(ratio) = EACH(lead) / EACH(old);
+    LANEWISE EACH(sum) = EACH(lead) * EACH(ratio);
+    running_sums(&sum);
+    LANEWISE EACH(sum) += w->inverse;
+    if (!(LANE(sum, LANES - 1) <= 4 * w->inverse && least > TINY)) return 0;
+    LANEWISE EACH(over) = REAL(1) / EACH(sum);
+    LANEWISE EACH(*lanes_at(gain)) = EACH(ratio) * EACH(over);
+    value = LANE(over, LANES - 1);
+    shift(&over, w->value);
+    LANEWISE EACH(*lanes_at(d)) = EACH(old) + EACH(lead) * (EACH(lead) * EACH(over));
+    w->inverse = LANE(sum, LANES - 1);
+    w->value = value;
+    return 1;
+}
+
+/* The same row by row, where one is new or of little weight: its old content goes, or cancels. */
+static void renew_rows(const group *a, int start, int rows, rls_real kept, weight *w)
 {
     const int length = a->wide - start;
-    rls_real *x = a->x + start, *block = a->triangle + row_offset(start, a->wide);
-    for (int i = first; i < rows; i++) {
-        const rls_real f = x[i], d = kept * a->d[start + i], ratio = f / d, sum = w + f * ratio;
-        rls_real gain = 0, *row = block + i * length;
+    rls_real *x = a->x + start, *row = block_at(a, start);
+    for (int i = 0; i < rows; i++, row += length) {
+        const rls_real f = x[i], d = kept * a->d[start + i], ratio = f / d, sum = w->inverse + f * ratio;
+        rls_real gain = 0;
         if (f == 0) {
             a->d[start + i] = d;
-        } else if (sum <= 4 * w && d > TINY) {
-            gain = ratio / sum;
-            a->d[start + i] = d + f * (f / w);
-            w = sum;
-            rotate(row, length, 1, x, length, &f, &gain);
+        } else if (sum <= 4 * w->inverse && d > TINY) {
+            gain = ratio * (1 / sum);
+            for (int k = 0; k < length; k++) {
+                x[k] -= f * row[k];
+                row[k] += gain * x[k];
+            }
+            a->d[start + i] = d + f * (f * w->value);
+            w->inverse = sum;
         } else {
             const int known = d > TINY;
-            gain = known ? ratio / sum : 1 / f;
-            renew(row, x, length, f, gain, known ? w / sum : 0);
+            gain = known ? ratio * (1 / sum) : 1 / f;
+            renew(row, x, length, f, gain, known ? w->inverse * (1 / sum) : 0);
             row[i] = 1;
-            a->d[start + i] = (known ? d : 0) + f * (f / w);
-            w = known ? sum : 1 / TINY;
+            a->d[start + i] = (known ? d : 0) + f * (f * w->value);
+            w->inverse = known ? sum : 1 / TINY;
         }
+        w->value = 1 / w->inverse;
         a->s[start + i] = gain;
     }
-    return w;
 }
 
-/* Rotate x, of weight 1/w, into rows first .. last - 1, whose information is first multiplied by `kept`. Returns what w has become;
-   s gets R^-T phi in the scale of the triangle. */
-static inline rls_real sweep(const group *a, int first, int last, rls_real kept, rls_real w)
+/* Rotate x, of weight w, into rows first .. last - 1, whose information is first multiplied by `kept`; x is 0 before `first`. s gets
+   R^-T phi in the scale of the triangle. What the next block eliminates is found before this one is changed: the chain of eliminations is the
+   longest there is, and a processor does the rest beside it. */
+static inline void sweep(const group *a, int first, int last, rls_real kept, rls_real w)
 {
-    for (int start = row_start(first); start < last; start += LANES) {
-        const int length = a->wide - start, rows = last - start < LANES ? last - start : LANES;
-        rls_real lead[LANES], gain[LANES], d[LANES], weight[LANES + 1], *x = a->x + start, *block = a->triangle + row_offset(start, a->wide);
-        int plain = first <= start;
-        weight[0] = w;
-        if (plain && rows == LANES) /* the usual case, with a constant for the compiler */
-            plain = plan(block, length, LANES, x, a->d + start, kept, lead, gain, d, weight);
-        else if (plain)
-            plain = plan(block, length, rows, x, a->d + start, kept, lead, gain, d, weight);
-        if (plain) {
-            rotate(block, length, rows, x, length, lead, gain);
-            for (int i = 0; i < rows; i++) a->d[start + i] = d[i];
-            for (int i = 0; i < rows; i++) a->s[start + i] = gain[i];
-            w = weight[rows];
-        } else {
-            w = renew_rows(a, start, first > start ? first - start : 0, rows, kept, w);
+    int start = block_start(first);
+    weight left = {1 / w, w};
+    rls_real lead[LANES], next[LANES], gain[LANES];
+    eliminate(block_at(a, start), a->wide - start, last - start, lanes_of(a->x + start), lead);
+    for (; start < last; start += LANES) {
+        const int length = a->wide - start;
+        rls_real *x = a->x + start, *block = block_at(a, start);
+        if (start + LANES < last) {
+            lanes t = *lanes_of(x + LANES);
+            reduce(block + LANES, length, &t, lead);
+            eliminate(block + LANES * length, length - LANES, last - start - LANES, &t, next);
         }
+        if (weigh(lead, a->d + start, kept, &left, gain)) {
+            *lanes_at(a->s + start) = *lanes_of(gain);
+            for (int k = 0; k < length; k += LANES) rotate(block + k, length, x + k, lead, gain);
+        } else {
+            renew_rows(a, start, last - start < LANES ? last - start : LANES, kept, &left);
+        }
+        for (int i = 0; i < LANES; i++) lead[i] = next[i];
     }
-    return w;
 }
 
 /* Whether column i of R stands out of the span of those before it, as far as rounding lets us see. */
 static inline int is_known(rls_real d, rls_real energy) { return d > EPSILON * energy; }
 
-/* Solve with the triangle of a block of rows: g <- block^-1 g, 0 where a coefficient is not known. */
-static inline void solve_block(const rls_real *block, int stride, int rows, const rls_real *d, const rls_real *energy, rls_real *g)
+/* Solve with the triangle of a block of rows: t <- block^-1 t, 0 where `known` is 0 instead of 1. */
+static inline void solve(const rls_real *block, int stride, const lanes *known, lanes *t)
 {
-    rls_real t[LANES];
-    for (int i = rows - 1; i >= 0; i--) {
-        rls_real sum = g[i];
-        for (int k = rows - 1; k > i; k--) sum -= block[i * stride + k] * t[k];
-        t[i] = is_known(d[i], energy[i]) ? sum : 0;
+    lanes column[LANES];
+    for (int i = 0; i < LANES; i++) {
+        LANEWISE EACH(column[i]) = EACH(*known) * EACH(*lanes_of(block + i * stride));
+        LANE(column[i], i) = 0;
     }
-    for (int i = 0; i < rows; i++) g[i] = t[i];
+    transpose(column);
+    for (int k = LANES - 1; k > 0; k--) {
+        const rls_real own = LANE(*t, k);
+        LANEWISE EACH(*t) -= own * EACH(column[k]);
+    }
+    LANEWISE EACH(*t) *= EACH(*known);
 }
 
 /* gain <- triangle^-1 s; a coefficient that is not known stays as it is, and the others explain the data without it. */
 static inline void back_substitute(const group *a)
 {
-    for (int k = 0; k < a->tall; k++) a->gain[k] = 0;
     for (int start = a->tall - LANES; start >= 0; start -= LANES) {
-        const int rows = a->n - start < LANES ? a->n - start : LANES, length = a->wide - start, right = a->tall - start - LANES;
-        const rls_real *block = a->triangle + row_offset(start, a->wide), *d = a->d + start, *energy = a->energy + start;
-        rls_real *g = a->gain + start;
-        for (int i = 0; i < rows; i++) g[i] = a->s[start + i] - dot(block + i * length + LANES, g + LANES, right);
-        if (rows == LANES) /* the usual case, with a constant for the compiler */
-            solve_block(block, length, LANES, d, energy, g);
-        else
-            solve_block(block, length, rows, d, energy, g);
+        const int length = a->wide - start;
+        const rls_real *block = block_at(a, start), *d = a->d + start, *energy = a->energy + start;
+        rls_real right[LANES], known[LANES];
+        lanes t;
+        for (int i = 0; i < LANES; i++) known[i] = is_known(d[i], energy[i]) ? REAL(1) : REAL(0);
+        for (int i = a->n - start; i < LANES; i++) known[i] = 0;
+        times(block + LANES, length, LANES, a->gain + start + LANES, a->tall - start - LANES, right);
+        LANEWISE EACH(t) = EACH(*lanes_of(a->s + start)) - EACH(*lanes_of(right));
+        solve(block, length, lanes_of(known), &t);
+        *lanes_at(a->gain + start) = t;
     }
 }
 
@@ -324,18 +440,16 @@ static inline rls_real loudness(const group *a)
 static inline void forget_direction(const group *a, rls_real factor)
 {
     rls_real length2 = 0, share, left = factor;
-    for (int i = 0; i < a->n; i++) {
-        const int start = row_start(i);
-        a->s[i] = dot(a->triangle + row_offset(i, a->wide), a->phi + start, a->tall - start);
-        length2 += a->d[i] * (a->s[i] * a->s[i]);
-    }
+    for (int start = 0; start < a->tall; start += LANES)
+        times(block_at(a, start), a->wide - start, LANES, a->phi + start, a->tall - start, a->s + start);
+    for (int i = 0; i < a->n; i++) length2 += a->d[i] * (a->s[i] * a->s[i]);
     if (!(length2 > TINY)) return;
     share = (1 - factor) / length2;
     for (int k = 0; k < a->wide; k++) a->x[k] = 0;
     for (int i = a->n - 1; i >= 0; i--) {
-        const int start = row_start(i);
+        const int start = block_start(i);
         const rls_real more = left + share * (a->d[i] * (a->s[i] * a->s[i])), out = share * a->s[i] / left, in = a->d[i] * a->s[i];
-        rls_real *restrict row = a->triangle + row_offset(i, a->wide), *restrict x = a->x + start;
+        rls_real *restrict row = entry(a, i, start), *restrict x = a->x + start;
         for (int k = 0; k < a->wide - start; k++) {
             const rls_real r = row[k], t = x[k];
             row[k] = r - out * t;
@@ -386,7 +500,7 @@ static inline void replenish(const group *a, rls_real samples, int j)
     for (int k = 0; k < a->wide; k++) a->x[k] = 0;
     a->x[j] = 1;
     for (int k = 0; k < a->m; k++) a->x[a->n + k] = a->theta[k * a->tall + j];
-    sweep(a, j, a->n, 1, 1 / (target - a->fed[j]));
+    sweep(a, j, a->n, 1, target - a->fed[j]);
     a->energy[j] += target - a->fed[j];
     a->fed[j] = target;
 }
@@ -394,8 +508,9 @@ static inline void replenish(const group *a, rls_real samples, int j)
 /* Information that is about to underflow is dropped. */
 static inline void drop_underflow(const group *a, int j)
 {
-    rls_real *row = a->triangle + row_offset(j, a->wide);
-    for (int k = 0; k < a->wide - row_start(j); k++) row[k] = absolute(row[k]) < TINY ? 0 : row[k];
+    const int start = block_start(j);
+    rls_real *row = entry(a, j, start);
+    for (int k = 0; k < a->wide - start; k++) row[k] = absolute(row[k]) < TINY ? 0 : row[k];
     if (a->d[j] < TINY) a->d[j] = 0;
     if (j < a->n && a->energy[j] < TINY) a->energy[j] = 0;
     if (j < a->n && a->fed[j] < TINY) a->fed[j] = 0;
@@ -410,34 +525,55 @@ static inline int is_determined(const group *a)
     return known == a->n;
 }
 
+static inline void predict(const group *a, const int *output, const rls_real *y)
+{
+    for (int j = 0; j < a->m; j += LANES) {
+        const int count = a->m - j < LANES ? a->m - j : LANES;
+        rls_real prediction[LANES];
+        times(a->theta + j * a->tall, a->tall, count, a->phi, a->tall, prediction);
+        for (int i = 0; i < count; i++) a->innovation[j + i] = y[output[j + i]] - prediction[i];
+    }
+}
+
+static inline void correct(const group *a)
+{
+    for (int j = 0; j < a->m; j++) {
+        rls_real *theta = a->theta + j * a->tall;
+        const rls_real innovation = a->innovation[j];
+        for (int k = 0; k < a->tall; k += LANES) LANEWISE EACH(*lanes_at(theta + k)) += innovation * EACH(*lanes_of(a->gain + k));
+    }
+}
+
 static void learn(const rls_forgetting *f, const group *a, const int *output, const rls_real *y)
 {
-    const int turn = (int)a->header[TURN];
+    const int turn = (int)a->header[TURN], order = a->n + a->m;
     const rls_real samples = wakefulness(f, a->n);
-    rls_real factor, kept, w;
-    for (int j = 0; j < a->m; j++) a->innovation[j] = y[output[j]] - dot(a->phi, a->theta + j * a->tall, a->tall);
+    rls_real factor, kept;
+    predict(a, output, y);
     new_peaks(a, samples);
     factor = forgetting_factor(f, a);
     kept = f->kind == RLS_DIRECTIONAL ? 1 : factor;
     replenish(a, samples, turn);
-    if (factor < kept) forget_direction(a, factor);
-    for (int k = 0; k < a->tall; k++) a->x[k] = a->phi[k];
-    for (int k = a->n; k < a->wide; k++) a->x[k] = 0;
+    if (factor < kept) {
+        forget_direction(a, factor);
+        for (int i = a->n; i < order; i++) a->d[i] *= factor;
+    }
+    for (int k = 0; k < a->n; k++) a->x[k] = a->phi[k];
     for (int j = 0; j < a->m; j++) a->x[a->n + j] = y[output[j]];
-    w = sweep(a, 0, a->n, kept, 1);
-    sweep(a, a->n, a->n + a->m, factor, w);
+    for (int k = order; k < a->wide; k++) a->x[k] = 0;
+    sweep(a, 0, order, kept, 1);
+    for (int i = order; i < a->wide; i++) a->d[i] = 1;
     for (int k = 0; k < a->tall; k++) {
         a->energy[k] = kept * a->energy[k] + a->phi[k] * a->phi[k];
         a->fed[k] *= kept;
     }
     back_substitute(a);
-    for (int j = 0; j < a->m; j++)
-        for (int k = 0; k < a->tall; k++) a->theta[j * a->tall + k] += a->innovation[j] * a->gain[k];
+    correct(a);
     a->header[DETERMINED] = REAL(is_determined(a));
     a->header[WEIGHT] = factor * a->header[WEIGHT] + 1;
     a->header[FACTOR] = factor;
     a->header[TURN] = REAL(turn + 1 < a->n ? turn + 1 : 0);
-    for (int i = turn; i < a->n + a->m; i += a->n) drop_underflow(a, i);
+    for (int i = turn; i < order; i += a->n) drop_underflow(a, i);
 }
 
 static int status(const rls_config *c, rls_real *state, rls_real *work)
@@ -572,7 +708,7 @@ void rls_coefficients(const rls_config *c, const rls_real *state, rls_real *thet
     for (int g = 0; g < c->groups; g++) {
         const rls_group *own = &c->group[g];
         const int n = own->entries * functions, wide = padded(n + own->outputs), tall = padded(n);
-        const rls_real *from = state + GROUP_HEADER + row_offset(n + own->outputs, wide) + wide;
+        const rls_real *from = state + GROUP_HEADER + block_offset(wide, wide) + wide;
         for (int j = 0; j < own->outputs; j++)
             for (int i = 0; i < n; i++)
                 theta[(own->entry[i / functions] * functions + i % functions) * c->outputs + own->output[j]] = from[j * tall + i];

@@ -41,7 +41,8 @@ class View:
             for name, part in parts.items():
                 setattr(self, name, memory[part])
         self.theta = self.theta.reshape(self.m, self.tall)
-        self.rows = [self.triangle[row] for row in layout.triangle.rows]
+        self.blocks = [self.triangle[block].reshape(LANES, -1) for block in layout.triangle.blocks]
+        self.rows = [row for block in self.blocks for row in block]
 
     header: Array
     triangle: Array
@@ -82,6 +83,7 @@ class Kernel:
             view = View(layout, state, work)
             for i, row in enumerate(view.rows):
                 row[i % LANES] = 1
+            view.d[view.n + view.m :] = 1
 
     def update(self, state: Array, work: Array, y: Array, u: Array, p: Any, f: Array | None = None) -> int:
         """Take in one sample, with the functions f(p) where the configuration has no factors; returns the status bits."""
@@ -177,10 +179,9 @@ class Kernel:
         return bits
 
     def _learn(self, a: View, y: Array) -> None:
-        n, m = a.n, a.m
+        n, order = a.n, a.n + a.m
         turn = int(a.header[at.TURN])
-        for j in range(m):
-            a.innovation[j] = y[j] - dot(a.phi, a.theta[j])
+        a.innovation[: a.m] = y - times(a.theta, a.phi)
         samples = self._wakefulness(n)
         self._new_peaks(a, samples)
         factor = self._forgetting_factor(a)
@@ -188,23 +189,21 @@ class Kernel:
         self._replenish(a, samples, turn)
         if factor < kept:
             self._forget_direction(a, factor)
-        a.x[:] = 0
-        a.x[:n] = a.phi[:n]
-        a.x[n : n + m] = y
-        w = self._sweep(a, 0, n, kept, self._real(1))
-        self._sweep(a, n, n + m, factor, w)
+            a.d[n:order] *= factor
+        a.x[:n], a.x[n:order], a.x[order:] = a.phi[:n], y, 0
+        self._sweep(a, 0, order, kept, self._real(1))
+        a.d[order:] = 1
         a.energy[:] = a.energy * kept + a.phi * a.phi
         a.fed *= kept
         known = a.d[: a.n] > a.d.dtype.type(self._limits.epsilon) * a.energy[: a.n]
         back_substitute(a, known)
-        for j in range(m):
-            a.theta[j] += a.innovation[j] * a.gain
+        a.theta += a.innovation[: a.m, None] * a.gain
         beyond = a.d.dtype.type(2 if a.header[at.DETERMINED] == 0 else 0)
         a.header[at.DETERMINED] = bool(np.all(known & (a.d[:n] > beyond * a.fed[:n])))
         a.header[at.WEIGHT] = factor * self._real(a.header[at.WEIGHT]) + self._real(1)
         a.header[at.FACTOR] = factor
         a.header[at.TURN] = (turn + 1) % n
-        for i in range(turn, n + m, n):
+        for i in range(turn, order, n):
             self._drop_underflow(a, i)
 
     def _new_peaks(self, a: View, samples: Any) -> None:
@@ -263,45 +262,67 @@ class Kernel:
         a.x[:] = 0
         a.x[j] = 1
         a.x[a.n : a.n + a.m] = a.theta[:, j]
-        self._sweep(a, j, a.n, real(1), real(1) / (target - fed))
+        self._sweep(a, j, a.n, real(1), target - fed)
         a.energy[j] += target - fed
         a.fed[j] = target
 
-    def _sweep(self, a: View, first: int, last: int, kept: Any, w: Any) -> Any:
-        real, tiny = self._real, self._limits.tiny
-        for i in range(first, last):
-            row, x = a.rows[i], a.x[i // LANES * LANES :]
-            f, d = real(a.x[i]), kept * real(a.d[i])
-            if f == 0:
-                a.s[i], a.d[i] = 0, d
-                continue
+    def _sweep(self, a: View, first: int, last: int, kept: Any, value: Any) -> None:
+        inverse = self._real(1) / value
+        for start in range(first // LANES * LANES, last, LANES):
+            block, x, here = a.blocks[start // LANES], a.x[start:], slice(start, start + LANES)
+            rows = min(last - start, LANES)
+            lead = np.zeros_like(x[:LANES])
+            remaining = x[:LANES].copy()
+            for i in range(rows):
+                lead[i] = remaining[i]
+                remaining -= lead[i] * block[i, :LANES]
+            old = a.d[here] * kept
+            ratio = lead / old
+            total = running_sums(lead * ratio) + inverse
+            if total[-1] <= 4 * inverse and (old > self._limits.tiny).all():
+                over = self._real(1) / total
+                a.s[here] = ratio * over
+                a.d[here] = old + lead * (lead * np.append(value, over[:-1]))
+                inverse, value = self._real(total[-1]), self._real(over[-1])
+                for i in range(LANES):
+                    x -= lead[i] * block[i]
+                    block[i] += a.s[start + i] * x
+            else:
+                inverse, value = self._renew_rows(a, start, rows, kept, inverse, value)
+
+    def _renew_rows(self, a: View, start: int, rows: int, kept: Any, inverse: Any, value: Any) -> tuple[Any, Any]:
+        real, tiny, one, x = self._real, self._limits.tiny, self._real(1), a.x[start:]
+        for i, row in enumerate(a.blocks[start // LANES][:rows]):
+            f, d, gain = real(x[i]), kept * real(a.d[start + i]), real(0)
             known = d > tiny
             ratio = f / d if known else real(0)
-            total = w + f * ratio
-            if known and total <= 4 * w:
-                gain = ratio / total
+            total = inverse + f * ratio
+            if f == 0:
+                a.d[start + i] = d
+            elif known and total <= 4 * inverse:
+                gain = ratio * (one / total)
                 x -= f * row
                 row += gain * x
-                a.d[i], w = d + f * (f / w), total
+                a.d[start + i], inverse = d + f * (f * value), total
             else:
-                gain, keep = (ratio / total, w / total) if known else (real(1) / f, real(0))
+                gain, keep = (ratio * (one / total), inverse * (one / total)) if known else (one / f, real(0))
                 r, t = row.copy(), x.copy()
                 x[:] = t - f * r
                 row[:] = keep * r + gain * t
-                row[i % LANES] = 1
-                a.d[i] = (d if known else real(0)) + f * (f / w)
-                w = total if known else real(1) / tiny
-            a.s[i] = gain
-        return w
+                row[i] = 1
+                a.d[start + i] = (d if known else real(0)) + f * (f * value)
+                inverse = total if known else one / tiny
+            value = one / inverse
+            a.s[start + i] = gain
+        return inverse, value
 
     def _forget_direction(self, a: View, factor: Any) -> None:
         real, n = self._real, a.n
         length2, one = real(0), real(1)
-        for i in range(n):
-            start = i // LANES * LANES
-            v = real(dot(a.rows[i][: a.tall - start], a.phi[start:]))
-            a.s[i] = v
-            length2 += real(a.d[i]) * (v * v)
+        for start, block in zip(range(0, a.tall, LANES), a.blocks, strict=False):
+            a.s[start : start + LANES] = times(block[:, : a.tall - start], a.phi[start:])
+        for d, v in zip(a.d[:n], a.s[:n], strict=True):
+            length2 += real(d) * (real(v) * real(v))
         if not length2 > self._limits.tiny:
             return
         share, left = (one - factor) / length2, factor
@@ -345,25 +366,29 @@ def evaluate(factor: Factor, p: Any) -> Array:
     return out
 
 
-def dot(a: Array, b: Array) -> Any:
-    """Their product, summed as in rls.c: LANES partial sums, then these in pairs."""
-    s = (a * b).reshape(-1, LANES).sum(axis=0)
-    s = s[:4] + s[4:]
-    s = s[:2] + s[2:]
-    return s[0] + s[1]
+def running_sums(v: Array) -> Array:
+    """Of LANES numbers, summed as in rls.c: neighbours first, then pairs, then fours."""
+    for step in (1, 2, 4):
+        v = v + np.append(np.zeros_like(v[:step]), v[:-step])
+    return v
+
+
+def times(rows: Array, b: Array) -> Array:
+    """rows (k, n) times b (n,), summed as in rls.c: LANES partial sums from the last column on, then these in pairs."""
+    s = (rows * b).reshape(len(rows), -1, LANES)[:, ::-1].sum(axis=1)
+    s = s[:, :4] + s[:, 4:]
+    s = s[:, :2] + s[:, 2:]
+    return s[:, 0] + s[:, 1]
 
 
 def back_substitute(a: View, known: Array) -> None:
     """gain <- triangle^-1 s; 0 for a coefficient that is not `known` (n,)."""
-    a.gain[:] = 0
     for start in range(a.tall - LANES, -1, -LANES):
-        stop = min(start + LANES, a.n)
-        g = a.gain[start:stop]
-        for i in range(start, stop):
-            a.gain[i] = a.s[i] - (dot(a.rows[i][LANES : a.tall - start], a.gain[start + LANES :]) if start + LANES < a.tall else 0)
-        block = np.array([a.rows[i][:LANES] for i in range(start, stop)])
-        for i in range(stop - start - 1, -1, -1):
-            if not known[start + i]:
+        block = a.blocks[start // LANES]
+        g = a.gain[start : start + LANES]
+        g[:] = a.s[start : start + LANES] - times(block[:, LANES : a.tall - start], a.gain[start + LANES :])
+        for i in range(LANES - 1, -1, -1):
+            if start + i >= a.n or not known[start + i]:
                 g[i] = 0
             g[:i] -= block[:i, i] * g[i]
 
