@@ -21,7 +21,7 @@ def medians(
 
     `clock` time.thread_time counts what one thread works and not what others keep it from: for work of one thread on a busy machine.
     `warm`: each is called once before, so that nothing is compiled while the clock runs; without it the caller has done so.
-    `settled`: each is called once more right before it is timed, and does not pay for the caches and the clock frequency its forerunner left.
+    `settled`: each is called once more right before it is timed: it does not pay for caches and a clock frequency that others left.
     """
     spent: dict[str, list[float]] = {name: [] for name in candidates}
     for call in candidates.values() if warm else ():
