@@ -112,7 +112,7 @@ def draw(curve: GainCurve, ax: Axes, *, legend: str = "upper left") -> Axes:
     ax.minorticks_off()
     ax.set_xlabel("permitted |dV/dt| (m/s²)")
     ax.set_ylabel(f"L2 gain, {curve.unit}")
-    ax.legend(loc=legend)
+    ax.legend(loc=legend, fontsize=8, frameon=False)
     return ax
 
 
