@@ -29,7 +29,8 @@ Options = Ridge | Lasso | Refined | OutputError
 METHODS: tuple[str, ...] = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
 OPTIONS: dict[str, type[Options]] = {"ridge": Ridge, "lasso": Lasso, "riv": Refined, "oe": OutputError}
 NOT_SETTLED = {
-    "riv": 'allow more iterations; a plant that is unstable in open loop needs instruments=("name", ...), the external excitation',
+    "riv": 'a plant that is unstable in open loop needs instruments=("name", ...), the external excitation; where the model is simpler '
+    'than the plant, method "iv" is the better one',
     "oe": "allow more evaluations, or fit a smaller structure",
 }
 """What to try where an iteration stops early."""
