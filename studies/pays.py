@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -62,22 +62,30 @@ def _line(condition: str, axis: str, output: str, runs: list[Comparison]) -> Lin
 
 
 def table(lines: Sequence[Line]) -> str:
-    """Medians over the seeds, LPV / LTI."""
+    """Medians over the seeds, LPV / LTI; then the worst of them, each model on the flight it does worst on."""
     head = "".join(f"{h:>20s}" for h in HORIZONS)
-    out = [
+    return "\n".join([
         f"held-out fit in percent, LPV / LTI of the same order, median of {lines[0].seeds} pairs of flights",
         f"scheduling pays: more than {PAYS:g} point better 1 s ahead and not worse in free run, on how many of them",
         f"{'':10s}{head}{'pays':>10s}",
-    ]
+        *_rows(lines, np.median, lambda line: f"{line.pays:7d}/{line.seeds}"),
+        "",
+        f"the same, worst of {lines[0].seeds} pairs of flights",
+        f"{'':10s}{head}",
+        *_rows(lines, np.min, lambda _: ""),
+    ])  # fmt: skip
+
+
+def _rows(lines: Sequence[Line], over: Callable[[np.ndarray], Any], end: Callable[[Line], str]) -> Iterator[str]:
     group = ("", "")
     for line in lines:
         if (line.condition, line.axis) != group:
-            out += [line.condition] if line.condition != group[0] else []
+            if line.condition != group[0]:
+                yield line.condition
             group = line.condition, line.axis
-            out.append(f" {line.axis}")
-        cells = "".join(f"{_median(line.lpv[h]):>10s} /{_median(line.lti[h]):>8s}" for h in HORIZONS)
-        out.append(f"  {line.output:8s}{cells}{line.pays:7d}/{line.seeds}")
-    return "\n".join(out)
+            yield f" {line.axis}"
+        cells = "".join(f"{percent(float(over(line.lpv[h]))):>10s} /{percent(float(over(line.lti[h]))):>8s}" for h in HORIZONS)
+        yield f"  {line.output:8s}{cells}{end(line)}"
 
 
 def data(lines: Sequence[Line]) -> list[dict[str, Any]]:
@@ -89,7 +97,3 @@ def data(lines: Sequence[Line]) -> list[dict[str, Any]]:
         }
         for line in lines
     ]  # fmt: skip
-
-
-def _median(values: np.ndarray) -> str:
-    return percent(float(np.median(values)))

@@ -18,10 +18,18 @@ def test_every_output_of_every_axis_is_judged_and_counted():
         assert line.pays in (0, 1)
         assert not line.pays or gain[0] > 1.0
     text = pays.table(lines)
-    assert text.count("longitudinal-vertical") == 1
+    assert text.count("longitudinal-vertical") == 2  # medians, then the worst
     assert len(pays.data(lines)) == len(lines)
     # noise-free, degree 2 contains degree 0: in sample and one step ahead it cannot do visibly worse held out
     assert np.all([line.lpv[HORIZONS[0]][0] > line.lti[HORIZONS[0]][0] - 5 for line in lines])
+
+
+def test_the_table_gives_the_median_and_the_worst_of_the_seeds():
+    fits = {h: np.array([90.0, -20.0, 70.0]) for h in HORIZONS}
+    text = pays.table([pays.Line("still", "pitch", "q", fits, {h: v + 1 for h, v in fits.items()}, 2)])
+    median, worst = (line.split() for line in text.splitlines() if line.startswith("  q"))
+    assert median == ["q", *["70.0", "/", "71.0"] * 3, "2/3"]
+    assert worst == ["q", *["-20.0", "/", "-19.0"] * 3]
 
 
 def test_the_breeze_blows_in_the_record(ideal):
