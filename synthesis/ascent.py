@@ -30,6 +30,10 @@ SHORTEST_REACH = 1e-3
 """The ascent ends where a trust region this small brings nothing."""
 
 
+SHORTEST_PERIOD = 0.01
+"""No cycle becomes shorter than this fraction of the longest: a p that is faster than every mode acts by its mean."""
+
+
 class Objective(NamedTuple):
     """What is made large along a cycle: a `measure`, divided by the period where `a_second`."""
 
@@ -121,7 +125,8 @@ def _step(
     count, spacing = len(time) - 1, float(time[1])
     change = 0.0 if fixed else min(0.4 * reach / (high - low), 0.5)
     longer = max(min(change, longest / float(time[-1]) - 1.0), 0.0)
-    bounds = [*zip(np.maximum(low, p[:-1] - reach), np.minimum(high, p[:-1] + reach), strict=True), (-change, longer)]
+    shorter = max(min(change, 1.0 - SHORTEST_PERIOD * longest / float(time[-1])), 0.0)
+    bounds = [*zip(np.maximum(low, p[:-1] - reach), np.minimum(high, p[:-1] + reach), strict=True), (-shorter, longer)]
     matrix, right = None, None
     if math.isfinite(rate):
         next_minus_this = sparse.diags([np.full(count, -1.0), np.ones(count - 1)], [0, 1], shape=(count, count)).tolil()  # type: ignore[list-item]

@@ -1,15 +1,17 @@
 """Bad scheduling trajectories: a gain that no certificate may undercut, or growth that no certificate can deny.
 
 Trapezoid waves within the range and the rate are the start: the Floquet multipliers of a coarse family from a table of
-transition matrices. From the best of them an ascent on the whole trajectory, first for growth, then for the gain of the
-periodic system. What is reported is growth beyond the error of the time steps, or |y|/|u| of an explicit input from rest.
+transition matrices, and for the gain waves of many periods. From the best of them ascents on the whole trajectory and on the
+corners of a wave (`corners`), first for growth, then for the gain of the periodic system. What is reported is growth beyond
+the error of the time steps, or |y|/|u| of an explicit input from rest.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import islice, zip_longest
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +20,7 @@ from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from synthesis.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
 from synthesis.certificate import Trajectory
+from synthesis.corners import Corners, climb
 from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.periodic import Lifted, multiplier, ratio_from_rest, worst_input
 from synthesis.wave_family import WaveFamily
@@ -85,21 +88,19 @@ def lower_bound(
     cycles, growing = hunt.fastest()
     if growing is not None:
         return growing
-    # slower ramps are allowed too, and now and then worse
-    slower = (Trajectory(*wave.vertices()) for wave in WaveFamily(lpv, rate / 2, search).coarse())
-    mixed = (c for pair in zip_longest(cycles, slower) for c in pair if c is not None)
-    stable = list(islice((c for c in mixed if hunt.multiplier(c) < 1), max(search.starts, search.evaluations)))
-    candidates = sorted(stable, key=hunt.gain, reverse=True)[: search.starts]
-    for start in tuple(candidates):
-        cycle, gain = hunt.ascend(start, GAIN)
-        if math.isinf(gain) and hunt.grows(cycle):
+    near, spread = hunt.ranked(hunt.near()), hunt.ranked(wave.cycle() for wave in hunt.family.spread())
+    # of the spread the best alone: long cycles begin high and have less room to rise
+    tops = [*sorted([*hunt.ranked(cycles), *near], key=_first)[-search.starts :], *spread[-1:]]
+    # the starts stay beside what they lead to: corners may fall between the nodes
+    found = list(tops)
+    for cycle in (*(hunt.ascend(c, GAIN) for _, c in tops), *(top for _, c in (*near[-1:], *spread[-1:]) for top in hunt.climb(c, GAIN))):
+        if hunt.grows(cycle):
             return hunt.growing(cycle)
-        # beside the waves themselves: corners may have fallen between the nodes
-        candidates.append(cycle)
-    if not candidates:
+        found += hunt.ranked([cycle])
+    if not found:
         return best
-    found = hunt.explicit(max(candidates, key=hunt.gain))
-    return found if found.gamma > best.gamma else best
+    explicit = hunt.explicit(max(found, key=_first)[1])
+    return explicit if explicit.gamma > best.gamma else best
 
 
 def growing_trajectory(lpv: LPVStateSpace, rate: float, search: Search | None = THOROUGH) -> Trajectory | None:
@@ -118,23 +119,49 @@ class _Hunt:
         self.family = WaveFamily(lpv, rate, search)
 
     def fastest(self) -> tuple[list[Trajectory], LowerBound | None]:
-        """Cycles worth a look, those of the fastest growth first; and the verdict where one of them grows."""
-        waves = [Trajectory(*wave.vertices()) for wave in self.family.coarse()]
-        climbed: list[tuple[float, Trajectory]] = []
-        for wave in waves[: self.search.starts]:
-            if self.grows(wave):
-                return [], self.growing(wave)
-            cycle, growth = self.ascend(wave, GROWTH)
-            if growth > 0 and self.grows(cycle):
+        """Cycles made to grow as fast as they can, the fastest last; and the verdict where one of them grows."""
+        reached: list[tuple[float, Trajectory]] = []
+        for cycle in self._steepening():
+            if self.grows(cycle):
                 return [], self.growing(cycle)
-            climbed.append((growth / float(cycle.time[-1]), cycle))
-        climbed.sort(key=lambda pair: -pair[0])
-        return [cycle for _, cycle in climbed] + waves, None
+            reached.append((math.log(max(self.multiplier(cycle), 1e-300)) / float(cycle.time[-1]), cycle))
+        return [cycle for _, cycle in sorted(reached, key=_first)[-self.search.starts :]], None
 
-    def ascend(self, cycle: Trajectory, objective: Objective) -> tuple[Trajectory, float]:
-        """The cycle a whole ascent leads to, and its measure."""
+    def _steepening(self) -> Iterator[Trajectory]:
+        waves = [wave.cycle() for wave in self.family.coarse()[: self.search.starts]]
+        yield from waves
+        for wave in waves[:1]:
+            yield from self.climb(wave, GROWTH)
+        for wave in waves:
+            yield self.ascend(wave, GROWTH)
+
+    def near(self) -> list[Trajectory]:
+        """Waves of fast growth, and slower ones, which now and then are worse."""
+        slower = self.rate / 2 if math.isfinite(self.rate) else 4 * self.lpv.scheduling.radius / self.family.slow
+        families = (self.family.coarse(), WaveFamily(self.lpv, slower, self.search).coarse())
+        mixed = [wave.cycle() for pair in zip_longest(*families) for wave in pair if wave is not None]
+        return mixed[: max(self.search.starts, self.search.evaluations)]
+
+    def ranked(self, cycles: Iterable[Trajectory]) -> list[tuple[float, Trajectory]]:
+        """Gains of the repeated cycles, the largest last, without those along which the state grows."""
+        gains = ((self.gain(cycle), cycle) for cycle in cycles)
+        return sorted(((gain, cycle) for gain, cycle in gains if math.isfinite(gain)), key=_first)
+
+    def climb(self, wave: Trajectory, objective: Objective) -> Iterator[Trajectory]:
+        """The cycles that ascents on the corners of a wave lead to: two corners, and where growth is asked four; none in discrete time."""
+        if self.lpv.dt is not None:
+            return
+        longest, period = max(self.family.longest, self.family.longest_period / self.search.steps), self.family.longest_period
+        corners = Corners.of(wave)
+        for again in (False, True)[: 1 + objective.a_second]:
+            start = corners.twice() if again else corners
+            corners = climb(self.lpv, self.rate, start, objective, longest, period, self.search.evaluations // 2)
+            yield corners.cycle(self.rate)
+
+    def ascend(self, cycle: Trajectory, objective: Objective) -> Trajectory:
+        """The cycle a whole ascent leads to."""
         start = on_nodes(cycle, self.search.nodes, self.lpv.dt)
-        return ascend(self.lpv, self.rate, start, objective, self.family.longest_period, self.search.evaluations)
+        return ascend(self.lpv, self.rate, start, objective, self.family.longest_period, self.search.evaluations)[0]
 
     def along(self, cycle: Trajectory, finer: int = 1, split: int = 1) -> Steps:
         """The model along one cycle."""
@@ -177,8 +204,22 @@ class _Hunt:
             halved = np.repeat(inputs, 2, axis=0).reshape(count, -1)
             half, _ = ratio_from_rest(Lifted.of(self.along(cycle, finer=2, split=2)), halved, rounds=1)
             ratio = min(ratio, half) - abs(ratio - half)
-        period = float(cycle.time[-1])
-        time = np.concatenate([system.time[:-1] + k * period for k in range(count)])
-        p = np.tile(np.interp(system.time[:-1], *cycle), count)
-        width = np.tile(np.diff(system.time), count) if self.lpv.dt is None else np.ones(len(time))
-        return LowerBound(ratio, Trajectory(time, p), inputs / np.sqrt(width)[:, None], growth)
+        width = np.tile(np.diff(system.time), count) if self.lpv.dt is None else np.ones(len(inputs))
+        return LowerBound(ratio, *_flown(cycle, system.time, count, inputs / np.sqrt(width)[:, None]), growth)
+
+
+def _first(pair: tuple[float, Trajectory]) -> float:
+    return pair[0]
+
+
+def _flown(cycle: Trajectory, at: Array, count: int, held: Array) -> tuple[Trajectory, Array]:
+    """The cycle so many times over, and the input held from each time to the next; where p jumps, one time with both values."""
+    start = np.interp(at[:-1], *cycle)
+    # the value a step ends with: of two at the same time interpolation takes the later one, backwards the earlier
+    end = np.interp(-at[1:], -cycle.time[::-1], cycle.p[::-1])
+    jumping = bool(np.any(np.diff(cycle.time) == 0))
+    jumps = np.flatnonzero(jumping & (np.abs(end - np.roll(start, -1)) > 1e-9 * np.ptp(cycle.p)))
+    time, p = np.insert(at[:-1], jumps + 1, at[jumps + 1]), np.insert(start, jumps + 1, end[jumps])
+    each = held.reshape(count, len(start), -1)
+    time = np.concatenate([time + k * at[-1] for k in range(count)])
+    return Trajectory(time, np.tile(p, count)), np.insert(each, jumps + 1, each[:, jumps], axis=1).reshape(len(time), -1)

@@ -19,6 +19,10 @@ FINEST = 8
 """For a slow p the levels are at most this many times closer than asked for."""
 
 
+PERIODS = 7
+"""Periods of the waves that `spread` looks at, from half that of the fastest mode to the longest."""
+
+
 class WaveFamily:
     """The waves of a model within `rate`, as coarse as `search` says.
 
@@ -46,10 +50,10 @@ class WaveFamily:
         """No cycle lasts longer, s."""
         return self.search.cycles * self.slow
 
-    def wave(self, bottom: float, top: float, dwell_bottom: float, dwell_top: float) -> Wave | None:
-        """The wave with ramps as steep as allowed; None where it is too long."""
+    def wave(self, bottom: float, top: float, dwell_bottom: float, dwell_top: float, ramp: float = 0.0) -> Wave | None:
+        """The wave with ramps as steep as allowed, but of `ramp` s at least; None where it is too long."""
         dt = self.lpv.dt
-        ramp = 0.0 if math.isinf(self.rate) else (top - bottom) / self.rate
+        ramp = max(ramp, 0.0 if math.isinf(self.rate) else (top - bottom) / self.rate)
         if dt is not None:
             ramp = math.ceil(ramp / dt - 1e-9) * dt
             dwell_bottom, dwell_top = (max(1.0, round(d / dt)) * dt for d in (dwell_bottom, dwell_top))
@@ -59,6 +63,8 @@ class WaveFamily:
     def coarse(self) -> list[Wave]:
         """The waves on the grid of levels and dwell times, that of the fastest growth first, one a pair of levels."""
         dwell = np.linspace(0.0, 0.75 * self.slow, self.search.dwells)
+        if self.lpv.dt is not None:
+            dwell = np.unique(np.maximum(np.round(dwell / self.lpv.dt), 1.0)) * self.lpv.dt
         waits = [[self._transition(p, p, d) for d in dwell] for p in self.grid]
         rise = [self._ramp(a, b) for a, b in zip(self.grid[:-1], self.grid[1:], strict=True)]
         fall = [self._ramp(b, a) for a, b in zip(self.grid[:-1], self.grid[1:], strict=True)]
@@ -72,13 +78,33 @@ class WaveFamily:
                     break
                 cycle = (np.array(waits[i]) @ down)[:, None] @ (np.array(waits[j]) @ up)[None]
                 radius = np.abs(np.linalg.eigvals(cycle)).max(axis=-1)
-                period = np.maximum(2 * shortest.ramp + dwell[:, None] + dwell, self.fast / 100)
-                pace = np.log(np.maximum(radius, 1e-300)) / period
+                period = 2 * shortest.ramp + dwell[:, None] + dwell
+                # a cycle of no length does not decay, and would be the best
+                pace = np.where(period > 0, np.log(np.maximum(radius, 1e-300)) / np.maximum(period, self.fast / 100), -math.inf)
                 a, b = np.unravel_index(int(pace.argmax()), pace.shape)
                 wave = self.wave(self.grid[i], self.grid[j], dwell[a], dwell[b])
                 if wave is not None:
                     found.append((float(pace.max()), wave))
         return [wave for _, wave in sorted(found, key=lambda pair: -pair[0])]
+
+    def spread(self) -> list[Wave]:
+        """Waves of many periods, whatever their growth: as much of the range as the rate allows, with rests and as triangles.
+
+        Where A does not depend on p all waves grow alike, and what p does to the gain depends on its period alone.
+        """
+        s = self.lpv.scheduling
+        # every sample of a cycle counts in discrete time, so that long cycles are dear
+        longest = self.longest_period if self.lpv.dt is None else min(self.longest_period, self.search.steps * self.lpv.dt)
+        found = []
+        for period in np.geomspace(0.5 * self.fast, 0.999 * max(longest, self.fast), PERIODS):
+            swing = min(s.high - s.low, 0.5 * period * self.rate)
+            rest = period - (0.0 if math.isinf(self.rate) else 2 * swing / self.rate)
+            if swing < s.high - s.low:
+                found += [self.wave(a, a + swing, 0.0, 0.0) for a in (s.low, s.middle - 0.5 * swing, s.high - swing)]
+            else:
+                found += [self.wave(s.low, s.high, share * rest, (1 - share) * rest) for share in (0.5, 0.2, 0.8)]
+                found.append(self.wave(s.low, s.high, 0.0, 0.0, 0.5 * period))
+        return [wave for wave in found if wave is not None]
 
     def _ramp(self, a: float, b: float) -> Array:
         return self._transition(a, b, 0.0 if math.isinf(self.rate) else abs(b - a) / self.rate)

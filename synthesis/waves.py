@@ -9,6 +9,7 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace
 from symheli.lpv.exponential import expm
+from synthesis.certificate import Trajectory
 
 Array = np.ndarray
 
@@ -29,6 +30,10 @@ class Wave(NamedTuple):
     def period(self) -> float:
         """Length of one cycle, s."""
         return self.dwell_bottom + self.dwell_top + 2.0 * self.ramp
+
+    def cycle(self) -> Trajectory:
+        """One cycle; where p jumps a time stands twice."""
+        return Trajectory(*self.vertices())
 
     def vertices(self, cycles: int = 1) -> tuple[Array, Array]:
         """Corner times (s) and values of p over whole cycles."""

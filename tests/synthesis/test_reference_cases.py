@@ -79,8 +79,8 @@ def test_no_stability_is_proven_beyond_the_worst_switching():
     critical = brentq(lambda k: worst_growth(1, 2, 2 + k), 4, 10)
     assert critical == pytest.approx(6.985, abs=5e-4)
     assert not stability(oscillator(1, 2, 2 + critical * 1.001), search=None).verified
-    # just above k* the growth is 1.0007 a half turn; 10 % above it is 1.05, and must be found
-    assert stability(oscillator(1, 2, 2 + critical * 1.1)).status is Status.GROWING
+    # the growth is 1.0016 a half turn there
+    assert stability(oscillator(1, 2, 2 + critical * 1.003)).status is Status.GROWING
     # below k* growth would be a false alarm
     assert stability(oscillator(1, 2, 2 + critical * 0.999)).status is not Status.GROWING
 
@@ -131,6 +131,9 @@ def test_meissners_equation_limits_what_is_proven_when_p_jumps():
     assert stability(oscillator(2 * z, 1 - 0.999 * quadratic, 1 + 0.999 * quadratic)).verified
     for e in (1.001 * quadratic, 1.001 * truth):
         assert not stability(oscillator(2 * z, 1 - e, 1 + e), search=None).verified
+    assert stability(oscillator(2 * z, 1 - 1.003 * truth, 1 + 1.003 * truth)).status is Status.GROWING
+    # below it growth would be a false alarm
+    assert stability(oscillator(2 * z, 1 - 0.999 * truth, 1 + 0.999 * truth)).status is not Status.GROWING
 
 
 # pairs of matrices in discrete time
@@ -224,11 +227,11 @@ def test_a_first_order_gain_at_its_two_ends_is_known():
 
 
 @pytest.mark.slow
-def test_the_lower_bound_of_a_first_order_gain_stays_below_its_exact_value():
-    found = [l2_gain(scalar(rate), relaxation=COARSE).lower / scalar_gain(rate) for rate in (0.1, 1.0, 10.0)]
-    assert max(found) <= 1.0
-    # at rate 1 the worst wave is found; at 10 the search stays at the frozen 2.25 (docs/reference_cases.md)
-    assert found[1] > 0.999
+@pytest.mark.parametrize(("rate", "share"), [(0.1, 0.997), (1.0, 0.999), (10.0, 0.998), (math.inf, 0.996)])
+def test_the_lower_bound_of_a_first_order_gain_comes_close_to_its_exact_value(rate, share):
+    """All waves grow alike here, so that only their gains can rank them. The shares are what was reached, rounded down."""
+    exact = 2.5 if math.isinf(rate) else scalar_gain(rate)
+    assert share < l2_gain(scalar(rate), relaxation=COARSE).lower / exact <= 1.0
 
 
 @pytest.mark.parametrize("rate", [0.0, 1.0, math.inf])

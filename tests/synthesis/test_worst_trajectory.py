@@ -9,6 +9,7 @@ from models import fastest_growth, lateral, random_stable, spring
 
 from synthesis.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
 from synthesis.certificate import Trajectory
+from synthesis.corners import Corners, climb, gradient
 from synthesis.periodic import Lifted, gain, growth, ratio_from_rest, worst_input
 from synthesis.waves import Wave, steps
 
@@ -112,3 +113,54 @@ def test_the_search_finds_more_than_the_waves_it_starts_from():
     hunt = _Hunt(lpv, 3.0, search)
     waves = max(gain for wave in hunt.family.coarse() if math.isfinite(gain := hunt.gain(Trajectory(*wave.vertices()))))
     assert lower_bound(lpv, search=search).gamma > 1.02 * waves
+
+
+@pytest.mark.parametrize("rate", [2.9, math.inf])
+@pytest.mark.parametrize("objective", [GROWTH, GAIN])
+def test_the_gradient_by_corners_is_its_difference_quotient(rate, objective):
+    lpv, rng = random_stable(3), np.random.default_rng(0)
+    # lengths away from whole multiples of the longest step, where the number of steps changes
+    corners = Corners(np.array([0.1, 0.8, 0.3, 0.9]), np.array([0.53, 0.77, 1.13, 0.34]))
+    levels, rests = rng.standard_normal((2, 4))
+
+    def score(h):
+        return gradient(lpv, Corners(corners.levels + h * levels, corners.rests + h * rests), rate, objective, 0.1)[0]
+
+    _, of_rests, of_levels = gradient(lpv, corners, rate, objective, 0.1)
+    # one-sided differences of 1e-6 inside; the frequency of the gain is held, which is exact to first order only at its peak
+    assert of_rests @ rests + of_levels @ levels == pytest.approx((score(1e-6) - score(-1e-6)) / 2e-6, rel=1e-4)
+
+
+def test_corners_reach_the_fastest_pumping_of_a_spring_exactly():
+    best = fastest_growth(0.05, 0.6)
+    # a fifth off in every way; much further, the multipliers are a complex pair, whose modulus no corner changes
+    start = Corners(np.array([-0.7, 0.8]), np.array([2.5, 1.2]))
+    lpv = spring(damping=0.05, change=0.6)
+    found = climb(lpv, math.inf, start, GROWTH, 0.2, 20.0, 30)
+    assert found.levels == pytest.approx([-1.0, 1.0])
+    # the steps are exact, since p is constant between its corners; 1e-6: the quadrature behind `best` has 4000 points
+    assert gradient(lpv, found, math.inf, GROWTH, 0.2)[0] == pytest.approx(best, rel=1e-6)
+
+
+def test_a_bound_by_jumps_is_flown_as_it_is_reported():
+    from test_order_of_bounds import response
+
+    from synthesis import Search, lower_bound
+
+    lpv = spring(damping=0.4)
+    found = lower_bound(lpv, math.inf, search=Search(levels=4, dwells=7, starts=1, nodes=20, evaluations=8, steps=60, samples=3000))
+    time, p = found.trajectory
+    assert np.any(np.diff(p)[np.diff(time) == 0] != 0)
+    energy = response(lpv, time, p, found.input, np.zeros((2, 1)), 0.02)[1]
+    # as in test_order_of_bounds: the last input sample is left out
+    assert math.sqrt(energy / np.sum(found.input[:-1, 0] ** 2 * np.diff(time))) == pytest.approx(found.gamma, rel=1e-3)
+    assert found.gamma > 1.1 * lower_bound(lpv, 0.0).gamma
+
+
+@pytest.mark.slow
+def test_a_p_that_may_jump_is_never_better_than_one_with_a_limit():
+    from synthesis import Search, lower_bound
+
+    quick = Search(levels=4, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=4000)
+    gains = [lower_bound(spring(damping=0.4), rate, search=quick).gamma for rate in (1.0, 3.0, math.inf)]
+    assert gains == sorted(gains)
