@@ -22,7 +22,7 @@ class Status(Enum):
     PROVEN = "proven on the whole interval"
     UNSTABLE = "no certificate exists: a model frozen at some p is not stable"
     GROWING = "no certificate exists: a scheduling trajectory within the limits makes the state grow"
-    INFEASIBLE = "the solver found no Lyapunov function of this form; the model may still be stable"
+    INFEASIBLE = "no Lyapunov function of this form exists, to the solver's accuracy; the model may still be stable"
     UNPROVEN = "unproven on a grid: the inequalities hold at its points, between them nothing is known"
     FAILED = "solver failed: what it returned could not be verified"
 

@@ -22,6 +22,8 @@ INFLATION = 1e-6
 
 VIOLATED = 1e-8
 """A block left out of the program joins it when its largest eigenvalue (scaled) exceeds this."""
+NOTHING = 1e-6
+"""A largest margin of stability below this (P <= I, scaled) counts as none: the solver is no more accurate than that."""
 ROUNDS = 12
 """Most rounds of adding violated blocks; what then remains violated only makes the recomputed gain larger."""
 
@@ -72,7 +74,13 @@ def _attempt(problem: Problem, relaxation: Relaxation, solver: Solver, form: For
     if problem.with_gain and lyapunov is not None:
         words += f", gamma {gamma:.6g}"
     attempt = Attempt(len(form.knots) - 1, form.degree, margin, words, gamma)
-    return Result(gamma, lyapunov, conditioning, candidate.answer, seconds, (attempt,))
+    return Result(gamma, lyapunov, conditioning, _answer(problem, candidate), seconds, (attempt,))
+
+
+def _answer(problem: Problem, candidate: Candidate) -> Answer:
+    """The solver's, but a largest margin of nothing, found for fewer blocks or for all of them, means that there is no P."""
+    nothing = not problem.with_gain and candidate.x is not None and candidate.x[-1] <= NOTHING
+    return Answer.INFEASIBLE if nothing and candidate.answer is Answer.SOLVED else candidate.answer
 
 
 def _solve_by_rounds(

@@ -25,6 +25,7 @@ from synthesis.polynomial.program import Shape, affine_inequalities, assemble
 from synthesis.polynomial.proof import Evidence, Units
 from synthesis.polynomial.regions import Pieces, pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
+from synthesis.proof_search import NOTHING
 from synthesis.scaling import model_scaling
 from synthesis.symmetric import length, smat
 
@@ -170,10 +171,13 @@ class _Hunt:
 
     def _judged(self, candidate: Candidate, shape: Shape) -> Found:
         """What P itself gives, whatever the solver said."""
-        nothing = Found(None, math.inf, candidate.answer)
         if candidate.x is None:
-            return nothing
+            return Found(None, math.inf, candidate.answer)
         n, free = self.model.sizes[0], shape.free
+        # a margin of nothing is an answer; a larger one that cannot be verified, or a gain that cannot, is the solver's trouble
+        margin = 1.0 if self.demand.kind.endswith("gain") else candidate.x[free.shape[1] * length(n)]
+        solved = candidate.answer is Answer.SOLVED
+        nothing = Found(None, math.inf, Answer.INFEASIBLE if solved and margin <= NOTHING else Answer.FAILED)
         values = smat(candidate.x[: free.shape[1] * length(n)].reshape(free.shape[1], -1), n)
         tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
         # judged as it is stored, in physical units
@@ -203,7 +207,7 @@ class _Report:
     def found(self, best: Found, limit: float, worst: Trajectory | None, bounds: float, hunt: _Hunt) -> BoxCertificate:
         """What the hunt brought."""
         if best.lyapunov is None:
-            status = Status.INFEASIBLE if best.answer in (Answer.INFEASIBLE, Answer.SOLVED) else Status.FAILED
+            status = Status.INFEASIBLE if best.answer is Answer.INFEASIBLE else Status.FAILED
         else:
             status = Status.UNPROVEN if self.relaxation.kind == "grid" else Status.PROVEN
         return self._made(best, limit, worst, bounds, hunt, status)

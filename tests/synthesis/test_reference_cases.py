@@ -14,7 +14,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from symheli.lpv import LFT, LPVStateSpace, Scheduling
-from synthesis import Relaxation, Status, frozen_gain, l2_gain, lft_gain, lft_stability, stability
+from synthesis import Relaxation, Solver, Status, frozen_gain, l2_gain, lft_gain, lft_stability, stability
 
 COARSE = Relaxation(segments=(4,))
 GOLDEN = (1 + math.sqrt(5)) / 2
@@ -62,7 +62,20 @@ def test_a_constant_p_reaches_the_circle_criterion():
     limit = 1 + 2 * math.sqrt(2)
     # 1e-4 of k: the margin by which the solver holds the LMI off
     assert stability(oscillator(1, 2, 2 + limit * (1 - 1e-4))).verify(rigorous=True)
-    assert not stability(oscillator(1, 2, 2 + limit * (1 + 1e-4)), search=None).verified
+    # just beyond it and far beyond it, by either route, the answer is that there is none, not that the solver failed
+    for excess in (1e-4, 0.1):
+        beyond = oscillator(1, 2, 2 + limit * (1 + excess))
+        for relaxation in (None, Relaxation(kind="sos", degree=0)):
+            assert stability(beyond, relaxation=relaxation, search=None).status is Status.INFEASIBLE
+        assert l2_gain(beyond, search=None).status is Status.INFEASIBLE
+
+
+def test_a_solver_stopped_early_is_not_taken_for_an_answer():
+    """A P exists, 1 % below the limit, but one iteration does not find it: nothing is known."""
+    inside, hasty = oscillator(1, 2, 2 + 0.99 * (1 + 2 * math.sqrt(2))), Solver(iterations=1)
+    for analysis in (stability, l2_gain):
+        for relaxation in (None, Relaxation(kind="sos", degree=0)):
+            assert analysis(inside, relaxation=relaxation, solver=hasty, search=None).status is Status.FAILED
 
 
 @pytest.mark.parametrize("scaling", ["D", "DG"])
