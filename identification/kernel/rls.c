@@ -17,24 +17,41 @@
 #define PRIOR (EPSILON / 16) /* samples with a regressor at its largest that are pretended at first, saying "coefficient 0" */
 #define MILLION 1048576      /* samples are counted in two numbers, each exact in single precision */
 
-/* LANES numbers side by side. `LANEWISE EACH(a) += EACH(b);` adds them all: as vectors where the compiler has these, else one by one, with
-   the same result. */
+/* LANES numbers side by side. `LANEWISE EACH(a) += EACH(b);` adds them all, LANE(a, i) is one of them: in one vector where the processor has
+   such long ones, else in parts of what it computes at once, and with the same result. */
 #if defined(__GNUC__) && !defined(RLS_NO_VECTORS)
-typedef rls_real lanes __attribute__((vector_size(LANES * sizeof(rls_real)), aligned(sizeof(rls_real)), may_alias));
+#define VECTOR(bytes) __attribute__((vector_size(bytes), aligned(sizeof(rls_real)), may_alias))
+#if defined(__AVX512F__) || (defined(__AVX__) && defined(RLS_SINGLE))
+#define WHOLE
+typedef rls_real lanes VECTOR(LANES * sizeof(rls_real));
+#elif defined(__AVX__)
+#define TOGETHER 4
+typedef rls_real part VECTOR(TOGETHER * sizeof(rls_real));
+#else
+#define TOGETHER ((int)(16 / sizeof(rls_real)))
+typedef rls_real part VECTOR(16);
+#endif
+#else
+#define TOGETHER 1
+typedef rls_real part;
+#endif
+#ifdef WHOLE
 #define LANEWISE
 #define EACH(of) (of)
 #define LANE(of, i) (of)[i]
 #else
 typedef struct {
-    rls_real at[LANES];
+    part at[LANES / TOGETHER];
 } lanes;
-#define LANEWISE for (int lane = 0; lane < LANES; lane++)
-#define EACH(of) (of).at[lane]
-#define LANE(of, i) (of).at[i]
+#define LANEWISE for (int k_ = 0; k_ < LANES / TOGETHER; k_++)
+#define EACH(of) (of).at[k_]
+#define LANE(of, i) ((rls_real *)&(of).at[(i) / TOGETHER])[(i) % TOGETHER]
 #endif
 
-/* Lanes of two vectors, counted through: within registers where the compiler can. */
-#if defined(__has_builtin) && !defined(RLS_NO_VECTORS)
+static const lanes none; /* zeros */
+
+/* Lanes of two vectors, counted through, without a way through memory. */
+#if defined(__has_builtin) && defined(WHOLE)
 #if __has_builtin(__builtin_shufflevector)
 #define SHUFFLE __builtin_shufflevector
 #endif
@@ -48,7 +65,6 @@ static inline const lanes *lanes_of(const rls_real *numbers) { return (const lan
 static inline void running_sums(lanes *v)
 {
 #ifdef SHUFFLE
-    const lanes none = {0};
     *v += SHUFFLE(none, *v, 0, 8, 9, 10, 11, 12, 13, 14);
     *v += SHUFFLE(none, *v, 0, 1, 8, 9, 10, 11, 12, 13);
     *v += SHUFFLE(none, *v, 0, 1, 2, 3, 8, 9, 10, 11);
@@ -62,7 +78,6 @@ static inline void running_sums(lanes *v)
 static inline void shift(lanes *v, rls_real first)
 {
 #ifdef SHUFFLE
-    const lanes none = {0};
     *v = SHUFFLE(none + first, *v, 0, 8, 9, 10, 11, 12, 13, 14);
 #else
     for (int i = LANES - 1; i > 0; i--) LANE(*v, i) = LANE(*v, i - 1);
@@ -211,7 +226,6 @@ static inline void partial_sums(const rls_real *rows, int stride, int count, con
 /* a'b for each of `count` rows a of a matrix, LANES at most; 0 for the rest of LANES. */
 static inline void times(const rls_real *rows, int stride, int count, const rls_real *b, int length, rls_real *result)
 {
-    const lanes none = {0};
     lanes s[LANES];
     int i = 0;
     for (int j = 0; j < LANES; j++) s[j] = none;
@@ -277,7 +291,7 @@ static inline void eliminate(const rls_real *block, int stride, int rows, const 
 static inline int weigh(const rls_real *leads, rls_real *d, rls_real kept, weight *w, rls_real *gain)
 {
     const lanes lead = *lanes_of(leads);
-    lanes old = *lanes_of(d), ratio, sum, over;
+    lanes old = *lanes_of(d), ratio = old, sum = old, over = old;
     rls_real least = 1, value;
     LANEWISE EACH(old) *= kept;
     for (int i = 0; i < LANES; i++) least = LANE(old, i) < least ? LANE(old, i) : least;
