@@ -8,6 +8,10 @@ from dataclasses import dataclass, field
 from synthesis import Search
 
 
+GLANCE = Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000)
+"""A short look for bad airspeeds."""
+
+
 @dataclass(frozen=True)
 class Effort:
     """How much is done: the whole study, or a look (`quick`)."""
@@ -23,6 +27,7 @@ class Effort:
     servo_rates: tuple[float, ...] = (0.0, 3.0, 8.0, math.inf)
     servo_segments: tuple[int, ...] = (8,)
     search: Search = field(default_factory=Search)
+    """For the lateral gust, whose gain grows with the rate; elsewhere a glance finds the growth there is, and nothing above frozen."""
 
     @classmethod
     def look(cls) -> Effort:
@@ -37,5 +42,5 @@ class Effort:
             False,
             (0.0, math.inf),
             (4,),
-            Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000),
+            GLANCE,
         )

@@ -15,7 +15,7 @@ from studies.transition import axes, guarantees
 from studies.transition.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
 from studies.transition.baseline import build_baseline
 from studies.transition.comparison import compare, compare_frozen
-from studies.transition.effort import Effort
+from studies.transition.effort import GLANCE, Effort
 from studies.transition.flights import FlightPlan, autopilot_for
 from studies.transition.outcome import Outcome
 from studies.transition.paper_experiment import PERIOD, run_experiment
@@ -165,7 +165,7 @@ def _prove_gust(study: Study, effort: Effort) -> None:
 
 def _prove_longitudinal(study: Study, effort: Effort) -> None:
     loop = longitudinal_loop(_need(study.heli))
-    study.bounds += guarantees.bounds("baseline", "longitudinal", loop, effort.longitudinal_rates, effort.gust_segments, effort.search)
+    study.bounds += guarantees.bounds("baseline", "longitudinal", loop, effort.longitudinal_rates, effort.gust_segments, GLANCE)
     study.bounds += guarantees.lft_bounds("baseline", "longitudinal", loop)
 
 
@@ -177,6 +177,6 @@ def _prove_servo(study: Study, effort: Effort) -> None:
         if name == "exact" and not effort.thorough:
             continue
         study.frozen_peaks[name] = frozen_gain(loop)
-        study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments, effort.search)
+        study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments, GLANCE)
         if effort.thorough and guarantees.has_lft(loop):
             study.bounds += guarantees.lft_bounds(name, "servo", loop)
