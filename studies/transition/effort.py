@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 from synthesis import Search
 
-
 GLANCE = Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000)
 """A short look for bad airspeeds."""
 
