@@ -40,6 +40,24 @@ def guarantee(found: Sequence[Bound], channel: str) -> Table:
     return table
 
 
+def not_about_the_helicopter(found: Sequence[Bound]) -> list[str]:
+    """Gains proven of an interpolated or identified model that a flown airspeed of the exact models exceeds, a sentence each."""
+    gains = [b for b in found if b.certificate.kind == "l2 gain"]
+    out = []
+    for exact in gains:
+        below = [b for b in gains if b.model != "exact" and (b.channel, b.rate) == (exact.channel, exact.rate)]
+        flown = exact.certificate.lower
+        for model in dict.fromkeys(b.model for b in below if exact.model == "exact"):
+            least = min(proven(b) for b in below if b.model == model)
+            if least < flown:
+                flight = "make their state grow" if math.isinf(flown) else f"reach {gain(flown)}"
+                out.append(
+                    f"{exact.channel.capitalize()} channel, {rate_text(exact.rate)}: {gain(least)} is proven of the {model} model, "
+                    f"and flown airspeeds of the exact models {flight}: that proof says nothing of the helicopter."
+                )
+    return list(dict.fromkeys(out))
+
+
 def every(found: Sequence[Bound]) -> list[Table]:
     """One table a channel that has bounds."""
     return [guarantee(found, channel) for channel in CHANNELS if any(b.channel == channel for b in found)]

@@ -23,7 +23,8 @@ def summary(study: Outcome) -> str:
     for r in study.recoveries:
         lines.append(f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within {r.B_error:.0e}")
     sections = [_marks(study), *(table.text() for table in gain_tables.every(study.bounds))]
-    return "\n".join(lines) + "\n\n" + "\n\n".join(s for s in sections if s) + "\n\n" + "\n".join(tables.verdicts(study))
+    sections += ["\n".join(gain_tables.not_about_the_helicopter(study.bounds)), "\n".join(tables.verdicts(study))]
+    return "\n\n".join(["\n".join(lines), *(s for s in sections if s)])
 
 
 def _marks(study: Outcome) -> str:

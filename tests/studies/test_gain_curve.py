@@ -53,3 +53,15 @@ def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
     assert {row[2] for row in table.rows} == {"proven"}
     curve = guarantees.gain_curve(found, "baseline", "gust", "lag")
     assert curve.jumping["LFT D/G"] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_proof_of_a_model_that_the_exact_one_exceeds_is_said_not_to_hold_for_the_helicopter():
+    def lag(gain):
+        return LPVStateSpace.polynomial([[[-2.0]], [[1.0]]], [[[gain]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0))
+
+    def bounds(model, gain):
+        return list(guarantees.bounds(model, "gust", lag(gain), (1.0,), (2,), Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1)))
+
+    (sentence,) = gain_tables.not_about_the_helicopter([*bounds("baseline", 1.0), *bounds("exact", 2.0)])
+    assert sentence.startswith("Gust channel, 1 m/s^2: 1 is proven of the baseline model, and flown airspeeds of the exact models reach 2")
+    assert not gain_tables.not_about_the_helicopter([*bounds("baseline", 2.1), *bounds("exact", 2.0)])
