@@ -3,7 +3,7 @@
 No solver is loaded by importing this package.
 """
 
-from synthesis.certificate import Attempt, Certificate, Seconds, Status, Trajectory
+from synthesis.certificate import Attempt, Certificate
 from synthesis.cone_program import Solver, installed_solvers
 from synthesis.decay_rate import decay_rate
 from synthesis.forms import Relaxation
@@ -16,6 +16,7 @@ from synthesis.lower_bound import LowerBound, Search, lower_bound
 from synthesis.lyapunov import MemoryLyapunov, SplineLyapunov
 from synthesis.margins import Margins, disk_margin, loop, margins
 from synthesis.polynomial import BoxCertificate, BoxLyapunov, PolynomialMatrix, PolynomialStateSpace
+from synthesis.verdict import Seconds, Status, Trajectory, Verdict
 
 __all__ = [
     "SCALINGS",
@@ -41,6 +42,7 @@ __all__ = [
     "Status",
     "Trajectory",
     "Trial",
+    "Verdict",
     "bandwidth",
     "decay_rate",
     "disk_margin",

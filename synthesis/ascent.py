@@ -18,8 +18,8 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from symheli.lpv import LPVStateSpace
-from synthesis.certificate import Trajectory
 from synthesis.periodic import Sensitivity, gain, growth
+from synthesis.verdict import Trajectory
 from synthesis.waves import Steps, steps
 
 Array = np.ndarray

@@ -60,6 +60,9 @@ class Solver:
         """Version of the installed package."""
         return importlib.metadata.version(_PACKAGES[self.name])
 
+    def __str__(self) -> str:
+        return f"{self.name} {self.version}, tolerance {self.tolerance:g}"
+
 
 _PACKAGES = {"CLARABEL": "clarabel", "SCS": "scs", "CVXOPT": "cvxopt", "MOSEK": "mosek", "SDPA": "sdpa-python", "COPT": "coptpy"}
 

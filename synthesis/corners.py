@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 from symheli.lpv import LPVStateSpace
 from synthesis.ascent import Objective
-from synthesis.certificate import Trajectory
+from synthesis.verdict import Trajectory
 from synthesis.waves import Steps, steps
 
 Array = np.ndarray

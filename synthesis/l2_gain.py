@@ -10,7 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace
-from synthesis.certificate import Certificate, Seconds, Status, Trajectory
+from synthesis.certificate import Certificate
 from synthesis.cone_program import Answer, Solver
 from synthesis.forms import Problem, Relaxation, scaled_problem
 from synthesis.frozen import frozen_gain, least_damped
@@ -19,6 +19,7 @@ from synthesis.lyapunov import Lyapunov
 from synthesis.polynomial import BoxCertificate, PolynomialStateSpace
 from synthesis.polynomial.analysis import Model, Rate, box_certificate
 from synthesis.proof_search import Result, prove
+from synthesis.verdict import Seconds, Status, Trajectory
 
 
 @overload
@@ -133,9 +134,10 @@ def _certificate(
     gamma = math.nan if kind == "stability" else best.gamma
     evidence = found[0].evidence(elevation) if found else None
     return Certificate(
-        kind, gamma, lower, frozen, status, best.lyapunov is not None, best.lyapunov, rate, _hypotheses(lpv, rate, best.lyapunov, kind),
-        f"{solver.name} {solver.version}, tolerance {solver.tolerance:g}", best.seconds._replace(bounds=bounds), best.conditioning,
-        best.attempts, worst, lpv.scheduling.unit, evidence,
+        kind=kind, gamma=gamma, lower=lower, frozen=frozen, status=status, verified=best.lyapunov is not None, rates=(rate,),
+        hypotheses=_hypotheses(lpv, rate, best.lyapunov, kind), solver=str(solver), seconds=best.seconds._replace(bounds=bounds),
+        conditioning=best.conditioning, attempts=best.attempts, worst=worst, lyapunov=best.lyapunov, unit=lpv.scheduling.unit,
+        evidence=evidence,
     )  # fmt: skip
 
 

@@ -19,10 +19,10 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from synthesis.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
-from synthesis.certificate import Trajectory
 from synthesis.corners import Corners, climb
 from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.periodic import Lifted, multiplier, ratio_from_rest, worst_input
+from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
 from synthesis.waves import Steps, steps
 

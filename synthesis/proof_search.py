@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from synthesis.bounded_real import Blocks, assemble
-from synthesis.certificate import Attempt, Seconds
+from synthesis.certificate import Attempt
 from synthesis.cone_program import Answer, Candidate, Solver, solve
 from synthesis.forms import Form, Problem, Relaxation, forms
 from synthesis.lyapunov import Lyapunov
+from synthesis.verdict import Seconds
 
 Array = np.ndarray
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace
 from symheli.lpv.exponential import expm
-from synthesis.certificate import Trajectory
+from synthesis.verdict import Trajectory
 
 Array = np.ndarray
 

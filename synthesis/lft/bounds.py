@@ -11,9 +11,9 @@ from scipy.optimize import minimize
 
 from symheli.lpv import LFT, LPVStateSpace, Scheduling
 from symheli.lpv.lft import Block
-from synthesis.certificate import Trajectory
 from synthesis.frozen import FrozenGain, norm
 from synthesis.lower_bound import LowerBound, Search, growing_trajectory, lower_bound
+from synthesis.verdict import Trajectory
 
 Array = np.ndarray
 

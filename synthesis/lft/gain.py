@@ -9,7 +9,6 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT
-from synthesis.certificate import Seconds, Status, Trajectory
 from synthesis.cone_program import Answer, Candidate, ConeProgram, Solver, solve
 from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
 from synthesis.lft.certificate import LFTCertificate, Trial
@@ -18,6 +17,7 @@ from synthesis.lft.multipliers import Class, Multiplier, check_scaling, multipli
 from synthesis.lft.program import gain_program, inequality, margin_program, unpack, with_state_channels
 from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.lower_bound import THOROUGH, LowerBound, Search
+from synthesis.verdict import Seconds, Status, Trajectory
 
 Array = np.ndarray
 
@@ -176,9 +176,10 @@ def _certificate(
     gamma = math.nan if kind == "stability" else found.gamma if found else math.inf
     seconds = Seconds(*(found.seconds if found else (0.0, 0.0, 0.0)), bounds)
     return LFTCertificate(
-        kind, scaling, gamma, below.gamma, frozen, status, proof is not None, proof, _hypotheses(lft, scaling, proof, kind),
-        f"{solver.name} {solver.version}, tolerance {solver.tolerance:g}", seconds, found.conditioning if found else math.inf,
-        tuple(found.trials) if found else (), below.trajectory, found.evidence if found else None,
+        kind=kind, scaling=scaling, gamma=gamma, lower=below.gamma, frozen=frozen, status=status, verified=proof is not None,
+        proof=proof, rates=(math.inf,) * len(lft.parameters), hypotheses=_hypotheses(lft, scaling, proof, kind), solver=str(solver),
+        seconds=seconds, conditioning=found.conditioning if found else math.inf, attempts=tuple(found.trials) if found else (),
+        worst=below.trajectory, evidence=found.evidence if found else None,
     )  # fmt: skip
 
 

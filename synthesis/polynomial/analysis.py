@@ -12,14 +12,14 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace
-from synthesis.certificate import Attempt, Seconds, Status, Trajectory
+from synthesis.certificate import Attempt
 from synthesis.cone_program import Answer, Candidate, Solver, solve
 from synthesis.forms import Relaxation
 from synthesis.lower_bound import Search
 from synthesis.lyapunov import graded_knots
 from synthesis.polynomial.bounds import Worst, growing, measure, worst_frozen, worst_moving
 from synthesis.polynomial.certificate import BoxCertificate
-from synthesis.polynomial.inequalities import Demand, Kind
+from synthesis.polynomial.inequalities import Demand
 from synthesis.polynomial.lyapunov import BoxLyapunov
 from synthesis.polynomial.program import Shape, affine_inequalities, assemble
 from synthesis.polynomial.proof import Evidence, Units
@@ -28,6 +28,7 @@ from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.proof_search import NOTHING
 from synthesis.scaling import model_scaling
 from synthesis.symmetric import length, smat
+from synthesis.verdict import Kind, Seconds, Status, Trajectory
 
 Array = np.ndarray
 Model = LPVStateSpace | PolynomialStateSpace | LFT
@@ -215,16 +216,17 @@ class _Report:
     def _made(
         self, best: Found, limit: float, worst: Trajectory | None, bounds: float, hunt: _Hunt | None, status: Status
     ) -> BoxCertificate:
-        kind = self.demand.kind
-        proven = status is Status.PROVEN
-        nothing = {"stability": math.nan, "decay rate": -math.inf}.get(kind, math.inf)
-        quiet = kind == "stability"
+        kind, proven = self.demand.kind, status is Status.PROVEN
+        nothing = -math.inf if kind == "decay rate" else math.inf
+        names = {"stability": (), "decay rate": ("alpha", "upper", "frozen")}.get(kind, ("gamma", "lower", "frozen"))
+        bounds_by_name = dict(zip(names, (best.bound if proven else nothing, limit, self.frozen), strict=False))
+        P, evidence = best.lyapunov, hunt.evidence if hunt else None
         return BoxCertificate(
-            kind, self.relaxation.kind, best.bound if proven else nothing, math.nan if quiet else limit,
-            math.nan if quiet else self.frozen, status, proven, best.lyapunov, self._hypotheses(best.lyapunov, status),
-            f"{self.solver.name} {self.solver.version}, tolerance {self.solver.tolerance:g}",
-            Seconds(*(float(s) for s in (*hunt.spent, bounds))) if hunt else Seconds(bounds=bounds), tuple(hunt.attempts) if hunt else (),
-            best.bound if status is Status.UNPROVEN else math.nan, worst, hunt.evidence if hunt else None,
+            kind=kind, **bounds_by_name, status=status, verified=proven, rates=self.demand.rates, hypotheses=self._hypotheses(P, status),
+            solver=str(self.solver), seconds=Seconds(*(float(s) for s in (*(hunt.spent if hunt else np.zeros(3)), bounds))),
+            conditioning=evidence.conditioning(P) if P and evidence else math.inf, attempts=tuple(hunt.attempts) if hunt else (),
+            worst=worst, relaxation=self.relaxation.kind, lyapunov=P,
+            indicative=best.bound if status is Status.UNPROVEN else math.nan, evidence=evidence,
         )  # fmt: skip
 
     def _hypotheses(self, P: BoxLyapunov | None, status: Status) -> tuple[str, ...]:
@@ -234,7 +236,7 @@ class _Report:
             speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
             out.append(f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}")
         if P is not None and status is Status.PROVEN:
-            out.append(f"P of degrees {P.degrees} on {P.segments} segment(s), found by {_FOUND[self.relaxation.kind]}")
+            out.append(f"{P.form}, found by {_FOUND[self.relaxation.kind]}")
             out.append(
                 "verified in floating point on the whole box, halved where needed; verify(rigorous=True) proves it in exact arithmetic"
             )

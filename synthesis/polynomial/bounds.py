@@ -12,13 +12,13 @@ from scipy import linalg
 from scipy.optimize import minimize
 
 from symheli.lpv import LPVStateSpace
-from synthesis.certificate import Trajectory
 from synthesis.frozen import FrozenGain, norm, to_continuous
 from synthesis.lower_bound import Search, growing_trajectory, lower_bound
 from synthesis.periodic import multiplier
 from synthesis.polynomial.inequalities import Demand
 from synthesis.polynomial.regions import Pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
+from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
 from synthesis.waves import steps
 

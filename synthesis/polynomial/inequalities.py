@@ -22,15 +22,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from synthesis.polynomial.matrix import PolynomialMatrix, block
 from synthesis.polynomial.regions import Number, Pieces, Region, exact, model_on, now, successor
+from synthesis.verdict import Kind
 
 Array = np.ndarray
-Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
 
 
 class Demand(NamedTuple):

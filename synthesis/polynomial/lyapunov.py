@@ -40,6 +40,11 @@ class BoxLyapunov:
         """Number of segments in each parameter."""
         return tuple(len(k) - 1 for k in self.knots)
 
+    @property
+    def form(self) -> str:
+        """The form in words."""
+        return f"V = x'P(p)x, P of degrees {self.degrees} on {self.segments} segment(s)"
+
     def segment(self, index: Sequence[int]) -> PolynomialMatrix:
         """P on one segment of each parameter."""
         box = tuple((float(k[j]), float(k[j + 1])) for k, j in zip(self.knots, index, strict=True))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import product
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -117,6 +117,12 @@ class Evidence(NamedTuple):
             if kind == "stability":
                 break
         return None
+
+    def conditioning(self, P: BoxLyapunov) -> float:
+        """Largest condition number of P in scaled coordinates, at its knots and a few values between; inf where P is not positive."""
+        axes = [np.unique([np.linspace(a, b, 5) for a, b in pairwise(k)]) for k in P.knots]
+        values = np.linalg.eigvalsh(self.units.to_scaled(P.at(np.array(list(product(*axes))))))
+        return float((values[:, -1] / values[:, 0]).max()) if values.min() > 0 else math.inf
 
     def floating(self, P: BoxLyapunov, bound: float) -> bool:
         """The whole box in floating point, and a grid of p through the model's own matrices."""

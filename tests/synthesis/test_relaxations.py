@@ -185,7 +185,7 @@ def test_a_grid_is_never_a_proof(analysis):
         assert math.isinf(cert.proven)
         assert cert.indicative == pytest.approx({l2_gain: 1, generalized_h2: math.sqrt(0.5), decay_rate: 1}[analysis], rel=1e-3)
     with pytest.raises(CertificateError):
-        replace(cert, verified=True, proven=1.0)
+        replace(cert, verified=True)
 
 
 @pytest.mark.parametrize("dt", [None, 0.2])
@@ -199,7 +199,7 @@ def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
         better = cert.proven * (1.02 if analysis is decay_rate else 0.98)
         # neither the bound nor P can be moved: negative P, or a bound better than P admits
         for bad in (
-            replace(cert, verified=False, proven=better),
+            replace(cert, verified=False, **{"alpha" if analysis is decay_rate else "gamma": better}),
             replace(cert, lyapunov=replace(P, coefficients=-P.coefficients)),
         ):
             assert not bad.verify()
@@ -219,11 +219,11 @@ def test_a_worst_trajectory_is_found_and_its_order_is_kept():
 
 def test_a_certificate_that_contradicts_a_frozen_model_cannot_be_made():
     cert = decay_rate(two_lags(), relaxation=QUICK, search=None)
-    with pytest.raises(CertificateError, match="frozen value"):
-        replace(cert, proven=1.01 * cert.frozen)
+    with pytest.raises(CertificateError, match="frozen decay rate"):
+        replace(cert, alpha=1.01 * cert.frozen)
     gain = l2_gain(two_lags(), relaxation=QUICK, search=None)
-    with pytest.raises(CertificateError, match="frozen value"):
-        replace(gain, proven=0.99 * gain.frozen)
+    with pytest.raises(CertificateError, match="frozen gain"):
+        replace(gain, gamma=0.99 * gain.frozen)
 
 
 def test_growth_along_a_trajectory_is_a_refusal():

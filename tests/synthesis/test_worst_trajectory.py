@@ -8,9 +8,9 @@ import pytest
 from models import fastest_growth, lateral, random_stable, spring
 
 from synthesis.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
-from synthesis.certificate import Trajectory
 from synthesis.corners import Corners, climb, gradient
 from synthesis.periodic import Lifted, gain, growth, ratio_from_rest, worst_input
+from synthesis.verdict import Trajectory
 from synthesis.waves import Wave, steps
 
 

@@ -1,0 +1,175 @@
+"""What every analysis answers: the truth between two bounds, under which hypotheses, and by which route."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from symheli.errors import CertificateError
+
+Array = np.ndarray
+Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
+
+
+class Status(Enum):
+    """How a certificate came out; the value is the sentence to print."""
+
+    PROVEN = "proven on the whole interval"
+    UNSTABLE = "no certificate exists: a model frozen at some p is not stable"
+    GROWING = "no certificate exists: a scheduling trajectory within the limits makes the state grow"
+    INFEASIBLE = "no Lyapunov function of this form exists, to the solver's accuracy; the model may still be stable"
+    UNPROVEN = "unproven on a grid: the inequalities hold at its points, between them nothing is known"
+    FAILED = "solver failed: what it returned could not be verified"
+
+
+class Seconds(NamedTuple):
+    """Wall time of each stage, s."""
+
+    build: float = 0.0
+    solve: float = 0.0
+    verify: float = 0.0
+    bounds: float = 0.0
+
+    def __str__(self) -> str:
+        return f"build {self.build:.2f} s, solve {self.solve:.2f} s, verify {self.verify:.2f} s, bounds {self.bounds:.2f} s"
+
+
+class Trajectory(NamedTuple):
+    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines (discrete time: samples) between them.
+
+    Several parameters: `p` (n, m).
+    """
+
+    time: Array
+    p: Array
+
+
+class Judge(Protocol):
+    """A model with its hypotheses, against which a Lyapunov function (with its multipliers) and a bound are checked."""
+
+    def floating(self, proof: Any, bound: float, /) -> bool:
+        """In floating point, with a margin for rounding."""
+        ...
+
+    def exact(self, proof: Any, bound: float, /) -> bool:
+        """In rational arithmetic."""
+        ...
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Verdict(ABC):
+    """A bound that holds for every p(t) within its range and rates, with its proof and its hypotheses.
+
+    kind          "l2 gain", "energy-to-peak gain", "decay rate" or "stability"
+    gamma         proven upper bound of a gain; inf where nothing was proven; NaN for the other kinds
+    lower         no upper bound can be smaller: from trajectories actually computed (inf: the state grows)
+    alpha         proven decay rate, 1/s: |x(t)| <= c exp(-alpha t) |x(0)|; -inf where nothing was proven; NaN for other kinds
+    upper         no larger decay rate can be proven, 1/s
+    frozen        the same from p constant alone; NaN for stability
+    status        a `Status`; its value is a sentence
+    verified      recomputed in floating point from the model and the proof alone
+    rates         bound on the rate of each parameter, in its units per second (inf: arbitrary; 0: frozen)
+    hypotheses    what the bound rests on, in sentences
+    solver        name, version and tolerance
+    seconds       wall time of each stage
+    conditioning  largest condition number of P in scaled coordinates, inf where there is none
+    attempts      every cone program that was tried; printed as a line each
+    worst         scheduling trajectory behind `lower` or `upper`, None where p is constant there
+    """
+
+    kind: Kind
+    gamma: float = math.nan
+    lower: float = math.nan
+    alpha: float = math.nan
+    upper: float = math.nan
+    frozen: float = math.nan
+    status: Status
+    verified: bool
+    rates: tuple[float, ...]
+    hypotheses: tuple[str, ...]
+    solver: str
+    seconds: Seconds
+    conditioning: float
+    attempts: tuple[Any, ...]
+    worst: Trajectory | None = None
+
+    def __post_init__(self) -> None:
+        """The order of the bounds. Raises `CertificateError`: one of two numbers that contradict each other is wrong."""
+        sign, moving = (-1.0, "upper bound") if self.kind == "decay rate" else (1.0, "lower bound")
+        what = self.kind.split()[-1] if self.kind.endswith("gain") else self.kind
+        # frozen and limit are computed to 1e-8, what is proven is loosened by 5e-7 at least
+        slack = 1e-6 * abs(self.proven) if math.isfinite(self.proven) else 0.0
+        for name, bound in ((f"frozen {what}", self.frozen), (moving, self.limit)):
+            if self.verified and sign * (bound - self.proven) > slack:
+                raise CertificateError(
+                    f"the {name} {bound:.9g} contradicts the certified {self.kind} {self.proven:.9g}; one of the two is wrong"
+                )
+        if sign * (self.frozen - self.limit) > 1e-9 * abs(self.frozen):
+            raise CertificateError(f"the {moving} {self.limit:.9g} forgets the frozen {what} {self.frozen:.9g}")
+        if self.verified and self.status is not Status.PROVEN:
+            raise CertificateError(f"a verified certificate cannot have the status {self.status.name}")
+
+    @property
+    def proven(self) -> float:
+        """`gamma` of a gain, `alpha` of a decay rate, NaN for stability."""
+        return self.alpha if self.kind == "decay rate" else self.gamma
+
+    @property
+    def limit(self) -> float:
+        """What no proof can beat: `lower` of a gain, `upper` of a decay rate, NaN for stability."""
+        return self.upper if self.kind == "decay rate" else self.lower
+
+    @property
+    def gap(self) -> float:
+        """gamma / lower, or upper / alpha: 1 means exact, inf that nothing is known; NaN for stability."""
+        above, below = (self.upper, self.alpha) if self.kind == "decay rate" else (self.gamma, self.lower)
+        return above / below if below > 0 else math.nan if math.isnan(below) else math.inf
+
+    @property
+    def rate(self) -> float:
+        """The rate of the one parameter; the largest of `rates` where there are several, 0 where there is none."""
+        return max(self.rates, default=0.0)
+
+    def verify(self, rigorous: bool = False) -> bool:
+        """Verify proof and bound anew; `rigorous`: in exact rational arithmetic (python-flint makes it fast).
+
+        Exact: the doubles of the model, of the proof, of rates and bound are taken as the rationals they are, and LDL'
+        factorisations decide; nothing between grid points is left out. Without a proof nothing is verified.
+        """
+        proof, judge = self._proof
+        if proof is None or judge is None:
+            return False
+        return (judge.exact if rigorous else judge.floating)(proof, self.proven)
+
+    @property
+    @abstractmethod
+    def _proof(self) -> tuple[Any, Judge | None]:
+        """What `verify` checks, and who judges it."""
+
+    @property
+    @abstractmethod
+    def _setting(self) -> str:
+        """How the bound was looked for, in some words."""
+
+    @property
+    @abstractmethod
+    def _form(self) -> str | None:
+        """The Lyapunov function in some words, None where there is none."""
+
+    def __str__(self) -> str:
+        lines = [f"{self.kind}, {self._setting}: {self.status.value}"]
+        if self.kind.endswith("gain"):
+            lines.append(f"  frozen {self.frozen:.6g} <= lower {self.lower:.6g} <= gain <= {self.gamma:.6g}")
+        elif self.kind == "decay rate":
+            lines.append(f"  {self.alpha:.6g} <= decay rate <= {self.upper:.6g} <= frozen {self.frozen:.6g}, 1/s")
+        if self._form is not None:
+            lines.append(f"  {self._form}, condition number {self.conditioning:.2g}")
+        lines.append(f"  {self.solver}; {self.seconds}")
+        lines += [f"  tried: {attempt}" for attempt in self.attempts]
+        lines += [f"  - {sentence}" for sentence in self.hypotheses]
+        return "\n".join(lines)
