@@ -93,7 +93,7 @@ def explained(arx: LPVARX, records: Sequence[FlightRecord], instruments: Instrum
     names = (*arx.inputs, *arx.outputs)
     tables = [_instrument_rows(arx, record, instruments, 0) for record in records]
     W, measured = np.vstack(tables), np.vstack([record.columns(names) for record in records])
-    known = np.isfinite(np.column_stack([W, measured])).all(axis=1)
+    known: Array = np.isfinite(np.column_stack([W, measured])).all(axis=1)
     if known.sum() <= W.shape[1]:
         raise ExcitationError(f"{W.shape[1]} instruments on {known.sum()} samples explain anything; record longer, or use fewer lags")
     Q = _range(W[known])
@@ -101,10 +101,12 @@ def explained(arx: LPVARX, records: Sequence[FlightRecord], instruments: Instrum
     found[known] = Q @ (Q.T @ measured[known])
     units = {str(s): s.unit for s in units_of(names, records)}
     ends = np.cumsum([len(r) for r in records])[:-1]
-    return tuple(
-        [r.with_signals(units, **dict(zip(names, part.T, strict=True))) for r, part in zip(records, np.split(table, ends), strict=True)]
-        for table in (np.where(known[:, None], measured, np.nan), found)
-    )
+
+    def replaced(table: Array) -> list[FlightRecord]:
+        parts = zip(records, np.split(table, ends), strict=True)
+        return [record.with_signals(units, **dict(zip(names, part.T, strict=True))) for record, part in parts]
+
+    return replaced(np.where(known[:, None], measured, np.nan)), replaced(found)
 
 
 def _instrument_rows(arx: LPVARX, record: FlightRecord, instruments: Instruments, first: int) -> Array:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from symheli.errors import SymheliError
 
@@ -70,7 +70,7 @@ class GainCurve:
         return words + "."
 
 
-def draw(curve: GainCurve, ax: Axes, *, legend: str = "upper left") -> Axes:
+def draw(curve: GainCurve, ax: Axes, *, legend: Literal["upper left", "upper right"] = "upper left") -> Axes:
     """Gain against acceleration on logarithmic axes: frozen at the left edge, an airspeed that jumps at the right.
 
     Shaded: grey where neither a proof nor growth is known, red where the state grows along a flown airspeed.
@@ -93,7 +93,8 @@ def draw(curve: GainCurve, ax: Axes, *, legend: str = "upper left") -> Axes:
     upper = {place[r]: g for r, g in curve.best.items()}
     both = [(x, g, upper[x]) for x, g in flown if x in upper]
     if both:
-        ax.fill_between(*zip(*both, strict=True), color=ORANGE, alpha=0.15, linewidth=0)
+        x, low_side, high_side = zip(*both, strict=True)
+        ax.fill_between(x, low_side, high_side, color=ORANGE, alpha=0.15, linewidth=0)
     for form, gains in curve.proven.items():
         points = sorted((place[r], g) for r, g in gains.items() if math.isfinite(g))
         if points:
