@@ -74,6 +74,8 @@ def dependence_report(model: LPVARXModel, records: FlightRecord | Iterable[Fligh
     little can be seen. Only what the regressors of the model do not explain themselves counts.
     """
     arx, records = model.structure, as_records(records)
+    for record in records:
+        model.require_same_kind(record)
     other = replace(arx, scheduling_at="now" if arx.scheduling_at == "lag" else "lag")
     data, extra = stacked(arx, records), stacked(other, records)
     common, mine, theirs = np.intersect1d(data.rows, extra.rows, return_indices=True)

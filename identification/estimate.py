@@ -19,7 +19,7 @@ from identification.recursive_least_squares import RecursiveLeastSquares
 from identification.refined_instruments import Refined, refined_instruments
 from identification.regressors import Regression, as_records, stacked, units_of
 from identification.ridge import Ridge, ridge
-from identification.structure import LPVARX
+from identification.structure import LPVARX, require_structure
 from symheli.errors import ConvergenceWarning, ExcitationError, InputError, UnknownNameError
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
@@ -64,6 +64,7 @@ def fit(
     penalty does not either), `UnknownNameError` for signals the record lacks, `InputError` where p leaves the range of the
     basis or an option does not fit the method. Warns (`ConvergenceWarning`) where an iteration does not settle.
     """
+    require_structure(structure)
     records = as_records(records)
     _check(method, forgetting, instruments, options)
     outputs, inputs = units_of(structure.outputs, records), units_of(structure.inputs, records)

@@ -102,7 +102,7 @@ def _report(arx: LPVARX, data: Regression, group: Group) -> ExcitationReport:
     rank = int(np.sum(values > RANK_TOLERANCE * max(values[0], 1e-300)))
     ranges, scheduling = arx.basis.ranges, ", ".join(arx.parameters)
     distinct, needed = distinct_values(data.p, ranges), arx.basis.distinct_values
-    bins = [np.histogram(p, bins=BINS, range=limits) for p, limits in zip(data.p.reshape(len(data.p), -1).T, ranges, strict=True)]
+    bins = [np.histogram(p, bins=BINS, range=limits) for p, limits in zip(data.p.reshape(-1, len(ranges)).T, ranges, strict=True)]
     occupancy, edges = (np.array(parts[0] if len(ranges) == 1 else parts) for parts in zip(*bins, strict=True))
     weakest = directions[-1]
     reason = ""

@@ -63,9 +63,9 @@ def frequency_response(
     records = as_records(records)
     outputs, inputs = units_of(outputs, records), units_of(inputs, records)
     dt = records[0].dt
-    n = round(window / dt)
-    if n < 8:
+    if not 7.5 * dt < window < np.inf:
         raise InputError(f"window: expected at least eight samples, {8 * dt:.3g} s, got {window} s")
+    n = round(window / dt)
     omega = 2 * np.pi * np.fft.rfftfreq(n, dt)
     low, high = band or (2 * np.pi / window, np.pi / dt)
     keep = (omega >= low * (1 - 1e-9)) & (omega <= high * (1 + 1e-9)) & (omega > 0)

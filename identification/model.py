@@ -13,6 +13,7 @@ import numpy as np
 from identification import prediction, realization
 from identification.coefficients import Coefficients
 from identification.excitation import ExcitationReport
+from identification.regressors import check_units
 from identification.structure import LPVARX
 from symheli.errors import InputError
 from symheli.lpv import FlightRecord, FunctionSpace, LinearModel, LPVStateSpace, NamedVector, Reduction, Scheduling, Signal, signals
@@ -60,8 +61,8 @@ class LPVARXModel:
             raise InputError(f"signals {given} are not those of the structure: {own}")
         if np.any(self.theta[~arx.free]):
             raise InputError("theta: coefficients that the structure leaves out must be zero")
-        if not self.dt > 0:
-            raise InputError(f"dt must be a positive number of seconds, got {self.dt}")
+        if not (isinstance(self.dt, int | float | np.floating) and 0 < self.dt < np.inf):
+            raise InputError(f"dt must be a positive number of seconds, got {self.dt!r}")
 
     @property
     def parameters(self) -> tuple[Signal, ...]:
@@ -77,7 +78,7 @@ class LPVARXModel:
         """Predictions (n, ny) `horizon` samples ahead: outputs known up to t - horizon, inputs and p up to t.
 
         NaN where a past is incomplete: the first memory + horizon - 1 samples of each segment, and behind missing
-        samples. Infinite where the prediction overflows. Raises `InputError` for another sample period.
+        samples. Infinite where the prediction overflows. Raises `InputError` for another sample period or unit.
         """
         return prediction.predict(self._along(record), horizon)
 
@@ -85,7 +86,7 @@ class LPVARXModel:
         """Free run (n, ny) from the first samples of each segment with the record's inputs and p.
 
         NaN for the samples the run starts from and where inputs or p are missing (behind which it starts again);
-        infinite from where it diverges. Raises `InputError` for another sample period.
+        infinite from where it diverges. Raises `InputError` for another sample period or unit.
         """
         return prediction.simulate(self._along(record))
 
@@ -140,7 +141,12 @@ class LPVARXModel:
 
         return saved_model.save_mat(self, path)
 
-    def _along(self, record: FlightRecord) -> prediction.Recursion:
+    def require_same_kind(self, record: FlightRecord) -> None:
+        """Raises `InputError` where `record` has another sample period, or a signal of the model in another unit."""
+        check_units((*self.outputs, *self.inputs, *self.parameters), record)
         if abs(record.dt - self.dt) > 0.01 * self.dt:
             raise InputError(f"the model was identified at dt = {self.dt:.4g} s, the record has {record.dt:.4g} s; resample it")
+
+    def _along(self, record: FlightRecord) -> prediction.Recursion:
+        self.require_same_kind(record)
         return prediction.Recursion.along(self.structure, self.theta, record)

@@ -44,7 +44,14 @@ class Online:
         return status & LEARNT != 0
 
     def absorb(self, phi: Array, y: Array) -> bool:
-        """Take in one regressor phi (n,) with the outputs y (ny,) it must explain, float64; the lags are left alone."""
+        """Take in one regressor phi (n,) with the outputs y (ny,) it must explain; the lags are left alone.
+
+        Raises `InputError` for another shape and numbers that are not finite; the estimator is then as before.
+        """
+        arx = self._configuration.structure
+        phi, y = vector(phi, arx.n_regressors, "phi"), vector(y, arx.ny, "y")
+        if not (np.isfinite(phi).all() and np.isfinite(y).all()):
+            raise InputError("phi and y must be finite; leave an incomplete regressor out")
         self._status = self._kernel.absorb(self._state, self._work, phi, y)
         return True
 

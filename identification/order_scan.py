@@ -91,6 +91,8 @@ def order_scan(
     basis = structure.basis
     if not isinstance(basis, Polynomial):
         raise InputError(f"an order scan varies the degree of a polynomial basis; this one is {basis}")
+    if not (orders and degrees):
+        raise InputError("orders, degrees: name at least one of each")
     train, test = as_records(training), as_records(validation)
     trials = []
     for degree, na in product(degrees, orders):

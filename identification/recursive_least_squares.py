@@ -13,10 +13,10 @@ from identification import kernel, saved_state
 from identification.forgetting import FLOOR, Constant, Directional, Forgetting, Variable, check_floor
 from identification.history import History
 from identification.kernel.configuration import Configuration
-from identification.online import Online, vector
+from identification.online import Online
 from identification.regressors import Samples, as_records, units_of
 from identification.rls_state import RLSInfo, RLSState
-from identification.structure import LPVARX
+from identification.structure import LPVARX, require_structure
 from symheli.errors import InputError
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
@@ -46,6 +46,7 @@ class RecursiveLeastSquares:
     precision: Literal["double", "single"] = "double"
 
     def __post_init__(self) -> None:
+        require_structure(self.structure)
         if self.precision not in PRECISIONS:
             raise InputError(f'precision: expected "double" or "single", got {self.precision!r}')
         if isinstance(self.forgetting, Constant | Variable | Directional):
@@ -87,14 +88,17 @@ class RecursiveLeastSquares:
     def absorb(self, state: RLSState, phi: Array, y: Array) -> tuple[RLSState, RLSInfo]:
         """Take in one regressor phi (n,) with the outputs y (ny,) it must explain."""
         online = self.online(state)
-        return _outcome(online, online.absorb(vector(phi, self.structure.n_regressors, "phi"), vector(y, self.structure.ny, "y")))
+        return _outcome(online, online.absorb(phi, y))
 
     def run(self, record: FlightRecord, state: RLSState | None = None) -> History:
         """Every sample of a record in turn, from `state` or from nothing; lags never reach across a gap.
 
         The same as `update` sample by sample.
         """
-        arx, (record,) = self.structure, as_records(record)
+        arx, records = self.structure, as_records(record)
+        if len(records) > 1:
+            raise InputError(f"run takes one record, got {len(records)}; go on from its state: run(second, run(first).state)")
+        record = records[0]
         s, online = Samples.of(arx, record), self.online(state)
         rows = np.column_stack([s.y, s.u, s.p])
         online.forget_past()
@@ -125,6 +129,8 @@ class RecursiveLeastSquares:
     def _own(self, state: RLSState | None) -> RLSState:
         if state is None:
             return self.init()
+        if not isinstance(state, RLSState):
+            raise InputError(f"state: expected one from init, update, run or load, got {state!r:.80}")
         if state.configuration.structure != self.structure or state.memory.dtype != self.configuration.dtype:
             raise InputError("state: it belongs to an estimator with another structure or precision; start with init()")
         return state

@@ -12,6 +12,9 @@ from symheli.errors import InputError
 from symheli.lpv import FlightRecord, Signal
 from symheli.lpv.arrays import Array
 
+SIZES = 1e-70, 1e70
+"""A signal that nowhere exceeds the first, or somewhere the second, is refused: sums of its squares under- or overflow."""
+
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -28,8 +31,10 @@ class Samples:
 
     @classmethod
     def of(cls, arx: LPVARX, record: FlightRecord) -> Samples:
-        """Raises `UnknownNameError` for a signal the record lacks, `InputError` where p leaves the range of the basis."""
+        """Raises `UnknownNameError` for a signal the record lacks, `InputError` where p leaves the basis or a size is absurd."""
         p = scheduling_values(arx, record)
+        for name in (*arx.outputs, *arx.inputs):
+            _check_size(name, record[name])
         return cls(record.columns(arx.outputs), record.columns(arx.inputs), p, basis_values(arx, p), record.segments())
 
 
@@ -113,13 +118,20 @@ def stacked(arx: LPVARX, records: Sequence[FlightRecord]) -> Regression:
 
 def as_records(records: FlightRecord | Iterable[FlightRecord]) -> tuple[FlightRecord, ...]:
     """One or several records as a tuple; raises `InputError` where they are none, or differ in sample period or units."""
-    out = (records,) if isinstance(records, FlightRecord) else tuple(records)
+    out = (records,) if isinstance(records, FlightRecord) else tuple(records) if isinstance(records, Iterable) else ()
     if not out or not all(isinstance(r, FlightRecord) for r in out):
         raise InputError("expected a FlightRecord or a list of them; build one with FlightRecord.from_frame, from_csv, ...")
     periods = [r.dt for r in out]
     if max(periods) - min(periods) > 0.01 * min(periods):
         raise InputError(f"the records differ in sample period ({min(periods):.4g} to {max(periods):.4g} s); resample them to one dt")
     return out
+
+
+def check_units(signals: Iterable[Signal], record: FlightRecord) -> None:
+    """Raises `InputError` where `record` has one of these signals in another unit, `UnknownNameError` where it lacks one."""
+    for signal, found in zip(signals, units_of([str(s) for s in signals], [record]), strict=True):
+        if signal.unit != found.unit:
+            raise InputError(f"{str(signal)!r} is in {found.unit} in the record, the model was identified in {signal.unit}")
 
 
 def units_of(names: Sequence[str], records: Sequence[FlightRecord]) -> tuple[Signal, ...]:
@@ -134,3 +146,9 @@ def units_of(names: Sequence[str], records: Sequence[FlightRecord]) -> tuple[Sig
             raise InputError(f"{name!r} has different units in the records: {', '.join(sorted(set(found)))}")
         out.append(Signal(name, found[0]))
     return tuple(out)
+
+
+def _check_size(name: str, signal: Array) -> None:
+    size, (low, high) = float(np.max(np.abs(signal), initial=0.0, where=np.isfinite(signal))), SIZES
+    if size > high or 0 < size < low:
+        raise InputError(f"{name} reaches {size:.3g}, {'beyond' if size > high else 'below'} what squares can express; check its unit")

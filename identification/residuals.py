@@ -13,11 +13,14 @@ from symheli.errors import InputError
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
 
+ROUNDING = 1e-14
+"""An error below this fraction of the signals' size is rounding: it has no causes to share out."""
+
 
 class Theil(NamedTuple):
     """Theil's inequality coefficient in [0, 1] (0: perfect) and the shares of the mean squared error, which sum to 1.
 
-    bias: a wrong mean; variance: a wrong size; covariance: the rest, noise and wrong phase. A good model errs by covariance.
+    (All are 0 where the error is rounding.) bias: a wrong mean; variance: a wrong size; covariance: the rest, noise and wrong phase. A good model errs by covariance.
     """
 
     coefficient: float
@@ -98,7 +101,7 @@ def theil(measured: Array, predicted: Array) -> Theil:
         raise InputError("theil: expected two finite arrays (n,) of one length")
     square = float(np.mean((measured - predicted) ** 2))
     size = float(np.sqrt(np.mean(measured**2)) + np.sqrt(np.mean(predicted**2)))
-    if square == 0:
+    if np.sqrt(square) <= ROUNDING * size:
         return Theil(0.0, 0.0, 0.0, 0.0)
     a, b = measured - measured.mean(), predicted - predicted.mean()
     bias = float((measured.mean() - predicted.mean()) ** 2) / square

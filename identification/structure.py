@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -103,6 +103,9 @@ class LPVARX:
             )
         if self.scheduling_at not in ("lag", "now"):
             raise InputError(f'scheduling_at: expected "lag" or "now", got {self.scheduling_at!r}')
+        for flag in ("offset", "offset_rate"):
+            if not isinstance(getattr(self, flag), bool):
+                raise InputError(f"{flag}: expected True or False, got {getattr(self, flag)!r}")
         empty = [y for y, used in zip(self.outputs, self.free.T, strict=True) if not used.any()]
         if empty:
             raise InputError(f"nothing to identify for {', '.join(empty)}: give na >= 1, or nb >= 1 with inputs, or offset=True")
@@ -239,8 +242,14 @@ def _at(lag: int) -> str:
     return f"(k-{lag})" if lag else "(k)"
 
 
+def require_structure(value: object) -> None:
+    """Raises `InputError` for anything but a structure."""
+    if not isinstance(value, LPVARX):
+        raise InputError(f"structure: expected LPVARX(outputs=..., inputs=..., scheduling=..., ...), got {value!r:.80}")
+
+
 def _names(value: object, group: str) -> tuple[str, ...]:
-    names = (value,) if isinstance(value, str) else tuple(value)  # type: ignore[arg-type]
+    names = (value,) if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
     if not all(isinstance(n, str) for n in names):
         raise InputError(f"{group}: expected names of signals, got {value!r}")
     if len(set(names)) != len(names):

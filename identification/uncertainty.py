@@ -30,6 +30,8 @@ class Band(NamedTuple):
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Lower and upper end (n,) of the normal confidence interval at each p."""
+        if not 0 < level < 1:
+            raise InputError(f"level: expected a share in (0, 1) such as 0.95, got {level!r}")
         half = norm.ppf(0.5 + 0.5 * level) * self.standard_error
         return self.value - half, self.value + half
 
@@ -88,13 +90,15 @@ def uncertainty(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecor
     arx = model.structure
     if model.method not in ("ls", "rls"):
         raise InputError(f'uncertainty is that of least squares; the model was fitted by "{model.method}"')
+    for record in records:
+        model.require_same_kind(record)
     data = stacked(arx, records)
     if len(data.phi) <= arx.n_regressors:
         raise InputError(f"{len(data.phi)} usable samples say nothing about the certainty of {arx.n_regressors} coefficients an output")
     runs = _runs(data)
     longest = max(run.stop - run.start for run in runs)
     reach = min(max(longest // 5, 1), longest - 1) if lags is None else lags
-    if not 0 <= reach < longest:
+    if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
     error = data.y - data.phi @ model.theta
     covariance, white = (np.zeros((arx.ny, arx.n_regressors, arx.n_regressors)) for _ in range(2))

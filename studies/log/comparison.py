@@ -14,6 +14,9 @@ from symheli.lpv import FlightRecord
 PAYS = 1.0
 """Scheduling pays where it adds more than this many points of held-out fit 1 s ahead, and loses no more in free run."""
 
+STILL = 1e-6
+"""A scheduling signal that moves by less than this part of its size stays where it is."""
+
 HORIZONS = ("one step", "1 s", "free run")
 
 
@@ -81,7 +84,7 @@ def scheduling_range(values: np.ndarray, degree: int) -> tuple[float, float]:
     if not len(known):
         raise InputError("the scheduling signal has no sample that is a number")
     low, high = float(known.min()), float(known.max())
-    if high > low:
+    if high - low > STILL * max(abs(low), abs(high)):
         return low, high
     if degree > 0:
         raise InputError(f"the scheduling signal stays at {low:g}: a model scheduled by it cannot be told; --degree 0 fits an LTI model")

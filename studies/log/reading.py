@@ -39,7 +39,7 @@ def read(
     """The record, on a uniform step where `dt` (s) says so.
 
     X-Plane logs declare their units. Elsewhere `units` declares those of `signals`; the names every room knows (u, q, theta,
-    ...) are SI unless declared otherwise. `time` and `dt` together resample. Raises `InputError`.
+    ...) are SI unless declared otherwise. A time column and `dt` together resample. Raises `InputError`.
     """
     if format == "xplane":
         return FlightRecord.from_xplane(path, dt)
@@ -61,11 +61,11 @@ def _undeclared(name: str) -> str:
 
 
 def _time_column(path: Path, dt: float | None) -> str | None:
-    if dt is not None:
-        return None
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         header = [name.strip().strip('"') for name in file.readline().split(",")]
     for name in TIMES:
         if name in header:
             return name
+    if dt is not None:
+        return None
     raise InputError(f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample period with --dt")

@@ -19,6 +19,8 @@ def frozen(value: Any, name: str, shape: Sequence[int | None] | None = None, *, 
     expected and the received shape, or with the index of the first entry that is not finite.
     """
     try:
+        if np.iscomplexobj(value):
+            raise TypeError("complex numbers")
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name}: expected numbers, got {value!r:.80}") from error

@@ -24,6 +24,8 @@ def with_norm(record: FlightRecord, parts: Sequence[str], name: str = "speed") -
 
 def smooth(record: FlightRecord, name: str, seconds: float) -> FlightRecord:
     """`name` after a causal first-order low-pass with this time constant (s), started anew in each segment and behind missing samples."""
+    if not 0 < seconds < math.inf:
+        raise InputError(f"seconds: expected a positive time constant, got {seconds}")
     signal, out = record[name], np.full(len(record), np.nan)
     for part in record.segments():
         state = math.nan
@@ -46,6 +48,8 @@ def low_pass(record: FlightRecord, cutoff: float, order: int = 4, *, zero_phase:
     rate = 1 / record.dt
     if not 0 < cutoff < rate / 2 or order < 1:
         raise InputError(f"cutoff: expected a frequency between 0 and {rate / 2:.4g} Hz (half the sampling frequency), got {cutoff}")
+    if not isinstance(order, int | np.integer):
+        raise InputError(f"order: expected a whole number >= 1, got {order!r}")
     for name in leave:
         record.columns([name])  # raises UnknownNameError with the nearest names
     sos, out = np.asarray(butter(order, cutoff, fs=rate, output="sos")), record.values.copy()
@@ -74,6 +78,8 @@ def _filtered(sos: Array, x: Array, zero_phase: bool) -> Array:
 
 def decimate(record: FlightRecord, n: int) -> FlightRecord:
     """Means of `n` samples in a row, all signals alike: a linear relation between them is kept, noise and dt change."""
+    if not isinstance(n, int | np.integer) or n < 1:
+        raise InputError(f"expected a whole number of samples >= 1 to take together, got {n!r}")
     if n == 1:
         return record
     times, values = [], []
@@ -81,7 +87,7 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
         rows = (part.stop - part.start) // n
         stop = part.start + rows * n
         times.append(record.time[part.start : stop].reshape(rows, n).mean(axis=1))
-        values.append(record.values[part.start : stop].reshape(rows, n, -1).mean(axis=1))
+        values.append(record.values[part.start : stop].reshape(rows, n, len(record.signals)).mean(axis=1))
     if sum(map(len, times)) < 2:
         raise InputError(f"taking {n} samples together leaves fewer than two; the record has {len(record)}")
     return replace(record, time=np.concatenate(times), values=np.concatenate(values))

@@ -23,6 +23,10 @@ GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""
 
 
+FINER = 1e4
+"""`resample` refuses a step that makes this many times as many samples."""
+
+
 @dataclass(frozen=True, eq=False)
 class FlightRecord:
     """Samples `values` (n, m) of `signals` at `time` (n,) in s, in SI units and radians.
@@ -59,7 +63,7 @@ class FlightRecord:
     def from_arrays(cls, time: object, units: Mapping[str, str], note: str = "", **columns: Any) -> FlightRecord:
         """From one array a signal, all as long as `time` (s); `units` declares the unit of each signal."""
         values, names = [], []
-        length = len(np.asarray(time))
+        length = np.size(time)
         for name, column in columns.items():
             if name not in units:
                 raise InputError(f"declare the unit of {name!r}: units={{{name!r}: ...}} ('1' where it has none)")
@@ -192,10 +196,14 @@ class FlightRecord:
 
         To a longer step: `low_pass` or `decimate` first, or what is faster folds back into what is slower.
         """
-        if not dt > 0:
+        if not 0 < dt < np.inf:
             raise InputError(f"dt must be a positive number of seconds, got {dt}")
+        parts = self.segments()
+        samples = sum(float(self.time[part.stop - 1] - self.time[part.start]) for part in parts) / dt
+        if samples > FINER * len(self):
+            raise InputError(f"dt of {dt:g} s makes {samples:.1e} samples of {len(self)}; dt is in seconds")
         times, values, offset = [], [], None
-        for part in self.segments():
+        for part in parts:
             old = self.time[part]
             offset = old[0] if offset is None else offset
             new = offset + dt * np.arange(np.ceil((old[0] - offset) / dt - 1e-9), np.floor((old[-1] - offset) / dt + 1e-9) + 1)

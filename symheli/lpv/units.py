@@ -40,6 +40,8 @@ def to_si(unit: str) -> tuple[float, str]:
 
     Products, powers and quotients of known units are units too: "slug ft^2", "ft/s^2/rad", "1/(ft s)".
     """
+    if not isinstance(unit, str):
+        raise InputError(f"unit: expected a text such as 'deg/s' ('1' where there is none), got {unit!r}")
     if unit in _TO_SI:
         return _TO_SI[unit]
     factor, powers = _parse(unit)

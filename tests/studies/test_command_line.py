@@ -188,6 +188,17 @@ def test_identify_says_where_scheduling_does_not_pay(run, tmp_path):
     assert "scheduling does NOT pay" in out
 
 
+def test_a_step_beside_a_time_column_resamples_by_that_column(answer, run, tmp_path):
+    log = scheduled_csv(tmp_path / "log.csv")
+    assert answer("identify", log, *STRUCTURE, *UNITS, "--dt", 0.1)["read"]["samples"] == 450
+    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--dt", 1e-9)
+    assert status == 1
+    assert "dt is in seconds" in error
+    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--delay", 5000)
+    assert status == 1
+    assert "0 usable samples" in error
+
+
 def test_identify_cuts_decimates_smooths_and_fits_lti_models(answer, tmp_path):
     log = scheduled_csv(tmp_path / "log.csv")
     options = ("--start", 5, "--stop", 35, "--decimate", 2, "--smooth-scheduling", 0.5, "--train", 0.5, "--scheduling-at", "now")
