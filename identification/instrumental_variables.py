@@ -93,7 +93,7 @@ def explained(arx: LPVARX, records: Sequence[FlightRecord], instruments: Instrum
     names = (*arx.inputs, *arx.outputs)
     tables = [_instrument_rows(arx, record, instruments, 0) for record in records]
     W, measured = np.vstack(tables), np.vstack([record.columns(names) for record in records])
-    known: Array = np.isfinite(np.column_stack([W, measured])).all(axis=1)
+    known = np.logical_and(np.isfinite(W).all(axis=1), np.isfinite(measured).all(axis=1))
     if known.sum() <= W.shape[1]:
         raise ExcitationError(f"{W.shape[1]} instruments on {known.sum()} samples explain anything; record longer, or use fewer lags")
     Q = _range(W[known])
