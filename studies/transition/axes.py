@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 import symheli
-from identification import LPVARX, LPVARXModel, Polynomial, fit
+from identification import LPVARX, LPVARXModel, Polynomial, RecursiveLeastSquares, fit
 from studies.transition.flights import TOP
 from symheli import FlightRecord, Helicopter, LinearModel
 
@@ -95,3 +96,13 @@ def instruments(axis: Axis) -> tuple[str, ...]:
 def identify(axis: Axis, training: FlightRecord, method: str = "rls", order: int = 3, degree: int = 2) -> LPVARXModel:
     """Fit `axis` to a training flight; "iv" takes the excitation of its inputs as instruments."""
     return fit(axis.structure(order, degree), training, method=method, instruments=instruments(axis) if method == "iv" else ())  # type: ignore[arg-type]
+
+
+def update_time(axis: Axis, flight: FlightRecord) -> float:
+    """Processor time (s) of one recursive update of the axis's coefficients along a flight, lags and basis included."""
+    online = RecursiveLeastSquares(axis.structure()).online()
+    rows = flight.columns((*axis.outputs, *axis.inputs, SCHEDULING))
+    online.run(rows, history=False)
+    begin = time.thread_time()
+    online.run(rows, history=False)
+    return (time.thread_time() - begin) / len(rows)

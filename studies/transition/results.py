@@ -70,6 +70,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         }
         for (axis, noise), s in study.scores.items()
     }
+    out["time of one recursive update"] = named(study.update_times, "s")
     out["rotor mode miss at 30 dB, order 2"] = {
         f"{axis}, {method}": named(misses, "%") for (axis, method), misses in study.noisy_modes.items()
     }

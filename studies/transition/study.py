@@ -119,6 +119,7 @@ def _identify(study: Study) -> None:
             model = axes.identify(axis, training, "rls" if axis in AXES else "ls")
             study.models[f"{axis.name}, {noise}"] = model
             study.scores[axis.name, noise] = axes.scores(heli, axis, model, test)
+    study.update_times = {axis.name: axes.update_time(axis, study.flights["training, 30 dB"]) for axis in (*AXES, ALL)}
     for axis in AXES:
         for method in ("ls", "iv"):
             model = axes.identify(axis, study.flights["training, 30 dB"], method, order=2)

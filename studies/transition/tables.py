@@ -172,6 +172,16 @@ def findings(study: Outcome) -> list[str]:
             + ", ".join(f"{d:+.0f} points for {y}" for y, d in change.items())
             + "."
         )
+    if study.update_times:
+        each = ", ".join(f"{1e6 * seconds:.2g} us ({name})" for name, seconds in study.update_times.items())
+        regressors, period = ALL.structure().n_regressors, next(iter(study.flights.values())).dt
+        share = 100 * study.update_times[ALL.name] / period
+        out.append(
+            f"One recursive update took {each} of processor time; with {len(ALL.outputs)} outputs and {regressors} regressors each that is "
+            f"{share:.2g} % of the sample period: the recursion is not too heavy for real time."
+            if share < 50
+            else f"One recursive update took {each} of processor time, {share:.0f} % of the sample period with all outputs."
+        )
     for name, peak in study.frozen_peaks.items():
         if math.isfinite(peak.gamma):
             out.append(f"Servo channel, {name}: the largest frozen gain is at {peak.p:.1f} m/s and {peak.omega:.2g} rad/s.")
