@@ -17,8 +17,8 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
-from symheli.lpv import LPVStateSpace
 from synthesis.periodic import Sensitivity, gain, growth
+from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 from synthesis.waves import Steps, steps
 
@@ -65,7 +65,7 @@ def on_nodes(trajectory: Trajectory, nodes: int, dt: float | None) -> Trajectory
 
 
 def ascend(
-    lpv: LPVStateSpace, rate: float, start: Trajectory, objective: Objective, longest: float, evaluations: int
+    lpv: Scheduled, rate: float, start: Trajectory, objective: Objective, longest: float, evaluations: int
 ) -> tuple[Trajectory, float]:  # fmt: skip
     """(cycle, measure of it) from `start` on equal intervals: no cycle longer than `longest` s, at most so many gradients."""
     s = lpv.scheduling
@@ -86,7 +86,7 @@ def ascend(
     return best, here.value
 
 
-def _gradient(lpv: LPVStateSpace, cycle: Trajectory, objective: Objective) -> tuple[Sensitivity, Array]:
+def _gradient(lpv: Scheduled, cycle: Trajectory, objective: Objective) -> tuple[Sensitivity, Array]:
     """The measure, and the gradient (N + 1,) of the score: by p at each node, and by the logarithm of the period.
 
     The steps are differenced, which costs three more evaluations: every second node moves at once, so that each step
@@ -112,7 +112,7 @@ def _gradient(lpv: LPVStateSpace, cycle: Trajectory, objective: Objective) -> tu
     return found, out / (period if objective.a_second else 1.0)
 
 
-def _along(lpv: LPVStateSpace, cycle: Trajectory) -> Steps:
+def _along(lpv: Scheduled, cycle: Trajectory) -> Steps:
     return steps(lpv, cycle.time, cycle.p, float(cycle.time[-1]))
 
 

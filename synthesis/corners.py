@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from symheli.lpv import LPVStateSpace
 from synthesis.ascent import Objective
+from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 from synthesis.waves import Steps, steps
 
@@ -58,12 +58,12 @@ class Corners(NamedTuple):
 class _Path(NamedTuple):
     """A model along corners in a fixed number of steps for every rest and ramp (2 k,), of which some last no time."""
 
-    lpv: LPVStateSpace
+    lpv: Scheduled
     rate: float
     counts: Array
 
     @classmethod
-    def along(cls, lpv: LPVStateSpace, corners: Corners, rate: float, longest: float) -> _Path:
+    def along(cls, lpv: Scheduled, corners: Corners, rate: float, longest: float) -> _Path:
         duration = np.diff(corners.cycle(rate).time)
         return cls(lpv, rate, np.maximum(np.ceil(duration / longest), 1).astype(int))
 
@@ -80,7 +80,7 @@ class _Path(NamedTuple):
         return steps(self.lpv, np.append(np.concatenate(inner), time[-1]), np.append(np.concatenate(values), p[-1]), float(time[-1]))
 
 
-def gradient(lpv: LPVStateSpace, corners: Corners, rate: float, objective: Objective, longest: float) -> tuple[float, Array, Array]:
+def gradient(lpv: Scheduled, corners: Corners, rate: float, objective: Objective, longest: float) -> tuple[float, Array, Array]:
     """(score, its gradient by the rests (k,) and by the levels (k,)); `longest` step in s.
 
     All rests are stretched at once, then every second level is moved: each step feels one of them alone.
@@ -116,7 +116,7 @@ def gradient(lpv: LPVStateSpace, corners: Corners, rate: float, objective: Objec
 
 
 def climb(
-    lpv: LPVStateSpace, rate: float, start: Corners, objective: Objective, longest: float, period: float, evaluations: int
+    lpv: Scheduled, rate: float, start: Corners, objective: Objective, longest: float, period: float, evaluations: int
 ) -> Corners:  # fmt: skip
     """The best corners an ascent from `start` meets, in steps of at most `longest` s and cycles of about `period` s at most.
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from symheli.lpv import LPVStateSpace
+from synthesis.scheduled import Scheduled
 
 Array = np.ndarray
 
@@ -21,15 +22,16 @@ class FrozenGain(NamedTuple):
     omega: float
 
 
-def frozen_gain(lpv: LPVStateSpace, *, points: int = 61, tolerance: float = 1e-8) -> FrozenGain:
+def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) -> FrozenGain:
     """max over p of the H-infinity norm of the frozen models, by a grid of `points` and local search around its peaks.
 
     Each norm by the level-set method on a Hamiltonian matrix (Boyd and Balakrishnan 1990; Bruinsma and Steinbuch 1990),
-    to a relative `tolerance` from below. gamma is inf where a frozen model is unstable.
+    to a relative `tolerance` from below. gamma is inf where a frozen model is unstable. The breaks of a spline are on the grid.
     """
     low, high = lpv.scheduling.low, lpv.scheduling.high
     grid = np.linspace(low, high, points)
-    grid = np.unique(np.concatenate([grid, [p for piece in lpv.basis.pieces() for p in (piece.low, piece.high) if low < p < high]]))
+    if isinstance(lpv, LPVStateSpace):
+        grid = np.unique(np.concatenate([grid, [p for piece in lpv.basis.pieces() for p in (piece.low, piece.high) if low < p < high]]))
     found: list[FrozenGain] = []
     for p in grid:
         gain, omega = norm(*lpv.matrices(float(p)), lpv.dt, tolerance)
@@ -48,7 +50,7 @@ def frozen_gain(lpv: LPVStateSpace, *, points: int = 61, tolerance: float = 1e-8
     return best
 
 
-def least_damped(lpv: LPVStateSpace, points: int = 201) -> tuple[float, float]:
+def least_damped(lpv: Scheduled, points: int = 201) -> tuple[float, float]:
     """(stability margin, p) of the worst frozen model: min of -Re(pole) (rad/s), or of 1 - |pole| in discrete time."""
     grid = np.linspace(lpv.scheduling.low, lpv.scheduling.high, points)
     poles = np.linalg.eigvals(lpv.matrices(grid).A)

@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace
 from synthesis.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
 from synthesis.corners import Corners, climb
 from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.periodic import Lifted, multiplier, ratio_from_rest, worst_input
+from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
 from synthesis.waves import Steps, steps
@@ -72,12 +72,12 @@ class LowerBound(NamedTuple):
 
 
 def lower_bound(
-    lpv: LPVStateSpace, rate: float | None = None, *, frozen: FrozenGain | None = None, search: Search | None = THOROUGH
+    lpv: Scheduled, rate: float | None = None, *, frozen: FrozenGain | None = None, search: Search | None = THOROUGH
 ) -> LowerBound:
     """A lower bound of the L2 gain over p(t) in range with |dp/dt| <= `rate` (default the model's own; inf: p may jump).
 
-    Deterministic. With `search` None, or rate 0, the `frozen` gain. In continuous time the error of the time steps, judged
-    by halving them, is taken off.
+    `lpv` may also be an LFT of one parameter. Deterministic. With `search` None, or rate 0, the `frozen` gain. In continuous
+    time the error of the time steps, judged by halving them, is taken off.
     """
     rate = lpv.scheduling.rate if rate is None else float(rate)
     frozen = frozen or frozen_gain(lpv)
@@ -103,7 +103,7 @@ def lower_bound(
     return explicit if explicit.gamma > best.gamma else best
 
 
-def growing_trajectory(lpv: LPVStateSpace, rate: float, search: Search | None = THOROUGH) -> Trajectory | None:
+def growing_trajectory(lpv: Scheduled, rate: float, search: Search | None = THOROUGH) -> Trajectory | None:
     """One cycle of a p(t) within the limits along which the free state grows, repeated; None where none was found."""
     if search is None or rate == 0:
         return None
@@ -114,7 +114,7 @@ def growing_trajectory(lpv: LPVStateSpace, rate: float, search: Search | None = 
 class _Hunt:
     """The search along one model at one rate."""
 
-    def __init__(self, lpv: LPVStateSpace, rate: float, search: Search):
+    def __init__(self, lpv: Scheduled, rate: float, search: Search):
         self.lpv, self.rate, self.search = lpv, rate, search
         self.family = WaveFamily(lpv, rate, search)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
+from synthesis.scheduled import Scheduled
 from synthesis.waves import Wave, steps
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class WaveFamily:
     `longest`: the longest time step that resolves the fastest mode, s.
     """
 
-    def __init__(self, lpv: LPVStateSpace, rate: float, search: Search):
+    def __init__(self, lpv: Scheduled, rate: float, search: Search):
         self.lpv, self.rate, self.search = lpv, rate, search
         s = lpv.scheduling
         poles = np.linalg.eigvals(lpv.matrices(np.linspace(s.low, s.high, search.levels + 1)).A)

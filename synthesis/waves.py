@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
 from symheli.lpv.exponential import expm
+from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 
 Array = np.ndarray
@@ -61,7 +61,7 @@ class Steps(NamedTuple):
         return out
 
 
-def steps(lpv: LPVStateSpace, time: Array, p: Array, longest: float, split: int = 1) -> Steps:
+def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1) -> Steps:
     """The model along straight lines between the corners (`time`, `p`), in steps of at most `longest` s, each cut in `split`.
 
     Continuous: fourth-order Magnus exponentials, exact where p rests (Hairer, Lubich and Wanner, IV.7). Discrete: its
@@ -101,5 +101,5 @@ def steps(lpv: LPVStateSpace, time: Array, p: Array, longest: float, split: int 
     return Steps(step, np.append(np.concatenate(starts), time[-1]), n)
 
 
-def _clip(lpv: LPVStateSpace, p: Array) -> Array:
+def _clip(lpv: Scheduled, p: Array) -> Array:
     return np.clip(p, lpv.scheduling.low, lpv.scheduling.high)

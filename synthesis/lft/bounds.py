@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
 
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
+from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
 from synthesis.frozen import FrozenGain, norm
 from synthesis.lower_bound import LowerBound, Search, growing_trajectory, lower_bound
@@ -89,8 +89,7 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
     limits = [s.rate / s.radius for s in lft.parameters if math.isfinite(s.rate) and s.rate > 0]
     tries = [(*line, rate) for rate in (math.inf, *limits[:1]) for line in _lines(len(lft.blocks))] if search else []
     for start, end, rate in tries:
-        line = cast(LPVStateSpace, along(lft, start, end))  # asked for matrices, scheduling, states and dt, which an LFT has too
-        found = lower_bound(line, rate, frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega), search=search)
+        found = lower_bound(along(lft, start, end), rate, frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega), search=search)
         if found.gamma > best.gamma:
             best = found._replace(trajectory=found.trajectory and _in_box(lft, found.trajectory, start, end))
         if math.isinf(best.gamma):
@@ -101,7 +100,7 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
 def box_growing_trajectory(lft: LFT, search: Search | None) -> Trajectory | None:
     """A p(t) along such a line on which the free state grows, None where none was found."""
     for start, end in _lines(len(lft.blocks)) if search else ():
-        found = growing_trajectory(cast(LPVStateSpace, along(lft, start, end)), math.inf, search)
+        found = growing_trajectory(along(lft, start, end), math.inf, search)
         if found is not None:
             return _in_box(lft, found, start, end)
     return None

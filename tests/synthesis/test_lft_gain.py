@@ -11,7 +11,20 @@ from models import constant, lag, lateral, random_stable, spring
 
 from symheli.errors import CertificateError, InputError, UnknownNameError
 from symheli.lpv import LFT, LinearModel, Scheduling, connect
-from synthesis import SCALINGS, Multiplier, Relaxation, Search, Solver, Status, frozen_box_gain, l2_gain, lft_gain, lft_stability
+from synthesis import (
+    SCALINGS,
+    Multiplier,
+    Relaxation,
+    Search,
+    Solver,
+    Status,
+    frozen_box_gain,
+    frozen_gain,
+    l2_gain,
+    lft_gain,
+    lft_stability,
+    lower_bound,
+)  # fmt: skip
 
 QUICK = Search(levels=4, dwells=7, evaluations=8, steps=60)
 CLOSE = 1e-5
@@ -190,6 +203,14 @@ def test_growth_along_a_diagonal_of_two_parameters_is_found():
     assert cert.status is Status.GROWING
     assert cert.worst is not None
     np.testing.assert_allclose(cert.worst.p[:, 1], 2 + 2 * cert.worst.p[:, 0], atol=1e-12)
+
+
+def test_an_lft_and_its_polynomial_model_have_the_same_lower_bound():
+    quick, lpv = Search(levels=4, dwells=4, starts=1, nodes=16, evaluations=4, steps=40, samples=2000), spring(damping=0.3)
+    # the same search on the same matrices, computed by another route: rounding, amplified a little by the ascents
+    found, expected = (lower_bound(model, 1.0, search=quick) for model in (reduced(lpv), lpv))
+    assert found.gamma == pytest.approx(expected.gamma, rel=1e-6)
+    assert expected.gamma > 1.001 * frozen_gain(lpv).gamma
 
 
 def test_the_lower_bound_sees_waves_at_the_parameters_own_rate():
