@@ -25,6 +25,7 @@ from identification.prediction import fit_percent
 from identification.recursive_least_squares import RecursiveLeastSquares
 from identification.refined_instruments import Refined
 from identification.residuals import ResidualAnalysis, Theil, residual_analysis, theil
+from identification.response_band import ResponseBand
 from identification.ridge import Ridge
 from identification.rls_state import RLSInfo, RLSState
 from identification.structure import LPVARX, Entry, Group, Term
@@ -62,6 +63,7 @@ __all__ = [
     "RecursiveLeastSquares",
     "Refined",
     "ResidualAnalysis",
+    "ResponseBand",
     "Ridge",
     "Spline",
     "Term",

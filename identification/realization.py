@@ -8,7 +8,7 @@ from identification.coefficients import Coefficients
 from identification.structure import LPVARX
 from symheli.errors import InputError
 from symheli.lpv import Basis, FunctionSpace, LinearModel, LPVStateSpace, Matrices, Polynomial, Scheduling, Signal
-from symheli.lpv.arrays import Array
+from symheli.lpv.arrays import Array, frozen
 
 ROUTES = {"shifted": "lag", "direct": "now"}
 """Which realization is exact for which `scheduling_at`."""
@@ -84,11 +84,17 @@ def direct(coefficients: Coefficients, scheduling: Scheduling, outputs: tuple[Si
     return LPVStateSpace(basis, A, B, C, D, scheduling, tuple(states), inputs, outputs, dt)
 
 
+def one_value(p: object, basis: FunctionSpace) -> Array:
+    """p as it is; raises `InputError` unless it is one number, or one of each of several parameters."""
+    values = frozen(p, "scheduling parameter")
+    if values.ndim > (basis.dimension > 1):
+        raise InputError(f"at: expected one value of p, got {p!r:.80}")
+    return values
+
+
 def at(coefficients: Coefficients, p: object, outputs: tuple[Signal, ...], inputs: tuple[Signal, ...], dt: float) -> LinearModel:
     """The model with p held (both structures agree then), in observer form."""
-    A, B, _, _ = coefficients.at(p)
-    if A.ndim > 3:
-        raise InputError(f"at: expected one value of p, got {p!r:.80}")
+    A, B, _, _ = coefficients.at(one_value(p, coefficients.basis))
     D = B[0] if coefficients.input_lags[:1] == (0,) else np.zeros((len(outputs), len(inputs)))
     matrices = _companion(A, _by_lag(B, coefficients.input_lags), 1.0, D)
     return LinearModel(*matrices, _state_names(outputs, len(matrices.A) // len(outputs)), inputs, outputs, dt=dt)

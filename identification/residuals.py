@@ -20,7 +20,8 @@ ROUNDING = 1e-14
 class Theil(NamedTuple):
     """Theil's inequality coefficient in [0, 1] (0: perfect) and the shares of the mean squared error, which sum to 1.
 
-    (All are 0 where the error is rounding.) bias: a wrong mean; variance: a wrong size; covariance: the rest, noise and wrong phase. A good model errs by covariance.
+    All are 0 where the error is rounding. bias: a wrong mean; variance: a wrong size; covariance: the rest, noise and wrong phase.
+    A good model errs by covariance.
     """
 
     coefficient: float

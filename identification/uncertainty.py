@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.signal import fftconvolve
 from scipy.stats import norm
 
-from identification.excitation import column_scale
+from identification.coefficient_covariance import covariances
 from identification.model import LPVARXModel
 from identification.regressors import Regression, as_records, stacked
+from identification.response_band import ResponseBand, response_band
 from symheli.errors import InputError
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Band(NamedTuple):
@@ -38,21 +40,27 @@ class Band(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Covariance of the coefficients of `model`, an equation at a time.
+    """Covariance of the coefficients of `model`.
 
-    `covariance` (ny, n, n): of theta[:, y], zero for coefficients an equation does not have. `white` (ny, n, n): the same by the formula
-    for white residuals. `colour` (ny,): by how much the standard errors grow on average where residuals are coloured (1: white).
+    `joint` (ny, n, ny, n): of theta[i, y] with theta[j, z], zero for coefficients an equation does not have. `white` (ny, n, n): of each
+    equation by the formula for white residuals. `colour` (ny,): by how much the standard errors grow on average where residuals are
+    coloured (1: white).
     """
 
     model: LPVARXModel
-    covariance: Array
+    joint: Array
     white: Array
     lags: int
 
     @property
+    def covariance(self) -> Array:
+        """(ny, n, n): of the coefficients of each equation, theta[:, y]."""
+        return np.einsum("yiyj->yij", self.joint)
+
+    @property
     def standard_errors(self) -> Array:
         """(n, ny), the Cramer-Rao bounds of normal residuals, corrected for their colour; like `model.theta`."""
-        return np.sqrt(np.einsum("yii->iy", self.covariance))
+        return np.sqrt(np.maximum(np.einsum("yiyi->iy", self.joint), 0.0))
 
     @property
     def colour(self) -> Array:
@@ -71,16 +79,47 @@ class Uncertainty:
                 block = slice(entry * size, (entry + 1) * size)
                 if not arx.free[block, y].any():
                     continue
-                error = np.sqrt(np.einsum("ki,ij,kj->k", f, self.covariance[y, block, block], f))
+                error = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", f, self.joint[y, block, y, block], f), 0.0))
                 name = arx.regressor_names[block.start].rsplit(" f0(", 1)[0]
                 out.append(Band(output, name, f @ theta[block, y], error))
         return tuple(out)
+
+    def draws(self, count: int, seed: int = 0) -> tuple[LPVARXModel, ...]:
+        """`count` models with coefficients drawn from the normal distribution of this covariance: what the truth may be.
+
+        Whatever is made of the model (state space, reduction, a controller's margin) is made of each of them to see how far it is certain.
+        """
+        if not isinstance(count, int | np.integer) or count < 1:
+            raise InputError(f"count: expected a whole number of models >= 1, got {count!r}")
+        arx, theta = self.model.structure, self.model.theta
+        free = arx.free.T.reshape(-1)
+        square = self.joint.reshape(len(free), len(free))[np.ix_(free, free)]
+        scale = np.sqrt(np.diagonal(square))
+        scale = np.where(scale > 0, scale, 1.0)
+        values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
+        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        moved = np.tile(theta.T.reshape(-1), (count, 1))
+        moved[:, free] += np.random.default_rng(seed).standard_normal((count, len(root))) @ root.T
+        return tuple(replace(self.model, theta=row.reshape(arx.ny, -1).T) for row in moved)
+
+    def frequency_response(self, p: object, omega: object) -> ResponseBand:
+        """The response at `omega` (k,) in rad/s with the scheduling held at p, and its standard error.
+
+        It is that of `at(p)` and of both exact state-space forms at p. Raises `InputError` for p outside the basis.
+        """
+        return response_band(self.model, self.joint, p, omega)
+
+    def plot(self, level: float = 0.95) -> Figure:
+        """A figure of every coefficient function with its confidence band over p; see `identification.band_plot`."""
+        from identification.band_plot import plot_bands
+
+        return plot_bands(self, level)
 
 
 def uncertainty(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord], *, lags: int | None = None) -> Uncertainty:
     """Covariance of the least-squares coefficients of `model` over the records it was fitted to.
 
-    With D = (Phi' Phi)^-1 and R(l) the autocorrelation of the residuals, D [sum_k sum_l phi(k) R(k - l) phi(l)'] D instead of
+    With D = (Phi' Phi)^-1 and R(l) the correlation of the residuals, D [sum_k sum_l phi(k) R(k - l) phi(l)'] D instead of
     sigma^2 D: modelling errors colour residuals, and the white formula is then too optimistic, often by 5 to 10 times. R is tapered
     (Bartlett) over `lags` samples, default a fifth of the longest run, as in the source. Instrumental-variable estimates are less certain
     than this says: `InputError`. Source: Morelli and Klein, "Accuracy of aerodynamic model parameters estimated from flight test
@@ -101,36 +140,7 @@ def uncertainty(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecor
     if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
     error = data.y - data.phi @ model.theta
-    covariance, white = (np.zeros((arx.ny, arx.n_regressors, arx.n_regressors)) for _ in range(2))
-    for group in arx.groups:
-        at = arx.regressors(group)
-        scale = column_scale(data.phi[:, at])
-        phi = data.phi[:, at] / scale
-        inverse = solve_triangular(np.linalg.qr(phi, mode="r"), np.eye(len(at)))
-        D = inverse @ inverse.T / np.outer(scale, scale)
-        left = max(len(phi) - len(at), 1)
-        for y in group.outputs:
-            place = (y, at[:, None], at)
-            white[place] = D * (error[:, y] @ error[:, y] / left)
-            middle = _coloured(phi, error[:, y], runs, reach) * (len(phi) / left) * np.outer(scale, scale)
-            covariance[place] = D @ middle @ D
-    return Uncertainty(model, covariance, white, reach)
-
-
-def _coloured(phi: Array, error: Array, runs: list[slice], lags: int) -> Array:
-    """sum_k sum_l phi(k) R(k - l) phi(l)' over unbroken runs, R the tapered autocorrelation of all residuals."""
-    sums = np.zeros(lags + 1)
-    for run in runs:
-        e = error[run]
-        full = fftconvolve(e, e[::-1])[len(e) - 1 :][: lags + 1]
-        sums[: len(full)] += full
-    R = sums / len(error) * (1 - np.arange(lags + 1) / (lags + 1))
-    kernel = np.concatenate([R[:0:-1], R])
-    out = np.zeros((phi.shape[1],) * 2)
-    for run in runs:
-        smooth = fftconvolve(phi[run], kernel[:, None], axes=0)[lags : lags + run.stop - run.start]
-        out += phi[run].T @ smooth
-    return 0.5 * (out + out.T)
+    return Uncertainty(model, *covariances(arx, data.phi, error, runs, reach), reach)
 
 
 def _runs(data: Regression) -> list[slice]:

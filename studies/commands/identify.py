@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,8 @@ from symheli.errors import InputError
 HELP = "fit an LPV-ARX model to a flight log and judge it on data it has not seen"
 XPLANE = {"outputs": ("q", "theta"), "inputs": ("stick_lon",), "scheduling": "airspeed"}
 """What is identified from an X-Plane log unless asked otherwise."""
+
+ONE_MODEL = {"plot": "draws the fits of", "bands": "draws the coefficients of", "save": "writes"}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -63,11 +67,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="draw measured, one step, 1 s and free run into this .png, .svg or .pdf (needs matplotlib)",
     )
 
+    add("--bands", type=options.picture, metavar="FILE", help="draw every coefficient over the scheduling signal with its 95 %% band")
+    add("--save", type=options.model_file, metavar="FILE", help="write the model: .json (Python, symheli export model) or .mat (MATLAB)")
+
 
 def run(arguments: argparse.Namespace) -> Output:
     """Read, prepare, fit, judge."""
     from identification import LPVARX, Polynomial
-    from studies.log import figure, report
+    from studies.log import report
     from studies.log.comparison import compare, scheduling_range
     from studies.log.reading import COMBINED, format_of, read
     from symheli.lpv import FlightRecord, conditioning
@@ -100,16 +107,32 @@ def run(arguments: argparse.Namespace) -> Output:
     )  # fmt: skip
     training, test = conditioning.split(record, arguments.train)
     if arguments.orders:
-        if arguments.plot:
-            raise InputError("--plot draws the fits of one model; --orders compares many")
+        for option in ("plot", "bands", "save"):
+            if getattr(arguments, option):
+                raise InputError(f"--{option} {ONE_MODEL[option]} one model; --orders compares many")
         return _orders(structure, training, test)
     result = compare(structure, training, test)
     facts = report.facts(arguments.log, kind, record, samples, outside, result)
     text, data = report.text(facts, result), report.data(facts, result)
-    if arguments.plot:
-        figure.save(figure.figure(result), arguments.plot)
-        text, data = f"{text}\nwrote {arguments.plot}", {**data, "written": [arguments.plot]}
+    written = list(_write(arguments, result))
+    if written:
+        text, data = "\n".join([text, *(f"wrote {path}" for path in written)]), {**data, "written": written}
     return Output(text, data)
+
+
+def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
+    """Pictures and the model, where asked for; the paths written."""
+    from identification import uncertainty
+    from studies.log import figure
+
+    if arguments.plot:
+        yield figure.save(figure.figure(result), arguments.plot)
+    if arguments.bands:
+        yield figure.save(uncertainty(result.scheduled, result.training).plot(), arguments.bands)
+    if arguments.save:
+        model = result.scheduled
+        model = replace(model, covariance=uncertainty(model, result.training).covariance)
+        yield model.save(arguments.save) if arguments.save.suffix == ".json" else model.save_mat(arguments.save)
 
 
 def _orders(structure: Any, training: Any, test: Any) -> Output:

@@ -132,6 +132,14 @@ def picture(text: str) -> Path:
     return path
 
 
+def model_file(text: str) -> Path:
+    """A file for an identified model."""
+    path = Path(text)
+    if path.suffix not in (".json", ".mat"):
+        raise argparse.ArgumentTypeError(f"expected a file that ends in .json or .mat, got {text!r}")
+    return path
+
+
 def unit(text: str) -> tuple[str, str]:
     """name=unit"""
     name, sign, value = text.partition("=")

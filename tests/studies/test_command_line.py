@@ -8,8 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 
 import symheli
+from identification import LPVARXModel
 from studies import cli
 from studies.commands import study as study_command
 from studies.output import as_json
@@ -174,6 +176,26 @@ def test_identify_draws_what_was_measured_and_predicted(run, answer, tmp_path, e
     status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--plot", picture, "--orders")
     assert status == 1
     assert "--plot draws the fits of one model" in error
+
+
+def test_identify_writes_the_model_and_the_bands_of_its_coefficients(answer, run, tmp_path):
+    pytest.importorskip("matplotlib")
+    log = scheduled_csv(tmp_path / "log.csv", noise=0.1)
+    paths = [tmp_path / name for name in ("bands.svg", "model.json")]
+    got = answer("identify", log, *STRUCTURE, *UNITS, "--bands", paths[0], "--save", paths[1])
+    assert got["written"] == [str(path) for path in paths]
+    assert paths[0].read_bytes().startswith(b"<?xml")
+    model = LPVARXModel.load(paths[1])
+    np.testing.assert_array_equal(model.coefficients.monomial().A, got["models"]["LPV, degree 1"]["coefficients"]["A"])
+    np.testing.assert_allclose(np.sqrt(np.einsum("yii->iy", model.covariance)), got["standard_errors"], rtol=1e-12)
+    answer("identify", log, *STRUCTURE, *UNITS, "--save", tmp_path / "model.mat")
+    assert list(np.atleast_1d(loadmat(tmp_path / "model.mat", simplify_cells=True)["outputs"])) == ["y"]
+    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--save", paths[1], "--orders")
+    assert status == 1
+    assert "--save writes one model" in error
+    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--save", log / "model.json")  # a file is no folder
+    assert status == 1
+    assert "cannot be written" in error
 
 
 def test_identify_says_where_scheduling_does_not_pay(run, tmp_path):
