@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -10,7 +9,9 @@ import numpy as np
 
 from identification import RecursiveLeastSquares, kernel
 from identification.forgetting import numbers
-from identification.kernel.configuration import KINDS, Configuration
+from identification.kernel.configuration import KINDS
+from studies import c_text
+from studies.c_text import identifier, literals, require_identifier, table
 from studies.files import write_text
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array
@@ -26,8 +27,7 @@ def write_estimator(rls: RecursiveLeastSquares, units: Mapping[str, str], folder
     `units` of every signal. A CMakeLists.txt of somebody else is left alone. Raises `InputError` for a name that is no C identifier,
     a signal without unit and functions of p that are not piecewise polynomial.
     """
-    if not re.fullmatch(r"[a-zA-Z]\w*", name):
-        raise InputError(f"name: expected a C identifier such as estimator, got {name!r}")
+    require_identifier(name)
     arx = rls.structure
     if missing := [s for s in (*arx.outputs, *arx.inputs, *arx.parameters) if s not in units]:
         raise InputError(f"units: none given for {', '.join(missing)}")
@@ -62,7 +62,7 @@ def header(rls: RecursiveLeastSquares, units: Mapping[str, str], name: str) -> s
         [f"#define {up}_Y_{s} {i} /* {units[s]} */" for i, s in enumerate(arx.outputs)],
         [f"#define {up}_U_{s} {i} /* {units[s]} */" for i, s in enumerate(arx.inputs)],
         [f"#define {up}_P_{s} {i} /* {units[s]}, {low:g} to {high:g} */" for i, (s, (low, high)) in enumerate(ranges.items())],
-        [f"#define {up}_R_{_identifier(r)} {i} /* {r} */" for i, r in enumerate(arx.regressor_names)],
+        [f"#define {up}_R_{identifier(r)} {i} /* {r} */" for i, r in enumerate(arx.regressor_names)],
     ]
     state, work = c.sizes
     return _HEADER.format(
@@ -80,22 +80,22 @@ def implementation(rls: RecursiveLeastSquares, name: str) -> str:
     entries = ", ".join(f"{{RLS_{KINDS[k].upper()}, {channel}, {lag}, {p_lag}}}" for k, channel, lag, p_lag in c.entries.tolist())
     lines = [f"static const rls_entry entries[] = {{{entries}}};"]
     for g, layout in enumerate(c.groups):
-        lines.append(_table("int", f"outputs_{g}", layout.group.outputs))
-        lines.append(_table("int", f"entries_{g}", layout.group.entries))
+        lines.append(table("int", f"outputs_{g}", layout.group.outputs))
+        lines.append(table("int", f"entries_{g}", layout.group.entries))
     groups = ", ".join(f"{{{y.m}, {len(y.group.entries)}, outputs_{g}, entries_{g}}}" for g, y in enumerate(c.groups))
     lines.append(f"static const rls_group groups[] = {{{groups}}};")
     factors = []
     for i, factor in enumerate(c.factors):
         functions, degree, pieces, slack, knots, bernstein = factor.arguments
-        lines.append(_table("rls_real", f"knots_{i}", _literals(knots, c)))
-        lines.append(_table("rls_real", f"bernstein_{i}", _literals(bernstein.reshape(-1), c)))
-        factors.append(f"{{{functions}, {degree}, {pieces}, {_literals([slack], c)[0]}, knots_{i}, bernstein_{i}}}")
+        lines.append(table("rls_real", f"knots_{i}", literals(knots, c.dtype)))
+        lines.append(table("rls_real", f"bernstein_{i}", literals(bernstein.reshape(-1), c.dtype)))
+        factors.append(f"{{{functions}, {degree}, {pieces}, {literals([slack], c.dtype)[0]}, knots_{i}, bernstein_{i}}}")
     lines.append(f"static const rls_factor factors[] = {{{', '.join(factors)}}};")
-    lines.append(_table("int", "products", c.index.reshape(-1).tolist()))
+    lines.append(table("int", "products", c.index.reshape(-1).tolist()))
     kinds = ("RLS_CONSTANT", "RLS_VARIABLE", "RLS_DIRECTIONAL")
     return _IMPLEMENTATION.format(
         name=name, up=name.upper(), tables="\n".join(lines), memory=arx.memory, entries=len(c.entries), groups=len(c.groups),
-        functions=arx.basis.size, factors=len(factors), forgetting=f"{{{kinds[kind]}, {', '.join(_literals(values, c))}}}",
+        functions=arx.basis.size, factors=len(factors), forgetting=f"{{{kinds[kind]}, {', '.join(literals(values, c.dtype))}}}",
     )  # fmt: skip
 
 
@@ -107,7 +107,8 @@ def check_program(rls: RecursiveLeastSquares, name: str) -> str:
     innovations, coefficients = map(np.asarray, history)
     return _CHECK.format(
         name=name, up=name.upper(), rows=len(rows), tolerance=TOLERANCE[rls.precision], learnt=int(learnt.sum()),
-        samples=_rows(rows.astype(c.dtype), c), innovations=_rows(innovations[learnt], c), theta=_rows(coefficients[-1], c),
+        samples=c_text.rows(rows, c.dtype), innovations=c_text.rows(innovations[learnt], c.dtype),
+        theta=c_text.rows(coefficients[-1], c.dtype),
     )  # fmt: skip
 
 
@@ -118,24 +119,6 @@ def samples(signals: int, ranges: Iterable[tuple[float, float]], count: int) -> 
     rows = np.column_stack([rng.standard_normal((count, signals)), *points])
     rows[count // 2, 0] = np.nan
     return rows
-
-
-def _identifier(regressor: str) -> str:
-    return re.sub(r"\W+", "_", regressor.replace("k-", "")).strip("_")
-
-
-def _literals(values: Iterable[float], c: Configuration) -> list[str]:
-    """Exact in the precision of the estimator."""
-    suffix = "f" if c.dtype is np.float32 else ""
-    return ["NAN" if np.isnan(v) else float(c.dtype(v)).hex() + suffix for v in values]
-
-
-def _table(kind: str, name: str, values: Iterable[object]) -> str:
-    return f"static const {kind} {name}[] = {{{', '.join(map(str, values))}}};"
-
-
-def _rows(rows: Array, c: Configuration) -> str:
-    return ",\n".join("    {" + ", ".join(_literals(row, c)) + "}" for row in rows)
 
 
 _HEADER = """/* Recursive estimator of an LPV input-output model, {precision} precision, {bytes} bytes of memory; see rls.h.

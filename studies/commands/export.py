@@ -7,16 +7,18 @@ from pathlib import Path
 
 from studies.commands import estimator, options
 from studies.output import Output
+from symheli.errors import InputError
 
-HELP = "C code of the equations of motion or the recursive estimator, a MATLAB file of the linear family, or the equations in print"
+HELP = "C code of the equations of motion, of the recursive estimator or of an identified model, a MATLAB file, or equations in print"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """What, of which helicopter, to where."""
     parser.add_argument(
         "format",
-        choices=("c", "estimator", "mat", "latex", "markdown"),
-        help="c: equations of motion and header; estimator: recursive identification for an autopilot; mat: linear models along airspeed; "
+        choices=("c", "estimator", "model", "mat", "latex", "markdown"),
+        help="c: equations of motion and header; estimator: recursive identification as C for an autopilot; model: an identified model "
+        "(--model) as C; mat: linear models along airspeed; "
         "latex, markdown: every component's equations to read",
     )
     options.vehicle(parser)
@@ -24,7 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="PATH",
-        help="file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder (estimator)",
+        help="file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder (estimator, model)",
     )
     parser.add_argument(
         "--airspeeds",
@@ -38,10 +40,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--points", type=options.at_least_one, default=14, metavar="N", help="airspeeds of the family (default: %(default)s)"
     )
     estimator.configure(parser)
+    group = parser.add_argument_group("model", "C code that predicts and simulates what symheli identify --save kept; --single applies")
+    group.add_argument("--model", type=Path, metavar="FILE.json", help="the identified model")
 
 
 def run(arguments: argparse.Namespace) -> Output:
     """Write the file(s) and say which."""
+    if arguments.format == "model":
+        return _said(_model(arguments))
     heli = options.helicopter(arguments)
     name = Path(arguments.vehicle).stem
     if arguments.format == "c":
@@ -61,4 +67,19 @@ def run(arguments: argparse.Namespace) -> Output:
 
         content, suffix = (heli.latex(standalone=True), "tex") if arguments.format == "latex" else (markdown(heli), "md")
         written = (write_text(arguments.out or Path(f"{name}_equations.{suffix}"), content),)
+    return _said(written)
+
+
+def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
+    from identification import LPVARXModel
+    from studies.export_model import write_model
+
+    if arguments.model is None:
+        raise InputError("name the model: --model FILE.json, as symheli identify LOG --save FILE.json writes it")
+    return write_model(
+        LPVARXModel.load(arguments.model), arguments.out or Path("model"), precision="single" if arguments.single else "double"
+    )
+
+
+def _said(written: tuple[Path, ...]) -> Output:
     return Output("\n".join(f"wrote {path}" for path in written), {"written": written})

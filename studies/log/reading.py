@@ -24,7 +24,7 @@ def format_of(path: Path) -> Format:
     if path.suffix.lower() == ".mat":
         return "mat"
     if path.suffix.lower() == ".ulg":
-        raise InputError(f"{path}: PX4 logs need topics; read it in Python with FlightRecord.from_ulog and write a CSV with to_frame()")
+        raise InputError(f"{path}: PX4 logs need topics: name them in a signal map, --map FILE.toml, or read it by FlightRecord.from_ulog")
     with path.open("rb") as file:
         head = file.read(4096)
     if head.startswith(b"MATLAB"):
