@@ -89,6 +89,17 @@ class Relaxation:
         """Whether this is more than plain Bernstein coefficients for one parameter: see `synthesis.polynomial`."""
         return self.kind != "bernstein" or self.subdivision > 0 or self.total_degree is not None
 
+    def check(self, dt: float | None, *, with_gain: bool) -> None:
+        """Raises `InputError` where the form of V does not suit the question."""
+        if dt is not None and (self.order > 1 or self.memory is not None):
+            name, value = ("order", self.order) if self.order > 1 else ("memory", self.memory)
+            raise InputError(
+                f"an order > 1 or a memory is for continuous time; this model is sampled every {dt:g} s: leave {name}={value} out, "
+                "or analyse the model before discretize(), as one in continuous time"
+            )
+        if with_gain and self.order > 1:
+            raise InputError("an order > 1 proves stability only: a V of that degree does not balance energies; for a gain use a memory")
+
 
 class Problem(NamedTuple):
     """What every attempt shares: the model in physical and in scaled units."""
@@ -200,7 +211,9 @@ class HigherOrder(Quadratic):
 
     def lyapunov(self, x: Array) -> SplineLyapunov:
         """V at the solver's point x, with the slack of every block."""
-        slack = x[self.unknowns * length(self.size) : -1].reshape(-1, null_size(self.states, self.order))
+        size = null_size(self.states, self.order)
+        # of one state there is one monomial, and nothing to add
+        slack = x[self.unknowns * length(self.size) : -1].reshape(-1, size) if size else None
         return SplineLyapunov(self.knots, self.degree, smat(self.coefficients(x), self.size), self.order, slack)
 
 
@@ -240,12 +253,8 @@ class Remembering(Form):
 
 
 def forms(problem: Problem, relaxation: Relaxation) -> Iterator[Form]:
-    """The forms to try in turn. Raises `InputError` where the relaxation does not suit the problem."""
+    """The forms to try in turn."""
     n, sampled = len(problem.lpv.states), problem.lpv.dt is not None
-    if sampled and (relaxation.order > 1 or relaxation.memory is not None):
-        raise InputError("an order > 1 or a memory is for continuous time; this model is sampled")
-    if problem.with_gain and relaxation.order > 1:
-        raise InputError("an order > 1 proves stability only: a V of that degree does not balance energies; for a gain use a memory")
     remembers = relaxation.memory is not None and 0 < problem.rate < math.inf
     constant = math.isinf(problem.rate) or relaxation.degree == 0
     usual = 2 if relaxation.order > 1 or sampled else 3

@@ -50,7 +50,7 @@ def l2_gain(
     relaxation, solver = relaxation or Relaxation(), _solver(solver)
     if not isinstance(lpv, LPVStateSpace) or relaxation.needs_box:
         return box_certificate(lpv, rate, "l2 gain", relaxation, solver, search)
-    rate = _check(lpv, rate, with_gain=True)
+    rate = _check(lpv, rate, relaxation, with_gain=True)
     start = time.perf_counter()
     frozen = frozen_gain(lpv)
     if math.isinf(frozen.gamma):
@@ -93,7 +93,7 @@ def stability(
     relaxation, solver = relaxation or Relaxation(), _solver(solver)
     if not isinstance(lpv, LPVStateSpace) or relaxation.needs_box:
         return box_certificate(lpv, rate, "stability", relaxation, solver, search)
-    rate = _check(lpv, rate, with_gain=False)
+    rate = _check(lpv, rate, relaxation, with_gain=False)
     margin, p = least_damped(lpv)
     if margin <= 0:
         at_rest = Trajectory(np.zeros(1), np.array([p]))
@@ -107,7 +107,8 @@ def stability(
     return _certificate(lpv, rate, solver, (problem, best), math.nan, math.nan, status, worst, bounds, relaxation.elevation)
 
 
-def _check(lpv: LPVStateSpace, rate: Rate, *, with_gain: bool) -> float:
+def _check(lpv: LPVStateSpace, rate: Rate, relaxation: Relaxation, *, with_gain: bool) -> float:
+    relaxation.check(lpv.dt, with_gain=with_gain)
     rate = lpv.scheduling.rate if rate is None else float(rate)  # type: ignore[arg-type]
     if not rate >= 0:
         raise InputError(f"rate must be >= 0 {lpv.scheduling.unit}/s (math.inf: as fast as it likes), got {rate}")

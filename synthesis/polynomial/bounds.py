@@ -26,7 +26,7 @@ Array = np.ndarray
 Measure = Callable[[Array, Array, Array, Array], float]
 
 WAVES = 30
-"""Waves looked at along each line for peaks and slow decay, those of the fastest growth first."""
+"""Waves looked at along each line for peaks and slow decay, those of the fastest growth first; for peaks, those of many periods too."""
 
 
 class Worst(NamedTuple):
@@ -135,7 +135,8 @@ def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Tra
     """Energy to peak along waves: the Gramian of inputs held over each step, from rest over some cycles."""
     family = WaveFamily(line, rate, search)
     best: tuple[float, Trajectory | None] = (0.0, None)
-    for wave in family.coarse()[:WAVES]:
+    # where A does not depend on p, growth ranks nothing
+    for wave in (*family.coarse()[:WAVES], *family.spread()):
         cycle = Trajectory(*wave.vertices())
         system = steps(line, cycle.time, cycle.p, max(family.longest, wave.period / search.steps))
         C, D = line.matrices(np.clip(np.interp(system.time, cycle.time, cycle.p), line.scheduling.low, line.scheduling.high))[2:]

@@ -24,7 +24,7 @@ from synthesis import (
     lft_gain,
     lft_stability,
     lower_bound,
-)  # fmt: skip
+)
 
 QUICK = Search(levels=4, dwells=7, evaluations=8, steps=60)
 CLOSE = 1e-5

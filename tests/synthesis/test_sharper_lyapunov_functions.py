@@ -1,6 +1,7 @@
 """Memory of p and forms of higher degree: their algebra, what they prove beyond x' P(p) x, and that they never prove too much."""
 
 import math
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -12,7 +13,7 @@ from scipy.optimize import brentq
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import MemoryLyapunov, Relaxation, Search, Solver, Status, l2_gain, lower_bound, stability
+from synthesis import MemoryLyapunov, Relaxation, Search, Solver, Status, decay_rate, generalized_h2, l2_gain, lower_bound, stability
 from synthesis.bernstein import blossom
 from synthesis.claim import Claim, lmi_polynomials
 from synthesis.forms import scaled_problem
@@ -212,9 +213,28 @@ def test_tampered_proofs_fail_in_either_arithmetic():
         assert not cert.verify(rigorous=True)
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.1, math.inf])
+@pytest.mark.parametrize(("form", "said"), [(MEMORY, "leave memory=1.5 out"), (QUARTIC, "leave order=2 out")])
+def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(form, said, rate, monkeypatch):
+    # the function of that name hides the module
+    for work in ("frozen_gain", "least_damped"):
+        monkeypatch.setattr(sys.modules["synthesis.l2_gain"], work, None)
+    sampled = spring().discretize(0.1)
+    for analysis in (l2_gain, stability):
+        with pytest.raises(InputError, match=rf"continuous time; this model is sampled every 0\.1 s: {said}"):
+            analysis(sampled, rate, relaxation=form)
+    for analysis in (generalized_h2, decay_rate):
+        with pytest.raises(InputError, match="order and memory of V are for l2_gain and stability"):
+            analysis(sampled, rate, relaxation=form)
+
+
+def test_one_state_has_a_form_of_higher_degree_too():
+    """Its one monomial leaves nothing to add to a block, which once was an array that could not be reshaped."""
+    assert stability(lag(), relaxation=QUARTIC).verify(rigorous=True)
+    assert not stability(replace(lag(), A=lag().A + np.array([[[1.0]], [[0.0]]])), relaxation=QUARTIC).verified
+
+
 def test_forms_that_do_not_suit_the_question_are_refused():
-    with pytest.raises(InputError, match="continuous time"):
-        stability(spring().discretize(0.1), 0.1, relaxation=QUARTIC)
     with pytest.raises(InputError, match="stability only"):
         l2_gain(spring(), 0.1, relaxation=QUARTIC, search=None)
     with pytest.raises(InputError, match="no memory beside"):
