@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import os
 from collections.abc import Mapping
@@ -32,7 +33,10 @@ def read_csv(
         raise InputError(f"{path}: not a table with one header line ({error})") from error
     if frame.empty:
         raise InputError(f"{path}: a header but no rows")
+    header = next(row for row in csv.reader(io.StringIO(content), skipinitialspace=True) if row)
     for name in (*units, *([time] if time else [])):
+        if header.count(name) > 1:
+            raise InputError(f"{path}: {header.count(name)} columns are called {name!r}; rename them, so that it is clear which is meant")
         if name not in frame.columns:
             raise UnknownNameError("column", name, [str(c) for c in frame.columns])
     columns = {name: _numbers(frame[name], name, path) for name in units}

@@ -74,14 +74,25 @@ class FlightRecord:
 
     @classmethod
     def from_frame(cls, frame: pandas.DataFrame, time: str, units: Mapping[str, str], time_unit: str = "s", note: str = "") -> FlightRecord:
-        """From a pandas DataFrame: `time` names the time column; the columns in `units` are taken and converted to SI."""
+        """From a pandas DataFrame: `time` names the time column; the columns in `units` are taken and converted to SI.
+
+        Raises `UnknownNameError` for a column that is not there, `InputError` for one of dates or words.
+        """
         for name in (time, *units):
             if name not in frame.columns:
                 raise UnknownNameError("column", name, [str(c) for c in frame.columns])
         factor, unit = to_si(time_unit)
         if unit != "s":
             raise InputError(f"time_unit must be a time, got {time_unit!r}")
-        return cls.from_arrays(factor * frame[time].to_numpy(float), units, note, **{str(n): frame[n].to_numpy(float) for n in units})
+        if frame[time].dtype.kind in "mM":
+            raise InputError(f"{time!r} holds dates; give numbers: (frame[{time!r}] - frame[{time!r}].iloc[0]).dt.total_seconds()")
+        columns = {}
+        for name in dict.fromkeys((time, *units)):
+            try:
+                columns[name] = frame[name].to_numpy(float)
+            except (TypeError, ValueError) as error:
+                raise InputError(f"column {name!r}: expected numbers ({error})") from error
+        return cls.from_arrays(factor * columns[time], units, note, **{str(n): columns[n] for n in units})
 
     @classmethod
     def from_csv(

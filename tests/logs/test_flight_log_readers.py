@@ -5,6 +5,7 @@ import types
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
@@ -145,12 +146,24 @@ def test_the_real_trex_flight_is_read_without_a_time_column():
         (["t,q", "0,1", "1,2"], dict(time="t", time_unit="m"), "time_unit"),
         (["t,q", "0,1", "1,2,3,4"], dict(time="t"), "not a table"),
         (["t,qq", "0,1"], dict(time="t"), "did you mean 'qq'"),
+        (["t,q,q", "0,1,5", "1,2,6"], dict(time="t"), "2 columns are called 'q'"),
     ],
 )
 def test_a_spoilt_csv_says_what_is_wrong(tmp_path, lines, options, message):
     path = write(tmp_path, *lines, name="log.csv")
     with pytest.raises(InputError, match=message):
         FlightRecord.from_csv(path, units={"q": "rad/s"}, **options)
+
+
+def test_a_frame_of_dates_or_words_is_refused_in_words():
+    """Dates as numbers are nano- or microseconds, by the version of pandas."""
+    frame = pd.DataFrame({"t": [0.0, 0.1, 0.2], "when": pd.date_range("2024-05-01", periods=3, freq="100ms"), "s": list("abc"), "q": 1.0})
+    with pytest.raises(InputError, match="'when' holds dates; give numbers"):
+        FlightRecord.from_frame(frame, "when", {"q": "rad/s"})
+    with pytest.raises(InputError, match="column 's': expected numbers"):
+        FlightRecord.from_frame(frame, "t", {"s": "1"})
+    seconds = frame.assign(t=(frame["when"] - frame["when"].iloc[0]).dt.total_seconds())
+    np.testing.assert_allclose(FlightRecord.from_frame(seconds, "t", {"q": "rad/s"}).time, [0.0, 0.1, 0.2], atol=1e-12)
 
 
 def test_a_missing_file_is_an_input_error(tmp_path):
