@@ -46,13 +46,14 @@ class Online:
     def absorb(self, phi: Array, y: Array) -> bool:
         """Take in one regressor phi (n,) with the outputs y (ny,) it must explain; the lags are left alone.
 
-        Raises `InputError` for another shape and numbers that are not finite; the estimator is then as before.
+        Raises `InputError` for wrong shapes. In real time every check counts: that the numbers are finite is left to who builds phi, a NaN
+        stays for good. `RecursiveLeastSquares.absorb` checks.
         """
-        arx = self._configuration.structure
-        phi, y = vector(phi, arx.n_regressors, "phi"), vector(y, arx.ny, "y")
-        if not (np.isfinite(phi).all() and np.isfinite(y).all()):
-            raise InputError("phi and y must be finite; leave an incomplete regressor out")
-        self._status = self._kernel.absorb(self._state, self._work, phi, y)
+        try:
+            self._status = self._kernel.absorb(self._state, self._work, phi, y)
+        except (TypeError, ValueError, BufferError):
+            arx = self._configuration.structure
+            self._status = self._kernel.absorb(self._state, self._work, vector(phi, arx.n_regressors, "phi"), vector(y, arx.ny, "y"))
         return True
 
     def run(self, samples: Array, history: bool = True) -> tuple[Array, Array | None, Array | None]:

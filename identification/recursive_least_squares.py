@@ -13,7 +13,7 @@ from identification import kernel, saved_state
 from identification.forgetting import FLOOR, Constant, Directional, Forgetting, Variable, check_floor
 from identification.history import History
 from identification.kernel.configuration import Configuration
-from identification.online import Online
+from identification.online import Online, vector
 from identification.regressors import Samples, as_records, units_of
 from identification.rls_state import RLSInfo, RLSState
 from identification.structure import LPVARX, require_structure
@@ -86,7 +86,13 @@ class RecursiveLeastSquares:
         return _outcome(online, online.update(y, u, p))
 
     def absorb(self, state: RLSState, phi: Array, y: Array) -> tuple[RLSState, RLSInfo]:
-        """Take in one regressor phi (n,) with the outputs y (ny,) it must explain."""
+        """Take in one regressor phi (n,) with the outputs y (ny,) it must explain.
+
+        Raises `InputError` for another shape and numbers that are not finite.
+        """
+        phi, y = vector(phi, self.structure.n_regressors, "phi"), vector(y, self.structure.ny, "y")
+        if not (np.isfinite(phi).all() and np.isfinite(y).all()):
+            raise InputError("phi and y must be finite; leave an incomplete regressor out")
         online = self.online(state)
         return _outcome(online, online.absorb(phi, y))
 

@@ -62,16 +62,19 @@ def test_a_model_is_not_applied_to_records_of_another_unit_or_step():
             use(slow)
 
 
-def test_a_regressor_that_is_not_finite_leaves_the_estimator_as_it_was():
+def test_a_wrong_regressor_leaves_the_estimator_as_it_was():
     rls = idn.RecursiveLeastSquares(TRUTH.arx)
     state = rls.run(RECORD).state
     for phi, y in ((np.full(12, np.nan), [1.0]), (np.zeros(12), [np.inf]), (np.zeros(3), [1.0]), (["a"] * 12, [1.0])):
-        online = rls.online(state)
-        with pytest.raises(InputError, match="phi"):
-            online.absorb(phi, y)
-        np.testing.assert_array_equal(online.state.memory, state.memory)
         with pytest.raises(InputError, match="phi"):
             rls.absorb(state, phi, y)
+    online = rls.online(state)
+    for phi in (np.zeros(3), ["a"] * 12):
+        with pytest.raises(InputError, match="phi"):
+            online.absorb(phi, np.ones(1))
+    np.testing.assert_array_equal(online.state.memory, state.memory)
+    online.absorb([1] * 12, [1])  # anything that is a number works, as in update
+    np.testing.assert_array_equal(online.coefficients, rls.absorb(state, np.ones(12), [1.0])[0].theta)
 
 
 WRONG = {
