@@ -97,6 +97,9 @@ class Kernel:
 
     def absorb(self, state: Array, work: Array, phi: Array, y: Array) -> int:
         """Take in one regressor and the outputs it must explain; returns the status bits."""
+        sizes = (phi, self._c.structure.n_regressors), (y, self._c.structure.ny)
+        if not all(isinstance(v, np.ndarray) and v.dtype == np.float64 and v.shape == (n,) for v, n in sizes):
+            raise TypeError("expected float64 arrays, a number for each regressor and each output")
         with np.errstate(all="ignore"):
             return self._absorb(state, work, phi.astype(self._c.dtype), y.astype(self._c.dtype))
 
