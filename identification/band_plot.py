@@ -23,7 +23,7 @@ def plot_bands(known: Uncertainty, level: float = 0.95) -> Figure:
     Raises `InputError` for several scheduling parameters, a level outside (0, 1) and without matplotlib.
     """
     model = known.model
-    if len(model.parameters) > 1:
+    if len(model.parameters) != 1:
         raise InputError("coefficients of several scheduling parameters are no curves; take bands(p) along a line")
     low, high = model.structure.basis.ranges[0]
     p = np.linspace(low, high, 101)

@@ -7,7 +7,8 @@ from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from numpy.fft import irfft, rfft
+from scipy.fft import next_fast_len
 from scipy.linalg import solve_triangular
 
 from identification.excitation import column_scale
@@ -32,10 +33,10 @@ def covariances(arx: LPVARX, phi: Array, error: Array, runs: Sequence[slice], la
         middle = sum(s.weighted(a.regressors, b.regressors, R[i, j]) for s in spectra) * m / np.sqrt(a.left * b.left)
         block = a.inverse @ middle @ b.inverse
         rows, columns = i * n + a.regressors, j * n + b.regressors
-        joint[np.ix_(rows, columns)] = 0.5 * (block + block.T) if i == j else block
-        joint[np.ix_(columns, rows)] = joint[np.ix_(rows, columns)].T
+        joint[rows[:, None], columns] = block = 0.5 * (block + block.T) if i == j else block
+        joint[columns[:, None], rows] = block.T
     for y, own in equations.items():
-        white[np.ix_([y], own.regressors, own.regressors)] = own.inverse * (error[:, y] @ error[:, y] / own.left)
+        white[y, own.regressors[:, None], own.regressors] = own.inverse * (error[:, y] @ error[:, y] / own.left)
     return joint.reshape(arx.ny, n, arx.ny, n), white
 
 
@@ -63,7 +64,7 @@ class _Spectra(NamedTuple):
 
     @classmethod
     def of(cls, phi: Array, error: Array, lags: int) -> _Spectra:
-        length = next_fast_len(max(len(phi) + lags, 2 * lags + 1), real=True)
+        length: int = next_fast_len(max(len(phi) + lags, 2 * lags + 1), real=True)  # type: ignore[assignment]
         return cls(rfft(phi, length, axis=0), rfft(error, length, axis=0), length)
 
     def correlations(self, lags: int) -> Array:

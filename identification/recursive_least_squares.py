@@ -102,7 +102,7 @@ class RecursiveLeastSquares:
         The same as `update` sample by sample.
         """
         arx, records = self.structure, as_records(record)
-        if len(records) > 1:
+        if len(records) != 1:
             raise InputError(f"run takes one record, got {len(records)}; go on from its state: run(second, run(first).state)")
         record = records[0]
         s, online = Samples.of(arx, record), self.online(state)

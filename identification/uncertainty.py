@@ -93,7 +93,7 @@ class Uncertainty:
             raise InputError(f"count: expected a whole number of models >= 1, got {count!r}")
         arx, theta = self.model.structure, self.model.theta
         free = arx.free.T.reshape(-1)
-        square = self.joint.reshape(len(free), len(free))[np.ix_(free, free)]
+        square = self.joint.reshape(len(free), len(free))[free][:, free]
         scale = np.sqrt(np.diagonal(square))
         scale = np.where(scale > 0, scale, 1.0)
         values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
@@ -139,7 +139,7 @@ def uncertainty(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecor
     reach = min(max(longest // 5, 1), longest - 1) if lags is None else lags
     if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
-    error = data.y - data.phi @ model.theta
+    error, reach = data.y - data.phi @ model.theta, int(reach)
     return Uncertainty(model, *covariances(arx, data.phi, error, runs, reach), reach)
 
 

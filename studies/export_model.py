@@ -78,7 +78,7 @@ def check(model: LPVARXModel, c: Configuration, name: str) -> str:
     wide, count = arx.ny + arx.nu, 2 * arx.memory + 60
     given = samples(wide, arx.basis.ranges, count).astype(c.dtype).astype(float)
     record = FlightRecord(model.dt * np.arange(count), given, (*model.outputs, *model.inputs, *model.parameters))
-    complete = np.isfinite(given).all(axis=1)
+    complete = np.logical_and.reduce(np.isfinite(given), axis=1)
     there = [k for k in range(arx.memory, count) if complete[k - arx.memory : k].all() and np.isfinite(given[k, arx.ny :]).all()]
     return _CHECK.format(
         name=name, up=name.upper(), rows=count, tolerance=TOLERANCE["single" if c.dtype is np.float32 else "double"], there=len(there),

@@ -63,7 +63,7 @@ class FlightRecord:
     def from_arrays(cls, time: object, units: Mapping[str, str], note: str = "", **columns: Any) -> FlightRecord:
         """From one array a signal, all as long as `time` (s); `units` declares the unit of each signal."""
         values, names = [], []
-        length = np.size(time)
+        length = np.asarray(time).size
         for name, column in columns.items():
             if name not in units:
                 raise InputError(f"declare the unit of {name!r}: units={{{name!r}: ...}} ('1' where it has none)")
