@@ -35,7 +35,8 @@ class Search:
 
     `levels` values of p and `dwells` dwell times span the coarse family of waves; an ascent begins from the best `starts` of
     them, on about `nodes` nodes a cycle, with at most `evaluations` gradients each; a cycle lasts at most `cycles` of the
-    slowest mode; `steps` bounds the time steps of a cycle, `samples` those of the explicit input.
+    slowest mode or, for the gain, as long as a slow p takes to cross its range; `steps` bounds the time steps of a cycle,
+    `samples` those of the explicit input.
     """
 
     levels: int = 12
@@ -88,7 +89,7 @@ def lower_bound(
     cycles, growing = hunt.fastest()
     if growing is not None:
         return growing
-    near, spread = hunt.ranked(hunt.near()), hunt.ranked(wave.cycle() for wave in hunt.family.spread())
+    near, spread = hunt.ranked(hunt.near()), hunt.ranked(wave.cycle() for wave in hunt.family.spread(frozen.p))
     # of the spread the best alone: long cycles begin high and have less room to rise
     tops = [*sorted([*hunt.ranked(cycles), *near], key=_first)[-search.starts :], *spread[-1:]]
     # the starts stay beside what they lead to: corners may fall between the nodes
@@ -151,7 +152,8 @@ class _Hunt:
         """The cycles that ascents on the corners of a wave lead to: two corners, and where growth is asked four; none in discrete time."""
         if self.lpv.dt is not None:
             return
-        longest, period = max(self.family.longest, self.family.longest_period / self.search.steps), self.family.longest_period
+        period = self.limit(wave)
+        longest = max(self.family.longest, period / self.search.steps)
         corners = Corners.of(wave)
         for again in (False, True)[: 1 + objective.a_second]:
             start = corners.twice() if again else corners
@@ -160,8 +162,15 @@ class _Hunt:
 
     def ascend(self, cycle: Trajectory, objective: Objective) -> Trajectory:
         """The cycle a whole ascent leads to."""
-        start = on_nodes(cycle, self.search.nodes, self.lpv.dt)
-        return ascend(self.lpv, self.rate, start, objective, self.family.longest_period, self.search.evaluations)[0]
+        limit = self.limit(cycle)
+        # nodes as close in a slow cycle, as far as the time steps allow
+        nodes = self.search.nodes * min(limit / self.family.longest_period, self.search.steps / self.search.nodes)
+        start = on_nodes(cycle, max(self.search.nodes, round(nodes)), self.lpv.dt)
+        return ascend(self.lpv, self.rate, start, objective, limit, self.search.evaluations)[0]
+
+    def limit(self, cycle: Trajectory) -> float:
+        """How long an ascent may make this cycle, s: a slow one as long as p needs to cross its range and come back."""
+        return self.family.longest_period if cycle.time[-1] <= self.family.longest_period else self.family.slowest_period
 
     def along(self, cycle: Trajectory, finer: int = 1, split: int = 1) -> Steps:
         """The model along one cycle."""

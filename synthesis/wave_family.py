@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from synthesis.lower_bound import Search
 
 Array = np.ndarray
+
+STRETCH = 2.0
+"""Along the slowest cycles time steps are at most this many times what resolves the fastest mode."""
 
 FINEST = 8
 """For a slow p the levels are at most this many times closer than asked for."""
@@ -47,18 +51,30 @@ class WaveFamily:
 
     @property
     def longest_period(self) -> float:
-        """No cycle lasts longer, s."""
+        """No cycle made to grow lasts longer, s."""
         return self.search.cycles * self.slow
 
-    def wave(self, bottom: float, top: float, dwell_bottom: float, dwell_top: float, ramp: float = 0.0) -> Wave | None:
-        """The wave with ramps as steep as allowed, but of `ramp` s at least; None where it is too long."""
+    @property
+    def slowest_period(self) -> float:
+        """No cycle made to have a large gain lasts longer, s: a slow p may cross its range and come back, as far as time steps go."""
+        if self.lpv.dt is not None:
+            # every sample of a cycle counts, so that long cycles are dear
+            return min(self.longest_period, self.search.steps * self.lpv.dt)
+        s, reach = self.lpv.scheduling, STRETCH * self.search.steps * self.longest
+        return max(self.longest_period, min(2 * (s.high - s.low) / self.rate, reach))
+
+    def wave(
+        self, bottom: float, top: float, dwell_bottom: float, dwell_top: float, ramp: float = 0.0, longest: float | None = None
+    ) -> Wave | None:  # fmt: skip
+        """The wave with ramps as steep as allowed, but of `ramp` s at least; None where it lasts over `longest` s (`longest_period`)."""
         dt = self.lpv.dt
+        longest = self.longest_period if longest is None else longest
         ramp = max(ramp, 0.0 if math.isinf(self.rate) else (top - bottom) / self.rate)
         if dt is not None:
             ramp = math.ceil(ramp / dt - 1e-9) * dt
             dwell_bottom, dwell_top = (max(1.0, round(d / dt)) * dt for d in (dwell_bottom, dwell_top))
         wave = Wave(bottom, top, dwell_bottom, dwell_top, ramp)
-        return wave if 0 < wave.period <= self.longest_period else None
+        return wave if 0 < wave.period <= longest else None
 
     def coarse(self) -> list[Wave]:
         """The waves on the grid of levels and dwell times, that of the fastest growth first, one a pair of levels."""
@@ -87,24 +103,25 @@ class WaveFamily:
                     found.append((float(pace.max()), wave))
         return [wave for _, wave in sorted(found, key=lambda pair: -pair[0])]
 
-    def spread(self) -> list[Wave]:
+    def spread(self, around: float | None = None) -> list[Wave]:
         """Waves of many periods, whatever their growth: as much of the range as the rate allows, with rests and as triangles.
 
-        Where A does not depend on p all waves grow alike, and what p does to the gain depends on its period alone.
+        Where A does not depend on p all waves grow alike, and what p does to the gain depends on its period alone. A p too slow
+        for its range moves at its ends, in its middle, and `around` a value, such as that of the worst frozen model.
         """
-        s = self.lpv.scheduling
-        # every sample of a cycle counts in discrete time, so that long cycles are dear
-        longest = self.longest_period if self.lpv.dt is None else min(self.longest_period, self.search.steps * self.lpv.dt)
+        s, wave = self.lpv.scheduling, partial(self.wave, longest=self.slowest_period)
+        centre = s.middle if around is None else around
         found = []
-        for period in np.geomspace(0.5 * self.fast, 0.999 * max(longest, self.fast), PERIODS):
+        for period in np.geomspace(0.5 * self.fast, 0.999 * max(self.slowest_period, self.fast), PERIODS):
             swing = min(s.high - s.low, 0.5 * period * self.rate)
             rest = period - (0.0 if math.isinf(self.rate) else 2 * swing / self.rate)
             if swing < s.high - s.low:
-                found += [self.wave(a, a + swing, 0.0, 0.0) for a in (s.low, s.middle - 0.5 * swing, s.high - swing)]
+                near = float(np.clip(centre - 0.5 * swing, s.low, s.high - swing))
+                found += [wave(a, a + swing, 0.0, 0.0) for a in dict.fromkeys((s.low, s.middle - 0.5 * swing, s.high - swing, near))]
             else:
-                found += [self.wave(s.low, s.high, share * rest, (1 - share) * rest) for share in (0.5, 0.2, 0.8)]
-                found.append(self.wave(s.low, s.high, 0.0, 0.0, 0.5 * period))
-        return [wave for wave in found if wave is not None]
+                found += [wave(s.low, s.high, share * rest, (1 - share) * rest) for share in (0.5, 0.2, 0.8)]
+                found.append(wave(s.low, s.high, 0.0, 0.0, 0.5 * period))
+        return [one for one in found if one is not None]
 
     def _ramp(self, a: float, b: float) -> Array:
         return self._transition(a, b, 0.0 if math.isinf(self.rate) else abs(b - a) / self.rate)

@@ -240,7 +240,7 @@ def test_a_first_order_gain_at_its_two_ends_is_known():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rate", "share"), [(0.1, 0.997), (1.0, 0.999), (10.0, 0.998), (math.inf, 0.996)])
+@pytest.mark.parametrize(("rate", "share"), [(0.01, 0.9999), (0.1, 0.999), (1.0, 0.999), (10.0, 0.998), (math.inf, 0.996)])
 def test_the_lower_bound_of_a_first_order_gain_comes_close_to_its_exact_value(rate, share):
     """All waves grow alike here, so that only their gains can rank them. The shares are what was reached, rounded down."""
     exact = 2.5 if math.isinf(rate) else scalar_gain(rate)
@@ -294,7 +294,7 @@ def test_swapping_a_lag_and_its_gain_costs_no_more_than_the_rate():
     rate = 0.2
     cert = l2_gain(commutator(rate))
     assert cert.frozen == pytest.approx(0.0, abs=1e-12)
-    assert 0.9 * rate < cert.lower < cert.gamma < rate
+    assert 0.92 * rate < cert.lower < cert.gamma < rate
     assert round(cert.lower, 1) == round(cert.gamma, 1) == 0.2
 
 

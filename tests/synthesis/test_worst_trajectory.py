@@ -157,6 +157,19 @@ def test_a_bound_by_jumps_is_flown_as_it_is_reported():
     assert found.gamma > 1.1 * lower_bound(lpv, 0.0).gamma
 
 
+def test_a_slow_p_is_given_the_time_to_cross_its_range():
+    """x' = -x + (2 - p) u, y = (1 + p) x, rate 0.01: 2.25 frozen, 2.25441 in truth, by a cycle much longer than the model's own time."""
+    from test_reference_cases import scalar
+
+    from synthesis import Search, lower_bound
+
+    quick = Search(levels=4, dwells=4, starts=1, nodes=40, evaluations=6, steps=120, samples=20_000)
+    found = lower_bound(scalar(0.01), search=quick)
+    # three times the slowest mode, 19 s, leave 2.2507; what was reached here, rounded down
+    assert 2.2525 < found.gamma < 2.25441
+    assert np.ptp(found.trajectory.p) > 0.01 * 19
+
+
 @pytest.mark.slow
 def test_a_p_that_may_jump_is_never_better_than_one_with_a_limit():
     from synthesis import Search, lower_bound
