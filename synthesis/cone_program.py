@@ -112,7 +112,19 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
     return Candidate(answer, x, time.perf_counter() - start, message)
 
 
+MEMORY = 4e9
+"""Bytes beyond which a program is left alone by an interior-point method: the operating system would end the process."""
+
+
+def _bytes(program: ConeProgram) -> float:
+    """What the scaling matrices of the cones take, in an interior-point method; their factors take a few times as much."""
+    return 8.0 * sum(length(n) ** 2 for n in program.sizes)
+
+
 def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
+    if _bytes(program) > MEMORY / 4:
+        words = f"not tried: cones of size {max(program.sizes)} would need several times {_bytes(program) / 1e9:.2g} GB"
+        return Answer.FAILED, None, f"{words}; a lower degree, fewer segments, Bernstein coefficients or SCS need less"
     clarabel: Any = importlib.import_module("clarabel")  # its stubs hide the classes
     settings = clarabel.DefaultSettings()
     settings.verbose = False

@@ -137,6 +137,9 @@ def successor(P: PolynomialMatrix, region: Region, number: Number, moving: Seque
         T = composition(P.degrees[i], corners)
         if not moving[i]:
             T = T[:, :1]
+        elif corners[0] == corners[1]:
+            # where p(k+1) may be does not depend on p: a step as wide as the range, or a strip between two knots
+            T = T[:1]
         # axis i becomes x_i; s_i goes behind the parameters
         c = np.tensordot(T, c, axes=(2, i))
         c = np.moveaxis(c, (0, 1), (i, m + i))

@@ -246,3 +246,26 @@ def test_wrong_input_gets_a_sentence():
         decay_rate(np.eye(2))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="total degree of P needs one segment"):
         l2_gain(lag(), relaxation=Relaxation(degree=2, segments=(2,), total_degree=2), search=None)
+
+
+def test_a_program_too_large_for_the_memory_is_left_alone_and_says_so():
+    """Sums of squares in p, q and their next values, of degree two: the process once was ended by the operating system."""
+    cert = l2_gain(mass_spring(0.5, dt=0.1), relaxation=Relaxation(kind="sos", degree=2), search=None)
+    assert cert.status is Status.FAILED
+    assert "would need several times" in str(cert)
+    assert "a lower degree" in str(cert)
+
+
+def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
+    """P(p(k+1)) does not depend on p(k) where p jumps: its degree in p is that of A'A alone, two, and not two more."""
+    from synthesis.polynomial.inequalities import decrease
+    from synthesis.polynomial.program import Shape, _pair
+    from synthesis.polynomial.regions import regions
+
+    model, shape = pieces(mass_spring(dt=0.1)), Shape((np.array([-1.0, 1]),) * 2, (2, 2))
+    degrees = {}
+    for rate in (math.inf, 1.0):
+        demand = Demand("stability", (rate, rate))
+        region = next(iter(regions(model, shape.knots, demand.steps(model.dt, shape.degrees))))
+        degrees[rate] = [F.degrees for F in decrease(model, region, _pair(shape, region, 2)[1], demand, float)]
+    assert degrees == {math.inf: [(2, 2, 2, 2)], 1.0: [(4, 4, 2, 2)]}
