@@ -205,7 +205,10 @@ def draw(cost: dict[tuple[int, int], float], path: Path) -> None:
         sizes = sorted(n for outputs, n in cost if outputs == m)
         axes.loglog(sizes, [1e6 * cost[m, n] for n in sizes], "o-", label=f"{m} outputs")
     axes.set(xlabel="regressors of each output", ylabel="one update, us", title="Outputs that share a regressor share its factor")
-    axes.grid(visible=True, which="both", alpha=0.3)
+    for ticks, put in ((sorted({n for _, n in cost}), axes.set_xticks), ([1, 2, 5, 10, 20], axes.set_yticks)):
+        put(ticks, [str(tick) for tick in ticks])
+    axes.minorticks_off()
+    axes.grid(visible=True, alpha=0.3)
     axes.legend()
     figure.savefig(path)
 
