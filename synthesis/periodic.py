@@ -99,7 +99,7 @@ def worst_input(system: Steps, lifted: Lifted | None = None) -> tuple[float, flo
         inverse = np.linalg.inv(np.exp(1j * angle) * np.eye(n) - F)
 
         def squared(v: Array) -> Array:
-            columns = np.column_stack([v.real, v.imag])
+            columns = np.column_stack([np.real(v), np.imag(v)])
             y = J @ columns + H @ _times(inverse, G @ columns)
             back = J.T @ y + G.T @ _times(inverse.conj().T, H.T @ y)
             return back[:, 0] + 1j * back[:, 1]
