@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from itertools import groupby
 from typing import Any
 
@@ -163,6 +164,7 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     return (Answer.SOLVED if word.startswith("solved") else Answer.FAILED), solution["x"], word
 
 
+@lru_cache(maxsize=32)
 def _scs_order(n: int) -> Array:
     place = np.zeros((n, n), dtype=int)
     columns, rows = np.tril_indices(n)
