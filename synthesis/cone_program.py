@@ -108,7 +108,7 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
     start = time.perf_counter()
     answer, x, message = method(program, solver)
     x = None if x is None else np.asarray(x, dtype=float)
-    if x is not None and not np.all(np.isfinite(x)):
+    if x is not None and (x.size != len(program.c) or not np.all(np.isfinite(x))):
         x = None
     return Candidate(answer, x, time.perf_counter() - start, message)
 
