@@ -44,18 +44,18 @@ def not_about_the_helicopter(found: Sequence[Bound]) -> list[str]:
     """Gains proven of an interpolated or identified model that a flown airspeed of the exact models exceeds, a sentence each."""
     gains = [b for b in found if b.certificate.kind == "l2 gain"]
     out = []
-    for exact in gains:
-        below = [b for b in gains if b.model != "exact" and (b.channel, b.rate) == (exact.channel, exact.rate)]
+    for exact in (b for b in gains if b.model == "exact"):
+        others = [b for b in gains if b.model != "exact" and (b.channel, b.rate) == (exact.channel, exact.rate)]
         flown = exact.certificate.lower
-        for model in dict.fromkeys(b.model for b in below if exact.model == "exact"):
-            least = min(proven(b) for b in below if b.model == model)
+        for model in dict.fromkeys(b.model for b in others):
+            least = min(proven(b) for b in others if b.model == model)
             if least < flown:
                 flight = "make their state grow" if math.isinf(flown) else f"reach {gain(flown)}"
                 out.append(
                     f"{exact.channel.capitalize()} channel, {rate_text(exact.rate)}: {gain(least)} is proven of the {model} model, "
                     f"and flown airspeeds of the exact models {flight}: that proof says nothing of the helicopter."
                 )
-    return list(dict.fromkeys(out))
+    return out
 
 
 def every(found: Sequence[Bound]) -> list[Table]:

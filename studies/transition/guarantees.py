@@ -63,10 +63,10 @@ def servo_loop(model: LPVStateSpace) -> LPVStateSpace:
     return scaled(close(model, "inputs"))
 
 
-def servo_loops(heli: Helicopter, family: LinearFamily, gentle: LPVARXModel, aggressive: LPVARXModel) -> dict[str, LPVStateSpace]:
-    """The servo loop around the exact models, their interpolation, and the models identified on either flight."""
-    return {
-        "exact": scaled(ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD)),
+def servo_loops(heli: Helicopter | None, family: LinearFamily, gentle: LPVARXModel, aggressive: LPVARXModel) -> dict[str, LPVStateSpace]:
+    """The servo loop around the exact models (not without `heli`), their interpolation, and the models identified on either flight."""
+    exact = {"exact": scaled(ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD))} if heli is not None else {}
+    return exact | {
         "baseline": servo_loop(sampled_baseline(family)),
         "identified, gentle flight": servo_loop(gentle.to_state_space()),
         "identified, aggressive flight": servo_loop(aggressive.to_state_space()),

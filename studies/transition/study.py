@@ -174,9 +174,7 @@ def _prove_servo(study: Study, effort: Effort) -> None:
     family = _need(study.baseline).nodes
     study.exact_frozen["servo"] = guarantees.exact_frozen_gain(family, sampled=True)
     gentle, aggressive = study.models["lateral, gentle"], study.models[f"{LATERAL.name}, noise-free"]
-    for name, loop in guarantees.servo_loops(_need(study.heli), family, gentle, aggressive).items():
-        if name == "exact" and not effort.thorough:
-            continue
+    for name, loop in guarantees.servo_loops(_need(study.heli) if effort.thorough else None, family, gentle, aggressive).items():
         study.frozen_peaks[name] = frozen_gain(loop)
         study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments, GLANCE)
         if effort.thorough and guarantees.has_lft(loop):
