@@ -49,11 +49,12 @@ def not_about_the_helicopter(found: Sequence[Bound]) -> list[str]:
         flown = exact.certificate.lower
         for model in dict.fromkeys(b.model for b in others):
             least = min(proven(b) for b in others if b.model == model)
-            if least < flown:
+            if least < flown and gain(least) != gain(flown):  # what no digit shown tells apart says nothing either way
+                who = "the exact models, frozen," if exact.rate == 0 else "flown airspeeds of the exact models"
                 flight = "make their state grow" if math.isinf(flown) else f"reach {gain(flown)}"
                 out.append(
                     f"{exact.channel.capitalize()} channel, {rate_text(exact.rate)}: {gain(least)} is proven of the {model} model, "
-                    f"and flown airspeeds of the exact models {flight}: that proof says nothing of the helicopter."
+                    f"and {who} {flight}: that proof says nothing of the helicopter."
                 )
     return out
 

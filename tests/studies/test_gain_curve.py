@@ -65,3 +65,4 @@ def test_a_proof_of_a_model_that_the_exact_one_exceeds_is_said_not_to_hold_for_t
     (sentence,) = gain_tables.not_about_the_helicopter([*bounds("baseline", 1.0), *bounds("exact", 2.0)])
     assert sentence.startswith("Gust channel, 1 m/s^2: 1 is proven of the baseline model, and flown airspeeds of the exact models reach 2")
     assert not gain_tables.not_about_the_helicopter([*bounds("baseline", 2.1), *bounds("exact", 2.0)])
+    assert not gain_tables.not_about_the_helicopter([*bounds("baseline", 2.0), *bounds("exact", 2.0001)])
