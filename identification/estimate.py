@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.excitation import excitation_of
-from identification.forgetting import Forgetting
+from identification.forgetting import Constant, Forgetting
 from identification.instrumental_variables import Instruments, explained, instrumental_variables
 from identification.lasso import Lasso, lasso
 from identification.least_squares import least_squares_by_group, residual_covariance
@@ -19,6 +19,7 @@ from identification.recursive_least_squares import RecursiveLeastSquares
 from identification.refined_instruments import Refined, refined_instruments
 from identification.regressors import Regression, as_records, stacked, units_of
 from identification.ridge import Ridge, ridge
+from identification.self_check import check_least_squares
 from identification.structure import LPVARX, require_structure
 from symheli.errors import ConvergenceWarning, ExcitationError, InputError, UnknownNameError
 from symheli.lpv import FlightRecord
@@ -62,7 +63,8 @@ def fit(
 
     Raises `ExcitationError` (with a report) where the data cannot determine every coefficient (ridge and lasso: where the
     penalty does not either), `UnknownNameError` for signals the record lacks, `InputError` where p leaves the range of the
-    basis or an option does not fit the method. Warns (`ConvergenceWarning`) where an iteration does not settle.
+    basis or an option does not fit the method, `AccuracyError` where "ls" or "rls" fail the check that their residual is orthogonal
+    to every regressor. Warns (`ConvergenceWarning`) where an iteration does not settle.
     """
     require_structure(structure)
     records = as_records(records)
@@ -88,10 +90,13 @@ def fit(
             theta, details = _output_error(structure, records, data, instruments, chosen)
         case _ if method == "rls":
             theta, covariance = _recursive(structure, data, forgetting)
+            if forgetting == 1.0 or forgetting == Constant(1.0):
+                check_least_squares(structure, data.phi, data.y, theta, method)
         case _ if method == "iv":
             theta = instrumental_variables(structure, records, data, Instruments.of(instruments))
         case _:
             theta = least_squares_by_group(structure, data.phi, data.y)
+            check_least_squares(structure, data.phi, data.y, theta, method)
     if not details.get("converged", True):
         warnings.warn(f"{method!r} did not settle: {NOT_SETTLED[method]}", ConvergenceWarning, stacklevel=2)
     if covariance is None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.determined import determined_columns
 from identification.regressors import Regression, as_records, stacked
 from identification.structure import LPVARX, Group
 from symheli.errors import ExcitationError
@@ -27,7 +28,7 @@ class ExcitationReport:
     """How well the scheduled regressors of a record determine the coefficients of a structure.
 
     `singular_values` (n,) of the regressor matrix with columns scaled to length 1, largest first; `condition` their
-    ratio; `rank` how many exceed 1e-11 of the largest; `distinct` scheduling values found against `needed`;
+    ratio; `rank` how many regressors are determined (`identification.determined`); `distinct` scheduling values found against `needed`;
     `occupancy` samples in each of the bins with `edges` (unit of p) over the range of the basis, a row for each of several
     parameters; `weakest` the direction (n,) the data determine worst, in scaled regressors. `reason` is empty where the data suffice.
     Where the equations differ in their regressors, this is the report on the worst of them, those of `outputs`.
@@ -99,7 +100,7 @@ def _report(arx: LPVARX, data: Regression, group: Group) -> ExcitationReport:
     regressors = arx.regressors(group)
     names, n = tuple(arx.regressor_names[i] for i in regressors), len(regressors)
     values, directions = spectrum(data.phi[:, regressors])
-    rank = int(np.sum(values > RANK_TOLERANCE * max(values[0], 1e-300)))
+    rank = int(np.sum(determined_columns(data.phi[:, regressors], arx.basis)))
     ranges, scheduling = arx.basis.ranges, ", ".join(arx.parameters)
     distinct, needed = distinct_values(data.p, ranges), arx.basis.distinct_values
     bins = [np.histogram(p, bins=BINS, range=limits) for p, limits in zip(data.p.reshape(-1, len(ranges)).T, ranges, strict=True)]

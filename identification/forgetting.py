@@ -18,7 +18,7 @@ class Constant:
     `floor` keeps the filter awake when excitation stops: the information on a coefficient never falls below that of `floor`
     samples with its regressor at its largest. It is fed in coefficient by coefficient, as a measurement saying "as it is now",
     which moves no coefficient, and from the first sample on, so that a cold start makes none wild; 0 turns it off. With factor 1
-    there is nothing to make up for. At the floor the gain is large:
+    there is nothing to make up for, and the floor is that of rounding, 32 eps samples. At the floor the gain is large:
     noise of a fraction r of the largest regressors moves the coefficients within floor / r^2 samples. Raises `InputError` out of range.
     """
 

@@ -29,9 +29,12 @@ class RecursiveLeastSquares:
     """Forgetting least squares, sample by sample: `init`, `update`, or `run` over a record; `online` for real time.
 
     Each sample rotates the row [phi', y'] into [sqrt(l) R, sqrt(l) Z] by square-root-free Givens rotations; the covariance is never
-    formed, so nothing can lose its definiteness. Outputs share the factor. The coefficients move along the gain
-    g = R^-1 (R^-T phi): theta += g (y - theta' phi)'. A coefficient the data do not determine yet stays as it is, at first 0, and
-    the others explain the data without it. Without forgetting the result is that of batch least squares.
+    formed, so nothing can lose its definiteness. Outputs share the factor, which nothing but data enters. The coefficients solve
+    R theta = Z: from sample to sample they move along the gain g = R^-1 (R^-T phi), theta += g (y - theta' phi)', and are solved anew
+    as soon as a running bound of the rounding errors along it is no longer small, so that they are at every sample those of batch
+    least squares on the weighted samples so far. What these leave open is kept small by rows that are pretended: each coefficient is
+    0, with the weight of 32 eps samples with its regressor at its largest (without forgetting; else see `Constant`). `determined` says
+    whether anything is left open, by the rule of `identification.determined`.
 
     `forgetting` is a factor l in (0, 1] (a sample k steps old has the weight l^k; then `floor` is that of `Constant`), or one of
     `Constant`, `Variable`, `Directional`. `precision` "single" computes as an autopilot without double precision would.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from identification.kernel import configuration as at
 from identification.kernel import twin
@@ -58,7 +59,7 @@ class RLSState:
 
     @property
     def peak(self) -> Array:
-        """(n,) largest regressors seen."""
+        """(n,) largest regressors to expect: each signal at its largest so far, times each function at its largest."""
         out = np.zeros(self.configuration.structure.n_regressors)
         for layout in self.configuration.groups:
             out[self.configuration.structure.regressors(layout.group)] = self._part(layout, "peak")[: layout.n]
@@ -91,15 +92,13 @@ class RLSState:
         return max(self._header(at.WEIGHT)) * float(np.finfo(self.configuration.dtype).eps) >= 1
 
     def solve(self) -> Array:
-        """The least-squares coefficients (n, ny) from the factor itself, R theta = Z; `theta` agrees with them to rounding."""
-        out, epsilon = self.theta.copy(), float(np.finfo(self.configuration.dtype).eps)
+        """The least-squares coefficients (n, ny) from the factor, R theta = Z, in double precision; `theta` agrees with them to rounding."""
+        structure = self.configuration.structure
+        out = np.zeros((structure.n_regressors, structure.ny))
         for layout in self.configuration.groups:
             n, triangle = layout.n, layout.triangle.full(self._part(layout, "triangle").astype(float))
-            where = self.configuration.structure.regressors(layout.group)[:, None], layout.group.outputs
-            theta = out[where]
-            for i in reversed(np.flatnonzero(self._part(layout, "d")[:n] > epsilon * self._part(layout, "energy")[:n])):
-                theta[i] = triangle[i, n:] - triangle[i, i + 1 : n] @ theta[i + 1 :]
-            out[where] = theta
+            where = structure.regressors(layout.group)[:, None], layout.group.outputs
+            out[where] = solve_triangular(triangle[:n, :n], triangle[:n, n:], unit_diagonal=True)
         return out
 
     @property
@@ -113,8 +112,7 @@ class RLSState:
         return out
 
     def _factor(self, layout: GroupLayout) -> Array:
-        order = layout.n + layout.m
-        d = self._part(layout, "d")[:order].astype(float)
+        d = self._part(layout, "d")[layout.triangle.used].astype(float)
         return np.sqrt(d)[:, None] * layout.triangle.full(self._part(layout, "triangle").astype(float))
 
     def _part(self, layout: GroupLayout, name: str) -> Array:

@@ -17,7 +17,7 @@ from identification.rls_state import RLSState
 from symheli.errors import InputError
 from symheli.lpv.whole_files import write_text
 
-SCHEMA, VERSION = "symheli recursive estimator", 2
+SCHEMA, VERSION = "symheli recursive estimator", 3
 
 
 def save(state: RLSState, path: str | os.PathLike[str]) -> None:

@@ -92,6 +92,7 @@ def implementation(rls: RecursiveLeastSquares, name: str) -> str:
         factors.append(f"{{{functions}, {degree}, {pieces}, {literals([slack], c.dtype)[0]}, knots_{i}, bernstein_{i}}}")
     lines.append(f"static const rls_factor factors[] = {{{', '.join(factors)}}};")
     lines.append(table("int", "products", c.index.reshape(-1).tolist()))
+    lines.append(table("rls_real", "largest", literals(c.largest, c.dtype)))
     kinds = ("RLS_CONSTANT", "RLS_VARIABLE", "RLS_DIRECTIONAL")
     return _IMPLEMENTATION.format(
         name=name, up=name.upper(), tables="\n".join(lines), memory=arx.memory, entries=len(c.entries), groups=len(c.groups),
@@ -172,7 +173,7 @@ _IMPLEMENTATION = """/* See {name}.h. */
 
 {tables}
 static const rls_config config = {{
-    {up}_NY, {up}_NU, {up}_NP, {memory}, {entries}, {groups}, entries, groups, {{{functions}, {factors}, factors, products}},
+    {up}_NY, {up}_NU, {up}_NP, {memory}, {entries}, {groups}, entries, groups, {{{functions}, {factors}, factors, products, largest}},
     {forgetting},
 }};
 static rls_real state[{up}_STATE], work[{up}_WORK];

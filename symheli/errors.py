@@ -49,6 +49,10 @@ class SolverError(SymheliError):
     """A numerical solver is missing, or is not one of the supported ones."""
 
 
+class AccuracyError(SymheliError):
+    """A result does not pass the check of its own computation: it is not what it claims to be and is not returned."""
+
+
 class ConvergenceWarning(UserWarning):
     """An iteration stopped before it settled; the result is its last value, and may be worse than where it started."""
 

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from identification.determined import largest
 from identification.forgetting import Forgetting, numbers
 from identification.structure import LPVARX, Group
 from symheli.errors import InputError
@@ -19,7 +20,7 @@ LANES = 8
 
 HEADER, GROUP_HEADER = LANES, LANES
 COUNT, MILLIONS, FILLED = 0, 1, 2
-WEIGHT, TURN, DETERMINED, STEPS, FACTOR = 0, 1, 2, 3, 4
+WEIGHT, TURN, DETERMINED, STEPS, FACTOR, SINCE = 0, 1, 2, 3, 4, 5
 MILLION = 2**20
 KINDS = ("output", "input", "offset", "increment")
 
@@ -31,10 +32,20 @@ def padded(n: int) -> int:
 
 @dataclass(frozen=True)
 class Triangle:
-    """A unit upper triangle of that order, in `wide` rows and columns; the rows of a block of LANES begin at its first diagonal."""
+    """A unit upper triangle of `n` rows and columns and, from `padded(n)` on, `m` more; the rows of a block of LANES begin at its first diagonal."""
 
-    order: int
-    wide: int
+    n: int
+    m: int
+
+    @property
+    def wide(self) -> int:
+        """Rows and columns with the empty ones."""
+        return padded(self.n) + padded(self.m)
+
+    @property
+    def used(self) -> Array:
+        """Which rows and columns are not empty."""
+        return np.r_[: self.n, padded(self.n) : padded(self.n) + self.m]
 
     @property
     def size(self) -> int:
@@ -48,11 +59,11 @@ class Triangle:
         return tuple(slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
 
     def full(self, packed: Array) -> Array:
-        """As a square matrix (order, order)."""
+        """As a square matrix (n + m, n + m)."""
         out = np.zeros((self.wide, self.wide), packed.dtype)
         for start, block in zip(range(0, self.wide, LANES), self.blocks, strict=True):
             out[start : start + LANES, start:] = packed[block].reshape(LANES, -1)
-        return out[: self.order, : self.order]
+        return out[np.ix_(self.used, self.used)]
 
 
 @dataclass(frozen=True)
@@ -67,8 +78,8 @@ class GroupLayout:
 
     @cached_property
     def triangle(self) -> Triangle:
-        """Of order n + m."""
-        return Triangle(self.n + self.m, padded(self.n + self.m))
+        """Of the regressors and the outputs."""
+        return Triangle(self.n, self.m)
 
     @cached_property
     def in_state(self) -> dict[str, slice]:
@@ -76,20 +87,20 @@ class GroupLayout:
         tall, high = padded(self.n), padded(self.m)
         sizes = {
             "header": GROUP_HEADER, "triangle": self.triangle.size, "d": self.triangle.wide, "theta": self.m * tall, "peak": tall,
-            "energy": tall, "fed": tall, "recent": high, "usual": high,
+            "energy": tall, "fed": tall, "recent": high, "usual": high, "power": high, "drift": high,
         }  # fmt: skip
         return _slices(sizes, self.state)
 
     @cached_property
     def in_work(self) -> dict[str, slice]:
         """Slices of the scratch by name."""
-        tall, wide = padded(self.n), self.triangle.wide
-        return _slices({"phi": tall, "x": wide, "s": wide, "gain": tall, "innovation": padded(self.m)}, self.work)
+        tall, high, wide = padded(self.n), padded(self.m), self.triangle.wide
+        return _slices({"phi": tall, "x": wide, "s": wide, "gain": tall, "solution": tall * high, "innovation": high}, self.work)
 
     @property
     def end(self) -> tuple[int, int]:
         """Behind the group, in state and scratch."""
-        return self.in_state["usual"].stop, self.in_work["innovation"].stop
+        return self.in_state["drift"].stop, self.in_work["innovation"].stop
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +158,11 @@ class Configuration:
         rows = basis.indices if isinstance(basis, Product) else [(j,) for j in range(basis.size)]
         return np.array(rows, np.int32)[:, :count].copy()
 
+    @cached_property
+    def largest(self) -> Array:
+        """(functions,) how large each becomes over the range of the basis."""
+        return largest(self.structure.basis).astype(self.dtype)
+
     @property
     def width(self) -> int:
         """Numbers kept of a sample: y, u, p, f(p)."""
@@ -188,8 +204,8 @@ class Configuration:
         groups = tuple((len(g.outputs), np.array(g.outputs, np.int32), len(g.entries), np.array(g.entries, np.int32)) for g in arx.groups)
         return (
             arx.ny, arx.nu, len(arx.parameters), arx.memory, len(self.entries), self.entries, groups, arx.basis.size,
-            tuple(f.arguments for f in self.factors), sum(f.knots.size + f.bernstein.size for f in self.factors), self.index,
-            numbers(self.forgetting),
+            tuple(f.arguments for f in self.factors), sum((f.knots.size + f.bernstein.size for f in self.factors), self.largest.size),
+            self.index, self.largest, numbers(self.forgetting),
         )  # fmt: skip
 
 

@@ -98,7 +98,7 @@ static size_t memory_needed(const rls_config *c, Py_ssize_t numbers)
 {
     const size_t groups = (size_t)c->groups, factors = (size_t)c->basis.factors, entries = (size_t)c->entries;
     return entries * sizeof(rls_entry) + groups * sizeof(rls_group) + factors * sizeof(rls_factor) + (size_t)numbers * sizeof(rls_real) +
-           ((size_t)c->basis.functions * factors + groups * ((size_t)c->outputs + entries)) * sizeof(int) + 16 * (4 + 2 * factors + 2 * groups);
+           ((size_t)c->basis.functions * factors + groups * ((size_t)c->outputs + entries)) * sizeof(int) + 16 * (5 + 2 * factors + 2 * groups);
 }
 
 static int read_groups(rls_config *c, rls_group *group, PyObject *groups, char **next)
@@ -140,8 +140,8 @@ static int read_factors(rls_config *c, rls_factor *factor, PyObject *factors, ch
     return 0;
 }
 
-/* Kernel(outputs, inputs, parameters, memory, entries (E, 4), groups, functions, factors, numbers in them, index (functions, factors),
-   forgetting); a group (outputs, their indices, entries, their indices), a factor (functions, degree, pieces, slack, knots, bernstein) */
+/* Kernel(outputs, inputs, parameters, memory, entries (E, 4), groups, functions, factors, numbers in them and in largest, index (functions,
+   factors), largest (functions), forgetting); a group (outputs, their indices, entries, their indices), a factor (functions, degree, pieces, slack, knots, bernstein) */
 static int kernel_init(PyObject *object, PyObject *args, PyObject *kwargs)
 {
     Kernel *self = (Kernel *)object;
@@ -155,13 +155,15 @@ static int kernel_init(PyObject *object, PyObject *args, PyObject *kwargs)
     rls_group *group;
     rls_factor *factor;
     int *product;
+    rls_real *largest;
+    PyObject *sizes;
     if ((kwargs && PyDict_Size(kwargs)) || self->memory) {
         PyErr_SetString(PyExc_TypeError, "a Kernel is made once, without keywords");
         return -1;
     }
-    if (!PyArg_ParseTuple(args, "iiiiiOO!iO!nO(idddddd)", &c->outputs, &c->inputs, &c->parameters, &c->memory, &entry_count, &entries,
-                          &PyTuple_Type, &groups, &c->basis.functions, &PyTuple_Type, &factors, &numbers, &index, &kind, f, f + 1, f + 2, f + 3,
-                          f + 4, f + 5))
+    if (!PyArg_ParseTuple(args, "iiiiiOO!iO!nOO(idddddd)", &c->outputs, &c->inputs, &c->parameters, &c->memory, &entry_count, &entries,
+                          &PyTuple_Type, &groups, &c->basis.functions, &PyTuple_Type, &factors, &numbers, &index, &sizes, &kind, f, f + 1, f + 2,
+                          f + 3, f + 4, f + 5))
         return -1;
     c->entries = entry_count;
     c->groups = (int)PyTuple_Size(groups);
@@ -176,6 +178,8 @@ static int kernel_init(PyObject *object, PyObject *args, PyObject *kwargs)
     c->group = group = take(&next, (size_t)c->groups * sizeof(rls_group));
     c->basis.factor = factor = take(&next, (size_t)c->basis.factors * sizeof(rls_factor));
     c->basis.index = product = take(&next, (size_t)(c->basis.functions * c->basis.factors) * sizeof(int));
+    c->basis.largest = largest = take(&next, (size_t)c->basis.functions * sizeof(rls_real));
+    if (copy_numbers(sizes, FORMAT, c->basis.functions, largest, "largest") < 0) return -1;
     if (copy_numbers(entries, "i", 4 * c->entries, entry, "entries") < 0) return -1;
     if (copy_numbers(index, "i", c->basis.functions * c->basis.factors, product, "index") < 0) return -1;
     if (read_groups(c, group, groups, &next) < 0 || read_factors(c, factor, factors, &next) < 0) return -1;

@@ -1,4 +1,8 @@
-/* See rls.h. Rotations after Gentleman (1973), Least squares computations by Givens transformations without square roots. */
+/* See rls.h. Rotations after Gentleman (1973), Least squares computations by Givens transformations without square roots.
+
+   All that is remembered of the data is the triangular factor [R, Z; 0, S], which nothing but data enters. The coefficients solve
+   R theta = Z. From sample to sample they move along the gain, theta += R^-1 (R^-T phi) (y - phi' theta), a tenth of the work; they are solved anew
+   as soon as a running bound of what rounding has added since is no longer small, so that they never come apart from the factor. */
 #include "rls.h"
 
 #include <float.h>
@@ -14,7 +18,11 @@
 #endif
 #define LANES 8
 #define REAL(number) ((rls_real)(number))
-#define PRIOR (EPSILON / 16) /* samples with a regressor at its largest that are pretended at first, saying "coefficient 0" */
+/* Samples with a regressor at its largest that are pretended, saying "coefficient 0": what the data leave open stays small, and rounding, which
+   knows EPSILON^2, decides nothing. */
+#define PRIOR (32 * EPSILON) /* identification/determined.py has the same */
+#define ALONG 32  /* samples at most between two solutions of R theta = Z */
+#define TRUSTED (512 * 512) /* (rounding errors along the gain that are put up with, in units of EPSILON of the output)^2 */
 #define MILLION 1048576      /* samples are counted in two numbers, each exact in single precision */
 
 /* LANES numbers side by side. `LANEWISE EACH(a) += EACH(b);` adds them all, LANE(a, i) is one of them: in one vector where the processor has
@@ -23,7 +31,9 @@
 #define VECTOR(bytes) __attribute__((vector_size(bytes), aligned(sizeof(rls_real)), may_alias))
 #if defined(__AVX512F__) || (defined(__AVX__) && defined(RLS_SINGLE))
 #define WHOLE
+#define TOGETHER LANES
 typedef rls_real lanes VECTOR(LANES * sizeof(rls_real));
+typedef lanes part;
 #elif defined(__AVX__)
 #define TOGETHER 4
 typedef rls_real part VECTOR(TOGETHER * sizeof(rls_real));
@@ -116,14 +126,15 @@ static inline void transpose(lanes *v)
 /* State: this header, the past (memory + 1 rows of y, u, p, f(p), newest first), the groups. */
 enum { COUNT, MILLIONS, FILLED, HEADER = LANES };
 /* A group: this header, then the arrays of `group` up to `usual`. */
-enum { WEIGHT, TURN, DETERMINED, STEPS, FACTOR, GROUP_HEADER = LANES };
+enum { WEIGHT, TURN, DETERMINED, STEPS, FACTOR, SINCE, GROUP_HEADER = LANES };
 
-/* n regressors, m outputs; n + m, n and m rounded up to whole LANES. The unit triangle has `wide` rows, those beyond n + m empty; LANES of
-   them are a block, whose rows all start at the column of its first diagonal. [R, Z; 0, S] = sqrt(d) triangle. */
+/* n regressors, m outputs; n and m rounded up to whole LANES are tall and high, together wide. The unit triangle has `wide` rows: n of the
+   regressors and, from `tall` on, m of the outputs, the others empty; LANES of them are a block, whose rows all start at the column of its first
+   diagonal. [R, Z; 0, S] = sqrt(d) triangle. */
 typedef struct {
     int n, m, wide, tall, high;
-    rls_real *header, *triangle, *d, *theta, *peak, *energy, *fed, *recent, *usual; /* state */
-    rls_real *phi, *x, *s, *gain, *innovation;                                      /* scratch */
+    rls_real *header, *triangle, *d, *theta, *peak, *energy, *fed, *recent, *usual, *power, *drift; /* state */
+    rls_real *phi, *x, *s, *gain, *solution, *innovation;                                           /* scratch */
 } group;
 
 static int padded(int n) { return (n + LANES - 1) / LANES * LANES; }
@@ -142,9 +153,9 @@ static group open_group(const rls_config *c, int g, rls_real *state, rls_real *w
     group a;
     a.n = c->group[g].entries * c->basis.functions;
     a.m = c->group[g].outputs;
-    a.wide = padded(a.n + a.m);
     a.tall = padded(a.n);
     a.high = padded(a.m);
+    a.wide = a.tall + a.high;
     a.header = state;
     a.triangle = a.header + GROUP_HEADER;
     a.d = a.triangle + block_offset(a.wide, a.wide);
@@ -154,11 +165,14 @@ static group open_group(const rls_config *c, int g, rls_real *state, rls_real *w
     a.fed = a.energy + a.tall;
     a.recent = a.fed + a.tall;
     a.usual = a.recent + a.high;
+    a.power = a.usual + a.high;
+    a.drift = a.power + a.high;
     a.phi = work;
     a.x = a.phi + a.tall;
     a.s = a.x + a.wide;
     a.gain = a.s + a.wide;
-    a.innovation = a.gain + a.tall;
+    a.solution = a.gain + a.tall;
+    a.innovation = a.solution + a.tall * a.high;
     return a;
 }
 
@@ -171,7 +185,7 @@ static rls_real *entry(const group *a, int i, int j)
     return block_at(a, start) + (i - start) * (a->wide - start) + j - start;
 }
 
-static rls_real *end_of_state(const group *a) { return a->usual + a->high; }
+static rls_real *end_of_state(const group *a) { return a->drift + a->high; }
 
 static rls_real *end_of_work(const group *a) { return a->innovation + a->high; }
 
@@ -185,8 +199,8 @@ int rls_state_size(const rls_config *c)
 {
     int size = groups_state(c);
     for (int g = 0; g < c->groups; g++) {
-        const int n = c->group[g].entries * c->basis.functions, m = c->group[g].outputs, wide = padded(n + m);
-        size += GROUP_HEADER + block_offset(wide, wide) + wide + (m + 3) * padded(n) + 2 * padded(m);
+        const int tall = padded(c->group[g].entries * c->basis.functions), high = padded(c->group[g].outputs), wide = tall + high;
+        size += GROUP_HEADER + block_offset(wide, wide) + wide + (c->group[g].outputs + 3) * tall + 4 * high;
     }
     return size;
 }
@@ -195,10 +209,17 @@ int rls_work_size(const rls_config *c)
 {
     int size = groups_work(c);
     for (int g = 0; g < c->groups; g++) {
-        const int n = c->group[g].entries * c->basis.functions, m = c->group[g].outputs;
-        size += 2 * padded(n) + 2 * padded(n + m) + padded(m);
+        const int tall = padded(c->group[g].entries * c->basis.functions), high = padded(c->group[g].outputs);
+        size += 2 * tall + 2 * (tall + high) + tall * high + high;
     }
     return size;
+}
+
+/* Rows of no regressor and no output weigh 1, so that nothing divides by 0. */
+static inline void fill_empty_rows(const group *a)
+{
+    for (int i = a->n; i < a->tall; i++) a->d[i] = 1;
+    for (int i = a->tall + a->m; i < a->wide; i++) a->d[i] = 1;
 }
 
 void rls_init(const rls_config *c, rls_real *state, rls_real *work)
@@ -209,7 +230,7 @@ void rls_init(const rls_config *c, rls_real *state, rls_real *work)
     for (int g = 0; g < c->groups; g++) {
         const group a = open_group(c, g, state, work);
         for (int i = 0; i < a.wide; i++) *entry(&a, i, i) = 1;
-        for (int i = a.n + a.m; i < a.wide; i++) a.d[i] = 1;
+        fill_empty_rows(&a);
         state = end_of_state(&a);
     }
 }
@@ -368,15 +389,15 @@ static inline void sweep(const group *a, int first, int last, rls_real kept, rls
     }
 }
 
-/* Whether column i of R stands out of the span of those before it, as far as rounding lets us see. */
-static inline int is_known(rls_real d, rls_real energy) { return d > EPSILON * energy; }
+/* A measurement of so much weight. */
+static inline weight weight_of(rls_real value) { return (weight){1 / value, value}; }
 
-/* Solve with the triangle of a block of rows: t <- block^-1 t, 0 where `known` is 0 instead of 1. */
-static inline void solve(const rls_real *block, int stride, const lanes *known, lanes *t)
+/* Solve with the unit triangle of a block of rows: t <- block^-1 t. */
+static inline void solve(const rls_real *block, int stride, lanes *t)
 {
     lanes column[LANES];
     for (int i = 0; i < LANES; i++) {
-        LANEWISE EACH(column[i]) = EACH(*known) * EACH(*lanes_of(block + i * stride));
+        column[i] = *lanes_of(block + i * stride);
         LANE(column[i], i) = 0;
     }
     transpose(column);
@@ -384,24 +405,50 @@ static inline void solve(const rls_real *block, int stride, const lanes *known, 
         const rls_real own = LANE(*t, k);
         LANEWISE EACH(*t) -= own * EACH(column[k]);
     }
-    LANEWISE EACH(*t) *= EACH(*known);
 }
 
-/* gain <- triangle^-1 s; a coefficient that is not known stays as it is, and the others explain the data without it. */
-static inline void back_substitute(const group *a)
+/* gain <- triangle^-1 s */
+static inline void find_gain(const group *a)
 {
     for (int start = a->tall - LANES; start >= 0; start -= LANES) {
         const int length = a->wide - start;
-        const rls_real *block = block_at(a, start), *d = a->d + start, *energy = a->energy + start;
-        rls_real right[LANES], known[LANES];
+        const rls_real *block = block_at(a, start);
+        rls_real right[LANES];
         lanes t;
-        for (int i = 0; i < LANES; i++) known[i] = is_known(d[i], energy[i]) ? REAL(1) : REAL(0);
-        for (int i = a->n - start; i < LANES; i++) known[i] = 0;
         times(block + LANES, length, LANES, a->gain + start + LANES, a->tall - start - LANES, right);
         LANEWISE EACH(t) = EACH(*lanes_of(a->s + start)) - EACH(*lanes_of(right));
-        solve(block, length, lanes_of(known), &t);
+        solve(block, length, &t);
         *lanes_at(a->gain + start) = t;
     }
+}
+
+/* Outputs `from` on, TOGETHER of them: solution (tall, high) <- R^-1 Z, products subtracted from the last column on. */
+static inline void back_substitute(const group *a, int from)
+{
+    for (int start = a->tall - LANES; start >= 0; start -= LANES) {
+        const int length = a->wide - start;
+        const rls_real *block = block_at(a, start);
+        part t[LANES];
+        for (int i = 0; i < LANES; i++) t[i] = *(const part *)(block + i * length + a->tall - start + from);
+        for (int k = a->tall - 1; k >= start + LANES; k--) {
+            const part known = *(const part *)(a->solution + k * a->high + from);
+            for (int i = 0; i < LANES; i++) t[i] -= block[i * length + k - start] * known;
+        }
+        for (int k = LANES - 1; k > 0; k--)
+            for (int i = 0; i < k; i++) t[i] -= block[i * length + k] * t[k];
+        for (int i = 0; i < LANES; i++) *(part *)(a->solution + (start + i) * a->high + from) = t[i];
+    }
+}
+
+/* theta <- R^-1 Z */
+static void solve_anew(const group *a)
+{
+    for (int from = 0; from < a->m; from += TOGETHER) back_substitute(a, from);
+    for (int j = 0; j < a->m; j++) {
+        a->drift[j] = 0;
+        for (int i = 0; i < a->n; i++) a->theta[j * a->tall + i] = a->solution[i * a->high + j];
+    }
+    a->header[SINCE] = 0;
 }
 
 static inline rls_real power(rls_real base, int exponent)
@@ -414,29 +461,40 @@ static inline rls_real power(rls_real base, int exponent)
     return result;
 }
 
+/* The fastest a coefficient forgets that nothing excites. */
+static inline rls_real fastest(const rls_forgetting *f)
+{
+    return f->kind == RLS_DIRECTIONAL ? 1 : f->kind == RLS_VARIABLE ? f->lowest : f->factor;
+}
+
 /* The information that coefficients are kept awake with, in samples with a regressor at its largest: enough that the floor still stands
    when half of it and then n samples more are forgotten. */
 static inline rls_real wakefulness(const rls_forgetting *f, int n)
 {
-    const rls_real fastest = f->kind == RLS_VARIABLE ? f->lowest : f->factor;
     rls_real kept, floor;
-    if (f->kind == RLS_DIRECTIONAL || fastest == 1) return PRIOR;
-    kept = power(fastest, n);
+    if (fastest(f) == 1) return PRIOR;
+    kept = power(fastest(f), n);
     floor = 2 * f->floor / (kept > REAL(1e-12) ? kept : REAL(1e-12));
     return floor > PRIOR ? floor : PRIOR;
 }
 
-/* Largest regressors so far. A coefficient whose regressor is seen for the first time is kept awake from the start, at the 0 it has, lest
-   the first samples make it wild: nothing is in its row and column yet. */
-static inline void new_peaks(const group *a, rls_real samples)
+/* The largest regressors one has to expect: a signal as large as any so far, times its functions at their largest. The coefficients of a signal that
+   is seen for the first time are kept awake from the start, at the 0 they have, lest the first samples make them wild: nothing is in
+   their rows and columns yet. */
+static inline void new_peaks(const rls_basis *b, const group *a, rls_real samples)
 {
-    int fresh = 0;
-    for (int i = 0; i < a->tall; i++) fresh += (a->peak[i] == 0) & (a->phi[i] != 0);
-    for (int i = 0; fresh && i < a->n; i++)
-        if (a->peak[i] == 0) a->d[i] = a->energy[i] = a->fed[i] = samples * (a->phi[i] * a->phi[i]);
-    for (int i = 0; i < a->tall; i++) {
-        const rls_real size = absolute(a->phi[i]);
-        a->peak[i] = size > a->peak[i] ? size : a->peak[i];
+    int larger = 0;
+    for (int i = 0; i < a->tall; i++) larger += absolute(a->phi[i]) > a->peak[i];
+    for (int i = 0; larger && i < a->n; i += b->functions) {
+        const int fresh = a->peak[i] == 0;
+        rls_real signal = 0;
+        for (int k = 0; k < b->functions; k++)
+            if (absolute(a->phi[i + k]) > signal * b->largest[k]) signal = absolute(a->phi[i + k]) / b->largest[k];
+        if (signal * b->largest[0] <= a->peak[i]) continue;
+        for (int k = i; k < i + b->functions; k++) {
+            a->peak[k] = signal * b->largest[k - i];
+            if (fresh) a->d[k] = a->energy[k] = a->fed[k] = samples * (a->peak[k] * a->peak[k]);
+        }
     }
 }
 
@@ -505,17 +563,27 @@ static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a
     return factor < f->lowest ? f->lowest : factor > f->factor ? f->factor : factor;
 }
 
-/* Keep coefficient j awake: a measurement that says "as it is now" moves nothing and makes up for what was forgotten. It comes as soon as
-   half is gone, n samples after the last turn of j at the earliest. */
-static inline void replenish(const group *a, rls_real samples, int j)
+/* Make up for what coefficient j has lost, as soon as half of what is pretended of it is gone, n samples after its last turn at the earliest. One
+   that is kept awake gets a measurement that says "as it is now" and moves no coefficient: rotated in with outputs 0, x ends as minus
+   the coefficients, and what outputs that leave no residual would have added follows. Else what is pretended goes on saying "0": little, but it
+   moves them. */
+static inline void replenish(const group *a, rls_real samples, int j, int kept_awake)
 {
-    const rls_real target = samples * (a->peak[j] * a->peak[j]);
+    const rls_real target = samples * (a->peak[j] * a->peak[j]), more = target - a->fed[j];
     if (2 * a->fed[j] >= target) return;
     for (int k = 0; k < a->wide; k++) a->x[k] = 0;
     a->x[j] = 1;
-    for (int k = 0; k < a->m; k++) a->x[a->n + k] = a->theta[k * a->tall + j];
-    sweep(a, j, a->n, 1, target - a->fed[j]);
-    a->energy[j] += target - a->fed[j];
+    if (kept_awake) {
+        sweep(a, j, a->n, 1, more);
+        for (int i = j; i < a->n; i++) {
+            rls_real *z = entry(a, i, a->tall);
+            for (int k = 0; k < a->m; k++) z[k] -= a->s[i] * a->x[a->tall + k];
+        }
+    } else {
+        sweep(a, j, a->tall + a->m, 1, more);
+        solve_anew(a);
+    }
+    a->energy[j] += more;
     a->fed[j] = target;
 }
 
@@ -530,12 +598,20 @@ static inline void drop_underflow(const group *a, int j)
     if (j < a->n && a->fed[j] < TINY) a->fed[j] = 0;
 }
 
-/* Whether every coefficient is known; at first it must also be known from more than what was fed to keep it awake. */
-static inline int is_determined(const group *a)
+/* Whether column i of R stands out of the span of those before it: by more than rounding lets us see of all it has been, and by more than
+   what is pretended. identification/determined.py is the same rule for a batch. */
+static inline int is_known(const group *a, int i, rls_real beyond)
 {
-    const rls_real beyond = a->header[DETERMINED] == 0 ? 2 : 0;
+    return (a->d[i] > EPSILON * a->energy[i]) & (a->d[i] > beyond * a->fed[i]);
+}
+
+/* Whether every coefficient is known: what is pretended decides less than a thousandth of it. Where it is kept awake with more, a third at first; and
+   what was known stays so on what takes the place of what is forgotten. */
+static inline int is_determined(const group *a, int kept_awake)
+{
+    const rls_real beyond = REAL(kept_awake ? (a->header[DETERMINED] != 0 ? 0 : 2) : 1000);
     int known = 0;
-    for (int i = 0; i < a->n; i++) known += is_known(a->d[i], a->energy[i]) & (a->d[i] > beyond * a->fed[i]);
+    for (int i = 0; i < a->n; i++) known += is_known(a, i, beyond);
     return known == a->n;
 }
 
@@ -549,45 +625,62 @@ static inline void predict(const group *a, const int *output, const rls_real *y)
     }
 }
 
+/* A running error analysis: an error of the gain g is backward stable, |R dg| <= EPSILON |R| |g|, and what has gone wrong before, R dtheta, grows no
+   more with what is learnt after. Where the bound, over what the outputs measure, is not small any longer, theta is solved anew. */
 static inline void correct(const group *a)
 {
+    rls_real error = 0;
+    int small = 1;
+    lanes sum = none;
+    for (int k = 0; k < a->tall; k += LANES)
+        LANEWISE EACH(sum) += EACH(*lanes_of(a->energy + k)) * (EACH(*lanes_of(a->gain + k)) * EACH(*lanes_of(a->gain + k)));
+    for (int i = 0; i < LANES; i++) error += LANE(sum, i);
+    a->header[SINCE] += 1;
     for (int j = 0; j < a->m; j++) {
         rls_real *theta = a->theta + j * a->tall;
         const rls_real innovation = a->innovation[j];
         for (int k = 0; k < a->tall; k += LANES) LANEWISE EACH(*lanes_at(theta + k)) += innovation * EACH(*lanes_of(a->gain + k));
     }
+    for (int j = 0; j < a->m; j++) {
+        a->drift[j] += error * (a->innovation[j] * a->innovation[j]);
+        small &= a->header[SINCE] * a->drift[j] <= TRUSTED * a->power[j];
+    }
+    if (!small || a->header[SINCE] >= ALONG) solve_anew(a);
 }
 
-static void learn(const rls_forgetting *f, const group *a, const int *output, const rls_real *y)
+static void learn(const rls_forgetting *f, const rls_basis *b, const group *a, const int *output, const rls_real *y)
 {
-    const int turn = (int)a->header[TURN], order = a->n + a->m;
     const rls_real samples = wakefulness(f, a->n);
+    const int turn = (int)a->header[TURN], kept_awake = samples > PRIOR;
     rls_real factor, kept;
+    replenish(a, samples, turn, kept_awake);
     predict(a, output, y);
-    new_peaks(a, samples);
+    new_peaks(b, a, samples);
     factor = forgetting_factor(f, a);
     kept = f->kind == RLS_DIRECTIONAL ? 1 : factor;
-    replenish(a, samples, turn);
     if (factor < kept) {
         forget_direction(a, factor);
-        for (int i = a->n; i < order; i++) a->d[i] *= factor;
+        for (int j = 0; j < a->m; j++) a->d[a->tall + j] *= factor;
     }
-    for (int k = 0; k < a->n; k++) a->x[k] = a->phi[k];
-    for (int j = 0; j < a->m; j++) a->x[a->n + j] = y[output[j]];
-    for (int k = order; k < a->wide; k++) a->x[k] = 0;
-    sweep(a, 0, order, kept, 1);
-    for (int i = order; i < a->wide; i++) a->d[i] = 1;
+    for (int k = 0; k < a->tall; k++) a->x[k] = a->phi[k];
+    for (int j = 0; j < a->high; j++) a->x[a->tall + j] = j < a->m ? y[output[j]] : 0;
+    for (int j = 0; j < a->high; j++) {
+        a->power[j] = factor * a->power[j] + a->x[a->tall + j] * a->x[a->tall + j];
+        a->power[j] = a->power[j] < TINY ? 0 : a->power[j];
+    }
+    sweep(a, 0, a->tall + a->m, kept, 1);
+    fill_empty_rows(a);
     for (int k = 0; k < a->tall; k++) {
         a->energy[k] = kept * a->energy[k] + a->phi[k] * a->phi[k];
         a->fed[k] *= kept;
     }
-    back_substitute(a);
+    find_gain(a);
     correct(a);
-    a->header[DETERMINED] = REAL(is_determined(a));
+    a->header[DETERMINED] = REAL(is_determined(a, kept_awake));
     a->header[WEIGHT] = factor * a->header[WEIGHT] + 1;
     a->header[FACTOR] = factor;
     a->header[TURN] = REAL(turn + 1 < a->n ? turn + 1 : 0);
-    for (int i = turn; i < order; i += a->n) drop_underflow(a, i);
+    for (int i = turn; i < a->wide; i += a->n) drop_underflow(a, i);
 }
 
 static int status(const rls_config *c, rls_real *state, rls_real *work)
@@ -611,7 +704,7 @@ int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_r
         const group a = open_group(c, g, s, w);
         for (int i = 0; i < c->group[g].entries; i++)
             for (int k = 0; k < functions; k++) a.phi[i * functions + k] = phi[c->group[g].entry[i] * functions + k];
-        learn(&c->forgetting, &a, c->group[g].output, y);
+        learn(&c->forgetting, &c->basis, &a, c->group[g].output, y);
         for (int j = 0; j < a.m; j++) innovation[c->group[g].output[j]] = a.innovation[j];
         s = end_of_state(&a);
         w = end_of_work(&a);
@@ -721,12 +814,12 @@ void rls_coefficients(const rls_config *c, const rls_real *state, rls_real *thet
     for (int i = rls_regressors(c) * c->outputs - 1; i >= 0; i--) theta[i] = 0;
     for (int g = 0; g < c->groups; g++) {
         const rls_group *own = &c->group[g];
-        const int n = own->entries * functions, wide = padded(n + own->outputs), tall = padded(n);
+        const int n = own->entries * functions, tall = padded(n), high = padded(own->outputs), wide = tall + high;
         const rls_real *from = state + GROUP_HEADER + block_offset(wide, wide) + wide;
         for (int j = 0; j < own->outputs; j++)
             for (int i = 0; i < n; i++)
                 theta[(own->entry[i / functions] * functions + i % functions) * c->outputs + own->output[j]] = from[j * tall + i];
-        state = from + (own->outputs + 3) * tall + 2 * padded(own->outputs);
+        state = from + (own->outputs + 3) * tall + 4 * high;
     }
 }
 

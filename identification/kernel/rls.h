@@ -33,11 +33,13 @@ typedef struct {
     const rls_real *knot, *bernstein;
 } rls_factor;
 
-/* Products of one function of each parameter: index[function][factor]. Without factors the caller provides the functions. */
+/* Products of one function of each parameter: index[function][factor]. Without factors the caller provides the functions. `largest` is how large
+   each function becomes. */
 typedef struct {
     int functions, factors;
     const rls_factor *factor;
     const int *index;
+    const rls_real *largest;
 } rls_basis;
 
 /* How old samples lose weight.
@@ -89,7 +91,8 @@ int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_r
 /* After a gap: the next update finds no past. */
 void rls_forget_past(rls_real *state);
 
-/* theta (rls_regressors, outputs), row by row; 0 where an output does not have a regressor. */
+/* theta (rls_regressors, outputs), row by row: the coefficients that explain all samples so far best, by their weights; 0 where an output does not
+   have a regressor. */
 void rls_coefficients(const rls_config *c, const rls_real *state, rls_real *theta);
 
 /* y minus its prediction (outputs) at the last sample that was learnt. */

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from identification.kernel import configuration as at
+from identification.determined import BEYOND, PRIOR, determined
 from identification.kernel.configuration import LANES, Configuration, Factor, GroupLayout
 from symheli.lpv.arrays import Array
 
 LEARNT, DETERMINED, SATURATED, REFUSED = 1, 2, 4, 8
 CONSTANT, VARIABLE, DIRECTIONAL = 0, 1, 2
+ALONG, TRUSTED = 32, 512 * 512
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Limits:
         """`real` is float or np.float32."""
         epsilon = real(np.finfo(real).eps)
         single = real is np.float32
-        return cls(epsilon, epsilon / real(16), real(1e15 if single else 1e145), real(1e-36 if single else 1e-290))
+        return cls(epsilon, real(PRIOR) * epsilon, real(1e15 if single else 1e145), real(1e-36 if single else 1e-290))
 
 
 class View:
@@ -37,6 +39,7 @@ class View:
 
     def __init__(self, layout: GroupLayout, state: Array, work: Array):
         self.n, self.m, self.wide, self.tall = layout.n, layout.m, layout.triangle.wide, at.padded(layout.n)
+        self.outputs = slice(self.tall, self.tall + self.m)
         for memory, parts in ((state, layout.in_state), (work, layout.in_work)):
             for name, part in parts.items():
                 setattr(self, name, memory[part])
@@ -53,11 +56,18 @@ class View:
     fed: Array
     recent: Array
     usual: Array
+    power: Array
+    drift: Array
     phi: Array
     x: Array
     s: Array
     gain: Array
     innovation: Array
+
+    def fill_empty_rows(self) -> None:
+        """They weigh 1, so that nothing divides by 0."""
+        self.d[self.n : self.tall] = 1
+        self.d[self.outputs.stop :] = 1
 
 
 class Kernel:
@@ -83,7 +93,7 @@ class Kernel:
             view = View(layout, state, work)
             for i, row in enumerate(view.rows):
                 row[i % LANES] = 1
-            view.d[view.n + view.m :] = 1
+            view.fill_empty_rows()
 
     def update(self, state: Array, work: Array, y: Array, u: Array, p: Any, f: Array | None = None) -> int:
         """Take in one sample, with the functions f(p) where the configuration has no factors; returns the status bits."""
@@ -182,41 +192,60 @@ class Kernel:
         return bits
 
     def _learn(self, a: View, y: Array) -> None:
-        n, order = a.n, a.n + a.m
-        turn = int(a.header[at.TURN])
-        a.innovation[: a.m] = y - times(a.theta, a.phi)
+        n, real = a.n, self._real
         samples = self._wakefulness(n)
+        turn, kept_awake = int(a.header[at.TURN]), bool(samples > self._limits.prior)
+        self._replenish(a, samples, turn, kept_awake)
+        a.innovation[: a.m] = y - times(a.theta, a.phi)
         self._new_peaks(a, samples)
         factor = self._forgetting_factor(a)
-        kept = self._real(1) if self._kind == DIRECTIONAL else factor
-        self._replenish(a, samples, turn)
+        kept = real(1) if self._kind == DIRECTIONAL else factor
         if factor < kept:
             self._forget_direction(a, factor)
-            a.d[n:order] *= factor
-        a.x[:n], a.x[n:order], a.x[order:] = a.phi[:n], y, 0
-        self._sweep(a, 0, order, kept, self._real(1))
-        a.d[order:] = 1
+            a.d[a.outputs] *= factor
+        a.x[: a.tall], a.x[a.outputs], a.x[a.outputs.stop :] = a.phi, y, 0
+        power = factor * a.power[: a.m] + y * y
+        a.power[: a.m] = np.where(power < self._limits.tiny, real(0), power)
+        self._sweep(a, 0, a.outputs.stop, kept, real(1))
+        a.fill_empty_rows()
         a.energy[:] = a.energy * kept + a.phi * a.phi
         a.fed *= kept
-        known = a.d[: a.n] > a.d.dtype.type(self._limits.epsilon) * a.energy[: a.n]
-        back_substitute(a, known)
-        a.theta += a.innovation[: a.m, None] * a.gain
-        beyond = a.d.dtype.type(2 if a.header[at.DETERMINED] == 0 else 0)
-        a.header[at.DETERMINED] = bool(np.all(known & (a.d[:n] > beyond * a.fed[:n])))
-        a.header[at.WEIGHT] = factor * self._real(a.header[at.WEIGHT]) + self._real(1)
+        find_gain(a)
+        self._correct(a)
+        a.header[at.DETERMINED] = self._is_determined(a, kept_awake)
+        a.header[at.WEIGHT] = factor * real(a.header[at.WEIGHT]) + real(1)
         a.header[at.FACTOR] = factor
         a.header[at.TURN] = (turn + 1) % n
-        for i in range(turn, order, n):
+        for i in range(turn, a.wide, n):
             self._drop_underflow(a, i)
 
+    def _correct(self, a: View) -> None:
+        lanes = (a.energy * (a.gain * a.gain)).reshape(-1, LANES).sum(axis=0)
+        error = np.add.accumulate(lanes)[-1]
+        a.header[at.SINCE] += 1
+        innovation = a.innovation[: a.m]
+        a.theta += innovation[:, None] * a.gain
+        a.drift[: a.m] += error * (innovation * innovation)
+        trusted = (a.header[at.SINCE] * a.drift[: a.m] <= TRUSTED * a.power[: a.m]).all()
+        if not trusted or a.header[at.SINCE] >= ALONG:
+            solve_anew(a)
+
+    def _is_determined(self, a: View, kept_awake: bool) -> bool:
+        beyond = (0.0 if a.header[at.DETERMINED] != 0 else 2.0) if kept_awake else BEYOND
+        return bool(determined(a.d[: a.n], a.energy[: a.n], a.fed[: a.n], beyond).all())
+
     def _new_peaks(self, a: View, samples: Any) -> None:
-        n = a.n
-        phi, peak = a.phi[:n], a.peak[:n]
-        fresh = (peak == 0) & (phi != 0)
-        prior = a.peak.dtype.type(samples) * (phi[fresh] * phi[fresh])
-        for part in (a.d[:n], a.energy[:n], a.fed[:n]):
-            part[fresh] = prior
-        np.maximum(peak, np.abs(phi), out=peak)
+        largest = self._c.largest
+        shape = -1, len(largest)
+        phi, peak = np.abs(a.phi[: a.n]).reshape(shape), a.peak[: a.n].reshape(shape)
+        signal = np.zeros(len(phi), phi.dtype)
+        for k, size in enumerate(largest):
+            signal = np.where(phi[:, k] > signal * size, phi[:, k] / size, signal)
+        larger = (phi > peak).any() & (signal * largest[0] > peak[:, 0])
+        fresh = larger & (peak[:, 0] == 0)
+        peak[larger] = signal[larger, None] * largest
+        for part in (a.d, a.energy, a.fed):
+            part[: a.n].reshape(shape)[fresh] = a.peak.dtype.type(samples) * (peak[fresh] * peak[fresh])
 
     def _loudness(self, a: View) -> Any:
         known = a.peak > 0
@@ -250,22 +279,31 @@ class Kernel:
         many = weight >= 2 * a.n or 2 * weight * (1 - self._factor) >= 1
         return bool(a.header[at.STEPS] > 0 or (a.header[at.DETERMINED] != 0 and many))
 
+    @property
+    def _fastest(self) -> Any:
+        """The fastest a coefficient forgets that nothing excites."""
+        return {CONSTANT: self._factor, VARIABLE: self._lowest, DIRECTIONAL: self._real(1)}[self._kind]
+
     def _wakefulness(self, n: int) -> Any:
         real = self._real
-        fastest = self._lowest if self._kind == VARIABLE else self._factor
-        if self._kind == DIRECTIONAL or fastest == 1:
+        if self._fastest == 1:
             return self._limits.prior
-        return max(self._limits.prior, real(2) * self._floor / max(power(fastest, n), real(1e-12)))
+        return max(self._limits.prior, real(2) * self._floor / max(power(self._fastest, n), real(1e-12)))
 
-    def _replenish(self, a: View, samples: Any, j: int) -> None:
+    def _replenish(self, a: View, samples: Any, j: int, kept_awake: bool) -> None:
         real = self._real
         target, fed = samples * real(a.peak[j] * a.peak[j]), real(a.fed[j])
         if real(2) * fed >= target:
             return
         a.x[:] = 0
         a.x[j] = 1
-        a.x[a.n : a.n + a.m] = a.theta[:, j]
-        self._sweep(a, j, a.n, real(1), target - fed)
+        if kept_awake:
+            self._sweep(a, j, a.n, real(1), target - fed)
+            for i in range(j, a.n):
+                a.rows[i][a.outputs.start - i // LANES * LANES :][: a.m] -= a.s[i] * a.x[a.outputs]
+        else:
+            self._sweep(a, j, a.outputs.stop, real(1), target - fed)
+            solve_anew(a)
         a.energy[j] += target - fed
         a.fed[j] = target
 
@@ -384,16 +422,26 @@ def times(rows: Array, b: Array) -> Array:
     return s[:, 0] + s[:, 1]
 
 
-def back_substitute(a: View, known: Array) -> None:
-    """gain <- triangle^-1 s; 0 for a coefficient that is not `known` (n,)."""
+def find_gain(a: View) -> None:
+    """gain <- triangle^-1 s"""
     for start in range(a.tall - LANES, -1, -LANES):
         block = a.blocks[start // LANES]
         g = a.gain[start : start + LANES]
         g[:] = a.s[start : start + LANES] - times(block[:, LANES : a.tall - start], a.gain[start + LANES :])
-        for i in range(LANES - 1, -1, -1):
-            if start + i >= a.n or not known[start + i]:
-                g[i] = 0
+        for i in range(LANES - 1, 0, -1):
             g[:i] -= block[:i, i] * g[i]
+
+
+def solve_anew(a: View) -> None:
+    """theta <- R^-1 Z"""
+    solution = np.array([row[a.outputs.start - i // LANES * LANES :][: a.m] for i, row in enumerate(a.rows[: a.tall])])
+    for k in range(a.tall - 1, 0, -1):
+        for start in range(0, k, LANES):
+            rows = min(k - start, LANES)
+            solution[start : start + rows] -= a.blocks[start // LANES][:rows, k - start, None] * solution[k]
+    a.theta[:] = solution.T
+    a.drift[:] = 0
+    a.header[at.SINCE] = 0
 
 
 def power(base: Any, exponent: int) -> Any:
