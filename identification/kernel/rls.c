@@ -478,26 +478,6 @@ static inline rls_real wakefulness(const rls_forgetting *f, int n)
     return floor > PRIOR ? floor : PRIOR;
 }
 
-/* The largest regressors one has to expect: a signal as large as any so far, times its functions at their largest. The coefficients of a signal that
-   is seen for the first time are kept awake from the start, at the 0 they have, lest the first samples make them wild: nothing is in
-   their rows and columns yet. */
-static inline void new_peaks(const rls_basis *b, const group *a, rls_real samples)
-{
-    int larger = 0;
-    for (int i = 0; i < a->tall; i++) larger += absolute(a->phi[i]) > a->peak[i];
-    for (int i = 0; larger && i < a->n; i += b->functions) {
-        const int fresh = a->peak[i] == 0;
-        rls_real signal = 0;
-        for (int k = 0; k < b->functions; k++)
-            if (absolute(a->phi[i + k]) > signal * b->largest[k]) signal = absolute(a->phi[i + k]) / b->largest[k];
-        if (signal * b->largest[0] <= a->peak[i]) continue;
-        for (int k = i; k < i + b->functions; k++) {
-            a->peak[k] = signal * b->largest[k - i];
-            if (fresh) a->d[k] = a->energy[k] = a->fed[k] = samples * (a->peak[k] * a->peak[k]);
-        }
-    }
-}
-
 /* The largest ratio of a regressor to its largest. */
 static inline rls_real loudness(const group *a)
 {
@@ -563,28 +543,68 @@ static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a
     return factor < f->lowest ? f->lowest : factor > f->factor ? f->factor : factor;
 }
 
-/* Make up for what coefficient j has lost, as soon as half of what is pretended of it is gone, n samples after its last turn at the earliest. One
-   that is kept awake gets a measurement that says "as it is now" and moves no coefficient: rotated in with outputs 0, x ends as minus
-   the coefficients, and what outputs that leave no residual would have added follows. Else what is pretended goes on saying "0": little, but it
-   moves them. */
-static inline void replenish(const group *a, rls_real samples, int j, int kept_awake)
+/* A measurement of coefficient j that says 0, of what weight is missing to `target`, rotated into the rows up to `last`. Up to n, x ends as minus the
+   coefficients. */
+static inline void feed(const group *a, int j, rls_real target, int last)
 {
-    const rls_real target = samples * (a->peak[j] * a->peak[j]), more = target - a->fed[j];
-    if (2 * a->fed[j] >= target) return;
+    const rls_real more = target - a->fed[j];
     for (int k = 0; k < a->wide; k++) a->x[k] = 0;
     a->x[j] = 1;
+    sweep(a, j, last, 1, more);
+    a->energy[j] += more;
+    a->fed[j] = target;
+}
+
+/* Make up for what coefficient j has lost, as soon as half of what is pretended of it is gone, n samples after its last turn at the earliest. One
+   that is kept awake gets a measurement that says "as it is now" and moves no coefficient: what outputs that leave no residual would have added to one
+   that says 0 follows. Else what is pretended goes on saying 0: little, but it moves them. */
+static inline void replenish(const group *a, rls_real samples, int j, int kept_awake)
+{
+    const rls_real target = samples * (a->peak[j] * a->peak[j]);
+    if (2 * a->fed[j] >= target) return;
     if (kept_awake) {
-        sweep(a, j, a->n, 1, more);
+        feed(a, j, target, a->n);
         for (int i = j; i < a->n; i++) {
             rls_real *z = entry(a, i, a->tall);
             for (int k = 0; k < a->m; k++) z[k] -= a->s[i] * a->x[a->tall + k];
         }
     } else {
-        sweep(a, j, a->tall + a->m, 1, more);
+        feed(a, j, target, a->tall + a->m);
         solve_anew(a);
     }
-    a->energy[j] += more;
-    a->fed[j] = target;
+}
+
+/* The largest regressors one has to expect: a signal as large as any so far, times its functions at their largest. The coefficients of a signal that
+   is seen for the first time are kept awake from the start, at the 0 they have, lest the first samples make them wild: nothing is in
+   their rows and columns yet. And so, at once, are those of one that has only whispered until now: by less, where little is pretended. */
+static inline void new_peaks(const rls_basis *b, const group *a, rls_real samples, int kept_awake)
+{
+    const rls_real louder = REAL(kept_awake ? 100 : 4);
+    int larger = 0, fed = 0;
+    for (int i = 0; i < a->tall; i++) larger += absolute(a->phi[i]) > a->peak[i];
+    for (int i = 0; larger && i < a->n; i += b->functions) {
+        const int fresh = a->peak[i] == 0;
+        rls_real signal = 0;
+        for (int k = 0; k < b->functions; k++)
+            if (absolute(a->phi[i + k]) > signal * b->largest[k]) signal = absolute(a->phi[i + k]) / b->largest[k];
+        if (!(samples * (signal * signal) > TINY)) { /* what is pretended of it would underflow: it is not there */
+            for (int k = i; k < i + b->functions; k++) a->phi[k] = 0;
+            continue;
+        }
+        if (signal * b->largest[0] <= a->peak[i]) continue;
+        for (int k = i; k < i + b->functions; k++) {
+            rls_real target;
+            a->peak[k] = signal * b->largest[k - i];
+            target = samples * (a->peak[k] * a->peak[k]);
+            if (fresh)
+                a->d[k] = a->energy[k] = a->fed[k] = target;
+            else if (target > louder * a->fed[k]) {
+                feed(a, k, target, a->tall + a->m);
+                fed = 1;
+            }
+        }
+    }
+    if (fed) solve_anew(a);
 }
 
 /* Information that is about to underflow is dropped. */
@@ -654,8 +674,8 @@ static void learn(const rls_forgetting *f, const rls_basis *b, const group *a, c
     const int turn = (int)a->header[TURN], kept_awake = samples > PRIOR;
     rls_real factor, kept;
     replenish(a, samples, turn, kept_awake);
+    new_peaks(b, a, samples, kept_awake);
     predict(a, output, y);
-    new_peaks(b, a, samples);
     factor = forgetting_factor(f, a);
     kept = f->kind == RLS_DIRECTIONAL ? 1 : factor;
     if (factor < kept) {

@@ -196,8 +196,8 @@ class Kernel:
         samples = self._wakefulness(n)
         turn, kept_awake = int(a.header[at.TURN]), bool(samples > self._limits.prior)
         self._replenish(a, samples, turn, kept_awake)
+        self._new_peaks(a, samples, kept_awake)
         a.innovation[: a.m] = y - times(a.theta, a.phi)
-        self._new_peaks(a, samples)
         factor = self._forgetting_factor(a)
         kept = real(1) if self._kind == DIRECTIONAL else factor
         if factor < kept:
@@ -234,18 +234,31 @@ class Kernel:
         beyond = (0.0 if a.header[at.DETERMINED] != 0 else 2.0) if kept_awake else BEYOND
         return bool(determined(a.d[: a.n], a.energy[: a.n], a.fed[: a.n], beyond).all())
 
-    def _new_peaks(self, a: View, samples: Any) -> None:
+    def _new_peaks(self, a: View, samples: Any, kept_awake: bool) -> None:
         largest = self._c.largest
         shape = -1, len(largest)
         phi, peak = np.abs(a.phi[: a.n]).reshape(shape), a.peak[: a.n].reshape(shape)
         signal = np.zeros(len(phi), phi.dtype)
         for k, size in enumerate(largest):
             signal = np.where(phi[:, k] > signal * size, phi[:, k] / size, signal)
-        larger = (phi > peak).any() & (signal * largest[0] > peak[:, 0])
-        fresh = larger & (peak[:, 0] == 0)
-        peak[larger] = signal[larger, None] * largest
-        for part in (a.d, a.energy, a.fed):
-            part[: a.n].reshape(shape)[fresh] = a.peak.dtype.type(samples) * (peak[fresh] * peak[fresh])
+        if not (phi > peak).any():
+            return
+        absent = ~(a.peak.dtype.type(samples) * (signal * signal) > self._limits.tiny)
+        a.phi[: a.n].reshape(shape)[absent] = 0
+        larger = ~absent & (signal * largest[0] > peak[:, 0])
+        louder, fed = self._real(100 if kept_awake else 4), False
+        for i in np.flatnonzero(larger):
+            fresh, where = peak[i, 0] == 0, slice(i * len(largest), (i + 1) * len(largest))
+            peak[i] = signal[i] * largest
+            target = a.peak.dtype.type(samples) * (peak[i] * peak[i])
+            if fresh:
+                a.d[where] = a.energy[where] = a.fed[where] = target
+                continue
+            for k in np.flatnonzero(target > louder * a.fed[where]):
+                self._feed(a, where.start + k, self._real(target[k]), a.outputs.stop)
+                fed = True
+        if fed:
+            solve_anew(a)
 
     def _loudness(self, a: View) -> Any:
         known = a.peak > 0
@@ -292,19 +305,23 @@ class Kernel:
 
     def _replenish(self, a: View, samples: Any, j: int, kept_awake: bool) -> None:
         real = self._real
-        target, fed = samples * real(a.peak[j] * a.peak[j]), real(a.fed[j])
-        if real(2) * fed >= target:
+        target = samples * real(a.peak[j] * a.peak[j])
+        if real(2) * real(a.fed[j]) >= target:
             return
-        a.x[:] = 0
-        a.x[j] = 1
         if kept_awake:
-            self._sweep(a, j, a.n, real(1), target - fed)
+            self._feed(a, j, target, a.n)
             for i in range(j, a.n):
                 a.rows[i][a.outputs.start - i // LANES * LANES :][: a.m] -= a.s[i] * a.x[a.outputs]
         else:
-            self._sweep(a, j, a.outputs.stop, real(1), target - fed)
+            self._feed(a, j, target, a.outputs.stop)
             solve_anew(a)
-        a.energy[j] += target - fed
+
+    def _feed(self, a: View, j: int, target: Any, last: int) -> None:
+        more = target - self._real(a.fed[j])
+        a.x[:] = 0
+        a.x[j] = 1
+        self._sweep(a, j, last, self._real(1), more)
+        a.energy[j] += more
         a.fed[j] = target
 
     def _sweep(self, a: View, first: int, last: int, kept: Any, value: Any) -> None:

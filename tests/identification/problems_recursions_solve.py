@@ -28,9 +28,9 @@ class Rows:
             self._add(np.eye(self.n)[j], self._now[j] if self.samples > PRIOR else 0 * y, target - self.fed[j])
             self.fed[j] = target
         peak = peaks(self.peak, phi, self.largest)
-        for i in np.flatnonzero((self.peak == 0) & (peak > 0)):
+        for i in np.flatnonzero((peak > self.peak) & (self.samples * peak**2 > (100 if self.samples > PRIOR else 4) * self.fed)):
+            self._add(np.eye(self.n)[i], 0 * y, self.samples * peak[i] ** 2 - self.fed[i])
             self.fed[i] = self.samples * peak[i] ** 2
-            self._add(np.eye(self.n)[i], 0 * y, self.fed[i])
         self.peak, self.w, self.fed = peak, self.w * factor, self.fed * factor
         self._add(phi, y, 1.0, data=True)
         self.turn = (self.turn + 1) % self.n
@@ -90,9 +90,9 @@ class Information:
                 self.L[j, j] += mpmath.mpf(target - self.fed[j])
                 self.fed[j] = target
             peak = peaks(self.peak, phi, self.largest)
-            for i in np.flatnonzero((self.peak == 0) & (peak > 0)):
+            for i in np.flatnonzero((peak > self.peak) & (PRIOR * peak**2 > 4 * self.fed)):
+                self.L[i, i] += mpmath.mpf(PRIOR * peak[i] ** 2 - self.fed[i])
                 self.fed[i] = PRIOR * peak[i] ** 2
-                self.L[i, i] += mpmath.mpf(self.fed[i])
             self.peak = peak
             exact, outputs = (np.array([mpmath.mpf(float(v)) for v in part], object) for part in (phi, y))
             if (np.abs(phi[peak > 0]) >= self.forgetting.quiet * peak[peak > 0]).any():
