@@ -18,6 +18,7 @@ from identification.structure import LPVARX
 from symheli.errors import InputError
 from symheli.lpv import FlightRecord, FunctionSpace, LinearModel, LPVStateSpace, NamedVector, Reduction, Scheduling, Signal, signals
 from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.sample_period import JITTER, same_period
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +145,7 @@ class LPVARXModel:
     def require_same_kind(self, record: FlightRecord) -> None:
         """Raises `InputError` where `record` has another sample period, or a signal of the model in another unit."""
         check_units((*self.outputs, *self.inputs, *self.parameters), record)
-        if abs(record.dt - self.dt) > 0.01 * self.dt:
+        if not same_period(record.dt, self.dt, JITTER):
             raise InputError(f"the model was identified at dt = {self.dt:.4g} s, the record has {record.dt:.4g} s; resample it")
 
     def _along(self, record: FlightRecord) -> prediction.Recursion:

@@ -12,6 +12,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.sample_period import JITTER, period_of
 from symheli.lpv.signal import Signal, indices, signals
 from symheli.lpv.units import to_si
 
@@ -149,15 +150,18 @@ class FlightRecord:
 
     @property
     def dt(self) -> float:
-        """Sample period (s): the median step. Raises `InputError` where the steps inside a segment vary by more than 1 %."""
+        """Sample period (s): the roundest number that the stamps allow (`sample_period.period_of`), so that 0.02 s is 0.02 s.
+
+        Raises `InputError` where the steps inside a segment vary by more than 1 %.
+        """
         steps = np.diff(self.time)
         dt = float(np.median(steps))
         inside = steps[steps <= GAP * dt]
-        if np.ptp(inside) > 0.01 * dt:
+        if np.ptp(inside) > JITTER * dt:
             raise InputError(
                 f"sampling is irregular (steps {inside.min():.4g} to {inside.max():.4g} s); resample first: record.resample({dt:.3g})"
             )
-        return dt
+        return period_of(inside, self.time[-1])
 
     def segments(self) -> tuple[slice, ...]:
         """Index ranges without a gap between them, in order."""
