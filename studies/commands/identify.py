@@ -28,6 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add("--format", choices=("auto", "xplane", "csv", "mat"), default="auto", help="default: by extension and content")
     add("--map", type=Path, metavar="FILE", help="TOML file that says which column is which signal, in which unit (docs/identify.md)")
     add("--time", metavar="COLUMN", help="time column of a table (default: t or time)")
+    add("--time-unit", choices=("s", "ms", "us", "ns"), default="s", help="unit of the time column (default: %(default)s)")
     add("--dt", type=options.positive, metavar="S", help="sample period, s: of a log without time, or to resample to")
     add(
         "--units",
@@ -87,8 +88,9 @@ def run(arguments: argparse.Namespace) -> Output:
         record = FlightRecord.from_map(arguments.log, arguments.map)
     else:
         record = read(
-            arguments.log, list(dict.fromkeys(wanted)), format=found, dt=arguments.dt, time=arguments.time, units=dict(arguments.units)
-        )
+            arguments.log, list(dict.fromkeys(wanted)), format=found, dt=arguments.dt, time=arguments.time, units=dict(arguments.units),
+            time_unit=arguments.time_unit,
+        )  # fmt: skip
     samples = len(record)
     if arguments.scheduling_from:
         record, scheduling = conditioning.with_norm(record, arguments.scheduling_from, COMBINED), COMBINED

@@ -12,7 +12,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.arrays import Array, frozen
-from symheli.lpv.sample_period import JITTER, period_of
+from symheli.lpv.sample_period import JITTER, period_of, warn_of_odd_steps
 from symheli.lpv.signal import Signal, indices, signals
 from symheli.lpv.units import to_si
 
@@ -62,7 +62,16 @@ class FlightRecord:
 
     @classmethod
     def from_arrays(cls, time: object, units: Mapping[str, str], note: str = "", **columns: Any) -> FlightRecord:
-        """From one array a signal, all as long as `time` (s); `units` declares the unit of each signal."""
+        """From one array a signal, all as long as `time` (s); `units` declares the unit of each signal.
+
+        Warns (`DataWarning`), as all readers do, where samples lie further apart than 1 s or closer than 0.1 ms.
+        """
+        record = cls._in_si(time, units, note, columns)
+        warn_of_odd_steps(record.time)
+        return record
+
+    @classmethod
+    def _in_si(cls, time: object, units: Mapping[str, str], note: str, columns: Mapping[str, Any]) -> FlightRecord:
         values, names = [], []
         length = np.asarray(time).size
         for name, column in columns.items():
@@ -82,9 +91,9 @@ class FlightRecord:
         for name in (time, *units):
             if name not in frame.columns:
                 raise UnknownNameError("column", name, [str(c) for c in frame.columns])
-        factor, unit = to_si(time_unit)
-        if unit != "s":
-            raise InputError(f"time_unit must be a time, got {time_unit!r}")
+        from symheli.logs.files import seconds_in
+
+        factor = seconds_in(time_unit)
         if frame[time].dtype.kind in "mM":
             raise InputError(f"{time!r} holds dates; give numbers: (frame[{time!r}] - frame[{time!r}].iloc[0]).dt.total_seconds()")
         columns = {}
@@ -99,7 +108,10 @@ class FlightRecord:
     def from_csv(
         cls, path: str | os.PathLike[str], time: str | None, units: Mapping[str, str], dt: float | None = None, time_unit: str = "s"
     ) -> FlightRecord:
-        """From a CSV file with a header line. A file without a time column (`time=None`) needs the sample period `dt` (s)."""
+        """From a table with a header line: commas, semicolons, tabs or blanks between cells, decimal points or commas, # comments.
+
+        `time` names the time column, in `time_unit`. A file without one (`time=None`) needs the sample period `dt` (s).
+        """
         from symheli.logs.csv import read_csv
 
         return cls._from_table(*read_csv(path, time, units, dt, time_unit), path)
@@ -119,11 +131,11 @@ class FlightRecord:
         return cls._from_table(*read_ulog(path, topics, dt), path)
 
     @classmethod
-    def from_mat(cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str]) -> FlightRecord:
-        """From a MATLAB file (v7.2 or older) with one vector a signal."""
+    def from_mat(cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s") -> FlightRecord:
+        """From a MATLAB file (v7.2 or older) with one vector a signal, `time` in `time_unit`."""
         from symheli.logs.mat import read_mat
 
-        return cls._from_table(*read_mat(path, time, units), path)
+        return cls._from_table(*read_mat(path, time, units, time_unit), path)
 
     @classmethod
     def from_map(cls, path: str | os.PathLike[str], signal_map: str | os.PathLike[str]) -> FlightRecord:
@@ -200,7 +212,7 @@ class FlightRecord:
 
     def with_signals(self, units: Mapping[str, str], **columns: Any) -> FlightRecord:
         """With these signals added, or replaced where the name exists."""
-        other = FlightRecord.from_arrays(self.time, units, **columns)
+        other = FlightRecord._in_si(self.time, units, self.note, columns)
         kept = [i for i, s in enumerate(self.signals) if s not in other.signals]
         return replace(
             self, values=np.column_stack([self.values[:, kept], other.values]), signals=(*(self.signals[i] for i in kept), *other.signals)
@@ -246,7 +258,9 @@ class FlightRecord:
         return split(self, fraction)
 
     def to_frame(self) -> pandas.DataFrame:
-        """A pandas DataFrame with a "t" column (s) and one column a signal."""
-        import pandas as pd
-
+        """A pandas DataFrame with a "t" column (s) and one column a signal; raises `InputError` without pandas."""
+        try:
+            import pandas as pd
+        except ImportError as error:
+            raise InputError('a DataFrame needs pandas: pip install "symheli[logs]"') from error
         return pd.DataFrame({"t": self.time, **{str(s): self.values[:, i] for i, s in enumerate(self.signals)}})

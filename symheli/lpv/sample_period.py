@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from fractions import Fraction
 from math import floor, log10
 
 import numpy as np
 
+from symheli.errors import DataWarning
 from symheli.lpv.arrays import Array
 
 SAME = 1e-6
@@ -14,6 +16,9 @@ SAME = 1e-6
 
 JITTER = 0.01
 """What the steps of a record may vary by, as a part of its period; two records are of one period within this too."""
+
+USUAL = 1e-4, 1.0
+"""Seconds between samples of a flight; a step beyond these is rather a time in another unit."""
 
 
 def same_period(first: float | None, second: float | None, tolerance: float = SAME) -> bool:
@@ -40,3 +45,16 @@ def period_of(steps: Array, last: float) -> float:
         if abs(candidate - mean) <= slack:
             return candidate
     return mean
+
+
+def warn_of_odd_steps(time: Array) -> None:
+    """Warns (`DataWarning`) where the median step of `time` (s) is that of no flight record: the unit is asked for."""
+    step, (least, most) = float(np.median(np.diff(time))), USUAL
+    if least <= step <= most:
+        return
+    meant = [unit for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if least <= step * factor <= most]
+    far = (
+        f"; if the time is in {' or '.join(meant)}, say so: time_unit={meant[0]!r} (--time-unit {meant[0]})" if step > most and meant
+        else "; the time is taken in seconds: check its unit"
+    )  # fmt: skip
+    warnings.warn(f"the samples are {step:.6g} s apart{far}", DataWarning, stacklevel=3)

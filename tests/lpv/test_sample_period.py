@@ -1,17 +1,20 @@
 """A record of 50 Hz says 0.02 s, whatever subtraction makes of its stamps, and goes with whatever else runs at 0.02 s."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from symheli import FlightRecord, LinearModel
+from symheli.errors import DataWarning
 from symheli.lpv import append, nu_gap
 from symheli.lpv.sample_period import same_period
 
 
 def record(time):
-    return FlightRecord.from_arrays(time, {"q": "rad/s"}, q=np.zeros(len(time)))
+    return FlightRecord(time, np.zeros((len(time), 1)), ("q",))
 
 
 @pytest.mark.parametrize("dt", [0.02, 0.01, 0.0084, 0.05, 1 / 30, 1 / 400, 0.1, 1.0, 2.5, 60.0, 1 / 3])
@@ -52,3 +55,16 @@ def test_models_go_together_where_their_periods_differ_by_rounding_and_not_other
             append(model(0.02), model(wrong))
     assert same_period(None, None)
     assert not same_period(None, 0.02)
+
+
+@pytest.mark.parametrize(("step", "unit"), [(20.0, "ms"), (20000.0, "us"), (2e7, "ns")])
+def test_a_time_in_another_unit_is_asked_for(step, unit):
+    with pytest.warns(DataWarning, match=rf"{re.escape(f'{step:.6g}')} s apart; if the time is in {unit}.*--time-unit {unit}"):
+        FlightRecord.from_arrays(step * np.arange(9), {"q": "rad/s"}, q=np.zeros(9))
+
+
+def test_a_step_no_flight_recorder_has_is_asked_about_once():
+    with pytest.warns(DataWarning, match="2e-05 s apart; the time is taken in seconds: check its unit") as warned:
+        got = FlightRecord.from_arrays(2e-5 * np.arange(9), {"q": "rad/s"}, q=np.zeros(9))
+        got.with_signals({"p": "1"}, p=np.zeros(9))
+    assert len(warned) == 1
