@@ -12,6 +12,7 @@ from identification.excitation import excitation_of
 from identification.forgetting import Forgetting
 from identification.instrumental_variables import Instruments, explained, instrumental_variables
 from identification.lasso import Lasso, lasso
+from identification.leakage import warn_of_leakage
 from identification.least_squares import least_squares_by_group, residual_covariance
 from identification.model import LPVARXModel
 from identification.output_error import OutputError, output_error
@@ -62,13 +63,15 @@ def fit(
 
     Raises `ExcitationError` (with a report) where the data cannot determine every coefficient (ridge and lasso: where the
     penalty does not either), `UnknownNameError` for signals the record lacks, `InputError` where p leaves the range of the
-    basis or an option does not fit the method. Warns (`ConvergenceWarning`) where an iteration does not settle.
+    basis or an option does not fit the method. Warns (`ConvergenceWarning`) where an iteration does not settle, and
+    (`DataWarning`) where the scheduling signal tells the model its own answer, or the samples are means and the delay is not 0.
     """
     require_structure(structure)
     records = as_records(records)
     _check(method, forgetting, instruments, options)
     outputs, inputs = units_of(structure.outputs, records), units_of(structure.inputs, records)
     scheduling = units_of(structure.parameters, records)
+    warn_of_leakage(structure, records)
     data = stacked(structure, records)
     report = excitation_of(structure, data)
     if method not in PENALISED or len(data.phi) == 0:

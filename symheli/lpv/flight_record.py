@@ -33,7 +33,8 @@ class FlightRecord:
     """Samples `values` (n, m) of `signals` at `time` (n,) in s, in SI units and radians.
 
     NaN marks a missing sample. A time step longer than 1.5 median steps is a gap: `segments()` splits there, and no
-    regressor reaches across. `note` says where the record comes from.
+    regressor reaches across. `note` says where the record comes from, `resampled` how its samples were made of others ("means of 4
+    samples"; empty where each is what was measured at its instant): then y(k) may depend on u(k).
     """
 
     time: Array
@@ -41,6 +42,7 @@ class FlightRecord:
     signals: tuple[Signal, ...]
     note: str = ""
     meta: Mapping[str, Any] = field(default_factory=dict)
+    resampled: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", signals(self.signals))
@@ -128,7 +130,7 @@ class FlightRecord:
         """From a PX4 ULog: {signal: (topic, field, unit)}, resampled to `dt` (s); needs pyulog (extra "logs")."""
         from symheli.logs.ulog import read_ulog
 
-        return cls._from_table(*read_ulog(path, topics, dt), path)
+        return replace(cls._from_table(*read_ulog(path, topics, dt), path), resampled=f"topics interpolated to {dt:g} s")
 
     @classmethod
     def from_mat(cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s") -> FlightRecord:
@@ -221,7 +223,8 @@ class FlightRecord:
     def resample(self, dt: float) -> FlightRecord:
         """Linear interpolation to a uniform step `dt` (s) inside each segment; nothing is invented across gaps.
 
-        To a longer step: `low_pass` or `decimate` first, or what is faster folds back into what is slower.
+        To a longer step: `low_pass` or `decimate` first, or what is faster folds back into what is slower. Between its neighbours an
+        output has heard the input that stands beside it: identify with delay 0.
         """
         if not 0 < dt < np.inf:
             raise InputError(f"dt must be a positive number of seconds, got {dt}")
@@ -237,7 +240,10 @@ class FlightRecord:
             if len(new):
                 times.append(new)
                 values.append(np.column_stack([np.interp(new, old, column) for column in self.values[part].T]))
-        return replace(self, time=np.concatenate(times), values=np.concatenate(values))
+        new, old = np.concatenate(times), float(np.median(np.diff(self.time)))
+        kept = len(new) == len(self) and np.allclose(new, self.time, rtol=0, atol=1e-9 * dt)
+        made = self.resampled if kept else f"interpolated to {dt:.4g} s from {old:.4g} s"
+        return replace(self, time=new, values=np.concatenate(values), resampled=made)
 
     def low_pass(self, cutoff: float, order: int = 4, *, zero_phase: bool = False, leave: Sequence[str] = ()) -> FlightRecord:
         """All signals but those of `leave` through one Butterworth filter with its corner at `cutoff` (Hz); see `symheli.lpv.low_pass`."""
@@ -246,7 +252,7 @@ class FlightRecord:
         return low_pass(self, cutoff, order, zero_phase=zero_phase, leave=leave)
 
     def decimate(self, n: int) -> FlightRecord:
-        """Means of `n` samples in a row, all signals alike; see `symheli.lpv.decimate`."""
+        """Means of `n` samples in a row, all signals alike, to identify with delay 0; see `symheli.lpv.decimate`."""
         from symheli.lpv.conditioning import decimate
 
         return decimate(self, n)
