@@ -35,8 +35,8 @@ class FrequencyResponse:
         """Mean squared mismatch cost J (ny, nu) of a model's response; below 100 is a good, below 50 an excellent match.
 
         J = 20/n sum W [ (dB error)^2 + 0.01745 (degree error)^2 ], W = (1.58 (1 - exp(-coherence)))^2, over the frequencies where the
-        coherence exceeds the threshold; NaN where there are none. `coherence` is gamma^2 itself, a share of power: W(0.6) = 0.51. Source: Tischler and Remple (2012), Aircraft and Rotorcraft System
-        Identification, eq. 11.4.
+        coherence exceeds the threshold; NaN where there are none. `coherence` is gamma^2 itself, a share of power: W(0.6) = 0.51.
+        Source: Tischler and Remple (2012), Aircraft and Rotorcraft System Identification, eq. 11.4.
         """
         H = model.select(inputs=self.inputs, outputs=self.outputs).frequency_response(self.omega)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -61,9 +61,9 @@ def warn_of_leakage(arx: LPVARX, records: Sequence[FlightRecord]) -> None:
             if share > MADE_OF_OUTPUTS:
                 term = "offset_rate" if arx.offset_rate else 'scheduling_at="now"'
                 warnings.warn(
-                    f"{parameter} is made of the outputs ({100 * share:.0f} % of what is new in it at k is in the outputs at k): with {term} "
-                    f"the model is told what it has to predict, and one step and free run flatter; schedule on a command, or leave {term} out "
-                    f"and score with hold_p=True",
+                    f"{parameter} is made of the outputs ({100 * share:.0f} % of what is new in it at k is in the outputs at k): "
+                    f"with {term} the model is told what it has to predict, and one step and free run flatter; "
+                    f"schedule on a command, or leave {term} out and score with hold_p=True",
                     DataWarning, stacklevel=3,
                 )  # fmt: skip
     made = next((record.resampled for record in records if record.resampled), "")

@@ -27,7 +27,8 @@ def never_determined(arx: LPVARX, group: Group) -> str:
     cure = "" if any(_repeated(bare, g) for g in bare.groups) else f"set offset=False (the functions of {twice[0]} it adds are there), or "
     return (
         f"{' and '.join(twice)} schedules the coefficients and is multiplied by them: {lost} of {len(arx.regressors(group))} regressors "
-        f"repeat others by algebra, so that more excitation cannot help; {cure}schedule on another signal, such as a command or a slow filter"
+        f"repeat others by algebra, so that more excitation cannot help; {cure}"
+        f"schedule on another signal, such as a command or a slow filter"
     )
 
 

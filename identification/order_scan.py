@@ -87,7 +87,8 @@ def order_scan(
 ) -> OrderScan:  # fmt: skip
     """Fit `structure` with every na = nb of `orders` and every polynomial degree, by least squares, and judge it on other records.
 
-    Degree 0 is the LTI model; nb follows na. `hold_p` as in `LPVARXModel.predict`: for a measured p. Raises `InputError` where the basis is no polynomial of one parameter.
+    Degree 0 is the LTI model; nb follows na. `hold_p` as in `LPVARXModel.predict`: for a measured p.
+    Raises `InputError` where the basis is no polynomial of one parameter.
     """
     basis = structure.basis
     if not isinstance(basis, Polynomial):

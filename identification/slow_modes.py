@@ -73,9 +73,10 @@ class SlowModes:
         worst = max(self.lost, key=lambda m: m.error / abs(m.s))
         at, together = ", ".join(f"{value:.3g}" for value in worst.p), max(round(worst.period / self.dt), 2)
         return (
-            f"slow modes: NOT known at {1 / self.dt:.3g} Hz: the pole {worst.s:.2g} 1/s at p = {at} is uncertain by {2 * worst.standard_error:.2g} "
-            f"(two standard errors) and moves by {worst.shift:.2g} where the residuals are taken for noise of the sensors; for this mode "
-            f"identify at about {1 / (self.dt * together):.2g} Hz (means of {together} samples, delay 0), or by instruments"
+            f"slow modes: NOT known at {1 / self.dt:.3g} Hz: the pole {worst.s:.2g} 1/s at p = {at} is uncertain by "
+            f"{2 * worst.standard_error:.2g} (two standard errors) and moves by {worst.shift:.2g} where the residuals are taken for noise "
+            f"of the sensors; for this mode identify at about {1 / (self.dt * together):.2g} Hz (means of {together} samples, delay 0), "
+            f"or by instruments"
         )
 
 
@@ -98,11 +99,8 @@ def slow_modes(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord
         for z in _poles(model, row):
             if z.imag >= 0 and 0 < abs(np.log(z)) < SLOW:
                 shift = max(float(np.min(np.abs(np.log(poles) - np.log(z)))) for poles in moved)
-                found.append(
-                    SlowMode(
-                        tuple(map(float, row)), complex(np.log(z) / model.dt), _standard_error(model, joint, row, z), shift / model.dt
-                    )
-                )
+                error = _standard_error(model, joint, row, z)
+                found.append(SlowMode(tuple(map(float, row)), complex(np.log(z) / model.dt), error, shift / model.dt))
     return SlowModes(tuple(found), model.dt)
 
 

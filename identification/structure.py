@@ -71,7 +71,8 @@ class LPVARX:
     that move about a trim x0(p), d(p) is x0'(p) to first order in the step; d(p) dt multiplies dp/dt.
 
     Raises `InputError` for repeated or missing names, negative orders, a basis of another number of parameters, an unknown
-    `scheduling_at` or an output that would predict itself. Source: Bamieh and Giarre (2002), Identification of linear parameter varying models.
+    `scheduling_at` or an output that would predict itself.
+    Source: Bamieh and Giarre (2002), Identification of linear parameter varying models.
     """
 
     outputs: tuple[str, ...]

@@ -35,8 +35,9 @@ def format_of(path: Path) -> Format:
 
 
 def read(
-    path: Path, signals: Sequence[str], *, format: Format, dt: float | None, time: str | None, units: Mapping[str, str], time_unit: str = "s"
-) -> FlightRecord:
+    path: Path, signals: Sequence[str], *, format: Format, dt: float | None, time: str | None, units: Mapping[str, str],
+    time_unit: str = "s",
+) -> FlightRecord:  # fmt: skip
     """The record, on a uniform step where `dt` (s) says so; a time column is in `time_unit`.
 
     X-Plane logs declare their units. Elsewhere `units` declares those of `signals`; the names every room knows (u, q, theta,

@@ -131,8 +131,8 @@ def modes(study: Outcome) -> Table:
     if study.first_stage:
         weakest = ", ".join(f"{F:.2g} ({axis})" for axis, F in study.first_stage.items())
         table.remarks.append(
-            f"In the direction they explain worst, the slow motion, these instruments have a first-stage F of {weakest}: below 10 they are weak, "
-            f"and what they say there is nearly as biased as least squares."
+            f"In the direction they explain worst, the slow motion, these instruments have a first-stage F of {weakest}: below 10 they "
+            f"are weak, and what they say there is nearly as biased as least squares."
         )
     return table
 

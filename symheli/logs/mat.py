@@ -13,8 +13,9 @@ from symheli.logs.files import Table, existing, seconds_in
 
 
 def read_mat(path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s") -> Table:
-    """The variables named in `units`, and `time` (there in `time_unit`) in s, from a file saved with -v7 or older; "log.theta" reaches into a struct.
+    """The variables named in `units`, and `time` (there in `time_unit`) in s, from a file saved with -v7 or older.
 
+    "log.theta" reaches into a struct.
     Raises `InputError` for version 7.3, a file that is none of MATLAB's, and variables that are no vectors of one length.
     """
     from scipy.io import loadmat

@@ -55,7 +55,7 @@ class SeparatedTable:
         for number, row in enumerate(rows, start=1):
             if any(row[width:]):
                 raise InputError(
-                    f"{path}: not a table: row {number} has {len(row)} cells, the header {width} names (separated by {SEPARATORS[separator]})"
+                    f"{path}: not a table: row {number} has {len(row)} cells, the header {width} names (separator: {SEPARATORS[separator]})"
                     + ("; a comma cannot be both separator and decimal sign" if separator == "," else "")
                 )
         if not rows:

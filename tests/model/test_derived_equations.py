@@ -130,7 +130,8 @@ def test_the_yawing_moment_turns_the_body_alone_under_either_governor(printed):
         for names, vector, column in ((heli.states, point.x.array, slope.A), (heli.inputs, point.u.array, slope.B)):
             for name in {"v", "d_ped", "d_col"} & set(names):
                 change = step * np.eye(len(vector))[names.index(name)]
-                at = [(vector + s * change, point.u.array) if vector is point.x.array else (point.x.array, vector + s * change) for s in (1, -1)]
+                moved = [vector + s * change for s in (1, -1)]
+                at = [(x, point.u.array) for x in moved] if vector is point.x.array else [(point.x.array, u) for u in moved]
                 moments = [float(heli.numeric("diagnostics")(x, u, np.zeros(3))[N][0]) for x, u in at]
                 expected = heli.vehicle.values("body")["Izz"] * column[5, names.index(name)]
                 # second differences of a smooth function: step^2
