@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.regressors import regression
 from identification.structure import LPVARX, Group
-from symheli.lpv import FlightRecord
+from symheli.lpv import FlightRecord, signals
 
 SAMPLES = 4
 """Random samples for each regressor."""
@@ -42,6 +42,7 @@ def _repeated(arx: LPVARX, group: Group) -> int:
     n = SAMPLES * len(regressors) + arx.memory
     columns = {name: rng.standard_normal(n) for name in (*arx.outputs, *arx.inputs)}
     columns |= {p: rng.uniform(low, high, n) for p, (low, high) in zip(arx.parameters, arx.basis.ranges, strict=True)}
-    phi = regression(arx, FlightRecord.from_arrays(0.1 * np.arange(n), dict.fromkeys(columns, "1"), **columns)).phi[:, regressors]
+    record = FlightRecord(0.1 * np.arange(n), np.column_stack(list(columns.values())), signals(columns))
+    phi = regression(arx, record).phi[:, regressors]
     values = np.linalg.svd(phi / np.linalg.norm(phi, axis=0), compute_uv=False)
     return int(np.sum(values <= ALGEBRA * values[0]))

@@ -51,8 +51,8 @@ class SlowMode:
 
     @property
     def period(self) -> float:
-        """The sample period (s) at which the mode would not be slow: 0.1 / |s|."""
-        return SLOW / abs(self.s)
+        """The sample period (s) at which the mode, as fast as it may be, would not be slow: 0.1 / max(|s|, error)."""
+        return SLOW / max(abs(self.s), self.error)
 
 
 @dataclass(frozen=True)

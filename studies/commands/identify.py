@@ -54,7 +54,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add("--commanded", action="store_true", help="the scheduling signal is known ahead; so are signals called ..._command")
     add("--na", type=options.count, default=3, metavar="N", help="lags of the outputs (default: %(default)s)")
     add("--nb", type=options.count, default=3, metavar="N", help="lags of the inputs (default: %(default)s)")
-    add("--delay", type=options.count, metavar="N", help="first lag of the inputs (default: 1; 0 where samples are means or interpolated)")
+    add(
+        "--delay",
+        type=options.count,
+        metavar="N",
+        help="first lag of the inputs (default: 1; 0, and one lag more, where samples are means or interpolated)",
+    )
     add("--degree", type=options.count, default=2, metavar="N", help="polynomial degree in p; 0: LTI only (default: %(default)s)")
     add("--orders", action="store_true", help="compare orders 1 to 4 and degrees 0 to 3 instead")
     add("--no-offset", action="store_true", help="no c(p): outputs are deviations already")
@@ -100,15 +105,17 @@ def run(arguments: argparse.Namespace) -> Output:
     record = prepared.record
     if arguments.test is None:
         training, test = record.split(arguments.train or 0.7)
-    elif arguments.train is not None:
-        raise InputError("--test holds out another log, --train a part of this one: give one of the two")
-    else:
+    elif arguments.train is None:
         training, test = record, _prepared(arguments, arguments.test, signals, cut=False).record
-    p = record[prepared.scheduling] if arguments.test is None else np.concatenate([r[prepared.scheduling] for r in (record, test)])
+    else:
+        raise InputError("--test holds out another log, --train a part of this one: give one of the two")
+    p = np.concatenate([part[prepared.scheduling] for part in (training, test) if part is not None])
     basis = Polynomial(arguments.degree, *scheduling_range(p, arguments.degree))
-    delay = arguments.delay if arguments.delay is not None else 0 if record.resampled else 1
+    delay, nb = arguments.delay, arguments.nb
+    if delay is None:  # u(k) comes to the lags that there are
+        delay, nb = (0, nb + 1) if record.resampled else (1, nb)
     structure = LPVARX(
-        signals.outputs, signals.inputs, prepared.scheduling, arguments.na, arguments.nb, delay, basis,
+        signals.outputs, signals.inputs, prepared.scheduling, arguments.na, nb, delay, basis,
         scheduling_at=arguments.scheduling_at, offset=not arguments.no_offset,
     )  # fmt: skip
     hold = not (arguments.commanded or prepared.scheduling.endswith("_command"))

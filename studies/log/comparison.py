@@ -77,7 +77,13 @@ class Comparison:
             return []
         if self.test is None:
             return ["nothing was held out: these numbers cannot tell whether scheduling pays"]
-        return [self._sentence(str(y)) for y in self.scheduled.outputs]
+        sentences = [self._sentence(str(y)) for y in self.scheduled.outputs]
+        rivals = self.models[len(self.judged) :]
+        if rivals:
+            other = replace(self, models=rivals)
+            turned = [str(y) for y in self.scheduled.outputs if self.pays(str(y)) != other.pays(str(y))]
+            sentences += [f"{rivals[0].label} beside {rivals[1].label} would say otherwise: {other._sentence(y)}" for y in turned]
+        return sentences
 
     def pays(self, output: str) -> bool:
         """Whether scheduling is better 1 s ahead or in free run on held-out data, and worse in neither; see `PAYS`."""
