@@ -15,7 +15,6 @@ from identification.excitation import column_scale
 from identification.structure import LPVARX
 from symheli.lpv.arrays import Array
 
-
 TAKEN = 0.8
 """Of the residuals' power, what the fit is taken to have removed at most."""
 

@@ -19,6 +19,9 @@ PAYS = 1.0
 STILL = 1e-6
 """A scheduling signal that moves by less than this part of its size stays where it is."""
 
+LEAST = -100.0
+"""A fit below this counts as this, where fits are averaged: what is useless can be no worse."""
+
 HORIZONS = ("one step", "1 s", "free run")
 
 Trim = Literal["auto", "moving", "still"]
@@ -111,10 +114,12 @@ class Comparison:
 
 def difference(one: float, other: float) -> str:
     """What a fit of `one` percent is beside one of `other`, as printed: "better", "worse", "no different", or of no use either way."""
-    if not max(one, other) > 0:
+    if np.isnan(one) or np.isnan(other):
+        return "no data to compare"
+    if max(one, other) <= 0:
         return "neither better than the mean of the record"
-    points = (round(one, 1) if np.isfinite(one) else -np.inf) - (round(other, 1) if np.isfinite(other) else -np.inf)
-    return "better" if points > PAYS else "worse" if points < -PAYS else "no different"
+    points = float(np.round(one, 1) - np.round(other, 1))  # one that diverges is infinitely far off
+    return "better" if round(points, 1) > PAYS else "worse" if round(points, 1) < -PAYS else "no different"
 
 
 def compare(
@@ -124,7 +129,7 @@ def compare(
     """Fit `structure`, and the same with constant coefficients where it has moving ones, by `method`.
 
     `trim` "auto" fits both once more with `offset_rate` where p moves and is not made of the outputs, and judges those that predict
-    1 s better in sample. `hold_p` as in `LPVARXModel.predict`.
+    1 s better in sample (as well: those that run free better). `hold_p` as in `LPVARXModel.predict`.
     """
 
     def pair(moving: bool) -> list[Scored]:
@@ -146,14 +151,24 @@ def compare(
             except (ExcitationError, InputError) as error:
                 note = f"offset_rate is not tried: {error}"
             else:
-                fits = [float(np.mean([max(v, -100.0) for v in models[0].in_sample["1 s"].values()])) for models in (first, second)]
-                first, second = (second, first) if fits[1] > fits[0] else (first, second)
+                without, with_it = (_mean_fits(models[0].in_sample) for models in (first, second))
+                first, second = (second, first) if with_it > without else (first, second)
+                numbers = (
+                    f"{one:.1f} % 1 s ahead and {free:.1f} % in free run {how}"
+                    for (one, free), how in ((with_it, "with it"), (without, "without"))
+                )
                 note = (
-                    f"offset_rate, the moving trim: {fits[1]:.1f} % 1 s ahead in sample with it, {fits[0]:.1f} % without "
-                    f"(mean of the outputs, none below -100); judged is the model {'with' if fits[1] > fits[0] else 'without'}"
+                    f"offset_rate, the moving trim, in sample: {', '.join(numbers)} (means of the outputs, none below {LEAST:g}); "
+                    f"judged is the model {'with' if with_it > without else 'without'}"
                 )
                 first = [*first, *second]
     return Comparison(tuple(first), training, test, hold_p, leak, note)
+
+
+def _mean_fits(scores: dict[str, dict[str, float]]) -> tuple[float, float]:
+    """Means over the outputs of the fits 1 s ahead and in free run, as printed; the first decides, the second where it is the same."""
+    one, free = (round(float(np.mean([max(v, LEAST) for v in scores[h].values()])), 1) for h in HORIZONS[1:])
+    return one, free
 
 
 def scheduling_range(values: np.ndarray, degree: int) -> tuple[float, float]:

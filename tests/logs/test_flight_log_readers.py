@@ -281,6 +281,7 @@ def test_ulog_topics_of_different_rates_meet_on_one_grid(tmp_path, monkeypatch):
     silent = (instants > 1.141) & (instants < 2.039)
     np.testing.assert_allclose(record["airspeed"][~silent], 2 * instants[~silent], atol=1e-9)
     assert np.isnan(record["airspeed"][silent]).all()
+    assert record.resampled == "topics interpolated to 0.02 s"
     with pytest.raises(UnknownNameError, match="unknown topic 'rate'"):
         FlightRecord.from_ulog(path, {"q": ("rate", "xyz[1]", "deg/s")}, dt=0.02)
 
