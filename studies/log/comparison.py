@@ -118,7 +118,7 @@ def difference(one: float, other: float) -> str:
         return "no data to compare"
     if max(one, other) <= 0:
         return "neither better than the mean of the record"
-    points = float(np.round(one, 1) - np.round(other, 1))  # one that diverges is infinitely far off
+    points = round(one, 1) - round(other, 1)  # one that diverges is infinitely far off
     return "better" if round(points, 1) > PAYS else "worse" if round(points, 1) < -PAYS else "no different"
 
 

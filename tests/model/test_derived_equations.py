@@ -119,25 +119,6 @@ def test_ideal_governor_is_the_derived_system_whose_engine_holds_the_speed(ideal
         assert abs(got[6]) < 1e-12 * np.abs(got).max() * body["Izz"] / drive["inertia"] * 10  # held
 
 
-@pytest.mark.parametrize("printed", [[], ["rotor_reaction"]])
-def test_the_yawing_moment_turns_the_body_alone_under_either_governor(printed):
-    """The moment on the body and r' of the exact linearization, whose rotor's inertia joins under "ideal": N_v = Izz dr'/dv, p = q = 0."""
-    for governor in ("ideal", "pi"):
-        heli = symheli.Helicopter.load("xcell60", governor=governor, printed=printed)
-        point = symheli.trim(heli, 8.0)
-        slope, step = symheli.linearize(heli, point), 1e-4
-        N = heli.diagnostics.name_out().index("N")
-        for names, vector, column in ((heli.states, point.x.array, slope.A), (heli.inputs, point.u.array, slope.B)):
-            for name in {"v", "d_ped", "d_col"} & set(names):
-                change = step * np.eye(len(vector))[names.index(name)]
-                moved = [vector + s * change for s in (1, -1)]
-                at = [(x, point.u.array) for x in moved] if vector is point.x.array else [(point.x.array, u) for u in moved]
-                moments = [float(heli.numeric("diagnostics")(x, u, np.zeros(3))[N][0]) for x, u in at]
-                expected = heli.vehicle.values("body")["Izz"] * column[5, names.index(name)]
-                # second differences of a smooth function: step^2
-                assert (moments[0] - moments[1]) / (2 * step) == pytest.approx(expected, rel=1e-5)
-
-
 def test_printed_rotor_reaction_contradicts_the_derivation():
     printed = symheli.Helicopter.load("xcell60", printed=["rotor_reaction"])
     with pytest.raises(AssertionError, match="Mismatch"):
