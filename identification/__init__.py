@@ -28,6 +28,7 @@ from identification.residuals import ResidualAnalysis, Theil, residual_analysis,
 from identification.response_band import ResponseBand
 from identification.ridge import Ridge
 from identification.rls_state import RLSInfo, RLSState
+from identification.slow_modes import SlowMode, SlowModes, slow_modes
 from identification.structure import LPVARX, Entry, Group, Term
 from identification.uncertainty import Band, Uncertainty, uncertainty
 from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
@@ -65,6 +66,8 @@ __all__ = [
     "ResidualAnalysis",
     "ResponseBand",
     "Ridge",
+    "SlowMode",
+    "SlowModes",
     "Spline",
     "Term",
     "Theil",
@@ -81,6 +84,7 @@ __all__ = [
     "frequency_response",
     "order_scan",
     "residual_analysis",
+    "slow_modes",
     "theil",
     "uncertainty",
 ]

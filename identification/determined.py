@@ -28,9 +28,9 @@ def determined(d: Array, energy: Array, fed: Array, beyond: float = BEYOND) -> A
 
 
 def determined_columns(phi: Array, basis: FunctionSpace) -> Array:
-    """The rule for a batch of regressors phi (m, n), signal after signal each times the functions of `basis`, of samples that weigh the same.
+    """The rule for a batch of regressors phi (m, n), signal after signal each times the functions of `basis`.
 
-    As a recursion applies it that forgets nothing.
+    As a recursion applies it that forgets nothing: samples weigh the same.
     """
     m, n = phi.shape
     size = largest(basis)

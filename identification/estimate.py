@@ -9,9 +9,11 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.excitation import excitation_of
+from identification.first_stage import WEAK, FirstStage
 from identification.forgetting import Constant, Forgetting
 from identification.instrumental_variables import Instruments, explained, instrumental_variables
 from identification.lasso import Lasso, lasso
+from identification.leakage import warn_of_leakage
 from identification.least_squares import least_squares_by_group, residual_covariance
 from identification.model import LPVARXModel
 from identification.output_error import OutputError, output_error
@@ -21,7 +23,7 @@ from identification.regressors import Regression, as_records, stacked, units_of
 from identification.ridge import Ridge, ridge
 from identification.self_check import check_least_squares
 from identification.structure import LPVARX, require_structure
-from symheli.errors import ConvergenceWarning, ExcitationError, InputError, UnknownNameError
+from symheli.errors import ConvergenceWarning, DataWarning, ExcitationError, InputError, UnknownNameError
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
 
@@ -38,6 +40,11 @@ NOT_SETTLED = {
 
 PENALISED = ("ridge", "lasso")
 """Methods whose penalty decides what the data leave open: the excitation report travels with the model and refuses nothing."""
+
+NOISE_FREE = 1e-6
+"""A residual below this part of every output biases no estimate."""
+
+TINY = np.finfo(float).tiny
 
 
 def fit(
@@ -56,21 +63,23 @@ def fit(
     (options `Ridge`, `Lasso`). Noise on the outputs biases all of these.
 
     "iv": instrumental variables: `instruments` names the external excitation signals (or is an `Instruments` with its window):
-    in closed loop what is added to the stabilised inputs, in open loop the inputs. "riv": the same refined with the
-    simulated response (`Refined`); in closed loop it needs `instruments` too, and then the plant may be unstable. "oe": the closest
-    free run (`OutputError`), from the least-squares or (with `instruments`) instrumental-variables estimate and its refinement;
-    in closed loop coloured noise biases it.
+    in closed loop what is added to the stabilised inputs, in open loop the inputs; `details["first_stage_F"]` says how strong they are.
+    "riv": the same refined with the simulated response (`Refined`); in closed loop it needs `instruments` too, and then the plant may
+    be unstable. "oe": the closest free run (`OutputError`), from the least-squares or (with `instruments`) instrumental-variables
+    estimate and its refinement; in closed loop coloured noise biases it.
 
     Raises `ExcitationError` (with a report) where the data cannot determine every coefficient (ridge and lasso: where the
     penalty does not either), `UnknownNameError` for signals the record lacks, `InputError` where p leaves the range of the
     basis or an option does not fit the method, `AccuracyError` where "ls" or "rls" fail the check that their residual is orthogonal
-    to every regressor. Warns (`ConvergenceWarning`) where an iteration does not settle.
+    to every regressor. Warns (`ConvergenceWarning`) where an iteration does not settle, and (`DataWarning`) where the scheduling signal
+    tells the model its own answer, the samples are means and the delay is not 0, or instruments are weak.
     """
     require_structure(structure)
     records = as_records(records)
     _check(method, forgetting, instruments, options)
     outputs, inputs = units_of(structure.outputs, records), units_of(structure.inputs, records)
     scheduling = units_of(structure.parameters, records)
+    warn_of_leakage(structure, records)
     data = stacked(structure, records)
     report = excitation_of(structure, data)
     if method not in PENALISED or len(data.phi) == 0:
@@ -93,7 +102,9 @@ def fit(
             if forgetting == 1.0 or forgetting == Constant(1.0):
                 check_least_squares(structure, data.phi, data.y, theta, method)
         case _ if method == "iv":
-            theta = instrumental_variables(structure, records, data, Instruments.of(instruments))
+            theta, weakest = instrumental_variables(structure, records, data, Instruments.of(instruments))
+            details = {"first_stage_F": weakest.F, "weakest": weakest.direction}
+            _warn_of_weakness(weakest, np.sqrt(np.mean((data.y - data.phi @ theta) ** 2, axis=0) / np.mean(data.y**2, axis=0).clip(TINY)))
         case _:
             theta = least_squares_by_group(structure, data.phi, data.y)
             check_least_squares(structure, data.phi, data.y, theta, method)
@@ -119,9 +130,18 @@ def _check(method: str, forgetting: float | Forgetting, instruments: Sequence[st
         raise InputError(f"options of method {method!r}: expected {expected}, got {options!r:.80}")
 
 
+def _warn_of_weakness(weakest: FirstStage, residual: Array) -> None:
+    if weakest.F < WEAK and np.any(residual > NOISE_FREE):
+        warnings.warn(
+            f"the instruments are weak (first-stage F {weakest.F:.2g}, usual least {WEAK:g}): along {weakest.direction} the estimate is "
+            f"nearly as biased as least squares; excite more, name more instruments, widen their window, or lower the order or the degree",
+            DataWarning, stacklevel=3,
+        )  # fmt: skip
+
+
 def _start(structure: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Sequence[str] | Instruments) -> Array:
     if instruments:
-        return instrumental_variables(structure, records, data, Instruments.of(instruments))
+        return instrumental_variables(structure, records, data, Instruments.of(instruments))[0]
     return least_squares_by_group(structure, data.phi, data.y)
 
 

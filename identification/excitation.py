@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.determined import determined_columns
+from identification.never_determined import never_determined
 from identification.regressors import Regression, as_records, stacked
 from identification.structure import LPVARX, Group
 from symheli.errors import ExcitationError
@@ -119,7 +120,7 @@ def _report(arx: LPVARX, data: Regression, group: Group) -> ExcitationReport:
             f"let {scheduling} visit more values, or choose a smaller basis{smaller}"
         )
     elif rank < n:
-        reason = (
+        reason = never_determined(arx, group) or (
             f"the regressors have rank {rank} of {n}: the data do not determine {direction_in_words(weakest, names)}; "
             f"excite the inputs more richly while {scheduling} moves, or lower na, nb or the size of the basis"
         )

@@ -34,15 +34,15 @@ class FrequencyResponse:
     def mismatch(self, model: LinearModel, coherence: float = 0.6) -> Array:
         """Mean squared mismatch cost J (ny, nu) of a model's response; below 100 is a good, below 50 an excellent match.
 
-        J = 20/n sum W [ (dB error)^2 + 0.01745 (degree error)^2 ], W = (1.58 (1 - exp(-coherence^2)))^2, over the frequencies where the
-        coherence exceeds the threshold; NaN where there are none. Source: Tischler and Remple (2012), Aircraft and Rotorcraft System
-        Identification, eq. 11.4.
+        J = 20/n sum W [ (dB error)^2 + 0.01745 (degree error)^2 ], W = (1.58 (1 - exp(-coherence)))^2, over the frequencies where the
+        coherence exceeds the threshold; NaN where there are none. `coherence` is gamma^2 itself, a share of power: W(0.6) = 0.51.
+        Source: Tischler and Remple (2012), Aircraft and Rotorcraft System Identification, eq. 11.4.
         """
         H = model.select(inputs=self.inputs, outputs=self.outputs).frequency_response(self.omega)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = self.G / H
             error = (20 * np.log10(np.abs(ratio))) ** 2 + 0.01745 * np.degrees(np.angle(ratio)) ** 2
-        weight = (1.58 * (1 - np.exp(-(self.coherence**2)))) ** 2
+        weight = (1.58 * (1 - np.exp(-self.coherence))) ** 2
         good = (self.coherence > coherence) & np.isfinite(error)
         count = good.sum(axis=0)
         total = np.sum(np.where(good, weight * error, 0.0), axis=0)

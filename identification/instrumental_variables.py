@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.excitation import RANK_TOLERANCE, column_scale, direction_in_words, spectrum
+from identification.first_stage import FirstStage, first_stage
 from identification.least_squares import least_squares
 from identification.regressors import Regression, basis_values, regressor_rows, scheduling_values, units_of
 from identification.structure import LPVARX
@@ -42,8 +43,10 @@ class Instruments:
         return tuple(int(i) for i in np.unique(np.round(np.linspace(first, last, min(self.lags, last - first + 1)))))
 
 
-def instrumental_variables(arx: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Instruments) -> Array:
-    """theta (n, ny) by two-stage least squares with more instruments than unknowns.
+def instrumental_variables(
+    arx: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Instruments
+) -> tuple[Array, FirstStage]:
+    """theta (n, ny) by two-stage least squares with more instruments than unknowns, and how strong they are where they are weakest.
 
     Each instrument is an excitation signal r(k-l) times f(p); offsets, and the increment of p, instrument themselves (p is taken as free
     of the noise). Stage one projects the regressors on the instruments (QR), stage two is least squares with what is left of
@@ -56,13 +59,15 @@ def instrumental_variables(arx: LPVARX, records: Sequence[FlightRecord], data: R
     known = np.isfinite(W).all(axis=1)
     W = W[known]
     Q = _range(W) if len(W) else W
-    theta = np.zeros((arx.n_regressors, arx.ny))
+    theta, strengths = np.zeros((arx.n_regressors, arx.ny)), []
+    own = np.repeat([e.kind in ("offset", "increment") for e in arx.entries], arx.basis.size)
     for group in arx.groups:
         regressors, outputs = arx.regressors(group), np.array(group.outputs)
         names = tuple(arx.regressor_names[i] for i in regressors)
         phi, y = data.phi[known][:, regressors], data.y[known][:, outputs]
         theta[regressors[:, None], outputs] = _two_stages(phi, y, W, Q, names, instruments)
-    return theta
+        strengths.append(first_stage(phi, Q, names, own[regressors]))
+    return theta, min(strengths)
 
 
 def _two_stages(phi: Array, y: Array, W: Array, Q: Array, names: tuple[str, ...], instruments: Instruments) -> Array:

@@ -18,6 +18,7 @@ from identification.structure import LPVARX
 from symheli.errors import InputError
 from symheli.lpv import FlightRecord, FunctionSpace, LinearModel, LPVStateSpace, NamedVector, Reduction, Scheduling, Signal, signals
 from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.sample_period import JITTER, same_period
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +75,18 @@ class LPVARXModel:
         """A_i, B_j, c, d in the basis; `.at(p)` for values, `.monomial()` for powers of p."""
         return Coefficients.of(self.structure, self.theta)
 
-    def predict(self, record: FlightRecord, horizon: int) -> Array:
+    def predict(self, record: FlightRecord, horizon: int, *, hold_p: bool = False) -> Array:
         """Predictions (n, ny) `horizon` samples ahead: outputs known up to t - horizon, inputs and p up to t.
+
+        `hold_p`: p too is known up to t - horizon only and held from there. So judge a model that is scheduled on a measurement: the
+        p of later carries what the outputs will do. A commanded p is known ahead.
 
         NaN where a past is incomplete: the first memory + horizon - 1 samples of each segment, and behind missing
         samples. Infinite where the prediction overflows. Raises `InputError` for another sample period or unit.
         """
+        if hold_p:
+            self.require_same_kind(record)
+            return prediction.predict_holding(self.structure, self.theta, record, horizon)
         return prediction.predict(self._along(record), horizon)
 
     def simulate(self, record: FlightRecord) -> Array:
@@ -90,9 +97,14 @@ class LPVARXModel:
         """
         return prediction.simulate(self._along(record))
 
-    def score(self, record: FlightRecord, horizon: int | None = None) -> NamedVector:
-        """Fit in percent of each output, `horizon` samples ahead or, with None, in free run; see `fit_percent`."""
-        guess = self.simulate(record) if horizon is None else self.predict(record, horizon)
+    def score(self, record: FlightRecord, horizon: int | None = None, *, hold_p: bool = False) -> NamedVector:
+        """Fit in percent of each output, `horizon` samples ahead or, with None, in free run; see `fit_percent`.
+
+        `hold_p` as in `predict`; a free run follows p all along, so that it raises `InputError` with it.
+        """
+        if horizon is None and hold_p:
+            raise InputError("hold_p: a free run follows p from its start to its end; give a horizon (samples) to hold p over")
+        guess = self.simulate(record) if horizon is None else self.predict(record, horizon, hold_p=hold_p)
         fit = prediction.fit_percent(record.columns(self.outputs), guess)
         return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)
 
@@ -144,7 +156,7 @@ class LPVARXModel:
     def require_same_kind(self, record: FlightRecord) -> None:
         """Raises `InputError` where `record` has another sample period, or a signal of the model in another unit."""
         check_units((*self.outputs, *self.inputs, *self.parameters), record)
-        if abs(record.dt - self.dt) > 0.01 * self.dt:
+        if not same_period(record.dt, self.dt, JITTER):
             raise InputError(f"the model was identified at dt = {self.dt:.4g} s, the record has {record.dt:.4g} s; resample it")
 
     def _along(self, record: FlightRecord) -> prediction.Recursion:

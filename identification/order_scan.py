@@ -83,10 +83,12 @@ def _cell(fit: float) -> str:
 def order_scan(
     structure: LPVARX, training: FlightRecord | Iterable[FlightRecord], validation: FlightRecord | Iterable[FlightRecord], *,
     orders: Sequence[int] = (1, 2, 3, 4), degrees: Sequence[int] = (0, 1, 2, 3), horizon: int = 50,
+    hold_p: bool = False,
 ) -> OrderScan:  # fmt: skip
     """Fit `structure` with every na = nb of `orders` and every polynomial degree, by least squares, and judge it on other records.
 
-    Degree 0 is the LTI model; nb follows na. Raises `InputError` where the basis is no polynomial of one parameter.
+    Degree 0 is the LTI model; nb follows na. `hold_p` as in `LPVARXModel.predict`: for a measured p.
+    Raises `InputError` where the basis is no polynomial of one parameter.
     """
     basis = structure.basis
     if not isinstance(basis, Polynomial):
@@ -97,11 +99,11 @@ def order_scan(
     trials = []
     for degree, na in product(degrees, orders):
         trial = replace(structure, na=na, nb=na if structure.inputs else 0, basis=Polynomial(degree, basis.low, basis.high))
-        trials.append(_judge(trial, train, test, horizon))
+        trials.append(_judge(trial, train, test, horizon, hold_p))
     return OrderScan(tuple(trials), horizon)
 
 
-def _judge(structure: LPVARX, train: Sequence[FlightRecord], test: Sequence[FlightRecord], horizon: int) -> Trial:
+def _judge(structure: LPVARX, train: Sequence[FlightRecord], test: Sequence[FlightRecord], horizon: int, hold_p: bool) -> Trial:
     nothing = np.full(structure.ny, np.nan)
     try:
         model = fit(structure, train)
@@ -112,5 +114,8 @@ def _judge(structure: LPVARX, train: Sequence[FlightRecord], test: Sequence[Flig
     n = len(error)
     sign, logdet = np.linalg.slogdet(error.T @ error / n)
     bic = n * logdet + int(structure.free.sum()) * np.log(n) if sign > 0 else -np.inf
-    steps = [np.mean([model.score(record, horizon=h).array for record in test], axis=0) for h in (1, horizon, None)]
+    steps = [
+        np.mean([model.score(record, horizon=h, hold_p=hold_p and h is not None).array for record in test], axis=0)
+        for h in (1, horizon, None)
+    ]
     return Trial(structure, float(bic), *steps)

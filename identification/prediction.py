@@ -57,8 +57,7 @@ def predict(run: Recursion, horizon: int) -> Array:
     All starts advance together: P_j(t) = known(t) - sum_i A_i(t) P_{max(j-i, 0)}(t-i), where P_0 = y and P_j(t) is the
     prediction of y(t) made j steps before.
     """
-    if not isinstance(horizon, int | np.integer) or isinstance(horizon, bool) or horizon < 1:
-        raise InputError(f"horizon: expected a whole number of steps >= 1, got {horizon!r}; a free run is simulate()")
+    require_horizon(horizon)
     ahead = [run.y]
     with np.errstate(all="ignore"):
         for j in range(1, int(horizon) + 1):
@@ -68,6 +67,48 @@ def predict(run: Recursion, horizon: int) -> Array:
                 new[i:] -= np.einsum("kij,kj->ki", run.A[i:, i - 1], past[:-i])
             ahead = [*ahead, np.clip(new, -DIVERGED, DIVERGED)][-(run.na + 1) :]
     return _flagged(ahead[-1])
+
+
+def predict_holding(arx: LPVARX, theta: Array, record: FlightRecord, horizon: int) -> Array:
+    """Predictions (n, ny) of y(t) from outputs and p up to t - horizon and inputs up to t, p held at its last known value.
+
+    As an autopilot predicts that schedules on a measurement: the coefficients stay, and p does not change. NaN as in `predict`.
+    """
+    require_horizon(horizon)
+    s, starts = Samples.of(arx, record), _starts(arx, record.segments(), horizon)
+    size, ahead = arx.basis.size, np.full((horizon + 1, len(starts), arx.ny), np.nan)
+    with np.errstate(all="ignore"):
+        for j in range(1, horizon + 1):
+            new, row = np.zeros((len(starts), arx.ny)), 0
+            for term in arx.terms:
+                count, step = len(term.signals), j - term.lag
+                block, row = theta[row : row + count * size].reshape(count, size, arx.ny), row + count * size
+                match term.kind:
+                    case "output":
+                        signal = -(s.y[starts + step] if step <= 0 else ahead[step])[:, list(term.signals)]
+                    case "input":
+                        signal = s.u[starts + step][:, list(term.signals)]
+                    case "offset":
+                        signal = np.ones((len(starts), 1))
+                    case "increment":
+                        continue
+                new += np.einsum("ks,kf,sfy->ky", signal, s.f[starts + min(j - term.p_lag, 0)], block, optimize=True)
+            ahead[j] = np.clip(new, -DIVERGED, DIVERGED)
+    out = np.full_like(s.y, np.nan)
+    out[starts + horizon] = ahead[horizon]
+    return _flagged(out)
+
+
+def _starts(arx: LPVARX, segments: tuple[slice, ...], horizon: int) -> Array:
+    """The last known sample of every prediction that has a past and an end in one segment."""
+    parts = [np.arange(part.start + max(arx.memory - 1, 0), part.stop - horizon) for part in segments]
+    return np.concatenate(parts).astype(int)
+
+
+def require_horizon(horizon: object) -> None:
+    """Raises `InputError` unless `horizon` is a number of steps."""
+    if not isinstance(horizon, int | np.integer) or isinstance(horizon, bool) or horizon < 1:
+        raise InputError(f"horizon: expected a whole number of steps >= 1, got {horizon!r}; a free run is simulate()")
 
 
 def simulate(run: Recursion) -> Array:

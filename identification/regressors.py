@@ -11,6 +11,7 @@ from identification.structure import LPVARX
 from symheli.errors import InputError
 from symheli.lpv import FlightRecord, Signal
 from symheli.lpv.arrays import Array
+from symheli.lpv.sample_period import JITTER, same_period
 
 SIZES = 1e-70, 1e70
 """A signal that nowhere exceeds the first, or somewhere the second, is refused: sums of its squares under- or overflow."""
@@ -122,7 +123,7 @@ def as_records(records: FlightRecord | Iterable[FlightRecord]) -> tuple[FlightRe
     if not out or not all(isinstance(r, FlightRecord) for r in out):
         raise InputError("expected a FlightRecord or a list of them; build one with FlightRecord.from_frame, from_csv, ...")
     periods = [r.dt for r in out]
-    if max(periods) - min(periods) > 0.01 * min(periods):
+    if not same_period(min(periods), max(periods), JITTER):
         raise InputError(f"the records differ in sample period ({min(periods):.4g} to {max(periods):.4g} s); resample them to one dt")
     return out
 

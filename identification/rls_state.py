@@ -92,7 +92,7 @@ class RLSState:
         return max(self._header(at.WEIGHT)) * float(np.finfo(self.configuration.dtype).eps) >= 1
 
     def solve(self) -> Array:
-        """The least-squares coefficients (n, ny) from the factor, R theta = Z, in double precision; `theta` agrees with them to rounding."""
+        """The least-squares coefficients (n, ny), R theta = Z, in double precision; `theta` agrees with them to rounding."""
         structure = self.configuration.structure
         out = np.zeros((structure.n_regressors, structure.ny))
         for layout in self.configuration.groups:

@@ -59,6 +59,9 @@ class LPVARX:
 
     `scheduling` names one parameter, or several: then `basis` is a `Product`.
 
+    A scheduling parameter may be an output or an input too. For an output only "lag" without `offset_rate` is causal then, and the offset's
+    functions of p repeat some of the output's.
+
     `scheduling_at="lag"` (default): each coefficient is taken at p(k - lag of its term), c and d at p(k-1): the form
     that has a minimal state-space realization with static dependence. "now": every coefficient at p(k), as in Budiyono
     and Sutarto, eqs 9-14.
@@ -67,8 +70,9 @@ class LPVARX:
     causal, so that batch and recursive estimates see the same number, and free of the sample period. For whole outputs
     that move about a trim x0(p), d(p) is x0'(p) to first order in the step; d(p) dt multiplies dp/dt.
 
-    Raises `InputError` for repeated or missing names, negative orders, a basis of another number of parameters or an unknown
-    `scheduling_at`. Source: Bamieh and Giarre (2002), Identification of linear parameter varying models.
+    Raises `InputError` for repeated or missing names, negative orders, a basis of another number of parameters, an unknown
+    `scheduling_at` or an output that would predict itself.
+    Source: Bamieh and Giarre (2002), Identification of linear parameter varying models.
     """
 
     outputs: tuple[str, ...]
@@ -103,6 +107,13 @@ class LPVARX:
             )
         if self.scheduling_at not in ("lag", "now"):
             raise InputError(f'scheduling_at: expected "lag" or "now", got {self.scheduling_at!r}')
+        known = sorted(set(self.outputs) & set(parameters))
+        if known and (self.offset_rate or self.scheduling_at == "now"):
+            what = "offset_rate" if self.offset_rate else 'scheduling_at="now"'
+            raise InputError(
+                f"{known[0]} is an output and schedules the coefficients: with {what} its own value at k would predict it; "
+                f'leave offset_rate out and take scheduling_at="lag", or schedule on a command'
+            )
         for flag in ("offset", "offset_rate"):
             if not isinstance(getattr(self, flag), bool):
                 raise InputError(f"{flag}: expected True or False, got {getattr(self, flag)!r}")

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import t as student
 
 from identification.coefficient_covariance import covariances
 from identification.model import LPVARXModel
@@ -23,18 +23,23 @@ if TYPE_CHECKING:
 
 
 class Band(NamedTuple):
-    """One coefficient function of the equation of `output`: what it multiplies, its `value` (n,) and `standard_error` (n,) at each p."""
+    """One coefficient function of the equation of `output`: what it multiplies, its `value` (n,) and `standard_error` (n,) at each p.
+
+    `freedom` and `stretch` are those of `Uncertainty`: they make intervals of short or coloured records wider than the normal ones.
+    """
 
     output: str
     regressor: str
     value: Array
     standard_error: Array
+    freedom: float = float("inf")
+    stretch: float = 1.0
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Lower and upper end (n,) of the normal confidence interval at each p."""
+        """Lower and upper end (n,) of the confidence interval at each p: Student's, `stretch` times as wide."""
         if not 0 < level < 1:
             raise InputError(f"level: expected a share in (0, 1) such as 0.95, got {level!r}")
-        half = norm.ppf(0.5 + 0.5 * level) * self.standard_error
+        half = student.ppf(0.5 + 0.5 * level, self.freedom) * self.stretch * self.standard_error
         return self.value - half, self.value + half
 
 
@@ -44,13 +49,23 @@ class Uncertainty:
 
     `joint` (ny, n, ny, n): of theta[i, y] with theta[j, z], zero for coefficients an equation does not have. `white` (ny, n, n): of each
     equation by the formula for white residuals. `colour` (ny,): by how much the standard errors grow on average where residuals are
-    coloured (1: white).
+    coloured (1: white). `lags` of the correlation, `samples` of the fit; `freedom` (ny,) of the standard errors, `stretch` of intervals:
+    see `identification.coefficient_covariance`. Where a record holds fewer than about 15 independent residuals intervals hold the truth
+    less often than they say still (docs/identification.md).
     """
 
     model: LPVARXModel
     joint: Array
     white: Array
+    freedom: Array
     lags: int
+    samples: int
+
+    @property
+    def stretch(self) -> float:
+        """What a taper over the fraction b of a record makes slow noise look smaller by: 1/sqrt(1 - b + b^2/3)."""
+        b = min(self.lags / self.samples, 1.0)
+        return float(1 / np.sqrt(1 - b + b**2 / 3))
 
     @property
     def covariance(self) -> Array:
@@ -81,7 +96,7 @@ class Uncertainty:
                     continue
                 error = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", f, self.joint[y, block, y, block], f), 0.0))
                 name = arx.regressor_names[block.start].rsplit(" f0(", 1)[0]
-                out.append(Band(output, name, f @ theta[block, y], error))
+                out.append(Band(output, name, f @ theta[block, y], error, float(self.freedom[y]), self.stretch))
         return tuple(out)
 
     def draws(self, count: int, seed: int = 0) -> tuple[LPVARXModel, ...]:
@@ -140,7 +155,7 @@ def uncertainty(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecor
     if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
     error, reach = data.y - data.phi @ model.theta, int(reach)
-    return Uncertainty(model, *covariances(arx, data.phi, error, runs, reach), reach)
+    return Uncertainty(model, *covariances(arx, data.phi, error, runs, reach), reach, len(error))
 
 
 def _runs(data: Regression) -> list[slice]:

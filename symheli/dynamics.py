@@ -131,9 +131,11 @@ class Dynamics:
         return replaced(derive(form(step)[0]), symbol, column(lam))
 
     def _diagnostics(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
-        total = self.euler(x, u, wind, par, self.inflow_solver)[1]
-        wrench = dict(zip("XYZLMN", (*total.force, *total.moment), strict=True))
-        values = {**total.flow, **wrench, **{f"switch {k}": v for k, v in total.switches.items()}}
+        xdot, total = self.euler(x, u, wind, par, self.inflow_solver)
+        # a rotor held at constant speed is turned with the body: the engine's torque and its reaction on the body say so
+        held = total.added_inertia * xdot[5]
+        wrench = dict(zip("XYZLMN", (*total.force, *total.moment[:2], total.moment[2] - held), strict=True))
+        values = {**total.flow, "Q_e": total.flow["Q_e"] + held, **wrench, **{f"switch {k}": v for k, v in total.switches.items()}}
         return {name.replace(" ", "_"): dense(v) for name, v in values.items()}
 
     # --- the sum of the parts; floats, arrays and CasADi expressions alike ---------------------------------------

@@ -59,3 +59,7 @@ class ConvergenceWarning(UserWarning):
 
 class CompilerWarning(UserWarning):
     """Compiled code is not available; the same numbers come out more slowly."""
+
+
+class DataWarning(UserWarning):
+    """Data, or a model made of them, may not mean what they seem to; the message says what was seen and what to do."""

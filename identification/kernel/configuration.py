@@ -32,7 +32,10 @@ def padded(n: int) -> int:
 
 @dataclass(frozen=True)
 class Triangle:
-    """A unit upper triangle of `n` rows and columns and, from `padded(n)` on, `m` more; the rows of a block of LANES begin at its first diagonal."""
+    """A unit upper triangle of `n` rows and columns and, from `padded(n)` on, `m` more.
+
+    The rows of a block of LANES begin at its first diagonal.
+    """
 
     n: int
     m: int

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.kernel import configuration as at
 from identification.determined import BEYOND, PRIOR, determined
+from identification.kernel import configuration as at
 from identification.kernel.configuration import LANES, Configuration, Factor, GroupLayout
 from symheli.lpv.arrays import Array
 

@@ -16,7 +16,7 @@ REQUIRED = ("casadi", "sympy", "numpy", "scipy", "control", "cvxpy", "clarabel")
 OPTIONAL = {
     "matplotlib": "figures of the study",
     "jinja2": "report of the study",
-    "pandas": "reading CSV logs, data frames",
+    "pandas": "records from and to data frames",
     "pyulog": "reading PX4 logs",
     "python-flint": "fast exact verification of certificates",
     "scs": "a second solver to cross-check",

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
-from identification import LPVARX, LPVARXModel, fit
-from symheli.errors import InputError
+from identification import LPVARX, LPVARXModel, fit, fit_percent
+from identification.leakage import MADE_OF_OUTPUTS, share_from_outputs
+from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FlightRecord
 
 PAYS = 1.0
-"""Scheduling pays where it adds more than this many points of held-out fit 1 s ahead, and loses no more in free run."""
+"""Points of held-out fit by which one model must beat another to be called better; what is printed (one digit) is what is compared."""
 
 STILL = 1e-6
 """A scheduling signal that moves by less than this part of its size stays where it is."""
 
+LEAST = -100.0
+"""A fit below this counts as this, where fits are averaged: what is useless can be no worse."""
+
 HORIZONS = ("one step", "1 s", "free run")
+
+Trim = Literal["auto", "moving", "still"]
+"""Whether the models have d(p) times the change of p (`offset_rate`): "auto" tries both."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +40,19 @@ class Scored:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The models fitted to one record, the scheduled one first where there are two."""
+    """The models fitted to one record: the one that is judged, the LTI one it is judged against (where there are two), then rivals.
+
+    `hold_p`: one step and 1 s hold p from the start of each prediction, because it is measured. `leak`: share of what is new in p that
+    the outputs of the same instant explain; beyond a half free runs, which follow p, are told what they predict. `trim_note`: why the
+    trim moves in the model that is judged, or not.
+    """
 
     models: tuple[Scored, ...]
     training: FlightRecord
     test: FlightRecord | None
+    hold_p: bool = False
+    leak: float = 0.0
+    trim_note: str = ""
 
     @property
     def scheduled(self) -> LPVARXModel:
@@ -44,38 +60,115 @@ class Comparison:
         return next(iter(self.models)).model
 
     @property
+    def judged(self) -> tuple[Scored, ...]:
+        """The first model and the LTI one beside it."""
+        return self.models[: 1 + (self.scheduled.structure.basis.size > 1)]
+
+    @property
     def low_high(self) -> tuple[float, float]:
         """Range of the scheduling the basis covers."""
         return self.scheduled.structure.basis.ranges[0]
 
+    @property
+    def told(self) -> bool:
+        """Whether a free run is told by p what it has to predict."""
+        return self.hold_p and self.leak > MADE_OF_OUTPUTS
+
     def verdict(self) -> list[str]:
         """Where scheduling pays and where it does not, in sentences."""
-        if len(self.models) < 2:
+        if len(self.judged) < 2:
             return []
         if self.test is None:
             return ["nothing was held out: these numbers cannot tell whether scheduling pays"]
-        return [self._sentence(str(y)) for y in self.scheduled.outputs]
+        sentences = [self._sentence(str(y)) for y in self.scheduled.outputs]
+        rivals = self.models[len(self.judged) :]
+        if rivals:
+            other = replace(self, models=rivals)
+            turned = [str(y) for y in self.scheduled.outputs if self.pays(str(y)) != other.pays(str(y))]
+            sentences += [f"{rivals[0].label} beside {rivals[1].label} would say otherwise: {other._sentence(y)}" for y in turned]
+        return sentences
 
     def pays(self, output: str) -> bool:
-        """Whether scheduling improves the held-out fit of `output`; see `PAYS`."""
-        lpv, lti = (m.held_out or {} for m in self.models)
-        second, free = (lpv[h][output] - lti[h][output] for h in HORIZONS[1:])
-        lost = np.isfinite(lti["free run"][output]) and not free >= -PAYS
-        return bool(second > PAYS and not lost)
+        """Whether scheduling is better 1 s ahead or in free run on held-out data, and worse in neither; see `PAYS`."""
+        found = self._differences(output).values()
+        return "better" in found and "worse" not in found
+
+    def _differences(self, output: str) -> dict[str, str]:
+        """{horizon: better, worse or no different}; free runs that are told their answer, or of no use either way, are no different."""
+        lpv, lti = (m.held_out or {} for m in self.judged)
+        out = {h: difference(lpv[h][output], lti[h][output]) for h in HORIZONS[1:]}
+        return {**out, "free run": "not counted"} if self.told else out
 
     def _sentence(self, output: str) -> str:
-        lpv, lti = ([(m.held_out or {})[h][output] for h in HORIZONS[1:]] for m in self.models)
-        numbers = f"{percent(lpv[0])} against {percent(lti[0])} % 1 s ahead, {percent(lpv[1])} against {percent(lti[1])} % in free run"
-        useless = "; neither predicts better than the mean of the record in free run" if not max(lpv[1], lti[1]) > 0 else ""
-        return f"{output}: scheduling {'pays' if self.pays(output) else 'does NOT pay'} on held-out data, {numbers}{useless}"
+        lpv, lti = (m.held_out or {} for m in self.judged)
+        found = self._differences(output)
+        verdict = "pays" if self.pays(output) else "does NOT pay"
+        if {"better", "worse"} <= set(found.values()):
+            verdict = "does NOT pay throughout"
+        numbers = (
+            f"{percent(lpv[h][output])} against {percent(lti[h][output])} % {where} ({found[h]})"
+            for h, where in zip(HORIZONS[1:], ("1 s ahead", "in free run"), strict=True)
+        )
+        return f"{output}: scheduling {verdict} on held-out data: {', '.join(numbers)}"
 
 
-def compare(structure: LPVARX, training: FlightRecord, test: FlightRecord | None) -> Comparison:
-    """Fit `structure`, and the same with constant coefficients where it has moving ones, by least squares."""
-    basis = structure.basis
-    structures = {f"LPV, degree {basis.size - 1}": structure} if basis.size > 1 else {}
-    structures["LTI"] = structure.lti()
-    return Comparison(tuple(_scored(label, arx, training, test) for label, arx in structures.items()), training, test)
+def difference(one: float, other: float) -> str:
+    """What a fit of `one` percent is beside one of `other`, as printed: "better", "worse", "no different", or of no use either way."""
+    if np.isnan(one) or np.isnan(other):
+        return "no data to compare"
+    if max(one, other) <= 0:
+        return "neither better than the mean of the record"
+    points = round(one, 1) - round(other, 1)  # one that diverges is infinitely far off
+    return "better" if round(points, 1) > PAYS else "worse" if round(points, 1) < -PAYS else "no different"
+
+
+def compare(
+    structure: LPVARX, training: FlightRecord, test: FlightRecord | None, *, trim: Trim = "still", hold_p: bool = False,
+    method: str = "ls", instruments: Sequence[str] = (),
+) -> Comparison:  # fmt: skip
+    """Fit `structure`, and the same with constant coefficients where it has moving ones, by `method`.
+
+    `trim` "auto" fits both once more with `offset_rate` where p moves and is not made of the outputs, and judges those that predict
+    1 s better in sample (as well: those that run free better). `hold_p` as in `LPVARXModel.predict`.
+    """
+
+    def pair(moving: bool) -> list[Scored]:
+        arx = replace(structure, offset_rate=moving)
+        suffix = ", moving trim" if moving else ""
+        structures = {f"LPV, degree {arx.basis.size - 1}{suffix}": arx} if arx.basis.size > 1 else {}
+        structures[f"LTI{suffix}"] = arx.lti()
+        return [_scored(label, s, training, test, hold_p, method, instruments) for label, s in structures.items()]
+
+    leak = float(np.max(share_from_outputs(structure, training)))
+    first, note = pair(trim == "moving"), ""
+    if trim == "auto" and structure.basis.size > 1:
+        if leak > MADE_OF_OUTPUTS:
+            told = f"{100 * leak:.0f} % of what is new in {structure.scheduling} is in the outputs of the same instant"
+            note = f"offset_rate is not tried: {told}"
+        else:
+            try:
+                second = pair(True)
+            except (ExcitationError, InputError) as error:
+                note = f"offset_rate is not tried: {error}"
+            else:
+                without, with_it = (_mean_fits(models[0].in_sample) for models in (first, second))
+                first, second = (second, first) if with_it > without else (first, second)
+                numbers = (
+                    f"{one:.1f} % 1 s ahead and {free:.1f} % in free run {how}"
+                    for (one, free), how in ((with_it, "with it"), (without, "without"))
+                )
+                note = (
+                    f"offset_rate, the moving trim, in sample: {', '.join(numbers)} (means of the outputs, none below {LEAST:g}); "
+                    f"judged is the model {'with' if with_it > without else 'without'}"
+                )
+                first = [*first, *second]
+    return Comparison(tuple(first), training, test, hold_p, leak, note)
+
+
+def _mean_fits(scores: dict[str, dict[str, float]]) -> tuple[float, float]:
+    """Means over the outputs of the fits 1 s ahead and in free run, as printed; the first decides, the second where it is the same."""
+    one, free = (round(float(np.mean([max(v, LEAST) for v in scores[h].values()])), 1) for h in HORIZONS[1:])
+    return one, free
 
 
 def scheduling_range(values: np.ndarray, degree: int) -> tuple[float, float]:
@@ -96,6 +189,11 @@ def steps(dt: float) -> dict[str, int | None]:
     return dict(zip(HORIZONS, (1, max(round(1.0 / dt), 1), None), strict=True))
 
 
+def ahead(model: LPVARXModel, record: FlightRecord, horizon: int | None, hold_p: bool) -> np.ndarray:
+    """What is scored and drawn: the prediction `horizon` samples ahead, or the free run."""
+    return model.simulate(record) if horizon is None else model.predict(record, horizon, hold_p=hold_p)
+
+
 def percent(value: float) -> str:
     """A fit in words where it is no number."""
     return "diverges" if np.isneginf(value) else "no data" if np.isnan(value) else f"{value:.1f}" if value > -1e4 else f"{value:.1e}"
@@ -107,12 +205,19 @@ def coefficients(model: LPVARXModel) -> dict[str, Any]:
     return {**values._asdict(), "output_lags": list(model.structure.output_lags), "input_lags": list(model.structure.input_lags)}
 
 
-def _scored(label: str, arx: LPVARX, training: FlightRecord, test: FlightRecord | None) -> Scored:
-    model = fit(arx, training)
-    return Scored(label, model, _scores(model, training), None if test is None else _scores(model, test))
+def _scored(
+    label: str, arx: LPVARX, training: FlightRecord, test: FlightRecord | None, hold_p: bool, method: str, instruments: Sequence[str]
+) -> Scored:  # fmt: skip
+    model = fit(arx, training, method=method, instruments=instruments)  # type: ignore[arg-type]
+    return Scored(label, model, _scores(model, training, hold_p), None if test is None else _scores(model, test, hold_p))
 
 
-def _scores(model: LPVARXModel, record: FlightRecord) -> dict[str, dict[str, float]]:
+def _scores(model: LPVARXModel, record: FlightRecord, hold_p: bool) -> dict[str, dict[str, float]]:
     return {
-        horizon: {str(name): float(value) for name, value in model.score(record, step).items()} for horizon, step in steps(model.dt).items()
+        horizon: dict(zip(model.structure.outputs, _fit(model, record, step, hold_p), strict=True))
+        for horizon, step in steps(model.dt).items()
     }
+
+
+def _fit(model: LPVARXModel, record: FlightRecord, horizon: int | None, hold_p: bool) -> list[float]:
+    return fit_percent(record.columns(model.outputs), ahead(model, record, horizon, hold_p)).tolist()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.log.comparison import Comparison, Scored, percent, steps
+from studies.log.comparison import Comparison, Scored, ahead, percent, steps
 from symheli.lpv.record_plot import draw, empty_figure, label, shade_missing
 from symheli.lpv.whole_files import write_bytes
 
@@ -34,12 +34,12 @@ def figure(result: Comparison) -> Figure:
     axes = picture.subplots(len(heights), 2, sharex="col", squeeze=False, gridspec_kw={"width_ratios": [3, 2], "height_ratios": heights})
     shown = [*model.outputs, model.parameters[0]]
     for part in parts:
-        ahead = {h: model.simulate(part) if n is None else model.predict(part, n) for h, n in steps(model.dt).items()}
+        drawn = {h: ahead(model, part, n, result.hold_p) for h, n in steps(model.dt).items()}
         for i, (row, name) in enumerate(zip(axes, shown, strict=True)):
             for ax in row:
                 draw(ax, part, part[name], color=MEASURED, linewidth=1.4, label="measured" if part is parts[0] else None)
                 shade_missing(ax, part, part[name])
-                for h, values in ahead.items() if i < len(model.outputs) else ():
+                for h, values in drawn.items() if i < len(model.outputs) else ():
                     draw(ax, part, values[:, i], color=COLOURS[h], linewidth=0.9, label=h if part is parts[0] else None)
     for row, name in zip(axes, shown, strict=True):
         measured = np.concatenate([part[name] for part in parts])
@@ -47,7 +47,7 @@ def figure(result: Comparison) -> Figure:
         margin = 0.15 * (high - low) or 1.0
         row[0].set_ylim(low - margin, high + margin)
         row[1].set_ylim(low - margin, high + margin)
-        fits = f": {_fits(result.models, str(name))}" if name in model.outputs else ""
+        fits = f": {_fits(result.judged, str(name))}" if name in model.outputs else ""
         row[0].set_title(label(name) + fits, fontsize=9, loc="left")
         if result.test is not None:
             row[0].axvline(result.test.time[0], color=MARK, linewidth=1.0, linestyle="--")

@@ -8,6 +8,7 @@ from typing import Literal
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.files import existing
+from symheli.logs.separated import SEPARATORS, SeparatedTable
 from symheli.lpv import FlightRecord
 from symheli.lpv.signal import UNITS
 
@@ -34,9 +35,10 @@ def format_of(path: Path) -> Format:
 
 
 def read(
-    path: Path, signals: Sequence[str], *, format: Format, dt: float | None, time: str | None, units: Mapping[str, str]
-) -> FlightRecord:
-    """The record, on a uniform step where `dt` (s) says so.
+    path: Path, signals: Sequence[str], *, format: Format, dt: float | None, time: str | None, units: Mapping[str, str],
+    time_unit: str = "s",
+) -> FlightRecord:  # fmt: skip
+    """The record, on a uniform step where `dt` (s) says so; a time column is in `time_unit`.
 
     X-Plane logs declare their units. Elsewhere `units` declares those of `signals`; the names every room knows (u, q, theta,
     ...) are SI unless declared otherwise. A time column and `dt` together resample. Raises `InputError`.
@@ -48,10 +50,10 @@ def read(
         if name not in declared:
             raise UnknownNameError("signal in --units", name, declared)
     if format == "mat":
-        record = FlightRecord.from_mat(path, time or "t", declared)
+        record = FlightRecord.from_mat(path, time or "t", declared, time_unit)
     else:
         column = time or _time_column(path, dt)
-        record = FlightRecord.from_csv(path, column, declared, dt if column is None else None)
+        record = FlightRecord.from_csv(path, column, declared, dt if column is None else None, time_unit)
         time = column
     return record.resample(dt) if dt is not None and time is not None else record
 
@@ -61,11 +63,13 @@ def _undeclared(name: str) -> str:
 
 
 def _time_column(path: Path, dt: float | None) -> str | None:
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        header = [name.strip().strip('"') for name in file.readline().split(",")]
+    table = SeparatedTable.read(path)
     for name in TIMES:
-        if name in header:
+        if name in table.header:
             return name
     if dt is not None:
         return None
-    raise InputError(f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample period with --dt")
+    found = f"{', '.join(map(repr, table.header))} (separated by {SEPARATORS[table.separator]})"
+    raise InputError(
+        f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample period with --dt; found {found}"
+    )

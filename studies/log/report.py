@@ -7,14 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from identification import residual_analysis, uncertainty
+from identification import residual_analysis, slow_modes, uncertainty
 from studies.log.comparison import HORIZONS, Comparison, coefficients, percent
 from studies.output import columns
 from symheli.lpv import FlightRecord
 
+CERTAIN = ("ls", "rls")
+"""Methods whose coefficients have a covariance here."""
 
-def facts(log: Path, kind: str, record: FlightRecord, rows: int, outside: int, result: Comparison) -> dict[str, Any]:
-    """What was read and used: `rows` in the file, `outside` --start and --stop, and what became of the rest."""
+
+def facts(
+    log: Path, kind: str, record: FlightRecord, rows: int, outside: int, result: Comparison, test_log: Path | None = None
+) -> dict[str, Any]:
+    """What was read and used: `rows` in the file, `outside` --start and --stop, and what became of the rest; a log held out, if any."""
     model, test = result.scheduled, result.test
     scheduling = model.parameters[0]
     seen = result.training[scheduling]
@@ -22,6 +27,8 @@ def facts(log: Path, kind: str, record: FlightRecord, rows: int, outside: int, r
     ahead = np.zeros(0) if test is None else test[scheduling]
     return {
         "log": log.name,
+        "test_log": None if test_log is None else test_log.name,
+        "resampled": record.resampled,
         "format": kind,
         "rows_read": rows,
         "rows_outside_start_stop": outside,
@@ -47,8 +54,8 @@ def text(found: dict[str, Any], result: Comparison) -> str:
     """The whole answer for a reader."""
     fit = "fit in percent of the output's own variation (100: perfect, 0: no better than its mean)"
     parts = [
-        *_read(found), *_structure(found, result), "", str(result.scheduled.excitation), "", fit, _table(result), "", *result.verdict(), "",
-        *_certainty(result),
+        *_read(found), *_structure(found, result), "", str(result.scheduled.excitation), "", fit, _table(result), *_horizons(result), "",
+        *result.verdict(), "", *_certainty(result),
     ]  # fmt: skip
     return "\n".join(parts).rstrip()
 
@@ -62,11 +69,15 @@ def data(found: dict[str, Any], result: Comparison) -> dict[str, Any]:
         }
         for scored in result.models
     }
-    judged = len(result.models) > 1 and result.test is not None
+    judged = len(result.judged) > 1 and result.test is not None
     pays = {str(y): result.pays(str(y)) for y in result.scheduled.outputs} if judged else None
+    certain = result.scheduled.method in CERTAIN
     return {
-        "read": found, "excitation": _excitation(result), "models": models, "scheduling_pays": pays, "verdict": result.verdict(),
-        "standard_errors": uncertainty(result.scheduled, result.training).standard_errors,
+        "read": found, "excitation": _excitation(result), "models": models, "judged": [scored.label for scored in result.judged],
+        "scheduling_pays": pays, "verdict": result.verdict(), "scheduling_held": result.hold_p, "scheduling_leak": result.leak,
+        "moving_trim": result.trim_note, "method": result.scheduled.method, "details": dict(result.scheduled.details),
+        "standard_errors": uncertainty(result.scheduled, result.training).standard_errors if certain else None,
+        "slow_modes": _slow(result) if certain else None,
     }  # fmt: skip
 
 
@@ -86,28 +97,64 @@ def _structure(found: dict[str, Any], result: Comparison) -> list[str]:
     arx = result.scheduled.structure
     (low, high), (trained_low, trained_high) = found["scheduling_range"], found["scheduling_range_of_training"]
     incomplete = found["training_samples_without_full_regressor"]
+    fitted, held = ("the first", "the last") if found["test_log"] is None else ("all", f"{found['test_log']}, all")
     return [
-        f"  fitted: the first {found['training_samples']} samples, {incomplete} without a complete regressor",
-        f"  held out: the last {found['held_out_samples']} samples",
-        f"  range of {arx.scheduling} in the whole record, which the model covers: {low:.4g} to {high:.4g} {found['scheduling_unit']}",
+        f"  fitted: {fitted} {found['training_samples']} samples, {incomplete} without a complete regressor, by {_method(result)}",
+        f"  held out: {held} {found['held_out_samples']} samples",
+        f"  range of {arx.scheduling} in all that was read, which the model covers: {low:.4g} to {high:.4g} {found['scheduling_unit']}",
         f"  fitted on {trained_low:.4g} to {trained_high:.4g}; {found['held_out_samples_beyond_training']} held-out samples lie beyond",
         f"  model: {', '.join(arx.outputs)} from {', '.join(arx.inputs)}, na {arx.na}, nb {arx.nb}, delay {arx.delay},"
         f" coefficients at {arx.scheduling_at}, {'with' if arx.offset else 'without'} offset",
+        *([f"  samples are {found['resampled']}: y(k) may depend on u(k), which delay 0 allows"] if found["resampled"] else []),
+        *([f"  {result.trim_note}"] if result.trim_note else []),
     ]
+
+
+def _method(result: Comparison) -> str:
+    model = result.scheduled
+    strength = f" (first-stage F {model.details['first_stage_F']:.3g})" if "first_stage_F" in model.details else ""
+    return f"{model.method}{strength}"
+
+
+def _horizons(result: Comparison) -> list[str]:
+    """What the predictions know of p."""
+    p = result.scheduled.structure.scheduling
+    if result.scheduled.structure.basis.size == 1 and not result.scheduled.structure.offset_rate:
+        return []
+    if not result.hold_p:
+        return [f"{p} is taken as known ahead, as a command is"]
+    told = (
+        f"; {100 * result.leak:.0f} % of what is new in it is in the outputs of the same instant: free runs are told what they predict, "
+        "and are not counted" if result.told else ""
+    )  # fmt: skip
+    return [f"{p} is taken as measured: one step and 1 s hold it from the start of each prediction, free runs follow it{told}"]
+
+
+def _slow(result: Comparison) -> dict[str, Any]:
+    found = slow_modes(result.scheduled, result.training)
+    return {
+        "lost": len(found.lost),
+        "modes": [{"p": m.p, "pole": m.s, "error": m.error, "lost": m.lost, "period": m.period} for m in found.modes],
+        "text": str(found),
+    }
 
 
 def _certainty(result: Comparison) -> list[str]:
     """What the residuals of the fit say, and how certain its coefficients are."""
     model = result.scheduled
     lags = min(25, len(result.training) // 20)
+    analysis = f"in sample, {residual_analysis(model, result.training, lags)}"
+    if model.method not in CERTAIN:
+        return [analysis]
     known = uncertainty(model, result.training)
     colour = ", ".join(f"{y} {factor:.1f}" for y, factor in zip(model.outputs, known.colour, strict=True))
     free = model.structure.free
     sure = np.abs(model.theta) > 2 * known.standard_errors
     count = f"{int(np.sum(sure & free))} of {int(free.sum())}"
     return [
-        f"in sample, {residual_analysis(model, result.training, lags)}",
+        analysis,
         f"coefficients more than two standard errors from zero: {count} (coloured residuals make the errors larger by: {colour})",
+        str(slow_modes(model, result.training)),
     ]
 
 

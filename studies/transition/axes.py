@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ import symheli
 from identification import LPVARX, LPVARXModel, Polynomial, RecursiveLeastSquares, fit
 from studies.transition.flights import TOP
 from symheli import FlightRecord, Helicopter, LinearModel
+from symheli.errors import DataWarning
 
 SCHEDULING = "airspeed_command"
 HORIZON = 1.0
@@ -94,8 +96,13 @@ def instruments(axis: Axis) -> tuple[str, ...]:
 
 
 def identify(axis: Axis, training: FlightRecord, method: str = "rls", order: int = 3, degree: int = 2) -> LPVARXModel:
-    """Fit `axis` to a training flight; "iv" takes the excitation of its inputs as instruments."""
-    return fit(axis.structure(order, degree), training, method=method, instruments=instruments(axis) if method == "iv" else ())  # type: ignore[arg-type]
+    """Fit `axis` to a training flight; "iv" takes the excitation of its inputs as instruments.
+
+    What is added to the inputs is weak along the slow modes: the report says so where it shows what instruments find.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "the instruments are weak", DataWarning)
+        return fit(axis.structure(order, degree), training, method=method, instruments=instruments(axis) if method == "iv" else ())  # type: ignore[arg-type]
 
 
 def update_time(axis: Axis, flight: FlightRecord) -> float:

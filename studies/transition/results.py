@@ -74,6 +74,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
     out["rotor mode miss at 30 dB, order 2"] = {
         f"{axis}, {method}": named(misses, "%") for (axis, method), misses in study.noisy_modes.items()
     }
+    out["first-stage F of the instruments at 30 dB, worst direction"] = named(study.first_stage, "1")
     out["comparison"] = {f"{axis}, {noise}": _comparison(c) for (axis, noise), c in study.comparisons.items()}
     out["frozen comparison"] = {name: _frozen(f) for name, f in study.frozen.items()}
     out["frozen gain of the exact models"] = {

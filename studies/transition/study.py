@@ -124,6 +124,7 @@ def _identify(study: Study) -> None:
         for method in ("ls", "iv"):
             model = axes.identify(axis, study.flights["training, 30 dB"], method, order=2)
             study.noisy_modes[axis.name, method] = axes.mode_misses(heli, model, axis.mode)
+        study.first_stage[axis.name] = model.details["first_stage_F"]  # of "iv", the last
     study.models["lateral, gentle"] = axes.identify(LATERAL, study.flights["gentle"], "rls", order=2)
 
 

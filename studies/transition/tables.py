@@ -125,8 +125,15 @@ def modes(study: Outcome) -> Table:
     for (axis, method), misses in study.noisy_modes.items():
         table.rows.append([f"{axis}, 30 dB, order 2, {words[method]}", *(f"{misses[v]:.2f}" for v in FROZEN_SPEEDS)])
     table.remarks.append(
-        "Noise fed back through the autopilot biases least squares; more lags hide it, the excitation as instrument removes it."
+        "Noise fed back through the autopilot biases least squares; more lags hide it, the excitation as instrument removes it from the "
+        "rotor modes."
     )
+    if study.first_stage:
+        weakest = ", ".join(f"{F:.2g} ({axis})" for axis, F in study.first_stage.items())
+        table.remarks.append(
+            f"In the direction they explain worst, the slow motion, these instruments have a first-stage F of {weakest}: below 10 they "
+            f"are weak, and what they say there is nearly as biased as least squares."
+        )
     return table
 
 

@@ -20,6 +20,7 @@ from symheli.flight.servo import Servo, ServoBank
 from symheli.helicopter import Helicopter
 from symheli.integrate import runge_kutta
 from symheli.lpv.flight_record import FlightRecord
+from symheli.lpv.sample_period import same_period
 from symheli.lpv.signal import UNITS, Signal
 from symheli.numeric import Numeric
 from symheli.rigid_body import body_to_earth
@@ -88,7 +89,7 @@ class _Flight:
         self.wind = wind.history(self.time, self.speed)
         top = max(float(self.speed.max()), float(self.speed.min()) + 1.0)
         self.autopilot = autopilot or gain_scheduled_lqr(heli, float(self.speed.min()), top, self.control_dt, servos=servos)
-        if abs(self.autopilot.dt - self.control_dt) > 1e-9:
+        if not same_period(self.autopilot.dt, self.control_dt):
             raise InputError(f"the autopilot was designed for {self.autopilot.dt} s, this flight controls every {self.control_dt:.6g} s")
         added = excitation(self.time) if excitation else {}
         self.added = np.column_stack([added.get(str(name), np.zeros(self.samples)) for name in heli.inputs])

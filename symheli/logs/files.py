@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.lpv.units import to_si
 
 Table = tuple[np.ndarray, dict[str, np.ndarray], dict[str, str]]
 """time (n,) in s, columns by name, unit of each column."""
@@ -40,3 +41,11 @@ def positive(dt: float, name: str = "dt") -> float:
     if not (np.isfinite(dt) and dt > 0):
         raise InputError(f"{name} must be a positive number of seconds, got {dt}")
     return float(dt)
+
+
+def seconds_in(time_unit: str) -> float:
+    """Seconds in one `time_unit`; raises `InputError` for a unit that is no time."""
+    factor, unit = to_si(time_unit)
+    if unit != "s":
+        raise InputError(f"time_unit must be a time such as 's', 'ms' or 'us', got {time_unit!r}")
+    return factor

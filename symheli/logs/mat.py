@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.logs.files import Table, existing
+from symheli.logs.files import Table, existing, seconds_in
 
 
-def read_mat(path: str | os.PathLike[str], time: str, units: Mapping[str, str]) -> Table:
-    """The variables named in `units`, and `time` in s, from a file saved with -v7 or older; "log.theta" reaches into a struct.
+def read_mat(path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s") -> Table:
+    """The variables named in `units`, and `time` (there in `time_unit`) in s, from a file saved with -v7 or older.
 
+    "log.theta" reaches into a struct.
     Raises `InputError` for version 7.3, a file that is none of MATLAB's, and variables that are no vectors of one length.
     """
     from scipy.io import loadmat
 
-    file = existing(path)
+    file, factor = existing(path), seconds_in(time_unit)
     try:
         content = loadmat(file, simplify_cells=True)
     except NotImplementedError as error:
@@ -31,7 +32,7 @@ def read_mat(path: str | os.PathLike[str], time: str, units: Mapping[str, str]) 
     for name, vector in vectors.items():
         if len(vector) != n:
             raise InputError(f"{file}: {name!r} has {len(vector)} samples, the time {time!r} has {n}")
-    return vectors[time], {name: vectors[name] for name in units}, dict(units)
+    return factor * vectors[time], {name: vectors[name] for name in units}, dict(units)
 
 
 def _vector(content: Mapping[str, Any], name: str, file: object) -> np.ndarray:

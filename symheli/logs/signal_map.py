@@ -99,7 +99,7 @@ class SignalMap:
             case "mat":
                 if self.time is None:
                     raise InputError(f"{log}: name the time vector in the signal map: time = ...")
-                return FlightRecord.from_mat(log, self.time, declared)
+                return FlightRecord.from_mat(log, self.time, declared, self.time_unit)
         return FlightRecord.from_csv(log, self.time, declared, self.dt if self.time is None else None, self.time_unit)
 
     def _unit(self, name: str, source: Source, record: FlightRecord) -> str:

@@ -77,7 +77,11 @@ def _filtered(sos: Array, x: Array, zero_phase: bool) -> Array:
 
 
 def decimate(record: FlightRecord, n: int) -> FlightRecord:
-    """Means of `n` samples in a row, all signals alike: a linear relation between them is kept, noise and dt change."""
+    """Means of `n` samples in a row, all signals alike: a linear relation between them is kept, noise and dt change.
+
+    Within a mean the output has heard the input already: y(k) depends on u(k), whatever it did before. Identify with delay 0; the record
+    remembers (`resampled`), and `fit` warns. No other filter avoids it: between slow samples what is band-limited is known from both sides.
+    """
     if not isinstance(n, int | np.integer) or n < 1:
         raise InputError(f"expected a whole number of samples >= 1 to take together, got {n!r}")
     if n == 1:
@@ -90,7 +94,7 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
         values.append(record.values[part.start : stop].reshape(rows, n, len(record.signals)).mean(axis=1))
     if sum(map(len, times)) < 2:
         raise InputError(f"taking {n} samples together leaves fewer than two; the record has {len(record)}")
-    return replace(record, time=np.concatenate(times), values=np.concatenate(values))
+    return replace(record, time=np.concatenate(times), values=np.concatenate(values), resampled=f"means of {n} samples")
 
 
 def cut(record: FlightRecord, start: float | None, stop: float | None) -> FlightRecord:

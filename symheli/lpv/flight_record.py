@@ -12,6 +12,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.sample_period import JITTER, period_of, warn_of_odd_steps
 from symheli.lpv.signal import Signal, indices, signals
 from symheli.lpv.units import to_si
 
@@ -32,7 +33,8 @@ class FlightRecord:
     """Samples `values` (n, m) of `signals` at `time` (n,) in s, in SI units and radians.
 
     NaN marks a missing sample. A time step longer than 1.5 median steps is a gap: `segments()` splits there, and no
-    regressor reaches across. `note` says where the record comes from.
+    regressor reaches across. `note` says where the record comes from, `resampled` how its samples were made of others ("means of 4
+    samples"; empty where each is what was measured at its instant): then y(k) may depend on u(k).
     """
 
     time: Array
@@ -40,6 +42,7 @@ class FlightRecord:
     signals: tuple[Signal, ...]
     note: str = ""
     meta: Mapping[str, Any] = field(default_factory=dict)
+    resampled: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", signals(self.signals))
@@ -61,7 +64,16 @@ class FlightRecord:
 
     @classmethod
     def from_arrays(cls, time: object, units: Mapping[str, str], note: str = "", **columns: Any) -> FlightRecord:
-        """From one array a signal, all as long as `time` (s); `units` declares the unit of each signal."""
+        """From one array a signal, all as long as `time` (s); `units` declares the unit of each signal.
+
+        Warns (`DataWarning`), as all readers do, where samples lie further apart than 1 s or closer than 0.1 ms.
+        """
+        record = cls._in_si(time, units, note, columns)
+        warn_of_odd_steps(record.time)
+        return record
+
+    @classmethod
+    def _in_si(cls, time: object, units: Mapping[str, str], note: str, columns: Mapping[str, Any]) -> FlightRecord:
         values, names = [], []
         length = np.asarray(time).size
         for name, column in columns.items():
@@ -81,9 +93,9 @@ class FlightRecord:
         for name in (time, *units):
             if name not in frame.columns:
                 raise UnknownNameError("column", name, [str(c) for c in frame.columns])
-        factor, unit = to_si(time_unit)
-        if unit != "s":
-            raise InputError(f"time_unit must be a time, got {time_unit!r}")
+        from symheli.logs.files import seconds_in
+
+        factor = seconds_in(time_unit)
         if frame[time].dtype.kind in "mM":
             raise InputError(f"{time!r} holds dates; give numbers: (frame[{time!r}] - frame[{time!r}].iloc[0]).dt.total_seconds()")
         columns = {}
@@ -98,7 +110,10 @@ class FlightRecord:
     def from_csv(
         cls, path: str | os.PathLike[str], time: str | None, units: Mapping[str, str], dt: float | None = None, time_unit: str = "s"
     ) -> FlightRecord:
-        """From a CSV file with a header line. A file without a time column (`time=None`) needs the sample period `dt` (s)."""
+        """From a table with a header line: commas, semicolons, tabs or blanks between cells, decimal points or commas, # comments.
+
+        `time` names the time column, in `time_unit`. A file without one (`time=None`) needs the sample period `dt` (s).
+        """
         from symheli.logs.csv import read_csv
 
         return cls._from_table(*read_csv(path, time, units, dt, time_unit), path)
@@ -115,14 +130,14 @@ class FlightRecord:
         """From a PX4 ULog: {signal: (topic, field, unit)}, resampled to `dt` (s); needs pyulog (extra "logs")."""
         from symheli.logs.ulog import read_ulog
 
-        return cls._from_table(*read_ulog(path, topics, dt), path)
+        return replace(cls._from_table(*read_ulog(path, topics, dt), path), resampled=f"topics interpolated to {dt:g} s")
 
     @classmethod
-    def from_mat(cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str]) -> FlightRecord:
-        """From a MATLAB file (v7.2 or older) with one vector a signal."""
+    def from_mat(cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s") -> FlightRecord:
+        """From a MATLAB file (v7.2 or older) with one vector a signal, `time` in `time_unit`."""
         from symheli.logs.mat import read_mat
 
-        return cls._from_table(*read_mat(path, time, units), path)
+        return cls._from_table(*read_mat(path, time, units, time_unit), path)
 
     @classmethod
     def from_map(cls, path: str | os.PathLike[str], signal_map: str | os.PathLike[str]) -> FlightRecord:
@@ -149,15 +164,18 @@ class FlightRecord:
 
     @property
     def dt(self) -> float:
-        """Sample period (s): the median step. Raises `InputError` where the steps inside a segment vary by more than 1 %."""
+        """Sample period (s): the roundest number that the stamps allow (`sample_period.period_of`), so that 0.02 s is 0.02 s.
+
+        Raises `InputError` where the steps inside a segment vary by more than 1 %.
+        """
         steps = np.diff(self.time)
         dt = float(np.median(steps))
         inside = steps[steps <= GAP * dt]
-        if np.ptp(inside) > 0.01 * dt:
+        if np.ptp(inside) > JITTER * dt:
             raise InputError(
                 f"sampling is irregular (steps {inside.min():.4g} to {inside.max():.4g} s); resample first: record.resample({dt:.3g})"
             )
-        return dt
+        return period_of(inside, self.time[-1])
 
     def segments(self) -> tuple[slice, ...]:
         """Index ranges without a gap between them, in order."""
@@ -196,7 +214,7 @@ class FlightRecord:
 
     def with_signals(self, units: Mapping[str, str], **columns: Any) -> FlightRecord:
         """With these signals added, or replaced where the name exists."""
-        other = FlightRecord.from_arrays(self.time, units, **columns)
+        other = FlightRecord._in_si(self.time, units, self.note, columns)
         kept = [i for i, s in enumerate(self.signals) if s not in other.signals]
         return replace(
             self, values=np.column_stack([self.values[:, kept], other.values]), signals=(*(self.signals[i] for i in kept), *other.signals)
@@ -205,7 +223,8 @@ class FlightRecord:
     def resample(self, dt: float) -> FlightRecord:
         """Linear interpolation to a uniform step `dt` (s) inside each segment; nothing is invented across gaps.
 
-        To a longer step: `low_pass` or `decimate` first, or what is faster folds back into what is slower.
+        To a longer step: `low_pass` or `decimate` first, or what is faster folds back into what is slower. Between its neighbours an
+        output has heard the input that stands beside it: identify with delay 0.
         """
         if not 0 < dt < np.inf:
             raise InputError(f"dt must be a positive number of seconds, got {dt}")
@@ -221,7 +240,10 @@ class FlightRecord:
             if len(new):
                 times.append(new)
                 values.append(np.column_stack([np.interp(new, old, column) for column in self.values[part].T]))
-        return replace(self, time=np.concatenate(times), values=np.concatenate(values))
+        new, old = np.concatenate(times), float(np.median(np.diff(self.time)))
+        kept = len(new) == len(self) and np.allclose(new, self.time, rtol=0, atol=1e-9 * dt)
+        made = self.resampled if kept else f"interpolated to {dt:.4g} s from {old:.4g} s"
+        return replace(self, time=new, values=np.concatenate(values), resampled=made)
 
     def low_pass(self, cutoff: float, order: int = 4, *, zero_phase: bool = False, leave: Sequence[str] = ()) -> FlightRecord:
         """All signals but those of `leave` through one Butterworth filter with its corner at `cutoff` (Hz); see `symheli.lpv.low_pass`."""
@@ -230,7 +252,7 @@ class FlightRecord:
         return low_pass(self, cutoff, order, zero_phase=zero_phase, leave=leave)
 
     def decimate(self, n: int) -> FlightRecord:
-        """Means of `n` samples in a row, all signals alike; see `symheli.lpv.decimate`."""
+        """Means of `n` samples in a row, all signals alike, to identify with delay 0; see `symheli.lpv.decimate`."""
         from symheli.lpv.conditioning import decimate
 
         return decimate(self, n)
@@ -242,7 +264,9 @@ class FlightRecord:
         return split(self, fraction)
 
     def to_frame(self) -> pandas.DataFrame:
-        """A pandas DataFrame with a "t" column (s) and one column a signal."""
-        import pandas as pd
-
+        """A pandas DataFrame with a "t" column (s) and one column a signal; raises `InputError` without pandas."""
+        try:
+            import pandas as pd
+        except ImportError as error:
+            raise InputError('a DataFrame needs pandas: pip install "symheli[logs]"') from error
         return pd.DataFrame({"t": self.time, **{str(s): self.values[:, i] for i, s in enumerate(self.signals)}})

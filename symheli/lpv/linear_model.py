@@ -13,6 +13,7 @@ from scipy.signal import cont2discrete
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.operating_point import OperatingPoint
+from symheli.lpv.sample_period import same_period
 from symheli.lpv.signal import Signal, indices, signals
 
 
@@ -82,7 +83,7 @@ class LinearModel:
         """
         at = indices(actuators, self.inputs, "input")
         for name, part in actuators.items():
-            if part.dt != self.dt or len(part.inputs) != 1 or len(part.outputs) != 1:
+            if not same_period(part.dt, self.dt) or len(part.inputs) != 1 or len(part.outputs) != 1:
                 raise InputError(
                     f"the actuator of {name} needs one input, one output and dt = {self.dt}; "
                     f"got {len(part.inputs)}, {len(part.outputs)} and {part.dt}"

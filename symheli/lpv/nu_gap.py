@@ -7,6 +7,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.arrays import frozen
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.sample_period import same_period
 
 
 def nu_gap(first: LinearModel, second: LinearModel, *, input_scale: object = 1.0, output_scale: object = 1.0, points: int = 2000) -> float:
@@ -17,7 +18,7 @@ def nu_gap(first: LinearModel, second: LinearModel, *, input_scale: object = 1.0
     1e-3 rad/s to Nyquist, logarithmic, refined where the winding number asks for it. Models with poles on the unit circle are
     refused with `InputError`. Source: G. Vinnicombe, Uncertainty and Feedback (2001), chapter 3.
     """
-    if first.dt is None or first.dt != second.dt:
+    if first.dt is None or not same_period(first.dt, second.dt):
         raise InputError(f"nu_gap compares discrete models with one sample period, got {first.dt} and {second.dt} s; discretize them")
     if first.inputs != second.inputs or first.outputs != second.outputs:
         raise InputError("nu_gap compares models with the same inputs and outputs in the same order")

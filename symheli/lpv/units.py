@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from symheli.errors import InputError, UnknownNameError
 
 _TO_SI: dict[str, tuple[float, str]] = {
-    "1": (1.0, "1"), "%": (0.01, "1"), "s": (1.0, "s"), "ms": (1e-3, "s"), "us": (1e-6, "s"), "min": (60.0, "s"),
+    "1": (1.0, "1"), "%": (0.01, "1"), "s": (1.0, "s"), "ms": (1e-3, "s"), "us": (1e-6, "s"), "ns": (1e-9, "s"), "min": (60.0, "s"),
     "m": (1.0, "m"), "cm": (0.01, "m"), "mm": (1e-3, "m"), "km": (1e3, "m"), "ft": (0.3048, "m"), "in": (0.0254, "m"),
     "m/s": (1.0, "m/s"), "km/h": (1 / 3.6, "m/s"), "kt": (1852 / 3600, "m/s"), "mph": (0.44704, "m/s"),
     "ft/s": (0.3048, "m/s"), "ft/min": (0.3048 / 60, "m/s"),

@@ -26,6 +26,7 @@ def short(pilot):
 
 def test_a_transition_reaches_its_airspeed_and_returns_to_hover(ideal, pilot):
     record = fly(ideal, AirspeedSchedule.transition(0.0, 13.0, 3.0, hold=3.0), autopilot=pilot)
+    assert record.dt == 0.02  # as asked for, not what differences of its stamps leave of it
     assert record["airspeed"].max() == pytest.approx(13.0, abs=1.5)
     np.testing.assert_allclose(record["airspeed"][-1], 0.0, atol=1.0)
     assert np.abs(record["airspeed"] - record["airspeed_command"]).max() < 1.5

@@ -5,7 +5,7 @@ import pytest
 from known_systems import moving, structure
 from scipy.signal import lfilter
 
-from identification import choose_experiments, compare_experiments, fit, frequency_response, uncertainty
+from identification import FrequencyResponse, choose_experiments, compare_experiments, fit, frequency_response, uncertainty
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FlightRecord, LinearModel
 
@@ -63,6 +63,17 @@ def test_coherence_falls_and_the_random_error_grows_with_noise_as_they_say():
     quiet = frequency_response(static(0.1), ("y",), ("a", "b"), window=5.0)
     assert np.median(quiet.random_error) < 0.2 * np.median(r[0].random_error)
     assert quiet.multiple.min() > 0.98
+
+
+@pytest.mark.parametrize(("coherence", "weight"), [(0.6, 0.51), (0.8, 0.76), (0.9, 0.88), (1.0, 1.0)])
+def test_the_mismatch_weighs_by_the_coherence_as_published(coherence, weight):
+    """W = (1.58 (1 - exp(-gamma^2)))^2 is 0.51 at gamma^2 = 0.6 and 1 at 1; half the gain at every frequency costs 20 W 6.02^2."""
+    shape = (5, 1, 1)
+    measured = FrequencyResponse(
+        np.arange(1.0, 6.0), np.full(shape, 0.5 + 0j), np.full(shape, coherence), np.ones((5, 1)), np.zeros(shape), ("y",), ("u",)
+    )  # fmt: skip
+    model = LinearModel(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], (), ("u",), ("y",), DT)
+    assert measured.mismatch(model, 0.5)[0, 0] == pytest.approx(20 * weight * (20 * np.log10(2)) ** 2, rel=0.01)  # two digits
 
 
 def test_gaps_are_not_bridged_and_inputs_that_move_together_are_refused():

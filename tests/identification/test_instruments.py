@@ -1,11 +1,14 @@
 """Closed-loop noise biases least squares; the external excitation does not know the noise."""
 
+import warnings
+
 import numpy as np
 import pytest
 from known_systems import structure
 
 import identification as idn
-from symheli.errors import ExcitationError, InputError
+from identification.first_stage import first_stage
+from symheli.errors import DataWarning, ExcitationError, InputError
 from symheli.lpv import FlightRecord
 
 GAIN = 0.35
@@ -68,3 +71,46 @@ def test_too_few_or_blind_instruments_are_refused():
         idn.fit(arx, silent, method="iv", instruments=("r",))
     with pytest.raises(InputError, match="window"):
         idn.Instruments(("r",), window=-1.0)
+
+
+def test_what_instruments_leave_of_the_bias_is_foreseen_by_their_strength():
+    """The louder the noise, the less of the output the excitation explains: F falls, and below 10 the bias of least squares is back."""
+    arx, true = structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0)), np.array([-1.815, 0.826])
+    left, F = [], []
+    for noise in (0.5, 2.0, 5.0, 20.0):
+        record = closed_loop(6000, noise=noise, seed=1)
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            model = idn.fit(arx, record, method="iv", instruments=("r",))
+        biased = idn.fit(arx, record).coefficients.at(6.5).A.ravel() - true
+        left.append(float((model.coefficients.at(6.5).A.ravel() - true) @ biased / (biased @ biased)))
+        F.append(model.details["first_stage_F"])
+        weak = [str(w.message) for w in said if w.category is DataWarning]
+        assert len(weak) == (F[-1] < 10)
+        assert all("the instruments are weak (first-stage F" in text and model.details["weakest"] in text for text in weak)
+    assert F == sorted(F, reverse=True)
+    assert F[0] > 100
+    assert F[-1] < 2  # 1 is what chance explains
+    assert left[0] < 0.02  # strong: measured 0.003 of the bias of least squares
+    assert left[2] > 0.08  # weak: 0.13
+    assert left[3] > 0.4  # hardly any: 0.5
+
+
+def test_the_first_stage_is_the_f_statistic_of_one_regressor_and_that_of_the_worst_combination_of_several():
+    rng = np.random.default_rng(3)
+    Z, own = rng.standard_normal((300, 4)), np.ones((300, 1))
+    x = np.column_stack([Z @ rng.standard_normal(4), Z @ rng.standard_normal(4)]) + rng.standard_normal((300, 2))
+    Q = np.linalg.qr(np.hstack([Z, own]))[0]
+
+    def F(column):
+        """The textbook's: restricted against unrestricted sum of squares."""
+        full, bare = (np.sum((column - A @ np.linalg.lstsq(A, column, rcond=None)[0]) ** 2) for A in (np.hstack([Z, own]), own))
+        return (bare - full) / 4 / (full / 295)
+
+    one = first_stage(np.hstack([x[:, :1], own]), Q, ("x", "1"), np.array([False, True]))
+    assert one.F == pytest.approx(F(x[:, 0]))
+    both = first_stage(np.hstack([x, own]), Q, ("x", "z", "1"), np.array([False, False, True]))
+    angles = np.linspace(0, np.pi, 2001)
+    # the best of 2000 directions is within 1e-5 of the least
+    assert both.F == pytest.approx(min(F(np.cos(a) * x[:, 0] + np.sin(a) * x[:, 1]) for a in angles), rel=1e-4)
+    assert first_stage(np.hstack([Z[:, :2], own]), Q, ("x", "z", "1"), np.array([False, False, True])).F > 1e9

@@ -108,8 +108,8 @@ def at_one_instant(one, state, columns, outputs, data, k):
         y = data.y[: k + 1, outputs]
         residual = np.linalg.norm(root[-len(y) :, None] * (y - rows @ best), axis=0)
         coefficients = np.linalg.norm(scale[:, None] * best, axis=0)
-        # perturbation of least squares (Higham, Accuracy and Stability, theorem 20.1): 100 roundings times the condition, and where the next
-        # row leaves the span of those seen, times its square and the residual
+        # perturbation of least squares (Higham, Accuracy and Stability, theorem 20.1): 100 roundings times the condition, and where the
+        # next row leaves the span of those seen, times its square and the residual
         allowed = 1e-8 * spread + 100 * EPS * np.linalg.norm(data.phi[k + 1][columns] / scale) * (
             condition * coefficients + condition**2 * residual
         )
@@ -181,5 +181,5 @@ def test_a_corrupted_estimate_is_not_returned(monkeypatch):
     record = creeping(arx, rate=3e-3, noise=0.03)
     least_squares = idn.estimate.least_squares_by_group
     monkeypatch.setattr(idn.estimate, "least_squares_by_group", lambda *args: least_squares(*args) * (1 + 1e-8))
-    with pytest.raises(AccuracyError, match="not orthogonal to .*not the least-squares ones"):
+    with pytest.raises(AccuracyError, match=r"not orthogonal to .*not the least-squares ones"):
         idn.fit(arx, record)

@@ -31,19 +31,24 @@ def test_the_covariance_is_its_double_sum():
     rng, lags = np.random.default_rng(0), 4
     runs, n = [slice(0, 3), slice(3, 40)], TWO.n_regressors  # one shorter than the lags
     phi, error = rng.normal(size=(40, n)), rng.normal(size=(40, 2))
-    joint, _ = covariances(TWO, phi, error, runs, lags)
+    joint, _, freedom = covariances(TWO, phi, error, runs, lags)
     R = {}
     for lag in range(-lags, lags + 1):
         pairs = [(k, k + lag) for r in runs for k in range(r.start, r.stop) if r.start <= k + lag < r.stop]
         R[lag] = sum(np.outer(error[a], error[b]) for a, b in pairs) / 40 * (1 - abs(lag) / (lags + 1))
-    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+    left = {}  # what share of the noise the fit leaves in the residuals
+    for i, j in ((0, 0), (1, 1), (0, 1), (1, 0)):
         a, b = (next(TWO.regressors(g) for g in TWO.groups if y in g.outputs) for y in (i, j))
         X, Z = phi[:, a], phi[:, b]
         middle = sum(
             R[q - k][i, j] * np.outer(X[k], Z[q]) for r in runs for k in range(r.start, r.stop) for q in range(r.start, r.stop)
             if abs(q - k) <= lags
         )  # fmt: skip
-        expected = np.linalg.inv(X.T @ X) @ middle @ np.linalg.inv(Z.T @ Z) * 40 / np.sqrt((40 - len(a)) * (40 - len(b)))
+        if i == j:
+            left[i] = 1 - np.trace(np.linalg.inv(X.T @ X) @ middle) / np.sum(error[:, i] ** 2)
+            independent = 40 / sum((R[lag][i, i] / R[0][i, i]) ** 2 for lag in R) * left[i]
+            assert freedom[i] == pytest.approx(1 / (1 / independent + lags / 60))
+        expected = np.linalg.inv(X.T @ X) @ middle @ np.linalg.inv(Z.T @ Z) / np.sqrt(left[i] * left[j])
         # 1e-12 of the largest entry: two orders of summation, condition below 100
         np.testing.assert_allclose(joint[i][np.ix_(a, [j], b)][:, 0], expected, rtol=0, atol=1e-12 * max(np.abs(joint).max(), 1))
 

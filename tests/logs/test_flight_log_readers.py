@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import DataWarning, InputError, UnknownNameError
 from symheli.logs.xplane import body_velocity
 from symheli.lpv import FlightRecord
 
@@ -134,6 +134,71 @@ def test_the_real_trex_flight_is_read_without_a_time_column():
     assert np.isfinite(record.values).all()
 
 
+SAME = {
+    "commas": ["t,q,note", "0,1.5,a", "0.1,,b", "0.2,-2e-1,c"],
+    "blanks about names": [" t , q\t,note  ", "0 , 1.5,a", " 0.1,,b", "0.2,  -2e-1 ,c"],
+    "semicolons": ["t;q;note", "0;1.5;a", "0.1;;b", "0.2;-2e-1;c"],
+    "decimal commas": ["t;q;note", "0;1,5;a", "0,1;;b", "0,2;-2e-1;c"],
+    "tabs": ["t\tq\tnote", "0\t1.5\ta", "0.1\t\tb", "0.2\t-2e-1\tc"],
+    "tabs, decimal commas": ["t\tq\tnote", "0\t1,5\ta", "0,1\tNaN\tb", "0,2\t-0,2\tc"],
+    "blanks": ["  t   q  note", "  0  1.5  a", "0.1  nan b", "0.2 -0.2 c"],
+    "comments": ["# logger 3.1, serial 7", "", "t,q,note", "# armed", "0,1.5,a", "0.1,null,b", "0.2,-0.2,c"],
+    "header in a comment": ["# logger 3.1", "# t q", "0 1.5", "0.1 nan", "0.2 -0.2"],
+    "separator behind the last": ["t;q;", "0;1.5;", "0.1;;", "0.2;-0.2;"],
+    "quotes": ['"t","q","note, by hand"', '0,1.5,"a, b"', "0.1,,b", "0.2,-2e-1,c"],
+    "cut last row": ["t,q,note", "0,1.5,a", "0.1,,b", "0.2,-0.2"],
+}
+
+
+@pytest.mark.parametrize("kind", SAME)
+def test_a_table_is_read_however_it_is_written_and_without_pandas(tmp_path, monkeypatch, kind):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    path = write(tmp_path, *SAME[kind], name="log.csv")
+    for newline in ("\n", "\r\n"):
+        path.write_bytes(newline.join(SAME[kind]).encode("utf-8-sig"))
+        record = FlightRecord.from_csv(path, time="t", units={"q": "rad/s"})
+        np.testing.assert_array_equal(record.time, [0, 0.1, 0.2])
+        np.testing.assert_array_equal(record["q"], [1.5, np.nan, -0.2])
+
+
+@pytest.mark.parametrize("numbers", [[0.0, -1.5, 3e-12], [1e300, -2.5e-300, 123456.789]])
+@pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", ".")])
+def test_what_pandas_writes_is_read_to_the_last_bit(tmp_path, numbers, separator, decimal):
+    frame = pd.DataFrame({"t": [0.0, 0.1, 0.2], "q": numbers})
+    frame.to_csv(tmp_path / "log.csv", sep=separator, decimal=decimal, index=False)
+    np.testing.assert_array_equal(FlightRecord.from_csv(tmp_path / "log.csv", "t", {"q": "1"})["q"], numbers)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["t,q", "0,02,1,5", "0,04,1,6"], "row 1 has 4 cells, the header 2 names .*a comma cannot be both separator and decimal sign"),
+        (["t;q", "0;1,5", "0.1;2"], "column 't', row 2: expected a number, got '0.1'; the decimal sign is a comma elsewhere"),
+        (["0.0,1", "0.1,2"], "the first line holds numbers"),
+        (["# only", "# words"], "nothing but comments"),
+        (["t,q", "0,1_000"], "got '1_000'"),
+    ],
+)
+def test_a_table_that_can_be_read_in_two_ways_is_not_guessed_at(tmp_path, lines, message):
+    with pytest.raises(InputError, match=message):
+        FlightRecord.from_csv(write(tmp_path, *lines, name="log.csv"), time="t", units={"q": "rad/s"})
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_a_clock_that_counts_in_another_unit_is_read_by_its_name_in_every_format(tmp_path, unit):
+    ticks = 20 * np.arange(5.0) / {"ms": 1, "us": 1e-3, "ns": 1e-6}[unit]
+    write(tmp_path, "t,q", *(f"{t:.0f},1" for t in ticks), name="log.csv")
+    savemat(tmp_path / "log.mat", {"t": ticks, "q": np.ones(5)})
+    for record in (
+        FlightRecord.from_csv(tmp_path / "log.csv", "t", {"q": "1"}, time_unit=unit),
+        FlightRecord.from_mat(tmp_path / "log.mat", "t", {"q": "1"}, time_unit=unit),
+        FlightRecord.from_frame(pd.DataFrame({"t": ticks, "q": 1.0}), "t", {"q": "1"}, time_unit=unit),
+    ):
+        assert record.dt == 0.02
+    with pytest.warns(DataWarning, match="s apart; if the time is in"):
+        FlightRecord.from_csv(tmp_path / "log.csv", "t", {"q": "1"})
+
+
 @pytest.mark.parametrize(
     ("lines", "options", "message"),
     [
@@ -216,6 +281,7 @@ def test_ulog_topics_of_different_rates_meet_on_one_grid(tmp_path, monkeypatch):
     silent = (instants > 1.141) & (instants < 2.039)
     np.testing.assert_allclose(record["airspeed"][~silent], 2 * instants[~silent], atol=1e-9)
     assert np.isnan(record["airspeed"][silent]).all()
+    assert record.resampled == "topics interpolated to 0.02 s"
     with pytest.raises(UnknownNameError, match="unknown topic 'rate'"):
         FlightRecord.from_ulog(path, {"q": ("rate", "xyz[1]", "deg/s")}, dt=0.02)
 

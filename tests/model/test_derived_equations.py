@@ -111,10 +111,11 @@ def test_ideal_governor_is_the_derived_system_whose_engine_holds_the_speed(ideal
         u = rng.uniform(-0.1, 0.15, 4)
         d = dict(zip(ideal.diagnostics.name_out(), (float(v) for v in ideal.diagnostics(x, u, 0)), strict=True))
         yaw = float(ideal.rhs(x, u, 0)[5])
-        engine = d["Q_e"] + drive["inertia"] * yaw
-        given = [*(d[n] for n in "XYZLM"), d["N"] + d["Q_e"], engine, d["Q_e"], GRAVITY, *body.values(), drive["inertia"]]
+        air = d["Q_mr"] + ideal.vehicle.values("tail_rotor")["gear_ratio"] * d["Q_tr"]
+        given = [*(d[n] for n in "XYZLM"), d["N"] + d["Q_e"], d["Q_e"], air, GRAVITY, *body.values(), drive["inertia"]]
         got = accelerations([0.0, 0.0, 0.0, *angles, 0.0], speeds, given)
         close(got[5], yaw, np.abs(got).max())
+        assert d["N"] == pytest.approx(body["Izz"] * yaw - (body["Ixx"] - body["Iyy"]) * speeds[3] * speeds[4], rel=1e-10, abs=1e-9)
         assert abs(got[6]) < 1e-12 * np.abs(got).max() * body["Izz"] / drive["inertia"] * 10  # held
 
 

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -219,6 +220,25 @@ def test_a_step_beside_a_time_column_resamples_by_that_column(answer, run, tmp_p
     status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--delay", 5000)
     assert status == 1
     assert "0 usable samples" in error
+
+
+def test_identify_reads_a_clock_in_milliseconds_and_decimal_commas_and_asks_where_the_unit_is_not_said(answer, run, tmp_path):
+    log, other = scheduled_csv(tmp_path / "log.csv"), tmp_path / "semicolons.csv"
+    rows = [line.split(",") for line in log.read_text().splitlines()]
+    ticks = [["t"], *([str(50 * k)] for k in range(len(rows) - 1))]
+    other.write_text("# logger\n" + "\n".join(" ;".join([t, *row[1:]]).replace(".", ",") for (t,), row in zip(ticks, rows, strict=True)))
+    expected, got = answer("identify", log, *STRUCTURE, *UNITS), answer("identify", other, *STRUCTURE, *UNITS, "--time-unit", "ms")
+    assert got["models"] == expected["models"]
+    assert got["read"]["dt"] == 0.05
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")  # as at a prompt, where a note is printed
+        status, _, error = run("identify", other, *STRUCTURE, *UNITS)
+    assert status == 0
+    assert "the samples are 50 s apart; if the time is in ms, say so" in error
+    other.write_text(other.read_text().replace("t ;", "clock ;", 1))
+    status, _, error = run("identify", other, *STRUCTURE, *UNITS)
+    assert status == 1
+    assert "no column is called t or time; name it with --time, or give the sample period with --dt; found 'clock', 'y', 'u', 'p'" in error
 
 
 def test_identify_cuts_decimates_smooths_and_fits_lti_models(answer, tmp_path):

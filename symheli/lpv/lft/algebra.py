@@ -12,6 +12,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.arrays import Array
 from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.sample_period import same_period
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import Signal
 
@@ -24,7 +25,7 @@ def append(*systems: LFT | LinearModel) -> LFT:
     lfts = [LFT.constant(s) if isinstance(s, LinearModel) else s for s in systems]
     if not lfts:
         raise InputError("append needs at least one system")
-    if len({lft.dt for lft in lfts}) > 1:
+    if not all(same_period(lft.dt, lfts[0].dt) for lft in lfts):
         raise InputError(f"systems must share one sample period, got {', '.join(str(lft.dt) for lft in lfts)}; discretize first")
     parameters = _parameters(lfts)
     rows: list[list[tuple[int, int]]] = [[], [], []]  # (system, row) of the parameter loop, the states, the outputs
