@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symheli.errors import SymheliError
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -118,11 +116,9 @@ def draw(curve: GainCurve, ax: Axes, *, legend: Literal["upper left", "upper rig
 
 
 def save(curves: Sequence[GainCurve], path: Path) -> None:
-    """One panel a curve, to `path`; its ending says the format. Raises `SymheliError` without matplotlib."""
-    try:
-        import matplotlib
-    except ImportError as error:
-        raise SymheliError("a figure needs matplotlib: pip install 'symheli[study]'") from error
+    """One panel a curve, to `path`; its ending says the format. """
+    import matplotlib
+
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 

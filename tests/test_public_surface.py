@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("symheli", "identification", "synthesis", "studies")
 PACKAGES = ("symheli", "symheli.equations", "symheli.lpv", "symheli.environment", "symheli.flight", "identification", "synthesis")
-SHARED = ("symheli.lpv", "symheli.errors")
+SHARED = ("symheli.lpv", "symheli.errors", "symheli.extras")
 """What identification and synthesis may see of the model's room."""
 
 

@@ -12,15 +12,12 @@ from studies.output import Output, columns
 
 HELP = "versions, C compiler, solvers, cache: what works on this computer"
 
-REQUIRED = ("casadi", "sympy", "numpy", "scipy", "control", "cvxpy", "clarabel")
+REQUIRED = ("casadi", "sympy", "mpmath", "numpy", "scipy", "control", "cvxpy", "clarabel", "matplotlib", "jinja2")
 OPTIONAL = {
-    "matplotlib": "figures of the study",
-    "jinja2": "report of the study",
     "pandas": "reading CSV logs, data frames",
     "pyulog": "reading PX4 logs",
     "python-flint": "fast exact verification of certificates",
     "scs": "a second solver to cross-check",
-    "slycot": "more of python-control",
 }
 
 

@@ -6,10 +6,12 @@ import csv
 import io
 import os
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.extras import extra
 from symheli.logs.files import Table, positive, text
 from symheli.lpv.units import to_si
 
@@ -20,10 +22,10 @@ def read_csv(
     """The columns named in `units`, as they stand, and the time in s.
 
     `time` names the time column (in `time_unit`); None where the file has none: its rows are then `dt` (s) apart. Empty
-    cells are missing samples (NaN). Raises `InputError` for a file that is no table, a cell that is no number, or a time missing.
+    cells are missing samples (NaN). Raises `InputError` for a file that is no table, a cell that is no number, or a time missing,
+    and without pandas.
     """
-    import pandas as pd
-
+    pd = _pandas()
     if (time is None) == (dt is None):
         raise InputError("give the name of the time column, or time=None and the sample period dt in s: one of the two")
     content = text(path)
@@ -51,9 +53,14 @@ def read_csv(
     return seconds, columns, dict(units)
 
 
-def _numbers(series: object, name: str, path: object) -> np.ndarray:
-    import pandas as pd
+def _pandas() -> Any:
+    with extra("logs", "reading a CSV log"):
+        import pandas
+    return pandas
 
+
+def _numbers(series: object, name: str, path: object) -> np.ndarray:
+    pd = _pandas()
     values = np.asarray(pd.to_numeric(series, errors="coerce"), dtype=float)  # type: ignore[call-overload]
     wrong = np.isnan(values) & ~pd.isna(series)  # type: ignore[call-overload]
     if np.any(wrong):
