@@ -61,7 +61,7 @@ def _headline(study: Outcome) -> dict[str, object]:
         "curves": curves(study.bounds),
         "gain_tables": gain_tables.every(study.bounds),
         "not_about_the_helicopter": gain_tables.not_about_the_helicopter(study.bounds),
-        "frozen_gain": next((b.certificate.frozen for b in gust), float("nan")),
+        "frozen_gain": next((b.certificate.frozen for b in gust), None),
         "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),
         "jump": min((b for b in gust if math.isinf(b.rate)), key=lambda b: (b.certificate.gamma, -b.certificate.lower), default=None),
         "inf": math.inf,
