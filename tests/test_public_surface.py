@@ -56,6 +56,15 @@ def test_importing_the_packages_loads_no_heavy_library():
     assert loaded == "[]"
 
 
+def test_a_script_beside_a_folder_called_symheli_imports_the_package(tmp_path):
+    """As a script beside the clone does: a folder without __init__.py must not pass for the package."""
+    for room in ROOMS:
+        (tmp_path / room).mkdir()
+    script = tmp_path / "script.py"
+    script.write_text("import identification, studies, symheli, synthesis\nprint(symheli.Helicopter, synthesis.l2_gain, identification.fit)")
+    subprocess.run([sys.executable, str(script)], check=True, capture_output=True, cwd=tmp_path)
+
+
 @pytest.mark.parametrize("room", ROOMS)
 def test_the_rooms_import_one_way(room):
     allowed = {
