@@ -11,7 +11,6 @@ from symheli.codegen import Layout, as_casadi, c_function, evaluate, program
 from symheli.codegen.branches import branches
 from symheli.compile import compiler, library
 
-
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 
