@@ -46,7 +46,9 @@ def test_the_blocks_of_a_page_run_and_print_what_it_says(page, tmp_path, monkeyp
 COMMAND = re.compile(r"^    (symheli identify tests/data(?:.*\\\n)*.*)\n\n((?:\|.*\n)+)", re.MULTILINE)
 
 
-@pytest.mark.parametrize("command, table", COMMAND.findall((DOCS / "identify.md").read_text(encoding="utf-8")), ids=["xplane", "trex550"])
+@pytest.mark.parametrize(
+    ("command", "table"), COMMAND.findall((DOCS / "identify.md").read_text(encoding="utf-8")), ids=["xplane", "trex550"]
+)
 def test_the_logs_beside_the_tests_give_the_tables_of_the_page(command, table, monkeypatch, capsys):
     """Fits held out, percent: q and theta, LPV and LTI."""
     monkeypatch.chdir(DOCS.parent)
