@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
+import subprocess
 from dataclasses import fields, replace
 
 import pytest
@@ -89,3 +91,15 @@ def test_numbers_are_on_the_disk_before_a_picture_fails(full, tmp_path, monkeypa
     with pytest.raises(RuntimeError, match="a picture failed"):
         report.write_report(full, tmp_path)
     assert json.loads((tmp_path / "results.json").read_text())["complete"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (shutil.which("chromium") and shutil.which("pdftotext")), reason="wants chromium and pdftotext")
+def test_on_paper_no_column_is_lost(full, tmp_path, unpainted):
+    """A4, as a browser prints it: every column of the widest table."""
+    page(full, tmp_path)
+    sheet = tmp_path / "report.pdf"
+    options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'browser'}", f"--print-to-pdf={sheet}"]
+    subprocess.run(["chromium", *options, str(tmp_path / "report.html")], check=True, capture_output=True, timeout=60)
+    text = subprocess.run(["pdftotext", "-layout", str(sheet), "-"], check=True, capture_output=True, text=True).stdout
+    assert text.count("small") >= len({b.channel for b in full.bounds if b.form == "LFT small gain"}) > 0
