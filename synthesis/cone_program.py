@@ -116,13 +116,13 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
 
 
 SHORT = 3e8
-"""Operations of an iteration that takes some tenths of a second: Clarabel can be interrupted between two."""
+"""Operations of an iteration that takes some tenths of a second: Clarabel and SCS can be interrupted between two."""
 
 
 def _interruptible(method: Callable[[ConeProgram, Solver], Any], program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     """Here where the solver looks up often enough, else in a process that an interrupt can end: starting it takes half a second."""
     operations = (sum(length(n) ** 3 for n in program.sizes) + len(program.c) ** 3) / 3
-    if method is _clarabel and operations < SHORT:
+    if method is not _cvxpy and operations < SHORT:
         return method(program, solver)
     try:
         return in_process(method, program, solver)
@@ -182,6 +182,8 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     )  # fmt: skip
     solution = engine.solve()
     word = str(solution["info"]["status"])
+    if word == "interrupted":  # SCS hears the keyboard itself
+        raise KeyboardInterrupt
     if word.startswith("infeasible"):
         return Answer.INFEASIBLE, None, word
     return (Answer.SOLVED if word.startswith("solved") else Answer.FAILED), solution["x"], word

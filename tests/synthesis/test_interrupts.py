@@ -6,9 +6,12 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
+from scipy import sparse
 
 from symheli.errors import InputError, SolverError
+from synthesis import cone_program
 from synthesis.interruptible import in_process, in_thread
 
 SOLVE = """
@@ -83,12 +86,23 @@ def test_another_process_answers_fails_or_ends_and_says_which(capfd):
         in_process(vanish, 7)
 
 
+def test_what_scs_has_heard_from_the_keyboard_is_passed_on(monkeypatch):
+    scs = pytest.importorskip("scs")
+
+    class Interrupted:
+        def __init__(self, *_, **__):
+            pass
+
+        def solve(self):
+            return {"info": {"status": "interrupted"}, "x": None}
+
+    monkeypatch.setattr(scs, "SCS", Interrupted)
+    program = cone_program.ConeProgram(np.ones(1), sparse.csc_matrix([[-1.0]]), np.ones(1), (1,))
+    with pytest.raises(KeyboardInterrupt):
+        cone_program.solve(program, cone_program.Solver("SCS"))
+
+
 def test_both_ways_of_solving_give_the_same_point(monkeypatch):
-    import numpy as np
-    from scipy import sparse
-
-    from synthesis import cone_program
-
     # the largest eigenvalue of a 2 x 2 matrix: x I - M >= 0
     M = np.array([2.0, 1.0 * np.sqrt(2), 3.0])
     program = cone_program.ConeProgram(np.ones(1), sparse.csc_matrix([[-1.0], [0.0], [-1.0]]), -M, (2,))
