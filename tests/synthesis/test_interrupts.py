@@ -36,7 +36,7 @@ print("ended by itself")
 @pytest.mark.parametrize(
     ("name", "n", "m", "after"),
     [
-        ("CLARABEL", 60, 600, 3.0),  # an iteration takes seconds: in a process of its own
+        ("CLARABEL", 60, 600, 2.0),  # an iteration takes seconds: in a process of its own
         pytest.param("CLARABEL", 25, 550, 0.3, marks=pytest.mark.slow),  # between two iterations
         pytest.param("SCS", 60, 600, 1.0, marks=pytest.mark.slow),
     ],
