@@ -1,6 +1,7 @@
 """The compiled estimator, optional: where it cannot be built, NumPy computes the same numbers. Everything else is in pyproject.toml.
 
-SYMHELI_NATIVE=0 builds for every processor of this kind instead of this one; SYMHELI_COMPILE=0 does not build.
+Each precision is built once for every processor of this kind and once more for each level of vector instructions the compiler knows:
+the fastest that the processor can run is taken when the kernel is first used. SYMHELI_COMPILE=0 does not build.
 """
 
 import hashlib
@@ -16,43 +17,62 @@ from setuptools.command.build_ext import build_ext
 FOLDER = "identification/kernel"
 SOURCES = [f"{FOLDER}/{name}" for name in ("rls.h", "rls.c", "python.c")]
 DIGEST = hashlib.sha256(b"".join((Path(__file__).parent / source).read_bytes() for source in SOURCES))
-KERNELS = [
-    Extension(
-        f"identification.kernel._{precision}",
+LEVELS = {
+    "": [],
+    "_avx2": ["-mavx2"],
+    "_avx512": ["-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl"],
+}
+"""Compiler flags by ending of the module's name; processor.c says which a processor can run."""
+
+
+def kernel(precision, level):
+    """One precision (double, single) for one of `LEVELS`."""
+    module = f"_{precision}{level}"
+    return Extension(
+        f"identification.kernel.{module}",
         [f"{FOLDER}/{precision}_precision.c"],
         depends=SOURCES,
-        define_macros=[("RLS_SOURCE", f'"{DIGEST.hexdigest()}"')],
+        define_macros=[("RLS_MODULE", module), ("RLS_SOURCE", f'"{DIGEST.hexdigest()}"')],
+        extra_compile_args=LEVELS[level],
         py_limited_api=True,
         optional=True,
     )
-    for precision in ("double", "single")
-]
+
+
+PROCESSOR = Extension("identification.kernel._processor", [f"{FOLDER}/processor.c"], py_limited_api=True, optional=True)
+KERNELS = [kernel(precision, level) for precision in ("double", "single") for level in LEVELS]
 
 
 class BuildKernel(build_ext):
-    """Optimised, in IEEE arithmetic without contraction, for this processor where the compiler knows it.
+    """Optimised, in IEEE arithmetic without contraction, for the levels the compiler knows.
 
     Python's own -fwrapv keeps a compiler from seeing how far a loop runs: without it an update takes a quarter to a third less.
     """
 
     def build_extensions(self):
-        """Add the flags this compiler takes, then build."""
-        if self.compiler.compiler_type != "msvc":
-            native = ["-march=native"] if os.environ.get("SYMHELI_NATIVE", "1") != "0" and self._accepts("-march=native") else []
+        """Leave out the levels this compiler does not know, add the flags it takes, then build."""
+        if self.compiler.compiler_type == "msvc":
+            self.extensions = [extension for extension in self.extensions if not extension.extra_compile_args]
+        else:
+            self.extensions = [extension for extension in self.extensions if self._accepts(extension.extra_compile_args)]
             for extension in self.extensions:
-                extension.extra_compile_args = [
-                    "-O3",
-                    "-ffp-contract=off",
-                    *native,
-                    *(["-fno-wrapv"] if self._accepts("-fno-wrapv") else []),
-                ]
+                extension.extra_compile_args += ["-O3", "-g0", "-ffp-contract=off"]
+                extension.extra_compile_args += ["-fno-wrapv"] if self._accepts(["-fno-wrapv"]) else []
         super().build_extensions()
 
-    def _accepts(self, flag):
+    def build_extension(self, extension):
+        """Each in a folder of its own: all levels come from one source."""
+        folder, self.build_temp = self.build_temp, os.path.join(self.build_temp, extension.name)
+        try:
+            super().build_extension(extension)
+        finally:
+            self.build_temp = folder
+
+    def _accepts(self, flags):
         with tempfile.TemporaryDirectory() as folder:
             source = Path(folder) / "empty.c"
             source.write_text("int nothing;\n")
-            command = [*self.compiler.compiler, flag, "-c", str(source), "-o", str(source.with_suffix(".o"))]
+            command = [*self.compiler.compiler, *flags, "-c", str(source), "-o", str(source.with_suffix(".o"))]
             try:
                 return subprocess.run(command, capture_output=True, timeout=60).returncode == 0
             except (OSError, subprocess.SubprocessError):
@@ -60,7 +80,7 @@ class BuildKernel(build_ext):
 
 
 setup(
-    ext_modules=[] if os.environ.get("SYMHELI_COMPILE") == "0" or sys.implementation.name != "cpython" else KERNELS,
+    ext_modules=[] if os.environ.get("SYMHELI_COMPILE") == "0" or sys.implementation.name != "cpython" else [PROCESSOR, *KERNELS],
     cmdclass={"build_ext": BuildKernel},
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
 )

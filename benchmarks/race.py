@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import platform
-import re
 import subprocess
-import sys
 from dataclasses import dataclass
-from datetime import date
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "benchmarks.md"
+from studies import stamped_tables
+
+DOCUMENT = stamped_tables.DOCS / "benchmarks.md"
 
 
 @dataclass(frozen=True)
@@ -68,11 +65,7 @@ def table(title: str, rows: list[tuple[str, ...]], head: tuple[str, ...]) -> str
 
 
 def machine() -> str:
-    """Processor, load, system, compiler and library versions of this run."""
-    try:
-        cpu = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text(encoding="utf-8")).group(1)  # type: ignore[union-attr]
-    except (OSError, AttributeError):
-        cpu = platform.processor() or platform.machine()
+    """Processor, system, compiler and library versions of this run."""
     try:
         compiler = subprocess.run(["cc", "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
     except (OSError, subprocess.CalledProcessError):
@@ -83,19 +76,9 @@ def machine() -> str:
             libraries.append(f"{name} {version(name)}")
         except PackageNotFoundError:
             libraries.append(f"no {name}")
-    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    return (
-        f"{cpu}, {os.cpu_count()} cores{load}, {platform.system()}; {compiler}; Python {platform.python_version()}, {', '.join(libraries)}"
-    )
+    return f"{stamped_tables.processor()}, {platform.system()}; {compiler}; Python {platform.python_version()}, {', '.join(libraries)}"
 
 
-def keep(section: str, text: str) -> Path:
-    """Replace what docs/benchmarks.md has between the marks of `section`; returns its path."""
-    begin, end = f"<!-- {section}: written by its script -->", f"<!-- {section}: end -->"
-    document = DOCUMENT.read_text(encoding="utf-8")
-    if begin not in document or end not in document:
-        raise SystemExit(f"{DOCUMENT} lacks the marks of {section!r}: {begin} ... {end}")
-    before, rest = document.split(begin, 1)
-    command = f"`python {Path(sys.argv[0]).parent.name}/{Path(sys.argv[0]).name} {' '.join(sys.argv[1:])}`, {date.today():%d %B %Y}"
-    DOCUMENT.write_text(f"{before}{begin}\n\n{command}: {machine()}.\n\n{text}\n\n{end}{rest.split(end, 1)[1]}", encoding="utf-8")
-    return DOCUMENT
+def keep(section: str, text: str) -> None:
+    """Put `text` between the marks of `section` in docs/benchmarks.md, stamped."""
+    stamped_tables.keep(DOCUMENT, section, text, machine())

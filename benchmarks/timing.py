@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from studies.stamped_tables import parsed
+
 
 def medians(
     candidates: dict[str, Callable[[], object]],
@@ -44,9 +46,7 @@ def arguments(description: str | None, plot: bool = False, write: bool = False) 
     parser.add_argument("--json", action="store_true", help="print each ratio by name")
     if plot:
         parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the result (needs matplotlib)")
-    if write:
-        parser.add_argument("--write", action="store_true", help="keep the tables in docs/benchmarks.md")
-    return parser.parse_args()
+    return parsed(parser, "benchmarks.md") if write else parser.parse_args()
 
 
 def lines(times: dict[str, float], ratios: dict[str, float]) -> list[str]:

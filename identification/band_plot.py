@@ -20,7 +20,7 @@ COLUMNS = 4
 def plot_bands(known: Uncertainty, level: float = 0.95) -> Figure:
     """A matplotlib figure with one panel a coefficient function: its value over p and the normal confidence interval at each p.
 
-    Raises `InputError` for several scheduling parameters, a level outside (0, 1) and without matplotlib.
+    Raises `InputError` for several scheduling parameters and a level outside (0, 1).
     """
     model = known.model
     if len(model.parameters) != 1:

@@ -13,12 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import synthesis
+from studies.bracket_table import bracket_table
 from studies.cover import Remainder, covered_gain
 from studies.exact_loop import ExactLateral
 from studies.gain_curve import GainCurve, save
 from studies.lateral_loop import lateral_loop
 from studies.output import as_json, columns, progress
 from studies.servo_bracket import curves_of, found_of, measure_servo, text_of
+from studies.stamped_tables import DOCS, keep, parsed, processor
 from symheli import Helicopter, LPVStateSpace
 from symheli.lpv.bases import Polynomial
 from synthesis import Relaxation, Search, Solver
@@ -134,16 +136,20 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="growth, the gain at 3 m/s^2 and P(p) only; identified: fewer accelerations")
     parser.add_argument("--json", action="store_true", help="print what a program would read")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw gain against acceleration")
-    options = parser.parse_args()
+    options = parsed(parser, "bracket.md")
     heli = Helicopter.load("xcell60", governor="ideal")
     if options.model == "identified":
         bounds = measure_servo(heli, options.quick)
         found, text, curves = found_of(bounds), text_of(bounds), curves_of(bounds)
+        table = f"```text\n{text}\n```"
     else:
         found = _measured(heli, exact=options.model == "exact", quick=options.quick)
         text = columns([[what, _words(result)] for what, result in found.items()], left=2)
+        table = bracket_table(found)
         curves = [curve(found, f"Lateral: gust to yaw rate and roll, {options.model} model")]
     print(as_json(found) if options.json else text)
+    if options.write:
+        keep(DOCS / "bracket.md", options.model, table, processor())
     if options.figure:
         save(curves, options.figure)
 

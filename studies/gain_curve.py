@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symheli.errors import SymheliError
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -53,6 +51,8 @@ class GainCurve:
 
     def verdict(self) -> str:
         """What the curve says, in one or two sentences."""
+        if math.isinf(self.frozen):
+            return "the loop is unstable at an airspeed held, so no gain can be proven."
         proven = {test: gain for test, gain in self.jumping.items() if math.isfinite(gain)}
         if not proven:
             words = "No test that lets the airspeed jump proves anything"
@@ -76,10 +76,10 @@ def draw(curve: GainCurve, ax: Axes, *, legend: Literal["upper left", "upper rig
     Shaded: grey where neither a proof nor growth is known, red where the state grows along a flown airspeed.
     """
     rates = sorted({r for gains in (curve.flown, *curve.proven.values()) for r in gains if 0 < r < math.inf})
-    slow, fast = 0.4 * min(0.1, *rates), 2.0 * max(6.0, *rates)
+    slow, fast = 0.4 * min([0.1, *rates]), 2.0 * max([6.0, *rates])
     place = {0.0: slow, math.inf: fast, **{r: r for r in rates}}
-    top = max(_finite(curve.jumping, *curve.proven.values(), curve.flown), default=curve.frozen)
-    low, high = 0.6 * curve.frozen, 2.5 * top
+    shown = [g for g in (curve.frozen, *_finite(curve.jumping, *curve.proven.values(), curve.flown)) if 0 < g < math.inf]
+    low, high = 0.6 * min(shown, default=1.0), 2.5 * max(shown, default=1.0)
     last = max(curve.best, default=0.0)
     edge = 1.12 * fast
     if not _finite(curve.jumping) and place[last] < min(curve.growing, fast):
@@ -99,8 +99,12 @@ def draw(curve: GainCurve, ax: Axes, *, legend: Literal["upper left", "upper rig
         points = sorted((place[r], g) for r, g in gains.items() if math.isfinite(g))
         if points:
             ax.plot(*zip(*points, strict=True), "o-", color=COLOURS.get(form, INK), markersize=4, label=f"proven, {form}")
-    ax.plot(*zip(*flown, strict=True), "^--", color=ORANGE, markersize=4, label="flown: no bound can be smaller")
-    ax.axhline(curve.frozen, color=GREY, linestyle=":", label=f"frozen, {curve.frozen:.3g}")
+    if flown:
+        ax.plot(*zip(*flown, strict=True), "^--", color=ORANGE, markersize=4, label="flown: no bound can be smaller")
+    if math.isfinite(curve.frozen):
+        ax.axhline(curve.frozen, color=GREY, linestyle=":", label=f"frozen, {curve.frozen:.3g}")
+    else:
+        ax.text(0.5, 0.5, "unstable at an airspeed held", transform=ax.transAxes, ha="center", color=RED)
     nothing = _jumping(curve, ax, slow)
     if nothing:
         words = f"airspeed may jump: nothing proven by\n{', '.join(nothing)}"
@@ -113,16 +117,15 @@ def draw(curve: GainCurve, ax: Axes, *, legend: Literal["upper left", "upper rig
     ax.minorticks_off()
     ax.set_xlabel("permitted |dV/dt| (m/s²)")
     ax.set_ylabel(f"L2 gain, {curve.unit}")
-    ax.legend(loc=legend, fontsize=8, frameon=False)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc=legend, fontsize=8, frameon=False)
     return ax
 
 
 def save(curves: Sequence[GainCurve], path: Path) -> None:
-    """One panel a curve, to `path`; its ending says the format. Raises `SymheliError` without matplotlib."""
-    try:
-        import matplotlib
-    except ImportError as error:
-        raise SymheliError("a figure needs matplotlib: pip install 'symheli[study]'") from error
+    """One panel a curve, to `path`; its ending says the format."""
+    import matplotlib
+
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 

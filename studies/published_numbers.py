@@ -57,7 +57,7 @@ def hover(heli: Helicopter) -> tuple[PublishedNumber, ...]:
     area = math.pi * rotor["radius"] ** 2
     ct = body["mass"] * GRAVITY / (heli.density * tip**2 * area)
     ideal, lossy = math.sqrt(ct / 2), math.sqrt(ct / (2 * rotor["inflow_efficiency"]))
-    solidity = 2 * rotor["chord"] / (math.pi * rotor["radius"])
+    solidity = rotor["blades"] * rotor["chord"] / (math.pi * rotor["radius"])
 
     def torque(lam: float) -> float:
         return (ct * lam + rotor["profile_drag"] * solidity / 8) * heli.density * tip**2 * area * rotor["radius"]

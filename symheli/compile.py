@@ -98,5 +98,7 @@ def _cpu() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
-        return platform.platform()
-    return "\n".join(sorted({line for line in lines if line.startswith(("model name", "flags", "Features"))}))
+        command = [compiler() or "", "-march=native", "-dM", "-E", "-x", "c", os.devnull]  # what native means here, as macros
+        return platform.platform() + subprocess.run(command, capture_output=True, text=True, timeout=60).stdout
+    telling = ("model name", "flags", "Features", "CPU implementer", "CPU part")
+    return "\n".join(sorted({line for line in lines if line.startswith(telling)}))

@@ -43,6 +43,11 @@ class Part:
         return self.component.positive
 
     @property
+    def counts(self) -> Mapping[str, int]:
+        """{entry: least} of those that must be whole numbers."""
+        return self.component.counts
+
+    @property
     def subscript(self) -> str:
         """What marks its forces in print."""
         return self.component.subscript + self.suffix

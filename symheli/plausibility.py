@@ -19,9 +19,12 @@ def impossibilities(sections: Mapping[str, Mapping[str, Quantity]], parts: Mappi
     """(section, entry, what is wrong) of every quantity that cannot be."""
     for section, entries in sections.items():
         positive = POSITIVE.get(section) or parts[section].positive
+        counts = parts[section].counts if section in parts else {}
         for entry, q in entries.items():
             if entry in positive and not q.value > 0:
                 yield section, entry, f"must be > 0 {q.unit}, got {q.value:g}"
+            elif entry in counts and not (q.value >= counts[entry] and q.value == int(q.value)):
+                yield section, entry, f"must be a whole number >= {counts[entry]}, got {q.value:g}"
             elif q.unit == "m^2" and q.value < 0:
                 yield section, entry, f"an area must be >= 0 m^2, got {q.value:g}"
     inertia = {axis: sections["body"][axis].value for axis in ("Ixx", "Iyy", "Izz")}

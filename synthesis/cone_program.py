@@ -17,12 +17,14 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 from itertools import groupby
+from threading import Event
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from symheli.errors import InputError, SolverError
+from synthesis.interruptible import in_process, in_thread
 from synthesis.symmetric import basis, length
 
 Array = np.ndarray
@@ -106,11 +108,26 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
     """The solver's candidate. Never raises for a failed solve: that is an answer."""
     method: Callable[[ConeProgram, Solver], tuple[Answer, Any, str]] = {"CLARABEL": _clarabel, "SCS": _scs}.get(solver.name, _cvxpy)
     start = time.perf_counter()
-    answer, x, message = method(program, solver)
+    answer, x, message = _interruptible(method, program, solver)
     x = None if x is None else np.asarray(x, dtype=float)
     if x is not None and (x.size != len(program.c) or not np.all(np.isfinite(x))):
         x = None
     return Candidate(answer, x, time.perf_counter() - start, message)
+
+
+SHORT = 3e8
+"""Operations of an iteration that takes some tenths of a second: Clarabel and SCS can be interrupted between two."""
+
+
+def _interruptible(method: Callable[[ConeProgram, Solver], Any], program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
+    """Here where the solver looks up often enough, else in a process that an interrupt can end: starting it takes half a second."""
+    operations = (sum(length(n) ** 3 for n in program.sizes) + len(program.c) ** 3) / 3
+    if method is not _cvxpy and operations < SHORT:
+        return method(program, solver)
+    try:
+        return in_process(method, program, solver)
+    except SolverError as error:
+        return Answer.FAILED, None, str(error)
 
 
 MEMORY = 4e9
@@ -135,7 +152,13 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     cones = [clarabel.ZeroConeT(program.equalities)] * (program.equalities > 0)
     cones += [clarabel.PSDTriangleConeT(n) for n in program.sizes]
     n = len(program.c)
-    solution = clarabel.DefaultSolver(sparse.csc_matrix((n, n)), program.c, program.A, program.b, cones, settings).solve()
+
+    def work(stop: Event) -> Any:
+        engine = clarabel.DefaultSolver(sparse.csc_matrix((n, n)), program.c, program.A, program.b, cones, settings)
+        engine.set_termination_callback(lambda _: stop.is_set())
+        return engine.solve()
+
+    solution = in_thread(work)
     word = str(solution.status)
     if "PrimalInfeasible" in word:
         return Answer.INFEASIBLE, None, word
@@ -159,6 +182,8 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     )  # fmt: skip
     solution = engine.solve()
     word = str(solution["info"]["status"])
+    if word == "interrupted":  # SCS hears the keyboard itself
+        raise KeyboardInterrupt
     if word.startswith("infeasible"):
         return Answer.INFEASIBLE, None, word
     return (Answer.SOLVED if word.startswith("solved") else Answer.FAILED), solution["x"], word

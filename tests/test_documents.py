@@ -41,3 +41,20 @@ def test_the_blocks_of_a_page_run_and_print_what_it_says(page, tmp_path, monkeyp
         found, said = ([float(n) for n in NUMBER.findall(text)] for text in (printed, written))
         # numbers of a flight: other processors and libraries round otherwise, and a last digit is half a unit of what is printed
         np.testing.assert_allclose(found, said, rtol=0.02, atol=0.11, err_msg=code)
+
+
+COMMAND = re.compile(r"^    (symheli identify tests/data(?:.*\\\n)*.*)\n\n((?:\|.*\n)+)", re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("command", "table"), COMMAND.findall((DOCS / "identify.md").read_text(encoding="utf-8")), ids=["xplane", "trex550"]
+)
+def test_the_logs_beside_the_tests_give_the_tables_of_the_page(command, table, monkeypatch, capsys):
+    """Fits held out, percent: q and theta, LPV and LTI."""
+    monkeypatch.chdir(DOCS.parent)
+    assert cli.main(command.replace("\\\n", " ").split()[1:]) == 0
+    said = [[float(cell) for cell in row.split("|")[2:-1]] for row in table.splitlines()[2:]]
+    printed = [line for line in capsys.readouterr().out.splitlines() if re.search(r"  (LPV, degree \d|LTI) ", line)]
+    found = [[float(number) for number in line.split()[-3:]] for line in printed]
+    # a free run of hundreds of samples: other processors and libraries round otherwise
+    np.testing.assert_allclose(found, said, rtol=0.02, atol=0.11)

@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("symheli", "identification", "synthesis", "studies")
 PACKAGES = ("symheli", "symheli.equations", "symheli.lpv", "symheli.environment", "symheli.flight", "identification", "synthesis")
-SHARED = ("symheli.lpv", "symheli.errors")
+SHARED = ("symheli.lpv", "symheli.errors", "symheli.extras")
 """What identification and synthesis may see of the model's room."""
 
 
@@ -54,6 +54,15 @@ def test_importing_the_packages_loads_no_heavy_library():
     code = f"import sys, symheli, symheli.lpv, identification, synthesis; print([m for m in {heavy} if m in sys.modules])"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
     assert loaded == "[]"
+
+
+def test_a_script_beside_a_folder_called_symheli_imports_the_package(tmp_path):
+    """As a script beside the clone does: a folder without __init__.py must not pass for the package."""
+    for room in ROOMS:
+        (tmp_path / room).mkdir()
+    script = tmp_path / "script.py"
+    script.write_text("import identification, studies, symheli, synthesis\nsymheli.Helicopter, synthesis.l2_gain")
+    subprocess.run([sys.executable, str(script)], check=True, capture_output=True, cwd=tmp_path)
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import importlib
@@ -31,13 +32,31 @@ def compiled_kernel(precision: str) -> Any | None:
     """The class in the compiled module; None, with a warning that says why, where there is none to use."""
     if os.environ.get("SYMHELI_COMPILE") == "0":
         return _without("SYMHELI_COMPILE=0")
-    try:
-        module = importlib.import_module(f"identification.kernel._{precision}")
-    except ImportError as error:
-        return _without(f"the estimator is not compiled ({error}); with a C compiler there, install symheli again")
+    kernels = compiled_kernels(precision)
+    if not kernels:
+        return _without("the estimator is not compiled; with a C compiler there, install symheli again")
+    module = next(iter(kernels.values()))
     if module.SOURCE != source_digest():
         return _without("the compiled estimator is older than its source; install symheli again")
     return module.Kernel
+
+
+def compiled_kernels(precision: str) -> dict[str, Any]:
+    """{level: compiled module} of what is built here and runs on this processor, the fastest first; all give the same bits."""
+    kernels: dict[str, Any] = {}
+    for level in processor_levels():
+        ending = "" if level == "baseline" else f"_{level}"
+        with contextlib.suppress(ImportError):
+            kernels[level] = importlib.import_module(f"identification.kernel._{precision}{ending}")
+    return kernels
+
+
+def processor_levels() -> tuple[str, ...]:
+    """Levels of vector instructions that processor and operating system can run, the fastest first; "baseline" runs everywhere."""
+    try:
+        return importlib.import_module("identification.kernel._processor").levels()
+    except ImportError:
+        return ("baseline",)
 
 
 def source_digest() -> str:

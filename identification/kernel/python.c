@@ -1,9 +1,15 @@
-/* The kernel for Python: one type, whose methods work on the caller's arrays. Included after rls.c, with MODULE, INITIALISE and
-   RLS_SOURCE (what it was built from) defined. */
+/* The kernel for Python: one type, whose methods work on the caller's arrays. Included after rls.c, with RLS_MODULE (the module's name,
+   one for each precision and level of processor) and RLS_SOURCE (what it was built from) defined. */
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030b0000
 #include <Python.h>
 #include <string.h>
+
+#define QUOTED(name) #name
+#define TEXT(macro) QUOTED(macro)
+#define JOINED(a, b) a##b
+#define INITIALISE(module) JOINED(PyInit_, module)
+#define MODULE "identification.kernel." TEXT(RLS_MODULE)
 
 #ifdef RLS_SINGLE
 #define FORMAT "f"
@@ -351,34 +357,11 @@ static PyType_Slot slots[] = {
 
 static PyType_Spec specification = {MODULE ".Kernel", sizeof(Kernel), 0, Py_TPFLAGS_DEFAULT, slots};
 
-/* Code made for the processor it was built on must not run on a lesser one: say so instead of dying. */
-static int right_processor(void)
-{
-    int right = 1;
-#if defined(__GNUC__) && (defined(__x86_64__) || defined(__i386__))
-    __builtin_cpu_init();
-#ifdef __AVX512F__
-    right = right && __builtin_cpu_supports("avx512f");
-#endif
-#ifdef __AVX2__
-    right = right && __builtin_cpu_supports("avx2");
-#endif
-#ifdef __AVX__
-    right = right && __builtin_cpu_supports("avx");
-#endif
-#endif
-    return right;
-}
-
 static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, MODULE, "The compiled kernel.", -1, NULL, NULL, NULL, NULL, NULL};
 
-PyMODINIT_FUNC INITIALISE(void)
+PyMODINIT_FUNC INITIALISE(RLS_MODULE)(void)
 {
     PyObject *module, *type;
-    if (!right_processor()) {
-        PyErr_SetString(PyExc_ImportError, "it was built for another processor; install again, or set SYMHELI_NATIVE=0 when building");
-        return NULL;
-    }
     if (!dtype_name && !(dtype_name = PyUnicode_InternFromString("dtype"))) return NULL;
     if (!float64) {
         PyObject *numpy = PyImport_ImportModule("numpy");

@@ -12,15 +12,12 @@ from studies.output import Output, columns
 
 HELP = "versions, C compiler, solvers, cache: what works on this computer"
 
-REQUIRED = ("casadi", "sympy", "numpy", "scipy", "control", "cvxpy", "clarabel")
+REQUIRED = ("casadi", "sympy", "mpmath", "numpy", "scipy", "control", "cvxpy", "clarabel", "matplotlib", "jinja2")
 OPTIONAL = {
-    "matplotlib": "figures of the study",
-    "jinja2": "report of the study",
     "pandas": "records from and to data frames",
     "pyulog": "reading PX4 logs",
     "python-flint": "fast exact verification of certificates",
     "scs": "a second solver to cross-check",
-    "slycot": "more of python-control",
 }
 
 
@@ -30,7 +27,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Output:
     """Look, and exit with 1 where something required is missing."""
-    from identification.kernel import compiled_kernel
+    from identification.kernel import compiled_kernel, compiled_kernels
     from symheli.compile import cache_directory, compiler
     from synthesis import installed_solvers
 
@@ -49,8 +46,12 @@ def run(arguments: argparse.Namespace) -> Output:
         compiling = (
             "C compiler: none found; models run in the CasADi virtual machine, several times slower, same numbers (install gcc or set CC)"
         )
-    estimator = compiled_kernel("double") is not None
-    said = "machine code" if estimator else "NumPy, the same numbers, many times slower (reinstall with a C compiler: pip install -e .)"
+    level = next(iter(compiled_kernels("double"))) if compiled_kernel("double") else None
+    said = (
+        f"machine code, level {level}"
+        if level
+        else "NumPy, the same numbers, many times slower (reinstall with a C compiler: pip install -e .)"
+    )
     text = "\n".join(
         (
             columns(rows, left=3),
@@ -62,7 +63,9 @@ def run(arguments: argparse.Namespace) -> Output:
     )
     missing = [n for n, v in required.items() if v is None]
     data = {
-        "python": platform.python_version(), "required": required, "optional": optional, "compiler": cc, "compiled_estimator": estimator,
+        "python": platform.python_version(), "required": required, "optional": optional, "compiler": cc,
+        "compiled_estimator": level is not None,
+        "estimator_level": level,
         "solvers": solvers,
         "cache": str(cache), "cache_writable": not problem, "missing": missing,
     }  # fmt: skip

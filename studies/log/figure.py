@@ -26,7 +26,7 @@ def figure(result: Comparison) -> Figure:
 
     A dashed line marks where the held-out part begins; free runs start anew there and behind each gap. The titles give the fits of
     each model on the held-out part (on all where nothing is), one step, 1 s and free run, in percent. The axes hold what was measured: a
-    prediction may leave them. Raises `InputError` without matplotlib.
+    prediction may leave them.
     """
     model, parts = result.scheduled, [r for r in (result.training, result.test) if r is not None]
     heights = [1.9] * len(model.outputs) + [1.2]

@@ -17,6 +17,7 @@ from studies.transition.flights import TOP
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
 from symheli.lpv.bases import Polynomial
 from synthesis import Certificate, LFTCertificate, Relaxation, Search
+from synthesis.frozen import norm
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
 """A disturbance of this size (rad) and an output of this size (rad/s, rad) count as 1 on the servo channel; the gust channel is in SI."""
@@ -84,10 +85,9 @@ def sampled_baseline(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
 
 
 def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
-    """Largest H-infinity norm over the exact models of the family, by python-control: gust loop, or servo loop at 50 Hz."""
-    import control
+    """Largest H-infinity norm over the exact models of the family: gust loop, or servo loop at 50 Hz; inf where one is unstable."""
 
-    def norm(model: LinearModel) -> float:
+    def closed(model: LinearModel) -> LPVStateSpace:
         one = LPVStateSpace.polynomial(
             [model.A],
             [model.B],
@@ -99,10 +99,11 @@ def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
             model.inputs,
             model.outputs,
         )
-        return float(control.system_norm((servo_loop(one) if sampled else close(one, "gust")).at(0.0).to_control(), p="inf"))  # type: ignore[arg-type]
+        return servo_loop(one) if sampled else close(one, "gust")
 
     lateral = family.select(STATES, ["d_lat", "d_ped"] if sampled else ["d_lat", "v_w"])
-    return max(norm(lateral[k].discretize(PERIOD) if sampled else lateral[k]) for k in range(len(lateral)))
+    loops = [closed(lateral[k].discretize(PERIOD) if sampled else lateral[k]) for k in range(len(lateral))]
+    return max(norm(*loop.matrices(0.0), loop.dt)[0] for loop in loops)
 
 
 def bounds(

@@ -14,7 +14,6 @@ from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
-from symheli.errors import SymheliError
 
 if TYPE_CHECKING:
     from studies.transition.outcome import Outcome
@@ -28,16 +27,13 @@ def write_results(study: Outcome, out: Path) -> Path:
 
 
 def write_report(study: Outcome, out: Path) -> Path:
-    """figures/*.png, results.json and report.html (self-contained: figures inside). Raises `SymheliError` without the extra."""
-    try:
-        import jinja2
-        import matplotlib.pyplot as plt
-    except ImportError as error:
-        raise SymheliError(
-            f"the report needs {error.name}: pip install 'symheli[study]'; the numbers are in {out / 'results.json'}"
-        ) from error
+    """results.json, figures/*.png and report.html (self-contained: figures inside), in this order: no number waits for a picture."""
+    import jinja2
+    import matplotlib.pyplot as plt
+
     from studies.transition.figures import figures
 
+    write_results(study, out)
     pictures = {}
     for name, caption, figure in figures(study):
         stream = io.BytesIO()
@@ -45,7 +41,6 @@ def write_report(study: Outcome, out: Path) -> Path:
         plt.close(figure)
         write_bytes(out / "figures" / f"{name}.png", stream.getvalue())
         pictures[name] = {"caption": caption, "data": base64.b64encode(stream.getvalue()).decode("ascii")}
-    write_results(study, out)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -66,7 +61,7 @@ def _headline(study: Outcome) -> dict[str, object]:
         "curves": curves(study.bounds),
         "gain_tables": gain_tables.every(study.bounds),
         "not_about_the_helicopter": gain_tables.not_about_the_helicopter(study.bounds),
-        "frozen_gain": next((b.certificate.frozen for b in gust), float("nan")),
+        "frozen_gain": next((b.certificate.frozen for b in gust), None),
         "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),
         "jump": min((b for b in gust if math.isinf(b.rate)), key=lambda b: (b.certificate.gamma, -b.certificate.lower), default=None),
         "inf": math.inf,

@@ -58,11 +58,12 @@ def interpolation(study: Outcome) -> Table:
     kinks = sorted((speed, name) for name, speeds in study.baseline.between.kinks.items() for speed in speeds)
     fitted = len(study.baseline.entries) - len(table.rows)
     table.remarks.append(f"The other {fitted} varying entries are fitted within 10 % of their range by some degree up to 6.")
-    table.remarks.append(
-        "Corners of the model: "
-        + ", ".join(f"{speed:.2f} m/s ({name})" for speed, name in kinks)
-        + ". No smooth function follows a jump there."
-    )
+    if kinks:
+        table.remarks.append(
+            "Corners of the model: "
+            + ", ".join(f"{speed:.2f} m/s ({name})" for speed, name in kinks)
+            + ". No smooth function follows a jump there."
+        )
     return table
 
 
@@ -147,8 +148,9 @@ def comparison(study: Outcome, axis: Axis, noise: str) -> Table:
     for p in c.predictors:
         table.rows.append([p.name, *(" / ".join(percent(fit[y]) for fit in (p.one_step, p.one_second, p.free_run)) for y in axis.outputs)])
     for j, y in enumerate(axis.outputs):
-        best = int(np.nanargmax([p.one_second[y] for p in c.predictors]))
-        table.bold.add((best, j + 1))
+        ahead = [p.one_second[y] for p in c.predictors]
+        if not np.isnan(ahead).all():
+            table.bold.add((int(np.nanargmax(ahead)), j + 1))
     return table
 
 
@@ -179,7 +181,7 @@ def findings(study: Outcome) -> list[str]:
             + ", ".join(f"{d:+.0f} points for {y}" for y, d in change.items())
             + "."
         )
-    if study.update_times:
+    if study.update_times and study.flights:
         each = ", ".join(f"{1e6 * seconds:.2g} us ({name})" for name, seconds in study.update_times.items())
         regressors, period = ALL.structure().n_regressors, next(iter(study.flights.values())).dt
         share = 100 * study.update_times[ALL.name] / period

@@ -66,11 +66,11 @@ class Effect:
 class Component:
     """A part of the airframe: a pure function and what it must be given.
 
-    `parameters` {name: unit} come from the vehicle file, `optional` ones if they are there, those in `positive` must be > 0;
-    `states` are its own; it may use the flow in `needs` and makes the flow in `makes`. `evaluate(parameters, motion, controls,
-    own, flow)` returns an `Effect` under these names: where a vehicle has two of a kind or puts one off the c.g.,
-    `symheli.part.Part` translates. In print, `subscript` marks its forces and `symbols` {parameter: LaTeX} its parameters;
-    without, their names do.
+    `parameters` {name: unit} come from the vehicle file, `optional` ones if they are there, those in `positive` must be > 0,
+    those in `counts` {name: least} whole numbers; `states` are its own; it may use the flow in `needs` and makes the flow in
+    `makes`. `evaluate(parameters, motion, controls, own, flow)` returns an `Effect` under these names: where a vehicle has two of a
+    kind or puts one off the c.g., `symheli.part.Part` translates. In print, `subscript` marks its forces and `symbols`
+    {parameter: LaTeX} its parameters; without, their names do.
     """
 
     evaluate: Callable[[SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect]
@@ -79,6 +79,7 @@ class Component:
     needs: tuple[str, ...] = ()
     makes: tuple[str, ...] = ()
     positive: tuple[str, ...] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
     optional: Mapping[str, str] = field(default_factory=dict)
     subscript: str = ""
     symbols: Mapping[str, str] = field(default_factory=dict)

@@ -33,7 +33,7 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     rotor looks the same after a turn about its shaft); the printed - is the option "lateral_flapping". The options
     "flapping_sign" (mu^2 sign(mu) is mu^2) and "thrust_limit" (2.5 m g) are printed forms too.
     """
-    plane = disc(par.radius, par.chord, 2, motion.Om, motion.rho, flow)
+    plane = disc(par.radius, par.chord, par.blades, motion.Om, motion.rho, flow)
     mu_x = flow.name(r"\mu_x", motion.u_a / plane.tip_speed)
     mu_y = flow.name(r"\mu_y", motion.v_a / plane.tip_speed)
     mu_z = flow.name(r"\mu_z", motion.w_a / plane.tip_speed)
@@ -79,6 +79,7 @@ COMPONENT = Component(
     parameters={
         "radius": "m",
         "chord": "m",
+        "blades": "1",
         "lift_slope": "1/rad",
         "profile_drag": "1",
         "ct_max": "1",
@@ -94,10 +95,12 @@ COMPONENT = Component(
     states=(Signal("a1"), Signal("b1")),
     makes=("V_imr", "lam0", "C_T", "T_mr", "Q_mr"),
     positive=("radius", "chord", "lift_slope", "ct_max", "bar_lock_number", "nominal_speed", "inflow_efficiency"),
+    counts={"blades": 2},
     subscript="mr",
     symbols={
         "radius": "R_{mr}",
         "chord": "c_{mr}",
+        "blades": "b_{mr}",
         "lift_slope": "a_{mr}",
         "profile_drag": "C_{D0,mr}",
         "ct_max": "C_{T max,mr}",

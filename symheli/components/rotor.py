@@ -21,7 +21,7 @@ class Disc(NamedTuple):
     force_scale: Any
 
 
-def disc(radius: Any, chord: Any, blades: int, Om: Any, rho: Any, flow: Flow) -> Disc:
+def disc(radius: Any, chord: Any, blades: Any, Om: Any, rho: Any, flow: Flow) -> Disc:
     """From radius and chord (m), number of blades, and speed Om (rad/s) in air of density rho (kg/m^3)."""
     solidity = flow.name(r"\sigma", blades * chord / (pi * radius))
     tip_speed = flow.name("V_{tip}", Om * radius)

@@ -21,7 +21,7 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     pitch (option "tail_rotor_linear") and mu_tr = sqrt(u_a^2 + w_tr^2)/(Om_tr R_tr) (printed without the root: option
     "tail_advance_ratio"). `d_ped` is the total blade pitch (rad).
     """
-    plane = disc(par.radius, par.chord, 2, par.gear_ratio * motion.Om, motion.rho, flow)
+    plane = disc(par.radius, par.chord, par.blades, par.gear_ratio * motion.Om, motion.rho, flow)
     v_tr = flow.name("v_{tr}", motion.v_a - par.arm * motion.r + par.height * motion.p)
     w_tr = flow.name("w_{tr}", motion.w_a + par.arm * motion.q - flow["w_wake"])
     speed2 = motion.u_a**2 + w_tr**2
@@ -53,6 +53,7 @@ COMPONENT = Component(
     parameters={
         "radius": "m",
         "chord": "m",
+        "blades": "1",
         "lift_slope": "1/rad",
         "profile_drag": "1",
         "ct_max": "1",
@@ -66,10 +67,12 @@ COMPONENT = Component(
     needs=("w_wake",),
     makes=("V_itr", "Y_tr", "Q_tr"),
     positive=("radius", "chord", "lift_slope", "ct_max", "gear_ratio", "inflow_efficiency"),
+    counts={"blades": 2},
     subscript="tr",
     symbols={
         "radius": "R_{tr}",
         "chord": "c_{tr}",
+        "blades": "b_{tr}",
         "lift_slope": "a_{tr}",
         "profile_drag": "C_{D0,tr}",
         "ct_max": "C_{T max,tr}",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.extras import extra
 from symheli.logs.files import Table, existing, positive
 
 SILENCE = 5.0
@@ -34,10 +35,8 @@ def read_ulog(path: str | os.PathLike[str], topics: Mapping[str, tuple[str, str,
 
 
 def _series(path: str | os.PathLike[str], topics: Mapping[str, tuple[str, str, str]]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    try:
+    with extra("logs", "reading a ULog file"):
         from pyulog import ULog  # type: ignore[import-not-found]
-    except ImportError as error:
-        raise InputError('reading ULog files needs pyulog: pip install "symheli[logs]"') from error
     file = existing(path)
     try:
         log = ULog(str(file))

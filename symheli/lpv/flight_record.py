@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.extras import extra
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.sample_period import JITTER, period_of, warn_of_odd_steps
 from symheli.lpv.signal import Signal, indices, signals
@@ -264,9 +265,8 @@ class FlightRecord:
         return split(self, fraction)
 
     def to_frame(self) -> pandas.DataFrame:
-        """A pandas DataFrame with a "t" column (s) and one column a signal; raises `InputError` without pandas."""
-        try:
+        """A pandas DataFrame with a "t" column (s) and one column a signal. Raises `InputError` without pandas."""
+        with extra("logs", "a data frame"):
             import pandas as pd
-        except ImportError as error:
-            raise InputError('a DataFrame needs pandas: pip install "symheli[logs]"') from error
+
         return pd.DataFrame({"t": self.time, **{str(s): self.values[:, i] for i, s in enumerate(self.signals)}})

@@ -27,8 +27,8 @@ def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Fig
     """A matplotlib figure of the signals `names` (default: all) against time (s), with their units.
 
     Shaded: gaps, and where a sample of that signal is missing; no line crosses them. A sample between two missing ones is a dot. The
-    figure belongs to no window: `figure.savefig("record.png")`, or its display in a notebook. Raises `InputError` without matplotlib
-    and for no signals, `UnknownNameError` for those the record lacks.
+    figure belongs to no window: `figure.savefig("record.png")`, or its display in a notebook. Raises `InputError`
+    for no signals, `UnknownNameError` for those the record lacks.
     """
     shown = record.select(record.signals if names is None else [names] if isinstance(names, str) else list(names))
     if not shown.signals:
@@ -52,11 +52,9 @@ def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Fig
 
 
 def empty_figure(width: float, height: float) -> Figure:
-    """A figure of this size (inches) that belongs to no window. Raises `InputError` without matplotlib."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise InputError('a plot needs matplotlib: pip install "symheli[study]"') from error
+    """A figure of this size (inches) that belongs to no window."""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height), layout="constrained")
 
 

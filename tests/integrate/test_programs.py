@@ -6,10 +6,12 @@ import casadi
 import numpy as np
 import pytest
 
-from symheli import InputError
+from symheli import InputError, compile
 from symheli.codegen import Layout, as_casadi, c_function, evaluate, program
 from symheli.codegen.branches import branches
 from symheli.compile import compiler, library
+
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 
 def points(heli, count, seed=0):
@@ -39,7 +41,7 @@ def test_the_virtual_machine_gives_the_bits_of_numpy(heli):
     np.testing.assert_array_equal(np.array(as_casadi(made).map(500)(x, u, wind)), np.array(evaluate(made, x, u, wind)[0]))
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@needs_compiler
 @pytest.mark.parametrize("layout", [Layout(), Layout(8), Layout(8, 2)])
 def test_machine_code_gives_the_bits_of_numpy_in_every_layout(ideal, layout):
     made, lanes = program(ideal.flight_rhs), layout.lanes
@@ -115,3 +117,25 @@ def test_the_right_hand_side_stays_cheap(ideal):
     assert names.count("sqrt") <= 12
     assert names.count("div") <= 12
     assert len(names) < 720
+
+
+@needs_compiler
+def test_code_made_for_one_processor_is_not_taken_by_another(tmp_path, monkeypatch):
+    """A home directory may be shared by two machines."""
+    monkeypatch.setenv("SYMHELI_CACHE", str(tmp_path))
+    source = "double one(void) { return 1.0; }\n"
+    here = library(source, "one")
+    assert library(source, "one") == here
+    monkeypatch.setattr(compile, "_cpu", lambda: "another processor")
+    assert library(source, "one") != here
+
+
+@needs_compiler
+def test_a_processor_is_told_from_another_where_linux_does_not_say(monkeypatch):
+    """By the macros that -march=native defines."""
+
+    def absent(*_, **__):
+        raise FileNotFoundError
+
+    monkeypatch.setattr(compile.Path, "read_text", absent)
+    assert "#define" in compile._cpu.__wrapped__()

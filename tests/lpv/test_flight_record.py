@@ -134,10 +134,10 @@ def test_a_plot_of_many_signals_stands_in_two_columns_and_of_named_ones_shows_th
         many.plot(["q"])
 
 
-def test_without_matplotlib_a_plot_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    with pytest.raises(InputError, match=r'needs matplotlib: pip install "symheli\[study\]"'):
-        record().plot()
+def test_without_pandas_a_data_frame_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(InputError, match=r"a data frame needs pandas: pip install 'symheli\[logs\]'"):
+        record().to_frame()
 
 
 def test_no_method_changes_the_record_it_is_called_on():

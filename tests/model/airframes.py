@@ -31,6 +31,7 @@ controls = { d_col = { d_col = 1.0, d_lon = -0.5 } }
 x = { value = -0.4, unit = "m", source = "test" }
 radius = { ref = "main_rotor.radius" }
 chord = { ref = "main_rotor.chord" }
+blades = { ref = "main_rotor.blades" }
 lift_slope = { ref = "main_rotor.lift_slope" }
 profile_drag = { ref = "main_rotor.profile_drag" }
 ct_max = { ref = "main_rotor.ct_max" }

@@ -32,12 +32,21 @@ def test_kahn_hudson_values_are_the_source_values_converted():
             factor, _ = to_si(stated[2])
             assert quantity.value == pytest.approx(factor * float(stated[1]), rel=5e-6), name
             checked += 1
-    assert checked == 25
+    assert checked == 27
     assert set(vehicle.assumed) == {n for n, q in vehicle.quantities.items() if not q.source.startswith("KH")}
     blade, offset = 0.0847 * to_si("slug ft^2")[0], 0.0225 / 2.25  # I_b, e/R
-    stiffness = 0.75 * 2 * blade * vehicle.values("drivetrain")["nominal_speed"] ** 2 * offset
+    stiffness = 0.75 * vehicle.values("main_rotor")["blades"] * blade * vehicle.values("drivetrain")["nominal_speed"] ** 2 * offset
     assert vehicle.values("vertical_fin")["lift_slope"] == pytest.approx(1.4339 / 0.275, rel=1e-5)
     assert vehicle.values("main_rotor")["hub_stiffness"] == pytest.approx(stiffness, rel=1e-5)
+
+
+def test_more_blades_of_less_chord_are_the_same_rotor(ideal):
+    """Blades enter by the solidity b c/(pi R) alone; one blade more of the same chord is another rotor."""
+    chord = ideal.vehicle.values("main_rotor")["chord"]
+    for other, same in (({"blades": 4, "chord": chord / 2}, True), ({"blades": 3}, False)):
+        changed = ideal.with_parameters({f"main_rotor.{entry}": value for entry, value in other.items()})
+        one, two = (symheli.trim(heli, 8.0) for heli in (ideal, changed))
+        assert np.allclose(two.u.array, one.u.array, rtol=0, atol=1e-13) == same  # rounding of the solidity through Newton's method
 
 
 @pytest.mark.parametrize("factor", [0.3, 5.0])

@@ -124,7 +124,8 @@ def test_inflow_root_meets_the_momentum_balance_written_by_hand(ideal):
             lam = exact.inflow([mpmath.mpf(float(v)) for v in (*x, *u, 0, 0, 0)], inflow_start(ideal, x, u, np.zeros(3)))[0]
             tip = mpmath.mpf(ideal.nominal_speed) * mpmath.mpf(par["radius"])
             mu_x, mu_y, mu_z = (mpmath.mpf(float(v)) / tip for v in x[:3])
-            half = mpmath.mpf(par["lift_slope"]) * mpmath.mpf(par["chord"]) / (mpmath.pi * mpmath.mpf(par["radius"]))
+            solidity = mpmath.mpf(par["blades"]) * mpmath.mpf(par["chord"]) / (mpmath.pi * mpmath.mpf(par["radius"]))
+            half = mpmath.mpf(par["lift_slope"]) * solidity / 2
             pitch = mpmath.mpf(float(u[2]))
             thrust = half * (pitch * (mpmath.mpf(1) / 3 + (mu_x**2 + mu_y**2) / 2) + (mu_z - lam) / 2)
             carried = 2 * mpmath.mpf(par["inflow_efficiency"]) * lam * mpmath.sqrt(mu_x**2 + mu_y**2 + (lam - mu_z) ** 2)

@@ -14,6 +14,7 @@ from symheli.vehicle import load_vehicle
 
 MASS = 'mass = { value = 8.2, unit = "kg", source = "G15 Table 15.1" }'
 RADIUS = 'radius = { value = 0.775, unit = "m", source = "G15 Table 15.1" }'
+BLADES = 'blades = { value = 2, unit = "1", source = "G15 text, solidity 2 c/(pi R)" }'
 
 
 def line_of(entry):
@@ -38,6 +39,10 @@ def line_of(entry):
         (RADIUS, 'radius = { value = 0.775, unit = "rad", source = "x" }', "expected m (or cm, mm, km, ft, in), got 0.775 rad"),
         (RADIUS, 'radius = { ref = "body.radius" }', "must name an entry with a value"),
         (RADIUS, 'radius = { ref = "body.mass" }', "expected m (or cm, mm, km, ft, in), got 8.2 kg"),
+        *(
+            (BLADES, BLADES.replace("value = 2", f"value = {n}"), f"main_rotor.blades: must be a whole number >= 2, got {n}")
+            for n in (1, 0, -2, 2.5)
+        ),
         (
             'Izz = { value = 0.28, unit = "kg m^2", source = "G15 Table 15.1" }',
             'Izz = { value = 0.9, unit = "kg m^2", source = "x" }',

@@ -1,0 +1,111 @@
+"""The report is written whatever the study found, and no finished number waits for it."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shutil
+import subprocess
+from dataclasses import fields, replace
+
+import pytest
+from matplotlib.figure import Figure
+
+from studies.transition import figures, gain_tables, guarantees, report
+from studies.transition import study as stages
+from studies.transition.effort import Effort
+from studies.transition.outcome import Outcome
+from symheli import LPVStateSpace, Scheduling
+from synthesis import Search
+
+GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+COLLECTIONS = [f.name for f in fields(Outcome) if f.name not in ("vehicle", "quick", "seed", "heli", "baseline", "complete")]
+DRAWN = ("experiments", "flights", "comparisons", "frozen", "bounds")
+"""Those that a figure shows."""
+
+
+@pytest.fixture(scope="module")
+def full():
+    """Every stage, as short as it gets."""
+    study = stages.Study("xcell60", True, 0)
+    effort = Effort(6, 4, (0.0, math.inf), (2,), (0.0,), (0.0,), False, (0.0, math.inf), (2,), GLIMPSE)
+    for title, stage in stages._stages(study, effort):
+        with stages._shown(title, study.seconds):
+            stage()
+    return study
+
+
+@pytest.fixture
+def unpainted(monkeypatch):
+    """Figures are drawn but not turned into pixels, which takes most of the time."""
+    monkeypatch.setattr(Figure, "savefig", lambda figure, stream, **_: stream.write(b"picture"))
+
+
+def page(outcome, folder):
+    return report.write_report(outcome, folder).read_text()
+
+
+def test_a_full_outcome_fills_every_section(full, tmp_path, unpainted):
+    for name in COLLECTIONS:
+        assert getattr(full, name), f"{name} is empty: not a full outcome"
+    text = page(full, tmp_path)
+    assert "Not reached" not in text
+    assert text.count("data:image/png;base64,") == len(list((tmp_path / "figures").iterdir())) > 10
+
+
+def test_an_empty_outcome_says_what_was_not_reached(tmp_path, unpainted):
+    text = page(Outcome("xcell60", True, 0), tmp_path)
+    assert text.count("Not reached") == 6
+
+
+def test_any_collection_of_the_outcome_may_be_empty(full, tmp_path, unpainted, monkeypatch):
+    for name in COLLECTIONS:
+        outcome = replace(full, **{name: type(getattr(full, name))()})
+        with monkeypatch.context() as undrawn:
+            if name not in DRAWN:
+                undrawn.setattr(figures, "figures", lambda _: ())
+            assert "<h2>6" in page(outcome, tmp_path), name
+        assert outcome.summary(), name
+
+
+def test_a_vehicle_whose_entries_are_all_fitted_gets_its_report(full, tmp_path, unpainted):
+    baseline = full.baseline
+    smooth = replace(baseline, entries=tuple(e for e in baseline.entries if e not in baseline.unfit))
+    assert "is fitted by a polynomial" in page(replace(full, baseline=smooth), tmp_path)
+    assert "is fitted by a polynomial" in page(replace(full, baseline=replace(baseline, entries=())), tmp_path)
+    kinkless = replace(smooth, between=replace(baseline.between, kinks={}))
+    assert "Corners of the model" not in page(replace(full, baseline=kinkless), tmp_path)
+
+
+def test_a_loop_that_is_unstable_when_frozen_gets_its_report(full, tmp_path, unpainted):
+    growing = LPVStateSpace.polynomial([[[-1.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("airspeed", "m/s", 0.0, 2.0))
+    found = list(guarantees.bounds("baseline", "gust", growing, (0.0, math.inf), (2,), GLIMPSE))
+    outcome = replace(full, bounds=found, exact_frozen={"gust": math.inf})
+    assert "unstable" in page(outcome, tmp_path)
+    assert outcome.summary()
+
+
+def test_numbers_are_on_the_disk_before_a_picture_fails(full, tmp_path, monkeypatch):
+    def fail(_):
+        raise RuntimeError("a picture failed")
+
+    monkeypatch.setattr(figures, "trim", fail)
+    full.complete = True
+    with pytest.raises(RuntimeError, match="a picture failed"):
+        report.write_report(full, tmp_path)
+    assert json.loads((tmp_path / "results.json").read_text())["complete"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (shutil.which("chromium") and shutil.which("pdftotext")), reason="wants chromium and pdftotext")
+def test_on_paper_no_column_is_lost(full, tmp_path, unpainted):
+    """A4, as a browser prints it: every column of the widest table."""
+    page(full, tmp_path)
+    sheet = tmp_path / "report.pdf"
+    options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'browser'}", f"--print-to-pdf={sheet}"]
+    subprocess.run(["chromium", *options, str(tmp_path / "report.html")], check=True, capture_output=True, timeout=60)
+    text = subprocess.run(["pdftotext", "-layout", str(sheet), "-"], check=True, capture_output=True, text=True).stdout
+    (table,) = gain_tables.every([b for b in full.bounds if b.channel == "gust"])
+    frozen = next(line for line in text.splitlines() if re.match(r"\s*baseline\s+frozen\s", line))
+    assert frozen.split() == " ".join(table.rows[0]).split()
