@@ -21,7 +21,7 @@
 /* Samples with a regressor at its largest that are pretended, saying "coefficient 0": what the data leave open stays small, and rounding, which
    knows EPSILON^2, decides nothing. */
 #define PRIOR (32 * EPSILON) /* identification/determined.py has the same */
-#define ALONG 32  /* samples at most between two solutions of R theta = Z */
+#define ALONG 128 /* samples at most between two solutions of R theta = Z */
 #define TRUSTED (512 * 512) /* (rounding errors along the gain that are put up with, in units of EPSILON of the output)^2 */
 #define MILLION 1048576      /* samples are counted in two numbers, each exact in single precision */
 

@@ -14,7 +14,7 @@ from symheli.lpv.arrays import Array
 
 LEARNT, DETERMINED, SATURATED, REFUSED = 1, 2, 4, 8
 CONSTANT, VARIABLE, DIRECTIONAL = 0, 1, 2
-ALONG, TRUSTED = 32, 512 * 512
+ALONG, TRUSTED = 128, 512 * 512
 
 
 @dataclass(frozen=True)
