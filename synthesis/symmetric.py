@@ -35,6 +35,11 @@ def smat(v: Array, n: int) -> Array:
     return out
 
 
+def symmetrized(M: Array) -> Array:
+    """The symmetric part of matrices (..., n, n): rounding leaves a product that ought to be symmetric a little skew."""
+    return 0.5 * (M + np.swapaxes(M, -1, -2))
+
+
 def basis(n: int) -> Array:
     """The matrices (n (n + 1) / 2, n, n) with smat(v) = sum_i v_i basis_i."""
     return smat(np.eye(length(n)), n)

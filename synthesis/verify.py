@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symheli.lpv import LPVStateSpace
+from synthesis import structure
 from synthesis.bernstein import transpose
 from synthesis.claim import Claim, Number, lmi_polynomials
 from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov
-from synthesis.pieces import ModelPiece
+from synthesis.pieces import ModelPiece, model_pieces, same_pieces
 from synthesis.scaling import Scaling
 from synthesis.symmetric_power import generator, monomials
 
@@ -200,6 +201,22 @@ class Evidence(NamedTuple):
     units: Scaling
     rate: float
     elevation: int
+
+    def fault(self, P: Lyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
+        """What keeps P from being about this model and this claim, before any inequality; None where nothing does."""
+        if not isinstance(P, SplineLyapunov | MemoryLyapunov):
+            return f"expected a SplineLyapunov or a MemoryLyapunov, got {type(P).__name__}"
+        if kind != ("l2 gain" if self.lpv.inputs else "stability"):
+            return f"the model of the proof is not one of the kind {kind!r}"
+        if not self.rate >= 0 or rates != (self.rate,):
+            return f"the proof is for rates {(self.rate,)}, the claim for {rates}"
+        s = self.lpv.scheduling
+        return structure.first(
+            P.fault_for(s.low, s.high, len(self.lpv.states)),
+            structure.whole(self.elevation, 0, "elevation"),
+            structure.coordinates(self.units.left, self.units.right, (self.units.channel, self.units.time), len(self.lpv.states)),
+            None if same_pieces(self.pieces, model_pieces(self.lpv)) else "the pieces are not those of the model",
+        )
 
     def least_gain(self, P: Lyapunov) -> tuple[float, float]:
         """(gain that P admits, conditioning of P); inf where P proves nothing, NaN without channels. Floating point."""

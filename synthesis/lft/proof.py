@@ -13,6 +13,7 @@ import numpy as np
 
 from symheli.lpv import LFT
 from symheli.lpv.lft.model import parts
+from synthesis import structure
 from synthesis.lft.coordinates import Coordinates
 from synthesis.lft.multipliers import Multiplier
 from synthesis.verify import positive_definite, rational
@@ -33,6 +34,23 @@ class Evidence(NamedTuple):
 
     lft: LFT
     coordinates: Coordinates
+
+    def fault(self, proof: Quadratic, kind: str, rates: tuple[float, ...]) -> str | None:
+        """What keeps the proof from being about this LFT and this claim, before any inequality; None where nothing does."""
+        if not isinstance(proof, Quadratic) or not isinstance(proof.multiplier, Multiplier):
+            return "expected P and a Multiplier"
+        if kind != ("l2 gain" if self.lft.inputs else "stability"):
+            return f"the LFT of the proof is not one of the kind {kind!r}"
+        if rates != (math.inf,) * len(self.lft.parameters):
+            return f"the proof is for parameters that jump, the claim for rates {rates}"
+        x, M = len(self.lft.states), proof.multiplier
+        units, left, right = self.coordinates
+        return structure.first(
+            structure.symmetric(np.asarray(proof.P), (x, x), "P"),
+            M.fault or (None if _structure_holds(M, self.lft) else f"the multiplier is not of the class {M.scaling!r} for this LFT"),
+            structure.coordinates(left, right, (), self.lft.order),
+            structure.coordinates(units.left, units.right, (units.channel, units.time), x),
+        )
 
     def least_gain(self, proof: Quadratic) -> tuple[float, float]:
         """(gain that the proof admits, condition number of P); inf where it proves nothing, NaN without channels."""

@@ -293,7 +293,7 @@ def _check_channels(model: Pieces, kind: Kind) -> None:
         raise InputError("the model has no states; its gain is the largest norm of D(p)")
     if kind.endswith("gain") and not (nu and ny):
         raise InputError(f"a gain needs inputs and outputs, got {nu} and {ny}; use stability() without channels")
-    if kind == "energy-to-peak gain" and model.dt is None and any(np.any(D.coefficients) for _, _, _, D in model.models.values()):
+    if kind == "energy-to-peak gain" and model.passes_peaks:
         raise InputError("the energy-to-peak gain of a continuous model needs D = 0: feedthrough passes peaks of any height")
 
 

@@ -13,11 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from synthesis import structure
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
 from synthesis.polynomial.inequalities import Demand, Pair, decrease, peak, positivity
 from synthesis.polynomial.lyapunov import BoxLyapunov
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.regions import Number, Pieces, convert, exact, regions
+from synthesis.symmetric import symmetrized
 from synthesis.verify import rational
 
 Array = np.ndarray
@@ -42,12 +44,11 @@ class Units(NamedTuple):
 
     def to_physical(self, P: Array) -> Array:
         """P of V in physical units from that in z."""
-        M = self.storage * self.left.T @ P @ self.left
-        return 0.5 * (M + np.swapaxes(M, -1, -2))
+        return symmetrized(self.storage * self.left.T @ P @ self.left)
 
     def to_scaled(self, P: Array) -> Array:
         """The inverse."""
-        return self.right.T @ P @ self.right / self.storage
+        return symmetrized(self.right.T @ P @ self.right / self.storage)
 
 
 class Evidence(NamedTuple):
@@ -56,6 +57,24 @@ class Evidence(NamedTuple):
     model: Pieces
     units: Units
     demand: Demand
+
+    def fault(self, P: BoxLyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
+        """What keeps P from being about this model and this claim, before any inequality; None where nothing does."""
+        if not isinstance(P, BoxLyapunov):
+            return f"expected a BoxLyapunov, got {type(P).__name__}"
+        if kind != self.demand.kind or self.demand.shift != 0.0:
+            return f"the proof is of the {self.demand.kind}, the claim of the {kind}"
+        if len(rates) != len(self.model.parameters) or not all(r >= 0 for r in rates) or rates != self.demand.rates:
+            return f"the proof is for rates {self.demand.rates}, the claim for {rates}"
+        if not self.model.original:
+            return "the pieces are not those of the model"
+        if kind == "energy-to-peak gain" and self.model.passes_peaks:
+            return "the energy-to-peak gain of a continuous model needs D = 0"
+        u = self.units
+        return structure.first(
+            P.fault_for([(s.low, s.high) for s in self.model.parameters], self.model.sizes[0]),
+            structure.coordinates(u.left, u.right, (u.inputs, u.outputs, u.time, u.storage), self.model.sizes[0]),
+        )
 
     @property
     def scaled(self) -> tuple[Pieces, Demand]:
