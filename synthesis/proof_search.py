@@ -66,7 +66,7 @@ def prove(problem: Problem, relaxation: Relaxation, solver: Solver, accept: floa
 
 def _attempt(problem: Problem, relaxation: Relaxation, solver: Solver, form: Form, margin: float) -> Result:
     start = time.perf_counter()
-    blocks = form.blocks(problem, relaxation.elevation)
+    blocks = form.weighed(problem, relaxation.elevation)
     candidate, rounds = _solve_by_rounds(problem, relaxation, solver, form, blocks, margin)
     solved = time.perf_counter()
     gamma, lyapunov, conditioning = _verified(problem, candidate, form, relaxation.elevation)

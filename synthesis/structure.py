@@ -62,12 +62,12 @@ def symmetric(coefficients: Array, shape: Sequence[int], name: str = "Lyapunov c
 def coordinates(left: Any, right: Any, units: Sequence[Any], size: int) -> str | None:
     """`left` and `right` (size, size) inverse to each other, every one of the `units` a finite number > 0."""
     try:
-        left, right, units = numbers(left, "left"), numbers(right, "right"), numbers(units, "units")
+        left, right, sizes = numbers(left, "left"), numbers(right, "right"), numbers(units, "units")
     except InputError as error:
         return str(error)
-    if left.shape != (size, size) or right.shape != (size, size) or not np.all(np.isfinite([*left.ravel(), *right.ravel(), *units])):
+    if left.shape != (size, size) or right.shape != (size, size) or not np.all(np.isfinite([*left.ravel(), *right.ravel(), *sizes])):
         return f"coordinates must be finite matrices of shape {(size, size)}"
     # 1e-3: far above what inverting loses, and enough for `right` to be regular
-    if not np.all(units > 0) or np.abs(left @ right - np.eye(size)).max(initial=0.0) > 1e-3:
+    if not np.all(sizes > 0) or np.abs(left @ right - np.eye(size)).max(initial=0.0) > 1e-3:
         return "coordinates need units > 0 and left = right^-1"
     return None

@@ -15,6 +15,7 @@ from synthesis.claim import Claim, Number, lmi_polynomials
 from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.pieces import ModelPiece, model_pieces, same_pieces
 from synthesis.scaling import Scaling
+from synthesis.symmetric import extended, symmetrized
 from synthesis.symmetric_power import generator, monomials
 
 Array = np.ndarray
@@ -32,8 +33,11 @@ class Findings(NamedTuple):
     conditioning: float
 
 
-def examine(claim: Claim) -> Findings:
-    """Floating point: eigenvalues of every coefficient, and the least g by Schur complement. Pass scaled data."""
+def examine(claim: Claim, weight: Array) -> Findings:
+    """Floating point: eigenvalues of every coefficient, and the least g by Schur complement. Pass scaled data.
+
+    `weight` changes the coordinates of the state blocks for the sake of rounding.
+    """
     P = claim.P
     if not claim.meaningful:
         return Findings(False, False, math.inf, math.inf)
@@ -44,6 +48,9 @@ def examine(claim: Claim) -> Findings:
     decreasing, g = True, 0.0
     for form in lmi_polynomials(claim, float):
         F = form.block.reshape(-1, *form.block.shape[-2:])
+        if len(weight) == n:
+            W = extended(weight, F.shape[1] - n)
+            F = symmetrized(W.T @ F @ W)
         top = F[:, :n, :n]
         eigenvalues = np.linalg.eigvalsh(top)
         decreasing &= bool(np.all(eigenvalues[:, -1] < -_rounding(n) * np.abs(eigenvalues).max(axis=1)))
@@ -214,7 +221,7 @@ class Evidence(NamedTuple):
         return structure.first(
             P.fault_for(s.low, s.high, len(self.lpv.states)),
             structure.whole(self.elevation, 0, "elevation"),
-            structure.coordinates(self.units.left, self.units.right, (self.units.channel, self.units.time), len(self.lpv.states)),
+            self.units.fault(len(self.lpv.states)),
             None if same_pieces(self.pieces, model_pieces(self.lpv)) else "the pieces are not those of the model",
         )
 
@@ -224,7 +231,7 @@ class Evidence(NamedTuple):
         scaled = tuple(piece.scaled(units.left, units.right, units.channel, units.time) for piece in self.pieces)
         back = P.in_units(units.right, units.channel**-2, units.time)
         rate = self.rate * units.time if self.lpv.dt is None else self.rate
-        findings = examine(Claim(scaled, back, rate, self.lpv.dt, self.elevation))
+        findings = examine(Claim(scaled, back, rate, self.lpv.dt, self.elevation), units.weight)
         if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
             return math.inf, math.inf
         return (units.channel * math.sqrt(findings.g) if self.lpv.inputs else math.nan), findings.conditioning
@@ -236,7 +243,7 @@ class Evidence(NamedTuple):
         claim = self._claim(P)
         if not (enough and claim.meaningful and claim.invariant(rational())):
             return False
-        return holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right)
+        return holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right @ self.units.weight)
 
     def exact(self, P: Lyapunov, gamma: float) -> bool:
         """The same over the whole interval in rational arithmetic."""

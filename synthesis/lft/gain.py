@@ -86,7 +86,7 @@ class _Attempt:
         if not lft.inputs:
             loop = with_state_channels(loop)
         self.inputs = loop.Bu.shape[1]
-        self.linear = inequality(loop, self.multipliers, lft.dt is None)
+        self.linear = inequality(loop, self.multipliers, lft.dt is None).congruent(self.evidence.coordinates.units.weight)
         self.proof: Quadratic | None = None
         self.gamma, self.conditioning, self.answer = math.inf, math.inf, Answer.FAILED
         self.trials: list[Trial] = []

@@ -49,7 +49,7 @@ class Evidence(NamedTuple):
             structure.symmetric(np.asarray(proof.P), (x, x), "P"),
             M.fault or (None if _structure_holds(M, self.lft) else f"the multiplier is not of the class {M.scaling!r} for this LFT"),
             structure.coordinates(left, right, (), self.lft.order),
-            structure.coordinates(units.left, units.right, (units.channel, units.time), x),
+            units.fault(x),
         )
 
     def least_gain(self, proof: Quadratic) -> tuple[float, float]:
@@ -59,7 +59,7 @@ class Evidence(NamedTuple):
         n, x = lft.order, len(lft.states)
         root = math.sqrt(units.time)
         # columns of (w, x, u); energies divided by the channel squared and counted in the unit of time
-        E[:n, :n], E[n : n + x, n : n + x] = right, root * units.right
+        E[:n, :n], E[n : n + x, n : n + x] = right, root * units.right @ units.weight
         E[n + x :, n + x :] = np.eye(len(lft.inputs))
         F = E.T @ _left_side(lft, proof, float) @ E / units.channel**2
         F = 0.5 * (F + F.T)

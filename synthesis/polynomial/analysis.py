@@ -158,7 +158,7 @@ class _Hunt:
         kind, n = self.demand.kind, self.model.sizes[0]
         gains = kind.endswith("gain")
         demand = self.scaled_demand._replace(shift=self.evidence.in_units(alpha) if alpha else 0.0)
-        inequalities = affine_inequalities(self.scaled, demand, shape, margin, self.relaxation.floor)
+        inequalities = affine_inequalities(self.scaled, demand, shape, margin, self.relaxation.floor, self.evidence.units.weight)
         program = assemble(inequalities, shape, n, self.relaxation, maximise=not gains)
         built = time.perf_counter()
         candidate = solve(program, self.solver)
@@ -301,12 +301,15 @@ def _units(model: Pieces, kind: Kind, expected: float) -> Units:
     middle = np.array([[s.middle for s in model.parameters]])
     A, B, C, D = (M[0] for M in model.at(middle))
     names = [tuple(f"{letter}{i}" for i in range(n)) for letter, n in zip("xuy", model.sizes, strict=True)]
-    scale = model_scaling(LinearModel(A, B, C, D, *names, dt=model.dt), expected if kind.endswith("gain") else 1.0)  # type: ignore[arg-type]
+    low, high = np.array([(s.low, s.high) for s in model.parameters]).T
+    every = model.at(low + np.linspace(0.0, 1.0, 9)[:, None] * (high - low))
+    frozen = LinearModel(A, B, C, D, *names, dt=model.dt)  # type: ignore[arg-type]
+    scale = model_scaling(frozen, expected if kind.endswith("gain") else 1.0, every)
     root = math.sqrt(scale.time)
     if kind == "energy-to-peak gain":
         # outputs are peaks, not energies
-        return Units(scale.left, scale.right, 1 / root, scale.channel, scale.time, 1.0)
-    return Units(scale.left, scale.right, 1 / root, scale.channel / root, scale.time, scale.channel**2)
+        return Units(scale.left, scale.right, 1 / root, scale.channel, scale.time, 1.0, scale.weight)
+    return Units(scale.left, scale.right, 1 / root, scale.channel / root, scale.time, scale.channel**2, scale.weight)
 
 
 def _alone(p: Array) -> Array:

@@ -33,7 +33,10 @@ TINY = 1e-12
 
 
 class Units(NamedTuple):
-    """x = right z, left = right^-1; units of inputs, outputs, time (s) and of V in which the numbers are of order one."""
+    """x = right z, left = right^-1; units of inputs, outputs, time (s) and of V in which the numbers are of order one.
+
+    `weight` as in `Scaling`.
+    """
 
     left: Array
     right: Array
@@ -41,6 +44,7 @@ class Units(NamedTuple):
     outputs: float
     time: float
     storage: float
+    weight: Array
 
     def to_physical(self, P: Array) -> Array:
         """P of V in physical units from that in z."""
@@ -74,6 +78,7 @@ class Evidence(NamedTuple):
         return structure.first(
             P.fault_for([(s.low, s.high) for s in self.model.parameters], self.model.sizes[0]),
             structure.coordinates(u.left, u.right, (u.inputs, u.outputs, u.time, u.storage), self.model.sizes[0]),
+            structure.symmetric(np.asarray(u.weight), (self.model.sizes[0],) * 2, "the weight"),
         )
 
     @property
@@ -165,7 +170,7 @@ class Evidence(NamedTuple):
         count = {1: 101, 2: 11}.get(m, 4)
         grid = np.array(list(product(*(np.linspace(s.low, s.high, count) for s in self.model.parameters))))
         A, B, C, D = self.model.at(grid)
-        T = self.units.right
+        T = self.units.right @ self.units.weight
         here = P.at(grid)
         if np.linalg.eigvalsh(T.T @ here @ T).min() <= 0:
             return False
