@@ -126,6 +126,8 @@ def climb(
     room = max(period - float(start.ramps(rate).sum()), float(start.rests.sum())) / k
     unit = room / 10
     least = 1e-4 * room
+    # no rest is nothing: where all of p(t) was ramps, corners of a p that jumps would last no time
+    start = start._replace(rests=np.clip(start.rests, 10 * least, 2 * room))
     best, best_score = start, -math.inf
 
     def cost(x: Array) -> tuple[float, Array]:
@@ -138,7 +140,7 @@ def climb(
             raise _Unbounded
         return -score, -np.concatenate([s.radius * of_levels, unit * of_rests])
 
-    at = np.concatenate([(start.levels - s.middle) / s.radius, np.clip(start.rests, 10 * least, 2 * room) / unit])
+    at = np.concatenate([(start.levels - s.middle) / s.radius, start.rests / unit])
     # as far from the middle of the start as a cycle has time for
     middle, swing = 0.5 * (start.levels.min() + start.levels.max()), 0.5 * rate * period / k
     bounds = [tuple(np.clip((middle + np.array([-swing, swing]) - s.middle) / s.radius, -1.0, 1.0))] * k + [

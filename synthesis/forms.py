@@ -282,6 +282,12 @@ def forms(problem: Problem, relaxation: Relaxation) -> Iterator[Form]:
             yield Quadratic(knots, degree, n)
 
 
+def constant_form(problem: Problem, relaxation: Relaxation) -> Form:
+    """A constant P, which proves for every rate what it proves for jumps."""
+    n, knots = len(problem.lpv.states), _knots(problem, relaxation, 8, 0)
+    return HigherOrder(knots, 0, n, relaxation.order) if relaxation.order > 1 else Quadratic(knots, 0, n)
+
+
 def _knots(problem: Problem, relaxation: Relaxation, segments: int, degree: int) -> Array:
     low, high = problem.pieces[0].low, problem.pieces[-1].high
     breaks = [piece.low for piece in problem.pieces[1:]]

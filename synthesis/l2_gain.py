@@ -18,7 +18,7 @@ from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bo
 from synthesis.lyapunov import Lyapunov
 from synthesis.polynomial import BoxCertificate, PolynomialStateSpace
 from synthesis.polynomial.analysis import Model, Rate, box_certificate
-from synthesis.proof_search import Result, prove
+from synthesis.proof_search import Result, prove, prove_gain
 from synthesis.verdict import Seconds, Status, Trajectory
 
 
@@ -60,14 +60,7 @@ def l2_gain(
     bounds = time.perf_counter() - start
     if math.isinf(below.gamma):
         return _certificate(lpv, rate, solver, None, math.inf, frozen.gamma, Status.GROWING, below.trajectory, bounds)
-    problem = scaled_problem(lpv, rate, below.gamma, with_gain=True)
-    best = prove(problem, relaxation, solver, relaxation.accept * below.gamma)
-    if best.lyapunov is None and best.answer is not Answer.INFEASIBLE:
-        # whether there is a P at all is a question with a bounded answer, which solvers handle better than an infinite gain
-        stable = prove(scaled_problem(lpv, rate, 1.0, with_gain=False), relaxation, solver, math.inf)
-        seconds = Seconds(*(a + b for a, b in zip(best.seconds, stable.seconds, strict=True)))
-        answer = Answer.INFEASIBLE if stable.answer is Answer.INFEASIBLE else Answer.FAILED
-        best = best._replace(answer=answer, seconds=seconds, attempts=best.attempts + stable.attempts)
+    problem, best = prove_gain(lpv, rate, frozen.gamma, relaxation, solver)
     return _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds, relaxation.elevation)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from scipy import linalg
@@ -17,8 +19,19 @@ UNSEEN = 0.3
 """Every state is driven and seen by this fraction of what inputs and outputs do: what they do not reach needs a scale too."""
 DECOUPLED = 1e-3
 """Balancing leaves a coupling alone where both of its directions are below this fraction of the states' own pace."""
+NOTHING = 1e-6
+"""A gain below this fraction of the response of the states is what cancellation leaves, and no scale of anything."""
+START = 0.1
+"""Fraction of that response from which a proof then sets out."""
+FAR = 30.0
+"""A bound this many times larger or smaller than the scale it was found in deserves its own."""
+RESCALED = 3
+"""Most changes of scale."""
 SWEEPS = 100
 """Most sweeps of balancing."""
+
+
+T = TypeVar("T")
 
 
 class Scaling(NamedTuple):
@@ -64,7 +77,6 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     made so by a shift.
     """
     n, continuous = len(model.states), model.dt is None
-    channel = gain if np.isfinite(gain) and gain > 0 else 1.0
     every = elsewhere or Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D)))
     B, C = np.hstack([*every.B]), np.vstack([*every.C])
     D = balance(np.abs(every.A).max(axis=0), B, C)
@@ -85,11 +97,29 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     Q = seen.T @ seen / level + level * (side @ side.T if continuous else inverse - A.T @ inverse @ A)
     root = linalg.inv(linalg.cholesky(X))
     weight = _inverse_root(root.T @ symmetrized(Q) @ root * (time if continuous else 1.0))
+    channel = _channel(gain, float(np.sqrt(np.trace(Wc) * np.trace(Wo))))
     size_B, size_C = np.linalg.norm(weight @ linalg.solve(root, B)), np.linalg.norm(C @ root @ weight) / channel
     # P = alpha I with alpha = |C|/|B| weighs inputs and outputs alike; put it into the coordinates
     alpha = size_C / size_B if size_B > 0 and size_C > 0 else 1.0
     right = D[:, None] * root / np.sqrt(alpha)
     return Scaling(np.sqrt(alpha) * linalg.inv(root) / D, right, channel, time, weight)
+
+
+def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected: float) -> list[T]:
+    """What `found(expected)` brings, (result, bound, scale it was found in); again in the scale of the bound while that is far off.
+
+    The frozen gain is a scale that no search changes, but a moving p may have a gain of another order.
+    """
+    results: list[T] = []
+    least = 0.0
+    for _ in range(1 + RESCALED):
+        result, bound, scale = found(expected)
+        results.append(result)
+        least = least or NOTHING * scale
+        if not least < bound < math.inf or scale / FAR < bound < scale * FAR:
+            break
+        expected = bound
+    return results
 
 
 def balance(A: Array, B: Array, C: Array) -> Array:
@@ -114,6 +144,11 @@ def balance(A: Array, B: Array, C: Array) -> Array:
         if np.abs(np.log(d / before)).max(initial=0.0) < 0.05:
             break
     return d
+
+
+def _channel(gain: float, response: float) -> float:
+    """The gain expected; where that is nothing beside the `response` of the states to inputs and outputs, a gain to begin with."""
+    return gain if math.isfinite(gain) and gain > NOTHING * response else START * response
 
 
 def _size(M: Array) -> float:

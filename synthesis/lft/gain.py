@@ -17,18 +17,14 @@ from synthesis.lft.multipliers import Class, Multiplier, check_scaling, multipli
 from synthesis.lft.program import gain_program, inequality, margin_program, unpack, with_state_channels
 from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.lower_bound import THOROUGH, LowerBound, Search
+from synthesis.proof_search import NOTHING, inflated
+from synthesis.scaling import in_its_own_scale
 from synthesis.verdict import Seconds, Status, Trajectory
 
 Array = np.ndarray
 
-INFLATION = 1e-6
-"""gamma^2 is raised by this fraction above what the proof admits in floating point, so that an exact check has room."""
-
 MARGINS = (1e-7, 1e-6, 1e-5, 1e-3)
 """The (x, w) block is held below -margin I in scaled coordinates, tried in turn until the answer is verified."""
-
-NOTHING = 1e-6
-"""A largest margin below this (P <= I, scaled) counts as none: the solver is no more accurate than that."""
 
 
 def lft_gain(
@@ -50,8 +46,17 @@ def lft_gain(
         return _certificate(lft, scaling, solver, None, LowerBound(math.inf, _at_rest(frozen)), math.inf, time.perf_counter() - start)
     below = box_lower_bound(lft, frozen, search)
     bounds = time.perf_counter() - start
-    attempt = _Attempt(lft, scaling, solver, below.gamma if math.isfinite(below.gamma) else frozen.gamma)
-    return _certificate(lft, scaling, solver, attempt.run(), below, frozen.gamma, bounds)
+
+    def found(expected: float) -> tuple[_Attempt, float, float]:
+        attempt = _Attempt(lft, scaling, solver, expected).run()
+        return attempt, attempt.gamma, attempt.evidence.coordinates.units.channel
+
+    tries = in_its_own_scale(found, frozen.gamma)
+    best = min(tries, key=lambda attempt: attempt.gamma)
+    for other in tries:
+        if other is not best:
+            best.add(other)
+    return _certificate(lft, scaling, solver, best, below, frozen.gamma, bounds)
 
 
 def lft_stability(
@@ -115,6 +120,12 @@ class _Attempt:
         self.ended = time.perf_counter()
         return self
 
+    def add(self, other: _Attempt) -> None:
+        """The programs and the time of another attempt at the same gain."""
+        self.trials = other.trials + self.trials
+        self.solving, self.verifying = self.solving + other.solving, self.verifying + other.verifying
+        self.begin -= other.ended - other.begin
+
     def _solve(self, program: ConeProgram) -> Candidate:
         candidate = solve(program, self.solver)
         self.solving += candidate.seconds
@@ -127,7 +138,7 @@ class _Attempt:
         for weight in weights if candidate.x is not None else ():
             proof = self._physical(float(weight) * np.asarray(candidate.x))
             least, conditioning = self.evidence.least_gain(proof)
-            gamma = least * math.sqrt(1 + INFLATION)
+            gamma = inflated(least, self.evidence.coordinates.units.channel)
             if gamma >= best or not self.evidence.floating(proof, gamma):
                 continue
             self.proof, self.gamma, self.conditioning, best = proof, gamma, conditioning, gamma

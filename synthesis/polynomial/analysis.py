@@ -25,8 +25,8 @@ from synthesis.polynomial.program import Shape, affine_inequalities, assemble
 from synthesis.polynomial.proof import Evidence, Units
 from synthesis.polynomial.regions import Pieces, pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
-from synthesis.proof_search import NOTHING
-from synthesis.scaling import model_scaling
+from synthesis.proof_search import CLOSE, NOTHING
+from synthesis.scaling import in_its_own_scale, model_scaling
 from synthesis.symmetric import length, smat
 from synthesis.verdict import Kind, Seconds, Status, Trajectory
 
@@ -63,8 +63,8 @@ def box_certificate(
     bounds = time.perf_counter() - start
     if math.isinf(limit.value) if sign > 0 else limit.value >= 0:
         return report.nothing(Status.GROWING, limit, limit.trajectory, bounds)
-    hunt = _Hunt(piece, demand, relaxation, solver, limit.value if sign > 0 else 1.0)
-    best = hunt.decay(sign * limit.value) if kind == "decay rate" else hunt.gain(limit.value)
+    hunt = _Hunt(piece, demand, relaxation, solver)
+    best = hunt.decay(sign * frozen.value) if kind == "decay rate" else hunt.gain(frozen.value)
     if best.lyapunov is None and kind == "stability":
         start = time.perf_counter()
         worst = growing(model, demand, search)
@@ -85,18 +85,35 @@ class Found(NamedTuple):
 class _Hunt:
     """Cone programs of finer and finer P."""
 
-    def __init__(self, model: Pieces, demand: Demand, relaxation: Relaxation, solver: Solver, expected: float):
+    def __init__(self, model: Pieces, demand: Demand, relaxation: Relaxation, solver: Solver, expected: float = 1.0):
         self.model, self.demand, self.relaxation, self.solver = model, demand, relaxation, solver
-        self.evidence = Evidence(model, _units(model, demand.kind, expected), demand)
-        self.scaled, self.scaled_demand = self.evidence.scaled
         self.attempts: list[Attempt] = []
         self.spent = np.zeros(3)
+        self.expect(expected)
+
+    def expect(self, bound: float) -> None:
+        """Set the units in which numbers are of order one where the bound is near this one."""
+        self.evidence = Evidence(self.model, _units(self.model, self.demand.kind, bound), self.demand)
+        self.scaled, self.scaled_demand = self.evidence.scaled
 
     def gain(self, limit: float) -> Found:
-        """The least gain, or any P for stability."""
+        """The least gain, or any P for stability; `limit` sets the first scale and says what is good enough."""
+        if self.demand.kind == "stability":
+            return self._least(limit)
+
+        def found(expected: float) -> tuple[tuple[Found, Evidence], float, float]:
+            self.expect(expected)
+            best = self._least(limit)
+            return (best, self.evidence), best.bound, 1.0 / self.evidence.in_units(1.0)
+
+        best, self.evidence = min(in_its_own_scale(found, limit), key=lambda pair: pair[0].bound)
+        return best
+
+    def _least(self, limit: float) -> Found:
         nothing = Found(None, math.nan if self.demand.kind == "stability" else math.inf)
         best = nothing
-        for shape in self._shapes():
+
+        def attempt(shape: Shape, best: Found) -> Found:
             for margin in self.relaxation.margins:
                 found = self._attempt(shape, margin, 0.0)
                 if found.lyapunov is None and best.lyapunov is None:
@@ -105,32 +122,51 @@ class _Hunt:
                     best = found
                 if found.lyapunov is not None or found.answer is Answer.INFEASIBLE:
                     break
+            return best
+
+        for shape in self._shapes():
+            best = attempt(shape, best)
             if best.lyapunov is not None and not best.bound > self.relaxation.accept * limit:
                 break
+        if any(shape.degrees) and (best.lyapunov is None or best.bound > (1 + CLOSE) * limit):
+            # a constant P proves for every rate what it proves for jumps
+            answer, best = best.answer, attempt(self._constant(), best)
+            best = best if best.lyapunov is not None else best._replace(answer=answer)
         return best
 
     def decay(self, limit: float) -> Found:
-        """The largest decay rate, between 0 and `limit` (1/s), by bisection; each P counts for all that it proves."""
+        """The largest decay rate, between 0 and `limit` (1/s); each P counts for all that it proves."""
         best = Found(None, -math.inf)
         tolerance = DECAY_TOLERANCE * limit
         for shape in self._shapes():
-            low, high = max(best.bound, 0.0), limit
-            trial = limit - tolerance
-            while True:
-                found = self._attempt(shape, 0.0, trial)
-                if found.lyapunov is not None and found.bound > best.bound:
-                    best = found
-                elif best.lyapunov is None:
-                    best = best._replace(answer=found.answer)
-                # a P that proves less than was asked for: the half below is left, whatever it would have allowed
-                low = max(low, found.bound if found.lyapunov is not None else 0.0)
-                high = high if low >= trial else trial
-                if high - low <= tolerance:
-                    break
-                trial = 0.5 * (low + high)
+            best = self._bisected(shape, best, limit - tolerance, limit)
             if best.lyapunov is not None and best.bound * self.relaxation.accept >= limit:
                 break
+        if any(shape.degrees) and best.bound < limit - 2 * tolerance:
+            # a constant P proves for every rate what it proves for jumps: asked first whether it proves more
+            answer, trial = best.answer, limit - tolerance if best.lyapunov is None else best.bound + tolerance
+            best = self._bisected(self._constant(), best, trial, limit)
+            best = best if best.lyapunov is not None else best._replace(answer=answer)
         return best
+
+    def _bisected(self, shape: Shape, best: Found, trial: float, limit: float) -> Found:
+        tolerance = DECAY_TOLERANCE * limit
+        low, high = max(best.bound, 0.0), limit
+        while True:
+            found = self._attempt(shape, 0.0, trial)
+            if found.lyapunov is not None and found.bound > max(best.bound, 0.0):
+                best = found
+            elif best.lyapunov is None:
+                best = best._replace(answer=found.answer)
+            # a P that proves less than was asked for: the half below is left, whatever it would have allowed
+            low = max(low, found.bound if found.lyapunov is not None else 0.0)
+            high = high if low >= trial else trial
+            if high - low <= tolerance:
+                return best
+            trial = 0.5 * (low + high)
+
+    def _constant(self) -> Shape:
+        return Shape(tuple(np.array([s.low, s.high]) for s in self.model.parameters), (0,) * len(self.model.parameters))
 
     def _shapes(self) -> list[Shape]:
         """The forms of P to be tried in turn."""

@@ -18,6 +18,7 @@ from synthesis.periodic import multiplier
 from synthesis.polynomial.inequalities import Demand
 from synthesis.polynomial.regions import Pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
+from synthesis.scaling import balance
 from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
 from synthesis.waves import steps
@@ -60,6 +61,8 @@ def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> 
     poles = np.linalg.eigvals(A)
     if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
         return math.inf
+    d = balance(np.abs(A), B, C)
+    A, B, C = A * d / d[:, None], B / d[:, None], C * d
     # the bilinear change keeps the Gramian
     F, G = (A, B) if dt is None else to_continuous(A, B, C, D)[:2]
     X = linalg.solve_continuous_lyapunov(F, -G @ G.T)

@@ -28,7 +28,10 @@ LADDER = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """The bound is loosened by these fractions in turn until the whole box is shown to admit it."""
 
 
-TINY = 1e-12
+FURTHER = (1e2, 1e4, 1e6)
+"""Steps beyond, where the model has no response to compare rounding with."""
+
+TINY = 1e-8
 """Least g in scaled units: a model without response is given a small gain rather than none."""
 
 
@@ -126,7 +129,8 @@ class Evidence(NamedTuple):
         kind = self.demand.kind
         if math.isinf(value):
             return None
-        for fraction in LADDER:
+        nothing = kind.endswith("gain") and value * self.in_units(1.0) <= math.sqrt(TINY * (1 + LADDER[0]))
+        for fraction in (*LADDER, *FURTHER) if nothing else LADDER:
             # gains: of gamma^2
             bound = (
                 value if kind == "stability" else value - fraction * abs(value) if kind == "decay rate" else value * math.sqrt(1 + fraction)
