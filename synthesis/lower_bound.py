@@ -24,7 +24,7 @@ from synthesis.periodic import Lifted, multiplier, ratio_from_rest, worst_input
 from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
-from synthesis.waves import Steps, steps
+from synthesis.waves import Steps, samples, steps
 
 Array = np.ndarray
 
@@ -62,8 +62,9 @@ THOROUGH = Search()
 class LowerBound(NamedTuple):
     """`gamma`: no smaller L2 gain can be certified (inf: the state grows along `trajectory`, repeated).
 
-    `trajectory` None: p constant, the frozen gain is the best found. `input` (n, nu): the input with |y| = gamma |u|, held
-    from each time of the trajectory to the next; None where none was computed. `growth`: factor of the state in one cycle.
+    `trajectory` None: p constant, the frozen gain is the best found; in discrete time it has one p a sample. `input` (n, nu): the
+    input with |y| = gamma |u|, held from each time of the trajectory to the next; None where none was computed. `growth`: factor
+    of the state in one cycle.
     """
 
     gamma: float
@@ -188,7 +189,8 @@ class _Hunt:
 
     def growing(self, cycle: Trajectory) -> LowerBound:
         """The verdict on a cycle along which the state grows."""
-        return LowerBound(math.inf, cycle, None, self.multiplier(cycle, 4))
+        shown = cycle if self.lpv.dt is None else samples(cycle, self.lpv.dt)
+        return LowerBound(math.inf, shown, None, self.multiplier(cycle, 4))
 
     def gain(self, cycle: Trajectory) -> float:
         """L2 gain of the periodic system, inf where it grows."""
@@ -213,7 +215,10 @@ class _Hunt:
             halved = np.repeat(inputs, 2, axis=0).reshape(count, -1)
             half, _ = ratio_from_rest(Lifted.of(self.along(cycle, finer=2, split=2)), halved, rounds=1)
             ratio = min(ratio, half) - abs(ratio - half)
-        width = np.tile(np.diff(system.time), count) if self.lpv.dt is None else np.ones(len(inputs))
+        if self.lpv.dt is not None:
+            p = np.tile(samples(cycle, self.lpv.dt).p, count)
+            return LowerBound(ratio, Trajectory(self.lpv.dt * np.arange(len(p)), p), inputs, growth)
+        width = np.tile(np.diff(system.time), count)
         return LowerBound(ratio, *_flown(cycle, system.time, count, inputs / np.sqrt(width)[:, None]), growth)
 
 

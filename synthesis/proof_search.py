@@ -55,7 +55,7 @@ def prove(problem: Problem, relaxation: Relaxation, solver: Solver, limit: float
     The constant one proves for every rate what it proves for jumps, so that no rate is worse than jumps. That there is no P is
     said of the form that was asked for, of which a constant is one.
     """
-    best = Result(math.inf, None, math.inf, Answer.FAILED, Seconds(), ())
+    best = Result(math.inf, None, math.inf, Answer.UNTRIED, Seconds(), ())
     spent, attempts = np.zeros(4), []
     tried: set[int] = set()
 
@@ -67,9 +67,9 @@ def prove(problem: Problem, relaxation: Relaxation, solver: Solver, limit: float
             attempts += result.attempts
             if result.lyapunov is not None and (best.lyapunov is None or result.gamma < best.gamma):
                 best = result
-            elif best.lyapunov is None:
+            elif best.lyapunov is None and result.answer is not Answer.UNTRIED:
                 best = best._replace(answer=result.answer)
-            if result.lyapunov is not None or result.answer is Answer.INFEASIBLE:
+            if result.lyapunov is not None or result.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
                 break
         return best
 
@@ -104,7 +104,7 @@ def prove_gain(lpv: LPVStateSpace, rate: float, frozen: float, relaxation: Relax
         # whether there is a P at all is a question with a bounded answer, which solvers handle better than an infinite gain
         stable = prove(scaled_problem(lpv, rate, 1.0, with_gain=False), relaxation, solver, math.inf)
         parts.append(stable)
-        best = best._replace(answer=Answer.INFEASIBLE if stable.answer is Answer.INFEASIBLE else Answer.FAILED)
+        best = best._replace(answer=Answer.INFEASIBLE if stable.answer is Answer.INFEASIBLE else best.answer)
     seconds = Seconds(*(sum(times) for times in zip(*(part.seconds for part in parts), strict=True)))
     return problem, best._replace(seconds=seconds, attempts=tuple(attempt for part in parts for attempt in part.attempts))
 

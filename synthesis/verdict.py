@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple, Protocol, get_args
 import numpy as np
 
 from symheli.errors import CertificateError, InputError
+from synthesis.cone_program import Answer
 
 Array = np.ndarray
 Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
@@ -25,6 +26,12 @@ class Status(Enum):
     INFEASIBLE = "no Lyapunov function of this form exists, to the solver's accuracy; the model may still be stable"
     UNPROVEN = "unproven on a grid: the inequalities hold at its points, between them nothing is known"
     FAILED = "solver failed: what it returned could not be verified"
+    UNTRIED = "not tried: the programs of this form are too large for the solver; nothing is known"
+
+    @classmethod
+    def without_proof(cls, answer: Answer) -> Status:
+        """What is known where nothing was proven and the last program tried was answered so."""
+        return {Answer.INFEASIBLE: cls.INFEASIBLE, Answer.UNTRIED: cls.UNTRIED}.get(answer, cls.FAILED)
 
 
 class Seconds(NamedTuple):
@@ -40,9 +47,9 @@ class Seconds(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines (discrete time: samples) between them.
+    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines between them; a jump has one time twice.
 
-    Several parameters: `p` (n, m).
+    Discrete time: one p for every sample. A cycle is to be repeated. Several parameters: `p` (n, m).
     """
 
     time: Array
@@ -120,7 +127,9 @@ class Verdict(ABC):
         if sign * (self.frozen - self.limit) > 1e-9 * abs(self.frozen):
             raise CertificateError(f"the {moving} {self.limit:.9g} forgets the frozen {what} {self.frozen:.9g}")
         if self.verified and self.status is not Status.PROVEN:
-            raise CertificateError(f"a verified certificate cannot have the status {self.status.name}")
+            raise CertificateError(f"a verified certificate cannot have the status {self.status}")
+        if self.verified and self.kind == "decay rate" and not self.alpha >= 0:
+            raise CertificateError(f"a decay rate of {self.alpha:.6g} is growth, and proves nothing")
 
     def _check_form(self) -> None:
         if not isinstance(self.kind, str) or self.kind not in get_args(Kind):

@@ -19,6 +19,7 @@ from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.lower_bound import THOROUGH, LowerBound, Search
 from synthesis.proof_search import NOTHING, inflated
 from synthesis.scaling import in_its_own_scale
+from synthesis.spectrum import surely_unstable
 from synthesis.verdict import Seconds, Status, Trajectory
 
 Array = np.ndarray
@@ -43,7 +44,10 @@ def lft_gain(
     start = time.perf_counter()
     frozen = frozen_box_gain(lft)
     if math.isinf(frozen.gamma):
-        return _certificate(lft, scaling, solver, None, LowerBound(math.inf, _at_rest(frozen)), math.inf, time.perf_counter() - start)
+        if surely_unstable(lft.at(*frozen.p).A, lft.dt):
+            return _certificate(lft, scaling, solver, None, LowerBound(math.inf, _at_rest(frozen)), math.inf, time.perf_counter() - start)
+        # stable or not to rounding: nothing is known from below
+        frozen, search = BoxGain(0.0, frozen.p, math.nan), None
     below = box_lower_bound(lft, frozen, search)
     bounds = time.perf_counter() - start
 
@@ -69,7 +73,7 @@ def lft_stability(
     """
     solver = _checked(lft, scaling, solver)
     frozen = frozen_box_gain(lft.select(inputs=(), outputs=()))
-    if math.isinf(frozen.gamma):
+    if math.isinf(frozen.gamma) and surely_unstable(lft.at(*frozen.p).A, lft.dt):
         return _certificate(lft, scaling, solver, None, LowerBound(math.nan, _at_rest(frozen)), math.nan, 0.0)
     found = _Attempt(lft.select(inputs=(), outputs=()), scaling, solver, 1.0).run()
     start = time.perf_counter()
@@ -109,7 +113,7 @@ class _Attempt:
             candidate = self._solve(gain_program(self.linear, self.multipliers, x, self.inputs, margin))
             self._judge("gain", margin, candidate, (1.0,))
             self.answer = candidate.answer
-            if self.proof is not None or candidate.answer is Answer.INFEASIBLE:
+            if self.proof is not None or candidate.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
                 break
         if self.proof is None:
             candidate = self._solve(margin_program(self.linear, self.multipliers, x, self.inputs))
@@ -183,7 +187,7 @@ def _certificate(
     elif growing:
         status = Status.GROWING
     else:
-        status = Status.INFEASIBLE if found.answer is Answer.INFEASIBLE else Status.FAILED
+        status = Status.without_proof(found.answer)
     gamma = math.nan if kind == "stability" else found.gamma if found else math.inf
     seconds = Seconds(*(found.seconds if found else (0.0, 0.0, 0.0)), bounds)
     return LFTCertificate(

@@ -27,6 +27,7 @@ from synthesis.polynomial.regions import Pieces, pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.proof_search import CLOSE, NOTHING
 from synthesis.scaling import in_its_own_scale, model_scaling
+from synthesis.spectrum import surely_unstable
 from synthesis.symmetric import length, smat
 from synthesis.verdict import Kind, Seconds, Status, Trajectory
 
@@ -36,6 +37,9 @@ Rate = float | Sequence[float] | Mapping[str, float] | None
 
 DECAY_TOLERANCE = 2e-3
 """The decay rate is found to this fraction of the frozen one."""
+
+ROUNDED = 1e-12
+"""What is looked for where the slowest frozen mode is stable or not to rounding, 1/s."""
 
 SAMPLES = {1: 17, 2: 7}
 """Values of each parameter in a region at which the bound of a P is first computed (more parameters: 3)."""
@@ -56,6 +60,10 @@ def box_certificate(
     sign = 1.0 if kind.endswith("gain") else -1.0
     report = _Report(piece, demand, relaxation, solver, sign * frozen.value)
     unstable = math.isinf(frozen.value) if sign > 0 else frozen.value >= 0
+    if unstable and not surely_unstable(piece.at(np.array([frozen.p])).A[0], piece.dt):
+        # stable or not to rounding: nothing is known from below
+        frozen, search, unstable = Worst(0.0 if sign > 0 else -ROUNDED, frozen.p), None, False
+        report = _Report(piece, demand, relaxation, solver, sign * frozen.value)
     if unstable:
         at_rest = Trajectory(np.zeros(1), _alone(np.array([frozen.p])))
         return report.nothing(Status.UNSTABLE, frozen, at_rest, time.perf_counter() - start)
@@ -79,7 +87,7 @@ class Found(NamedTuple):
 
     lyapunov: BoxLyapunov | None
     bound: float
-    answer: Answer = Answer.FAILED
+    answer: Answer = Answer.UNTRIED
 
 
 class _Hunt:
@@ -117,10 +125,10 @@ class _Hunt:
             for margin in self.relaxation.margins:
                 found = self._attempt(shape, margin, 0.0)
                 if found.lyapunov is None and best.lyapunov is None:
-                    best = nothing._replace(answer=found.answer)
+                    best = nothing._replace(answer=best.answer if found.answer is Answer.UNTRIED else found.answer)
                 elif found.lyapunov is not None and (best.lyapunov is None or found.bound < best.bound):
                     best = found
-                if found.lyapunov is not None or found.answer is Answer.INFEASIBLE:
+                if found.lyapunov is not None or found.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
                     break
             return best
 
@@ -156,8 +164,10 @@ class _Hunt:
             found = self._attempt(shape, 0.0, trial)
             if found.lyapunov is not None and found.bound > max(best.bound, 0.0):
                 best = found
-            elif best.lyapunov is None:
+            elif best.lyapunov is None and found.answer is not Answer.UNTRIED:
                 best = best._replace(answer=found.answer)
+            if found.answer is Answer.UNTRIED:
+                return best
             # a P that proves less than was asked for: the half below is left, whatever it would have allowed
             low = max(low, found.bound if found.lyapunov is not None else 0.0)
             high = high if low >= trial else trial
@@ -244,7 +254,7 @@ class _Report:
     def found(self, best: Found, limit: float, worst: Trajectory | None, bounds: float, hunt: _Hunt) -> BoxCertificate:
         """What the hunt brought."""
         if best.lyapunov is None:
-            status = Status.INFEASIBLE if best.answer is Answer.INFEASIBLE else Status.FAILED
+            status = Status.without_proof(best.answer)
         else:
             status = Status.UNPROVEN if self.relaxation.kind == "grid" else Status.PROVEN
         return self._made(best, limit, worst, bounds, hunt, status)

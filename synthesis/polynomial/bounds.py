@@ -21,7 +21,7 @@ from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.scaling import balance
 from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
-from synthesis.waves import steps
+from synthesis.waves import samples, steps
 
 Array = np.ndarray
 Measure = Callable[[Array, Array, Array, Array], float]
@@ -142,19 +142,21 @@ def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Tra
     for wave in (*family.coarse()[:WAVES], *family.spread()):
         cycle = Trajectory(*wave.vertices())
         system = steps(line, cycle.time, cycle.p, max(family.longest, wave.period / search.steps))
-        C, D = line.matrices(np.clip(np.interp(system.time, cycle.time, cycle.p), line.scheduling.low, line.scheduling.high))[2:]
+        shown = cycle if line.dt is None else samples(cycle, line.dt)
+        after = np.interp(system.time[1:], *cycle) if line.dt is None else np.roll(shown.p, -1)
+        C, D = line.matrices(np.clip(after, line.scheduling.low, line.scheduling.high))[2:]
         n, X, peak = system.states, np.zeros((system.states, system.states)), 0.0
         cycles = max(3, min(20, math.ceil(2 * family.slow / wave.period)))
         for k in range(cycles * len(system.step)):
             j = k % len(system.step)
             Phi, Gamma = system.step[j, :n, :n], system.step[j, :n, n:]
             X = Phi @ X @ Phi.T + Gamma @ Gamma.T
-            size = C[j + 1] @ X @ C[j + 1].T + (D[j + 1] @ D[j + 1].T if line.dt is not None else 0.0)
+            size = C[j] @ X @ C[j].T + (D[j] @ D[j].T if line.dt is not None else 0.0)
             peak = max(peak, float(np.linalg.eigvalsh(size).max()))
         # the time steps are good to about 1e-4
         value = math.sqrt(peak) * (1 - 1e-4 * (line.dt is None))
         if value > best[0]:
-            best = value, cycle
+            best = value, shown
     return best
 
 
@@ -171,7 +173,7 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
         ]  # fmt: skip
         value = rates[1] - abs(rates[1] - rates[0])
         if value > best[0]:
-            best = value, cycle
+            best = value, cycle if line.dt is None else samples(cycle, line.dt)
     return best
 
 
