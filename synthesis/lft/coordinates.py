@@ -68,7 +68,8 @@ def coordinates(lft: LFT, gain: float, *, one: bool = False) -> Coordinates:
     pencil = s[:, None, None] * np.eye(x) - loop.A
     noise = linalg.inv(plain.units.weight)
     B, C = np.hstack([loop.Bw, noise, loop.Bu]), np.vstack([loop.Cz, noise, loop.Cy])
-    G = C @ np.linalg.solve(pencil, np.broadcast_to(B, (len(s), *B.shape)))
+    # the pseudo-inverse: only sizes matter, and next to a pole that is singular to rounding there is one too
+    G = C @ np.linalg.pinv(pencil) @ B
     G[:, :n, :n] += loop.Dzw
     G[:, :n, n + x :] += loop.Dzu
     G[:, n + x :, :n] += loop.Dyw
