@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
-from synthesis import structure
+from symheli.lpv import LPVStateSpace, Matrices
+from synthesis import pointwise, structure
 from synthesis.bernstein import transpose
 from synthesis.claim import Claim, Number, lmi_polynomials
 from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov
@@ -246,8 +246,40 @@ class Evidence(NamedTuple):
         return holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right @ self.units.weight)
 
     def exact(self, P: Lyapunov, gamma: float) -> bool:
-        """The same over the whole interval in rational arithmetic."""
-        return proven(self._claim(P), gamma)
+        """The same over the whole interval in rational arithmetic, and again at some p through the model's own matrices."""
+        return proven(self._claim(P), gamma) and self.witnessed(P, gamma, rational())
+
+    def witnessed(self, P: Lyapunov, gamma: float, number: Number) -> bool:
+        """The pieces are the model, and the inequalities hold at some p without them; see `pointwise`."""
+        lpv, g = self.lpv, None if math.isnan(gamma) else number(gamma) * number(gamma)
+        s = lpv.scheduling
+        breaks = [b for piece in lpv.basis.pieces() for b in (piece.low, piece.high) if s.low < b < s.high]
+        points = pointwise.inside([s.low, s.high, *P.knots, *breaks])
+        if not all(self._reproduced(p) for p in pointwise.inside([s.low, s.high, *breaks])):
+            return False
+        for p in points:
+            model = Matrices(*(pointwise.numbers(M, number) for M in lpv.matrices(p)))
+            if P.order > 1:
+                if not pointwise.decreases(P, p, model.A, self.rate, self.units.right, number):
+                    return False
+                continue
+            every = (
+                pointwise.memory_inequalities(P, p, model, self.rate, g, number)
+                if isinstance(P, MemoryLyapunov)
+                else pointwise.spline_inequalities(P, p, model, self.rate, lpv.dt, g, (s.low, s.high), number)
+            )
+            if not all(positive_definite(-F) for F in every):
+                return False
+        return True
+
+    def _reproduced(self, p: float) -> bool:
+        piece = next(piece for piece in self.pieces if p <= piece.high)
+        t, weights, lpv = (p - piece.low) / (piece.high - piece.low), np.abs(self.lpv.basis(p)), self.lpv
+        for coefficients, own, terms in zip(piece[2:], lpv.matrices(p), (lpv.A, lpv.B, lpv.C, lpv.D), strict=True):
+            size = np.tensordot(weights, np.abs(terms), axes=1)
+            if not pointwise.same_entries(pointwise.bernstein(coefficients, t), own, size):
+                return False
+        return True
 
     def _claim(self, P: Lyapunov) -> Claim:
         return Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation)

@@ -7,19 +7,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LFT
+from symheli.lpv import LFT, Matrices
 from symheli.lpv.lft.model import parts
-from synthesis import structure
+from synthesis import pointwise, structure
 from synthesis.lft.coordinates import Coordinates
 from synthesis.lft.multipliers import Multiplier
 from synthesis.verify import positive_definite, rational
 
 Array = np.ndarray
 Number = Callable[[float], Any]
+
+CORNERS = 6
+"""Most parameters at all of whose corners a proof is checked once more."""
 
 
 class Quadratic(NamedTuple):
@@ -89,7 +93,22 @@ class Evidence(NamedTuple):
         else:
             for i in range(n + x, len(F)):
                 F[i, i] = F[i, i] + number(gamma) * number(gamma)
-        return all(positive_definite(M) for M in (_exact(proof.P, number), *_conditions(proof.multiplier, number), F))
+        exactly = all(positive_definite(M) for M in (_exact(proof.P, number), *_conditions(proof.multiplier, number), F))
+        return exactly and self.witnessed(proof, gamma, number)
+
+    def witnessed(self, proof: Quadratic, gamma: float, number: Number) -> bool:
+        """V = x'Px does at the corners of the box and inside it what is claimed, through the closed model's own matrices."""
+        g = None if math.isnan(gamma) else number(gamma) * number(gamma)
+        P, m = _exact(proof.P, number), len(self.lft.parameters)
+        corners = product((-1.0, 1.0), repeat=m) if m <= CORNERS else ()
+        diagonals = (np.where(np.arange(m) % 2, -t, t) for t in np.linspace(-0.9, 0.9, 7))
+        for delta in (*corners, *diagonals):
+            model = self.lft.at(*(s.middle + d * s.radius for s, d in zip(self.lft.parameters, delta, strict=True)))
+            own = Matrices(*(_exact(M, number) for M in (model.A, model.B, model.C, model.D)))
+            F = pointwise.dissipation(own, P, None, None if self.lft.dt is None else P, g)
+            if not positive_definite(-F):
+                return False
+        return True
 
     def _conditions_hold(self, proof: Quadratic) -> bool:
         units, right = self.coordinates.units, self.coordinates.right

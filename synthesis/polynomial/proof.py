@@ -13,14 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synthesis import structure
+from symheli.lpv import Matrices
+from synthesis import pointwise, structure
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
 from synthesis.polynomial.inequalities import Demand, Pair, decrease, peak, positivity
 from synthesis.polynomial.lyapunov import BoxLyapunov
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.regions import Number, Pieces, convert, exact, regions
 from synthesis.symmetric import symmetrized
-from synthesis.verify import rational
+from synthesis.verify import positive_definite, rational
 
 Array = np.ndarray
 
@@ -30,6 +31,9 @@ LADDER = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 
 FURTHER = (1e2, 1e4, 1e6)
 """Steps beyond, where the model has no response to compare rounding with."""
+
+WITNESSES = 40
+"""Values of several parameters at which a proof is checked once more, through the model's own matrices."""
 
 TINY = 1e-8
 """Least g in scaled units: a model without response is given a small gain rather than none."""
@@ -166,7 +170,59 @@ class Evidence(NamedTuple):
         """The whole box in rational arithmetic: the doubles of model, P, rates and bound as the rationals they are."""
         if not self.demand.meaningful(self.model.dt, P.degrees) or math.isinf(bound):
             return False
-        return all(map(negative_definite_exactly, polynomials(self.model, P, self.demand, bound, rational())))
+        exactly = all(map(negative_definite_exactly, polynomials(self.model, P, self.demand, bound, rational())))
+        return exactly and self.witnessed(P, bound, rational())
+
+    def witnessed(self, P: BoxLyapunov, bound: float, number: Number) -> bool:
+        """The pieces are the model, and the inequalities hold at some p without them; see `pointwise`."""
+        model, demand, dt = self.model, self.demand, self.model.dt
+        box = [(s.low, s.high) for s in model.parameters]
+        axes = [pointwise.inside([*breaks, *knots]) for breaks, knots in zip(model.breaks, P.knots, strict=True)]
+        # all of a single axis, of several a diagonal through their product
+        count = WITNESSES if len(axes) > 1 else len(axes[0])
+        points = np.array([[axis[(k * (3 * i + 1)) % len(axis)] for i, axis in enumerate(axes)] for k in range(count)])
+        own = model.at(points)
+        alpha = number(bound) if demand.kind == "decay rate" else number(0.0)
+        g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
+        steps = demand.steps(dt, P.degrees)
+        corners = list(product(*((-1, 1) if d and r > 0 else (0,) for d, r in zip(P.degrees, demand.rates, strict=True))))
+        for k, p in enumerate(points):
+            if not self._reproduced(p, [M[k] for M in own]):
+                return False
+            A, B, C, D = (pointwise.numbers(M[k], number) for M in own)
+            here, slopes = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, p, number)
+            forms: list[Array] = [-here]
+            through = Matrices(A, B, C, D)
+            if demand.kind == "energy-to-peak gain":
+                # V grows by at most the energy of the input, and the outputs are seen by it
+                through = Matrices(A, B, C * 0, D * 0)
+                if dt is None:
+                    forms.append(-np.block([[here, C.T], [C, np.eye(len(C), dtype=int) * g]]))
+                else:
+                    eye, zero = np.eye(B.shape[1], dtype=int) * number(1.0), np.zeros((A.shape[0], B.shape[1]), dtype=int) * number(1.0)
+                    forms.append(-np.block([[here, zero, C.T], [zero.T, eye, D.T], [C, D, np.eye(len(C), dtype=int) * g]]))
+            level = number(1.0) if demand.kind == "energy-to-peak gain" else g
+            if dt is None:
+                for signs in corners:
+                    moving = zip(signs, demand.rates, slopes, strict=True)
+                    drift = sum((sign * number(r) * slope for sign, r, slope in moving if sign), 2 * alpha * here)
+                    forms.append(pointwise.dissipation(through, here, drift, None, level))
+            else:
+                growth = number(math.exp(2.0 * bound * dt)) if demand.kind == "decay rate" else number(1.0)
+                for q in pointwise.reached(p, steps, box):
+                    after = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, q, number)[0]
+                    forms.append(pointwise.dissipation(through, here, None, after * growth, level))
+            if not all(positive_definite(-F) for F in forms):
+                return False
+        return True
+
+    def _reproduced(self, p: Array, own: list[Array]) -> bool:
+        index = tuple(pointwise.segment_of(np.array(b), float(q)) for b, q in zip(self.model.breaks, p, strict=True))
+        for M, expected in zip(self.model.models[index], own, strict=True):
+            size = np.abs(M.coefficients).max(axis=tuple(range(len(p))))
+            if not pointwise.same_entries(pointwise.tensor(M.coefficients, M.box, p), expected, size):
+                return False
+        return True
 
     def on_grid(self, P: BoxLyapunov, bound: float) -> bool:
         """The inequalities at a grid of p and the corners of what p may do next, written out without polynomials."""
