@@ -1,6 +1,7 @@
 """What a proof asserts, as polynomials with Bernstein coefficients in any arithmetic.
 
-Nothing here is shared with the assembly of the cone program: an error there cannot pass here.
+The inequalities are written out here once more, but what they are written on is shared with the assembly of the cone program: the
+pieces of the model, cells and strips, restriction and composition by blossoms. An error there both would believe; `pointwise` would not.
 """
 
 from __future__ import annotations

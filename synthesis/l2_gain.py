@@ -14,6 +14,7 @@ from synthesis.certificate import Certificate
 from synthesis.cone_program import Answer, Solver
 from synthesis.forms import Problem, Relaxation, scaled_problem
 from synthesis.frozen import FrozenGain, frozen_gain, least_damped
+from synthesis.hypotheses import VERIFIED, fitted
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
 from synthesis.lyapunov import Lyapunov
 from synthesis.polynomial import BoxCertificate, PolynomialStateSpace
@@ -152,11 +153,12 @@ def _hypotheses(lpv: LPVStateSpace, rate: float, P: Lyapunov | None, kind: str) 
     unit = "" if s.unit == "1" else f" {s.unit}"
     speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
     out = [f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}"]
+    out += fitted(lpv)
     if lpv.trim is not None:
         out.append("the drift of a moving trim, -x0'(p) dp/dt, is left out: it acts as a further disturbance")
     if P is not None:
         out.append(f"{P.form}; one LMI per Bernstein coefficient, for every p in the interval and every admissible rate")
-        out.append("verified in floating point: every coefficient, and a grid of p; verify(rigorous=True) proves it in exact arithmetic")
+        out.append(VERIFIED.format(what="every coefficient, and a grid of p", shared="pieces, cells, strips and blossoms"))
     if kind == "l2 gain":
         out.append("the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs together")
     return tuple(out)

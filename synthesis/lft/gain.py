@@ -10,6 +10,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LFT
 from synthesis.cone_program import Answer, Candidate, ConeProgram, Solver, solve
+from synthesis.hypotheses import VERIFIED
 from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
 from synthesis.lft.certificate import LFTCertificate, Trial
 from synthesis.lft.coordinates import coordinates, scaled
@@ -210,7 +211,7 @@ def _hypotheses(lft: LFT, scaling: str, proof: Quadratic | None, kind: str) -> t
     ranges = ", ".join(f"{s.name} in [{s.low:g}, {s.high:g}]{'' if s.unit == '1' else ' ' + s.unit}" for s in lft.parameters)
     out = [f"{ranges or 'no parameter'}: exogenous, as fast as it likes; a limit on its rate is not used", f"constant P; {_CLASS[scaling]}"]
     if proof is not None:
-        out.append("verified in floating point: finitely many matrices; verify(rigorous=True) proves it in exact arithmetic")
+        out.append(VERIFIED.format(what="finitely many matrices", shared="only the matrices of the LFT"))
     if kind == "l2 gain":
         out.append("the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs together")
     return tuple(out)

@@ -15,6 +15,7 @@ from symheli.lpv import LFT, LinearModel, LPVStateSpace
 from synthesis.certificate import Attempt
 from synthesis.cone_program import Answer, Candidate, Solver, solve
 from synthesis.forms import Relaxation
+from synthesis.hypotheses import VERIFIED, fitted
 from synthesis.lower_bound import Search
 from synthesis.lyapunov import graded_knots
 from synthesis.polynomial.bounds import Worst, growing, measure, worst_frozen, worst_moving
@@ -281,11 +282,11 @@ class _Report:
             unit = "" if s.unit == "1" else f" {s.unit}"
             speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
             out.append(f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}")
+        out += fitted(self.model.source)
         if P is not None and status is Status.PROVEN:
             out.append(f"{P.form}, found by {_FOUND[self.relaxation.kind]}")
-            out.append(
-                "verified in floating point on the whole box, halved where needed; verify(rigorous=True) proves it in exact arithmetic"
-            )
+            shared = "pieces, regions, products of polynomials and the inequalities themselves"
+            out.append(VERIFIED.format(what="the whole box, halved where needed, and a grid of p", shared=shared))
         if status is Status.UNPROVEN:
             out.append(f"the inequalities hold at {self.relaxation.points} values of each parameter in every region: no guarantee")
         out += _MEANING.get(self.demand.kind, ())

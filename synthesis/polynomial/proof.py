@@ -1,7 +1,8 @@
 """Is this P(p) a proof on the whole box? Recomputed from the model and P alone, whichever relaxation found P.
 
 Floating point: Bernstein coefficients, boxes halved until they tell, and a grid through the model's own code.
-Exact: the same boxes in rational arithmetic.
+Exact: the same boxes in rational arithmetic, and single p by `pointwise`. The inequalities themselves (`inequalities`), the regions and the
+algebra of polynomials are those from which the cone program was assembled; `pointwise` has none of them.
 """
 
 from __future__ import annotations
