@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from synthesis.ascent import Objective
+from synthesis.budget import UNLIMITED, Budget
 from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 from synthesis.waves import Steps, steps
@@ -116,7 +117,8 @@ def gradient(lpv: Scheduled, corners: Corners, rate: float, objective: Objective
 
 
 def climb(
-    lpv: Scheduled, rate: float, start: Corners, objective: Objective, longest: float, period: float, evaluations: int
+    lpv: Scheduled, rate: float, start: Corners, objective: Objective, longest: float, period: float, evaluations: int,
+    budget: Budget = UNLIMITED,
 ) -> Corners:  # fmt: skip
     """The best corners an ascent from `start` meets, in steps of at most `longest` s and cycles of about `period` s at most.
 
@@ -136,8 +138,8 @@ def climb(
         score, of_rests, of_levels = gradient(lpv, here, rate, objective, longest)
         if score > best_score:
             best, best_score = here, score
-        if not math.isfinite(score):
-            raise _Unbounded
+        if not math.isfinite(score) or budget.over:
+            raise _Ended
         return -score, -np.concatenate([s.radius * of_levels, unit * of_rests])
 
     at = np.concatenate([(start.levels - s.middle) / s.radius, start.rests / unit])
@@ -149,10 +151,10 @@ def climb(
     options: Any = {"maxfun": evaluations, "maxiter": evaluations}
     try:
         minimize(cost, at, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
-    except _Unbounded:
+    except _Ended:
         pass
     return best
 
 
-class _Unbounded(Exception):
-    """The state grows along the corners met last, or does not respond at all."""
+class _Ended(Exception):
+    """The state grows along the corners met last, or does not respond at all; or time is up."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace
+from synthesis.budget import said
 from synthesis.certificate import Certificate
 from synthesis.cone_program import Answer, Solver
 from synthesis.forms import Problem, Relaxation, scaled_problem
@@ -67,7 +68,8 @@ def l2_gain(
     if math.isinf(below.gamma):
         return _certificate(lpv, rate, solver, None, math.inf, frozen.gamma, Status.GROWING, below.trajectory, bounds)
     problem, best = prove_gain(lpv, rate, frozen.gamma, relaxation, solver)
-    return _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds, relaxation.elevation)
+    cert = _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds, relaxation.elevation)
+    return cert.resting_on(said(search and search.seconds, bounds))
 
 
 @overload

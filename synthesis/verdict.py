@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, Literal, NamedTuple, Protocol, get_args
+from typing import Any, Literal, NamedTuple, Protocol, Self, get_args
 
 import numpy as np
 
@@ -176,6 +177,10 @@ class Verdict(ABC):
         except (np.linalg.LinAlgError, OverflowError):
             # numbers too large to compute with show nothing
             return False
+
+    def resting_on(self, sentences: Iterable[str]) -> Self:
+        """The same with further hypotheses."""
+        return replace(self, hypotheses=(*self.hypotheses, *sentences))
 
     @property
     def fault(self) -> str | None:

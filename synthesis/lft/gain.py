@@ -9,6 +9,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT
+from synthesis.budget import said
 from synthesis.cone_program import Answer, Candidate, ConeProgram, Solver, solve
 from synthesis.hypotheses import VERIFIED
 from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
@@ -61,7 +62,7 @@ def lft_gain(
     for other in tries:
         if other is not best:
             best.add(other)
-    return _certificate(lft, scaling, solver, best, below, frozen.gamma, bounds)
+    return _certificate(lft, scaling, solver, best, below, frozen.gamma, bounds).resting_on(said(search and search.seconds, bounds))
 
 
 def lft_stability(

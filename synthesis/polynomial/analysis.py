@@ -12,6 +12,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace
+from synthesis.budget import said
 from synthesis.certificate import Attempt
 from synthesis.cone_program import Answer, Candidate, Solver, solve
 from synthesis.forms import Relaxation
@@ -80,7 +81,8 @@ def box_certificate(
         bounds += time.perf_counter() - start
         if worst is not None:
             return report.nothing(Status.GROWING, frozen, worst, bounds, hunt)
-    return report.found(best, sign * limit.value, limit.trajectory, bounds, hunt)
+    cert = report.found(best, sign * limit.value, limit.trajectory, bounds, hunt)
+    return cert if kind == "stability" else cert.resting_on(said(search and search.seconds, bounds))
 
 
 class Found(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -12,6 +13,7 @@ from scipy import linalg
 from scipy.optimize import minimize
 
 from symheli.lpv import LPVStateSpace
+from synthesis.budget import Budget
 from synthesis.frozen import FrozenGain, norm, to_continuous
 from synthesis.lower_bound import Search, growing_trajectory, lower_bound
 from synthesis.periodic import multiplier
@@ -107,10 +109,12 @@ def worst_moving(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, fr
     best = frozen
     if search is None or all(rate == 0 for rate in demand.rates):
         return best
-    for line, back in _lines(model, demand.rates):
-        rate = line.scheduling.rate
-        if rate == 0:
-            continue
+    budget, lines = Budget(search.seconds), [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.rate > 0]
+    for k, (line, back) in enumerate(lines):
+        if budget.over:
+            break
+        budget.tell("line %d of %d, %.6g so far", k + 1, len(lines), abs(best.value))
+        rate, search = line.scheduling.rate, replace(search, seconds=budget.left / (len(lines) - k))
         if demand.kind == "l2 gain":
             found = lower_bound(line, rate, frozen=FrozenGain(frozen.value, 0.0, 0.0), search=search)
             value, trajectory = found.gamma, found.trajectory
@@ -127,7 +131,14 @@ def worst_moving(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, fr
 
 def growing(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, search: Search | None) -> Trajectory | None:
     """A p(t) on such a line along which the state grows, None where none was found."""
-    for line, back in _lines(model, demand.rates) if search else ():
+    if search is None:
+        return None
+    budget, lines = Budget(search.seconds), list(_lines(model, demand.rates))
+    for k, (line, back) in enumerate(lines):
+        if budget.over:
+            break
+        budget.tell("line %d of %d", k + 1, len(lines))
+        search = replace(search, seconds=budget.left / (len(lines) - k))
         found = growing_trajectory(line, line.scheduling.rate, search)
         if found is not None:
             return Trajectory(found.time, back(found.p))
@@ -139,7 +150,10 @@ def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Tra
     family = WaveFamily(line, rate, search)
     best: tuple[float, Trajectory | None] = (0.0, None)
     # where A does not depend on p, growth ranks nothing
+    budget = Budget(search.seconds)
     for wave in (*family.coarse()[:WAVES], *family.spread()):
+        if budget.over:
+            break
         cycle = Trajectory(*wave.vertices())
         system = steps(line, cycle.time, cycle.p, max(family.longest, wave.period / search.steps))
         shown = cycle if line.dt is None else samples(cycle, line.dt)
@@ -164,7 +178,10 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
     """Minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers; the error of the time steps taken off."""
     family = WaveFamily(line, rate, search)
     best: tuple[float, Trajectory | None] = (-math.inf, None)
+    budget = Budget(search.seconds)
     for wave in family.coarse()[:WAVES]:
+        if budget.over:
+            break
         cycle = Trajectory(*wave.vertices())
         longest = max(family.longest, wave.period / search.steps)
         rates = [
