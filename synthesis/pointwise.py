@@ -33,7 +33,7 @@ def numbers(values: Any, number: Number) -> Array:
     return values if number is float else np.asarray(np.frompyfunc(number, 1, 1)(values), dtype=object).reshape(values.shape)
 
 
-def inside(points: Sequence[float]) -> list[float]:
+def inside(points: Any) -> list[float]:
     """Values of p within each stretch between `points`."""
     ends = sorted(set(map(float, points)))
     return [a + share * (b - a) for a, b in pairwise(ends) for share in INSIDE]
@@ -42,7 +42,10 @@ def inside(points: Sequence[float]) -> list[float]:
 def bernstein(coefficients: Array, t: Any) -> Array:
     """sum_i C(d, i) t^i (1 - t)^(d - i) coefficients[i], written out."""
     d = len(coefficients) - 1
-    return sum((coefficients[i] * (comb(d, i) * t**i * (1 - t) ** (d - i)) for i in range(1, d + 1)), coefficients[0] * (1 - t) ** d)
+    out = coefficients[0] * (1 - t) ** d
+    for i in range(1, d + 1):
+        out = out + coefficients[i] * (comb(d, i) * t**i * (1 - t) ** (d - i))
+    return out
 
 
 def segment_of(knots: Array, p: float) -> int:
@@ -59,7 +62,7 @@ def spline(knots: Array, degree: int, coefficients: Array, p: float, number: Num
 
 
 def tensor_spline(
-    knots: Sequence[Array], degrees: Sequence[int], coefficients: Array, p: Sequence[float], number: Number
+    knots: Sequence[Array], degrees: Sequence[int], coefficients: Array, p: Any, number: Number
 ) -> tuple[Array, list[Array]]:  # fmt: skip
     """(value, derivative by each parameter) at p (m,) of a spline in several parameters, in the arithmetic."""
     index = [segment_of(k, float(q)) for k, q in zip(knots, p, strict=True)]
@@ -73,7 +76,7 @@ def tensor_spline(
     return _at(c, local), slopes
 
 
-def tensor(coefficients: Array, box: Sequence[tuple[float, float]], p: Sequence[float]) -> Array:
+def tensor(coefficients: Array, box: Sequence[tuple[float, float]], p: Array) -> Array:
     """The polynomial of these Bernstein coefficients over the box at p (m,)."""
     return _at(coefficients, [(q - a) / (b - a) for q, (a, b) in zip(p, box, strict=True)])
 
@@ -98,7 +101,7 @@ def dissipation(model: Matrices, P: Array, drift: Array | None, after: Array | N
     return np.block([[top, side], [side.T, corner - np.eye(len(corner), dtype=int) * g]])
 
 
-def reached(p: Sequence[float], steps: Sequence[float], box: Sequence[tuple[float, float]]) -> Iterator[tuple[float, ...]]:
+def reached(p: Any, steps: Sequence[float], box: Sequence[tuple[float, float]]) -> Iterator[tuple[float, ...]]:
     """Values of p(k+1): as far as it goes in every direction, part of the way, and where it is."""
     each = [
         sorted({min(max(q + share * step, low), high) for share in (-1.0, -0.382, 0.0, 0.618, 1.0)}) if step > 0 else [q]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from scipy import linalg
@@ -162,7 +162,7 @@ def _pace(A: Array) -> Array:
     return np.maximum(size, 1e-12 * _size(size))
 
 
-def _stabilised(A: Array, poles: Array, continuous: bool) -> Array:
+def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
     """A with its poles moved inside the stability region by as little as the Gramians need."""
     if continuous:
         shift = float(poles.real.max()) + 1e-6 * float(np.abs(poles).min() or np.abs(poles).max() or 1.0)

@@ -259,7 +259,7 @@ class Evidence(NamedTuple):
             return False
         for p in points:
             model = Matrices(*(pointwise.numbers(M, number) for M in lpv.matrices(p)))
-            if P.order > 1:
+            if isinstance(P, SplineLyapunov) and P.order > 1:
                 if not pointwise.decreases(P, p, model.A, self.rate, self.units.right, number):
                     return False
                 continue

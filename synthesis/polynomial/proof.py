@@ -206,7 +206,9 @@ class Evidence(NamedTuple):
             if dt is None:
                 for signs in corners:
                     moving = zip(signs, demand.rates, slopes, strict=True)
-                    drift = sum((sign * number(r) * slope for sign, r, slope in moving if sign), 2 * alpha * here)
+                    drift = 2 * alpha * here
+                    for sign, r, slope in moving:
+                        drift = drift + sign * number(r) * slope if sign else drift
                     forms.append(pointwise.dissipation(through, here, drift, None, level))
             else:
                 growth = number(math.exp(2.0 * bound * dt)) if demand.kind == "decay rate" else number(1.0)
