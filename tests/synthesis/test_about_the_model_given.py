@@ -122,7 +122,9 @@ def test_frozen_gains_near_zero_set_no_scale():
 
 
 @pytest.mark.parametrize("route", ROUTES)
-@pytest.mark.parametrize("lpv", [spring(damping=0.4), random_stable(4, rate=1.0)], ids=["spring", "random"])
+@pytest.mark.parametrize(
+    "lpv", [spring(damping=0.4), pytest.param(random_stable(4, rate=1.0), marks=pytest.mark.slow)], ids=["spring", "random"]
+)
 def test_looking_harder_from_below_changes_nothing_above(route, lpv):
     harder = replace(QUICK, levels=6, dwells=7, nodes=40, evaluations=10, steps=80)
     certs = [ROUTES[route](lpv, 0.5, search) for search in (None, QUICK, harder)]

@@ -13,7 +13,7 @@ from synthesis import Relaxation, Search, decay_rate, generalized_h2, l2_gain, l
 
 QUICK = Search(levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000)
 SOS = Relaxation(kind="sos", segments=(1,), degree=1)
-common = settings(max_examples=10, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+common = settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 # spring: p pumps; two_ends: input at one end of p, output at the other
 springs = st.builds(lambda damping, dt: spring(damping=damping).discretize(dt), st.floats(0.3, 0.6), st.sampled_from([0.2, 0.5, 1.1]))
 
@@ -66,7 +66,7 @@ def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(
     A, B, C, D = lpv.matrices(cert.worst.p)
     u = np.random.default_rng(0).standard_normal((len(A), B.shape[2]))
     ratio = 0.0
-    for _ in range(60):
+    for _ in range(25):
         u /= np.linalg.norm(u)
         x, costate, y = np.zeros(A.shape[1]), np.zeros(A.shape[1]), np.zeros((len(A), C.shape[1]))
         for k in range(len(A)):
@@ -74,8 +74,8 @@ def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(
         ratio = np.linalg.norm(y)
         for k in range(len(A) - 1, -1, -1):
             u[k], costate = D[k].T @ y[k] + B[k].T @ costate, A[k].T @ costate + C[k].T @ y[k]
-    # 2e-2: that many passes leave about a percent
-    assert ratio > cert.lower * (1 - 2e-2)
+    # 5e-2: that many passes leave a few percent
+    assert ratio > cert.lower * (1 - 5e-2)
 
 
 @common
