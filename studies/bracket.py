@@ -80,7 +80,7 @@ def bracket(
 ) -> Bracket:
     """The gain at one acceleration from both sides; `exact`: the better proof, and that of the cover, pass rational arithmetic."""
     plain = synthesis.l2_gain(loop, rate, search=None)
-    memory = synthesis.l2_gain(loop, rate, relaxation=relaxation, search=search or Search(), solver=PATIENT)
+    memory = synthesis.l2_gain(loop, rate, relaxation=relaxation, search=search or Search(seconds=math.inf), solver=PATIENT)
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
     if rest and plain.verified:

@@ -52,7 +52,7 @@ def proven(loop: LPVStateSpace, test: str) -> bool:
 
 def grows(loop: LPVStateSpace, search: Search | None = None) -> bool:
     """Whether a jumping airspeed is found along which the state grows: no test can succeed then."""
-    return synthesis.stability(loop, math.inf, search=search or Search()).status is Status.GROWING
+    return synthesis.stability(loop, math.inf, search=search or Search(seconds=math.inf)).status is Status.GROWING
 
 
 def largest(test: str, widen: Callable[[float], tuple[float, float]], succeeds: Callable[[float, float], bool], width: float) -> Reach:

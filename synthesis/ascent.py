@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
+from synthesis.budget import UNLIMITED, Budget
 from synthesis.periodic import Sensitivity, gain, growth
 from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
@@ -65,15 +66,15 @@ def on_nodes(trajectory: Trajectory, nodes: int, dt: float | None) -> Trajectory
 
 
 def ascend(
-    lpv: Scheduled, rate: float, start: Trajectory, objective: Objective, longest: float, evaluations: int
+    lpv: Scheduled, rate: float, start: Trajectory, objective: Objective, longest: float, evaluations: int, budget: Budget = UNLIMITED
 ) -> tuple[Trajectory, float]:  # fmt: skip
-    """(cycle, measure of it) from `start` on equal intervals: no cycle longer than `longest` s, at most so many gradients."""
+    """(cycle, measure of it) from `start` on equal intervals: no cycle longer than `longest` s, so many gradients, within the `budget`."""
     s = lpv.scheduling
     width = s.high - s.low
     best, reach = start, REACH
     here, gradient = _gradient(lpv, best, objective)
     for _ in range(evaluations - 1):
-        if reach < SHORTEST_REACH or not math.isfinite(here.value):
+        if reach < SHORTEST_REACH or not math.isfinite(here.value) or budget.over:
             break
         trial = _step(best, gradient, rate, (s.low, s.high), reach * width, longest, fixed=lpv.dt is not None)
         if trial is None:

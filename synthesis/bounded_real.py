@@ -47,6 +47,12 @@ class Blocks(NamedTuple):
         """F (m, N, N) with g = 0 at the coefficients P (k, n (n + 1)/2) of the whole spline."""
         return smat(np.einsum("mjvl,jv->ml", self.linear, P[self.columns]) + self.constant, N)
 
+    def congruent(self, W: Array) -> Blocks:
+        """W' F W for every F, W (N, N) not acting on the part with g."""
+        N = len(W)
+        K = svec(W.T @ basis(N) @ W)
+        return self._replace(linear=self.linear @ K, constant=self.constant @ K)
+
     def keep(self, which: Array) -> Blocks:
         """Only these of the m blocks."""
         return self._replace(linear=self.linear[which], constant=self.constant[which], weight=self.weight[which])

@@ -1,6 +1,7 @@
 """What a proof asserts, as polynomials with Bernstein coefficients in any arithmetic.
 
-Nothing here is shared with the assembly of the cone program: an error there cannot pass here.
+The inequalities are written out here once more, but what they are written on is shared with the assembly of the cone program: the
+pieces of the model, cells and strips, restriction and composition by blossoms. An error there both would believe; `pointwise` would not.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError
 from synthesis.bernstein import composition, elevate, multiply, restriction, transpose
 from synthesis.cells import Cell, Strip, cells, strips
 from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov
@@ -68,9 +68,8 @@ def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
         block = elevate(block, degrees)
         if slack is not None:
             own = slack[used : used + len(block)]
-            if len(own) < len(block):
-                raise InputError(f"P carries slack for {len(slack)} Bernstein coefficients, but the model and rate have more")
-            block, used = block + own[:, None], used + len(own)
+            # where P carries too little of it the blocks stand as they are
+            block, used = np.concatenate([block[: len(own)] + own[:, None], block[len(own) :]]), used + len(own)
         yield Form(block, elevate(weight[..., None, None], degrees)[..., 0, 0])
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,27 +37,42 @@ class Answer(Enum):
     SOLVED = "the solver reports a solution"
     INFEASIBLE = "the solver reports that no solution exists"
     FAILED = "the solver stopped without an answer"
+    UNTRIED = "the program was not given to the solver"
 
 
 @dataclass(frozen=True)
 class Solver:
     """Which solver, and when it stops.
 
-    `name` as cvxpy spells it; `tolerance` on residuals and gap (relative); `iterations` 0 keeps 200 for interior points
-    and 20000 for SCS; `time_limit` in s.
+    `name` as cvxpy spells it; `tolerance` on residuals and gap (relative); `iterations` at most; `time_limit` in s. What is
+    None is set to what suits the solver: 1e-8, 200 and 600 s; SCS, a first-order method, 1e-5 and 20000, since the gain is
+    recomputed from P afterwards and more digits cost minutes; no time limit for CVXOPT and SDPA, which have no option for one.
+    Raises `InputError` for a setting out of range or without an option, `SolverError` for a solver that is not installed.
     """
 
     name: str = "CLARABEL"
-    tolerance: float = 1e-8
-    iterations: int = 0
-    time_limit: float = 600.0
+    tolerance: float | None = None
+    iterations: int | None = None
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(self.name).upper())
-        if not 0 < self.tolerance < 1 or self.iterations < 0 or not self.time_limit > 0:
-            raise InputError("expected 0 < tolerance < 1, iterations >= 0 and time_limit > 0 s")
         if self.name not in installed_solvers():
             raise SolverError(f"solver {self.name!r} is not available; installed here: {', '.join(installed_solvers())}")
+        for setting, usual in _USUAL.items():
+            given = getattr(self, setting)
+            if given is None:
+                usual = _FIRST_ORDER.get(setting, usual) if self.name == "SCS" else usual
+                object.__setattr__(self, setting, usual if setting in _OPTIONS[self.name] else None)
+            elif setting not in _OPTIONS[self.name]:
+                raise InputError(f"{self.name} has no option for {setting}, got {given}; leave it None or take another solver")
+            elif not 0 < given < (1 if setting == "tolerance" else math.inf):
+                raise InputError(f"expected 0 < tolerance < 1, iterations >= 1 and time_limit > 0 s, got {setting} = {given}")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The settings in the solver's own words, as they are handed to it."""
+        return {option: getattr(self, setting) for setting, options in _OPTIONS[self.name].items() for option in options}
 
     @property
     def version(self) -> str:
@@ -64,10 +80,29 @@ class Solver:
         return importlib.metadata.version(_PACKAGES[self.name])
 
     def __str__(self) -> str:
-        return f"{self.name} {self.version}, tolerance {self.tolerance:g}"
+        limit = "no time limit" if self.time_limit is None else f"{self.time_limit:g} s"
+        return f"{self.name} {self.version}, tolerance {self.tolerance:g}, at most {self.iterations} iterations, {limit}"
 
 
 _PACKAGES = {"CLARABEL": "clarabel", "SCS": "scs", "CVXOPT": "cvxopt", "MOSEK": "mosek", "SDPA": "sdpa-python", "COPT": "coptpy"}
+
+
+_USUAL: dict[str, Any] = {"tolerance": 1e-8, "iterations": 200, "time_limit": 600.0}
+_FIRST_ORDER: dict[str, Any] = {"tolerance": 1e-5, "iterations": 20000}
+
+_OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
+    "CLARABEL": {"tolerance": ("tol_gap_abs", "tol_gap_rel", "tol_feas"), "iterations": ("max_iter",), "time_limit": ("time_limit",)},
+    "SCS": {"tolerance": ("eps_abs", "eps_rel"), "iterations": ("max_iters",), "time_limit": ("time_limit_secs",)},
+    "CVXOPT": {"tolerance": ("abstol", "reltol", "feastol"), "iterations": ("max_iters",)},
+    "MOSEK": {
+        "tolerance": ("MSK_DPAR_INTPNT_CO_TOL_REL_GAP", "MSK_DPAR_INTPNT_CO_TOL_PFEAS", "MSK_DPAR_INTPNT_CO_TOL_DFEAS"),
+        "iterations": ("MSK_IPAR_INTPNT_MAX_ITERATIONS",),
+        "time_limit": ("MSK_DPAR_OPTIMIZER_MAX_TIME",),
+    },
+    "SDPA": {"tolerance": ("epsilonStar", "epsilonDash"), "iterations": ("maxIteration",)},
+    "COPT": {"tolerance": ("RelGap", "FeasTol", "DualTol"), "iterations": ("BarIterLimit",), "time_limit": ("TimeLimit",)},
+}
+"""What each solver calls tolerance, iterations and time limit; a setting that is missing has no option."""
 
 
 def installed_solvers() -> tuple[str, ...]:
@@ -142,13 +177,12 @@ def _bytes(program: ConeProgram) -> float:
 def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     if _bytes(program) > MEMORY / 4:
         words = f"not tried: cones of size {max(program.sizes)} would need several times {_bytes(program) / 1e9:.2g} GB"
-        return Answer.FAILED, None, f"{words}; a lower degree, fewer segments, Bernstein coefficients or SCS need less"
+        return Answer.UNTRIED, None, f"{words}; a lower degree, fewer segments, Bernstein coefficients or SCS need less"
     clarabel: Any = importlib.import_module("clarabel")  # its stubs hide the classes
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    settings.max_iter = solver.iterations or 200
-    settings.time_limit = solver.time_limit
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = solver.tolerance
+    for option, value in solver.options.items():
+        setattr(settings, option, value)
     cones = [clarabel.ZeroConeT(program.equalities)] * (program.equalities > 0)
     cones += [clarabel.PSDTriangleConeT(n) for n in program.sizes]
     n = len(program.c)
@@ -174,12 +208,7 @@ def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     blocks = [_scs_order(n) + start for n, start in zip(program.sizes, starts[:-1], strict=True)]
     order = np.concatenate([np.arange(program.equalities), *blocks])
     data = {"A": program.A.tocsr()[order].tocsc(), "b": program.b[order], "c": program.c}
-    # a first-order method: the gain is recomputed from P afterwards, and more digits cost minutes
-    tolerance = max(solver.tolerance, 1e-5)
-    engine = scs.SCS(
-        data, {"z": program.equalities, "s": list(program.sizes)}, verbose=False, eps_abs=tolerance, eps_rel=tolerance,
-        max_iters=solver.iterations or 20000, time_limit_secs=solver.time_limit,
-    )  # fmt: skip
+    engine = scs.SCS(data, {"z": program.equalities, "s": list(program.sizes)}, verbose=False, **solver.options)
     solution = engine.solve()
     word = str(solution["info"]["status"])
     if word == "interrupted":  # SCS hears the keyboard itself
@@ -212,7 +241,8 @@ def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
             start += length(n)
     problem = cp.Problem(cp.Minimize(program.c @ x), constraints)
     try:
-        problem.solve(solver=solver.name)
+        # cvxpy hands MOSEK's parameters on under a name of their own
+        problem.solve(solver=solver.name, **({"mosek_params": solver.options} if solver.name == "MOSEK" else solver.options))
     except CvxpyError as error:
         return Answer.FAILED, None, str(error)
     if problem.status in ("infeasible", "infeasible_inaccurate"):

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from synthesis.ascent import Objective
+from synthesis.budget import UNLIMITED, Budget
 from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 from synthesis.waves import Steps, steps
@@ -116,7 +117,8 @@ def gradient(lpv: Scheduled, corners: Corners, rate: float, objective: Objective
 
 
 def climb(
-    lpv: Scheduled, rate: float, start: Corners, objective: Objective, longest: float, period: float, evaluations: int
+    lpv: Scheduled, rate: float, start: Corners, objective: Objective, longest: float, period: float, evaluations: int,
+    budget: Budget = UNLIMITED,
 ) -> Corners:  # fmt: skip
     """The best corners an ascent from `start` meets, in steps of at most `longest` s and cycles of about `period` s at most.
 
@@ -126,6 +128,8 @@ def climb(
     room = max(period - float(start.ramps(rate).sum()), float(start.rests.sum())) / k
     unit = room / 10
     least = 1e-4 * room
+    # no rest is nothing: where all of p(t) was ramps, corners of a p that jumps would last no time
+    start = start._replace(rests=np.clip(start.rests, 10 * least, 2 * room))
     best, best_score = start, -math.inf
 
     def cost(x: Array) -> tuple[float, Array]:
@@ -134,11 +138,11 @@ def climb(
         score, of_rests, of_levels = gradient(lpv, here, rate, objective, longest)
         if score > best_score:
             best, best_score = here, score
-        if not math.isfinite(score):
-            raise _Unbounded
+        if not math.isfinite(score) or budget.over:
+            raise _Ended
         return -score, -np.concatenate([s.radius * of_levels, unit * of_rests])
 
-    at = np.concatenate([(start.levels - s.middle) / s.radius, np.clip(start.rests, 10 * least, 2 * room) / unit])
+    at = np.concatenate([(start.levels - s.middle) / s.radius, start.rests / unit])
     # as far from the middle of the start as a cycle has time for
     middle, swing = 0.5 * (start.levels.min() + start.levels.max()), 0.5 * rate * period / k
     bounds = [tuple(np.clip((middle + np.array([-swing, swing]) - s.middle) / s.radius, -1.0, 1.0))] * k + [
@@ -147,10 +151,10 @@ def climb(
     options: Any = {"maxfun": evaluations, "maxiter": evaluations}
     try:
         minimize(cost, at, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
-    except _Unbounded:
+    except _Ended:
         pass
     return best
 
 
-class _Unbounded(Exception):
-    """The state grows along the corners met last, or does not respond at all."""
+class _Ended(Exception):
+    """The state grows along the corners met last, or does not respond at all; or time is up."""

@@ -19,7 +19,7 @@ from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov, graded_
 from synthesis.memory_blocks import memory_blocks
 from synthesis.pieces import ModelPiece, model_pieces
 from synthesis.scaling import Scaling, scaling
-from synthesis.symmetric import length, smat, svec
+from synthesis.symmetric import extended, length, smat, svec
 from synthesis.symmetric_power import generator, monomials, null_matrix, null_size
 from synthesis.verify import Evidence
 
@@ -157,6 +157,11 @@ class Form(ABC):
     def lyapunov(self, x: Array) -> Lyapunov:
         """V at the solver's point x, in scaled units."""
 
+    def weighed(self, problem: Problem, extra: int) -> list[Blocks]:
+        """The same in coordinates in which slow and fast states count alike."""
+        W = extended(problem.units.weight, len(problem.lpv.inputs))
+        return [block.congruent(W) for block in self.blocks(problem, extra)]
+
     def coefficients(self, x: Array) -> Array:
         """Coefficients of P (unknowns, size (size + 1)/2) as vectors."""
         return x[: self.unknowns * length(self.size)].reshape(self.unknowns, -1)
@@ -208,6 +213,10 @@ class HigherOrder(Quadratic):
             for q in problem.scaled
         )
         return super().blocks(problem._replace(scaled=lifted), extra)
+
+    def weighed(self, problem: Problem, extra: int) -> list[Blocks]:
+        """The blocks as they are: what is added to them is in the coordinates of P."""
+        return self.blocks(problem, extra)
 
     def lyapunov(self, x: Array) -> SplineLyapunov:
         """V at the solver's point x, with the slack of every block."""
@@ -271,6 +280,12 @@ def forms(problem: Problem, relaxation: Relaxation) -> Iterator[Form]:
             yield HigherOrder(knots, degree, n, relaxation.order)
         else:
             yield Quadratic(knots, degree, n)
+
+
+def constant_form(problem: Problem, relaxation: Relaxation) -> Form:
+    """A constant P, which proves for every rate what it proves for jumps."""
+    n, knots = len(problem.lpv.states), _knots(problem, relaxation, 8, 0)
+    return HigherOrder(knots, 0, n, relaxation.order) if relaxation.order > 1 else Quadratic(knots, 0, n)
 
 
 def _knots(problem: Problem, relaxation: Relaxation, segments: int, degree: int) -> Array:

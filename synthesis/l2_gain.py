@@ -10,15 +10,18 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace
+from synthesis.budget import said
 from synthesis.certificate import Certificate
 from synthesis.cone_program import Answer, Solver
 from synthesis.forms import Problem, Relaxation, scaled_problem
-from synthesis.frozen import frozen_gain, least_damped
+from synthesis.frozen import FrozenGain, frozen_gain, least_damped
+from synthesis.hypotheses import VERIFIED, fitted
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
 from synthesis.lyapunov import Lyapunov
 from synthesis.polynomial import BoxCertificate, PolynomialStateSpace
 from synthesis.polynomial.analysis import Model, Rate, box_certificate
-from synthesis.proof_search import Result, prove
+from synthesis.proof_search import Result, prove, prove_gain
+from synthesis.spectrum import surely_unstable
 from synthesis.verdict import Seconds, Status, Trajectory
 
 
@@ -54,21 +57,19 @@ def l2_gain(
     start = time.perf_counter()
     frozen = frozen_gain(lpv)
     if math.isinf(frozen.gamma):
-        at_rest = Trajectory(np.zeros(1), np.array([frozen.p]))
-        return _certificate(lpv, rate, solver, None, math.inf, math.inf, Status.UNSTABLE, at_rest, time.perf_counter() - start)
+        p = _surely_unstable(lpv, frozen.p)
+        if p is not None:
+            at_rest = Trajectory(np.zeros(1), np.array([p]))
+            return _certificate(lpv, rate, solver, None, math.inf, math.inf, Status.UNSTABLE, at_rest, time.perf_counter() - start)
+        # stable or not to rounding: nothing is known from below
+        frozen, search = FrozenGain(0.0, frozen.p, math.nan), None
     below = lower_bound(lpv, rate, frozen=frozen, search=search)
     bounds = time.perf_counter() - start
     if math.isinf(below.gamma):
         return _certificate(lpv, rate, solver, None, math.inf, frozen.gamma, Status.GROWING, below.trajectory, bounds)
-    problem = scaled_problem(lpv, rate, below.gamma, with_gain=True)
-    best = prove(problem, relaxation, solver, relaxation.accept * below.gamma)
-    if best.lyapunov is None and best.answer is not Answer.INFEASIBLE:
-        # whether there is a P at all is a question with a bounded answer, which solvers handle better than an infinite gain
-        stable = prove(scaled_problem(lpv, rate, 1.0, with_gain=False), relaxation, solver, math.inf)
-        seconds = Seconds(*(a + b for a, b in zip(best.seconds, stable.seconds, strict=True)))
-        answer = Answer.INFEASIBLE if stable.answer is Answer.INFEASIBLE else Answer.FAILED
-        best = best._replace(answer=answer, seconds=seconds, attempts=best.attempts + stable.attempts)
-    return _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds, relaxation.elevation)
+    problem, best = prove_gain(lpv, rate, frozen.gamma, relaxation, solver)
+    cert = _certificate(lpv, rate, solver, (problem, best), below.gamma, frozen.gamma, None, below.trajectory, bounds, relaxation.elevation)
+    return cert.resting_on(said(search and search.seconds, bounds))
 
 
 @overload
@@ -95,8 +96,8 @@ def stability(
         return box_certificate(lpv, rate, "stability", relaxation, solver, search)
     rate = _check(lpv, rate, relaxation, with_gain=False)
     margin, p = least_damped(lpv)
-    if margin <= 0:
-        at_rest = Trajectory(np.zeros(1), np.array([p]))
+    if margin <= 0 and (unstable := _surely_unstable(lpv, p)) is not None:
+        at_rest = Trajectory(np.zeros(1), np.array([unstable]))
         return _certificate(lpv, rate, solver, None, math.nan, math.nan, Status.UNSTABLE, at_rest, 0.0)
     problem = scaled_problem(lpv, rate, 1.0, with_gain=False)
     best = prove(problem, relaxation, solver, math.inf)
@@ -105,6 +106,13 @@ def stability(
     status = Status.GROWING if worst is not None else None
     bounds = time.perf_counter() - start
     return _certificate(lpv, rate, solver, (problem, best), math.nan, math.nan, status, worst, bounds, relaxation.elevation)
+
+
+def _surely_unstable(lpv: LPVStateSpace, p: float) -> float | None:
+    """A p, the suspect one first, at which the frozen model is unstable beyond rounding; None where there is none."""
+    s = lpv.scheduling
+    every = np.append(p, np.linspace(s.low, s.high, 201))
+    return next((float(q) for q, A in zip(every, lpv.matrices(every).A, strict=True) if surely_unstable(A, lpv.dt)), None)
 
 
 def _check(lpv: LPVStateSpace, rate: Rate, relaxation: Relaxation, *, with_gain: bool) -> float:
@@ -129,9 +137,9 @@ def _certificate(
 ) -> Certificate:  # fmt: skip
     """The certificate of what was `found` (None: nothing was tried); `status` None where the search for P decides."""
     kind = "stability" if math.isnan(lower) else "l2 gain"
-    best = found[1] if found else Result(math.inf, None, math.inf, Answer.FAILED, Seconds(), ())
+    best = found[1] if found else Result(math.inf, None, math.inf, Answer.UNTRIED, Seconds(), ())
     if status is None:
-        status = Status.PROVEN if best.lyapunov else Status.INFEASIBLE if best.answer is Answer.INFEASIBLE else Status.FAILED
+        status = Status.PROVEN if best.lyapunov else Status.without_proof(best.answer)
     gamma = math.nan if kind == "stability" else best.gamma
     evidence = found[0].evidence(elevation) if found else None
     return Certificate(
@@ -147,11 +155,12 @@ def _hypotheses(lpv: LPVStateSpace, rate: float, P: Lyapunov | None, kind: str) 
     unit = "" if s.unit == "1" else f" {s.unit}"
     speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
     out = [f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}"]
+    out += fitted(lpv)
     if lpv.trim is not None:
         out.append("the drift of a moving trim, -x0'(p) dp/dt, is left out: it acts as a further disturbance")
     if P is not None:
         out.append(f"{P.form}; one LMI per Bernstein coefficient, for every p in the interval and every admissible rate")
-        out.append("verified in floating point: every coefficient, and a grid of p; verify(rigorous=True) proves it in exact arithmetic")
+        out.append(VERIFIED.format(what="every coefficient, and a grid of p", shared="pieces, cells, strips and blossoms"))
     if kind == "l2 gain":
         out.append("the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs together")
     return tuple(out)

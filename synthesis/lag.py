@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
+from synthesis import structure
 
 Array = np.ndarray
 
@@ -33,11 +35,21 @@ class LagRegion:
 
     def __post_init__(self) -> None:
         for name in ("knots", "lower", "upper"):
-            array = np.array(getattr(self, name), dtype=float)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-        if not self.knots.shape == self.lower.shape == self.upper.shape or not np.all(self.lower < self.upper) or not self.time > 0:
-            raise InputError("expected lower < upper at every knot and a lag time > 0 s")
+            object.__setattr__(self, name, structure.numbers(getattr(self, name), name))
+        if self.fault:
+            raise InputError(self.fault)
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong with the form, None where nothing is."""
+        found = structure.ascending(self.knots)
+        if found:
+            return found
+        if not self.knots.shape == self.lower.shape == self.upper.shape or not np.all(np.isfinite([self.lower, self.upper])):
+            return "expected one finite lower and upper at every knot"
+        if not np.all(self.lower < self.upper) or not (isinstance(self.time, float | int) and 0 < self.time < math.inf):
+            return "expected lower < upper at every knot and a finite lag time > 0 s"
+        return None
 
     @classmethod
     def reached(cls, knots: Array, rate: float, time: float) -> LagRegion:

@@ -18,13 +18,14 @@ import numpy as np
 
 from symheli.errors import InputError
 from synthesis.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
+from synthesis.budget import Budget
 from synthesis.corners import Corners, climb
 from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.periodic import Lifted, multiplier, ratio_from_rest, worst_input
 from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
-from synthesis.waves import Steps, steps
+from synthesis.waves import Steps, samples, steps
 
 Array = np.ndarray
 
@@ -36,7 +37,8 @@ class Search:
     `levels` values of p and `dwells` dwell times span the coarse family of waves; an ascent begins from the best `starts` of
     them, on about `nodes` nodes a cycle, with at most `evaluations` gradients each; a cycle lasts at most `cycles` of the
     slowest mode or, for the gain, as long as a slow p takes to cross its range; `steps` bounds the time steps of a cycle,
-    `samples` those of the explicit input.
+    `samples` those of the explicit input. It ends after `seconds` of wall time, for all lines through a box together; math.inf makes
+    the result independent of the machine. The logger "synthesis" tells how far it is (INFO).
     """
 
     levels: int = 12
@@ -47,23 +49,25 @@ class Search:
     cycles: float = 3.0
     steps: int = 200
     samples: int = 150_000
+    seconds: float = 10.0
 
     def __post_init__(self) -> None:
         least = {"levels": 2, "dwells": 1, "starts": 1, "nodes": 8, "evaluations": 1, "steps": 8, "samples": 8}
         wrong = [f"{name} >= {low}" for name, low in least.items() if getattr(self, name) < low]
-        if wrong or not self.cycles > 0:
-            raise InputError(f"expected {', '.join([*wrong, 'cycles > 0'])}, got {self}")
+        if wrong or not self.cycles > 0 or not self.seconds > 0:
+            raise InputError(f"expected {', '.join([*wrong, 'cycles > 0', 'seconds > 0'])}, got {self}")
 
 
 THOROUGH = Search()
-"""The default: some seconds for five states."""
+"""The default: some seconds for five states, ten at most."""
 
 
 class LowerBound(NamedTuple):
     """`gamma`: no smaller L2 gain can be certified (inf: the state grows along `trajectory`, repeated).
 
-    `trajectory` None: p constant, the frozen gain is the best found. `input` (n, nu): the input with |y| = gamma |u|, held
-    from each time of the trajectory to the next; None where none was computed. `growth`: factor of the state in one cycle.
+    `trajectory` None: p constant, the frozen gain is the best found; in discrete time it has one p a sample. `input` (n, nu): the
+    input with |y| = gamma |u|, held from each time of the trajectory to the next; None where none was computed. `growth`: factor
+    of the state in one cycle.
     """
 
     gamma: float
@@ -77,8 +81,8 @@ def lower_bound(
 ) -> LowerBound:
     """A lower bound of the L2 gain over p(t) in range with |dp/dt| <= `rate` (default the model's own; inf: p may jump).
 
-    `lpv` may also be an LFT of one parameter. Deterministic. With `search` None, or rate 0, the `frozen` gain. In continuous
-    time the error of the time steps, judged by halving them, is taken off.
+    `lpv` may also be an LFT of one parameter. Deterministic as long as `search.seconds` suffice. With `search` None, or rate 0,
+    the `frozen` gain. In continuous time the error of the time steps, judged by halving them, is taken off.
     """
     rate = lpv.scheduling.rate if rate is None else float(rate)
     frozen = frozen or frozen_gain(lpv)
@@ -94,10 +98,11 @@ def lower_bound(
     tops = [*sorted([*hunt.ranked(cycles), *near], key=_first)[-search.starts :], *spread[-1:]]
     # the starts stay beside what they lead to: corners may fall between the nodes
     found = list(tops)
-    for cycle in (*(hunt.ascend(c, GAIN) for _, c in tops), *(top for _, c in (*near[-1:], *spread[-1:]) for top in hunt.climb(c, GAIN))):
+    for cycle in hunt.improved(tops, [*near[-1:], *spread[-1:]]):
         if hunt.grows(cycle):
             return hunt.growing(cycle)
         found += hunt.ranked([cycle])
+        hunt.budget.tell("gain %.6g", max(gain for gain, _ in found) if found else best.gamma)
     if not found:
         return best
     explicit = hunt.explicit(max(found, key=_first)[1])
@@ -117,16 +122,28 @@ class _Hunt:
 
     def __init__(self, lpv: Scheduled, rate: float, search: Search):
         self.lpv, self.rate, self.search = lpv, rate, search
+        self.budget = Budget(search.seconds)
         self.family = WaveFamily(lpv, rate, search)
 
     def fastest(self) -> tuple[list[Trajectory], LowerBound | None]:
         """Cycles made to grow as fast as they can, the fastest last; and the verdict where one of them grows."""
         reached: list[tuple[float, Trajectory]] = []
         for cycle in self._steepening():
+            if self.budget.over and reached:
+                break
             if self.grows(cycle):
                 return [], self.growing(cycle)
             reached.append((math.log(max(self.multiplier(cycle), 1e-300)) / float(cycle.time[-1]), cycle))
         return [cycle for _, cycle in sorted(reached, key=_first)[-self.search.starts :]], None
+
+    def improved(self, tops: list[tuple[float, Trajectory]], waves: list[tuple[float, Trajectory]]) -> Iterator[Trajectory]:
+        """What ascents of the gain lead to: on the nodes of the `tops`, on the corners of the `waves`; as far as there is time."""
+        for _, cycle in tops:
+            if not self.budget.over:
+                yield self.ascend(cycle, GAIN)
+        for _, cycle in waves:
+            if not self.budget.over:
+                yield from self.climb(cycle, GAIN)
 
     def _steepening(self) -> Iterator[Trajectory]:
         waves = [wave.cycle() for wave in self.family.coarse()[: self.search.starts]]
@@ -145,7 +162,8 @@ class _Hunt:
 
     def ranked(self, cycles: Iterable[Trajectory]) -> list[tuple[float, Trajectory]]:
         """Gains of the repeated cycles, the largest last, without those along which the state grows."""
-        gains = ((self.gain(cycle), cycle) for cycle in cycles)
+        # one at least, so that there is something to improve
+        gains = ((self.gain(cycle), cycle) for k, cycle in enumerate(cycles) if k == 0 or not self.budget.over)
         return sorted(((gain, cycle) for gain, cycle in gains if math.isfinite(gain)), key=_first)
 
     def climb(self, wave: Trajectory, objective: Objective) -> Iterator[Trajectory]:
@@ -157,7 +175,7 @@ class _Hunt:
         corners = Corners.of(wave)
         for again in (False, True)[: 1 + objective.a_second]:
             start = corners.twice() if again else corners
-            corners = climb(self.lpv, self.rate, start, objective, longest, period, self.search.evaluations // 2)
+            corners = climb(self.lpv, self.rate, start, objective, longest, period, self.search.evaluations // 2, self.budget)
             yield corners.cycle(self.rate)
 
     def ascend(self, cycle: Trajectory, objective: Objective) -> Trajectory:
@@ -166,7 +184,7 @@ class _Hunt:
         # nodes as close in a slow cycle, as far as the time steps allow
         nodes = self.search.nodes * min(limit / self.family.longest_period, self.search.steps / self.search.nodes)
         start = on_nodes(cycle, max(self.search.nodes, round(nodes)), self.lpv.dt)
-        return ascend(self.lpv, self.rate, start, objective, limit, self.search.evaluations)[0]
+        return ascend(self.lpv, self.rate, start, objective, limit, self.search.evaluations, self.budget)[0]
 
     def limit(self, cycle: Trajectory) -> float:
         """How long an ascent may make this cycle, s: a slow one as long as p needs to cross its range and come back."""
@@ -188,7 +206,8 @@ class _Hunt:
 
     def growing(self, cycle: Trajectory) -> LowerBound:
         """The verdict on a cycle along which the state grows."""
-        return LowerBound(math.inf, cycle, None, self.multiplier(cycle, 4))
+        shown = cycle if self.lpv.dt is None else samples(cycle, self.lpv.dt)
+        return LowerBound(math.inf, shown, None, self.multiplier(cycle, 4))
 
     def gain(self, cycle: Trajectory) -> float:
         """L2 gain of the periodic system, inf where it grows."""
@@ -213,7 +232,10 @@ class _Hunt:
             halved = np.repeat(inputs, 2, axis=0).reshape(count, -1)
             half, _ = ratio_from_rest(Lifted.of(self.along(cycle, finer=2, split=2)), halved, rounds=1)
             ratio = min(ratio, half) - abs(ratio - half)
-        width = np.tile(np.diff(system.time), count) if self.lpv.dt is None else np.ones(len(inputs))
+        if self.lpv.dt is not None:
+            p = np.tile(samples(cycle, self.lpv.dt).p, count)
+            return LowerBound(ratio, Trajectory(self.lpv.dt * np.arange(len(p)), p), inputs, growth)
+        width = np.tile(np.diff(system.time), count)
         return LowerBound(ratio, *_flown(cycle, system.time, count, inputs / np.sqrt(width)[:, None]), growth)
 
 

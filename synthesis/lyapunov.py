@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symheli.errors import InputError
+from synthesis import structure
 from synthesis.bernstein import blossom
 from synthesis.lag import LagRegion
-from synthesis.symmetric_power import null_matrix, null_weights, power
+from synthesis.symmetric import symmetrized
+from synthesis.symmetric_power import monomials, null_matrix, null_size, null_weights, power
 
 Array = np.ndarray
 
@@ -34,10 +36,32 @@ class SplineLyapunov:
 
     def __post_init__(self) -> None:
         _freeze(self, "knots", "coefficients", *(() if self.slack is None else ("slack",)))
-        n = self.coefficients.shape[-1]
-        expected = (self.segments * self.degree + 1, n, n)
-        if self.coefficients.shape != expected:
-            raise InputError(f"expected Lyapunov coefficients of shape {expected}, got {self.coefficients.shape}")
+        if self.fault:
+            raise InputError(self.fault)
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong with the form, None where nothing is."""
+        found = structure.first(
+            structure.ascending(self.knots), structure.whole(self.degree, 0, "degree"), structure.whole(self.order, 1, "order")
+        )
+        if found:
+            return found
+        n = self.coefficients.shape[-1] if self.coefficients.ndim else 0
+        if self.slack is not None and (self.slack.ndim != 2 or not np.all(np.isfinite(self.slack))):
+            return f"slack must be finite numbers, a row a Bernstein coefficient, got shape {self.slack.shape}"
+        return structure.symmetric(self.coefficients, (self.segments * self.degree + 1, n, n))
+
+    def fault_for(self, low: float, high: float, states: int) -> str | None:
+        """What keeps it from being a function of `states` states for every p in [low, high]."""
+        if self.fault:
+            return self.fault
+        size = len(monomials(states, self.order)) if self.order > 1 else states
+        if self.coefficients.shape[-1] != size:
+            return f"P is of {self.coefficients.shape[-1]} variables, the model has {size}"
+        if self.slack is not None and self.slack.shape[1] != null_size(states, self.order):
+            return f"slack must have {null_size(states, self.order)} columns, got {self.slack.shape[1]}"
+        return structure.covering(self.knots, low, high)
 
     @property
     def segments(self) -> int:
@@ -110,10 +134,31 @@ class MemoryLyapunov:
 
     def __post_init__(self) -> None:
         _freeze(self, "lead_knots", "coefficients")
-        n = self.coefficients.shape[-1]
-        expected = (self.segments * self.degree + 1, (len(self.lead_knots) - 1) * self.lead_degree + 1, n, n)
-        if self.coefficients.shape != expected:
-            raise InputError(f"expected Lyapunov coefficients of shape {expected}, got {self.coefficients.shape}")
+        if self.fault:
+            raise InputError(self.fault)
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong with the form, None where nothing is."""
+        if not isinstance(self.region, LagRegion):
+            return f"region must be a LagRegion, got {type(self.region).__name__}"
+        found = structure.first(
+            self.region.fault, structure.ascending(self.lead_knots, "lead_knots"), structure.whole(self.degree, 1, "degree"),
+            structure.whole(self.lead_degree, 1, "lead_degree"),
+        )  # fmt: skip
+        if found:
+            return found
+        n = self.coefficients.shape[-1] if self.coefficients.ndim else 0
+        shape = (self.segments * self.degree + 1, (len(self.lead_knots) - 1) * self.lead_degree + 1, n, n)
+        return structure.first(structure.covering(self.lead_knots, 0.0, 1.0, "the share"), structure.symmetric(self.coefficients, shape))
+
+    def fault_for(self, low: float, high: float, states: int) -> str | None:
+        """What keeps it from being a function of `states` states for every p in [low, high]."""
+        if self.fault:
+            return self.fault
+        if self.coefficients.shape[-1] != states:
+            return f"P is of {self.coefficients.shape[-1]} variables, the model has {states}"
+        return structure.covering(self.knots, low, high)
 
     @property
     def knots(self) -> Array:
@@ -165,14 +210,11 @@ Lyapunov = SplineLyapunov | MemoryLyapunov
 
 def _freeze(thing: object, *names: str) -> None:
     for name in names:
-        array = np.array(getattr(thing, name), dtype=float)
-        array.flags.writeable = False
-        object.__setattr__(thing, name, array)
+        object.__setattr__(thing, name, structure.numbers(getattr(thing, name), name))
 
 
 def _congruent(P: Array, T: Array, factor: float) -> Array:
-    M = factor * T.T @ P @ T
-    return 0.5 * (M + np.swapaxes(M, -1, -2))
+    return symmetrized(factor * T.T @ P @ T)
 
 
 def graded_knots(low: float, high: float, segments: int, grading: float, breaks: Sequence[float] = (), shortest: float = 0.0) -> Array:

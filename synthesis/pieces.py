@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +54,11 @@ def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
             functions = functions @ restriction(functions.shape[1] - 1, (a - piece.low) / width, (b - piece.low) / width).T
         out.append(ModelPiece(a, b, *(_coefficients(M, functions) for M in (lpv.A, lpv.B, lpv.C, lpv.D))))
     return tuple(out)
+
+
+def same_pieces(a: Sequence[ModelPiece], b: Sequence[ModelPiece]) -> bool:
+    """Whether they are equal to the last bit."""
+    return len(a) == len(b) and all(np.array_equal(x, y) for one, other in zip(a, b, strict=True) for x, y in zip(one, other, strict=True))
 
 
 def _coefficients(M: Array, functions: Array) -> Array:

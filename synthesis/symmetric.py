@@ -35,6 +35,18 @@ def smat(v: Array, n: int) -> Array:
     return out
 
 
+def symmetrized(M: Array) -> Array:
+    """The symmetric part of matrices (..., n, n): rounding leaves a product that ought to be symmetric a little skew."""
+    return 0.5 * (M + np.swapaxes(M, -1, -2))
+
+
+def extended(M: Array, by: int) -> Array:
+    """[M 0; 0 I] with an identity of size `by`."""
+    out = np.eye(len(M) + by)
+    out[: len(M), : len(M)] = M
+    return out
+
+
 def basis(n: int) -> Array:
     """The matrices (n (n + 1) / 2, n, n) with smat(v) = sum_i v_i basis_i."""
     return smat(np.eye(length(n)), n)

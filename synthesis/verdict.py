@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol, Self, get_args
 
 import numpy as np
 
-from symheli.errors import CertificateError
+from symheli.errors import CertificateError, InputError
+from synthesis.cone_program import Answer
 
 Array = np.ndarray
 Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
@@ -25,6 +27,12 @@ class Status(Enum):
     INFEASIBLE = "no Lyapunov function of this form exists, to the solver's accuracy; the model may still be stable"
     UNPROVEN = "unproven on a grid: the inequalities hold at its points, between them nothing is known"
     FAILED = "solver failed: what it returned could not be verified"
+    UNTRIED = "not tried: the programs of this form are too large for the solver; nothing is known"
+
+    @classmethod
+    def without_proof(cls, answer: Answer) -> Status:
+        """What is known where nothing was proven and the last program tried was answered so."""
+        return {Answer.INFEASIBLE: cls.INFEASIBLE, Answer.UNTRIED: cls.UNTRIED}.get(answer, cls.FAILED)
 
 
 class Seconds(NamedTuple):
@@ -40,9 +48,9 @@ class Seconds(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines (discrete time: samples) between them.
+    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines between them; a jump has one time twice.
 
-    Several parameters: `p` (n, m).
+    Discrete time: one p for every sample. A cycle is to be repeated. Several parameters: `p` (n, m).
     """
 
     time: Array
@@ -51,6 +59,10 @@ class Trajectory(NamedTuple):
 
 class Judge(Protocol):
     """A model with its hypotheses, against which a Lyapunov function (with its multipliers) and a bound are checked."""
+
+    def fault(self, proof: Any, kind: Kind, rates: tuple[float, ...], /) -> str | None:
+        """What is wrong with the form of the proof, or keeps it from being about this claim; None where nothing does."""
+        ...
 
     def floating(self, proof: Any, bound: float, /) -> bool:
         """In floating point, with a margin for rounding."""
@@ -99,7 +111,11 @@ class Verdict(ABC):
     worst: Trajectory | None = None
 
     def __post_init__(self) -> None:
-        """The order of the bounds. Raises `CertificateError`: one of two numbers that contradict each other is wrong."""
+        """The form of the claim, then the order of the bounds.
+
+        Raises `InputError` for what is no claim, `CertificateError` where two numbers contradict each other: one of them is wrong.
+        """
+        self._check_form()
         sign, moving = (-1.0, "upper bound") if self.kind == "decay rate" else (1.0, "lower bound")
         what = self.kind.split()[-1] if self.kind.endswith("gain") else self.kind
         # frozen and limit are computed to 1e-8, what is proven is loosened by 5e-7 at least
@@ -112,7 +128,18 @@ class Verdict(ABC):
         if sign * (self.frozen - self.limit) > 1e-9 * abs(self.frozen):
             raise CertificateError(f"the {moving} {self.limit:.9g} forgets the frozen {what} {self.frozen:.9g}")
         if self.verified and self.status is not Status.PROVEN:
-            raise CertificateError(f"a verified certificate cannot have the status {self.status.name}")
+            raise CertificateError(f"a verified certificate cannot have the status {self.status}")
+        if self.verified and self.kind == "decay rate" and not self.alpha >= 0:
+            raise CertificateError(f"a decay rate of {self.alpha:.6g} is growth, and proves nothing")
+
+    def _check_form(self) -> None:
+        if not isinstance(self.kind, str) or self.kind not in get_args(Kind):
+            raise InputError(f"expected one of the kinds {', '.join(get_args(Kind))}, got {self.kind!r:.60}")
+        if not isinstance(self.rates, tuple):
+            raise InputError(f"expected a tuple of rates, one each parameter, got {self.rates!r:.60}")
+        for bound in (self.gamma, self.lower, self.alpha, self.upper, self.frozen, *self.rates):
+            if not isinstance(bound, float):
+                raise InputError(f"bounds and rates must be floats (NaN where there is none), got {bound!r:.60}")
 
     @property
     def proven(self) -> float:
@@ -142,9 +169,35 @@ class Verdict(ABC):
         factorisations decide; nothing between grid points is left out. Without a proof nothing is verified.
         """
         proof, judge = self._proof
-        if proof is None or judge is None:
+        if proof is None or judge is None or self.fault is not None:
             return False
-        return (judge.exact if rigorous else judge.floating)(proof, self.proven)
+        try:
+            with np.errstate(all="ignore"):
+                return (judge.exact if rigorous else judge.floating)(proof, self.proven)
+        except (np.linalg.LinAlgError, OverflowError):
+            # numbers too large to compute with show nothing
+            return False
+
+    def resting_on(self, sentences: Iterable[str]) -> Self:
+        """The same with further hypotheses."""
+        return replace(self, hypotheses=(*self.hypotheses, *sentences))
+
+    @property
+    def fault(self) -> str | None:
+        """Why the claim cannot be what was proven, by its form alone: a sentence, None where nothing is wrong or nothing is proven."""
+        proof, judge = self._proof
+        if proof is None or judge is None:
+            return None
+        if self.kind != "decay rate" and not math.isnan(self.alpha):
+            return f"a proof of the {self.kind} has no decay rate"
+        if not self.kind.endswith("gain") and not math.isnan(self.gamma):
+            return f"a proof of the {self.kind} has no gain"
+        if self.kind != "stability" and not 0 <= self.proven < math.inf:
+            return f"the bound of a {self.kind} must be a finite number >= 0, got {self.proven}"
+        try:
+            return judge.fault(proof, self.kind, self.rates)
+        except (TypeError, ValueError, AttributeError, LookupError, OverflowError) as error:
+            return f"the evidence is none that an analysis made: {error}"
 
     @property
     @abstractmethod

@@ -8,12 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
+from symheli.lpv import LPVStateSpace, Matrices
+from synthesis import pointwise, structure
 from synthesis.bernstein import transpose
 from synthesis.claim import Claim, Number, lmi_polynomials
 from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov
-from synthesis.pieces import ModelPiece
+from synthesis.pieces import ModelPiece, model_pieces, same_pieces
 from synthesis.scaling import Scaling
+from synthesis.symmetric import extended, symmetrized
 from synthesis.symmetric_power import generator, monomials
 
 Array = np.ndarray
@@ -31,8 +33,11 @@ class Findings(NamedTuple):
     conditioning: float
 
 
-def examine(claim: Claim) -> Findings:
-    """Floating point: eigenvalues of every coefficient, and the least g by Schur complement. Pass scaled data."""
+def examine(claim: Claim, weight: Array) -> Findings:
+    """Floating point: eigenvalues of every coefficient, and the least g by Schur complement. Pass scaled data.
+
+    `weight` changes the coordinates of the state blocks for the sake of rounding.
+    """
     P = claim.P
     if not claim.meaningful:
         return Findings(False, False, math.inf, math.inf)
@@ -43,6 +48,9 @@ def examine(claim: Claim) -> Findings:
     decreasing, g = True, 0.0
     for form in lmi_polynomials(claim, float):
         F = form.block.reshape(-1, *form.block.shape[-2:])
+        if len(weight) == n:
+            W = extended(weight, F.shape[1] - n)
+            F = symmetrized(W.T @ F @ W)
         top = F[:, :n, :n]
         eigenvalues = np.linalg.eigvalsh(top)
         decreasing &= bool(np.all(eigenvalues[:, -1] < -_rounding(n) * np.abs(eigenvalues).max(axis=1)))
@@ -201,13 +209,29 @@ class Evidence(NamedTuple):
     rate: float
     elevation: int
 
+    def fault(self, P: Lyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
+        """What keeps P from being about this model and this claim, before any inequality; None where nothing does."""
+        if not isinstance(P, SplineLyapunov | MemoryLyapunov):
+            return f"expected a SplineLyapunov or a MemoryLyapunov, got {type(P).__name__}"
+        if kind != ("l2 gain" if self.lpv.inputs else "stability"):
+            return f"the model of the proof is not one of the kind {kind!r}"
+        if not self.rate >= 0 or rates != (self.rate,):
+            return f"the proof is for rates {(self.rate,)}, the claim for {rates}"
+        s = self.lpv.scheduling
+        return structure.first(
+            P.fault_for(s.low, s.high, len(self.lpv.states)),
+            structure.whole(self.elevation, 0, "elevation"),
+            self.units.fault(len(self.lpv.states)),
+            None if same_pieces(self.pieces, model_pieces(self.lpv)) else "the pieces are not those of the model",
+        )
+
     def least_gain(self, P: Lyapunov) -> tuple[float, float]:
         """(gain that P admits, conditioning of P); inf where P proves nothing, NaN without channels. Floating point."""
         units = self.units
         scaled = tuple(piece.scaled(units.left, units.right, units.channel, units.time) for piece in self.pieces)
         back = P.in_units(units.right, units.channel**-2, units.time)
         rate = self.rate * units.time if self.lpv.dt is None else self.rate
-        findings = examine(Claim(scaled, back, rate, self.lpv.dt, self.elevation))
+        findings = examine(Claim(scaled, back, rate, self.lpv.dt, self.elevation), units.weight)
         if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
             return math.inf, math.inf
         return (units.channel * math.sqrt(findings.g) if self.lpv.inputs else math.nan), findings.conditioning
@@ -219,11 +243,43 @@ class Evidence(NamedTuple):
         claim = self._claim(P)
         if not (enough and claim.meaningful and claim.invariant(rational())):
             return False
-        return holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right)
+        return holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right @ self.units.weight)
 
     def exact(self, P: Lyapunov, gamma: float) -> bool:
-        """The same over the whole interval in rational arithmetic."""
-        return proven(self._claim(P), gamma)
+        """The same over the whole interval in rational arithmetic, and again at some p through the model's own matrices."""
+        return proven(self._claim(P), gamma) and self.witnessed(P, gamma, rational())
+
+    def witnessed(self, P: Lyapunov, gamma: float, number: Number) -> bool:
+        """The pieces are the model, and the inequalities hold at some p without them; see `pointwise`."""
+        lpv, g = self.lpv, None if math.isnan(gamma) else number(gamma) * number(gamma)
+        s = lpv.scheduling
+        breaks = [b for piece in lpv.basis.pieces() for b in (piece.low, piece.high) if s.low < b < s.high]
+        points = pointwise.inside([s.low, s.high, *P.knots, *breaks])
+        if not all(self._reproduced(p) for p in pointwise.inside([s.low, s.high, *breaks])):
+            return False
+        for p in points:
+            model = Matrices(*(pointwise.numbers(M, number) for M in lpv.matrices(p)))
+            if isinstance(P, SplineLyapunov) and P.order > 1:
+                if not pointwise.decreases(P, p, model.A, self.rate, self.units.right, number):
+                    return False
+                continue
+            every = (
+                pointwise.memory_inequalities(P, p, model, self.rate, g, number)
+                if isinstance(P, MemoryLyapunov)
+                else pointwise.spline_inequalities(P, p, model, self.rate, lpv.dt, g, (s.low, s.high), number)
+            )
+            if not all(positive_definite(-F) for F in every):
+                return False
+        return True
+
+    def _reproduced(self, p: float) -> bool:
+        piece = next(piece for piece in self.pieces if p <= piece.high)
+        t, weights, lpv = (p - piece.low) / (piece.high - piece.low), np.abs(self.lpv.basis(p)), self.lpv
+        for coefficients, own, terms in zip(piece[2:], lpv.matrices(p), (lpv.A, lpv.B, lpv.C, lpv.D), strict=True):
+            size = np.tensordot(weights, np.abs(terms), axes=1)
+            if not pointwise.same_entries(pointwise.bernstein(coefficients, t), own, size):
+                return False
+        return True
 
     def _claim(self, P: Lyapunov) -> Claim:
         return Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation)

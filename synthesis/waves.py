@@ -61,6 +61,13 @@ class Steps(NamedTuple):
         return out
 
 
+def samples(trajectory: Trajectory, dt: float) -> Trajectory:
+    """One value of p a sample, from the start to one sample before the end: a cycle can be repeated as it is."""
+    time, p = trajectory
+    at = time[0] + dt * np.arange(max(1, round((time[-1] - time[0]) / dt)))
+    return Trajectory(at, np.interp(at, time, p))
+
+
 def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1) -> Steps:
     """The model along straight lines between the corners (`time`, `p`), in steps of at most `longest` s, each cut in `split`.
 
@@ -69,9 +76,9 @@ def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1)
     """
     n = len(lpv.states)
     if lpv.dt is not None:
-        count = max(1, round((time[-1] - time[0]) / lpv.dt))
-        at = time[0] + lpv.dt * np.arange(count + 1)
-        A, B, C, D = lpv.matrices(_clip(lpv, np.interp(at[:-1], time, p)))
+        sampled = samples(Trajectory(time, p), lpv.dt)
+        A, B, C, D = lpv.matrices(_clip(lpv, sampled.p))
+        at = np.append(sampled.time, sampled.time[-1] + lpv.dt)
         return Steps(np.concatenate([np.concatenate([A, B], 2), np.concatenate([C, D], 2)], 1), at, n)
     starts, widths, p0, slope = [], [], [], []
     for t0, t1, q0, q1 in zip(time[:-1], time[1:], p[:-1], p[1:], strict=True):

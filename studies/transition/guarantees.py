@@ -116,7 +116,7 @@ def bounds(
     relaxation = Relaxation(segments=segments)
     for rate in rates:
         form = CONSTANT if math.isinf(rate) else PLAIN
-        certificate = synthesis.l2_gain(lpv, rate, relaxation=relaxation, search=Search() if math.isinf(rate) else search)
+        certificate = synthesis.l2_gain(lpv, rate, relaxation=relaxation, search=Search(seconds=math.inf) if math.isinf(rate) else search)
         yield Bound(name, channel, rate, form, certificate)
         if not certificate.verified and math.isfinite(certificate.lower):
             yield Bound(name, channel, rate, form, synthesis.stability(lpv, rate, relaxation=relaxation, search=None))

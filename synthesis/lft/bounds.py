@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from scipy.optimize import minimize
 
 from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
+from synthesis.budget import Budget
 from synthesis.frozen import FrozenGain, norm
 from synthesis.lower_bound import LowerBound, Search, growing_trajectory, lower_bound
 from synthesis.verdict import Trajectory
@@ -88,7 +90,12 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
     best = LowerBound(frozen.gamma, None)
     limits = [s.rate / s.radius for s in lft.parameters if math.isfinite(s.rate) and s.rate > 0]
     tries = [(*line, rate) for rate in (math.inf, *limits[:1]) for line in _lines(len(lft.blocks))] if search else []
-    for start, end, rate in tries:
+    budget = Budget(search.seconds if search else math.inf)
+    for k, (start, end, rate) in enumerate(tries):
+        if search is None or budget.over:
+            break
+        budget.tell("line %d of %d, gain %.6g so far", k + 1, len(tries), best.gamma)
+        search = replace(search, seconds=budget.left / (len(tries) - k))
         found = lower_bound(along(lft, start, end), rate, frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega), search=search)
         if found.gamma > best.gamma:
             best = found._replace(trajectory=found.trajectory and _in_box(lft, found.trajectory, start, end))
@@ -99,7 +106,14 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
 
 def box_growing_trajectory(lft: LFT, search: Search | None) -> Trajectory | None:
     """A p(t) along such a line on which the free state grows, None where none was found."""
-    for start, end in _lines(len(lft.blocks)) if search else ():
+    if search is None:
+        return None
+    budget, lines = Budget(search.seconds), _lines(len(lft.blocks))
+    for k, (start, end) in enumerate(lines):
+        if budget.over:
+            break
+        budget.tell("line %d of %d", k + 1, len(lines))
+        search = replace(search, seconds=budget.left / (len(lines) - k))
         found = growing_trajectory(along(lft, start, end), math.inf, search)
         if found is not None:
             return _in_box(lft, found, start, end)

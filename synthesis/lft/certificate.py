@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.errors import InputError
 from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.verdict import Verdict
 
@@ -37,6 +38,19 @@ class LFTCertificate(Verdict):
     scaling: str
     proof: Quadratic | None
     evidence: Evidence | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.scaling, str):
+            raise InputError(f"expected the name of a scaling, got {self.scaling!r:.60}")
+
+    @property
+    def fault(self) -> str | None:
+        """As for every certificate; the multiplier is of the class the certificate names."""
+        found = super().fault
+        if found or self.proof is None or self.proof.multiplier.scaling == self.scaling:
+            return found
+        return f"the multiplier is of the class {self.proof.multiplier.scaling!r}, the claim of {self.scaling!r:.60}"
 
     @property
     def lyapunov(self) -> Array | None:

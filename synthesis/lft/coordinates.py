@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from symheli.lpv import LFT
+from symheli.lpv import LFT, Matrices
 from symheli.lpv.lft.model import parts
 from synthesis.scaling import Scaling, model_scaling
 
@@ -47,7 +47,7 @@ def split(lft: LFT) -> Loop:
 
 def scaled(lft: LFT, coordinates: Coordinates) -> Loop:
     """The LFT in these coordinates: outputs divided by the channel, time in its unit, energies keep their ratios."""
-    (left, right, channel, time), L, R = coordinates.units, coordinates.left, coordinates.right
+    (left, right, channel, time, _), L, R = coordinates.units, coordinates.left, coordinates.right
     loop, root = split(lft), np.sqrt(time)
     return Loop(
         time * left @ loop.A @ right, root * left @ loop.Bw @ R, root * left @ loop.Bu,
@@ -60,12 +60,16 @@ def coordinates(lft: LFT, gain: float, *, one: bool = False) -> Coordinates:
     """From the model at the middle of the box and an expected `gain`: states by a Lyapunov solution, the copies of a parameter
     by balancing what state noise and inputs make of z against what w makes of state and outputs (`one`: by one number)."""
     middle = lft.at(*(s.middle for s in lft.parameters))
-    plain = Coordinates(model_scaling(middle, gain), np.eye(lft.order), np.eye(lft.order))
+    every = [lft.at(*(s.middle + delta * s.radius for s in lft.parameters)) for delta in np.linspace(-1.0, 1.0, 9)]
+    elsewhere = Matrices(*(np.stack([getattr(model, name) for model in every]) for name in "ABCD"))
+    plain = Coordinates(model_scaling(middle, gain, elsewhere), np.eye(lft.order), np.eye(lft.order))
     loop, n, x = scaled(lft, plain), lft.order, len(lft.states)
     s = _frequencies(loop.A, lft.dt is None)
     pencil = s[:, None, None] * np.eye(x) - loop.A
-    B, C = np.hstack([loop.Bw, np.eye(x), loop.Bu]), np.vstack([loop.Cz, np.eye(x), loop.Cy])
-    G = C @ np.linalg.solve(pencil, np.broadcast_to(B, (len(s), *B.shape)))
+    noise = linalg.inv(plain.units.weight)
+    B, C = np.hstack([loop.Bw, noise, loop.Bu]), np.vstack([loop.Cz, noise, loop.Cy])
+    # the pseudo-inverse: only sizes matter, and next to a pole that is singular to rounding there is one too
+    G = C @ np.linalg.pinv(pencil) @ B
     G[:, :n, :n] += loop.Dzw
     G[:, :n, n + x :] += loop.Dzu
     G[:, n + x :, :n] += loop.Dyw
@@ -84,8 +88,9 @@ def _frequencies(A: Array, continuous: bool) -> Array:
     if not continuous:
         return 1.005 * np.exp(1j * np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 40)]))
     size = np.abs(np.linalg.eigvals(A)) if len(A) else np.ones(1)
-    omega = np.concatenate([[0.0], np.geomspace(0.3 * max(size.min(), 1e-3 * size.max()), 3 * size.max(), 40)])
-    return 1j * omega + 0.005 * size.max()
+    slowest = max(float(size.min()), 1e-12 * float(size.max()), 1e-300)
+    omega = np.concatenate([[0.0], np.geomspace(0.3 * slowest, 3 * max(float(size.max()), slowest), 40), size])
+    return 1j * omega + 0.005 * np.maximum(omega, slowest)
 
 
 def _spread(direct: Array, around: Array) -> Array:
@@ -98,10 +103,15 @@ def _balancing(reach: Array, seen: Array) -> Array:
     """T with T^-1 reach T^-T = T' seen T, diagonal; directions that hardly matter are treated as if they did."""
     if not len(reach):
         return reach
+    # each copy in a unit of its own first: those it came with may differ by any number
+    a, b = np.diag(reach), np.diag(seen)
+    both = (a > 0) & (b > 0)
+    unit = np.where(both, a / np.where(both, b, 1.0), 1.0) ** 0.25
+    reach, seen = reach / np.outer(unit, unit), seen * np.outer(unit, unit)
     reach, seen = (M + 1e-6 * max(float(np.trace(M)) / len(M), 1e-300) * np.eye(len(M)) for M in (reach, seen))
     root = linalg.cholesky(reach, lower=True)
     values, V = linalg.eigh(root.T @ seen @ root)
-    return root @ V / np.maximum(values, 1e-300) ** 0.25
+    return unit[:, None] * root @ V / np.maximum(values, 1e-300) ** 0.25
 
 
 def _adjoint(G: Array) -> Array:

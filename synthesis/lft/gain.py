@@ -9,7 +9,9 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT
+from synthesis.budget import said
 from synthesis.cone_program import Answer, Candidate, ConeProgram, Solver, solve
+from synthesis.hypotheses import VERIFIED
 from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
 from synthesis.lft.certificate import LFTCertificate, Trial
 from synthesis.lft.coordinates import coordinates, scaled
@@ -17,18 +19,15 @@ from synthesis.lft.multipliers import Class, Multiplier, check_scaling, multipli
 from synthesis.lft.program import gain_program, inequality, margin_program, unpack, with_state_channels
 from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.lower_bound import THOROUGH, LowerBound, Search
+from synthesis.proof_search import NOTHING, inflated
+from synthesis.scaling import in_its_own_scale
+from synthesis.spectrum import surely_unstable
 from synthesis.verdict import Seconds, Status, Trajectory
 
 Array = np.ndarray
 
-INFLATION = 1e-6
-"""gamma^2 is raised by this fraction above what the proof admits in floating point, so that an exact check has room."""
-
 MARGINS = (1e-7, 1e-6, 1e-5, 1e-3)
 """The (x, w) block is held below -margin I in scaled coordinates, tried in turn until the answer is verified."""
-
-NOTHING = 1e-6
-"""A largest margin below this (P <= I, scaled) counts as none: the solver is no more accurate than that."""
 
 
 def lft_gain(
@@ -47,11 +46,23 @@ def lft_gain(
     start = time.perf_counter()
     frozen = frozen_box_gain(lft)
     if math.isinf(frozen.gamma):
-        return _certificate(lft, scaling, solver, None, LowerBound(math.inf, _at_rest(frozen)), math.inf, time.perf_counter() - start)
+        if surely_unstable(lft.at(*frozen.p).A, lft.dt):
+            return _certificate(lft, scaling, solver, None, LowerBound(math.inf, _at_rest(frozen)), math.inf, time.perf_counter() - start)
+        # stable or not to rounding: nothing is known from below
+        frozen, search = BoxGain(0.0, frozen.p, math.nan), None
     below = box_lower_bound(lft, frozen, search)
     bounds = time.perf_counter() - start
-    attempt = _Attempt(lft, scaling, solver, below.gamma if math.isfinite(below.gamma) else frozen.gamma)
-    return _certificate(lft, scaling, solver, attempt.run(), below, frozen.gamma, bounds)
+
+    def found(expected: float) -> tuple[_Attempt, float, float]:
+        attempt = _Attempt(lft, scaling, solver, expected).run()
+        return attempt, attempt.gamma, attempt.evidence.coordinates.units.channel
+
+    tries = in_its_own_scale(found, frozen.gamma)
+    best = min(tries, key=lambda attempt: attempt.gamma)
+    for other in tries:
+        if other is not best:
+            best.add(other)
+    return _certificate(lft, scaling, solver, best, below, frozen.gamma, bounds).resting_on(said(search and search.seconds, bounds))
 
 
 def lft_stability(
@@ -64,7 +75,7 @@ def lft_stability(
     """
     solver = _checked(lft, scaling, solver)
     frozen = frozen_box_gain(lft.select(inputs=(), outputs=()))
-    if math.isinf(frozen.gamma):
+    if math.isinf(frozen.gamma) and surely_unstable(lft.at(*frozen.p).A, lft.dt):
         return _certificate(lft, scaling, solver, None, LowerBound(math.nan, _at_rest(frozen)), math.nan, 0.0)
     found = _Attempt(lft.select(inputs=(), outputs=()), scaling, solver, 1.0).run()
     start = time.perf_counter()
@@ -86,7 +97,7 @@ class _Attempt:
         if not lft.inputs:
             loop = with_state_channels(loop)
         self.inputs = loop.Bu.shape[1]
-        self.linear = inequality(loop, self.multipliers, lft.dt is None)
+        self.linear = inequality(loop, self.multipliers, lft.dt is None).congruent(self.evidence.coordinates.units.weight)
         self.proof: Quadratic | None = None
         self.gamma, self.conditioning, self.answer = math.inf, math.inf, Answer.FAILED
         self.trials: list[Trial] = []
@@ -104,7 +115,7 @@ class _Attempt:
             candidate = self._solve(gain_program(self.linear, self.multipliers, x, self.inputs, margin))
             self._judge("gain", margin, candidate, (1.0,))
             self.answer = candidate.answer
-            if self.proof is not None or candidate.answer is Answer.INFEASIBLE:
+            if self.proof is not None or candidate.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
                 break
         if self.proof is None:
             candidate = self._solve(margin_program(self.linear, self.multipliers, x, self.inputs))
@@ -114,6 +125,12 @@ class _Attempt:
                 self.answer = Answer.INFEASIBLE if margin <= NOTHING else Answer.FAILED
         self.ended = time.perf_counter()
         return self
+
+    def add(self, other: _Attempt) -> None:
+        """The programs and the time of another attempt at the same gain."""
+        self.trials = other.trials + self.trials
+        self.solving, self.verifying = self.solving + other.solving, self.verifying + other.verifying
+        self.begin -= other.ended - other.begin
 
     def _solve(self, program: ConeProgram) -> Candidate:
         candidate = solve(program, self.solver)
@@ -127,7 +144,7 @@ class _Attempt:
         for weight in weights if candidate.x is not None else ():
             proof = self._physical(float(weight) * np.asarray(candidate.x))
             least, conditioning = self.evidence.least_gain(proof)
-            gamma = least * math.sqrt(1 + INFLATION)
+            gamma = inflated(least, self.evidence.coordinates.units.channel)
             if gamma >= best or not self.evidence.floating(proof, gamma):
                 continue
             self.proof, self.gamma, self.conditioning, best = proof, gamma, conditioning, gamma
@@ -172,7 +189,7 @@ def _certificate(
     elif growing:
         status = Status.GROWING
     else:
-        status = Status.INFEASIBLE if found.answer is Answer.INFEASIBLE else Status.FAILED
+        status = Status.without_proof(found.answer)
     gamma = math.nan if kind == "stability" else found.gamma if found else math.inf
     seconds = Seconds(*(found.seconds if found else (0.0, 0.0, 0.0)), bounds)
     return LFTCertificate(
@@ -195,7 +212,7 @@ def _hypotheses(lft: LFT, scaling: str, proof: Quadratic | None, kind: str) -> t
     ranges = ", ".join(f"{s.name} in [{s.low:g}, {s.high:g}]{'' if s.unit == '1' else ' ' + s.unit}" for s in lft.parameters)
     out = [f"{ranges or 'no parameter'}: exogenous, as fast as it likes; a limit on its rate is not used", f"constant P; {_CLASS[scaling]}"]
     if proof is not None:
-        out.append("verified in floating point: finitely many matrices; verify(rigorous=True) proves it in exact arithmetic")
+        out.append(VERIFIED.format(what="finitely many matrices", shared="only the matrices of the LFT"))
     if kind == "l2 gain":
         out.append("the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs together")
     return tuple(out)

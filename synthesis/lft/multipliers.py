@@ -24,6 +24,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.lft.model import parts
+from synthesis import structure
 from synthesis.symmetric import basis
 
 Array = np.ndarray
@@ -46,13 +47,22 @@ class Multiplier:
     R: Array
 
     def __post_init__(self) -> None:
-        n = sum(self.sizes)
+        if not isinstance(self.sizes, tuple) or any(structure.whole(size, 0, "size") for size in self.sizes):
+            raise InputError(f"expected a tuple of block sizes, got {self.sizes!r:.60}")
         for name in ("Q", "S", "R"):
-            array = np.array(getattr(self, name), dtype=float)
-            if array.shape != (n, n):
-                raise InputError(f"{name} of a multiplier: expected shape {(n, n)}, got {array.shape}")
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, structure.numbers(getattr(self, name), name))
+        if self.fault:
+            raise InputError(self.fault)
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong with the form, None where nothing is."""
+        if not isinstance(self.scaling, str) or self.scaling not in SCALINGS:
+            return f"expected one of the scalings {', '.join(SCALINGS)}, got {self.scaling!r:.60}"
+        n = sum(self.sizes)
+        if self.S.shape != (n, n) or not np.all(np.isfinite(self.S)):
+            return f"S of a multiplier: expected finite numbers of shape {(n, n)}, got shape {self.S.shape}"
+        return structure.first(*(structure.symmetric(M, (n, n), f"{name} of a multiplier") for name, M in (("Q", self.Q), ("R", self.R))))
 
     @property
     def matrix(self) -> Array:

@@ -18,7 +18,7 @@ from scipy import sparse
 from synthesis.cone_program import ConeProgram
 from synthesis.lft.coordinates import Loop
 from synthesis.lft.multipliers import Class
-from synthesis.symmetric import basis, smat, svec
+from synthesis.symmetric import basis, extended, smat, svec
 
 Array = np.ndarray
 
@@ -32,6 +32,11 @@ class Linear(NamedTuple):
     constant: Array
     matrices: Array
     first: int
+
+    def congruent(self, weight: Array) -> Linear:
+        """W' F W for every F, W = diag(weight, I)."""
+        W = extended(weight, len(self.constant) - len(weight))
+        return self._replace(constant=W.T @ self.constant @ W, matrices=W.T @ self.matrices @ W)
 
 
 def inequality(loop: Loop, multipliers: Class, continuous: bool) -> Linear:

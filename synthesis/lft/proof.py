@@ -7,18 +7,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LFT
+from symheli.lpv import LFT, Matrices
 from symheli.lpv.lft.model import parts
+from synthesis import pointwise, structure
 from synthesis.lft.coordinates import Coordinates
 from synthesis.lft.multipliers import Multiplier
 from synthesis.verify import positive_definite, rational
 
 Array = np.ndarray
 Number = Callable[[float], Any]
+
+CORNERS = 6
+"""Most parameters at all of whose corners a proof is checked once more."""
 
 
 class Quadratic(NamedTuple):
@@ -34,6 +39,23 @@ class Evidence(NamedTuple):
     lft: LFT
     coordinates: Coordinates
 
+    def fault(self, proof: Quadratic, kind: str, rates: tuple[float, ...]) -> str | None:
+        """What keeps the proof from being about this LFT and this claim, before any inequality; None where nothing does."""
+        if not isinstance(proof, Quadratic) or not isinstance(proof.multiplier, Multiplier):
+            return "expected P and a Multiplier"
+        if kind != ("l2 gain" if self.lft.inputs else "stability"):
+            return f"the LFT of the proof is not one of the kind {kind!r}"
+        if rates != (math.inf,) * len(self.lft.parameters):
+            return f"the proof is for parameters that jump, the claim for rates {rates}"
+        x, M = len(self.lft.states), proof.multiplier
+        units, left, right = self.coordinates
+        return structure.first(
+            structure.symmetric(np.asarray(proof.P), (x, x), "P"),
+            M.fault or (None if _structure_holds(M, self.lft) else f"the multiplier is not of the class {M.scaling!r} for this LFT"),
+            structure.coordinates(left, right, (), self.lft.order),
+            units.fault(x),
+        )
+
     def least_gain(self, proof: Quadratic) -> tuple[float, float]:
         """(gain that the proof admits, condition number of P); inf where it proves nothing, NaN without channels."""
         lft, (units, _, right) = self.lft, self.coordinates
@@ -41,7 +63,7 @@ class Evidence(NamedTuple):
         n, x = lft.order, len(lft.states)
         root = math.sqrt(units.time)
         # columns of (w, x, u); energies divided by the channel squared and counted in the unit of time
-        E[:n, :n], E[n : n + x, n : n + x] = right, root * units.right
+        E[:n, :n], E[n : n + x, n : n + x] = right, root * units.right @ units.weight
         E[n + x :, n + x :] = np.eye(len(lft.inputs))
         F = E.T @ _left_side(lft, proof, float) @ E / units.channel**2
         F = 0.5 * (F + F.T)
@@ -71,7 +93,22 @@ class Evidence(NamedTuple):
         else:
             for i in range(n + x, len(F)):
                 F[i, i] = F[i, i] + number(gamma) * number(gamma)
-        return all(positive_definite(M) for M in (_exact(proof.P, number), *_conditions(proof.multiplier, number), F))
+        exactly = all(positive_definite(M) for M in (_exact(proof.P, number), *_conditions(proof.multiplier, number), F))
+        return exactly and self.witnessed(proof, gamma, number)
+
+    def witnessed(self, proof: Quadratic, gamma: float, number: Number) -> bool:
+        """V = x'Px does at the corners of the box and inside it what is claimed, through the closed model's own matrices."""
+        g = None if math.isnan(gamma) else number(gamma) * number(gamma)
+        P, m = _exact(proof.P, number), len(self.lft.parameters)
+        corners = product((-1.0, 1.0), repeat=m) if m <= CORNERS else ()
+        diagonals = (np.where(np.arange(m) % 2, -t, t) for t in np.linspace(-0.9, 0.9, 7))
+        for delta in (*corners, *diagonals):
+            model = self.lft.at(*(s.middle + d * s.radius for s, d in zip(self.lft.parameters, delta, strict=True)))
+            own = Matrices(*(_exact(M, number) for M in (model.A, model.B, model.C, model.D)))
+            F = pointwise.dissipation(own, P, None, None if self.lft.dt is None else P, g)
+            if not positive_definite(-F):
+                return False
+        return True
 
     def _conditions_hold(self, proof: Quadratic) -> bool:
         units, right = self.coordinates.units, self.coordinates.right

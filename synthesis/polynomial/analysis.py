@@ -12,9 +12,11 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace
+from synthesis.budget import said
 from synthesis.certificate import Attempt
 from synthesis.cone_program import Answer, Candidate, Solver, solve
 from synthesis.forms import Relaxation
+from synthesis.hypotheses import VERIFIED, fitted
 from synthesis.lower_bound import Search
 from synthesis.lyapunov import graded_knots
 from synthesis.polynomial.bounds import Worst, growing, measure, worst_frozen, worst_moving
@@ -25,8 +27,9 @@ from synthesis.polynomial.program import Shape, affine_inequalities, assemble
 from synthesis.polynomial.proof import Evidence, Units
 from synthesis.polynomial.regions import Pieces, pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
-from synthesis.proof_search import NOTHING
-from synthesis.scaling import model_scaling
+from synthesis.proof_search import CLOSE, NOTHING
+from synthesis.scaling import in_its_own_scale, model_scaling
+from synthesis.spectrum import surely_unstable
 from synthesis.symmetric import length, smat
 from synthesis.verdict import Kind, Seconds, Status, Trajectory
 
@@ -36,6 +39,9 @@ Rate = float | Sequence[float] | Mapping[str, float] | None
 
 DECAY_TOLERANCE = 2e-3
 """The decay rate is found to this fraction of the frozen one."""
+
+ROUNDED = 1e-12
+"""What is looked for where the slowest frozen mode is stable or not to rounding, 1/s."""
 
 SAMPLES = {1: 17, 2: 7}
 """Values of each parameter in a region at which the bound of a P is first computed (more parameters: 3)."""
@@ -56,6 +62,10 @@ def box_certificate(
     sign = 1.0 if kind.endswith("gain") else -1.0
     report = _Report(piece, demand, relaxation, solver, sign * frozen.value)
     unstable = math.isinf(frozen.value) if sign > 0 else frozen.value >= 0
+    if unstable and not surely_unstable(piece.at(np.array([frozen.p])).A[0], piece.dt):
+        # stable or not to rounding: nothing is known from below
+        frozen, search, unstable = Worst(0.0 if sign > 0 else -ROUNDED, frozen.p), None, False
+        report = _Report(piece, demand, relaxation, solver, sign * frozen.value)
     if unstable:
         at_rest = Trajectory(np.zeros(1), _alone(np.array([frozen.p])))
         return report.nothing(Status.UNSTABLE, frozen, at_rest, time.perf_counter() - start)
@@ -63,15 +73,16 @@ def box_certificate(
     bounds = time.perf_counter() - start
     if math.isinf(limit.value) if sign > 0 else limit.value >= 0:
         return report.nothing(Status.GROWING, limit, limit.trajectory, bounds)
-    hunt = _Hunt(piece, demand, relaxation, solver, limit.value if sign > 0 else 1.0)
-    best = hunt.decay(sign * limit.value) if kind == "decay rate" else hunt.gain(limit.value)
+    hunt = _Hunt(piece, demand, relaxation, solver)
+    best = hunt.decay(sign * frozen.value) if kind == "decay rate" else hunt.gain(frozen.value)
     if best.lyapunov is None and kind == "stability":
         start = time.perf_counter()
         worst = growing(model, demand, search)
         bounds += time.perf_counter() - start
         if worst is not None:
             return report.nothing(Status.GROWING, frozen, worst, bounds, hunt)
-    return report.found(best, sign * limit.value, limit.trajectory, bounds, hunt)
+    cert = report.found(best, sign * limit.value, limit.trajectory, bounds, hunt)
+    return cert if kind == "stability" else cert.resting_on(said(search and search.seconds, bounds))
 
 
 class Found(NamedTuple):
@@ -79,58 +90,96 @@ class Found(NamedTuple):
 
     lyapunov: BoxLyapunov | None
     bound: float
-    answer: Answer = Answer.FAILED
+    answer: Answer = Answer.UNTRIED
 
 
 class _Hunt:
     """Cone programs of finer and finer P."""
 
-    def __init__(self, model: Pieces, demand: Demand, relaxation: Relaxation, solver: Solver, expected: float):
+    def __init__(self, model: Pieces, demand: Demand, relaxation: Relaxation, solver: Solver, expected: float = 1.0):
         self.model, self.demand, self.relaxation, self.solver = model, demand, relaxation, solver
-        self.evidence = Evidence(model, _units(model, demand.kind, expected), demand)
-        self.scaled, self.scaled_demand = self.evidence.scaled
         self.attempts: list[Attempt] = []
         self.spent = np.zeros(3)
+        self.expect(expected)
+
+    def expect(self, bound: float) -> None:
+        """Set the units in which numbers are of order one where the bound is near this one."""
+        self.evidence = Evidence(self.model, _units(self.model, self.demand.kind, bound), self.demand)
+        self.scaled, self.scaled_demand = self.evidence.scaled
 
     def gain(self, limit: float) -> Found:
-        """The least gain, or any P for stability."""
+        """The least gain, or any P for stability; `limit` sets the first scale and says what is good enough."""
+        if self.demand.kind == "stability":
+            return self._least(limit)
+
+        def found(expected: float) -> tuple[tuple[Found, Evidence], float, float]:
+            self.expect(expected)
+            best = self._least(limit)
+            return (best, self.evidence), best.bound, 1.0 / self.evidence.in_units(1.0)
+
+        best, self.evidence = min(in_its_own_scale(found, limit), key=lambda pair: pair[0].bound)
+        return best
+
+    def _least(self, limit: float) -> Found:
         nothing = Found(None, math.nan if self.demand.kind == "stability" else math.inf)
         best = nothing
-        for shape in self._shapes():
+
+        def attempt(shape: Shape, best: Found) -> Found:
             for margin in self.relaxation.margins:
                 found = self._attempt(shape, margin, 0.0)
                 if found.lyapunov is None and best.lyapunov is None:
-                    best = nothing._replace(answer=found.answer)
+                    best = nothing._replace(answer=best.answer if found.answer is Answer.UNTRIED else found.answer)
                 elif found.lyapunov is not None and (best.lyapunov is None or found.bound < best.bound):
                     best = found
-                if found.lyapunov is not None or found.answer is Answer.INFEASIBLE:
+                if found.lyapunov is not None or found.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
                     break
+            return best
+
+        for shape in self._shapes():
+            best = attempt(shape, best)
             if best.lyapunov is not None and not best.bound > self.relaxation.accept * limit:
                 break
+        if any(shape.degrees) and (best.lyapunov is None or best.bound > (1 + CLOSE) * limit):
+            # a constant P proves for every rate what it proves for jumps
+            answer, best = best.answer, attempt(self._constant(), best)
+            best = best if best.lyapunov is not None else best._replace(answer=answer)
         return best
 
     def decay(self, limit: float) -> Found:
-        """The largest decay rate, between 0 and `limit` (1/s), by bisection; each P counts for all that it proves."""
+        """The largest decay rate, between 0 and `limit` (1/s); each P counts for all that it proves."""
         best = Found(None, -math.inf)
         tolerance = DECAY_TOLERANCE * limit
         for shape in self._shapes():
-            low, high = max(best.bound, 0.0), limit
-            trial = limit - tolerance
-            while True:
-                found = self._attempt(shape, 0.0, trial)
-                if found.lyapunov is not None and found.bound > best.bound:
-                    best = found
-                elif best.lyapunov is None:
-                    best = best._replace(answer=found.answer)
-                # a P that proves less than was asked for: the half below is left, whatever it would have allowed
-                low = max(low, found.bound if found.lyapunov is not None else 0.0)
-                high = high if low >= trial else trial
-                if high - low <= tolerance:
-                    break
-                trial = 0.5 * (low + high)
+            best = self._bisected(shape, best, limit - tolerance, limit)
             if best.lyapunov is not None and best.bound * self.relaxation.accept >= limit:
                 break
+        if any(shape.degrees) and best.bound < limit - 2 * tolerance:
+            # a constant P proves for every rate what it proves for jumps: asked first whether it proves more
+            answer, trial = best.answer, limit - tolerance if best.lyapunov is None else best.bound + tolerance
+            best = self._bisected(self._constant(), best, trial, limit)
+            best = best if best.lyapunov is not None else best._replace(answer=answer)
         return best
+
+    def _bisected(self, shape: Shape, best: Found, trial: float, limit: float) -> Found:
+        tolerance = DECAY_TOLERANCE * limit
+        low, high = max(best.bound, 0.0), limit
+        while True:
+            found = self._attempt(shape, 0.0, trial)
+            if found.lyapunov is not None and found.bound > max(best.bound, 0.0):
+                best = found
+            elif best.lyapunov is None and found.answer is not Answer.UNTRIED:
+                best = best._replace(answer=found.answer)
+            if found.answer is Answer.UNTRIED:
+                return best
+            # a P that proves less than was asked for: the half below is left, whatever it would have allowed
+            low = max(low, found.bound if found.lyapunov is not None else 0.0)
+            high = high if low >= trial else trial
+            if high - low <= tolerance:
+                return best
+            trial = 0.5 * (low + high)
+
+    def _constant(self) -> Shape:
+        return Shape(tuple(np.array([s.low, s.high]) for s in self.model.parameters), (0,) * len(self.model.parameters))
 
     def _shapes(self) -> list[Shape]:
         """The forms of P to be tried in turn."""
@@ -158,7 +207,7 @@ class _Hunt:
         kind, n = self.demand.kind, self.model.sizes[0]
         gains = kind.endswith("gain")
         demand = self.scaled_demand._replace(shift=self.evidence.in_units(alpha) if alpha else 0.0)
-        inequalities = affine_inequalities(self.scaled, demand, shape, margin, self.relaxation.floor)
+        inequalities = affine_inequalities(self.scaled, demand, shape, margin, self.relaxation.floor, self.evidence.units.weight)
         program = assemble(inequalities, shape, n, self.relaxation, maximise=not gains)
         built = time.perf_counter()
         candidate = solve(program, self.solver)
@@ -208,7 +257,7 @@ class _Report:
     def found(self, best: Found, limit: float, worst: Trajectory | None, bounds: float, hunt: _Hunt) -> BoxCertificate:
         """What the hunt brought."""
         if best.lyapunov is None:
-            status = Status.INFEASIBLE if best.answer is Answer.INFEASIBLE else Status.FAILED
+            status = Status.without_proof(best.answer)
         else:
             status = Status.UNPROVEN if self.relaxation.kind == "grid" else Status.PROVEN
         return self._made(best, limit, worst, bounds, hunt, status)
@@ -235,11 +284,11 @@ class _Report:
             unit = "" if s.unit == "1" else f" {s.unit}"
             speed = "arbitrarily fast" if math.isinf(rate) else "constant" if rate == 0 else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
             out.append(f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}")
+        out += fitted(self.model.source)
         if P is not None and status is Status.PROVEN:
             out.append(f"{P.form}, found by {_FOUND[self.relaxation.kind]}")
-            out.append(
-                "verified in floating point on the whole box, halved where needed; verify(rigorous=True) proves it in exact arithmetic"
-            )
+            shared = "pieces, regions, products of polynomials and the inequalities themselves"
+            out.append(VERIFIED.format(what="the whole box, halved where needed, and a grid of p", shared=shared))
         if status is Status.UNPROVEN:
             out.append(f"the inequalities hold at {self.relaxation.points} values of each parameter in every region: no guarantee")
         out += _MEANING.get(self.demand.kind, ())
@@ -293,7 +342,7 @@ def _check_channels(model: Pieces, kind: Kind) -> None:
         raise InputError("the model has no states; its gain is the largest norm of D(p)")
     if kind.endswith("gain") and not (nu and ny):
         raise InputError(f"a gain needs inputs and outputs, got {nu} and {ny}; use stability() without channels")
-    if kind == "energy-to-peak gain" and model.dt is None and any(np.any(D.coefficients) for _, _, _, D in model.models.values()):
+    if kind == "energy-to-peak gain" and model.passes_peaks:
         raise InputError("the energy-to-peak gain of a continuous model needs D = 0: feedthrough passes peaks of any height")
 
 
@@ -301,12 +350,15 @@ def _units(model: Pieces, kind: Kind, expected: float) -> Units:
     middle = np.array([[s.middle for s in model.parameters]])
     A, B, C, D = (M[0] for M in model.at(middle))
     names = [tuple(f"{letter}{i}" for i in range(n)) for letter, n in zip("xuy", model.sizes, strict=True)]
-    scale = model_scaling(LinearModel(A, B, C, D, *names, dt=model.dt), expected if kind.endswith("gain") else 1.0)  # type: ignore[arg-type]
+    low, high = np.array([(s.low, s.high) for s in model.parameters]).T
+    every = model.at(low + np.linspace(0.0, 1.0, 9)[:, None] * (high - low))
+    frozen = LinearModel(A, B, C, D, *names, dt=model.dt)  # type: ignore[arg-type]
+    scale = model_scaling(frozen, expected if kind.endswith("gain") else 1.0, every)
     root = math.sqrt(scale.time)
     if kind == "energy-to-peak gain":
         # outputs are peaks, not energies
-        return Units(scale.left, scale.right, 1 / root, scale.channel, scale.time, 1.0)
-    return Units(scale.left, scale.right, 1 / root, scale.channel / root, scale.time, scale.channel**2)
+        return Units(scale.left, scale.right, 1 / root, scale.channel, scale.time, 1.0, scale.weight)
+    return Units(scale.left, scale.right, 1 / root, scale.channel / root, scale.time, scale.channel**2, scale.weight)
 
 
 def _alone(p: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -12,15 +13,17 @@ from scipy import linalg
 from scipy.optimize import minimize
 
 from symheli.lpv import LPVStateSpace
+from synthesis.budget import Budget
 from synthesis.frozen import FrozenGain, norm, to_continuous
 from synthesis.lower_bound import Search, growing_trajectory, lower_bound
 from synthesis.periodic import multiplier
 from synthesis.polynomial.inequalities import Demand
 from synthesis.polynomial.regions import Pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
+from synthesis.scaling import balance
 from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
-from synthesis.waves import steps
+from synthesis.waves import samples, steps
 
 Array = np.ndarray
 Measure = Callable[[Array, Array, Array, Array], float]
@@ -60,6 +63,8 @@ def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> 
     poles = np.linalg.eigvals(A)
     if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
         return math.inf
+    d = balance(np.abs(A), B, C)
+    A, B, C = A * d / d[:, None], B / d[:, None], C * d
     # the bilinear change keeps the Gramian
     F, G = (A, B) if dt is None else to_continuous(A, B, C, D)[:2]
     X = linalg.solve_continuous_lyapunov(F, -G @ G.T)
@@ -104,10 +109,12 @@ def worst_moving(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, fr
     best = frozen
     if search is None or all(rate == 0 for rate in demand.rates):
         return best
-    for line, back in _lines(model, demand.rates):
-        rate = line.scheduling.rate
-        if rate == 0:
-            continue
+    budget, lines = Budget(search.seconds), [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.rate > 0]
+    for k, (line, back) in enumerate(lines):
+        if budget.over:
+            break
+        budget.tell("line %d of %d, %.6g so far", k + 1, len(lines), abs(best.value))
+        rate, search = line.scheduling.rate, replace(search, seconds=budget.left / (len(lines) - k))
         if demand.kind == "l2 gain":
             found = lower_bound(line, rate, frozen=FrozenGain(frozen.value, 0.0, 0.0), search=search)
             value, trajectory = found.gamma, found.trajectory
@@ -124,7 +131,14 @@ def worst_moving(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, fr
 
 def growing(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, search: Search | None) -> Trajectory | None:
     """A p(t) on such a line along which the state grows, None where none was found."""
-    for line, back in _lines(model, demand.rates) if search else ():
+    if search is None:
+        return None
+    budget, lines = Budget(search.seconds), list(_lines(model, demand.rates))
+    for k, (line, back) in enumerate(lines):
+        if budget.over:
+            break
+        budget.tell("line %d of %d", k + 1, len(lines))
+        search = replace(search, seconds=budget.left / (len(lines) - k))
         found = growing_trajectory(line, line.scheduling.rate, search)
         if found is not None:
             return Trajectory(found.time, back(found.p))
@@ -136,22 +150,27 @@ def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Tra
     family = WaveFamily(line, rate, search)
     best: tuple[float, Trajectory | None] = (0.0, None)
     # where A does not depend on p, growth ranks nothing
+    budget = Budget(search.seconds)
     for wave in (*family.coarse()[:WAVES], *family.spread()):
+        if budget.over:
+            break
         cycle = Trajectory(*wave.vertices())
         system = steps(line, cycle.time, cycle.p, max(family.longest, wave.period / search.steps))
-        C, D = line.matrices(np.clip(np.interp(system.time, cycle.time, cycle.p), line.scheduling.low, line.scheduling.high))[2:]
+        shown = cycle if line.dt is None else samples(cycle, line.dt)
+        after = np.interp(system.time[1:], *cycle) if line.dt is None else np.roll(shown.p, -1)
+        C, D = line.matrices(np.clip(after, line.scheduling.low, line.scheduling.high))[2:]
         n, X, peak = system.states, np.zeros((system.states, system.states)), 0.0
         cycles = max(3, min(20, math.ceil(2 * family.slow / wave.period)))
         for k in range(cycles * len(system.step)):
             j = k % len(system.step)
             Phi, Gamma = system.step[j, :n, :n], system.step[j, :n, n:]
             X = Phi @ X @ Phi.T + Gamma @ Gamma.T
-            size = C[j + 1] @ X @ C[j + 1].T + (D[j + 1] @ D[j + 1].T if line.dt is not None else 0.0)
+            size = C[j] @ X @ C[j].T + (D[j] @ D[j].T if line.dt is not None else 0.0)
             peak = max(peak, float(np.linalg.eigvalsh(size).max()))
         # the time steps are good to about 1e-4
         value = math.sqrt(peak) * (1 - 1e-4 * (line.dt is None))
         if value > best[0]:
-            best = value, cycle
+            best = value, shown
     return best
 
 
@@ -159,7 +178,10 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
     """Minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers; the error of the time steps taken off."""
     family = WaveFamily(line, rate, search)
     best: tuple[float, Trajectory | None] = (-math.inf, None)
+    budget = Budget(search.seconds)
     for wave in family.coarse()[:WAVES]:
+        if budget.over:
+            break
         cycle = Trajectory(*wave.vertices())
         longest = max(family.longest, wave.period / search.steps)
         rates = [
@@ -168,7 +190,7 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
         ]  # fmt: skip
         value = rates[1] - abs(rates[1] - rates[0])
         if value > best[0]:
-            best = value, cycle
+            best = value, cycle if line.dt is None else samples(cycle, line.dt)
     return best
 
 

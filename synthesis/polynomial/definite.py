@@ -44,7 +44,7 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
         matrices = G.coefficients.reshape(-1, *G.shape)
         numbers = matrices.astype(float)
         # where rounded numbers already say no, halving comes before exact work
-        promising = bool(np.all(np.linalg.eigvalsh(numbers)[:, -1] < 0))
+        promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[:, -1] < 0))
         if promising and all(positive_definite(-M) for M in matrices):
             continue
         corners = G.coefficients[tuple(slice(None, None, max(d, 1)) for d in G.degrees)].reshape(-1, *G.shape)
@@ -55,6 +55,13 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
             return False
         waiting += G.split(int(np.argmax(curvature)))
     return True
+
+
+def _normalised(F: Array) -> Array:
+    """Matrices (..., n, n) with a diagonal of -1 where it is negative: rounding then means the same in all units."""
+    size = np.sqrt(np.abs(np.diagonal(F, axis1=-2, axis2=-1)))
+    size = np.where(size > 0, size, 1.0)
+    return F / size[..., :, None] / size[..., None, :]
 
 
 def _corners(shape: tuple[int, ...]) -> tuple[slice, ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.errors import InputError
+from synthesis import structure
 from synthesis.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray
@@ -26,14 +27,34 @@ class BoxLyapunov:
     coefficients: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "knots", tuple(np.array(k, dtype=float) for k in self.knots))
-        array = np.array(self.coefficients, dtype=float)
-        array.flags.writeable = False
-        object.__setattr__(self, "coefficients", array)
-        expected = tuple((len(k) - 1) * d + 1 for k, d in zip(self.knots, self.degrees, strict=True))
-        n = array.shape[-1]
-        if array.shape != (*expected, n, n):
-            raise InputError(f"expected Lyapunov coefficients of shape {(*expected, n, n)}, got {array.shape}")
+        if not isinstance(self.knots, tuple) or not isinstance(self.degrees, tuple):
+            raise InputError(f"expected a tuple of knots and one of degrees, got {self.knots!r:.60} and {self.degrees!r:.60}")
+        object.__setattr__(self, "knots", tuple(structure.numbers(k, "knots") for k in self.knots))
+        object.__setattr__(self, "coefficients", structure.numbers(self.coefficients, "coefficients"))
+        if self.fault:
+            raise InputError(self.fault)
+
+    @property
+    def fault(self) -> str | None:
+        """What is wrong with the form, None where nothing is."""
+        if len(self.knots) != len(self.degrees):
+            return f"expected a degree for each of {len(self.knots)} parameters, got {self.degrees}"
+        found = structure.first(*map(structure.ascending, self.knots), *(structure.whole(d, 0, "degree") for d in self.degrees))
+        if found:
+            return found
+        n = self.coefficients.shape[-1] if self.coefficients.ndim else 0
+        counts = tuple((len(k) - 1) * d + 1 for k, d in zip(self.knots, self.degrees, strict=True))
+        return structure.symmetric(self.coefficients, (*counts, n, n))
+
+    def fault_for(self, box: Sequence[tuple[float, float]], states: int) -> str | None:
+        """What keeps it from being a function of `states` states for every p in the box."""
+        if self.fault:
+            return self.fault
+        if len(self.knots) != len(box):
+            return f"P is of {len(self.knots)} parameters, the model has {len(box)}"
+        if self.coefficients.shape[-1] != states:
+            return f"P is of {self.coefficients.shape[-1]} variables, the model has {states}"
+        return structure.first(*(structure.covering(k, *ends) for k, ends in zip(self.knots, box, strict=True)))
 
     @property
     def segments(self) -> tuple[int, ...]:

@@ -18,7 +18,7 @@ from synthesis.polynomial.inequalities import Demand, Pair, decrease, peak, posi
 from synthesis.polynomial.lyapunov import segment_slices
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.regions import Pieces, Region, regions
-from synthesis.symmetric import basis, length, svec
+from synthesis.symmetric import basis, extended, length, svec
 
 Array = np.ndarray
 
@@ -63,8 +63,8 @@ class Affine(NamedTuple):
     N: int
 
 
-def affine_inequalities(model: Pieces, demand: Demand, shape: Shape, margin: float, floor: float) -> list[Affine]:
-    """Every inequality of the problem, scaled data."""
+def affine_inequalities(model: Pieces, demand: Demand, shape: Shape, margin: float, floor: float, weight: Array) -> list[Affine]:
+    """Every inequality of the problem, scaled data; the state blocks of the decrease in coordinates changed by `weight`."""
     nx, nu, ny = model.sizes
     eye, gains = np.eye(nx), demand.kind in ("l2 gain", "energy-to-peak gain")
     nothing = svec(np.zeros((nx, nx)))
@@ -83,7 +83,9 @@ def affine_inequalities(model: Pieces, demand: Demand, shape: Shape, margin: flo
         level, fixed, back_off = svec(eye), 0 * eye, nothing
     for region in regions(model, shape.knots, demand.steps(model.dt, shape.degrees)):
         columns, pair = _pair(shape, region, nx)
-        out += [_affine(F, columns, level, back_off, fixed) for F in decrease(model, region, pair, demand, float)]
+        for F in decrease(model, region, pair, demand, float):
+            W = extended(weight, F.shape[0] - nx)
+            out.append(_affine(PolynomialMatrix(F.box, W.T @ F.coefficients @ W), columns, level, back_off, fixed))
         if demand.kind == "energy-to-peak gain" and region.next_segment == region.segment:
             columns, P = _unknown(shape, region.segment, np.unique(_ids(shape, region.segment)), nx)
             F = peak(model, region, P, float)

@@ -1,7 +1,8 @@
 """Is this P(p) a proof on the whole box? Recomputed from the model and P alone, whichever relaxation found P.
 
 Floating point: Bernstein coefficients, boxes halved until they tell, and a grid through the model's own code.
-Exact: the same boxes in rational arithmetic.
+Exact: the same boxes in rational arithmetic, and single p by `pointwise`. The inequalities themselves (`inequalities`), the regions and the
+algebra of polynomials are those from which the cone program was assembled; `pointwise` has none of them.
 """
 
 from __future__ import annotations
@@ -13,12 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.lpv import Matrices
+from synthesis import pointwise, structure
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
 from synthesis.polynomial.inequalities import Demand, Pair, decrease, peak, positivity
 from synthesis.polynomial.lyapunov import BoxLyapunov
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.regions import Number, Pieces, convert, exact, regions
-from synthesis.verify import rational
+from synthesis.symmetric import symmetrized
+from synthesis.verify import positive_definite, rational
 
 Array = np.ndarray
 
@@ -26,12 +30,21 @@ LADDER = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """The bound is loosened by these fractions in turn until the whole box is shown to admit it."""
 
 
-TINY = 1e-12
+FURTHER = (1e2, 1e4, 1e6)
+"""Steps beyond, where the model has no response to compare rounding with."""
+
+WITNESSES = 40
+"""Values of several parameters at which a proof is checked once more, through the model's own matrices."""
+
+TINY = 1e-8
 """Least g in scaled units: a model without response is given a small gain rather than none."""
 
 
 class Units(NamedTuple):
-    """x = right z, left = right^-1; units of inputs, outputs, time (s) and of V in which the numbers are of order one."""
+    """x = right z, left = right^-1; units of inputs, outputs, time (s) and of V in which the numbers are of order one.
+
+    `weight` as in `Scaling`.
+    """
 
     left: Array
     right: Array
@@ -39,15 +52,15 @@ class Units(NamedTuple):
     outputs: float
     time: float
     storage: float
+    weight: Array
 
     def to_physical(self, P: Array) -> Array:
         """P of V in physical units from that in z."""
-        M = self.storage * self.left.T @ P @ self.left
-        return 0.5 * (M + np.swapaxes(M, -1, -2))
+        return symmetrized(self.storage * self.left.T @ P @ self.left)
 
     def to_scaled(self, P: Array) -> Array:
         """The inverse."""
-        return self.right.T @ P @ self.right / self.storage
+        return symmetrized(self.right.T @ P @ self.right / self.storage)
 
 
 class Evidence(NamedTuple):
@@ -56,6 +69,25 @@ class Evidence(NamedTuple):
     model: Pieces
     units: Units
     demand: Demand
+
+    def fault(self, P: BoxLyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
+        """What keeps P from being about this model and this claim, before any inequality; None where nothing does."""
+        if not isinstance(P, BoxLyapunov):
+            return f"expected a BoxLyapunov, got {type(P).__name__}"
+        if kind != self.demand.kind or self.demand.shift != 0.0:
+            return f"the proof is of the {self.demand.kind}, the claim of the {kind}"
+        if len(rates) != len(self.model.parameters) or not all(r >= 0 for r in rates) or rates != self.demand.rates:
+            return f"the proof is for rates {self.demand.rates}, the claim for {rates}"
+        if not self.model.original:
+            return "the pieces are not those of the model"
+        if kind == "energy-to-peak gain" and self.model.passes_peaks:
+            return "the energy-to-peak gain of a continuous model needs D = 0"
+        u = self.units
+        return structure.first(
+            P.fault_for([(s.low, s.high) for s in self.model.parameters], self.model.sizes[0]),
+            structure.coordinates(u.left, u.right, (u.inputs, u.outputs, u.time, u.storage), self.model.sizes[0]),
+            structure.symmetric(np.asarray(u.weight), (self.model.sizes[0],) * 2, "the weight"),
+        )
 
     @property
     def scaled(self) -> tuple[Pieces, Demand]:
@@ -102,7 +134,8 @@ class Evidence(NamedTuple):
         kind = self.demand.kind
         if math.isinf(value):
             return None
-        for fraction in LADDER:
+        nothing = kind.endswith("gain") and value * self.in_units(1.0) <= math.sqrt(TINY * (1 + LADDER[0]))
+        for fraction in (*LADDER, *FURTHER) if nothing else LADDER:
             # gains: of gamma^2
             bound = (
                 value if kind == "stability" else value - fraction * abs(value) if kind == "decay rate" else value * math.sqrt(1 + fraction)
@@ -138,7 +171,61 @@ class Evidence(NamedTuple):
         """The whole box in rational arithmetic: the doubles of model, P, rates and bound as the rationals they are."""
         if not self.demand.meaningful(self.model.dt, P.degrees) or math.isinf(bound):
             return False
-        return all(map(negative_definite_exactly, polynomials(self.model, P, self.demand, bound, rational())))
+        exactly = all(map(negative_definite_exactly, polynomials(self.model, P, self.demand, bound, rational())))
+        return exactly and self.witnessed(P, bound, rational())
+
+    def witnessed(self, P: BoxLyapunov, bound: float, number: Number) -> bool:
+        """The pieces are the model, and the inequalities hold at some p without them; see `pointwise`."""
+        model, demand, dt = self.model, self.demand, self.model.dt
+        box = [(s.low, s.high) for s in model.parameters]
+        axes = [pointwise.inside([*breaks, *knots]) for breaks, knots in zip(model.breaks, P.knots, strict=True)]
+        # all of a single axis, of several a diagonal through their product
+        count = WITNESSES if len(axes) > 1 else len(axes[0])
+        points = np.array([[axis[(k * (3 * i + 1)) % len(axis)] for i, axis in enumerate(axes)] for k in range(count)])
+        own = model.at(points)
+        alpha = number(bound) if demand.kind == "decay rate" else number(0.0)
+        g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
+        steps = demand.steps(dt, P.degrees)
+        corners = list(product(*((-1, 1) if d and r > 0 else (0,) for d, r in zip(P.degrees, demand.rates, strict=True))))
+        for k, p in enumerate(points):
+            if not self._reproduced(p, [M[k] for M in own]):
+                return False
+            A, B, C, D = (pointwise.numbers(M[k], number) for M in own)
+            here, slopes = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, p, number)
+            forms: list[Array] = [-here]
+            through = Matrices(A, B, C, D)
+            if demand.kind == "energy-to-peak gain":
+                # V grows by at most the energy of the input, and the outputs are seen by it
+                through = Matrices(A, B, C * 0, D * 0)
+                if dt is None:
+                    forms.append(-np.block([[here, C.T], [C, np.eye(len(C), dtype=int) * g]]))
+                else:
+                    eye, zero = np.eye(B.shape[1], dtype=int) * number(1.0), np.zeros((A.shape[0], B.shape[1]), dtype=int) * number(1.0)
+                    forms.append(-np.block([[here, zero, C.T], [zero.T, eye, D.T], [C, D, np.eye(len(C), dtype=int) * g]]))
+            level = number(1.0) if demand.kind == "energy-to-peak gain" else g
+            if dt is None:
+                for signs in corners:
+                    moving = zip(signs, demand.rates, slopes, strict=True)
+                    drift = 2 * alpha * here
+                    for sign, r, slope in moving:
+                        drift = drift + sign * number(r) * slope if sign else drift
+                    forms.append(pointwise.dissipation(through, here, drift, None, level))
+            else:
+                growth = number(math.exp(2.0 * bound * dt)) if demand.kind == "decay rate" else number(1.0)
+                for q in pointwise.reached(p, steps, box):
+                    after = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, q, number)[0]
+                    forms.append(pointwise.dissipation(through, here, None, after * growth, level))
+            if not all(positive_definite(-F) for F in forms):
+                return False
+        return True
+
+    def _reproduced(self, p: Array, own: list[Array]) -> bool:
+        index = tuple(pointwise.segment_of(np.array(b), float(q)) for b, q in zip(self.model.breaks, p, strict=True))
+        for M, expected in zip(self.model.models[index], own, strict=True):
+            size = np.abs(M.coefficients).max(axis=tuple(range(len(p))))
+            if not pointwise.same_entries(pointwise.tensor(M.coefficients, M.box, p), expected, size):
+                return False
+        return True
 
     def on_grid(self, P: BoxLyapunov, bound: float) -> bool:
         """The inequalities at a grid of p and the corners of what p may do next, written out without polynomials."""
@@ -146,7 +233,7 @@ class Evidence(NamedTuple):
         count = {1: 101, 2: 11}.get(m, 4)
         grid = np.array(list(product(*(np.linspace(s.low, s.high, count) for s in self.model.parameters))))
         A, B, C, D = self.model.at(grid)
-        T = self.units.right
+        T = self.units.right @ self.units.weight
         here = P.at(grid)
         if np.linalg.eigvalsh(T.T @ here @ T).min() <= 0:
             return False

@@ -22,14 +22,34 @@ Number = Callable[[float], Any]
 class Pieces(NamedTuple):
     """A model of one or several parameters, polynomial between the `breaks` of each (most have none inside their range).
 
-    `at(p)` gives the matrices at p (k, m) by the model's own code, for checks.
+    `source` is the model as it was given.
     """
 
+    source: LPVStateSpace | PolynomialStateSpace
     parameters: tuple[Scheduling, ...]
     breaks: tuple[tuple[float, ...], ...]
     models: dict[tuple[int, ...], tuple[PolynomialMatrix, ...]]
     dt: float | None
-    at: Callable[[Array], Matrices]
+
+    def at(self, p: Array) -> Matrices:
+        """The matrices at p (k, m) by the model's own code, for checks."""
+        return self.source.matrices(p[..., 0] if isinstance(self.source, LPVStateSpace) else p)
+
+    @property
+    def passes_peaks(self) -> bool:
+        """Whether an input of any height passes at once to the outputs: feedthrough in continuous time."""
+        return self.dt is None and any(np.any(D.coefficients) for *_, D in self.models.values())
+
+    @property
+    def original(self) -> bool:
+        """Whether these are the pieces of the `source`, to the last bit."""
+        own = pieces(self.source)
+        same = (self.parameters, self.breaks, self.dt, self.models.keys()) == (own.parameters, own.breaks, own.dt, own.models.keys())
+        return same and all(
+            M.box == N.box and np.array_equal(M.coefficients, N.coefficients)
+            for key in own.models
+            for M, N in zip(self.models[key], own.models[key], strict=True)
+        )
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -58,14 +78,14 @@ class Pieces(NamedTuple):
 def pieces(model: LPVStateSpace | PolynomialStateSpace) -> Pieces:
     """The model in polynomial pieces over its box."""
     if isinstance(model, PolynomialStateSpace):
-        return Pieces(model.parameters, model.box, {(0,) * len(model.box): (model.A, model.B, model.C, model.D)}, model.dt, model.matrices)
+        return Pieces(model, model.parameters, model.box, {(0,) * len(model.box): (model.A, model.B, model.C, model.D)}, model.dt)
     parts = model_pieces(model)
     models = {
         (k,): tuple(PolynomialMatrix(((piece.low, piece.high),), M) for M in (piece.A, piece.B, piece.C, piece.D))
         for k, piece in enumerate(parts)
     }  # fmt: skip
     breaks = (parts[0].low, *(piece.high for piece in parts))
-    return Pieces((model.scheduling,), (breaks,), models, model.dt, lambda p: model.matrices(p[..., 0]))
+    return Pieces(model, (model.scheduling,), (breaks,), models, model.dt)
 
 
 class Region(NamedTuple):

@@ -148,7 +148,7 @@ def test_an_unstable_plant_is_never_proven(solver):
 
 def never_proven(solver, scale, excess):
     """First with the look at frozen poles, then by P alone."""
-    quick = Solver(solver, iterations=100 if solver == "SCS" else 0)
+    quick = Solver(solver, iterations=100 if solver == "SCS" else None)
     for dt in (None, 0.1):
         model = unstable(excess, scale, dt)
         for kind in (*PROOFS, "grid"):
@@ -251,7 +251,7 @@ def test_wrong_input_gets_a_sentence():
 def test_a_program_too_large_for_the_memory_is_left_alone_and_says_so():
     """Sums of squares in p, q and their next values, of degree two: the process once was ended by the operating system."""
     cert = l2_gain(mass_spring(0.5, dt=0.1), relaxation=Relaxation(kind="sos", degree=2), search=None)
-    assert cert.status is Status.FAILED
+    assert cert.status is Status.UNTRIED
     assert "would need several times" in str(cert)
     assert "a lower degree" in str(cert)
 

@@ -1,0 +1,73 @@
+"""What a proof must look like before any inequality is asked of it: each check gives the fault in words, None where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from symheli.errors import InputError
+
+Array = np.ndarray
+
+
+def first(*faults: str | None) -> str | None:
+    """The first fault there is."""
+    return next((fault for fault in faults if fault), None)
+
+
+def numbers(values: Any, name: str) -> Array:
+    """A read-only array of doubles. Raises `InputError` where `values` are something else."""
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name}: expected an array of numbers, got {values!r:.60}") from None
+    array.flags.writeable = False
+    return array
+
+
+def ascending(knots: Array, name: str = "knots") -> str | None:
+    """Two knots or more, finite, each larger than the one before."""
+    if knots.ndim != 1 or len(knots) < 2 or not np.all(np.isfinite(knots)) or not np.all(np.diff(knots) > 0):
+        return f"{name} must be two or more finite numbers in ascending order, got {knots}"
+    return None
+
+
+def covering(knots: Array, low: float, high: float, name: str = "p") -> str | None:
+    """The knots reach from one end of the range to the other."""
+    if knots[0] != low or knots[-1] != high:
+        return f"P is known for {name} in [{knots[0]:.6g}, {knots[-1]:.6g}], the model holds on [{low:.6g}, {high:.6g}]"
+    return None
+
+
+def whole(value: Any, least: int, name: str) -> str | None:
+    """An integer of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        return f"{name} must be an integer >= {least}, got {value!r:.60}"
+    return None
+
+
+def symmetric(coefficients: Array, shape: Sequence[int], name: str = "Lyapunov coefficients") -> str | None:
+    """Finite matrices, exactly symmetric, in an array of this shape."""
+    if coefficients.shape != tuple(shape):
+        return f"expected {name} of shape {tuple(shape)}, got {coefficients.shape}"
+    if not np.all(np.isfinite(coefficients)):
+        return f"{name} must be finite"
+    if not np.array_equal(coefficients, np.swapaxes(coefficients, -1, -2)):
+        return f"{name} must be symmetric: x'Px does not see a skew part"
+    return None
+
+
+def coordinates(left: Any, right: Any, units: Sequence[Any], size: int) -> str | None:
+    """`left` and `right` (size, size) inverse to each other, every one of the `units` a finite number > 0."""
+    try:
+        left, right, sizes = numbers(left, "left"), numbers(right, "right"), numbers(units, "units")
+    except InputError as error:
+        return str(error)
+    if left.shape != (size, size) or right.shape != (size, size) or not np.all(np.isfinite([*left.ravel(), *right.ravel(), *sizes])):
+        return f"coordinates must be finite matrices of shape {(size, size)}"
+    # 1e-3: far above what inverting loses, and enough for `right` to be regular
+    if not np.all(sizes > 0) or np.abs(left @ right - np.eye(size)).max(initial=0.0) > 1e-3:
+        return "coordinates need units > 0 and left = right^-1"
+    return None

@@ -1,0 +1,43 @@
+"""What a certificate rests on can be read in it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import lag, spring
+
+from synthesis import Relaxation, decay_rate, l2_gain, lft_gain, stability
+
+COARSE = Relaxation(segments=(2,), degree=2)
+SOS = Relaxation(kind="sos", degree=1, segments=(1,))
+
+
+@pytest.mark.parametrize("relaxation", [COARSE, SOS])
+@pytest.mark.parametrize("analysis", [l2_gain, stability])
+def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, relaxation):
+    lpv = lag()
+    # the family had 2 % more in A at one node, and only that: A is -1 .. -2
+    off = [np.zeros((3, *M.shape[1:])) for M in (lpv.A, lpv.B, lpv.C, lpv.D)]
+    off[0][1, 0, 0] = 0.04
+    text = str(analysis(replace(lpv, residuals=type(lpv.matrices(0.5))(*off)), relaxation=relaxation, search=None))
+    assert "differs from what it was fitted to by at most 2 % of its largest value, in A[1, 1]" in text
+    assert "fitted to" not in str(analysis(lpv, relaxation=relaxation, search=None))
+
+
+def test_the_misfit_of_a_sampled_model_is_measured_from_its_own_samples():
+    lpv = spring(damping=0.4).discretize(1.0)
+    text = str(l2_gain(lpv, 0.1, relaxation=COARSE, search=None))
+    # by another route: the zero-order hold at the nodes of the fit
+    p = -np.cos(np.pi * np.arange(41) / 40)
+    exact = np.array([spring(damping=0.4).at(q).discretize(1.0).A for q in p])
+    own = lpv.matrices(p).A
+    worst = (np.abs(own - exact).max(axis=0) / np.abs(own).max(axis=0)).max()
+    assert "the sampled model (p held over each 1 s, entries fitted in p)" in text
+    assert f"at most {100 * worst:.2g} %" in text
+
+
+def test_what_is_trusted_is_said():
+    for cert in (l2_gain(lag(), relaxation=COARSE, search=None), decay_rate(lag(), relaxation=SOS, search=None)):
+        assert "through the model's own matrices" in str(cert)
+        assert "are shared by the search for P and the proof" in str(cert)
+    assert "only the matrices of the LFT are shared" in str(lft_gain(lag().to_lft().reduce(), search=None))

@@ -1,0 +1,25 @@
+"""No proof of a random plant near the limit is false: some in every run, ten thousand in all (docs/reliability.md)."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # benchmarks/ is not installed
+
+from benchmarks.reliability import ROUTES, count
+
+CHUNK = 500
+
+
+def test_no_proof_of_the_first_plants_is_false():
+    asked, proven, wrong = count(0, 48)
+    assert not wrong
+    # plants on the stable side are there, and some of them are proven by every route
+    assert set(asked) == set(ROUTES) == {route for route in ROUTES if proven[route]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("chunk", range(20))
+def test_no_proof_near_the_limit_is_false(chunk):
+    assert count(CHUNK * chunk, CHUNK)[2] == []
