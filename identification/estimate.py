@@ -21,7 +21,7 @@ from identification.recursive_least_squares import RecursiveLeastSquares
 from identification.refined_instruments import Refined, refined_instruments
 from identification.regressors import Regression, as_records, stacked, units_of
 from identification.ridge import Ridge, ridge
-from identification.self_check import check_least_squares
+from identification.self_check import check_least_squares, check_recursion
 from identification.structure import LPVARX, require_structure
 from symheli.errors import ConvergenceWarning, DataWarning, ExcitationError, InputError, UnknownNameError
 from symheli.lpv import FlightRecord
@@ -175,4 +175,5 @@ def _recursive(structure: LPVARX, data: Regression, forgetting: float | Forgetti
     for phi, y in zip(data.phi, data.y, strict=True):
         online.absorb(phi, y)
     state = online.state
+    check_recursion(state, data.phi, data.y)
     return state.solve(), state.residual_covariance

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification.determined import PRIOR, largest
+from identification.rls_state import RLSState
 from identification.structure import LPVARX
 from symheli.errors import AccuracyError
 from symheli.lpv.arrays import Array
@@ -31,4 +32,17 @@ def check_least_squares(arx: LPVARX, phi: Array, y: Array, theta: Array, method:
         raise AccuracyError(
             f"method {method!r} lost its accuracy: the residual of {arx.outputs[output]} is not orthogonal to {arx.regressor_names[row]}; "
             "these coefficients are not the least-squares ones, use another method and report the record"
+        )
+
+
+def check_recursion(state: RLSState, phi: Array, y: Array) -> None:
+    """Raises `AccuracyError` unless the coefficients that moved sample by sample predict what those solved from the factor predict.
+
+    With any forgetting; to 1e-8 of the spread of each output over phi (m, n), y (m, ny).
+    """
+    apart = np.abs(phi @ (state.theta - state.solve())).max(axis=0)
+    if not (apart <= 1e-8 * np.std(y, axis=0) + 1e-12 * np.abs(y).max(axis=0)).all():
+        raise AccuracyError(
+            f"the recursion lost its accuracy: its coefficients predict {apart.max():.3g} apart from those of its factor; "
+            'use method "ls" and report the record'
         )

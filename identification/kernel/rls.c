@@ -440,9 +440,13 @@ static inline void back_substitute(const group *a, int from)
     }
 }
 
-/* theta <- R^-1 Z */
+/* So much is known that an ordinary sample is lost to rounding: single precision that never forgets. */
+static inline int is_full(const group *a) { return a->header[WEIGHT] * EPSILON >= 1; }
+
+/* theta <- R^-1 Z. A factor that is full has lost samples; what has moved along the gain since is better. */
 static void solve_anew(const group *a)
 {
+    if (is_full(a)) return;
     for (int from = 0; from < a->m; from += TOGETHER) back_substitute(a, from);
     for (int j = 0; j < a->m; j++) {
         a->drift[j] = 0;
@@ -710,7 +714,7 @@ static int status(const rls_config *c, rls_real *state, rls_real *work)
     for (int g = 0; g < c->groups; g++) {
         const group a = open_group(c, g, state, work);
         if (a.header[DETERMINED] == 0) bits &= ~RLS_DETERMINED;
-        if (a.header[WEIGHT] * EPSILON >= 1) bits |= RLS_SATURATED;
+        if (is_full(&a)) bits |= RLS_SATURATED;
         state = end_of_state(&a);
     }
     return bits;

@@ -187,7 +187,7 @@ class Kernel:
             header = state[layout.in_state["header"]]
             if header[at.DETERMINED] == 0:
                 bits &= ~DETERMINED
-            if header[at.WEIGHT] * self._limits.epsilon >= 1:
+            if is_full(header):
                 bits |= SATURATED
         return bits
 
@@ -449,8 +449,15 @@ def find_gain(a: View) -> None:
             g[:i] -= block[:i, i] * g[i]
 
 
+def is_full(header: Array) -> bool:
+    """Whether an ordinary sample is lost to rounding."""
+    return bool(header[at.WEIGHT] * np.finfo(header.dtype).eps >= 1)
+
+
 def solve_anew(a: View) -> None:
-    """theta <- R^-1 Z"""
+    """theta <- R^-1 Z, unless the factor is full."""
+    if is_full(a.header):
+        return
     solution = np.array([row[a.outputs.start - i // LANES * LANES :][: a.m] for i, row in enumerate(a.rows[: a.tall])])
     for k in range(a.tall - 1, 0, -1):
         for start in range(0, k, LANES):
