@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import product
-from math import comb
 from typing import Any
 
 import numpy as np
@@ -12,9 +10,10 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Polynomial
+from symheli.lpv.equilibration import significant
 from symheli.lpv.lft.model import LFT, Block
-from symheli.lpv.lft.reduction import significant
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.recentred import recentred
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import signals
 
@@ -53,7 +52,7 @@ def from_monomials(
         M = {name: matrices.get(exponents, zero[name]) for name, (_, matrices) in given.items()}
         whole[exponents] = np.block([[M["A"], M["B"]], [M["C"], M["D"]]])
     return _chains(
-        _normalised(whole, parameters), parameters, signals(states or [f"x{i + 1}" for i in range(nx)]),
+        recentred(whole, [(s.middle, s.radius) for s in parameters]), parameters, signals(states or [f"x{i + 1}" for i in range(nx)]),
         signals(inputs or [f"u{i + 1}" for i in range(nu)]), signals(outputs or [f"y{i + 1}" for i in range(ny)]), dt,
     )  # fmt: skip
 
@@ -71,18 +70,6 @@ def _coefficients(name: str, matrices: Mapping[Any, Any], count: int) -> tuple[t
     if len({M.shape for M in out.values()}) > 1:
         raise InputError(f"{name}: coefficient matrices differ in shape: {', '.join(str(M.shape) for M in out.values())}")
     return next(iter(out.values())).shape, out  # type: ignore[return-value]
-
-
-def _normalised(whole: Mapping[tuple[int, ...], Array], parameters: Sequence[Scheduling]) -> dict[tuple[int, ...], Array]:
-    """Coefficients in delta of a polynomial in p = middle + radius delta."""
-    out: dict[tuple[int, ...], Array] = {}
-    for exponents, M in whole.items():
-        for powers in product(*(range(e + 1) for e in exponents)):
-            factor = 1.0
-            for s, e, k in zip(parameters, exponents, powers, strict=True):
-                factor *= comb(e, k) * s.radius**k * s.middle ** (e - k)
-            out[powers] = out.get(powers, np.zeros_like(M)) + factor * M
-    return out
 
 
 def _chains(

@@ -10,8 +10,9 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array
+from symheli.lpv.equilibration import equilibrate, significant
 from symheli.lpv.lft.model import LFT, Block, parts
-from symheli.lpv.lft.reduction import equilibrate, reduce, significant
+from symheli.lpv.lft.reduction import reduce
 
 
 class Truncation(NamedTuple):
