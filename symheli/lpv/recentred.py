@@ -17,6 +17,11 @@ Centre = tuple[float | Fraction, float | Fraction]
 """(middle, radius) of a parameter p = middle + radius delta."""
 
 
+def centre(low: float, high: float) -> Centre:
+    """Of a parameter in [low, high], exactly."""
+    return (Fraction(low) + Fraction(high)) / 2, (Fraction(high) - Fraction(low)) / 2
+
+
 def recentred(terms: Mapping[tuple[int, ...], Array], centres: Sequence[Centre]) -> dict[tuple[int, ...], Array]:
     """{exponents: matrix} of powers of delta from those of p = middle + radius delta, one centre a parameter.
 

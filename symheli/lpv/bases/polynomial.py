@@ -15,7 +15,7 @@ from numpy.polynomial import chebyshev, legendre
 from symheli.errors import InputError, PrecisionWarning, UnknownNameError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases.basis import Basis, Piece, check_range
-from symheli.lpv.recentred import recentred
+from symheli.lpv.recentred import centre, recentred
 
 DIGITS = 8.0
 """More decimal digits lost than this, half of a double's, are worth a warning."""
@@ -68,9 +68,9 @@ class Polynomial(Basis):
     @cached_property
     def monomial(self) -> Array:
         """Matrix T (n, n): f_j(p) = sum_i T[j, i] p^i, p in physical units; each entry exact before it is rounded."""
-        low, high = Fraction(self.low), Fraction(self.high)
+        middle, radius = map(Fraction, centre(self.low, self.high))
         power = {(i,): column for i, column in enumerate(self._powers.T)}
-        physical = recentred(power, [(-(low + high) / (high - low), 2 / (high - low))])
+        physical = recentred(power, [(-middle / radius, 1 / radius)])
         return frozen(np.stack([physical[i,] if (i,) in physical else np.zeros(self.size) for i in range(self.size)], axis=1), "monomial")
 
     @cached_property
@@ -122,8 +122,7 @@ class Polynomial(Basis):
         given = frozen(coefficients, "monomial coefficients")
         if given.shape[0] > self.size:
             raise InputError(f"degree {given.shape[0] - 1} does not fit in a basis of degree {self.degree}")
-        low, high = Fraction(self.low), Fraction(self.high)
-        x = recentred({(i,): M for i, M in enumerate(given)}, [((low + high) / 2, (high - low) / 2)])
+        x = recentred({(i,): M for i, M in enumerate(given)}, [centre(self.low, self.high)])
         padded = np.zeros((self.size, *given.shape[1:]))
         for (i,), M in x.items():
             padded[i] = M

@@ -10,15 +10,15 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Polynomial
-from symheli.lpv.equilibration import significant
-from symheli.lpv.lft.model import LFT, Block
+from symheli.lpv.lft.model import LFT, Block, parts
+from symheli.lpv.lft.reduction import steps
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
-from symheli.lpv.recentred import recentred
+from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import signals
 
-ROUNDING = 1e-11
-"""A power of the parameter whose coefficients are below this, rows and columns scaled to one, is rounding."""
+ROUNDING = 16 * np.finfo(float).eps
+"""Rounding of one product of the loop, as a fraction of the terms that were added."""
 
 
 def from_lpv(lpv: LPVStateSpace) -> LFT:
@@ -52,7 +52,7 @@ def from_monomials(
         M = {name: matrices.get(exponents, zero[name]) for name, (_, matrices) in given.items()}
         whole[exponents] = np.block([[M["A"], M["B"]], [M["C"], M["D"]]])
     return _chains(
-        recentred(whole, [(s.middle, s.radius) for s in parameters]), parameters, signals(states or [f"x{i + 1}" for i in range(nx)]),
+        recentred(whole, [centre(s.low, s.high) for s in parameters]), parameters, signals(states or [f"x{i + 1}" for i in range(nx)]),
         signals(inputs or [f"u{i + 1}" for i in range(nu)]), signals(outputs or [f"y{i + 1}" for i in range(ny)]), dt,
     )  # fmt: skip
 
@@ -112,23 +112,71 @@ def _before(exponents: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
     return i, (*exponents[:i], exponents[i] - 1, *exponents[i + 1 :])
 
 
-def powers(lft: LFT) -> list[Array] | None:
-    """Coefficients M_0, M_1, ... of delta for one parameter, None where the dependence is not polynomial."""
-    out, right = [lft.M22], lft.M12
-    for _ in range(2 * lft.order):
-        out.append(lft.M21 @ right)
-        right = lft.M11 @ right
-    size = np.max(np.abs(out), axis=0)
-    # by Cayley and Hamilton `order` zeros in a row are followed by zeros only
-    while len(out) > 1 and not np.any(significant(np.abs(out[-1]), size, ROUNDING)):
-        out.pop()
-    return out if len(out) <= lft.order + 1 else None
+def expanded(lft: LFT) -> dict[tuple[int, ...], Array] | None:
+    """{exponents: coefficient} of M in powers of delta, None where the dependence is rational: exact where the powers of the loop end.
+
+    They end by the pattern of zeros in M11 (then no tolerance has a say), or, after rotations of the loop, by rounding: where what is
+    left out is proven to be below the rounding of the terms kept, entry by entry, everywhere in the box. Coefficients below that
+    rounding are left out. Units of states, inputs, outputs and copies play no part.
+    """
+    m, n = len(lft.blocks), lft.order
+    zero: tuple[int, ...] = (0,) * m
+    out = {zero: lft.M22}
+    length = steps(lft.M11)
+    if length is None and not _loop_ends(lft):
+        return None
+    word = {zero: lft.M12}
+    size, whole = np.abs(lft.M12), np.abs(lft.M22)
+    count = n if length is None else length
+    for _ in range(count):
+        fed = _times_delta(word, lft)
+        for exponents, M in fed.items():
+            out[exponents] = out.get(exponents, 0.0) + lft.M21 @ M
+        whole = whole + np.abs(lft.M21) @ size
+        word, size = {e: lft.M11 @ M for e, M in fed.items()}, np.abs(lft.M11) @ size
+    bar = (count + 1) * ROUNDING * whole
+    kept = {e: np.where(np.abs(M) > bar, M, 0.0) for e, M in out.items() if e != zero}
+    return {zero: lft.M22, **{e: M for e, M in kept.items() if np.any(M)}}
+
+
+def _loop_ends(lft: LFT) -> bool:
+    """Whether the powers of M11 Delta vanish to rounding: what follows the first n is bounded over the whole box.
+
+    |(I - L)^-1| <= S (I - N)^-1 with L = M11 Delta, S the sum of |L^k|, k < n, and N >= |L^n|, entry by entry.
+    """
+    n, m = lft.order, len(lft.blocks)
+    eye: dict[tuple[int, ...], Array] = {(0,) * m: np.eye(n)}
+    power, S, whole = eye, np.zeros((n, n)), np.abs(lft.M22)
+    magnitude = np.abs(lft.M12)
+    for _ in range(n):
+        S = S + sum(np.abs(M) for M in power.values())
+        whole, magnitude = whole + np.abs(lft.M21) @ magnitude, np.abs(lft.M11) @ magnitude
+        power = {e: lft.M11 @ M for e, M in _times_delta(power, lft).items()}
+        N = sum(np.abs(M) for M in power.values())
+        bar = (n + 1) * ROUNDING * whole
+        if np.abs(np.linalg.eigvals(N)).max(initial=0.0) < 0.5:
+            rest = np.abs(lft.M21) @ N @ S @ np.linalg.solve(np.eye(n) - N, np.abs(lft.M12))
+            if np.all(rest <= bar):
+                return True
+    return False
+
+
+def _times_delta(word: Mapping[tuple[int, ...], Array], lft: LFT) -> dict[tuple[int, ...], Array]:
+    """Delta times a polynomial in delta whose coefficients have the rows of the loop."""
+    out: dict[tuple[int, ...], Array] = {}
+    for exponents, M in word.items():
+        for i, rows in enumerate(parts(lft.sizes)):
+            if np.any(M[rows]):
+                raised = (*exponents[:i], exponents[i] + 1, *exponents[i + 1 :])
+                out.setdefault(raised, np.zeros_like(M))[rows] += M[rows]
+    return out
 
 
 def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
     """See `LFT.to_lpv`."""
     s, nx = lft.scheduling, len(lft.states)
-    exact = powers(lft)
+    terms = expanded(lft)
+    exact = None if terms is None else [terms.get((i,), np.zeros_like(lft.M22)) for i in range(max(terms)[0] + 1)]
     if exact is None and degree is None:
         raise InputError("this LFT depends on its parameter rationally; to_lpv(degree=...) fits polynomials and reports the misfit")
     if degree is not None and exact is not None and degree < len(exact) - 1:
@@ -141,7 +189,7 @@ def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
         assert degree is not None  # noqa: S101 - refused above
         basis = Polynomial(degree, s.low, s.high)
         nodes = s.middle + s.radius * np.cos(np.pi * (np.arange(8 * (degree + 1)) + 0.5) / (8 * (degree + 1)))
-        values = lft.matrix((nodes[:, None] - s.middle) / s.radius)
+        values = lft.matrix(s.normalised(nodes)[:, None])
         M = basis.fit(nodes, values)
         wrong = np.tensordot(basis(nodes), M, axes=1) - values
         misfit = Matrices(wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:])

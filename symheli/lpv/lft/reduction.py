@@ -95,7 +95,7 @@ def _units(lft: LFT) -> _Units:
 class _Subspace(NamedTuple):
     """Orthonormal `basis` (n_i, r_i) of what inputs reach in a block, and the `level` (r_i,) of each direction.
 
-    Where the powers of the loop end: the length of the shortest word that reaches it, so that the loop only leads upwards.
+    Where the powers of the loop end: the length of the longest words that reach it, so that the loop only leads upwards.
     """
 
     basis: Array
@@ -122,7 +122,9 @@ def _reached(M11: Array, M12: Array, blocks: tuple[Block, ...], tolerance: float
     words = [[M12[here] for here in part]]
     if end is not None:
         for _ in range(end - 1):
-            words.append([_compressed(np.hstack([M11[here, there] @ w for there, w in zip(part, words[-1], strict=True)])) for here in part])
+            words.append(
+                [_compressed(np.hstack([M11[here, there] @ w for there, w in zip(part, words[-1], strict=True)])) for here in part]
+            )
         for level in reversed(range(end)):
             spaces = [space.extended(w, level, threshold) for space, w in zip(spaces, words[level], strict=True)]
         return spaces
