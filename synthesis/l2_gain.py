@@ -17,14 +17,15 @@ from synthesis.frozen import frozen_gain, least_damped
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
 from synthesis.lyapunov import Lyapunov
 from synthesis.polynomial import BoxCertificate, PolynomialStateSpace
-from synthesis.polynomial.analysis import Model, Rate, box_certificate
+from synthesis.polynomial.analysis import Model, box_certificate
 from synthesis.proof_search import Result, prove
+from synthesis.rates import Rate, rates
 from synthesis.verdict import Seconds, Status, Trajectory
 
 
 @overload
 def l2_gain(
-    lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    lpv: LPVStateSpace, rate: Rate = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
 ) -> Certificate: ...  # fmt: skip
 @overload
@@ -73,7 +74,7 @@ def l2_gain(
 
 @overload
 def stability(
-    lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    lpv: LPVStateSpace, rate: Rate = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
 ) -> Certificate: ...  # fmt: skip
 @overload
@@ -109,14 +110,12 @@ def stability(
 
 def _check(lpv: LPVStateSpace, rate: Rate, relaxation: Relaxation, *, with_gain: bool) -> float:
     relaxation.check(lpv.dt, with_gain=with_gain)
-    rate = lpv.scheduling.rate if rate is None else float(rate)  # type: ignore[arg-type]
-    if not rate >= 0:
-        raise InputError(f"rate must be >= 0 {lpv.scheduling.unit}/s (math.inf: as fast as it likes), got {rate}")
+    (limit,) = rates((lpv.scheduling,), rate)
     if not lpv.states:
         raise InputError("the model has no states; its gain is the largest norm of D(p)")
     if with_gain and not (lpv.inputs and lpv.outputs):
         raise InputError(f"a gain needs inputs and outputs, got {len(lpv.inputs)} and {len(lpv.outputs)}; use stability() without channels")
-    return rate
+    return limit
 
 
 def _solver(solver: Solver | str) -> Solver:

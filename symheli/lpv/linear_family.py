@@ -12,6 +12,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Basis, PiecewiseLinear, Polynomial, Spline
+from symheli.lpv.equilibration import is_singular
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.operating_point import OperatingPoint
@@ -103,7 +104,7 @@ class LinearFamily:
         def reduce(model: LinearModel) -> LinearModel:
             A, B, C, D = model.A, model.B, model.C[rows], model.D[rows]
             ss = A[np.ix_(gone, gone)]
-            if np.linalg.cond(ss) > 1e12:
+            if is_singular(ss):
                 raise InputError(f"cannot residualize {', '.join(states)}: they do not settle (singular dynamics)")
             X, U = np.linalg.solve(ss, A[np.ix_(gone, kept)]), np.linalg.solve(ss, B[gone])
             return replace(

@@ -125,6 +125,12 @@ class LinearModel:
         )  # fmt: skip
 
     @classmethod
+    def gain(cls, matrix: Any, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
+        """y = matrix u without states; `matrix` (ny, nu)."""
+        nu, ny = len(inputs), len(outputs)
+        return cls(np.zeros((0, 0)), np.zeros((0, nu)), np.zeros((ny, 0)), matrix, (), signals(inputs), signals(outputs))
+
+    @classmethod
     def from_control(
         cls, system: Any, *, units: Mapping[str, str] | None = None, states: Sequence[str] | None = None,
         inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,

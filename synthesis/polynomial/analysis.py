@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import InputError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace
 from synthesis.certificate import Attempt
 from synthesis.cone_program import Answer, Candidate, Solver, solve
@@ -26,13 +25,13 @@ from synthesis.polynomial.proof import Evidence, Units
 from synthesis.polynomial.regions import Pieces, pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.proof_search import NOTHING
+from synthesis.rates import Rate, rates
 from synthesis.scaling import model_scaling
 from synthesis.symmetric import length, smat
 from synthesis.verdict import Kind, Seconds, Status, Trajectory
 
 Array = np.ndarray
 Model = LPVStateSpace | PolynomialStateSpace | LFT
-Rate = float | Sequence[float] | Mapping[str, float] | None
 
 DECAY_TOLERANCE = 2e-3
 """The decay rate is found to this fraction of the frozen one."""
@@ -49,7 +48,7 @@ def box_certificate(
     if relaxation.order > 1 or relaxation.memory is not None:
         raise InputError("order and memory of V are for l2_gain and stability of one parameter; here V = x'P(p)x")
     piece = pieces(model)
-    demand = Demand(kind, _rates(piece, rate))
+    demand = Demand(kind, rates(piece.parameters, rate))
     _check_channels(piece, kind)
     start = time.perf_counter()
     frozen = worst_frozen(piece, measure(demand, piece.dt))
@@ -267,24 +266,6 @@ def _accepted(model: Model) -> LPVStateSpace | PolynomialStateSpace:
             "LPVStateSpace.polynomial(...), PolynomialStateSpace.polynomial(...) or LinearFamily.interpolate()"
         )
     return model
-
-
-def _rates(model: Pieces, rate: Rate) -> tuple[float, ...]:
-    names = [s.name for s in model.parameters]
-    if rate is None:
-        rates = tuple(s.rate for s in model.parameters)
-    elif isinstance(rate, Mapping):
-        for name in rate:
-            if name not in names:
-                raise UnknownNameError("scheduling parameter", name, names)
-        rates = tuple(float(rate.get(s.name, s.rate)) for s in model.parameters)
-    elif isinstance(rate, Sequence):
-        rates = tuple(map(float, rate))
-    else:
-        rates = (float(rate),) * len(names)
-    if len(rates) != len(names) or not all(r >= 0 for r in rates):
-        raise InputError(f"rate must be >= 0 per second, one for all or one for each of {', '.join(names)}, got {rate}")
-    return rates
 
 
 def _check_channels(model: Pieces, kind: Kind) -> None:

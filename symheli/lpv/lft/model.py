@@ -231,7 +231,7 @@ class LFT:
 
         return truncate(self, error, order)
 
-    def star(self, other: LFT, outputs: int = 0, inputs: int | None = None) -> LFT:
+    def star(self, other: Any, outputs: int = 0, inputs: int | None = None) -> LFT:
         """Redheffer star product: the last `outputs` outputs feed the first inputs of `other`, whose first `inputs` outputs
         feed the last inputs here. By default series connection, y = self(other(u)).
 

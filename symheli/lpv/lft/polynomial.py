@@ -11,14 +11,13 @@ from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Polynomial
 from symheli.lpv.lft.model import LFT, Block, parts
-from symheli.lpv.lft.reduction import steps
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import signals
 
 ROUNDING = 16 * np.finfo(float).eps
-"""Rounding of one product of the loop, as a fraction of the terms that were added."""
+"""By how much of itself an entry of an LFT may be off: it was rounded when the LFT was made."""
 
 
 def from_lpv(lpv: LPVStateSpace) -> LFT:
@@ -113,52 +112,45 @@ def _before(exponents: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
 
 
 def expanded(lft: LFT) -> dict[tuple[int, ...], Array] | None:
-    """{exponents: coefficient} of M in powers of delta, None where the dependence is rational: exact where the powers of the loop end.
+    """{exponents: coefficient} of M in powers of delta, None where the dependence is rational.
 
-    They end by the pattern of zeros in M11 (then no tolerance has a say), or, after rotations of the loop, by rounding: where what is
-    left out is proven to be below the rounding of the terms kept, entry by entry, everywhere in the box. Coefficients below that
-    rounding are left out. Units of states, inputs, outputs and copies play no part.
+    A polynomial is one whose powers of L = M11 Delta end: exactly, as those of `LFT.polynomial` and its reductions do, or, where
+    the loop was rotated, to rounding. Then what is left out is proven to stay below `_rounding` in the whole box, entry by entry;
+    so do the coefficients left out. Units of states, inputs, outputs and copies play no part.
     """
     m, n = len(lft.blocks), lft.order
     zero: tuple[int, ...] = (0,) * m
+    power, size = {zero: np.eye(n)}, np.zeros((n, n))
     out = {zero: lft.M22}
-    length = steps(lft.M11)
-    if length is None and not _loop_ends(lft):
-        return None
-    word = {zero: lft.M12}
-    size, whole = np.abs(lft.M12), np.abs(lft.M22)
-    count = n if length is None else length
-    for _ in range(count):
-        fed = _times_delta(word, lft)
+    for _ in range(n):  # no polynomial of n copies has a higher degree
+        size = size + sum(np.abs(M) for M in power.values())
+        fed = _times_delta(power, lft)
         for exponents, M in fed.items():
-            out[exponents] = out.get(exponents, 0.0) + lft.M21 @ M
-        whole = whole + np.abs(lft.M21) @ size
-        word, size = {e: lft.M11 @ M for e, M in fed.items()}, np.abs(lft.M11) @ size
-    bar = (count + 1) * ROUNDING * whole
-    kept = {e: np.where(np.abs(M) > bar, M, 0.0) for e, M in out.items() if e != zero}
-    return {zero: lft.M22, **{e: M for e, M in kept.items() if np.any(M)}}
+            out[exponents] = out.get(exponents, 0.0) + lft.M21 @ M @ lft.M12
+        power = {e: lft.M11 @ M for e, M in fed.items()}
+        bar = _rounding(lft, size)
+        if np.all(_rest(lft, size, sum((np.abs(M) for M in power.values()), np.zeros((n, n)))) <= bar):
+            kept = {e: np.where(np.abs(M) > bar, M, 0.0) for e, M in out.items() if e != zero}
+            return {zero: lft.M22, **{e: M for e, M in kept.items() if np.any(M)}}
+    return None if n else out
 
 
-def _loop_ends(lft: LFT) -> bool:
-    """Whether the powers of M11 Delta vanish to rounding: what follows the first n is bounded over the whole box.
+def _rounding(lft: LFT, size: Array) -> Array:
+    """What M can change anywhere in the box, to first order, where every entry of M11 .. M22 changes by `ROUNDING` of itself.
 
-    |(I - L)^-1| <= S (I - N)^-1 with L = M11 Delta, S the sum of |L^k|, k < n, and N >= |L^n|, entry by entry.
+    `size` bounds (I - M11 Delta)^-1 entry by entry.
     """
-    n, m = lft.order, len(lft.blocks)
-    eye: dict[tuple[int, ...], Array] = {(0,) * m: np.eye(n)}
-    power, S, whole = eye, np.zeros((n, n)), np.abs(lft.M22)
-    magnitude = np.abs(lft.M12)
-    for _ in range(n):
-        S = S + sum(np.abs(M) for M in power.values())
-        whole, magnitude = whole + np.abs(lft.M21) @ magnitude, np.abs(lft.M11) @ magnitude
-        power = {e: lft.M11 @ M for e, M in _times_delta(power, lft).items()}
-        N = sum(np.abs(M) for M in power.values())
-        bar = (n + 1) * ROUNDING * whole
-        if np.abs(np.linalg.eigvals(N)).max(initial=0.0) < 0.5:
-            rest = np.abs(lft.M21) @ N @ S @ np.linalg.solve(np.eye(n) - N, np.abs(lft.M12))
-            if np.all(rest <= bar):
-                return True
-    return False
+    reached = np.abs(lft.M12) + np.abs(lft.M11) @ size @ np.abs(lft.M12)
+    return ROUNDING * (np.abs(lft.M22) + np.abs(lft.M21) @ size @ reached)
+
+
+def _rest(lft: LFT, size: Array, last: Array) -> Array:
+    """Bound of all that follows the k powers of L summed so far: |L^k| <= `last`, |(I - L)^-1| <= `size` (I - last)^-1."""
+    if not np.any(last):
+        return np.zeros(lft.M22.shape)
+    if not np.abs(np.linalg.eigvals(last)).max() < 0.5:
+        return np.full(lft.M22.shape, np.inf)
+    return np.abs(lft.M21) @ size @ last @ np.linalg.solve(np.eye(lft.order) - last, np.abs(lft.M12))
 
 
 def _times_delta(word: Mapping[tuple[int, ...], Array], lft: LFT) -> dict[tuple[int, ...], Array]:

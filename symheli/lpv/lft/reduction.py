@@ -89,7 +89,8 @@ def _units(lft: LFT) -> _Units:
     sight = np.broadcast_to((rows[:, None] * lft.M21).T, (len(delta), lft.order, len(rows)))
     see = np.abs(np.linalg.solve(back, sight)).max(axis=(0, 2), initial=0.0)
     both = (reach > 0) & (see > 0)
-    return _Units(rows, columns, np.sqrt(np.where(both, see, 1.0) / np.where(both, reach, 1.0)))
+    copies = 0.5 * (np.log2(np.where(both, see, 1.0)) - np.log2(np.where(both, reach, 1.0)))
+    return _Units(rows, columns, np.exp2(np.round(copies)))  # powers of two cost no rounding
 
 
 class _Subspace(NamedTuple):
