@@ -84,7 +84,7 @@ def norm(A: Array, B: Array, C: Array, D: Array, dt: float | None = None, tolera
         return 0.0, 0.0
     peak = peak.climbed(response, poles)
     for _ in range(50):
-        named = np.unique(np.abs(_hamiltonian_eigenvalues(A, B, C, D, peak.gain * (1 + tolerance)).imag))
+        named = np.unique(np.abs(np.imag(_hamiltonian_eigenvalues(A, B, C, D, peak.gain * (1 + tolerance)))))
         between = np.concatenate([named, 0.5 * (named[1:] + named[:-1]), np.sqrt(named[1:] * named[:-1])])
         higher = peak.or_higher(response, between)
         if higher.gain <= peak.gain * (1 + tolerance):
@@ -167,8 +167,8 @@ def _hamiltonian_eigenvalues(A: Array, B: Array, C: Array, D: Array, level: floa
 def crossings(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:
     """Frequencies >= 0 where a singular value of the response equals `level`: imaginary eigenvalues of the Hamiltonian."""
     values = _hamiltonian_eigenvalues(A, B, C, D, level)
-    on_axis = np.abs(values.real) <= 1e-7 * (1e-3 * np.abs(values).max() + np.abs(values))
-    omega = np.unique(np.abs(values[on_axis].imag))
+    on_axis = np.abs(np.real(values)) <= 1e-7 * (1e-3 * np.abs(values).max() + np.abs(values))
+    omega = np.unique(np.abs(np.imag(values[on_axis])))
     return np.concatenate([[0.0], omega]) if len(omega) and np.any(omega > 0) else omega
 
 

@@ -12,6 +12,7 @@ from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace
 from synthesis.certificate import Certificate
 from synthesis.cone_program import Answer, Solver
+from synthesis.fine_sampling import fine_sampling
 from synthesis.forms import Problem, Relaxation, scaled_problem
 from synthesis.frozen import frozen_gain, least_damped
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
@@ -21,6 +22,8 @@ from synthesis.polynomial.analysis import Model, box_certificate
 from synthesis.proof_search import Result, prove
 from synthesis.rates import Rate, rates
 from synthesis.verdict import Seconds, Status, Trajectory
+
+Array = np.ndarray
 
 
 @overload
@@ -135,10 +138,15 @@ def _certificate(
     evidence = found[0].evidence(elevation) if found else None
     return Certificate(
         kind=kind, gamma=gamma, lower=lower, frozen=frozen, status=status, verified=best.lyapunov is not None, rates=(rate,),
-        hypotheses=_hypotheses(lpv, rate, best.lyapunov, kind), solver=str(solver), seconds=best.seconds._replace(bounds=bounds),
+        hypotheses=_hypotheses(lpv, rate, best.lyapunov, kind) + fine_sampling(_frozen(lpv), lpv.dt, gamma, lower),
+        solver=str(solver), seconds=best.seconds._replace(bounds=bounds),
         conditioning=best.conditioning, attempts=best.attempts, worst=worst, lyapunov=best.lyapunov, unit=lpv.scheduling.unit,
         evidence=evidence,
     )  # fmt: skip
+
+
+def _frozen(lpv: LPVStateSpace) -> Array:
+    return lpv.matrices(np.linspace(lpv.scheduling.low, lpv.scheduling.high, 41)).A
 
 
 def _hypotheses(lpv: LPVStateSpace, rate: float, P: Lyapunov | None, kind: str) -> tuple[str, ...]:

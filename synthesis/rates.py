@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import Scheduling
@@ -14,6 +17,7 @@ Rate = float | Sequence[float] | Mapping[str, float] | None
 def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
     """One rate a parameter; raises `InputError` for a wrong number of them or one that is not >= 0, `UnknownNameError` for a name."""
     names = [s.name for s in parameters]
+    found: list[Any]
     if rate is None:
         found = [s.rate for s in parameters]
     elif isinstance(rate, Mapping):
@@ -22,7 +26,7 @@ def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
                 raise UnknownNameError("scheduling parameter", name, names)
         found = [rate.get(s.name, s.rate) for s in parameters]
     else:
-        found = [rate] * len(names) if isinstance(rate, int | float) else list(rate) if _listed(rate) else [rate]
+        found = list(rate) if isinstance(rate, Sequence | np.ndarray) and not isinstance(rate, str) else [rate] * len(names)
     try:
         numbers = tuple(float(value) for value in found)
     except (TypeError, ValueError):
@@ -33,7 +37,3 @@ def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
             f"rate must be >= 0 (math.inf: as fast as it likes), one for all, one for each of {units}, or by name, got {rate!r}"
         )
     return numbers
-
-
-def _listed(rate: object) -> bool:
-    return hasattr(rate, "__len__") and not isinstance(rate, str)

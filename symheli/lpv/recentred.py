@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import product
 from math import comb, prod
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from symheli.lpv.arrays import Array
 
 _exact = np.frompyfunc(Fraction, 1, 1)
 
-Centre = tuple[float | Fraction, float | Fraction]
+Centre = tuple[Fraction, Fraction]
 """(middle, radius) of a parameter p = middle + radius delta."""
 
 
@@ -27,12 +28,11 @@ def recentred(terms: Mapping[tuple[int, ...], Array], centres: Sequence[Centre])
 
     The doubles are taken as the rationals they are and every sum is rounded once: nothing cancels, however far from zero p lives.
     """
-    exact = [(Fraction(middle), Fraction(radius)) for middle, radius in centres]
-    out: dict[tuple[int, ...], Array] = {}
+    out: dict[tuple[int, ...], Any] = {}
     for exponents, M in terms.items():
         M = _exact(np.asarray(M, dtype=float))
         for powers in product(*(range(e + 1) for e in exponents)):
-            factor = prod(comb(e, k) * r**k * c ** (e - k) for (c, r), e, k in zip(exact, exponents, powers, strict=True))
+            factor = prod(comb(e, k) * r**k * c ** (e - k) for (c, r), e, k in zip(centres, exponents, powers, strict=True))
             if factor:
                 out[powers] = out[powers] + factor * M if powers in out else factor * M
     return {powers: np.asarray(M).astype(float) for powers, M in out.items()}

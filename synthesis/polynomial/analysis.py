@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +15,7 @@ from symheli.errors import InputError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace
 from synthesis.certificate import Attempt
 from synthesis.cone_program import Answer, Candidate, Solver, solve
+from synthesis.fine_sampling import fine_sampling
 from synthesis.forms import Relaxation
 from synthesis.lower_bound import Search
 from synthesis.lyapunov import graded_knots
@@ -221,12 +224,19 @@ class _Report:
         bounds_by_name = dict(zip(names, (best.bound if proven else nothing, limit, self.frozen), strict=False))
         P, evidence = best.lyapunov, hunt.evidence if hunt else None
         return BoxCertificate(
-            kind=kind, **bounds_by_name, status=status, verified=proven, rates=self.demand.rates, hypotheses=self._hypotheses(P, status),
+            kind=kind, **bounds_by_name, status=status, verified=proven, rates=self.demand.rates,
+            hypotheses=self._hypotheses(P, status) + self._sampling(bounds_by_name),
             solver=str(self.solver), seconds=Seconds(*(float(s) for s in (*(hunt.spent if hunt else np.zeros(3)), bounds))),
             conditioning=evidence.conditioning(P) if P and evidence else math.inf, attempts=tuple(hunt.attempts) if hunt else (),
             worst=worst, relaxation=self.relaxation.kind, lyapunov=P,
             indicative=best.bound if status is Status.UNPROVEN else math.nan, evidence=evidence,
         )  # fmt: skip
+
+    def _sampling(self, bounds: Mapping[str, float]) -> tuple[str, ...]:
+        if "gamma" not in bounds:
+            return ()
+        corners = np.array(list(product(*((s.low, s.middle, s.high) for s in self.model.parameters))))
+        return fine_sampling(self.model.at(corners)[0], self.model.dt, bounds["gamma"], bounds["lower"])
 
     def _hypotheses(self, P: BoxLyapunov | None, status: Status) -> tuple[str, ...]:
         out = []

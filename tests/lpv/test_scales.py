@@ -1,7 +1,10 @@
 """What depends on p is decided entry by entry: no unit of a state, an input, an output or a parameter changes the model."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from families import random_lpv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -141,3 +144,16 @@ def test_equilibrated_matrices_are_the_same_in_any_units():
         np.testing.assert_allclose(one, two, rtol=1e-9)  # logarithms of 24 decades lose a few digits
     assert is_singular(np.array([[1.0, 2e12], [1e-12, 2.0]]))
     assert not is_singular(np.diag([1.0, 1e-20]))
+
+
+def test_truncation_cuts_the_same_copies_in_all_units():
+    lpv, _ = random_lpv(3, rank=2)
+    plain = lpv.to_lft().truncate(order=6)
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        x, u, y = (10.0 ** rng.uniform(-12, 12, n) for n in (4, 2, 3))
+        scaled = replace(
+            lpv, A=x[:, None] * lpv.A / x, B=x[:, None] * lpv.B / u, C=y[:, None] * lpv.C / x, D=y[:, None] * lpv.D / u
+        )  # fmt: skip
+        cut = scaled.to_lft().truncate(order=6)
+        assert (cut.error, cut.bound) == pytest.approx((plain.error, plain.bound), rel=1e-9)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
 from math import comb, log10
 from typing import ClassVar
@@ -68,7 +67,7 @@ class Polynomial(Basis):
     @cached_property
     def monomial(self) -> Array:
         """Matrix T (n, n): f_j(p) = sum_i T[j, i] p^i, p in physical units; each entry exact before it is rounded."""
-        middle, radius = map(Fraction, centre(self.low, self.high))
+        middle, radius = centre(self.low, self.high)
         power = {(i,): column for i, column in enumerate(self._powers.T)}
         physical = recentred(power, [(-middle / radius, 1 / radius)])
         return frozen(np.stack([physical[i,] if (i,) in physical else np.zeros(self.size) for i in range(self.size)], axis=1), "monomial")

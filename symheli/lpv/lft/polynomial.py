@@ -120,13 +120,14 @@ def expanded(lft: LFT) -> dict[tuple[int, ...], Array] | None:
     """
     m, n = len(lft.blocks), lft.order
     zero: tuple[int, ...] = (0,) * m
-    power, size = {zero: np.eye(n)}, np.zeros((n, n))
-    out = {zero: lft.M22}
+    power: dict[tuple[int, ...], Array] = {zero: np.eye(n)}
+    out: dict[tuple[int, ...], Array] = {zero: lft.M22}
+    size = np.zeros((n, n))
     for _ in range(n):  # no polynomial of n copies has a higher degree
         size = size + sum(np.abs(M) for M in power.values())
         fed = _times_delta(power, lft)
         for exponents, M in fed.items():
-            out[exponents] = out.get(exponents, 0.0) + lft.M21 @ M @ lft.M12
+            out[exponents] = out.get(exponents, np.zeros_like(lft.M22)) + lft.M21 @ M @ lft.M12
         power = {e: lft.M11 @ M for e, M in fed.items()}
         bar = _rounding(lft, size)
         if np.all(_rest(lft, size, sum((np.abs(M) for M in power.values()), np.zeros((n, n)))) <= bar):
