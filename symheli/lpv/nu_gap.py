@@ -75,7 +75,7 @@ def chordal_distance(
 
 def angles(poles: np.ndarray, points: int) -> np.ndarray:
     """Angles of z from 0 to pi: logarithmic, and around every pole as dense as it is close to the circle."""
-    speed = np.abs(np.log(poles[poles != 0]))  # in units of 1/dt
+    speed = np.abs(np.log(poles[poles != 0].astype(complex)))  # in units of 1/dt
     slowest = min(1.0, float(speed.min(initial=1.0)))
     around = np.sinh(np.linspace(-8.0, 8.0, 41))
     near = (np.abs(np.angle(poles))[:, None] + np.abs(np.abs(poles) - 1)[:, None] * around).ravel()

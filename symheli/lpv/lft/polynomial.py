@@ -114,8 +114,8 @@ def _before(exponents: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
 def expanded(lft: LFT) -> dict[tuple[int, ...], Array] | None:
     """{exponents: coefficient} of M in powers of delta, None where the dependence is rational.
 
-    A polynomial is one whose powers of L = M11 Delta end: exactly, as those of `LFT.polynomial` and its reductions do, or, where
-    the loop was rotated, to rounding. Then what is left out is proven to stay below `_rounding` in the whole box, entry by entry;
+    A polynomial is one whose powers of L = M11 Delta end: exactly, as those of `LFT.polynomial` do, or, where the loop was
+    rotated (reduced, say), to rounding. Then what is left out is proven to stay below `_rounding` in the whole box, entry by entry;
     so do the coefficients left out. Units of states, inputs, outputs and copies play no part.
     """
     m, n = len(lft.blocks), lft.order

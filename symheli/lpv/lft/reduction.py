@@ -17,39 +17,67 @@ SAMPLES = 12
 
 
 def reduce(lft: LFT, tolerance: float) -> LFT:
-    """See `LFT.reduce`: what no input reaches and no output sees is removed, block by block, all blocks together.
+    """See `LFT.reduce`."""
+    return _one_parameter(lft, tolerance) if len(lft.blocks) == 1 else _structured(lft, tolerance)
+
+
+def _one_parameter(lft: LFT, tolerance: float) -> LFT:
+    """Minimal order, exactly.
+
+    M(delta) = M22 + sum_i delta^i M21 M11^(i-1) M12, so the order is the rank of the block Hankel matrix of
+    its Markov parameters, and the singular vectors realize it (Ho-Kalman). Singular values below `tolerance`
+    times the largest count as zero, as does dependence that is not `significant`.
+    """
+    n = lft.order
+    rows, columns = lft.M22.shape
+    markov, power = [], lft.M12
+    while len(markov) < 2 * n + 1 and np.abs(power).max(initial=0) > 0:
+        markov.append(lft.M21 @ power)
+        power = lft.M11 @ power
+    depth = len(markov) if np.abs(power).max(initial=0) == 0 else n
+    markov += [np.zeros((rows, columns))] * (2 * depth - len(markov))
+    if depth == 0:
+        return _projected(lft, [np.zeros((n, 0))], [np.zeros((n, 0))])
+    depends = significant(np.abs(np.stack(markov)).max(axis=0), lft.M22, tolerance)
+    markov = [np.where(depends, M, 0.0) for M in markov]
+    # states and channels of different size: balance rows and columns so that the rank is judged entry by entry
+    size = np.abs(np.stack(markov)).max(axis=0)
+    row_scale, column_scale = equilibrate(size)
+    scaled = [row_scale[:, None] * M * column_scale for M in markov]
+    hankel = np.block([[scaled[i + j] for j in range(depth)] for i in range(depth)])
+    shifted = np.block(
+        [[scaled[i + j + 1] if i + j + 1 < len(scaled) else np.zeros((rows, columns)) for j in range(depth)] for i in range(depth)]
+    )
+    U, s, Vt = np.linalg.svd(hankel)
+    r = int(np.sum(s > tolerance * s[0])) if s[0] > 0 else 0
+    root = np.sqrt(s[:r])
+    M11 = (U[:, :r].T @ shifted @ Vt[:r].T) / root[:, None] / root
+    M12 = root[:, None] * Vt[:r, :columns] / column_scale
+    M21 = U[:rows, :r] * root / row_scale[:, None]
+    # what does not depend on the parameter is cut off from it to the last bit
+    M12, M21 = np.where(np.any(depends, axis=0), M12, 0.0), np.where(np.any(depends, axis=1)[:, None], M21, 0.0)
+    return replace(lft, M11=M11, M12=M12, M21=M21, blocks=(Block(lft.blocks[0].scheduling, r),))
+
+
+def _structured(lft: LFT, tolerance: float) -> LFT:
+    """Remove what no input reaches and what no output sees, block by block, all blocks together.
 
     The subspaces of each parameter's copies that words in the M11 blocks reach (and, transposed, see) are the smallest
-    realization for one parameter and for parameters that do not commute; parameters that do may allow fewer still. Source:
-    Cockburn and Morton, "Linear fractional representations of uncertain systems", Automatica 33 (1997).
-
-    Ranks are judged in coordinates in which rows, columns and copies are of one size, whatever the units. A loop whose powers
-    end, that of a polynomial, is made strictly triangular again, so that what was a polynomial is one to the last bit.
+    realization for parameters that do not commute; parameters that do may allow fewer still. Source: Cockburn and
+    Morton, "Linear fractional representations of uncertain systems", Automatica 33 (1997). Ranks are judged in coordinates in which
+    rows, columns and copies are of one size, whatever the units.
     """
     lft = _without_rounding(lft, tolerance)
     units = _units(lft)
     lft = replace(lft, M11=units.copies[:, None] * lft.M11 / units.copies, M12=units.copies[:, None] * lft.M12, M21=lft.M21 / units.copies)
     while True:
         seen = _reached(lft.M11.T, (units.rows[:, None] * lft.M21).T, lft.blocks, tolerance)
-        smaller = _projected(lft, seen, transposed=True)
+        smaller = _projected(lft, seen, seen)
         reached = _reached(smaller.M11, smaller.M12 * units.columns, smaller.blocks, tolerance)
-        smaller = _projected(smaller, reached, transposed=False)
+        smaller = _projected(smaller, reached, reached)
         if smaller.order == lft.order:
             return smaller
         lft = smaller
-
-
-def steps(M11: Array) -> int | None:
-    """Number of powers of the loop until they vanish whatever the parameters, by the pattern of its zeros; None where they go on."""
-    left, pattern = np.ones(len(M11), dtype=bool), M11 != 0
-    for k in range(len(M11) + 1):
-        if not np.any(left):
-            return k
-        fed = left & np.any(pattern[:, left], axis=1)
-        if np.array_equal(fed, left):
-            return None
-        left = fed
-    return None
 
 
 class _Units(NamedTuple):
@@ -88,75 +116,45 @@ def _units(lft: LFT) -> _Units:
     back = np.swapaxes(np.eye(lft.order) - delta[:, :, None] * lft.M11, -1, -2)
     sight = np.broadcast_to((rows[:, None] * lft.M21).T, (len(delta), lft.order, len(rows)))
     see = np.abs(np.linalg.solve(back, sight)).max(axis=(0, 2), initial=0.0)
-    both = (reach > 0) & (see > 0)
-    copies = 0.5 * (np.log2(np.where(both, see, 1.0)) - np.log2(np.where(both, reach, 1.0)))
+    # what is only reached, or only seen, goes away: meanwhile it is of size one
+    reached, seen = np.where(reach > 0, reach, 1.0), np.where(see > 0, see, 1.0)
+    only = (reach > 0) != (see > 0)
+    copies = np.where(only, 1.0, 0.5) * (np.log2(seen) - np.log2(reached))
     return _Units(rows, columns, np.exp2(np.round(copies)))  # powers of two cost no rounding
 
 
-class _Subspace(NamedTuple):
-    """Orthonormal `basis` (n_i, r_i) of what inputs reach in a block, and the `level` (r_i,) of each direction.
-
-    Where the powers of the loop end: the length of the longest words that reach it, so that the loop only leads upwards.
-    """
-
-    basis: Array
-    level: Array
-
-    def extended(self, columns: Array, level: int, threshold: float) -> _Subspace:
-        """Together with the directions of `columns` it lacks."""
-        rest = columns
-        for _ in range(2):  # twice is enough for orthogonality to rounding
-            rest = rest - self.basis @ (self.basis.T @ rest)
-        if min(rest.shape) == 0:
-            return self
-        U, s, _ = np.linalg.svd(rest, full_matrices=False)
-        new = U[:, s > threshold]
-        return _Subspace(np.hstack([self.basis, new]), np.concatenate([self.level, np.full(new.shape[1], level)]))
-
-
-def _reached(M11: Array, M12: Array, blocks: tuple[Block, ...], tolerance: float) -> list[_Subspace]:
-    """What the inputs reach in each block."""
+def _reached(M11: Array, M12: Array, blocks: tuple[Block, ...], tolerance: float) -> list[Array]:
+    """Orthonormal bases (n_i, r_i) of what the inputs reach in each block."""
     part = parts([block.size for block in blocks])
-    threshold = tolerance * float(np.abs(M12).max(initial=0.0))
-    spaces = [_Subspace(np.zeros((block.size, 0)), np.zeros(0, dtype=int)) for block in blocks]
-    end = steps(M11)
-    words = [[M12[here] for here in part]]
-    if end is not None:
-        for _ in range(end - 1):
-            words.append(
-                [_compressed(np.hstack([M11[here, there] @ w for there, w in zip(part, words[-1], strict=True)])) for here in part]
-            )
-        for level in reversed(range(end)):
-            spaces = [space.extended(w, level, threshold) for space, w in zip(spaces, words[level], strict=True)]
-        return spaces
-    spaces = [space.extended(w, 0, threshold) for space, w in zip(spaces, words[0], strict=True)]
+    scale = max(float(np.abs(M12).max(initial=0.0)), 1e-300)
+    bases = [_extended(np.zeros((block.size, 0)), M12[here], tolerance * scale) for block, here in zip(blocks, part, strict=True)]
+    reach = max(float(np.abs(M11).max(initial=0.0)), 1e-300)
     while True:
-        images = [np.hstack([M11[here, there] @ s.basis for there, s in zip(part, spaces, strict=True)]) for here in part]
-        reach = tolerance * float(np.abs(M11).max(initial=0.0))
-        grown = [space.extended(image, 0, reach) for space, image in zip(spaces, images, strict=True)]
-        if all(a.basis.shape == b.basis.shape for a, b in zip(grown, spaces, strict=True)):
+        grown = []
+        for i, here in enumerate(part):
+            images = [M11[here, there] @ bases[j] for j, there in enumerate(part)]
+            grown.append(_extended(bases[i], np.hstack(images), tolerance * reach))
+        if all(a.shape == b.shape for a, b in zip(grown, bases, strict=True)):
             return grown
-        spaces = grown
+        bases = grown
 
 
-def _compressed(columns: Array) -> Array:
-    """As few columns as rows with the same span and size."""
-    if columns.shape[1] <= columns.shape[0]:
-        return columns
-    U, s, _ = np.linalg.svd(columns, full_matrices=False)
-    return U * s
+def _extended(basis: Array, columns: Array, threshold: float) -> Array:
+    """The basis together with the directions of `columns` it lacks."""
+    rest = columns
+    for _ in range(2):  # twice is enough for orthogonality to rounding
+        rest = rest - basis @ (basis.T @ rest)
+    if min(rest.shape) == 0:
+        return basis
+    U, s, _ = np.linalg.svd(rest, full_matrices=False)
+    return np.hstack([basis, U[:, s > threshold]])
 
 
-def _projected(lft: LFT, spaces: list[_Subspace], *, transposed: bool) -> LFT:
-    """The LFT with the copies of these subspaces, of the loop or of its transpose."""
-    T = _diagonal([space.basis for space in spaces])
-    M11 = T.T @ lft.M11 @ T
-    if steps(lft.M11) is not None:
-        level = np.concatenate([space.level for space in spaces])
-        upwards = level[:, None] > level
-        M11 = np.where(upwards.T if transposed else upwards, M11, 0.0)
-    blocks = tuple(Block(block.scheduling, space.basis.shape[1]) for block, space in zip(lft.blocks, spaces, strict=True))
-    return replace(lft, M11=M11, M12=T.T @ lft.M12, M21=lft.M21 @ T, blocks=blocks)
+def _projected(lft: LFT, left: list[Array], right: list[Array]) -> LFT:
+    """The LFT with copies z_i = right_i z_i', left_i' right_i = I."""
+    L, R = _diagonal(left), _diagonal(right)
+    blocks = tuple(Block(block.scheduling, basis.shape[1]) for block, basis in zip(lft.blocks, right, strict=True))
+    return replace(lft, M11=L.T @ lft.M11 @ R, M12=L.T @ lft.M12, M21=lft.M21 @ R, blocks=blocks)
 
 
 def _diagonal(parts: list[Array]) -> Array:
