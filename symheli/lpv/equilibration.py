@@ -15,13 +15,18 @@ NOISE = 1e-12
 """An entry this far below the largest of its row or column, in the units that suit all entries best, has no say in those units."""
 
 
-def equilibrate(size: Array, sweeps: int = 5) -> tuple[Array, Array]:
+def equilibrate(size: Array) -> tuple[Array, Array]:
     """Row and column factors that bring the largest entry of each to about one (zero rows and columns keep 1).
 
     They start from the least-squares fit of log size by -log row - log column, so that row * size * column is the same
     whatever the units of rows and columns. Source: Curtis and Reid, J. Inst. Maths Applics 10 (1972).
     """
-    row, column = _logarithmic(np.asarray(size, dtype=float))
+    size = np.asarray(size, dtype=float)
+    return peaks_to_one(size, *_logarithmic(size))
+
+
+def peaks_to_one(size: Array, row: Array, column: Array, sweeps: int = 5) -> tuple[Array, Array]:
+    """The factors nearest to `row` and `column`, by a few sweeps, with which the largest entry of each row and column is about one."""
     for _ in range(sweeps):
         scaled = row[:, None] * size * column
         peak = scaled.max(axis=1, initial=0.0)
