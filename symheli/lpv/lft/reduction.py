@@ -69,7 +69,8 @@ def _as_much_reached_as_seen(lft: LFT) -> LFT:
     power, size = lft.M12, np.zeros(lft.M22.shape)
     for _ in range(2 * lft.order):
         size, power = np.maximum(size, np.abs(lft.M21 @ power)), lft.M11 @ power
-    rows, columns = peaks_to_one(size, *map(np.ones, lft.M22.shape))
+    height, width = lft.M22.shape
+    rows, columns = peaks_to_one(size, np.ones(height), np.ones(width))
     reach, sight = [lft.M12 * columns], [rows[:, None] * lft.M21]
     for _ in range(lft.order - 1):
         reach.append(lft.M11 @ reach[-1])
