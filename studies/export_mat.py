@@ -42,8 +42,9 @@ def content(family: LinearFamily, title: str) -> bytes:
         for group in ("states", "inputs", "outputs")
         for key, cells in ((group, _cells(getattr(family, group))), (f"{group}_units", _cells([s.unit for s in getattr(family, group)])))
     }
-    x0 = np.array([[t.x[s] for s in family.states] for t in family.trims])
-    u0 = np.array([[t.u[s] for s in family.inputs] for t in family.trims])
+    points = family.known_trims("a MAT file of trimmed models")
+    x0 = np.array([[t.x[s] for s in family.states] for t in points])
+    u0 = np.array([[t.u[s] for s in family.inputs] for t in points])
     y0 = np.einsum("kij,kj->ki", family.C, x0) + np.einsum("kij,kj->ki", family.D, u0)
     trims = {"x0": x0.T, "u0": u0.T, "y0": y0.T}
     kinks = np.array(sorted(v for found in family.kinks.values() for v in found))

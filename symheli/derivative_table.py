@@ -74,7 +74,7 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
     """
     if family.dt is not None:
         raise InputError(f"derivatives are those of continuous models; this family has dt = {family.dt} s")
-    for point in family.trims:
+    for point in family.known_trims("a table of derivatives"):
         if any(abs(point.x[rate]) > 1e-9 for rate in ("p", "q", "r") if rate in point.x):  # straight to the accuracy of a trim
             raise InputError("derivatives are tabulated for straight flight; this family turns")
     columns = [s for s in family.states if s not in ("phi", "theta")]  # these enter by gravity and kinematics alone

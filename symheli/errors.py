@@ -57,6 +57,10 @@ class ConvergenceWarning(UserWarning):
     """An iteration stopped before it settled; the result is its last value, and may be worse than where it started."""
 
 
+class PrecisionWarning(UserWarning):
+    """The numbers asked for cannot hold what they are to say: rounding takes most of their digits."""
+
+
 class CompilerWarning(UserWarning):
     """Compiled code is not available; the same numbers come out more slowly."""
 

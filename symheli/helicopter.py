@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -69,6 +69,10 @@ class Helicopter:
     ) -> Helicopter:
         """By the name of a packaged airframe (`symheli.vehicle.vehicles()`) or the path of a vehicle TOML file."""
         return cls(load_vehicle(vehicle), governor, float(density), frozenset(printed), float(smoothing))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The airframe and its options, without what was built from them: CasADi's functions cross no process border."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     # --- other numbers, same equations -------------------------------------------------------------------------
 

@@ -72,7 +72,7 @@ class StitchedModel:
             raise InputError("stitching needs at least two airspeeds")
         if kind not in _TABLES:
             raise UnknownNameError("kind of table", kind, _TABLES)
-        if gusts := [n for n in family.inputs if n not in family.trims[0].u]:
+        if gusts := [n for n in family.inputs if n not in family.known_trims("a stitched model")[0].u]:
             raise InputError(f"leave {', '.join(gusts)} out (family.select(inputs=...)): wind enters a stitched model by its kinematics")
         nodes = tuple(float(p) for p in family.airspeeds)
         x0 = np.array([[trim.x[s] for s in family.states] for trim in family.trims])

@@ -5,8 +5,9 @@ from __future__ import annotations
 from synthesis.cone_program import Solver
 from synthesis.forms import Relaxation
 from synthesis.lower_bound import THOROUGH, Search
-from synthesis.polynomial.analysis import Model, Rate, box_certificate
+from synthesis.polynomial.analysis import Model, box_certificate
 from synthesis.polynomial.certificate import BoxCertificate
+from synthesis.rates import Rate
 
 
 def decay_rate(

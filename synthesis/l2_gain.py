@@ -13,21 +13,25 @@ from symheli.lpv import LFT, LPVStateSpace
 from synthesis.budget import said
 from synthesis.certificate import Certificate
 from synthesis.cone_program import Answer, Solver
+from synthesis.fine_sampling import fine_sampling
 from synthesis.forms import Problem, Relaxation, scaled_problem
 from synthesis.frozen import FrozenGain, frozen_gain, least_damped
 from synthesis.hypotheses import VERIFIED, fitted
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
 from synthesis.lyapunov import Lyapunov
 from synthesis.polynomial import BoxCertificate, PolynomialStateSpace
-from synthesis.polynomial.analysis import Model, Rate, box_certificate
+from synthesis.polynomial.analysis import Model, box_certificate
 from synthesis.proof_search import Result, prove, prove_gain
+from synthesis.rates import Rate, rates
 from synthesis.spectrum import surely_unstable
 from synthesis.verdict import Seconds, Status, Trajectory
+
+Array = np.ndarray
 
 
 @overload
 def l2_gain(
-    lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    lpv: LPVStateSpace, rate: Rate = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
 ) -> Certificate: ...  # fmt: skip
 @overload
@@ -74,7 +78,7 @@ def l2_gain(
 
 @overload
 def stability(
-    lpv: LPVStateSpace, rate: float | None = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
+    lpv: LPVStateSpace, rate: Rate = None, *, relaxation: Relaxation | None = None, solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
 ) -> Certificate: ...  # fmt: skip
 @overload
@@ -117,14 +121,12 @@ def _surely_unstable(lpv: LPVStateSpace, p: float) -> float | None:
 
 def _check(lpv: LPVStateSpace, rate: Rate, relaxation: Relaxation, *, with_gain: bool) -> float:
     relaxation.check(lpv.dt, with_gain=with_gain)
-    rate = lpv.scheduling.rate if rate is None else float(rate)  # type: ignore[arg-type]
-    if not rate >= 0:
-        raise InputError(f"rate must be >= 0 {lpv.scheduling.unit}/s (math.inf: as fast as it likes), got {rate}")
+    (limit,) = rates((lpv.scheduling,), rate)
     if not lpv.states:
         raise InputError("the model has no states; its gain is the largest norm of D(p)")
     if with_gain and not (lpv.inputs and lpv.outputs):
         raise InputError(f"a gain needs inputs and outputs, got {len(lpv.inputs)} and {len(lpv.outputs)}; use stability() without channels")
-    return rate
+    return limit
 
 
 def _solver(solver: Solver | str) -> Solver:
@@ -144,10 +146,15 @@ def _certificate(
     evidence = found[0].evidence(elevation) if found else None
     return Certificate(
         kind=kind, gamma=gamma, lower=lower, frozen=frozen, status=status, verified=best.lyapunov is not None, rates=(rate,),
-        hypotheses=_hypotheses(lpv, rate, best.lyapunov, kind), solver=str(solver), seconds=best.seconds._replace(bounds=bounds),
+        hypotheses=_hypotheses(lpv, rate, best.lyapunov, kind) + fine_sampling(_frozen(lpv), lpv.dt, gamma, lower),
+        solver=str(solver), seconds=best.seconds._replace(bounds=bounds),
         conditioning=best.conditioning, attempts=best.attempts, worst=worst, lyapunov=best.lyapunov, unit=lpv.scheduling.unit,
         evidence=evidence,
     )  # fmt: skip
+
+
+def _frozen(lpv: LPVStateSpace) -> Array:
+    return lpv.matrices(np.linspace(lpv.scheduling.low, lpv.scheduling.high, 41)).A
 
 
 def _hypotheses(lpv: LPVStateSpace, rate: float, P: Lyapunov | None, kind: str) -> tuple[str, ...]:

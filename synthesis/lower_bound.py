@@ -22,6 +22,7 @@ from synthesis.budget import Budget
 from synthesis.corners import Corners, climb
 from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.periodic import Lifted, multiplier, ratio_from_rest, worst_input
+from synthesis.rates import Rate, rates
 from synthesis.scheduled import Scheduled
 from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
@@ -76,20 +77,18 @@ class LowerBound(NamedTuple):
     growth: float = math.nan
 
 
-def lower_bound(
-    lpv: Scheduled, rate: float | None = None, *, frozen: FrozenGain | None = None, search: Search | None = THOROUGH
-) -> LowerBound:
+def lower_bound(lpv: Scheduled, rate: Rate = None, *, frozen: FrozenGain | None = None, search: Search | None = THOROUGH) -> LowerBound:
     """A lower bound of the L2 gain over p(t) in range with |dp/dt| <= `rate` (default the model's own; inf: p may jump).
 
     `lpv` may also be an LFT of one parameter. Deterministic as long as `search.seconds` suffice. With `search` None, or rate 0,
     the `frozen` gain. In continuous time the error of the time steps, judged by halving them, is taken off.
     """
-    rate = lpv.scheduling.rate if rate is None else float(rate)
+    (limit,) = rates((lpv.scheduling,), rate)
     frozen = frozen or frozen_gain(lpv)
     best = LowerBound(frozen.gamma, None)
-    if search is None or rate == 0 or not math.isfinite(frozen.gamma):
+    if search is None or limit == 0 or not math.isfinite(frozen.gamma):
         return best
-    hunt = _Hunt(lpv, rate, search)
+    hunt = _Hunt(lpv, limit, search)
     cycles, growing = hunt.fastest()
     if growing is not None:
         return growing

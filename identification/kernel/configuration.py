@@ -66,7 +66,7 @@ class Triangle:
         out = np.zeros((self.wide, self.wide), packed.dtype)
         for start, block in zip(range(0, self.wide, LANES), self.blocks, strict=True):
             out[start : start + LANES, start:] = packed[block].reshape(LANES, -1)
-        return out[np.ix_(self.used, self.used)]
+        return out[self.used[:, None], self.used]
 
 
 @dataclass(frozen=True)

@@ -255,7 +255,7 @@ class Kernel:
                 a.d[where] = a.energy[where] = a.fed[where] = target
                 continue
             for k in np.flatnonzero(target > louder * a.fed[where]):
-                self._feed(a, where.start + k, self._real(target[k]), a.outputs.stop)
+                self._feed(a, where.start + int(k), self._real(target[k]), a.outputs.stop)
                 fed = True
         if fed:
             solve_anew(a)

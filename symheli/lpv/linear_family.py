@@ -12,6 +12,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Basis, PiecewiseLinear, Polynomial, Spline
+from symheli.lpv.equilibration import is_singular
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.operating_point import OperatingPoint
@@ -26,8 +27,8 @@ Kind = Literal["polynomial", "spline", "linear"]
 class LinearFamily:
     """K linear models at increasing `airspeeds` (m/s): A (K, nx, nx), B (K, nx, nu), C (K, ny, nx), D (K, ny, nu).
 
-    `trims` holds the operating point of each. `kinks` maps a name of the physics (a saturation, an edge of a
-    wake) to the airspeeds at which the models change with a corner.
+    `trims` holds the operating point of each; empty where the matrices come from elsewhere and none is known. `kinks` maps a name
+    of the physics (a saturation, an edge of a wake) to the airspeeds at which the models change with a corner.
     """
 
     airspeeds: Array
@@ -38,7 +39,7 @@ class LinearFamily:
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
-    trims: tuple[OperatingPoint, ...]
+    trims: tuple[OperatingPoint, ...] = ()
     dt: float | None = None
     kinks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
@@ -51,15 +52,20 @@ class LinearFamily:
         K, nx, nu, ny = len(self.airspeeds), len(self.states), len(self.inputs), len(self.outputs)
         for name, shape in (("A", (K, nx, nx)), ("B", (K, nx, nu)), ("C", (K, ny, nx)), ("D", (K, ny, nu))):
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
-        if len(self.trims) != K:
-            raise InputError(f"expected {K} trims, one an airspeed, got {len(self.trims)}")
+        if len(self.trims) not in (0, K):
+            raise InputError(f"expected {K} trims, one an airspeed, or none at all, got {len(self.trims)}")
 
     @classmethod
     def from_models(
         cls, airspeeds: Sequence[float] | Array, models: Sequence[LinearModel], kinks: Mapping[str, tuple[float, ...]] | None = None
     ) -> LinearFamily:
-        """From linear models with equal names, one an airspeed (m/s), each with its operating point."""
+        """From linear models with equal names and sample period, one an airspeed (m/s); all with their operating point, or none."""
+        if not len(models) or len(models) != len(np.atleast_1d(np.asarray(airspeeds))):
+            raise InputError(f"expected one model an airspeed, got {len(models)} models")
         first = models[0]
+        for k, model in enumerate(models):
+            if (model.states, model.inputs, model.outputs, model.dt) != (first.states, first.inputs, first.outputs, first.dt):
+                raise InputError(f"models[{k}]: expected states, inputs, outputs and dt of models[0]; select or discretize first")
         return cls(
             np.asarray(airspeeds, float), np.stack([m.A for m in models]), np.stack([m.B for m in models]),
             np.stack([m.C for m in models]), np.stack([m.D for m in models]),
@@ -70,7 +76,16 @@ class LinearFamily:
         return len(self.airspeeds)
 
     def __getitem__(self, k: int) -> LinearModel:
-        return LinearModel(self.A[k], self.B[k], self.C[k], self.D[k], self.states, self.inputs, self.outputs, self.dt, self.trims[k])
+        return LinearModel(self.A[k], self.B[k], self.C[k], self.D[k], self.states, self.inputs, self.outputs, self.dt, self._trim(k))
+
+    def known_trims(self, purpose: str) -> tuple[OperatingPoint, ...]:
+        """The trims; raises `InputError` where there are none, which `purpose` needs."""
+        if not self.trims:
+            raise InputError(f"{purpose} needs the trim at each airspeed, and this family has none; give its models a point, or sweep")
+        return self.trims
+
+    def _trim(self, k: int) -> OperatingPoint | None:
+        return self.trims[k] if self.trims else None
 
     def select(
         self, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
@@ -89,7 +104,7 @@ class LinearFamily:
         def reduce(model: LinearModel) -> LinearModel:
             A, B, C, D = model.A, model.B, model.C[rows], model.D[rows]
             ss = A[np.ix_(gone, gone)]
-            if np.linalg.cond(ss) > 1e12:
+            if is_singular(ss):
                 raise InputError(f"cannot residualize {', '.join(states)}: they do not settle (singular dynamics)")
             X, U = np.linalg.solve(ss, A[np.ix_(gone, kept)]), np.linalg.solve(ss, B[gone])
             return replace(
@@ -109,7 +124,7 @@ class LinearFamily:
 
         "polynomial": least-squares fit of `degree`; "spline": cubic through the nodes; "linear": straight lines.
         `.residuals` of the result are fit minus node values. The trim schedule is always the cubic spline (linear
-        below four nodes): its slope is the drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2.
+        below four nodes), none without trims: its slope is the drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2.
         """
         low, high = float(self.airspeeds[0]), float(self.airspeeds[-1])
         if len(self) < 2:
@@ -127,13 +142,17 @@ class LinearFamily:
         exact = Matrices(self.A, self.B, self.C, self.D)
         fitted = Matrices(*(basis.fit(self.airspeeds, M) for M in exact))
         residuals = Matrices(*(np.tensordot(basis(self.airspeeds), F, axes=1) - M for F, M in zip(fitted, exact, strict=True)))
-        trim_basis = Spline(nodes) if len(self) >= 4 else PiecewiseLinear(nodes)
-        x0 = np.array([[trim.x[s] for s in self.states] for trim in self.trims])
-        u0 = np.array([[trim.u[i] if i in trim.u else 0.0 for i in self.inputs] for trim in self.trims])
         return LPVStateSpace(
             basis, *fitted, Scheduling("airspeed", "m/s", low, high, rate), self.states, self.inputs, self.outputs,
-            dt=self.dt, trim=TrimSchedule(trim_basis, x0, u0), residuals=residuals,
+            dt=self.dt, trim=self._schedule(nodes), residuals=residuals,
         )  # fmt: skip
+
+    def _schedule(self, nodes: tuple[float, ...]) -> TrimSchedule | None:
+        if not self.trims:
+            return None
+        x0 = np.array([[trim.x[s] for s in self.states] for trim in self.trims])
+        u0 = np.array([[trim.u[i] if i in trim.u else 0.0 for i in self.inputs] for trim in self.trims])
+        return TrimSchedule(Spline(nodes) if len(self) >= 4 else PiecewiseLinear(nodes), x0, u0)
 
     def _map(self, change) -> LinearFamily:
         return LinearFamily.from_models(self.airspeeds, [change(self[k]) for k in range(len(self))], self.kinks)

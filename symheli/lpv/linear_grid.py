@@ -90,6 +90,6 @@ class LinearGrid:
             raise UnknownNameError("axis", ", ".join(value) or "(none)", [str(self.axis)])
         wanted = value[str(self.axis)]
         miss = np.abs(self.values - wanted)
-        if not miss.min() <= 1e-9 * max(1.0, abs(wanted)):  # the same number, rounded otherwise
+        if not miss.min() <= 1e-9 * max(abs(wanted), np.ptp(self.values)):  # the same number, rounded otherwise
             raise InputError(f"{self.axis} = {wanted} {self.axis.unit} is not on the grid: {', '.join(f'{v:g}' for v in self.values)}")
         return self.families[int(miss.argmin())]

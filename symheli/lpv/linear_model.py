@@ -12,6 +12,7 @@ from scipy.signal import cont2discrete
 
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
+from symheli.lpv.equilibration import loop_inverse
 from symheli.lpv.operating_point import OperatingPoint
 from symheli.lpv.sample_period import same_period
 from symheli.lpv.signal import Signal, indices, signals
@@ -102,12 +103,11 @@ class LinearModel:
         )  # fmt: skip
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LinearModel:
-        """Close u_i = gain y_j + (new u_i) for each {(input, output): gain}; no feedthrough from u to the outputs used (`InputError`)."""
+        """Close u_i = gain y_j + (new u_i) for each {(input, output): gain}; raises `InputError` where I - K D is singular."""
         K = feedback_matrix(gains, self.inputs, self.outputs)
-        if np.abs(K @ self.D).max(initial=0.0) > 0:
-            raise InputError("an output that is fed back depends on an input directly; put an actuator or a delay between")
-        KC = K @ self.C
-        return replace(self, A=self.A + self.B @ KC, C=self.C + self.D @ KC)
+        N = loop_inverse(K @ self.D)
+        NKC = N @ K @ self.C
+        return replace(self, A=self.A + self.B @ NKC, B=self.B @ N, C=self.C + self.D @ NKC, D=self.D @ N)
 
     def frequency_response(self, omega: object) -> np.ndarray:
         """G(j omega) (n, ny, nu), complex, at `omega` (n,) in rad/s."""
@@ -126,12 +126,43 @@ class LinearModel:
         )  # fmt: skip
 
     @classmethod
-    def from_control(cls, system: Any) -> LinearModel:
-        """From a python-control `StateSpace`; its labels become the names, units are looked up by name."""
+    def gain(cls, matrix: Any, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
+        """y = matrix u without states; `matrix` (ny, nu)."""
+        nu, ny = len(inputs), len(outputs)
+        return cls(np.zeros((0, 0)), np.zeros((0, nu)), np.zeros((ny, 0)), matrix, (), signals(inputs), signals(outputs))
+
+    @classmethod
+    def from_control(
+        cls, system: Any, *, units: Mapping[str, str] | None = None, states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
+    ) -> LinearModel:  # fmt: skip
+        """From a python-control `StateSpace` (a `TransferFunction` is realised first); nothing is converted.
+
+        Its labels become the names where `states`, `inputs` or `outputs` give none. `units` {name: unit} says what the signals are
+        in; for the others the unit of a well-known name, "1" else. Raises `InputError` for another type, a sample period of unknown
+        length (dt = True) and wrong numbers of names, `UnknownNameError` for the unit of a signal that is not there.
+        """
+        if not is_control_system(system):
+            raise InputError(f"expected a StateSpace or a TransferFunction of python-control, got {type(system).__name__}")
+        if not hasattr(system, "A"):
+            import control
+
+            system = control.ss(system)
+        if system.dt is True:
+            raise InputError("the system is discrete with a sample period of unknown length (dt = True); set .dt to seconds")
+        groups = [
+            list(given or labels)
+            for given, labels in ((states, system.state_labels), (inputs, system.input_labels), (outputs, system.output_labels))
+        ]
+        indices(units or {}, [name for group in groups for name in group], "signal")
         return cls(
-            system.A, system.B, system.C, system.D, signals(system.state_labels), signals(system.input_labels),
-            signals(system.output_labels), dt=float(system.dt) if system.dt else None,
-        )  # fmt: skip
+            system.A, system.B, system.C, system.D, *(signals(group, units) for group in groups), dt=float(system.dt) if system.dt else None
+        )
+
+
+def is_control_system(system: object) -> bool:
+    """Whether this is a system of python-control, which need not be installed or loaded for the answer."""
+    return type(system).__module__.partition(".")[0] == "control" and hasattr(system, "input_labels")
 
 
 def feedback_matrix(gains: Mapping[tuple[str, str], float], inputs: Sequence[str], outputs: Sequence[str]) -> np.ndarray:

@@ -133,19 +133,15 @@ class LPVStateSpace:
         )  # fmt: skip
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LPVStateSpace:
-        """Close u_i = gain * y_j + (new u_i) for each {(input, output): gain}.
+        """Close u_i = gain * y_j + (new u_i) for each {(input, output): gain}; always an `LPVStateSpace`, exact.
 
-        The outputs used must not depend on p or on u directly (C_j constant, D_j = 0): then every entry stays
-        in the basis. Raises `InputError` otherwise.
+        Outputs that depend on p multiply inputs that do: a polynomial model then has up to twice the degree, in another basis
+        `InputError`. A loop through constant feedthrough is solved; through feedthrough D(p) that depends on p the closed loop is
+        rational and `InputError` says so: `to_lft().feedback(gains)` closes it exactly, as an `LFT`.
         """
-        K = feedback_matrix(gains, self.inputs, self.outputs)
-        used = np.flatnonzero(np.any(K, axis=0))
-        nodes = np.linspace(self.scheduling.low, self.scheduling.high, 4 * self.basis.size + 1)
-        C, D = self.matrices(nodes)[2:]
-        if np.ptp(C[:, used], axis=0).max(initial=0) > 1e-12 * (1 + np.abs(C).max()) or np.abs(D[:, used]).max(initial=0) > 0:
-            raise InputError("feedback needs outputs that are constant combinations of the states without feedthrough")
-        KC = K[:, used] @ C[0, used]
-        return replace(self, A=self.A + self.B @ KC, C=self.C + self.D @ KC, trim=None, residuals=None)
+        from symheli.lpv.output_feedback import close
+
+        return close(self, feedback_matrix(gains, self.inputs, self.outputs))
 
     def discretize(self, dt: float, *, degree: int | None = None, nodes: int = 41) -> LPVStateSpace:
         """Zero-order-hold equivalent at each of `nodes` frozen p, fitted element-wise by a polynomial of `degree`.

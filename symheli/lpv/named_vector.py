@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from symheli.errors import UnknownNameError
 from symheli.lpv.arrays import Array, frozen
@@ -12,7 +15,7 @@ from symheli.lpv.signal import Signal, signals
 
 @dataclass(frozen=True, eq=False)
 class NamedVector(Mapping[str, float]):
-    """Values (n,) with a `Signal` each: `x["theta"]` is a float, `x.array` the vector, `x.signals` names and units."""
+    """Values (n,) with a `Signal` each: `x["theta"]` is a float, `x.array` (or `np.asarray(x)`) the vector, `x.signals` names and units."""
 
     signals: tuple[Signal, ...]
     array: Array
@@ -34,6 +37,9 @@ class NamedVector(Mapping[str, float]):
 
     def __len__(self) -> int:
         return len(self.signals)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.array(self.array, dtype=dtype) if copy or dtype is not None else self.array
 
     def __repr__(self) -> str:
         return "(" + ", ".join(f"{n}={v:.5g} {n.unit}" for n, v in zip(self.signals, self.array, strict=True)) + ")"

@@ -9,14 +9,21 @@ from symheli.lpv.arrays import frozen
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.sample_period import same_period
 
+ON_THE_CIRCLE = 1e3 * np.finfo(float).eps
+"""A pole this close to the unit circle may be on it: what rounding moves the eigenvalues of a small matrix by."""
+
+REFINEMENTS = 30
+"""How often an interval of frequency is halved, at most, until the determinant turns little in it."""
+
 
 def nu_gap(first: LinearModel, second: LinearModel, *, input_scale: object = 1.0, output_scale: object = 1.0, points: int = 2000) -> float:
     """The nu-gap metric in [0, 1] of two discrete models with equal sample period, inputs and outputs.
 
     Inputs are divided by `input_scale` and outputs by `output_scale` (one a channel, in their units): the gap depends on them. 1
-    where the winding-number condition fails: no controller is known to suit both. Evaluated on `points` frequencies from
-    1e-3 rad/s to Nyquist, logarithmic, refined where the winding number asks for it. Models with poles on the unit circle are
-    refused with `InputError`. Source: G. Vinnicombe, Uncertainty and Feedback (2001), chapter 3.
+    where the winding-number condition fails: no controller is known to suit both. Evaluated on `points` frequencies up to Nyquist,
+    logarithmic, from a thousandth of the slowest pole, at the poles and around them, and between them where the response turns by
+    more than an eighth of a circle. Models with poles on the unit circle, as far as rounding can tell, are refused with
+    `InputError`. Source: G. Vinnicombe, Uncertainty and Feedback (2001), chapter 3.
     """
     if first.dt is None or not same_period(first.dt, second.dt):
         raise InputError(f"nu_gap compares discrete models with one sample period, got {first.dt} and {second.dt} s; discretize them")
@@ -24,19 +31,29 @@ def nu_gap(first: LinearModel, second: LinearModel, *, input_scale: object = 1.0
         raise InputError("nu_gap compares models with the same inputs and outputs in the same order")
     su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
     sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
-    unstable = []
+    unstable, poles = [], []
     for model in (first, second):
-        size = np.abs(model.poles())
-        if np.any(np.abs(size - 1) < 1e-9):
+        found = model.poles()
+        if np.any(np.abs(np.abs(found) - 1) < ON_THE_CIRCLE):
             raise InputError("nu_gap: a pole lies on the unit circle")
-        unstable.append(int(np.sum(size > 1)))
-    angle = np.concatenate([[0.0], np.geomspace(1e-3 * first.dt, np.pi, points)])
+        unstable.append(int(np.sum(np.abs(found) > 1)))
+        poles.append(found)
+    angle = angles(np.concatenate(poles), points)
 
     def responses(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         one, two = (m.frequency_response(angle / m.dt) * su[None, None, :] / sy[None, :, None] for m in (first, second))  # type: ignore[operator]
         return one, two
 
     P1, P2 = responses(angle)
+    for _ in range(REFINEMENTS):
+        coarse = np.flatnonzero(np.abs(_turns(P1, P2)) > np.pi / 4)
+        if not len(coarse):
+            break
+        between = 0.5 * (angle[coarse] + angle[coarse + 1])
+        angle = np.concatenate([angle, between])
+        order = np.argsort(angle)
+        angle = angle[order]
+        P1, P2 = (np.concatenate(pair)[order] for pair in zip((P1, P2), responses(between), strict=True))
     if _winding(P1, P2) + unstable[0] - unstable[1] != 0:
         return 1.0
     return float(_chordal(P1, P2).max())
@@ -55,12 +72,24 @@ def chordal_distance(
     return _chordal(*(m.frequency_response(omega) * su[None, None, :] / sy[None, :, None] for m in (first, second)))
 
 
+def angles(poles: np.ndarray, points: int) -> np.ndarray:
+    """Angles of z from 0 to pi: logarithmic, and around every pole as dense as it is close to the circle."""
+    speed = np.abs(np.log(poles[poles != 0].astype(complex)))  # in units of 1/dt
+    slowest = min(1.0, float(speed.min(initial=1.0)))
+    around = np.sinh(np.linspace(-8.0, 8.0, 41))
+    near = (np.abs(np.angle(poles))[:, None] + np.abs(np.abs(poles) - 1)[:, None] * around).ravel()
+    return np.unique(np.concatenate([[0.0], np.geomspace(1e-3 * slowest, np.pi, points), near[(near > 0) & (near < np.pi)]]))
+
+
+def _turns(P1: np.ndarray, P2: np.ndarray) -> np.ndarray:
+    """Angles by which det(I + P2* P1) turns from one frequency to the next."""
+    f = np.linalg.det(np.eye(P1.shape[2]) + np.conj(np.swapaxes(P2, 1, 2)) @ P1)
+    return np.angle(f[1:] / f[:-1])
+
+
 def _winding(P1: np.ndarray, P2: np.ndarray) -> int:
     """Clockwise turns about 0 of det(I + P2* P1) along the unit circle (upper half, doubled by symmetry): zeros less poles outside it."""
-    eye = np.eye(P1.shape[2])
-    f = np.linalg.det(eye + np.conj(np.swapaxes(P2, 1, 2)) @ P1)
-    turns = np.sum(np.angle(f[1:] / f[:-1])) / np.pi  # both half circles: 2 x sum / (2 pi)
-    return -round(float(turns))
+    return -round(float(np.sum(_turns(P1, P2)) / np.pi))  # both half circles: 2 x sum / (2 pi)
 
 
 def _chordal(P1: np.ndarray, P2: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
-from symheli.lpv.nu_gap import nu_gap
+from symheli.lpv.nu_gap import angles, nu_gap
 from symheli.lpv.signal import Signal
 
 Model = TypeVar("Model", LPVStateSpace, LinearModel)
@@ -110,7 +110,8 @@ def _comparable(full: LinearModel, small: LinearModel) -> tuple[LinearModel, Lin
     """Both discrete: continuous models by one bilinear transformation, which keeps gains and the nu-gap."""
     if full.dt is not None:
         return full, small
-    dt = 2.0 / max(np.abs(full.poles()).max(initial=0.0), 1.0)  # maps the fastest pole to the middle of the frequency grid
+    fastest = float(np.abs(full.poles()).max(initial=0.0))
+    dt = 2.0 / fastest if fastest > 0 else 1.0  # maps the fastest pole to a quarter of the circle
     return _bilinear(full, dt), _bilinear(small, dt)
 
 
@@ -123,7 +124,7 @@ def _bilinear(model: LinearModel, dt: float) -> LinearModel:
 def _relative_error(one: LinearModel, two: LinearModel, su: Array, sy: Array) -> float:
     if not (one.is_stable() and two.is_stable()):
         return float("nan")
-    omega = np.concatenate([[0.0], np.geomspace(1e-4, np.pi, 1000)]) / one.dt  # type: ignore[operator]
+    omega = angles(np.concatenate([one.poles(), two.poles()]), 1000) / one.dt  # type: ignore[operator]
     G, R = (m.frequency_response(omega) * su / sy[:, None] for m in (one, two))
     size = np.linalg.norm(G, 2, axis=(1, 2)).max()
     return float(np.linalg.norm(G - R, 2, axis=(1, 2)).max() / size) if size > 0 else 0.0

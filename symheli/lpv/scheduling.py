@@ -38,6 +38,10 @@ class Scheduling:
         """Half the width of the range, in `unit`."""
         return 0.5 * (self.high - self.low)
 
+    def normalised(self, p: Array) -> Array:
+        """p as a number from -1 at `low` to 1 at `high`; no digit of p is lost far from zero."""
+        return ((p - self.low) - (self.high - p)) / (self.high - self.low)
+
     def with_rate(self, rate: float) -> Scheduling:
         """The same parameter with another rate limit."""
         return replace(self, rate=rate)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import InputError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace
 from synthesis.budget import said
 from synthesis.certificate import Attempt
 from synthesis.cone_program import Answer, Candidate, Solver, solve
+from synthesis.fine_sampling import fine_sampling
 from synthesis.forms import Relaxation
 from synthesis.hypotheses import VERIFIED, fitted
 from synthesis.lower_bound import Search
@@ -28,6 +30,7 @@ from synthesis.polynomial.proof import Evidence, Units
 from synthesis.polynomial.regions import Pieces, pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.proof_search import CLOSE, NOTHING
+from synthesis.rates import Rate, rates
 from synthesis.scaling import in_its_own_scale, model_scaling
 from synthesis.spectrum import surely_unstable
 from synthesis.symmetric import length, smat
@@ -35,7 +38,6 @@ from synthesis.verdict import Kind, Seconds, Status, Trajectory
 
 Array = np.ndarray
 Model = LPVStateSpace | PolynomialStateSpace | LFT
-Rate = float | Sequence[float] | Mapping[str, float] | None
 
 DECAY_TOLERANCE = 2e-3
 """The decay rate is found to this fraction of the frozen one."""
@@ -55,7 +57,7 @@ def box_certificate(
     if relaxation.order > 1 or relaxation.memory is not None:
         raise InputError("order and memory of V are for l2_gain and stability of one parameter; here V = x'P(p)x")
     piece = pieces(model)
-    demand = Demand(kind, _rates(piece, rate))
+    demand = Demand(kind, rates(piece.parameters, rate))
     _check_channels(piece, kind)
     start = time.perf_counter()
     frozen = worst_frozen(piece, measure(demand, piece.dt))
@@ -271,12 +273,19 @@ class _Report:
         bounds_by_name = dict(zip(names, (best.bound if proven else nothing, limit, self.frozen), strict=False))
         P, evidence = best.lyapunov, hunt.evidence if hunt else None
         return BoxCertificate(
-            kind=kind, **bounds_by_name, status=status, verified=proven, rates=self.demand.rates, hypotheses=self._hypotheses(P, status),
+            kind=kind, **bounds_by_name, status=status, verified=proven, rates=self.demand.rates,
+            hypotheses=self._hypotheses(P, status) + self._sampling(bounds_by_name),
             solver=str(self.solver), seconds=Seconds(*(float(s) for s in (*(hunt.spent if hunt else np.zeros(3)), bounds))),
             conditioning=evidence.conditioning(P) if P and evidence else math.inf, attempts=tuple(hunt.attempts) if hunt else (),
             worst=worst, relaxation=self.relaxation.kind, lyapunov=P,
             indicative=best.bound if status is Status.UNPROVEN else math.nan, evidence=evidence,
         )  # fmt: skip
+
+    def _sampling(self, bounds: Mapping[str, float]) -> tuple[str, ...]:
+        if "gamma" not in bounds:
+            return ()
+        corners = np.array(list(product(*((s.low, s.middle, s.high) for s in self.model.parameters))))
+        return fine_sampling(self.model.at(corners)[0], self.model.dt, bounds["gamma"], bounds["lower"])
 
     def _hypotheses(self, P: BoxLyapunov | None, status: Status) -> tuple[str, ...]:
         out = []
@@ -316,24 +325,6 @@ def _accepted(model: Model) -> LPVStateSpace | PolynomialStateSpace:
             "LPVStateSpace.polynomial(...), PolynomialStateSpace.polynomial(...) or LinearFamily.interpolate()"
         )
     return model
-
-
-def _rates(model: Pieces, rate: Rate) -> tuple[float, ...]:
-    names = [s.name for s in model.parameters]
-    if rate is None:
-        rates = tuple(s.rate for s in model.parameters)
-    elif isinstance(rate, Mapping):
-        for name in rate:
-            if name not in names:
-                raise UnknownNameError("scheduling parameter", name, names)
-        rates = tuple(float(rate.get(s.name, s.rate)) for s in model.parameters)
-    elif isinstance(rate, Sequence):
-        rates = tuple(map(float, rate))
-    else:
-        rates = (float(rate),) * len(names)
-    if len(rates) != len(names) or not all(r >= 0 for r in rates):
-        raise InputError(f"rate must be >= 0 per second, one for all or one for each of {', '.join(names)}, got {rate}")
-    return rates
 
 
 def _check_channels(model: Pieces, kind: Kind) -> None:

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT, LinearModel, LPVStateSpace, Matrices, Polynomial, Scheduling, Signal, signals
-from synthesis.bernstein import elevation_matrix
+from symheli.lpv.lft import expanded
+from symheli.lpv.recentred import centre, recentred
 from synthesis.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray
-
-ROUNDING = 1e-12
-"""Powers of a parameter whose coefficients are smaller than this fraction of the largest are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +60,9 @@ class PolynomialStateSpace:
     ) -> PolynomialStateSpace:  # fmt: skip
         """From monomials, {exponents: matrix}: A={(0, 0): A0, (1, 0): A1, (0, 2): A2} is A0 + p1 A1 + p2^2 A2, p in physical units."""
         box = tuple((s.low, s.high) for s in parameters)
-        a, b, c, d = (PolynomialMatrix.from_monomials(M, box) for M in (A, B, C, D))
+        for M in (A, B, C, D):
+            PolynomialMatrix.from_monomials(M, box)  # refuses what is not {exponents: matrix}
+        a, b, c, d = (_in_delta(recentred(M, [centre(*bounds) for bounds in box]), parameters) for M in (A, B, C, D))
 
         def names(given: Sequence[str] | None, letter: str, count: int) -> tuple[Signal, ...]:
             return signals(given or [f"{letter}{i + 1}" for i in range(count)])
@@ -84,24 +83,17 @@ class PolynomialStateSpace:
 
     @classmethod
     def from_lft(cls, lft: LFT) -> PolynomialStateSpace:
-        """The same model; `InputError` where the dependence is rational. The degree in a parameter is at most its copies: reduce first."""
-        parameters = lft.parameters
-        nodes = [_nodes(size, s) for size, s in zip(lft.sizes, parameters, strict=True)]
-        grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1)
-        M = np.block([[*lft.matrices(_points(grid))[:2]], [*lft.matrices(_points(grid))[2:]]])
-        for i, (size, s) in enumerate(zip(lft.sizes, parameters, strict=True)):
-            M = np.moveaxis(np.tensordot(np.linalg.inv(_values(size, nodes[i], s)), M, axes=(1, i)), 0, i)
-        whole = _trimmed(PolynomialMatrix(tuple((s.low, s.high) for s in parameters), M))
-        trials = np.array(list(product(*(s.low + (s.high - s.low) * np.array([0.137, 0.618, 0.911]) for s in parameters))))
-        expected = np.block([[*lft.matrices(_points(trials))[:2]], [*lft.matrices(_points(trials))[2:]]])
-        if np.abs(whole(trials) - expected).max() > 1e-9 * (1 + np.abs(expected).max()):
+        """The same model, reduced or not; `InputError` where the dependence is rational (see `symheli.lpv.lft.expanded`)."""
+        terms = expanded(lft)
+        if terms is None:
             raise InputError(
                 "the LFT depends on its parameters as a rational function, not a polynomial; use lft_gain, or fit a polynomial"
             )
-        nx = len(lft.states)
+        parameters, nx = lft.parameters, len(lft.states)
 
         def part(rows: slice, columns: slice) -> PolynomialMatrix:
-            return _trimmed(replace(whole, coefficients=whole.coefficients[..., rows, columns]))
+            own = {e: M[rows, columns] for e, M in terms.items() if not sum(e) or np.any(M[rows, columns])}
+            return _in_delta(own, parameters)
 
         top, bottom = slice(None, nx), slice(nx, None)
         matrices = part(top, top), part(top, bottom), part(bottom, top), part(bottom, bottom)
@@ -142,10 +134,6 @@ class PolynomialStateSpace:
         return LPVStateSpace(basis, A, B, C, D, line, self.states, self.inputs, self.outputs, self.dt)
 
 
-def _points(grid: Array) -> Array:
-    return grid[..., 0] if grid.shape[-1] == 1 else grid
-
-
 def _nodes(degree: int, s: Scheduling) -> Array:
     return s.middle - s.radius * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
 
@@ -156,19 +144,7 @@ def _values(degree: int, nodes: Array, s: Scheduling) -> Array:
     return one(nodes[:, None])[:, 0, :]
 
 
-def _trimmed(F: PolynomialMatrix) -> PolynomialMatrix:
-    """Without the powers that are rounding, one parameter after the other: the finite differences of the coefficients vanish."""
-    c = F.coefficients
-    size = np.abs(c).max(initial=0.0)
-    for axis in range(len(F.box)):
-        while c.shape[axis] > 1:
-            up = elevation_matrix(c.shape[axis] - 2, c.shape[axis] - 1)
-            lower = _along(np.linalg.pinv(up), c, axis)
-            if np.abs(_along(up, lower, axis) - c).max(initial=0.0) > ROUNDING * size:
-                break
-            c = lower
-    return replace(F, coefficients=c)
-
-
-def _along(T: Array, c: Array, axis: int) -> Array:
-    return np.moveaxis(np.tensordot(T, c, axes=(1, axis)), 0, axis)
+def _in_delta(terms: Mapping[tuple[int, ...], Any], parameters: Sequence[Scheduling]) -> PolynomialMatrix:
+    """From {exponents: matrix} of the parameters normalised to [-1, 1], over their physical ranges."""
+    normalised = PolynomialMatrix.from_monomials(terms, ((-1.0, 1.0),) * len(parameters))
+    return replace(normalised, box=tuple((s.low, s.high) for s in parameters))

@@ -1,12 +1,14 @@
 """LPV models: evaluation, feedback, sampling and response."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from families import SPEED, random_lpv, stacked
 from scipy.integrate import solve_ivp
 
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Scheduling, simulate
+from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, simulate
 
 
 def stable(dt=None):
@@ -39,8 +41,28 @@ def test_feedback_closes_the_loop_at_every_p():
     for p in (0.0, 5.0, 13.0):
         model = lpv.at(p)
         np.testing.assert_allclose(closed.at(p).A, model.A + model.B @ [[0.0, -3.0]], atol=1e-13)
-    with pytest.raises(InputError, match="feedback needs outputs"):
-        random_lpv(1)[0].feedback({("u1", "y1"): 1.0})
+
+
+def test_a_rational_loop_is_closed_by_the_lft_that_the_message_names():
+    lpv, gains = random_lpv(1)[0], {("u1", "y1"): 0.1}
+    with pytest.raises(InputError, match=r"lpv\.to_lft\(\)\.feedback\(\.\.\.\) closes it exactly"):
+        lpv.feedback(gains)
+    for p in (0.0, 5.0, 13.0):
+        np.testing.assert_allclose(stacked(lpv.to_lft().feedback(gains).at(p)), stacked(lpv.at(p).feedback(gains)), atol=1e-12)
+
+
+def test_a_spline_is_closed_where_its_products_stay_splines():
+    nodes = (0.0, 3.0, 5.0, 13.0)
+    rng = np.random.default_rng(0)
+    A, C = rng.standard_normal((4, 2, 2)), rng.standard_normal((4, 1, 2))
+    B = np.broadcast_to(rng.standard_normal((2, 1)), (4, 2, 1))
+    lpv = LPVStateSpace(PiecewiseLinear(nodes), A, B, C, np.zeros((4, 1, 1)), SPEED, ("x1", "x2"), ("u1",), ("y1",))
+    closed = lpv.feedback({("u1", "y1"): 2.0})
+    for p in (0.0, 4.1, 13.0):
+        np.testing.assert_allclose(stacked(closed.at(p)), stacked(lpv.at(p).feedback({("u1", "y1"): 2.0})), atol=1e-14)
+    moving = replace(lpv, B=rng.standard_normal((4, 2, 1)))
+    with pytest.raises(InputError, match="leaves this basis"):
+        moving.feedback({("u1", "y1"): 2.0})
 
 
 def test_sampled_model_is_the_hold_equivalent_at_the_nodes_up_to_its_residuals():

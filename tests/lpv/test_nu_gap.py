@@ -58,3 +58,33 @@ def test_models_that_cannot_be_compared_are_refused():
         nu_gap(pole(0.9), model(np.array([[0.9]]), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)), dt=0.2))
     with pytest.raises(InputError, match="unit circle"):
         nu_gap(pole(1.0), pole(0.5))
+
+
+def lag(dt, slow=0.01):
+    """1/(s + slow), sampled with a hold."""
+    return model(np.array([[np.exp(-slow * dt)]]), np.array([[-np.expm1(-slow * dt) / slow]]), np.eye(1), np.zeros((1, 1)), dt)
+
+
+def test_the_gap_does_not_depend_on_how_finely_a_slow_pole_is_sampled():
+    """A pole 1e-10 inside the circle was once taken to lie on it, and frequencies below 1e-3 rad/s were never looked at."""
+    expected = nu_gap(lag(1e-2), lag(1e-2, 0.03))
+    for dt in (1e-4, 1e-8):
+        # a hold of 1e-2 s differs from none by half a sample's phase at the crossover of 1 rad/s
+        assert nu_gap(lag(dt), lag(dt, 0.03)) == pytest.approx(expected, rel=1e-2)
+
+
+def test_turns_at_the_sharpest_resonance_are_counted():
+    """k/(s^2 + 2 z s + 1) with z = 1e-7 and -1e-7: both are at infinity on the sphere where they differ, so they are close."""
+
+    def resonance(damping, dt=0.1):
+        A = np.array([[0.0, 1.0], [-1.0, -2 * damping]])
+        inverse = np.linalg.inv(np.eye(2) - 0.5 * dt * A)
+        B = inverse @ np.array([[0.0], [dt]])
+        C = np.array([[1.0, 0.0]]) @ inverse
+        return model(inverse @ (np.eye(2) + 0.5 * dt * A), B, C, 0.5 * np.array([[1.0, 0.0]]) @ B, dt)
+
+    assert nu_gap(resonance(1e-7), resonance(-1e-7)) < 1e-5
+
+
+def test_sample_periods_that_are_equal_but_for_rounding_are_equal():
+    assert nu_gap(lag(0.02), lag(0.019999999999999574)) == pytest.approx(0, abs=1e-9)

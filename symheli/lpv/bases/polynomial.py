@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
-from math import comb
+from math import comb, log10
 from typing import ClassVar
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import InputError, PrecisionWarning, UnknownNameError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases.basis import Basis, Piece, check_range
+from symheli.lpv.recentred import centre, recentred
+
+DIGITS = 8.0
+"""More decimal digits lost than this, half of a double's, are worth a warning."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class Polynomial(Basis):
         return np.sqrt(2.0 * np.arange(self.size) + 1.0)
 
     def _values(self, p: Array, derivative: int) -> Array:
-        x = (2.0 * p - self.low - self.high) / (self.high - self.low)
+        x = ((p - self.low) - (self.high - p)) / (self.high - self.low)  # no digit of p is lost far from zero
         if derivative == 0:
             return (legendre.legvander(x, self.degree) * self._norms).reshape(*p.shape, self.size)
         scale = (2.0 / (self.high - self.low)) ** derivative
@@ -61,14 +66,36 @@ class Polynomial(Basis):
 
     @cached_property
     def monomial(self) -> Array:
-        """Matrix T (n, n): f_j(p) = sum_i T[j, i] p^i, p in physical units."""
-        rows = np.zeros((self.size, self.size))
-        shift = np.polynomial.Polynomial([-(self.low + self.high) / (self.high - self.low), 2.0 / (self.high - self.low)])
-        for j in range(self.size):
-            power = legendre.leg2poly(np.eye(self.size)[j]) * self._norms[j]
-            coefficients = np.polynomial.Polynomial(power)(shift).coef
-            rows[j, : len(coefficients)] = coefficients
-        return frozen(rows, "monomial")
+        """Matrix T (n, n): f_j(p) = sum_i T[j, i] p^i, p in physical units; each entry exact before it is rounded."""
+        middle, radius = centre(self.low, self.high)
+        power = {(i,): column for i, column in enumerate(self._powers.T)}
+        physical = recentred(power, [(-middle / radius, 1 / radius)])
+        return frozen(np.stack([physical[i,] if (i,) in physical else np.zeros(self.size) for i in range(self.size)], axis=1), "monomial")
+
+    @cached_property
+    def _powers(self) -> Array:
+        """Matrix T (n, n): f_j = sum_i T[j, i] x^i."""
+        return np.stack([np.pad(legendre.leg2poly(row), (0, self.size))[: self.size] for row in np.diag(self._norms)])
+
+    @cached_property
+    def digits_lost(self) -> float:
+        """Decimal digits that rounding costs where a polynomial is written in powers of p in physical units and summed.
+
+        Few near zero, 16 (all of a double's) for degree 3 on [1e5, 1e5 + 1]; this basis itself loses none.
+        """
+        reach = max(abs(self.low), abs(self.high))
+        size = np.abs(self.monomial) @ reach ** np.arange(self.size) / self._norms
+        return log10(float(size.max()))
+
+    def _physical(self) -> Array:
+        """`monomial`, with a warning where it loses too much."""
+        if self.digits_lost > DIGITS:
+            warnings.warn(
+                f"powers of p lose about {self.digits_lost:.0f} of 16 digits on [{self.low:g}, {self.high:g}]; "
+                "keep the coefficients of the basis, or write the model in powers of p less the middle of its range",
+                PrecisionWarning, stacklevel=3,
+            )  # fmt: skip
+        return self.monomial
 
     def form(self, name: str) -> Array:
         """Matrix T (n, n): f_j = sum_i T[j, i] g_i for the forms in `GRADED` and "bernstein" (over [low, high])."""
@@ -78,35 +105,41 @@ class Polynomial(Basis):
             case "legendre":
                 return np.diag(self._norms)
             case "chebyshev" | "scaled":
-                power = [legendre.leg2poly(row) for row in np.diag(self._norms)]
-                rows = [chebyshev.poly2cheb(r) for r in power] if name == "chebyshev" else power
+                rows = [chebyshev.poly2cheb(r) for r in self._powers] if name == "chebyshev" else self._powers
                 return np.stack([np.pad(r, (0, self.size - len(r))) for r in rows])
             case "monomial":
-                return self.monomial
+                return self._physical()
             case "bernstein":
                 return self.pieces()[0].bernstein
         raise UnknownNameError("form", name, (*self.GRADED, "bernstein"))
 
     def from_monomial(self, coefficients: object) -> Array:
-        """Coefficients in this basis (n, ...) of sum_i p^i M_i with M = `coefficients` (at most n, ...), p in physical units."""
+        """Coefficients in this basis (n, ...) of sum_i p^i M_i with M = `coefficients` (at most n, ...), p in physical units.
+
+        Exact but for the last rounding: the powers are moved to the middle of the range as the rationals they are.
+        """
         given = frozen(coefficients, "monomial coefficients")
         if given.shape[0] > self.size:
             raise InputError(f"degree {given.shape[0] - 1} does not fit in a basis of degree {self.degree}")
+        x = recentred({(i,): M for i, M in enumerate(given)}, [centre(self.low, self.high)])
         padded = np.zeros((self.size, *given.shape[1:]))
-        padded[: given.shape[0]] = given
-        return np.linalg.solve(self.monomial.T, padded.reshape(self.size, -1)).reshape(padded.shape)
+        for (i,), M in x.items():
+            padded[i] = M
+        return np.linalg.solve(self._powers.T, padded.reshape(self.size, -1)).reshape(padded.shape)
 
     def to_monomial(self, coefficients: object) -> Array:
-        """Monomial coefficients M_i (n, ...) in physical units of p from coefficients in this basis (n, ...)."""
-        return np.tensordot(self.monomial.T, frozen(coefficients, "coefficients"), axes=1)
+        """Monomial coefficients M_i (n, ...) in physical units of p from coefficients in this basis (n, ...).
+
+        Warns (`PrecisionWarning`) where powers of p lose more than half of the digits; see `digits_lost`.
+        """
+        return np.tensordot(self._physical().T, frozen(coefficients, "coefficients"), axes=1)
 
     def pieces(self) -> tuple[Piece, ...]:
         """One piece: the Bernstein coefficients of each function over [low, high]."""
         d = self.degree
-        x_power = np.stack([np.pad(legendre.leg2poly(row), (0, d + 1))[: d + 1] for row in np.diag(self._norms)])
         shift = np.zeros((d + 1, d + 1))  # x = 2 s - 1
         for i in range(d + 1):
             for k in range(i + 1):
                 shift[i, k] = comb(i, k) * 2.0**k * (-1.0) ** (i - k)
         power_to_bernstein = np.array([[comb(i, k) / comb(d, k) if k <= i else 0.0 for i in range(d + 1)] for k in range(d + 1)])
-        return (Piece(self.low, self.high, x_power @ shift @ power_to_bernstein),)
+        return (Piece(self.low, self.high, self._powers @ shift @ power_to_bernstein),)

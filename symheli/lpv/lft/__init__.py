@@ -3,8 +3,9 @@
 from symheli.lpv.lft.algebra import append, feedback, parallel, series
 from symheli.lpv.lft.interconnection import connect
 from symheli.lpv.lft.model import LFT, Block
+from symheli.lpv.lft.polynomial import expanded
 from symheli.lpv.lft.sampling import HoldError
 from symheli.lpv.lft.truncation import Truncation
 from symheli.lpv.lft.well_posed import WellPosedness
 
-__all__ = ["LFT", "Block", "HoldError", "Truncation", "WellPosedness", "append", "connect", "feedback", "parallel", "series"]
+__all__ = ["LFT", "Block", "HoldError", "Truncation", "WellPosedness", "append", "connect", "expanded", "feedback", "parallel", "series"]

@@ -10,23 +10,23 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.arrays import Array
+from symheli.lpv.equilibration import is_singular
 from symheli.lpv.lft.model import LFT, Block, parts
-from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.lft.systems import System, as_lft
 from symheli.lpv.sample_period import same_period
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import Signal
 
 
-def append(*systems: LFT | LinearModel) -> LFT:
+def append(*systems: System) -> LFT:
     """Side by side: states, inputs and outputs one after the other, a parameter of several systems in one block.
 
     A name that comes again gets the number of its system: phi, phi_2.
     """
-    lfts = [LFT.constant(s) if isinstance(s, LinearModel) else s for s in systems]
+    lfts = [as_lft(s) for s in systems]
     if not lfts:
         raise InputError("append needs at least one system")
-    if not all(same_period(lft.dt, lfts[0].dt) for lft in lfts):
-        raise InputError(f"systems must share one sample period, got {', '.join(str(lft.dt) for lft in lfts)}; discretize first")
+    dt = _sample_period(lfts)
     parameters = _parameters(lfts)
     rows: list[list[tuple[int, int]]] = [[], [], []]  # (system, row) of the parameter loop, the states, the outputs
     columns: list[list[tuple[int, int]]] = [[], [], []]
@@ -53,7 +53,7 @@ def append(*systems: LFT | LinearModel) -> LFT:
     n = sum(block.size for block in blocks)
     return LFT(
         M[:n, :n], M[:n, n:], M[n:, :n], M[n:, n:], blocks, _distinct([lft.states for lft in lfts]),
-        _distinct([lft.inputs for lft in lfts]), _distinct([lft.outputs for lft in lfts]), lfts[0].dt,
+        _distinct([lft.inputs for lft in lfts]), _distinct([lft.outputs for lft in lfts]), dt,
     )  # fmt: skip
 
 
@@ -66,7 +66,7 @@ def close(lft: LFT, K: Array, E: Array, F: Array, inputs: Sequence[Signal], outp
     nx, n = len(lft.states), lft.order
     D = lft.M22[nx:, nx:]
     loop = np.eye(len(lft.inputs)) - K @ D
-    if np.linalg.cond(loop) > 1e12:
+    if is_singular(loop):
         raise InputError("the loop is not well posed: I - K D is singular at the middle of the parameter range")
     left = np.block([[lft.M11, lft.M12[:, :nx]], [lft.M21[:nx], lft.M22[:nx, :nx]]])
     B, C = np.vstack([lft.M12[:, nx:], lft.M22[:nx, nx:]]), np.hstack([lft.M21[nx:], lft.M22[nx:, :nx]])
@@ -75,8 +75,9 @@ def close(lft: LFT, K: Array, E: Array, F: Array, inputs: Sequence[Signal], outp
     return LFT(whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:], lft.blocks, lft.states, tuple(inputs), tuple(outputs), lft.dt)
 
 
-def series(first: LFT | LinearModel, second: LFT | LinearModel) -> LFT:
+def series(first: System, second: System) -> LFT:
     """y = second(first(u)): the outputs of `first` feed the inputs of `second` in their order."""
+    first, second = as_lft(first), as_lft(second)
     ny, nu = len(first.outputs), len(first.inputs)
     if len(second.inputs) != ny:
         raise InputError(f"series connection needs as many inputs ({len(second.inputs)}) as outputs of the other ({ny})")
@@ -86,8 +87,9 @@ def series(first: LFT | LinearModel, second: LFT | LinearModel) -> LFT:
     return close(both, K, E, np.eye(len(both.outputs))[ny:], first.inputs, second.outputs)
 
 
-def parallel(first: LFT | LinearModel, second: LFT | LinearModel) -> LFT:
+def parallel(first: System, second: System) -> LFT:
     """y = first(u) + second(u); the signals keep the names of `first`."""
+    first, second = as_lft(first), as_lft(second)
     nu, ny = len(first.inputs), len(first.outputs)
     if (len(second.inputs), len(second.outputs)) != (nu, ny):
         raise InputError(
@@ -98,8 +100,9 @@ def parallel(first: LFT | LinearModel, second: LFT | LinearModel) -> LFT:
     return close(both, np.zeros((2 * nu, 2 * ny)), E, F, first.inputs, first.outputs)
 
 
-def feedback(plant: LFT | LinearModel, controller: LFT | LinearModel, sign: float = -1.0) -> LFT:
+def feedback(plant: System, controller: System, sign: float = -1.0) -> LFT:
     """y = plant(u + sign controller(y)), all outputs into all inputs, in their order."""
+    plant, controller = as_lft(plant), as_lft(controller)
     nu, ny = len(plant.inputs), len(plant.outputs)
     if (len(controller.inputs), len(controller.outputs)) != (ny, nu):
         raise InputError(
@@ -111,8 +114,9 @@ def feedback(plant: LFT | LinearModel, controller: LFT | LinearModel, sign: floa
     return close(both, K, np.eye(nu + ny)[:, :nu], np.eye(ny + nu)[:ny], plant.inputs, plant.outputs)
 
 
-def star(upper: LFT, lower: LFT, outputs: int, inputs: int | None) -> LFT:
+def star(upper: LFT, lower: System, outputs: int, inputs: int | None) -> LFT:
     """See `LFT.star`."""
+    lower = as_lft(lower)
     inputs = len(lower.outputs) if inputs is None else inputs
     nu, ny = len(upper.inputs), len(upper.outputs)
     if not (0 <= outputs <= min(ny, len(lower.inputs)) and 0 <= inputs <= min(nu, len(lower.outputs))):
@@ -146,13 +150,24 @@ def over_range(lft: LFT, scheduling: Scheduling) -> LFT:
     here = _where(lft, scheduling.name)
     a[here], b[here] = (scheduling.middle - old.middle) / old.radius, scheduling.radius / old.radius
     loop = np.eye(lft.order) - lft.M11 * a
-    if lft.order and np.linalg.cond(loop) > 1e12:
+    if is_singular(loop):
         raise InputError(f"the parameter loop is singular at the middle of the new range of {scheduling.name}; see .well_posed()")
     M11, M12 = np.linalg.solve(loop, lft.M11), np.linalg.solve(loop, lft.M12)
     blocks = tuple(Block(scheduling if block.scheduling is old else block.scheduling, block.size) for block in lft.blocks)
     # w = (a + b delta') z: the outputs see M21 (a z + b w'), and z = M11 b w' + M12 v after the constant part is closed
     M21 = lft.M21 * b + (lft.M21 * a) @ (M11 * b)
     return replace(lft, M11=M11 * b, M12=M12, M21=M21, M22=lft.M22 + (lft.M21 * a) @ M12, blocks=blocks)
+
+
+def _sample_period(lfts: Sequence[LFT]) -> float | None:
+    """The one of all systems with states; those without go with any."""
+    given = [lft.dt for lft in lfts if lft.states or lft.dt is not None]
+    if not all(same_period(dt, given[0]) for dt in given):
+        raise InputError(
+            f"systems must share one sample period, got {', '.join('continuous' if dt is None else f'{dt:g} s' for dt in given)}; "
+            "discretize the continuous ones first"
+        )
+    return given[0] if given else None
 
 
 def _parameters(lfts: Sequence[LFT]) -> list[Scheduling]:

@@ -10,22 +10,21 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.lft.algebra import append, close
 from symheli.lpv.lft.model import LFT
-from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.lft.systems import System, as_lft
 from symheli.lpv.signal import Signal
 
 
-def connect(
-    *systems: LFT | LinearModel, inputs: Sequence[str], outputs: Sequence[str], sums: Mapping[str, Mapping[str, float]] | None = None
-) -> LFT:
+def connect(*systems: System, inputs: Sequence[str], outputs: Sequence[str], sums: Mapping[str, Mapping[str, float]] | None = None) -> LFT:
     """One system of several: an input takes the output, or the external input, that has its name.
 
     `sums` gives an input another source, {input: {signal: gain, ...}} with outputs and external `inputs` as signals.
-    `outputs` are outputs of the systems. Units of connected signals must agree. Raises `InputError` where an input is left
-    open, an output name is used twice, or a loop is singular.
+    `outputs` are outputs of the systems: LFTs, linear models, polynomial LPV models, systems of python-control. Units of connected
+    signals must agree. Raises `InputError` where an input is left open, an output name is used twice, or a loop is singular.
     """
-    whole = append(*systems)
-    given_inputs = list(chain(*(s.inputs for s in systems)))
-    given_outputs = list(chain(*(s.outputs for s in systems)))
+    lfts = [as_lft(s, by_name=True) for s in systems]
+    whole = append(*lfts)
+    given_inputs = list(chain(*(s.inputs for s in lfts)))
+    given_outputs = list(chain(*(s.outputs for s in lfts)))
     twice = sorted({str(y) for y in given_outputs if given_outputs.count(y) > 1})
     if twice:
         raise InputError(f"several systems have an output called {', '.join(twice)}; rename all but one")

@@ -149,7 +149,7 @@ class LFT:
             raise InputError(f"expected {len(names)} parameter value(s) ({self._names()}), got {len(p) + len(named)}")
         values = [*p, *(named[name] for name in names[len(p) :])]
         pairs = zip(self.parameters, values, strict=True)
-        return np.array([(float(s.check(value)) - s.middle) / s.radius for s, value in pairs])
+        return np.array([s.normalised(s.check(value)) for s, value in pairs])
 
     def matrix(self, delta: object) -> Array:
         """[A B; C D] at normalised parameters `delta` (..., m), shape (..., nx + ny, nx + nu)."""
@@ -172,7 +172,7 @@ class LFT:
             p = p[..., None]
         if not p.ndim or p.shape[-1] != len(self.blocks):
             raise InputError(f"expected the {len(self.blocks)} parameters ({self._names()}) along the last axis, got shape {p.shape}")
-        delta = [(s.check(p[..., i]) - s.middle) / s.radius for i, s in enumerate(self.parameters)]
+        delta = [s.normalised(s.check(p[..., i])) for i, s in enumerate(self.parameters)]
         M, nx = self.matrix(np.stack(delta, axis=-1) if delta else p), len(self.states)
         return Matrices(M[..., :nx, :nx], M[..., :nx, nx:], M[..., nx:, :nx], M[..., nx:, nx:])
 
@@ -231,7 +231,7 @@ class LFT:
 
         return truncate(self, error, order)
 
-    def star(self, other: LFT, outputs: int = 0, inputs: int | None = None) -> LFT:
+    def star(self, other: Any, outputs: int = 0, inputs: int | None = None) -> LFT:
         """Redheffer star product: the last `outputs` outputs feed the first inputs of `other`, whose first `inputs` outputs
         feed the last inputs here. By default series connection, y = self(other(u)).
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import product
-from math import comb
 from typing import Any
 
 import numpy as np
@@ -12,14 +10,14 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Polynomial
-from symheli.lpv.lft.model import LFT, Block
-from symheli.lpv.lft.reduction import significant
+from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import signals
 
-ROUNDING = 1e-11
-"""A power of the parameter whose coefficients are below this, rows and columns scaled to one, is rounding."""
+ROUNDING = 16 * np.finfo(float).eps
+"""By how much of itself an entry of an LFT may be off: it was rounded when the LFT was made."""
 
 
 def from_lpv(lpv: LPVStateSpace) -> LFT:
@@ -53,7 +51,7 @@ def from_monomials(
         M = {name: matrices.get(exponents, zero[name]) for name, (_, matrices) in given.items()}
         whole[exponents] = np.block([[M["A"], M["B"]], [M["C"], M["D"]]])
     return _chains(
-        _normalised(whole, parameters), parameters, signals(states or [f"x{i + 1}" for i in range(nx)]),
+        recentred(whole, [centre(s.low, s.high) for s in parameters]), parameters, signals(states or [f"x{i + 1}" for i in range(nx)]),
         signals(inputs or [f"u{i + 1}" for i in range(nu)]), signals(outputs or [f"y{i + 1}" for i in range(ny)]), dt,
     )  # fmt: skip
 
@@ -71,18 +69,6 @@ def _coefficients(name: str, matrices: Mapping[Any, Any], count: int) -> tuple[t
     if len({M.shape for M in out.values()}) > 1:
         raise InputError(f"{name}: coefficient matrices differ in shape: {', '.join(str(M.shape) for M in out.values())}")
     return next(iter(out.values())).shape, out  # type: ignore[return-value]
-
-
-def _normalised(whole: Mapping[tuple[int, ...], Array], parameters: Sequence[Scheduling]) -> dict[tuple[int, ...], Array]:
-    """Coefficients in delta of a polynomial in p = middle + radius delta."""
-    out: dict[tuple[int, ...], Array] = {}
-    for exponents, M in whole.items():
-        for powers in product(*(range(e + 1) for e in exponents)):
-            factor = 1.0
-            for s, e, k in zip(parameters, exponents, powers, strict=True):
-                factor *= comb(e, k) * s.radius**k * s.middle ** (e - k)
-            out[powers] = out.get(powers, np.zeros_like(M)) + factor * M
-    return out
 
 
 def _chains(
@@ -125,23 +111,65 @@ def _before(exponents: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
     return i, (*exponents[:i], exponents[i] - 1, *exponents[i + 1 :])
 
 
-def powers(lft: LFT) -> list[Array] | None:
-    """Coefficients M_0, M_1, ... of delta for one parameter, None where the dependence is not polynomial."""
-    out, right = [lft.M22], lft.M12
-    for _ in range(2 * lft.order):
-        out.append(lft.M21 @ right)
-        right = lft.M11 @ right
-    size = np.max(np.abs(out), axis=0)
-    # by Cayley and Hamilton `order` zeros in a row are followed by zeros only
-    while len(out) > 1 and not np.any(significant(np.abs(out[-1]), size, ROUNDING)):
-        out.pop()
-    return out if len(out) <= lft.order + 1 else None
+def expanded(lft: LFT) -> dict[tuple[int, ...], Array] | None:
+    """{exponents: coefficient} of M in powers of delta, None where the dependence is rational.
+
+    A polynomial is one whose powers of L = M11 Delta end: exactly, as those of `LFT.polynomial` do, or, where the loop was
+    rotated (reduced, say), to rounding. Then what is left out is proven to stay below `_rounding` in the whole box, entry by entry;
+    so do the coefficients left out. Units of states, inputs, outputs and copies play no part.
+    """
+    m, n = len(lft.blocks), lft.order
+    zero: tuple[int, ...] = (0,) * m
+    power: dict[tuple[int, ...], Array] = {zero: np.eye(n)}
+    out: dict[tuple[int, ...], Array] = {zero: lft.M22}
+    size = np.zeros((n, n))
+    for _ in range(n):  # no polynomial of n copies has a higher degree
+        size = size + sum(np.abs(M) for M in power.values())
+        fed = _times_delta(power, lft)
+        for exponents, M in fed.items():
+            out[exponents] = out.get(exponents, np.zeros_like(lft.M22)) + lft.M21 @ M @ lft.M12
+        power = {e: lft.M11 @ M for e, M in fed.items()}
+        bar = _rounding(lft, size)
+        if np.all(_rest(lft, size, sum((np.abs(M) for M in power.values()), np.zeros((n, n)))) <= bar):
+            kept = {e: np.where(np.abs(M) > bar, M, 0.0) for e, M in out.items() if e != zero}
+            return {zero: lft.M22, **{e: M for e, M in kept.items() if np.any(M)}}
+    return None if n else out
+
+
+def _rounding(lft: LFT, size: Array) -> Array:
+    """What M can change anywhere in the box, to first order, where every entry of M11 .. M22 changes by `ROUNDING` of itself.
+
+    `size` bounds (I - M11 Delta)^-1 entry by entry.
+    """
+    reached = np.abs(lft.M12) + np.abs(lft.M11) @ size @ np.abs(lft.M12)
+    return ROUNDING * (np.abs(lft.M22) + np.abs(lft.M21) @ size @ reached)
+
+
+def _rest(lft: LFT, size: Array, last: Array) -> Array:
+    """Bound of all that follows the k powers of L summed so far: |L^k| <= `last`, |(I - L)^-1| <= `size` (I - last)^-1."""
+    if not np.any(last):
+        return np.zeros(lft.M22.shape)
+    if not np.abs(np.linalg.eigvals(last)).max() < 0.5:
+        return np.full(lft.M22.shape, np.inf)
+    return np.abs(lft.M21) @ size @ last @ np.linalg.solve(np.eye(lft.order) - last, np.abs(lft.M12))
+
+
+def _times_delta(word: Mapping[tuple[int, ...], Array], lft: LFT) -> dict[tuple[int, ...], Array]:
+    """Delta times a polynomial in delta whose coefficients have the rows of the loop."""
+    out: dict[tuple[int, ...], Array] = {}
+    for exponents, M in word.items():
+        for i, rows in enumerate(parts(lft.sizes)):
+            if np.any(M[rows]):
+                raised = (*exponents[:i], exponents[i] + 1, *exponents[i + 1 :])
+                out.setdefault(raised, np.zeros_like(M))[rows] += M[rows]
+    return out
 
 
 def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
     """See `LFT.to_lpv`."""
     s, nx = lft.scheduling, len(lft.states)
-    exact = powers(lft)
+    terms = expanded(lft)
+    exact = None if terms is None else [terms.get((i,), np.zeros_like(lft.M22)) for i in range(max(terms)[0] + 1)]
     if exact is None and degree is None:
         raise InputError("this LFT depends on its parameter rationally; to_lpv(degree=...) fits polynomials and reports the misfit")
     if degree is not None and exact is not None and degree < len(exact) - 1:
@@ -154,7 +182,7 @@ def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
         assert degree is not None  # noqa: S101 - refused above
         basis = Polynomial(degree, s.low, s.high)
         nodes = s.middle + s.radius * np.cos(np.pi * (np.arange(8 * (degree + 1)) + 0.5) / (8 * (degree + 1)))
-        values = lft.matrix((nodes[:, None] - s.middle) / s.radius)
+        values = lft.matrix(s.normalised(nodes)[:, None])
         M = basis.fit(nodes, values)
         wrong = np.tensordot(basis(nodes), M, axes=1) - values
         misfit = Matrices(wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:])

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from symheli.errors import InputError
 from symheli.lpv.arrays import Array
+from symheli.lpv.equilibration import equilibrate, peaks_to_one, significant
 from symheli.lpv.lft.model import LFT, Block, parts
+
+SAMPLES = 12
+"""Points of the box at which the size of what depends on the parameters is looked at."""
 
 
 def reduce(lft: LFT, tolerance: float) -> LFT:
@@ -48,7 +54,32 @@ def _one_parameter(lft: LFT, tolerance: float) -> LFT:
     M11 = (U[:, :r].T @ shifted @ Vt[:r].T) / root[:, None] / root
     M12 = root[:, None] * Vt[:r, :columns] / column_scale
     M21 = U[:rows, :r] * root / row_scale[:, None]
-    return replace(lft, M11=M11, M12=M12, M21=M21, blocks=(Block(lft.blocks[0].scheduling, r),))
+    # what does not depend on the parameter is cut off from it to the last bit
+    M12, M21 = np.where(np.any(depends, axis=0), M12, 0.0), np.where(np.any(depends, axis=1)[:, None], M21, 0.0)
+    return _as_much_reached_as_seen(replace(lft, M11=M11, M12=M12, M21=M21, blocks=(Block(lft.blocks[0].scheduling, r),)))
+
+
+def _as_much_reached_as_seen(lft: LFT) -> LFT:
+    """Coordinates of the copies of one parameter in which its Hankel matrix is balanced, near the units the model came in.
+
+    What a small gain proves depends on coordinates, of which these are as good as any: the same however the LFT was made.
+    """
+    if not lft.order:
+        return lft
+    power, size = lft.M12, np.zeros(lft.M22.shape)
+    for _ in range(2 * lft.order):
+        size, power = np.maximum(size, np.abs(lft.M21 @ power)), lft.M11 @ power
+    height, width = lft.M22.shape
+    rows, columns = peaks_to_one(size, np.ones(height), np.ones(width))
+    reach, sight = [lft.M12 * columns], [rows[:, None] * lft.M21]
+    for _ in range(lft.order - 1):
+        reach.append(lft.M11 @ reach[-1])
+        sight.append(sight[-1] @ lft.M11)
+    R, S = np.hstack(reach), np.vstack(sight)
+    U, s, Vt = np.linalg.svd(S @ R, full_matrices=False)
+    root = np.sqrt(s[: lft.order])
+    into, out = (U[:, : lft.order] / root).T @ S, R @ (Vt[: lft.order].T / root)
+    return replace(lft, M11=into @ lft.M11 @ out, M12=into @ lft.M12, M21=lft.M21 @ out)
 
 
 def _structured(lft: LFT, tolerance: float) -> LFT:
@@ -56,20 +87,63 @@ def _structured(lft: LFT, tolerance: float) -> LFT:
 
     The subspaces of each parameter's copies that words in the M11 blocks reach (and, transposed, see) are the smallest
     realization for parameters that do not commute; parameters that do may allow fewer still. Source: Cockburn and
-    Morton, "Linear fractional representations of uncertain systems", Automatica 33 (1997).
+    Morton, "Linear fractional representations of uncertain systems", Automatica 33 (1997). Ranks are judged in coordinates in which
+    rows, columns and copies are of one size, whatever the units.
     """
-    size = np.abs(lft.M22)
-    for word in (lft.M21 @ lft.M12, lft.M21 @ lft.M11 @ lft.M12):
-        size = np.maximum(size, np.abs(word))
-    row_scale, column_scale = equilibrate(size)
+    lft = _without_rounding(lft, tolerance)
+    units = _units(lft)
+    lft = replace(lft, M11=units.copies[:, None] * lft.M11 / units.copies, M12=units.copies[:, None] * lft.M12, M21=lft.M21 / units.copies)
     while True:
-        seen = _reached(lft.M11.T, (row_scale[:, None] * lft.M21).T, lft.blocks, tolerance)
+        seen = _reached(lft.M11.T, (units.rows[:, None] * lft.M21).T, lft.blocks, tolerance)
         smaller = _projected(lft, seen, seen)
-        reached = _reached(smaller.M11, smaller.M12 * column_scale, smaller.blocks, tolerance)
+        reached = _reached(smaller.M11, smaller.M12 * units.columns, smaller.blocks, tolerance)
         smaller = _projected(smaller, reached, reached)
         if smaller.order == lft.order:
             return smaller
         lft = smaller
+
+
+class _Units(NamedTuple):
+    """Factors that bring the rows (nx + ny,) and columns (nx + nu,) of M, and the copies (n,), to one size."""
+
+    rows: Array
+    columns: Array
+    copies: Array
+
+
+def _samples(lft: LFT) -> Array:
+    """Points of the box (SAMPLES, m), the same every time; nearer to its middle where the loop is singular."""
+    delta = np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, len(lft.blocks)))
+    for shrink in (1.0, 0.7, 0.5, 0.2, 0.0):
+        try:
+            lft.matrix(shrink * delta)
+        except InputError:
+            continue
+        return shrink * delta
+    return 0.0 * delta
+
+
+def _without_rounding(lft: LFT, tolerance: float) -> LFT:
+    """Rows and columns of M in which no entry depends on the parameters by more than rounding are cut off from them."""
+    change = np.abs(lft.matrix(_samples(lft)) - lft.M22).max(axis=0)
+    depends = significant(change, lft.M22, tolerance)
+    rows, columns = np.any(depends, axis=1), np.any(depends, axis=0)
+    return replace(lft, M12=np.where(columns, lft.M12, 0.0), M21=np.where(rows[:, None], lft.M21, 0.0))
+
+
+def _units(lft: LFT) -> _Units:
+    delta = np.repeat(_samples(lft), lft.sizes, axis=-1)
+    rows, columns = equilibrate(np.abs(lft.matrix(_samples(lft))).max(axis=0, initial=0.0))
+    loop = np.eye(lft.order) - lft.M11 * delta[:, None, :]
+    reach = np.abs(np.linalg.solve(loop, np.broadcast_to(lft.M12 * columns, (len(delta), *lft.M12.shape)))).max(axis=(0, 2), initial=0.0)
+    back = np.swapaxes(np.eye(lft.order) - delta[:, :, None] * lft.M11, -1, -2)
+    sight = np.broadcast_to((rows[:, None] * lft.M21).T, (len(delta), lft.order, len(rows)))
+    see = np.abs(np.linalg.solve(back, sight)).max(axis=(0, 2), initial=0.0)
+    # what is only reached, or only seen, goes away: meanwhile it is of size one
+    reached, seen = np.where(reach > 0, reach, 1.0), np.where(see > 0, see, 1.0)
+    only = (reach > 0) != (see > 0)
+    copies = np.where(only, 1.0, 0.5) * (np.log2(seen) - np.log2(reached))
+    return _Units(rows, columns, np.exp2(np.round(copies)))  # powers of two cost no rounding
 
 
 def _reached(M11: Array, M12: Array, blocks: tuple[Block, ...], tolerance: float) -> list[Array]:
@@ -113,25 +187,3 @@ def _diagonal(parts: list[Array]) -> Array:
         out[i : i + p.shape[0], j : j + p.shape[1]] = p
         i, j = i + p.shape[0], j + p.shape[1]
     return out
-
-
-def significant(dependence: Array, constant: Array, tolerance: float) -> Array:
-    """Entries whose `dependence` on the parameters is more than `tolerance` of the size their row and column give them.
-
-    That size is one for all after rows and columns are scaled, so units play no part; what is below is rounding.
-    """
-    row, column = equilibrate(np.maximum(np.abs(constant), dependence))
-    return row[:, None] * dependence * column > tolerance
-
-
-def equilibrate(size: Array, sweeps: int = 5) -> tuple[Array, Array]:
-    """Row and column factors that bring the largest entry of each to about one (zero rows and columns keep 1)."""
-    row, column = np.ones(size.shape[0]), np.ones(size.shape[1])
-    for _ in range(sweeps):
-        scaled = row[:, None] * size * column
-        peak = scaled.max(axis=1, initial=0.0)
-        row = np.where(peak > 0, row / np.sqrt(np.where(peak > 0, peak, 1)), row)
-        scaled = row[:, None] * size * column
-        peak = scaled.max(axis=0, initial=0.0)
-        column = np.where(peak > 0, column / np.sqrt(np.where(peak > 0, peak, 1)), column)
-    return row, column

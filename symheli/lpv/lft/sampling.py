@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.lpv.equilibration import is_singular
 from symheli.lpv.lft.model import LFT
 
 
@@ -35,7 +36,7 @@ def tustin(lft: LFT, dt: float) -> LFT:
     whole = np.block([[lft.M11, lft.M12], [lft.M21, lft.M22]])
     state = slice(n, n + nx)
     loop = np.eye(nx) - 0.5 * dt * whole[state, state]
-    if nx and np.linalg.cond(loop) > 1e12:
+    if is_singular(loop):
         raise InputError(f"Tustin's rule fails: 2/dt = {2 / dt:g} rad/s is a pole; take another dt")
     slope = np.linalg.solve(loop, whole[state])  # dx/dt from (w, xi, u)
     out = whole + 0.5 * dt * whole[:, state] @ slope

@@ -10,8 +10,9 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.arrays import Array
+from symheli.lpv.equilibration import equilibrate, significant
 from symheli.lpv.lft.model import LFT, Block, parts
-from symheli.lpv.lft.reduction import equilibrate, reduce, significant
+from symheli.lpv.lft.reduction import reduce
 
 
 class Truncation(NamedTuple):
@@ -96,7 +97,7 @@ def _gramians(M11: Array, B: Array, sizes: tuple[int, ...], factor: int) -> list
     X = constant
     for _ in range(4000):
         new = constant + factor * mask * (M11 @ X @ M11.T)
-        if not np.all(np.isfinite(new)) or np.abs(new).max() > 1e12 * (1 + np.abs(constant).max()):
+        if not np.all(np.isfinite(new)) or np.abs(new).max() > 1e12 * np.abs(constant).max():
             return None
         if np.abs(new - X).max() <= 1e-14 * np.abs(new).max():
             return [new[part, part] for part in parts(sizes)]
