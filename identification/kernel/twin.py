@@ -247,15 +247,15 @@ class Kernel:
         a.phi[: a.n].reshape(shape)[absent] = 0
         larger = ~absent & (signal * largest[0] > peak[:, 0])
         louder, fed = self._real(100 if kept_awake else 4), False
-        for i in np.flatnonzero(larger):
+        for i in np.flatnonzero(larger).tolist():
             fresh, where = peak[i, 0] == 0, slice(i * len(largest), (i + 1) * len(largest))
             peak[i] = signal[i] * largest
             target = a.peak.dtype.type(samples) * (peak[i] * peak[i])
             if fresh:
                 a.d[where] = a.energy[where] = a.fed[where] = target
                 continue
-            for k in np.flatnonzero(target > louder * a.fed[where]):
-                self._feed(a, where.start + int(k), self._real(target[k]), a.outputs.stop)
+            for k in np.flatnonzero(target > louder * a.fed[where]).tolist():
+                self._feed(a, where.start + k, self._real(target[k]), a.outputs.stop)
                 fed = True
         if fed:
             solve_anew(a)

@@ -21,7 +21,7 @@ from synthesis.forms import Relaxation
 from synthesis.hypotheses import VERIFIED, fitted
 from synthesis.lower_bound import Search
 from synthesis.lyapunov import graded_knots
-from synthesis.polynomial.bounds import Worst, growing, measure, worst_frozen, worst_moving
+from synthesis.polynomial.bounds import Worst, growing, measure, unstable_at, worst_frozen, worst_moving
 from synthesis.polynomial.certificate import BoxCertificate
 from synthesis.polynomial.inequalities import Demand
 from synthesis.polynomial.lyapunov import BoxLyapunov
@@ -32,7 +32,6 @@ from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.proof_search import CLOSE, NOTHING
 from synthesis.rates import Rate, rates
 from synthesis.scaling import in_its_own_scale, model_scaling
-from synthesis.spectrum import surely_unstable
 from synthesis.symmetric import length, smat
 from synthesis.verdict import Kind, Seconds, Status, Trajectory
 
@@ -64,8 +63,9 @@ def box_certificate(
     sign = 1.0 if kind.endswith("gain") else -1.0
     report = _Report(piece, demand, relaxation, solver, sign * frozen.value)
     unstable = math.isinf(frozen.value) if sign > 0 else frozen.value >= 0
-    if unstable and not surely_unstable(piece.at(np.array([frozen.p])).A[0], piece.dt):
-        # stable or not to rounding: nothing is known from below
+    if unstable and (at := unstable_at(piece, frozen.p or ())) is not None:
+        frozen = Worst(frozen.value, at)
+    elif unstable:  # stable or not to rounding: nothing is known from below
         frozen, search, unstable = Worst(0.0 if sign > 0 else -ROUNDED, frozen.p), None, False
         report = _Report(piece, demand, relaxation, solver, sign * frozen.value)
     if unstable:

@@ -21,6 +21,7 @@ from synthesis.polynomial.inequalities import Demand
 from synthesis.polynomial.regions import Pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.scaling import balance
+from synthesis.spectrum import surely_unstable
 from synthesis.verdict import Trajectory
 from synthesis.wave_family import WaveFamily
 from synthesis.waves import samples, steps
@@ -75,10 +76,7 @@ def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> 
 def worst_frozen(model: Pieces, size: Measure) -> Worst:
     """The largest over a grid of the box, and a local search from its best points."""
     low, high = np.array([(s.low, s.high) for s in model.parameters]).T
-    m = len(low)
-    count = {1: 61, 2: 15, 3: 7}.get(m, 3)
-    axes = [np.unique(np.r_[np.linspace(a, b, count), breaks]) for a, b, breaks in zip(low, high, model.breaks, strict=True)]
-    grid = np.array(list(product(*axes)))
+    m, count, grid = len(low), _count(model), _grid(model)
 
     def at(p: Array) -> float:
         return size(*(M[0] for M in model.at(np.clip(p, low, high)[None])))
@@ -99,6 +97,21 @@ def worst_frozen(model: Pieces, size: Measure) -> Worst:
         if value > worst.value:
             worst = Worst(value, tuple(map(float, np.clip(found.x, low, high))))
     return worst
+
+
+def unstable_at(model: Pieces, suspect: tuple[float, ...]) -> tuple[float, ...] | None:
+    """A p, the suspect one first, at which the frozen model is unstable beyond rounding; None where there is none on the grid."""
+    points = np.vstack([suspect, _grid(model)])
+    return next((tuple(map(float, p)) for p, A in zip(points, model.at(points).A, strict=True) if surely_unstable(A, model.dt)), None)
+
+
+def _count(model: Pieces) -> int:
+    return {1: 61, 2: 15, 3: 7}.get(len(model.parameters), 3)
+
+
+def _grid(model: Pieces) -> Array:
+    axes = [np.unique(np.r_[np.linspace(s.low, s.high, _count(model)), b]) for s, b in zip(model.parameters, model.breaks, strict=True)]
+    return np.array(list(product(*axes)))
 
 
 def worst_moving(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, frozen: Worst, search: Search | None) -> Worst:
