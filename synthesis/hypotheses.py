@@ -24,7 +24,7 @@ def fitted(model: object) -> tuple[str, ...]:
     s = model.scheduling
     matrices = model.matrices(np.linspace(s.low, s.high, 41))
     worst, place = 0.0, ""
-    for name, own, residual in zip("ABCD", matrices, model.residuals, strict=True):
+    for name, own, residual in zip("ABCD", matrices, model.residuals.matrices, strict=True):
         if not residual.size:
             continue
         size, off = np.abs(own).max(axis=0), np.abs(residual).max(axis=0)

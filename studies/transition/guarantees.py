@@ -15,7 +15,9 @@ from studies.gain_curve import GainCurve
 from studies.lateral_loop import STATES, close
 from studies.transition.flights import TOP
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
+from symheli.lpv.arrays import Array
 from symheli.lpv.bases import Polynomial
+from symheli.lpv.lpv_state_space import Matrices
 from synthesis import Certificate, LFTCertificate, Relaxation, Search
 from synthesis.frozen import norm
 
@@ -51,7 +53,13 @@ class Bound:
 def scaled(lpv: LPVStateSpace) -> LPVStateSpace:
     """Inputs and outputs measured in `SIZES`."""
     inputs, outputs = np.array([SIZES[i] for i in lpv.inputs]), np.array([SIZES[y] for y in lpv.outputs])
-    return replace(lpv, B=lpv.B * inputs, C=lpv.C / outputs[:, None], D=lpv.D * inputs / outputs[:, None], residuals=None, trim=None)
+
+    def measured(A: Array, B: Array, C: Array, D: Array) -> Matrices:
+        return Matrices(A, B * inputs, C / outputs[:, None], D * inputs / outputs[:, None])
+
+    model = replace(lpv, **measured(lpv.A, lpv.B, lpv.C, lpv.D)._asdict(), residuals=None, trim=None)
+    origin = lpv.fitted_to
+    return model if origin is None else model.with_residuals(origin.nodes, measured(*origin.matrices))
 
 
 def gust_loop(family: LinearFamily, degree: int = 3) -> LPVStateSpace:

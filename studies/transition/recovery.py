@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,7 @@ class Recovery:
 
 def recover(family: LinearFamily, period: float = 0.02, degree: int = 3, samples: int = 1500, seed: int = 0) -> Recovery:
     """Discretize at nodes, fit element-wise, fly with random p and inputs, identify, compare at 50 airspeeds."""
-    plant = family.select(STATES, INPUTS).interpolate("polynomial", degree).discretize(period, degree=degree)
+    plant = replace(family.select(STATES, INPUTS).interpolate("polynomial", degree), residuals=None).discretize(period, degree=degree)
     rng = np.random.default_rng(seed)
     p, u = rng.uniform(0.0, TOP, samples), 0.02 * rng.standard_normal((samples, len(INPUTS)))
     x, _ = simulate(plant, p, u)

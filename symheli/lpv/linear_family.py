@@ -141,11 +141,11 @@ class LinearFamily:
             raise UnknownNameError("interpolation kind", kind, ("polynomial", "spline", "linear"))
         exact = Matrices(self.A, self.B, self.C, self.D)
         fitted = Matrices(*(basis.fit(self.airspeeds, M) for M in exact))
-        residuals = Matrices(*(np.tensordot(basis(self.airspeeds), F, axes=1) - M for F, M in zip(fitted, exact, strict=True)))
-        return LPVStateSpace(
+        model = LPVStateSpace(
             basis, *fitted, Scheduling("airspeed", "m/s", low, high, rate), self.states, self.inputs, self.outputs,
-            dt=self.dt, trim=self._schedule(nodes), residuals=residuals,
+            dt=self.dt, trim=self._schedule(nodes),
         )  # fmt: skip
+        return model.with_residuals(self.airspeeds, exact)
 
     def _schedule(self, nodes: tuple[float, ...]) -> TrimSchedule | None:
         if not self.trims:

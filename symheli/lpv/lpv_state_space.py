@@ -30,13 +30,28 @@ class Matrices(NamedTuple):
     D: Array
 
 
+class Residuals(NamedTuple):
+    """Fit minus what it was fitted to at `nodes` (K,): A (K, nx, nx), B (K, nx, nu), C (K, ny, nx), D (K, ny, nu)."""
+
+    nodes: Array
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+    @property
+    def matrices(self) -> Matrices:
+        """Without the nodes."""
+        return Matrices(*self[1:])
+
+
 @dataclass(frozen=True, eq=False)
 class LPVStateSpace:
     """dx/dt = A(p) x + B(p) u, y = C(p) x + D(p) u (dt None), or x(k+1) = A(p(k)) x(k) + ... (dt in s).
 
     A (n, nx, nx), B (n, nx, nu), C (n, ny, nx), D (n, ny, nu) are coefficients: A(p) = sum_j f_j(p) A_j with
     the n functions f_j of `basis`. x and u are deviations from the schedule `trim` where there is one.
-    `residuals`, where the model was fitted to a family: fit minus family at its nodes, (K, ...) each.
+    `residuals`, where the model was fitted to a family or sampled: fit minus what it was fitted to, at its nodes.
     """
 
     basis: Basis
@@ -50,7 +65,7 @@ class LPVStateSpace:
     outputs: tuple[Signal, ...]
     dt: float | None = None
     trim: TrimSchedule | None = None
-    residuals: Matrices | None = None
+    residuals: Residuals | None = None
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):
@@ -129,7 +144,7 @@ class LPVStateSpace:
             self, A=kept.A, B=kept.B, C=kept.C, D=kept.D,
             states=tuple(self.states[i] for i in ix), inputs=tuple(self.inputs[i] for i in iu),
             outputs=tuple(self.outputs[i] for i in iy), trim=self.trim and self.trim.select(ix, iu),
-            residuals=self.residuals and keep(*self.residuals),
+            residuals=self.residuals and Residuals(self.residuals.nodes, *keep(*self.residuals.matrices)),
         )  # fmt: skip
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LPVStateSpace:
@@ -147,7 +162,8 @@ class LPVStateSpace:
         """Zero-order-hold equivalent at each of `nodes` frozen p, fitted element-wise by a polynomial of `degree`.
 
         `degree` defaults to that of the basis (needed where the basis is no polynomial). The misfit at the nodes
-        is in `.residuals`: the exponential of a polynomial is no polynomial.
+        is in `.residuals`: the exponential of a polynomial is no polynomial. So is the misfit to the sampled models of the family
+        that this model was fitted to, at the nodes of that.
         """
         if self.dt is not None:
             raise InputError(f"the model is already discrete (dt = {self.dt} s)")
@@ -158,12 +174,31 @@ class LPVStateSpace:
         low, high = self.scheduling.low, self.scheduling.high
         # Chebyshev-Lobatto nodes: the fit stays close to the best one between them too
         p = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(nodes) / (nodes - 1))
-        frozen_models = [self.at(value).discretize(dt) for value in p]
-        exact = Matrices(*(np.stack([getattr(m, name) for m in frozen_models]) for name in "ABCD"))
+        sampled = self._sampled(self.matrices(p), dt)
         basis = Polynomial(degree, low, high)
-        fitted = Matrices(*(basis.fit(p, M) for M in exact))
-        misfit = Matrices(*(np.tensordot(basis(p), F, axes=1) - E for F, E in zip(fitted, exact, strict=True)))
-        return replace(self, basis=basis, A=fitted.A, B=fitted.B, C=fitted.C, D=fitted.D, dt=dt, residuals=misfit)
+        fitted = Matrices(*(basis.fit(p, M) for M in sampled))
+        model = replace(self, basis=basis, A=fitted.A, B=fitted.B, C=fitted.C, D=fitted.D, dt=dt, residuals=None)
+        if (origin := self.fitted_to) is not None:
+            p = np.append(p, origin.nodes)
+            sampled = Matrices(*map(np.concatenate, zip(sampled, self._sampled(origin.matrices, dt), strict=True)))
+        return model.with_residuals(p, sampled)
+
+    @property
+    def fitted_to(self) -> Residuals | None:
+        """What the model was fitted to, at its nodes: fit minus residuals; None where it was given as it is."""
+        if self.residuals is None:
+            return None
+        exact = (M - off for M, off in zip(self.matrices(self.residuals.nodes), self.residuals.matrices, strict=True))
+        return Residuals(self.residuals.nodes, *exact)
+
+    def with_residuals(self, nodes: Array, exact: Matrices) -> LPVStateSpace:
+        """The same model as a fit of `exact` (K, ...) at `nodes` (K,)."""
+        off = (M - E for M, E in zip(self.matrices(nodes), exact, strict=True))
+        return replace(self, residuals=Residuals(nodes, *off))
+
+    def _sampled(self, matrices: Matrices, dt: float) -> Matrices:
+        frozen = [LinearModel(*each, self.states, self.inputs, self.outputs).discretize(dt) for each in zip(*matrices, strict=True)]
+        return Matrices(*(np.stack([getattr(model, name) for model in frozen]) for name in "ABCD"))
 
     def reduce(self, order: int, *, nodes: int = 21, input_scale: object = 1.0, output_scale: object = 1.0) -> Reduction[LPVStateSpace]:
         """`order` states by one projection balanced over p, with the error it makes; see `symheli.lpv.reduce`."""

@@ -25,7 +25,17 @@ class _Loop(NamedTuple):
 
 
 def close(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
-    """The model with u = K y + r; see `LPVStateSpace.feedback`."""
+    """The model with u = K y + r; see `LPVStateSpace.feedback`. It is a fit of what the loop makes of what `lpv` was fitted to."""
+    closed = _closed(lpv, K)
+    if (origin := lpv.fitted_to) is None:
+        return closed
+    A, B, C, D = origin.matrices
+    N = np.stack([loop_inverse(K @ each) for each in D])
+    back = N @ K @ C
+    return closed.with_residuals(origin.nodes, Matrices(A + B @ back, B @ N, C + D @ back, D @ N))
+
+
+def _closed(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
     nodes = _nodes(lpv.basis, lpv.scheduling.low, lpv.scheduling.high)
     values = lpv.matrices(nodes)
     fed = np.any(K, axis=0)  # outputs that are fed back

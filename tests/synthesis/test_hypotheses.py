@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from models import lag, spring
 
+from symheli.lpv import LPVStateSpace
+from symheli.lpv.lpv_state_space import Residuals
 from synthesis import Relaxation, decay_rate, l2_gain, lft_gain, stability
 
 COARSE = Relaxation(segments=(2,), degree=2)
@@ -16,10 +18,11 @@ SOS = Relaxation(kind="sos", degree=1, segments=(1,))
 @pytest.mark.parametrize("analysis", [l2_gain, stability])
 def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, relaxation):
     lpv = lag()
+    s = lpv.scheduling
     # the family had 2 % more in A at one node, and only that: A is -1 .. -2
     off = [np.zeros((3, *M.shape[1:])) for M in (lpv.A, lpv.B, lpv.C, lpv.D)]
     off[0][1, 0, 0] = 0.04
-    text = str(analysis(replace(lpv, residuals=type(lpv.matrices(0.5))(*off)), relaxation=relaxation, search=None))
+    text = str(analysis(replace(lpv, residuals=Residuals(np.linspace(s.low, s.high, 3), *off)), relaxation=relaxation, search=None))
     assert "differs from what it was fitted to by at most 2 % of its largest value, in A[1, 1]" in text
     assert "fitted to" not in str(analysis(lpv, relaxation=relaxation, search=None))
 
@@ -34,6 +37,21 @@ def test_the_misfit_of_a_sampled_model_is_measured_from_its_own_samples():
     worst = (np.abs(own - exact).max(axis=0) / np.abs(own).max(axis=0)).max()
     assert "the sampled model (p held over each 1 s, entries fitted in p)" in text
     assert f"at most {100 * worst:.2g} %" in text
+
+
+@pytest.mark.parametrize("change", [lambda m: m.feedback({("u1", "y1"): -0.5}), lambda m: m.discretize(0.2)], ids=["closed", "sampled"])
+def test_the_misfit_survives_closing_a_loop_and_sampling(change):
+    """What a closed or sampled fit is off by is what the same loop, or hold, makes of the family."""
+    lpv = lag()
+    nodes = np.linspace(lpv.scheduling.low, lpv.scheduling.high, 3)
+    exact = lpv.matrices(nodes)
+    fitted = lpv.with_residuals(nodes, exact._replace(A=exact.A - 0.1 * nodes[:, None, None]))
+    changed = change(fitted)
+    for k, p in enumerate(nodes):
+        plain = LPVStateSpace.polynomial([exact.A[k] - 0.1 * p], [exact.B[k]], [exact.C[k]], [exact.D[k]], scheduling=lpv.scheduling)
+        off = changed.at(p).A - change(plain).at(p).A
+        np.testing.assert_allclose(changed.residuals.A[k - len(nodes)], off, atol=1e-12)
+    assert "fitted to by at most" in str(stability(changed, relaxation=COARSE, search=None))
 
 
 def test_what_is_trusted_is_said():

@@ -11,7 +11,7 @@ from symheli.errors import InputError
 from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Polynomial
 from symheli.lpv.lft.model import LFT, Block, parts
-from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.lpv.lpv_state_space import LPVStateSpace, Residuals
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.signal import signals
@@ -185,7 +185,7 @@ def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
         values = lft.matrix(s.normalised(nodes)[:, None])
         M = basis.fit(nodes, values)
         wrong = np.tensordot(basis(nodes), M, axes=1) - values
-        misfit = Matrices(wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:])
+        misfit = Residuals(nodes, wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:])
     # the orthonormal polynomials over [-1, 1] in delta are those over [low, high] in p
     basis = Polynomial(degree, s.low, s.high)
     return LPVStateSpace(
