@@ -726,8 +726,11 @@ int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_r
     const int functions = c->basis.functions;
     for (int g = 0; g < c->groups; g++) {
         const group a = open_group(c, g, s, w);
-        for (int i = 0; i < c->group[g].entries; i++)
-            for (int k = 0; k < functions; k++) a.phi[i * functions + k] = phi[c->group[g].entry[i] * functions + k];
+        if (a.n == rls_regressors(c)) /* all of them, in order */
+            for (int i = 0; i < a.n; i++) a.phi[i] = phi[i];
+        else
+            for (int i = 0; i < c->group[g].entries; i++)
+                for (int k = 0; k < functions; k++) a.phi[i * functions + k] = phi[c->group[g].entry[i] * functions + k];
         learn(&c->forgetting, &c->basis, &a, c->group[g].output, y);
         for (int j = 0; j < a.m; j++) innovation[c->group[g].output[j]] = a.innovation[j];
         s = end_of_state(&a);
