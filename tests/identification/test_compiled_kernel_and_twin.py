@@ -34,10 +34,12 @@ def both(rls):
 
 
 def awkward(arx, n=160):
-    """Rows [y, u, p] with a silence, a missing sample, a jump and sizes far apart."""
+    """Rows [y, u, p] with a silence, a missing sample, a jump, sizes far apart, and p that rests and creeps before it moves."""
     rng = np.random.default_rng(3)
     rows = np.column_stack([rng.normal(size=(n, arx.ny + arx.nu)), moving(n)])
     rows[:5, :-1] *= 1e-6
+    rows[:20, -1] = 3.0
+    rows[20:40, -1] = 3.0 + 1e-5 * np.arange(20)
     rows[60, 0] = np.nan
     rows[90:120, :-1] = 0.0
     rows[130:, 0] *= 50.0
