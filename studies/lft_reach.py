@@ -14,6 +14,7 @@ import synthesis
 from studies.lateral_loop import lateral_loop
 from studies.longitudinal_loop import longitudinal_loop
 from studies.output import as_json, columns, progress
+from studies.stamped_tables import DOCS, keep, parsed, processor
 from symheli import Helicopter, LPVStateSpace, Scheduling
 from synthesis import Search, Status
 
@@ -120,7 +121,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="the lateral loop, grown from hover only")
     parser.add_argument("--json", action="store_true", help="print what a program would read")
-    options = parser.parse_args()
+    options = parsed(parser, "lft.md")
     heli = Helicopter.load("xcell60", governor="ideal")
     loops = {"lateral": lateral_loop(heli)} | ({} if options.quick else {"longitudinal": longitudinal_loop(heli)})
     found: dict[str, dict[str, Any]] = {}
@@ -131,15 +132,42 @@ def main() -> None:
             found[name][what] = result
     rows = [[f"{name}: {what}", _words(result)] for name, results in found.items() for what, result in results.items()]
     print(as_json(found) if options.json else columns(rows, left=2))
+    if options.write:
+        keep(DOCS / "lft.md", "reach", "\n\n".join(tables(loop, results) for loop, results in found.items()), processor())
+
+
+def tables(loop: str, results: dict[str, Any]) -> str:
+    """The gains proven of one loop, range by range, and the largest ranges that each test proves stable, in Markdown."""
+    proven_gains = {what.removeprefix("gains on "): found for what, found in results.items() if what.startswith("gains on ")}
+    reached: dict[str, dict[str, str]] = {}
+    for what, found in results.items():
+        if "test" in found:
+            where, test = what.rsplit(", ", 1)
+            reached.setdefault(where, {})[test] = _range(found)
+    return "\n\n".join(_table(title, rows) for title, rows in ((f"{loop}: gain on", proven_gains), (f"{loop}: stable", reached)) if rows)
+
+
+def _table(title: str, rows: dict[str, dict[str, Any]]) -> str:
+    names = list(dict.fromkeys(name for row in rows.values() for name in row))
+    lines = [[title, *names], ["---"] * (len(names) + 1)]
+    lines += [[what, *(_word(row.get(name, "")) for name in names)] for what, row in rows.items()]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _range(found: dict[str, Any]) -> str:
+    if found["test"] == "no growth found":
+        return f"from {found['failed'][1]:.3g} m/s" if found["failed"] else "none found"
+    return f"{found['low']:.3g} - {found['high']:.3g} m/s"
 
 
 def _words(result: dict[str, Any]) -> str:
-    def word(value: Any) -> str:
-        if isinstance(value, tuple):
-            return f"[{value[0]:.3g}, {value[1]:.3g}]"
-        return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return ", ".join(f"{key} {_word(value)}" for key, value in result.items() if key != "test")
 
-    return ", ".join(f"{key} {word(value)}" for key, value in result.items() if key != "test")
+
+def _word(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"[{value[0]:.3g}, {value[1]:.3g}]"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import pytest
 
 import synthesis
 from studies.lateral_loop import lateral_loop
-from studies.lft_reach import about, from_hover, largest, on, proven
+from studies.lft_reach import about, from_hover, largest, on, proven, tables
 from studies.longitudinal_loop import longitudinal_loop
 
 
@@ -47,3 +47,26 @@ def test_the_reach_of_each_scaling_on_the_lateral_loop(ideal):
     assert 0.4 < upper[0] < upper[1] < upper[2] < 2.0
     widths = [found.high - found.low for found in (about(loop, 6.5, test) for test in ("small gain", "D", "DG"))]
     assert 2.0 < widths[0] < widths[1] < widths[2] < 9.5
+
+
+def test_the_tables_of_the_page_hold_every_range_and_say_what_failed():
+    found = {
+        "order": {"LFT": 18, "reduced": 15},
+        "gains on [0, 1] m/s": {"DG": 4.581, "small gain": "INFEASIBLE", "frozen": 0.957},
+        "gains on [0, 13] m/s": {"DG": "INFEASIBLE", "frozen": 0.984},
+        "whole range, jumping airspeed": {"grows": True},
+        "from the low end, DG": {"test": "DG", "low": 0.0, "high": 1.56, "failed": (0.0, 1.57)},
+        "from the low end, growth": {"test": "no growth found", "low": 0.0, "high": 3.99, "failed": (0.0, 4.0)},
+        "about 2 m/s, DG": {"test": "DG", "low": 0.57, "high": 3.43, "failed": None},
+    }
+    assert tables("lateral", found).splitlines() == [
+        "| lateral: gain on | DG | small gain | frozen |",
+        "| --- | --- | --- | --- |",
+        "| [0, 1] m/s | 4.581 | INFEASIBLE | 0.957 |",
+        "| [0, 13] m/s | INFEASIBLE |  | 0.984 |",
+        "",
+        "| lateral: stable | DG | growth |",
+        "| --- | --- | --- |",
+        "| from the low end | 0 - 1.56 m/s | from 4 m/s |",
+        "| about 2 m/s | 0.57 - 3.43 m/s |  |",
+    ]
