@@ -339,7 +339,7 @@ static void renew_rows(const group *a, int start, int rows, rls_real kept, weigh
     for (int i = 0; i < rows; i++, row += length) {
         const rls_real f = x[i], d = kept * a->d[start + i], ratio = f / d, sum = w->inverse + f * ratio;
         rls_real gain = 0;
-        if (f == 0) {
+        if (f == 0 || (d <= TINY && absolute(f) < TINY)) {
             a->d[start + i] = d;
         } else if (sum <= 4 * w->inverse && d > TINY) {
             gain = ratio * (1 / sum);
@@ -349,13 +349,20 @@ static void renew_rows(const group *a, int start, int rows, rls_real kept, weigh
             }
             a->d[start + i] = d + f * (f * w->value);
             w->inverse = sum;
-        } else {
-            const int known = d > TINY;
-            gain = known ? ratio * (1 / sum) : 1 / f;
-            renew(row, x, length, f, gain, known ? w->inverse * (1 / sum) : 0);
+        } else if (d > TINY) {
+            gain = ratio * (1 / sum);
+            renew(row, x, length, f, gain, w->inverse * (1 / sum));
             row[i] = 1;
-            a->d[start + i] = (known ? d : 0) + f * (f * w->value);
-            w->inverse = known ? sum : 1 / TINY;
+            a->d[start + i] = d + f * (f * w->value);
+            w->inverse = sum;
+        } else { /* nothing is known here: all of x is explained, and what would be left of it is rounding that must teach no other row */
+            gain = 1 / f;
+            for (int k = 0; k < length; k++) {
+                row[k] = gain * x[k];
+                x[k] = 0;
+            }
+            row[i] = 1;
+            a->d[start + i] = f * (f * w->value);
         }
         w->value = 1 / w->inverse;
         a->s[start + i] = gain;

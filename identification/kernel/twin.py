@@ -355,21 +355,26 @@ class Kernel:
             known = d > tiny
             ratio = f / d if known else real(0)
             total = inverse + f * ratio
-            if f == 0:
+            if f == 0 or (not known and abs(f) < tiny):
                 a.d[start + i] = d
             elif known and total <= 4 * inverse:
                 gain = ratio * (one / total)
                 x -= f * row
                 row += gain * x
                 a.d[start + i], inverse = d + f * (f * value), total
-            else:
-                gain, keep = (ratio * (one / total), inverse * (one / total)) if known else (one / f, real(0))
+            elif known:
+                gain, keep = ratio * (one / total), inverse * (one / total)
                 r, t = row.copy(), x.copy()
                 x[:] = t - f * r
                 row[:] = keep * r + gain * t
                 row[i] = 1
-                a.d[start + i] = (d if known else real(0)) + f * (f * value)
-                inverse = total if known else one / tiny
+                a.d[start + i], inverse = d + f * (f * value), total
+            else:
+                gain = one / f
+                row[:] = gain * x
+                x[:] = 0
+                row[i] = 1
+                a.d[start + i] = f * (f * value)
             value = one / inverse
             a.s[start + i] = gain
         return inverse, value

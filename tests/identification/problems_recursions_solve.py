@@ -53,6 +53,12 @@ class Rows:
         return out
 
     @property
+    def residual(self):
+        """Weighted squares (m, m) of what the best coefficients leave of every row."""
+        left = np.sqrt(self.w)[:, None] * (self.b - self.A @ self.theta)
+        return left.T @ left
+
+    @property
     def _now(self):
         """In double precision: where coefficients are kept awake the condition is moderate."""
         A, b, scale = self._weighted

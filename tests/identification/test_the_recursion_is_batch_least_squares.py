@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_systems import Truth, structure
-from problems_recursions_solve import EPS, problem
+from problems_recursions_solve import EPS, Rows, problem
 
 import identification as idn
 from identification import kernel
@@ -92,10 +92,14 @@ def compare(arx, data, forgetting, checks):
             one.absorb(phi[columns], y[outputs], state._header(at.FACTOR)[g])
             if k in when:
                 at_one_instant(one, state, columns, outputs, data, k)
+                if isinstance(one, Rows):
+                    left = state.factors[g][len(columns) :, len(columns) :]
+                    np.testing.assert_allclose(left.T @ left, one.residual, rtol=1e-6, atol=1e-8 * np.sum(data.y**2))
 
 
 def at_one_instant(one, state, columns, outputs, data, k):
     best, theta, solved = one.theta, state.theta[np.ix_(columns, outputs)], state.solve()[np.ix_(columns, outputs)]
+    assert np.isfinite(state.memory).all()
     spread = data.y[:, outputs].std(axis=0)
     rows, root = one.rows
     for found in (theta, solved):
@@ -153,6 +157,22 @@ def test_batch_and_recursion_call_the_same_records_determined(experiment):
         online.absorb(phi, y)
     batch = all(determined_columns(data.phi[:, arx.regressors(g)], arx.basis).all() for g in arx.groups)
     assert online.determined == batch
+
+
+@pytest.mark.parametrize("outputs", [1, 5, 9])
+def test_a_plant_at_rest_that_starts_to_move_leaves_nothing_that_is_no_number(outputs):
+    """Once, rounding that was left of a sample explained whole taught further rows, each 1e-16 of the last, down to where 1/f overflows."""
+    names, rng = tuple("abcdefghi"[:outputs]), np.random.default_rng(2)
+    arx = structure(outputs=names, inputs=("u", "v"), na=1, nb=1, basis=idn.Polynomial(3, 0.0, 13.0))
+    A, B = 0.5 * np.eye(outputs) + 0.1 * rng.standard_normal((outputs, outputs)) / outputs, 0.02 * rng.standard_normal((outputs, 2))
+    y, online = np.zeros(outputs), idn.RecursiveLeastSquares(arx).online()
+    for p in rng.uniform(0, 13, 200):
+        u = rng.standard_normal(2)
+        online.update(y, u, p)
+        assert np.isfinite(online.state.memory).all()
+        y = A @ y + B @ u * (1 + 0.05 * p)
+    # outputs of 0.1: what is pretended of the coefficients, 32 eps samples, leaves less than this
+    assert np.abs(online.state.residual_covariance).max() < 1e-16
 
 
 def creeping(arx, samples=400, rate=1e-4, noise=0.0):
