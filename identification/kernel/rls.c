@@ -1,7 +1,7 @@
 /* See rls.h. Rotations after Gentleman (1973), Least squares computations by Givens transformations without square roots.
 
    All that is remembered of the data is the triangular factor [R, Z; 0, S], which nothing but data enters. The coefficients solve
-   R theta = Z. From sample to sample they move along the gain, theta += R^-1 (R^-T phi) (y - phi' theta), a tenth of the work; they are solved anew
+   R theta = Z. From sample to sample they move along the gain, theta += R^-1 (R^-T phi) (y - phi' theta), with far less work; they are solved anew
    as soon as a running bound of what rounding has added since is no longer small, so that they never come apart from the factor. */
 #include "rls.h"
 
@@ -395,9 +395,6 @@ static inline void sweep(const group *a, int first, int last, rls_real kept, rls
         for (int i = 0; i < LANES; i++) lead[i] = next[i];
     }
 }
-
-/* A measurement of so much weight. */
-static inline weight weight_of(rls_real value) { return (weight){1 / value, value}; }
 
 /* Solve with the unit triangle of a block of rows: t <- block^-1 t. */
 static inline void solve(const rls_real *block, int stride, lanes *t)
