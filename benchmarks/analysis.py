@@ -1,7 +1,9 @@
-"""The proven gain of the lateral loop: against the same LMI on a grid in cvxpy, against D-scaled LFTs; growth, memory, shares.
+"""The proven gain of the lateral loop: against the same LMI on a grid in cvxpy, against D-scaled
+LFTs; growth, memory, shares.
 
-Opponent: benchmarks/opponents/gridded_lmi.py. Each proof is timed whole, frozen gain and verification included, without the
-search for a lower bound, which the opponent has no counterpart of.
+Opponent: benchmarks/opponents/gridded_lmi.py. Each proof is timed whole, frozen gain and
+verification included, without the search for a lower bound, which the opponent has no counterpart
+of.
 """
 
 from __future__ import annotations
@@ -49,40 +51,61 @@ class Goal(NamedTuple):
 
 
 def behind_servo(heli: symheli.Helicopter, delay: int) -> LPVStateSpace:
-    """The lateral loop with the servo of d_lat (3 states) and Pade's delay of order `delay` before it: 8 + `delay` states.
+    """The lateral loop with the servo of d_lat (3 states) and Pade's delay of order `delay` before
+    it: 8 + `delay` states.
 
-    Cubic element-wise, as the loop of five states is; parts that do not depend on the airspeed stay as they are.
+    Cubic element-wise, as the loop of five states is; parts that do not depend on the airspeed stay
+    as they are.
     """
     airspeeds = np.linspace(0.0, 13.0, 27)
-    family = symheli.sweep(heli, airspeeds, inputs=("d_lat", "v_w")).select(STATES, ("d_lat", "v_w"))  # type: ignore[arg-type]
+    family = symheli.sweep(heli, airspeeds, inputs=("d_lat", "v_w")).select(
+        STATES, ("d_lat", "v_w")
+    )  # type: ignore[arg-type]
     models = []
     for k in range(len(family)):
         model = family[k].driven_by({"d_lat": XCELL_SERVOS["d_lat"].linear("d_lat")})
         if delay:
             model = model.driven_by({"d_lat": pade_delay("d_lat", DELAY, delay)})
-        models.append(model.feedback({("d_lat", "phi"): HOLD}).select(inputs=("v_w",), outputs=OUTPUTS))
-    powers = np.linalg.lstsq(
-        np.vander(airspeeds / 13.0, 4, increasing=True),
-        np.stack([np.concatenate([m.A.ravel(), m.B.ravel(), m.C.ravel(), m.D.ravel()]) for m in models]), rcond=None,
-    )[0] / 13.0 ** np.arange(4)[:, None]  # fmt: skip
+        models.append(
+            model.feedback({("d_lat", "phi"): HOLD}).select(inputs=("v_w",), outputs=OUTPUTS)
+        )
+    powers = (
+        np.linalg.lstsq(
+            np.vander(airspeeds / 13.0, 4, increasing=True),
+            np.stack(
+                [
+                    np.concatenate([m.A.ravel(), m.B.ravel(), m.C.ravel(), m.D.ravel()])
+                    for m in models
+                ]
+            ),
+            rcond=None,
+        )[0]
+        / 13.0 ** np.arange(4)[:, None]
+    )
     first = models[0]
     cuts = np.cumsum([first.A.size, first.B.size, first.C.size])
     A, B, C, D = (
         list(part.reshape(4, *like.shape))
-        for part, like in zip(np.split(powers, cuts, axis=1), (first.A, first.B, first.C, first.D), strict=True)
+        for part, like in zip(
+            np.split(powers, cuts, axis=1), (first.A, first.B, first.C, first.D), strict=True
+        )
     )
     return LPVStateSpace.polynomial(A, B, C, D, Scheduling("airspeed", "m/s", 0.0, 13.0, RATE))
 
 
 def springs(parameters: int) -> LFT:
-    """Masses of 1 kg in a row, as many as `parameters`, damped; each spring between 1 and 2 N/m, as it likes."""
+    """Masses of 1 kg in a row, as many as `parameters`, damped; each spring between 1 and 2 N/m, as
+    it likes.
+    """
     m = parameters
     none = (0,) * m
     A: dict[tuple[int, ...], np.ndarray] = {none: np.zeros((2 * m, 2 * m))}
     A[none][:m, m:], A[none][m:, m:] = np.eye(m), -2.0 * np.eye(m)
     for i in range(m):
         stretch = np.eye(m)[i] - (np.eye(m)[i - 1] if i else 0.0)
-        A[tuple(int(i == k) for k in range(m))] = np.block([[np.zeros((m, 2 * m))], [-np.outer(stretch, stretch), np.zeros((m, m))]])
+        A[tuple(int(i == k) for k in range(m))] = np.block(
+            [[np.zeros((m, 2 * m))], [-np.outer(stretch, stretch), np.zeros((m, m))]]
+        )
     B, C = np.zeros((2 * m, 1)), np.zeros((1, 2 * m))
     B[-1], C[0, m - 1] = 1.0, 1.0
     ranges = [Scheduling(f"k{i + 1}", "N/m", 1.0, 2.0, math.inf) for i in range(m)]
@@ -107,8 +130,12 @@ def d_scaled(loop: LPVStateSpace) -> LFTCertificate:
     return lft_gain(loop.to_lft().reduce(), "D", search=None)
 
 
-def alternating(candidates: dict[str, Callable[[], Any]], runs: int) -> tuple[dict[str, float], dict[str, Any]]:
-    """Median times, s, of `runs` calls each, taking turns, and the last results; calls of a minute cannot be warmed up first."""
+def alternating(
+    candidates: dict[str, Callable[[], Any]], runs: int
+) -> tuple[dict[str, float], dict[str, Any]]:
+    """Median times, s, of `runs` calls each, taking turns, and the last results; calls of a minute
+    cannot be warmed up first.
+    """
     spent: dict[str, list[float]] = {name: [] for name in candidates}
     results = {}
     for _ in range(runs):
@@ -120,14 +147,22 @@ def alternating(candidates: dict[str, Callable[[], Any]], runs: int) -> tuple[di
 
 
 def _peak() -> float:
-    """Largest resident size of this process so far, MiB; NaN where the system does not say (it is Linux that does)."""
+    """Largest resident size of this process so far, MiB; NaN where the system does not say (it is
+    Linux that does).
+    """
     status = Path("/proc/self/status")
-    found = re.search(r"VmHWM:\s*(\d+) kB", status.read_text(encoding="utf-8")) if status.exists() else None
+    found = (
+        re.search(r"VmHWM:\s*(\d+) kB", status.read_text(encoding="utf-8"))
+        if status.exists()
+        else None
+    )
     return int(found.group(1)) / 1024 if found else math.nan
 
 
 def _memory(call: Callable[..., Any], *args: Any) -> float:
-    """Growth of the largest resident size over one call, MiB, with both contestants' libraries loaded before."""
+    """Growth of the largest resident size over one call, MiB, with both contestants' libraries
+    loaded before.
+    """
     import clarabel  # noqa: F401
     import cvxpy  # noqa: F401
 
@@ -159,17 +194,21 @@ def growth(loops: dict[int, LPVStateSpace], quick: bool) -> dict[str, list[tuple
     degrees, masses = ((1, 2, 3), (1, 2)) if quick else ((1, 2, 3, 4), (1, 2, 3, 4))
     lfts = {m: springs(m) for m in masses}
     return {
-        "states (P: 4 segments of degree 2)": [(n, timed(lambda loop=loop: proof(loop, few))) for n, loop in loops.items()],
+        "states (P: 4 segments of degree 2)": [
+            (n, timed(lambda loop=loop: proof(loop, few))) for n, loop in loops.items()
+        ],
         "degree of P (5 states, 4 segments)": [
-            (d, timed(lambda d=d: proof(loops[5], Relaxation(segments=(4,), degree=d)))) for d in degrees
+            (d, timed(lambda d=d: proof(loops[5], Relaxation(segments=(4,), degree=d))))
+            for d in degrees
         ],
         "parameters, LFT test D/G (twice as many states)": [
             (m, timed(lambda lft=lft: lft_gain(lft, "DG", search=None))) for m, lft in lfts.items()
         ],
         "parameters, LFT test full block": [
-            (m, timed(lambda lft=lft: lft_gain(lft, "full block", search=None))) for m, lft in lfts.items()
+            (m, timed(lambda lft=lft: lft_gain(lft, "full block", search=None)))
+            for m, lft in lfts.items()
         ],
-    }  # fmt: skip
+    }
 
 
 def plot(curves: dict[str, list[tuple[int, float]]], path: Path) -> Path | None:
@@ -202,43 +241,82 @@ def main() -> None:
 
     def compare(states: int, degree: int, runs: int) -> None:
         loop, name = loops[states], f"grid of 51, degree {degree}"
-        times, results = alternating({"proof": lambda: proof(loop), name: lambda: gridded(loop, degree)}, runs)
+        times, results = alternating(
+            {"proof": lambda: proof(loop), name: lambda: gridded(loop, degree)}, runs
+        )
         certificate, (gain, solving) = results["proof"], results[name]
         seconds = certificate.seconds
-        lines.append(f"{states} states, proof: gain {certificate.gamma:.4f}, {times['proof']:.2f} s, {certificate.status.name}")
-        lines.append(f"{states} states, {name}: gain {gain:.4f} (not proven), {times[name]:.2f} s, {solving:.2f} s of it in the solver")
-        goals.append(Goal(f"{states} states: time of the proof / {name}", times["proof"] / times[name], 1.0))
-        goals.append(Goal(f"{states} states: proven gain / gain of the {name}", certificate.gamma / gain, 1.01))
-        goals.append(Goal(f"{states} states: building / solving, beside the {name}", seconds.build / seconds.solve, 1.0))
-        ratios[f"{states} states: time of the proof / solver of the {name}"] = times["proof"] / solving
+        lines.append(
+            f"{states} states, proof: gain {certificate.gamma:.4f}, {times['proof']:.2f} s,"
+            f" {certificate.status.name}"
+        )
+        lines.append(
+            f"{states} states, {name}: gain {gain:.4f} (not proven), {times[name]:.2f} s,"
+            f" {solving:.2f} s of it in the solver"
+        )
+        goals.append(
+            Goal(f"{states} states: time of the proof / {name}", times["proof"] / times[name], 1.0)
+        )
+        goals.append(
+            Goal(
+                f"{states} states: proven gain / gain of the {name}", certificate.gamma / gain, 1.01
+            )
+        )
+        goals.append(
+            Goal(
+                f"{states} states: building / solving, beside the {name}",
+                seconds.build / seconds.solve,
+                1.0,
+            )
+        )
+        ratios[f"{states} states: time of the proof / solver of the {name}"] = (
+            times["proof"] / solving
+        )
 
     compare(5, 3, 1 if options.quick else 3)
     if not options.quick:
         compare(5, 12, 1)
         compare(10, 3, 1)
 
-    times, results = alternating({"proof": lambda: proof(narrow), "D": lambda: d_scaled(narrow)}, 1 if options.quick else 3)
-    lines.append(f"{NARROW[0]:g} to {NARROW[1]:g} m/s: proof {results['proof'].gamma:.3f} in {times['proof']:.2f} s, "
-                 f"D-scaled LFT {results['D'].gamma:.3f} in {times['D']:.2f} s")  # fmt: skip
+    times, results = alternating(
+        {"proof": lambda: proof(narrow), "D": lambda: d_scaled(narrow)}, 1 if options.quick else 3
+    )
+    lines.append(
+        f"{NARROW[0]:g} to {NARROW[1]:g} m/s: proof {results['proof'].gamma:.3f} in"
+        f" {times['proof']:.2f} s, D-scaled LFT {results['D'].gamma:.3f} in {times['D']:.2f} s"
+    )
     lines.append(f"0 to 13 m/s: D-scaled LFT {d_scaled(loops[5]).status.name}")
-    ratios["narrow range: gain of the D-scaled LFT / proven gain"] = results["D"].gamma / results["proof"].gamma
+    ratios["narrow range: gain of the D-scaled LFT / proven gain"] = (
+        results["D"].gamma / results["proof"].gamma
+    )
     ratios["narrow range: time of the proof / D-scaled LFT"] = times["proof"] / times["D"]
 
     if not options.quick:
         ours, theirs = memory(proof, loops[5]), memory(gridded, loops[5], 3)
-        lines.append(f"peak memory, 5 states: proof {ours:.0f} MiB, grid of 51 with degree 3 {theirs:.0f} MiB")
+        lines.append(
+            f"peak memory, 5 states: proof {ours:.0f} MiB, grid of 51 with degree 3"
+            f" {theirs:.0f} MiB"
+        )
         if theirs > 0:
             ratios["peak memory of the proof / grid of 51, degree 3"] = ours / theirs
 
     curves = growth(loops, options.quick)
     for name, points in curves.items():
         power = exponent([n for n, _ in points], [t for _, t in points])
-        lines.append(f"time against {name}: " + ", ".join(f"{n}: {t:.2f} s" for n, t in points) + f"; exponent {power:.1f}")
+        lines.append(
+            f"time against {name}: "
+            + ", ".join(f"{n}: {t:.2f} s" for n, t in points)
+            + f"; exponent {power:.1f}"
+        )
         ratios[f"exponent of time against {name}"] = power
     if options.json:
         print(json.dumps({g.name: g.value for g in goals} | ratios, indent=1))
         return
-    lines += [f"{g.name:60s}{g.value:10.3f} x, at most {g.most:g}: {'met' if g.value <= g.most else 'MISSED'}" for g in goals]
+    lines += [
+        f"{g.name:60s}{g.value:10.3f} x, at most {g.most:g}:"
+        f" {'met' if g.value <= g.most else 'MISSED'}"
+        for g in goals
+    ]
     lines += [f"{name:60s}{value:10.3f}" for name, value in ratios.items()]
     print("\n".join(lines))
     if options.write:

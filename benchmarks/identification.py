@@ -1,4 +1,5 @@
-"""Recursive identification in real time: one update that yields the coefficients against what others write, its cost, and an LPV analysis.
+"""Recursive identification in real time: one update that yields the coefficients against what
+others write, its cost, and an LPV analysis.
 
 Times are those of one thread at work: what else the computer does is not counted.
 
@@ -18,9 +19,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one core, as in flight
 
 import numpy as np
 
-sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scripts named like the packages they measure
+# this folder holds scripts named like the packages they measure
+sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from benchmarks.opponents.covariance_rls import CovarianceRLS, Padasip, TunedCovarianceRLS, padasip_is_installed  # noqa: E402
+from benchmarks.opponents.covariance_rls import (  # noqa: E402
+    CovarianceRLS,
+    Padasip,
+    TunedCovarianceRLS,
+    padasip_is_installed,
+)
 from benchmarks.timing import arguments, keep, lines, medians  # noqa: E402
 from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
 from identification.kernel import compiled_kernel  # noqa: E402
@@ -43,12 +50,18 @@ def main() -> None:
     options = arguments(__doc__, plot=True, write=True)
     times: dict[str, float] = {}
     ratios: dict[str, float] = {}
-    notes = [] if compiled_kernel("double") else ["the kernel is not compiled: this is its NumPy twin"]
+    notes = (
+        [] if compiled_kernel("double") else ["the kernel is not compiled: this is its NumPy twin"]
+    )
     for case, arx in CASES.items():
         measured, extra = updates(case, arx, 0.4 if options.quick else 6.0)
         times |= measured
         own = measured[f"{case}: ours"]
-        ratios |= {f"{name} / ours": t / own for name, t in measured.items() if name != f"{case}: ours" and "ours" not in name}
+        ratios |= {
+            f"{name} / ours": t / own
+            for name, t in measured.items()
+            if name != f"{case}: ours" and "ours" not in name
+        }
         ratios |= {f"{case}: {name}": value for name, value in extra.items()}
     if not padasip_is_installed():
         notes.append("padasip is not installed (pip install padasip): its ratios are left out")
@@ -58,9 +71,11 @@ def main() -> None:
         print(json.dumps(ratios, indent=1))
     else:
         goals = [
-            f"goal {name}: {ratios[name]:.1f}, wanted {goal:g}{'' if ratios[name] >= goal else '  MISSED'}"
-            for name, goal in GOALS.items() if name in ratios
-        ]  # fmt: skip
+            f"goal {name}: {ratios[name]:.1f}, wanted"
+            f" {goal:g}{'' if ratios[name] >= goal else '  MISSED'}"
+            for name, goal in GOALS.items()
+            if name in ratios
+        ]
         text = "\n".join([*lines(times, ratios), table(cost), *goals, *notes])
         print(text)
         if options.write:
@@ -70,9 +85,11 @@ def main() -> None:
 
 
 def updates(case: str, arx: LPVARX, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Median time of one update of each, in s, from a complete regressor unless it says "with lags"; and speeds in GFLOP/s.
+    """Median time of one update of each, in s, from a complete regressor unless it says "with
+    lags"; and speeds in GFLOP/s.
 
-    Every side is given the rows as arrays of their own: taking them out of a matrix is not part of an update.
+    Every side is given the rows as arrays of their own: taking them out of a matrix is not part of
+    an update.
     """
     from scipy.linalg.blas import dgemv
 
@@ -81,9 +98,15 @@ def updates(case: str, arx: LPVARX, seconds: float) -> tuple[dict[str, float], d
     u, p = rng.standard_normal((WARM, arx.nu)), rng.uniform(0.0, 13.0, WARM)
     rls = RecursiveLeastSquares(arx)
     online, flying = rls.online(), rls.online()
-    slow, single = RecursiveLeastSquares(arx, Directional(0.99)).online(), RecursiveLeastSquares(arx, precision="single").online()
+    slow, single = (
+        RecursiveLeastSquares(arx, Directional(0.99)).online(),
+        RecursiveLeastSquares(arx, precision="single").online(),
+    )
     forgetful = RecursiveLeastSquares(arx, 0.999).online()
-    others = {"covariance RLS (NumPy)": CovarianceRLS, "covariance RLS (BLAS in place)": TunedCovarianceRLS}
+    others = {
+        "covariance RLS (NumPy)": CovarianceRLS,
+        "covariance RLS (BLAS in place)": TunedCovarianceRLS,
+    }
     if padasip_is_installed():
         others["padasip once an output"] = Padasip
     built = {name: make(n, m) for name, make in others.items()}
@@ -93,8 +116,12 @@ def updates(case: str, arx: LPVARX, seconds: float) -> tuple[dict[str, float], d
         flying.update(y[k], u[k], float(p[k]))
         for one in built.values():
             one.update(phi[k], y[k])
-    # the race is only worth something where all arrive at the same coefficients: 1e-6 is their prior, 1 / P(0)
-    assert all(np.allclose(np.array(built[name].theta), online.coefficients, atol=1e-5) for name in list(others)[:2])
+    # the race is only worth something where all arrive at the same coefficients: 1e-6 is their
+    # prior, 1 / P(0)
+    assert all(
+        np.allclose(np.array(built[name].theta), online.coefficients, atol=1e-5)
+        for name in list(others)[:2]
+    )
     rows, matrix = np.column_stack([y, u, p]), np.asfortranarray(rng.standard_normal((n, n)))
     regressors = [(phi[k].copy(), y[k].copy()) for k in range(CALLS)]
     samples = [(y[k].copy(), u[k].copy(), float(p[k])) for k in range(CALLS)]
@@ -120,13 +147,19 @@ def updates(case: str, arx: LPVARX, seconds: float) -> tuple[dict[str, float], d
             flying.coefficients  # noqa: B018
 
     candidates = {
-        "ours": absorb(online), "ours, with lags and basis": fly, "ours, factor 0.999": absorb(forgetful),
-        "ours, directional": absorb(slow), "ours, single precision": absorb(single),
-        "ours, loop in C": lambda: flying.run(rows[:CALLS], history=False), 
+        "ours": absorb(online),
+        "ours, with lags and basis": fly,
+        "ours, factor 0.999": absorb(forgetful),
+        "ours, directional": absorb(slow),
+        "ours, single precision": absorb(single),
+        "ours, loop in C": lambda: flying.run(rows[:CALLS], history=False),
         "DGEMV of that size": lambda: [dgemv(1.0, matrix, x) for x in phi[:CALLS]],
         **{name: update(one) for name, one in built.items()},
-    }  # fmt: skip
-    measured = {name: t / CALLS for name, t in medians(candidates, seconds, time.thread_time, settled=True).items()}
+    }
+    measured = {
+        name: t / CALLS
+        for name, t in medians(candidates, seconds, time.thread_time, settled=True).items()
+    }
     speed = {
         "GFLOP/s of an update": operations(n, m) / measured["ours"] / 1e9,
         "GFLOP/s in a loop in C": operations(n, m) / measured["ours, loop in C"] / 1e9,
@@ -136,7 +169,9 @@ def updates(case: str, arx: LPVARX, seconds: float) -> tuple[dict[str, float], d
 
 
 def operations(n: int, m: int) -> int:
-    """Additions and multiplications of one update: rotations, back substitution, predictions and coefficients."""
+    """Additions and multiplications of one update: rotations, back substitution, predictions and
+    coefficients.
+    """
     N = n + m
     return 2 * N * (N + 1) + n * (n - 1) + 4 * n * m
 
@@ -151,10 +186,16 @@ def costs(seconds: float) -> dict[tuple[int, int], float]:
         names = tuple(f"y{j}" for j in range(outputs))
         arx = LPVARX(names, tuple(f"u{i}" for i in range(n // 3)), "p", 0, 1, 1, BASIS)
         online = RecursiveLeastSquares(arx).online()
-        rows = np.column_stack([rng.standard_normal((300, outputs + arx.nu)), rng.uniform(0.0, 13.0, 300)])
+        rows = np.column_stack(
+            [rng.standard_normal((300, outputs + arx.nu)), rng.uniform(0.0, 13.0, 300)]
+        )
         online.run(rows, history=False)
         some = rows[:50]
-        spent = medians({"": lambda online=online, some=some: online.run(some, history=False)}, seconds, time.thread_time)
+        spent = medians(
+            {"": lambda online=online, some=some: online.run(some, history=False)},
+            seconds,
+            time.thread_time,
+        )
         found[outputs, n] = spent[""] / len(some)
     return found
 
@@ -165,15 +206,22 @@ def table(cost: dict[tuple[int, int], float]) -> str:
     lines = ["one update, us       regressors", "outputs " + "".join(f"{n:9d}" for n in sizes)]
     lines += [f"{m:7d} " + "".join(f"{1e6 * cost[m, n]:9.2f}" for n in sizes) for m in outputs]
     (m, n), dearest = max(cost.items(), key=lambda item: item[1])
-    lines.append(f"{m} outputs with {n} regressors take {100 * dearest / 0.02:.2f} % of a 20 ms period on this computer")
+    lines.append(
+        f"{m} outputs with {n} regressors take {100 * dearest / 0.02:.2f} % of a 20 ms period on"
+        " this computer"
+    )
     return "\n".join(lines)
 
 
 def analysis() -> dict[str, float]:
-    """Time and memory of a gridded rate-bounded analysis with 5 states against identifying 5 outputs from a minute at 50 Hz."""
+    """Time and memory of a gridded rate-bounded analysis with 5 states against identifying 5
+    outputs from a minute at 50 Hz.
+    """
     script = Path(__file__).with_name("opponents") / "gridded_analysis.py"
     try:
-        done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=120)
+        done = subprocess.run(
+            [sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=120
+        )
     except (subprocess.SubprocessError, OSError):
         return {}
     told = json.loads(done.stdout)
@@ -181,7 +229,9 @@ def analysis() -> dict[str, float]:
     rls = RecursiveLeastSquares(arx)
     rng = np.random.default_rng(0)
     rows = np.column_stack([rng.standard_normal((3000, 7)), rng.uniform(0.0, 13.0, 3000)])
-    seconds = medians({"": lambda: rls.online().run(rows, history=False)}, 0.2, time.thread_time)[""]
+    seconds = medians({"": lambda: rls.online().run(rows, history=False)}, 0.2, time.thread_time)[
+        ""
+    ]
     memory = 8 * sum(rls.configuration.sizes)
     return {
         "gridded analysis, seconds": told["seconds"],
@@ -204,8 +254,15 @@ def draw(cost: dict[tuple[int, int], float], path: Path) -> None:
     for m in sorted({key[0] for key in cost}):
         sizes = sorted(n for outputs, n in cost if outputs == m)
         axes.loglog(sizes, [1e6 * cost[m, n] for n in sizes], "o-", label=f"{m} outputs")
-    axes.set(xlabel="regressors of each output", ylabel="one update, us", title="Outputs that share a regressor share its factor")
-    for ticks, put in ((sorted({n for _, n in cost}), axes.set_xticks), ([1, 2, 5, 10, 20], axes.set_yticks)):
+    axes.set(
+        xlabel="regressors of each output",
+        ylabel="one update, us",
+        title="Outputs that share a regressor share its factor",
+    )
+    for ticks, put in (
+        (sorted({n for _, n in cost}), axes.set_xticks),
+        ([1, 2, 5, 10, 20], axes.set_yticks),
+    ):
         put(ticks, [str(tick) for tick in ticks])
     axes.minorticks_off()
     axes.grid(visible=True, alpha=0.3)

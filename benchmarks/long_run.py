@@ -1,4 +1,6 @@
-"""A hundred million recursive updates in double and single precision: no NaN, no growth, and when single precision is full."""
+"""A hundred million recursive updates in double and single precision: no NaN, no growth, and when
+single precision is full.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scripts named like the packages they measure
+sys.path[0] = str(
+    Path(__file__).resolve().parents[1]
+)  # this folder holds scripts named like the packages they measure
 
 from benchmarks.timing import arguments  # noqa: E402
 from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
@@ -19,12 +23,18 @@ WAYS = {"no forgetting": 1.0, "factor 0.999": 0.999, "directional 0.99": Directi
 
 
 def flight(noise: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
-    """Rows [y, u, p] of y(k) = (0.8 - 0.3 x) y(k-1) + (0.5 + 0.2 x) u(k-1) + noise, x = p/5 - 1, and the four coefficients."""
+    """Rows [y, u, p] of y(k) = (0.8 - 0.3 x) y(k-1) + (0.5 + 0.2 x) u(k-1) + noise, x = p/5 - 1,
+    and the four coefficients.
+    """
     rng = np.random.default_rng(0)
     p = 5 + 5 * np.sin(0.01 * np.arange(CHUNK))
     x, u, y = p / 5 - 1, rng.standard_normal(CHUNK), np.zeros(CHUNK)
     for k in range(1, CHUNK):
-        y[k] = (0.8 - 0.3 * x[k - 1]) * y[k - 1] + (0.5 + 0.2 * x[k - 1]) * u[k - 1] + noise * rng.standard_normal()
+        y[k] = (
+            (0.8 - 0.3 * x[k - 1]) * y[k - 1]
+            + (0.5 + 0.2 * x[k - 1]) * u[k - 1]
+            + noise * rng.standard_normal()
+        )
     rows = np.column_stack([y, u, p])
     rows[0] = np.nan  # each repetition starts its lags afresh
     return rows, np.array([-0.8, 0.3 / np.sqrt(3), 0.5, 0.2 / np.sqrt(3)])  # f1 = sqrt(3) x
@@ -55,7 +65,9 @@ def main() -> None:
             if not options.json:
                 said = f"full after {full} updates" if full else "not full"
                 print(
-                    f"{label:28s} {online.state.count:>11d} updates, {spent:6.1f} s, largest error {worst:.2e}, finite, {said}", flush=True
+                    f"{label:28s} {online.state.count:>11d} updates, {spent:6.1f} s, largest error"
+                    f" {worst:.2e}, finite, {said}",
+                    flush=True,
                 )
     if options.json:
         print(json.dumps(found, indent=1))

@@ -1,4 +1,6 @@
-"""Flights, batches and sweeps of the X-Cell against the same work as others would write it (see benchmarks/opponents)."""
+"""Flights, batches and sweeps of the X-Cell against the same work as others would write it (see
+benchmarks/opponents).
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path[0] = str(Path(__file__).resolve().parents[1])  # this folder holds scripts named like the packages they measure
+sys.path[0] = str(
+    Path(__file__).resolve().parents[1]
+)  # this folder holds scripts named like the packages they measure
 
 import symheli  # noqa: E402
 from benchmarks.opponents import scipy_flight  # noqa: E402
@@ -24,11 +28,15 @@ from symheli.numeric import Numeric  # noqa: E402
 DT, STEPS = 0.02, 4  # s; Runge-Kutta steps of 5 ms
 STILL = np.zeros(3)
 FLIGHTS, QUICK_FLIGHTS = 10_000, 128
-RTOL = 5e-10  # of solve_ivp's RK45: over these 30 s 1e-9 leaves 1.3e-5, twice what the Runge-Kutta steps leave, and this 2e-6
+# of solve_ivp's RK45: over these 30 s 1e-9 leaves 1.3e-5, twice what the Runge-Kutta steps leave,
+# and this 2e-6
+RTOL = 5e-10
 
 C, NUMBA = "C by hand, -O3 -march=native", "Numba"
 
-Fly = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # (x0, inputs (n, 4), wind) -> states (n + 1, 15)
+Fly = Callable[
+    [np.ndarray, np.ndarray, np.ndarray], np.ndarray
+]  # (x0, inputs (n, 4), wind) -> states (n + 1, 15)
 
 
 @dataclass
@@ -47,8 +55,12 @@ class Contestants:
     def __init__(self, race: Race):
         self.heli = symheli.Helicopter.load("xcell60", governor="ideal")
         schedule = symheli.AirspeedSchedule.transition(0.0, 13.0, acceleration=3.0, hold=7.3)
-        self.inputs = np.ascontiguousarray(symheli.fly(self.heli, schedule).columns(self.heli.inputs)[:1500])
-        self.x0 = symheli.simulate(self.heli, symheli.trim(self.heli, 0.0), self.inputs[:1], dt=DT).states[0]
+        self.inputs = np.ascontiguousarray(
+            symheli.fly(self.heli, schedule).columns(self.heli.inputs)[:1500]
+        )
+        self.x0 = symheli.simulate(
+            self.heli, symheli.trim(self.heli, 0.0), self.inputs[:1], dt=DT
+        ).states[0]
         self.on_the_way = self.symheli(self.x0, self.inputs, STILL)[200]  # after 4 s, accelerating
         self.compiled: dict[str, Fly] = {}
         self.numba_batch = None
@@ -76,7 +88,11 @@ def right_hand_side(race: Race, who: Contestants) -> None:
     """One evaluation of the Euler form through three of symheli's own doors."""
     heli, point, calls = who.heli, symheli.trim(who.heli, 7.0), 200
     x, u = point.x.array, point.u.array
-    fast, machine, parameters = heli.numeric("rhs"), Numeric(heli.rhs), heli.parameters.array.tolist()
+    fast, machine, parameters = (
+        heli.numeric("rhs"),
+        Numeric(heli.rhs),
+        heli.parameters.array.tolist(),
+    )
 
     def plain() -> np.ndarray:
         """The component functions called with floats, no CasADi."""
@@ -90,28 +106,49 @@ def right_hand_side(race: Race, who: Contestants) -> None:
     times = medians({**many, "NumPy": plain}, 0.5 if race.quick else 5.0, time.thread_time)
     times |= {name: times[name] / calls for name in many}
     race.tables.append(
-        table("### One right-hand side of symheli, called from Python", [(n, readable(t)) for n, t in times.items()], ("", "median"))
+        table(
+            "### One right-hand side of symheli, called from Python",
+            [(n, readable(t)) for n, t in times.items()],
+            ("", "median"),
+        )
     )
     for name in ("virtual machine", "NumPy"):
         race.ratios.append(Ratio(f"compiled against {name}", times[name] / times["compiled"]))
 
 
 def fly_one(race: Race, who: Contestants) -> None:
-    """30 s of flight, the states kept every 20 ms; SciPy, a hundred times slower, takes its turns in a group of its own."""
+    """30 s of flight, the states kept every 20 ms; SciPy, a hundred times slower, takes its turns
+    in a group of its own.
+    """
     rows = []
 
-    def take_turns(flyers: dict[str, Fly], x0: np.ndarray, inputs: np.ndarray, seconds: float) -> dict[str, float]:
+    def take_turns(
+        flyers: dict[str, Fly], x0: np.ndarray, inputs: np.ndarray, seconds: float
+    ) -> dict[str, float]:
         exact = symheli.simulate(who.heli, x0, inputs, dt=DT, method=RungeKutta4(DT / 64)).states
-        times = medians({name: partial(fly, x0, inputs, STILL) for name, fly in flyers.items()}, seconds, time.thread_time)
+        times = medians(
+            {name: partial(fly, x0, inputs, STILL) for name, fly in flyers.items()},
+            seconds,
+            time.thread_time,
+        )
         for name, fly in flyers.items():
             error = np.abs(fly(x0, inputs, STILL) - exact).max()
             rows.append((name, f"{len(inputs) * DT:g} s", readable(times[name]), f"{error:.1e}"))
         return times
 
-    times = take_turns({"symheli.simulate": who.symheli, **who.compiled}, who.x0, who.inputs, 1.0 if race.quick else 10.0)
+    times = take_turns(
+        {"symheli.simulate": who.symheli, **who.compiled},
+        who.x0,
+        who.inputs,
+        1.0 if race.quick else 10.0,
+    )
     ours = times["symheli.simulate"]
     if (c := times.get(C)) is not None:
-        race.ratios.append(Ratio("30 s of flight: symheli's time over hand-written C's", ours / c, 1.2, at_most=True))
+        race.ratios.append(
+            Ratio(
+                "30 s of flight: symheli's time over hand-written C's", ours / c, 1.2, at_most=True
+            )
+        )
     if (numba := times.get(NUMBA)) is not None:
         race.ratios.append(Ratio("30 s of flight: times faster than Numba", numba / ours, 1.3))
 
@@ -119,7 +156,10 @@ def fly_one(race: Race, who: Contestants) -> None:
     if race.quick:
         part, start = who.inputs[200:300], who.on_the_way
         race.notes.append("SciPy and symheli beside it: 2 s of the acceleration in place of 30 s")
-    arrays, floats = "SciPy solve_ivp, state unpacked from NumPy", "SciPy solve_ivp, state unpacked to Python floats"
+    arrays, floats = (
+        "SciPy solve_ivp, state unpacked from NumPy",
+        "SciPy solve_ivp, state unpacked to Python floats",
+    )
     slow = {
         "symheli.simulate, beside SciPy": who.symheli,
         arrays: lambda x, u, wind: scipy_flight.fly(x, u, wind, DT, RTOL, unpack=iter),
@@ -127,8 +167,16 @@ def fly_one(race: Race, who: Contestants) -> None:
     }
     times = take_turns(slow, start, part, 0.0)
     ours = times["symheli.simulate, beside SciPy"]
-    race.ratios.append(Ratio("30 s of flight: times faster than SciPy on NumPy equations", times[arrays] / ours, 300.0))
-    race.ratios.append(Ratio("30 s of flight: times faster than SciPy on Python floats", times[floats] / ours))
+    race.ratios.append(
+        Ratio(
+            "30 s of flight: times faster than SciPy on NumPy equations",
+            times[arrays] / ours,
+            300.0,
+        )
+    )
+    race.ratios.append(
+        Ratio("30 s of flight: times faster than SciPy on Python floats", times[floats] / ours)
+    )
     race.tables.append(
         table(
             "### One flight, Runge-Kutta steps of 5 ms, states every 20 ms",
@@ -139,7 +187,9 @@ def fly_one(race: Race, who: Contestants) -> None:
 
 
 def fly_many(race: Race, who: Contestants) -> None:
-    """Monte Carlo: 10 s flights from scattered starts, each in its own steady wind; the last states are kept."""
+    """Monte Carlo: 10 s flights from scattered starts, each in its own steady wind; the last states
+    are kept.
+    """
     count = QUICK_FLIGHTS if race.quick else FLIGHTS
     if race.quick:
         race.notes.append(f"batch: {count} flights in place of {FLIGHTS:,}")
@@ -152,12 +202,16 @@ def fly_many(race: Race, who: Contestants) -> None:
         return symheli.simulate_batch(who.heli, starts, inputs, winds[:, None], dt=DT).final
 
     def loop(fly: Fly) -> Callable[[], np.ndarray]:
-        return lambda: np.stack([fly(x, inputs, wind)[-1] for x, wind in zip(starts, winds, strict=True)])
+        return lambda: np.stack(
+            [fly(x, inputs, wind)[-1] for x, wind in zip(starts, winds, strict=True)]
+        )
 
     candidates = {"symheli.simulate_batch": batch, "a loop of symheli.simulate": loop(who.symheli)}
     candidates |= {f"a loop of {name}": loop(fly) for name, fly in who.compiled.items()}
     if parallel := who.numba_batch:
-        candidates["Numba, prange over the flights"] = lambda: parallel(starts, inputs, winds, DT, STEPS)
+        candidates["Numba, prange over the flights"] = lambda: parallel(
+            starts, inputs, winds, DT, STEPS
+        )
     ends = {name: call() for name, call in candidates.items()}
     # chaos does not build up in 10 s: what differs is rounding
     apart = {name: np.abs(end - ends["symheli.simulate_batch"]).max() for name, end in ends.items()}
@@ -183,19 +237,31 @@ def sweep(race: Race, who: Contestants) -> None:
     speeds = np.linspace(0.0, 13.0, 25 if race.quick else 200)
     if race.quick:
         race.notes.append(f"sweep: {len(speeds)} airspeeds in place of 200")
-    candidates = {"symheli.sweep": lambda: symheli.sweep(who.heli, speeds), "python-control": lambda: python_control_sweep.sweep(speeds)}
+    candidates = {
+        "symheli.sweep": lambda: symheli.sweep(who.heli, speeds),
+        "python-control": lambda: python_control_sweep.sweep(speeds),
+    }
     times = medians(candidates, 0.0 if race.quick else 5.0, time.thread_time)
     family, theirs = symheli.sweep(who.heli, speeds), python_control_sweep.sweep(speeds)
-    trims = max(np.abs(x - t.x.array).max() for (x, _, _), t in zip(theirs, family.trims, strict=True))
+    trims = max(
+        np.abs(x - t.x.array).max() for (x, _, _), t in zip(theirs, family.trims, strict=True)
+    )
     smooth = [
-        k for k, v in enumerate(speeds) if all(abs(v - kink) > 0.05 for found in family.kinks.values() for kink in found) and v > 0.05
+        k
+        for k, v in enumerate(speeds)
+        if all(abs(v - kink) > 0.05 for found in family.kinks.values() for kink in found)
+        and v > 0.05
     ]
     models = max(np.abs(theirs[k][2].A - family.A[k]).max() for k in smooth)
     race.tables.append(
         table(
             f"### Trim and linear model at {len(speeds)} airspeeds, 0 to 13 m/s",
             [
-                ("symheli.sweep (exact derivatives, kinks found)", readable(times["symheli.sweep"]), ""),
+                (
+                    "symheli.sweep (exact derivatives, kinks found)",
+                    readable(times["symheli.sweep"]),
+                    "",
+                ),
                 (
                     "python-control, find_operating_point and linearize",
                     readable(times["python-control"]),

@@ -16,7 +16,9 @@ DOCUMENT = stamped_tables.DOCS / "benchmarks.md"
 
 @dataclass(frozen=True)
 class Ratio:
-    """`value` against `goal`: at least that, or with `at_most` no more. Without a goal it is there for orientation."""
+    """`value` against `goal`: at least that, or with `at_most` no more. Without a goal it is there
+    for orientation.
+    """
 
     name: str
     value: float
@@ -35,13 +37,26 @@ class Ratio:
         """The goal and whether it is met."""
         if self.goal is None:
             return ""
-        return f"{'at most' if self.at_most else 'at least'} {self.goal:g} x: {'met' if self.met else 'MISSED'}"
+        return (
+            f"{'at most' if self.at_most else 'at least'} {self.goal:g} x:"
+            f" {'met' if self.met else 'MISSED'}"
+        )
 
 
-def present(section: str, options: argparse.Namespace, tables: list[str], ratios: list[Ratio], notes: list[str]) -> None:
-    """Print the tables and the ratios with their goals, or the ratios as JSON; keep them where --write asks for it."""
+def present(
+    section: str,
+    options: argparse.Namespace,
+    tables: list[str],
+    ratios: list[Ratio],
+    notes: list[str],
+) -> None:
+    """Print the tables and the ratios with their goals, or the ratios as JSON; keep them where
+    --write asks for it.
+    """
     rows = [(r.name, f"{r.value:.3g}", r.verdict) for r in ratios]
-    text = "\n\n".join([*tables, table("### Ratios", rows, ("", "x", "goal")), *(f"- {note}" for note in notes)])
+    text = "\n\n".join(
+        [*tables, table("### Ratios", rows, ("", "x", "goal")), *(f"- {note}" for note in notes)]
+    )
     print(json.dumps({r.name: r.value for r in ratios}, indent=1) if options.json else text)
     if options.write:
         keep(section, text)
@@ -61,13 +76,23 @@ def table(title: str, rows: list[tuple[str, ...]], head: tuple[str, ...]) -> str
     def text(line: tuple[str, ...]) -> str:
         return "| " + " | ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)) + " |"
 
-    return "\n".join([title, "", text(head), "|" + "|".join("-" * (w + 2) for w in widths) + "|", *map(text, rows)])
+    return "\n".join(
+        [
+            title,
+            "",
+            text(head),
+            "|" + "|".join("-" * (w + 2) for w in widths) + "|",
+            *map(text, rows),
+        ]
+    )
 
 
 def machine() -> str:
     """Processor, system, compiler and library versions of this run."""
     try:
-        compiler = subprocess.run(["cc", "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+        compiler = subprocess.run(
+            ["cc", "--version"], capture_output=True, text=True, check=True
+        ).stdout.splitlines()[0]
     except (OSError, subprocess.CalledProcessError):
         compiler = "no C compiler"
     libraries = []
@@ -76,7 +101,10 @@ def machine() -> str:
             libraries.append(f"{name} {version(name)}")
         except PackageNotFoundError:
             libraries.append(f"no {name}")
-    return f"{stamped_tables.processor()}, {platform.system()}; {compiler}; Python {platform.python_version()}, {', '.join(libraries)}"
+    return (
+        f"{stamped_tables.processor()}, {platform.system()}; {compiler}; Python"
+        f" {platform.python_version()}, {', '.join(libraries)}"
+    )
 
 
 def keep(section: str, text: str) -> None:

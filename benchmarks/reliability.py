@@ -2,11 +2,12 @@
 
     python benchmarks/reliability.py --plants 10000
 
-Plant k is made from the seed k alone: two or three states in units spread over up to twelve decades, polynomial in p, continuous
-or sampled, its worst frozen pole between 1e-2 and 1e-10 of its own pace from the border, on either side. Stability and gains are
-asked for, by splines, over a box and as an LFT; for every sixth plant the search for P is asked past the look at the frozen
-poles. A proof is false where, in 40 digits, a frozen pole is on the wrong side or a frozen gain exceeds the bound, or where an
-explicit switching p(t) within the limits grows.
+Plant k is made from the seed k alone: two or three states in units spread over up to twelve
+decades, polynomial in p, continuous or sampled, its worst frozen pole between 1e-2 and 1e-10 of its
+own pace from the border, on either side. Stability and gains are asked for, by splines, over a box
+and as an LFT; for every sixth plant the search for P is asked past the look at the frozen poles. A
+proof is false where, in 40 digits, a frozen pole is on the wrong side or a frozen gain exceeds the
+bound, or where an explicit switching p(t) within the limits grows.
 """
 
 from __future__ import annotations
@@ -25,7 +26,14 @@ from synthesis import Relaxation, Solver, l2_gain, lft_gain, stability
 from synthesis.forms import scaled_problem
 from synthesis.proof_search import prove
 
-ROUTES = ("stability by splines", "stability over a box", "gain by splines", "gain over a box", "gain as an LFT", "past the frozen poles")
+ROUTES = (
+    "stability by splines",
+    "stability over a box",
+    "gain by splines",
+    "gain over a box",
+    "gain as an LFT",
+    "past the frozen poles",
+)
 COARSE = Relaxation(segments=(2,), degree=2)
 BOX = Relaxation(kind="sos", segments=(1,), degree=1)
 
@@ -50,7 +58,9 @@ def plant(seed: int) -> Plant:
     A[0] = A[0] - (growth[k] + margin) * np.eye(n)
     if dt is not None:
         A = [np.eye(n) + dt * A[0], *(dt * M for M in A[1:])]
-        radius = np.abs(np.linalg.eigvals(sum(M * grid[:, None, None] ** i for i, M in enumerate(A)))).max(axis=1)
+        radius = np.abs(
+            np.linalg.eigvals(sum(M * grid[:, None, None] ** i for i, M in enumerate(A)))
+        ).max(axis=1)
         k = int(radius.argmax())
         A = [M * (1 - margin) / radius[k] for M in A]
     T = np.diag(10 ** rng.uniform(-6, 6, n))
@@ -58,16 +68,29 @@ def plant(seed: int) -> Plant:
     B, C = T @ rng.standard_normal((n, 1)), rng.standard_normal((1, n)) @ back
     rate = float(rng.choice([0.0, 0.1, 1.0, math.inf]))
     scheduling = Scheduling("p", "1", 0.0, 1.0, rate)
-    return Plant(LPVStateSpace.polynomial([T @ M @ back for M in A], [B], [C], [[[0.0]]], scheduling, dt=dt), float(grid[k]))
+    return Plant(
+        LPVStateSpace.polynomial([T @ M @ back for M in A], [B], [C], [[[0.0]]], scheduling, dt=dt),
+        float(grid[k]),
+    )
 
 
 def judge(seed: int) -> tuple[str, bool, str]:
-    """(route, whether something was proven, why that is false: empty where it is not) for one plant."""
+    """(route, whether something was proven, why that is false: empty where it is not) for one
+    plant.
+    """
     lpv, worst = plant(seed)
     route = ROUTES[seed % len(ROUTES)]
     gamma = math.inf
     if route == "past the frozen poles":
-        proven = prove(scaled_problem(lpv, lpv.scheduling.rate, 1.0, with_gain=False), COARSE, Solver(), math.inf).lyapunov is not None
+        proven = (
+            prove(
+                scaled_problem(lpv, lpv.scheduling.rate, 1.0, with_gain=False),
+                COARSE,
+                Solver(),
+                math.inf,
+            ).lyapunov
+            is not None
+        )
     else:
         if route.endswith("LFT"):
             cert = lft_gain(lpv.to_lft().reduce(), search=None)
@@ -75,7 +98,15 @@ def judge(seed: int) -> tuple[str, bool, str]:
             analysis = stability if route.startswith("stability") else l2_gain
             cert = analysis(lpv, relaxation=COARSE if "splines" in route else BOX, search=None)
         proven, gamma = cert.verified, cert.gamma
-    return route, proven, _refuted(lpv, worst, gamma, math.inf if route.endswith("LFT") else lpv.scheduling.rate) if proven else ""
+    return (
+        route,
+        proven,
+        (
+            _refuted(lpv, worst, gamma, math.inf if route.endswith("LFT") else lpv.scheduling.rate)
+            if proven
+            else ""
+        ),
+    )
 
 
 def _refuted(lpv: LPVStateSpace, worst: float, gamma: float, rate: float) -> str:
@@ -101,21 +132,33 @@ def _gain(lpv: LPVStateSpace, p: float) -> float:
         M, b, c = (mpmath.matrix(X.tolist()) for X in (A, B, C))
         poles = mpmath.eig(M, left=False, right=False)
         points = (
-            [mpmath.mpc(0, mpmath.im(q)) for q in poles] if lpv.dt is None else [mpmath.expjpi(mpmath.arg(q) / mpmath.pi) for q in poles]
+            [mpmath.mpc(0, mpmath.im(q)) for q in poles]
+            if lpv.dt is None
+            else [mpmath.expjpi(mpmath.arg(q) / mpmath.pi) for q in poles]
         )
         points.append(mpmath.mpf(0 if lpv.dt is None else 1))
-        return float(max(abs((c * mpmath.lu_solve(s * mpmath.eye(len(A)) - M, b))[0]) for s in points))
+        return float(
+            max(abs((c * mpmath.lu_solve(s * mpmath.eye(len(A)) - M, b))[0]) for s in points)
+        )
 
 
 def _switching(lpv: LPVStateSpace) -> float:
-    """Largest factor of the state over a cycle of two values of p, each held for one of some times."""
+    """Largest factor of the state over a cycle of two values of p, each held for one of some
+    times.
+    """
     ends = _balanced(lpv.matrices(np.array([0.0, 0.5, 1.0])).A)
     pace = float(np.abs(np.linalg.eigvals(ends)).max())
     if lpv.dt is None:
         steps = [[expm(M * t) for t in np.linspace(0.2, 4.0, 8) / pace] for M in ends]
     else:
         steps = [[np.linalg.matrix_power(M, k) for k in (1, 2, 4, 8)] for M in ends]
-    return max(float(np.abs(np.linalg.eigvals(a @ b)).max()) for i in range(3) for j in range(i) for a in steps[i] for b in steps[j])
+    return max(
+        float(np.abs(np.linalg.eigvals(a @ b)).max())
+        for i in range(3)
+        for j in range(i)
+        for a in steps[i]
+        for b in steps[j]
+    )
 
 
 def _balanced(stack: np.ndarray) -> np.ndarray:
@@ -123,16 +166,22 @@ def _balanced(stack: np.ndarray) -> np.ndarray:
     d = np.ones(len(size))
     for _ in range(50):
         for i in range(len(d)):
-            row, column = float(size[i] @ d / d[i] - size[i, i]), float(size[:, i] @ (1 / d) * d[i] - size[i, i])
+            row, column = (
+                float(size[i] @ d / d[i] - size[i, i]),
+                float(size[:, i] @ (1 / d) * d[i] - size[i, i]),
+            )
             d[i] *= math.sqrt(row / column) if row > 0 and column > 0 else 1.0
     return stack * d / d[:, None]
 
 
 def count(first: int, plants: int) -> tuple[Counter[str], Counter[str], list[str]]:
-    """(plants and proofs a route, the false ones in words) of so many plants from number `first` on."""
+    """(plants and proofs a route, the false ones in words) of so many plants from number `first`
+    on.
+    """
     asked, proven, wrong = Counter[str](), Counter[str](), []
     for seed in range(first, first + plants):
-        # a frozen gain is infinite at an unstable p, which SciPy's bounded search subtracts from itself
+        # a frozen gain is infinite at an unstable p, which SciPy's bounded search subtracts from
+        # itself
         with np.errstate(invalid="ignore"):
             route, proof, refuted = judge(seed)
         asked[route] += 1
@@ -143,7 +192,9 @@ def count(first: int, plants: int) -> tuple[Counter[str], Counter[str], list[str
 
 def main() -> None:
     """Count and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--plants", type=int, default=10_000)
     parser.add_argument("--first", type=int, default=0, help="number of the first plant")
     options = parser.parse_args()

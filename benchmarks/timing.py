@@ -19,11 +19,13 @@ def medians(
     warm: bool = True,
     settled: bool = False,
 ) -> dict[str, float]:
-    """Median time of one call of each, in s, over about `seconds` of interleaved runs each and at least three.
+    """Median time of one call of each, in s, over about `seconds` of interleaved runs each and at
+    least three.
 
-    `clock` time.thread_time counts what one thread works and not what others keep it from: for work of one thread on a busy machine.
-    `warm`: each is called once before, so that nothing is compiled while the clock runs; without it the caller has done so.
-    `settled`: each is called once more right before it is timed: it does not pay for caches and a clock frequency that others left.
+    `clock` time.thread_time counts what one thread works and not what others keep it from: for work
+    of one thread on a busy machine. `warm`: each is called once before, so that nothing is compiled
+    while the clock runs; without it the caller has done so. `settled`: each is called once more
+    right before it is timed: it does not pay for caches and a clock frequency that others left.
     """
     spent: dict[str, list[float]] = {name: [] for name in candidates}
     for call in candidates.values() if warm else ():
@@ -39,13 +41,19 @@ def medians(
     return {name: statistics.median(times) for name, times in spent.items()}
 
 
-def arguments(description: str | None, plot: bool = False, write: bool = False) -> argparse.Namespace:
-    """--quick and --json, as every benchmark has them; --plot where there is something to draw, --write to keep it in the documentation."""
+def arguments(
+    description: str | None, plot: bool = False, write: bool = False
+) -> argparse.Namespace:
+    """--quick and --json, as every benchmark has them; --plot where there is something to draw,
+    --write to keep it in the documentation.
+    """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--quick", action="store_true", help="shorter runs, under 40 s")
     parser.add_argument("--json", action="store_true", help="print each ratio by name")
     if plot:
-        parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the result (needs matplotlib)")
+        parser.add_argument(
+            "--plot", type=Path, metavar="FILE", help="draw the result (needs matplotlib)"
+        )
     return parsed(parser, "benchmarks.md") if write else parser.parse_args()
 
 

@@ -1,8 +1,11 @@
-"""Flight records in, LPV models out: recursive, batch and instrumental-variable estimates of input-output models with moving coefficients.
+"""Flight records in, LPV models out: recursive, batch and instrumental-variable estimates of
+input-output models with moving coefficients.
 
-    arx = LPVARX(outputs=("q", "theta"), inputs=("d_lon",), scheduling="airspeed", na=2, nb=1, delay=1, basis=Polynomial(2, 0.0, 13.0))
+    arx = LPVARX(outputs=("q", "theta"), inputs=("d_lon",), scheduling="airspeed", na=2, nb=1,
+                 delay=1, basis=Polynomial(2, 0.0, 13.0))
     model = fit(arx, record, method="ls")
-    model.score(record, horizon=1), model.score(record, horizon=50), model.score(record)  # one step flatters: report all three
+    # one step flatters: report one step, a horizon and the free run
+    model.score(record, horizon=1), model.score(record, horizon=50), model.score(record)
 
 Units are those of the record: SI and radians.
 """
@@ -11,7 +14,12 @@ from identification.coefficients import Coefficients, CoefficientValues
 from identification.dependence import DependenceReport, dependence_report
 from identification.estimate import fit
 from identification.excitation import ExcitationReport, excitation_report
-from identification.experiment_design import Experiment, Plan, choose_experiments, compare_experiments
+from identification.experiment_design import (
+    Experiment,
+    Plan,
+    choose_experiments,
+    compare_experiments,
+)
 from identification.forgetting import Constant, Directional, Forgetting, Variable
 from identification.frequency_response import FrequencyResponse, frequency_response
 from identification.history import History

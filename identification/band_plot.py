@@ -1,4 +1,6 @@
-"""Coefficient functions as a picture: each over the scheduling parameter, with its confidence band."""
+"""Coefficient functions as a picture: each over the scheduling parameter, with its confidence
+band.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,17 @@ COLUMNS = 4
 
 
 def plot_bands(known: Uncertainty, level: float = 0.95) -> Figure:
-    """A matplotlib figure with one panel a coefficient function: its value over p and the normal confidence interval at each p.
+    """A matplotlib figure with one panel a coefficient function: its value over p and the normal
+    confidence interval at each p.
 
     Raises `InputError` for several scheduling parameters and a level outside (0, 1).
     """
     model = known.model
     if len(model.parameters) != 1:
-        raise InputError("coefficients of several scheduling parameters are no curves; take bands(p) along a line")
+        raise InputError(
+            "coefficients of several scheduling parameters are no curves; take bands(p) along a"
+            " line"
+        )
     low, high = model.structure.basis.ranges[0]
     p = np.linspace(low, high, 101)
     shown = known.bands(p)

@@ -1,4 +1,6 @@
-"""The covariance of least-squares coefficients whose residuals are correlated, in time and between outputs."""
+"""The covariance of least-squares coefficients whose residuals are correlated, in time and between
+outputs.
+"""
 
 from __future__ import annotations
 
@@ -21,30 +23,50 @@ TAKEN = 0.8
 LEAST_FREEDOM = 2.0
 
 
-def covariances(arx: LPVARX, phi: Array, error: Array, runs: Sequence[slice], lags: int) -> tuple[Array, Array, Array]:
-    """Of all coefficients together (ny, n, ny, n), of each equation as if its residuals were white (ny, n, n), and freedom (ny,).
+def covariances(
+    arx: LPVARX, phi: Array, error: Array, runs: Sequence[slice], lags: int
+) -> tuple[Array, Array, Array]:
+    """Of all coefficients together (ny, n, ny, n), of each equation as if its residuals were white
+    (ny, n, n), and freedom (ny,).
 
-    From regressors phi (m, n) and residuals (m, ny) in unbroken `runs`. With D_i = (Phi_i' Phi_i)^-1 of equation i and R_ij the correlation
-    of residuals i and j over `lags` samples, tapered (Bartlett): D_i [sum_k sum_l phi_i(k) R_ij(l - k) phi_j(l)'] D_j, divided by the
-    share of the noise's power that the fit has not removed: 1 - tr(D_i M_i)/(m R_ii(0)) with M_i the bracket; 1 - n/m for white residuals.
+    From regressors phi (m, n) and residuals (m, ny) in unbroken `runs`. With D_i = (Phi_i'
+    Phi_i)^-1 of equation i and R_ij the correlation of residuals i and j over `lags` samples,
+    tapered (Bartlett): D_i [sum_k sum_l phi_i(k) R_ij(l - k) phi_j(l)'] D_j, divided by the share
+    of the noise's power that the fit has not removed: 1 - tr(D_i M_i)/(m R_ii(0)) with M_i the
+    bracket; 1 - n/m for white residuals.
 
-    `freedom`: degrees of freedom of the estimated variances. There are m/(1 + 2 sum R(l)^2/R(0)^2) independent residuals, and a taper
-    over a fraction b = lags/m of the record leaves 1.5/b of them to tell slow noise by; the reciprocals add up.
-    Sources: Bartlett (1946) for the first, Kiefer and Vogelsang, Econometric Theory 21 (2005), for fixed b.
+    `freedom`: degrees of freedom of the estimated variances. There are m/(1 + 2 sum R(l)^2/R(0)^2)
+    independent residuals, and a taper over a fraction b = lags/m of the record leaves 1.5/b of them
+    to tell slow noise by; the reciprocals add up. Sources: Bartlett (1946) for the first, Kiefer
+    and Vogelsang, Econometric Theory 21 (2005), for fixed b.
     """
     n, m = arx.n_regressors, len(phi)
-    equations = {y: _Equation.of(arx.regressors(group), phi) for group in arx.groups for y in group.outputs}
+    equations = {
+        y: _Equation.of(arx.regressors(group), phi) for group in arx.groups for y in group.outputs
+    }
     spectra = [_Spectra.of(phi[run], error[run], lags) for run in runs]
-    R = sum(s.correlations(lags) for s in spectra) / m * (1 - np.abs(np.arange(-lags, lags + 1)) / (lags + 1))
-    joint, white, taken = np.zeros((arx.ny * n, arx.ny * n)), np.zeros((arx.ny, n, n)), np.zeros(arx.ny)
+    R = (
+        sum(s.correlations(lags) for s in spectra)
+        / m
+        * (1 - np.abs(np.arange(-lags, lags + 1)) / (lags + 1))
+    )
+    joint, white, taken = (
+        np.zeros((arx.ny * n, arx.ny * n)),
+        np.zeros((arx.ny, n, n)),
+        np.zeros(arx.ny),
+    )
 
     def between(i: int, j: int) -> Array:
-        return sum(s.weighted(equations[i].regressors, equations[j].regressors, R[i, j]) for s in spectra)  # type: ignore[return-value]
+        return sum(
+            s.weighted(equations[i].regressors, equations[j].regressors, R[i, j]) for s in spectra
+        )  # type: ignore[return-value]
 
     power = np.maximum(R[range(arx.ny), range(arx.ny), lags], np.finfo(float).tiny)
     own = [between(i, i) for i in range(arx.ny)]
     for i, middle in enumerate(own):
-        taken[i] = min(max(float(np.sum(equations[i].inverse * middle)) / (m * power[i]), 0.0), TAKEN)
+        taken[i] = min(
+            max(float(np.sum(equations[i].inverse * middle)) / (m * power[i]), 0.0), TAKEN
+        )
     for i, j in combinations_with_replacement(range(arx.ny), 2):
         a, b = equations[i], equations[j]
         middle = (own[i] if i == j else between(i, j)) / np.sqrt((1 - taken[i]) * (1 - taken[j]))
@@ -53,14 +75,18 @@ def covariances(arx: LPVARX, phi: Array, error: Array, runs: Sequence[slice], la
         joint[rows[:, None], columns] = block = 0.5 * (block + block.T) if i == j else block
         joint[columns[:, None], rows] = block.T
     for y, own in equations.items():
-        white[y, own.regressors[:, None], own.regressors] = own.inverse * (error[:, y] @ error[:, y] / own.left)
+        white[y, own.regressors[:, None], own.regressors] = own.inverse * (
+            error[:, y] @ error[:, y] / own.left
+        )
     independent = m / np.sum((np.einsum("iil->il", R) / power[:, None]) ** 2, axis=1) * (1 - taken)
     freedom = 1 / (1 / np.maximum(independent, LEAST_FREEDOM) + lags / (1.5 * m))
     return joint.reshape(arx.ny, n, arx.ny, n), white, freedom
 
 
 class _Equation(NamedTuple):
-    """Regressors (n,) of an equation, (Phi' Phi)^-1 (n, n), and the degrees of freedom that white residuals have left."""
+    """Regressors (n,) of an equation, (Phi' Phi)^-1 (n, n), and the degrees of freedom that white
+    residuals have left.
+    """
 
     regressors: Array
     inverse: Array
@@ -75,7 +101,9 @@ class _Equation(NamedTuple):
 
 
 class _Spectra(NamedTuple):
-    """Fourier transforms of the regressors (k, n) and residuals (k, ny) of an unbroken run, padded so that `lags` samples wrap nowhere."""
+    """Fourier transforms of the regressors (k, n) and residuals (k, ny) of an unbroken run, padded
+    so that `lags` samples wrap nowhere.
+    """
 
     phi: Array
     error: Array
@@ -96,4 +124,6 @@ class _Spectra(NamedTuple):
         lags = len(R) // 2
         kernel = rfft(np.concatenate([R[lags:], np.zeros(self.length - len(R)), R[:lags]])).conj()
         kernel[1 : (self.length + 1) // 2] *= 2  # the negative frequencies
-        return (self.phi[:, rows].conj().T @ (kernel[:, None] * self.phi[:, columns])).real / self.length
+        return (
+            self.phi[:, rows].conj().T @ (kernel[:, None] * self.phi[:, columns])
+        ).real / self.length

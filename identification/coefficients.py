@@ -13,7 +13,8 @@ from symheli.lpv.arrays import Array, frozen
 
 
 class CoefficientValues(NamedTuple):
-    """Coefficients at given p: A (..., na, ny, ny), B (..., nb, ny, nu), c (..., ny), d (..., ny); the axes of p come first.
+    """Coefficients at given p: A (..., na, ny, ny), B (..., nb, ny, nu), c (..., ny), d (..., ny);
+    the axes of p come first.
 
     With several parameters d is (..., ny, parameters).
     """
@@ -28,9 +29,9 @@ class CoefficientValues(NamedTuple):
 class Coefficients:
     """A_i(p) = sum_j f_j(p) A[i-1, j] and so on, f_j the functions of `basis`.
 
-    A (na, n, ny, ny) for output lags 1 .. na, B (nb, n, ny, nu) for the lags `input_lags`, c (n, ny) and d (n, ny) for
-    the offset and the increment of p, d (n, ny, parameters) with several (zero where the structure has none). Units: those of y
-    per those of what they multiply.
+    A (na, n, ny, ny) for output lags 1 .. na, B (nb, n, ny, nu) for the lags `input_lags`, c (n,
+    ny) and d (n, ny) for the offset and the increment of p, d (n, ny, parameters) with several
+    (zero where the structure has none). Units: those of y per those of what they multiply.
     """
 
     basis: FunctionSpace
@@ -43,7 +44,12 @@ class Coefficients:
     def __post_init__(self) -> None:
         n, ny = self.basis.size, self.c.shape[-1]
         increments = (n, ny) if self.basis.dimension == 1 else (n, ny, self.basis.dimension)
-        for name, shape in (("A", (None, n, ny, ny)), ("B", (len(self.input_lags), n, ny, None)), ("c", (n, ny)), ("d", increments)):
+        for name, shape in (
+            ("A", (None, n, ny, ny)),
+            ("B", (len(self.input_lags), n, ny, None)),
+            ("c", (n, ny)),
+            ("d", increments),
+        ):
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
 
     @classmethod
@@ -51,27 +57,49 @@ class Coefficients:
         """From theta (n_regressors, ny) in the order of the regressors."""
         n, ny, d = arx.basis.size, arx.ny, len(arx.parameters)
         blocks = {
-            "output": np.zeros((len(arx.output_lags), n, ny, ny)), "input": np.zeros((len(arx.input_lags), n, ny, arx.nu)),
-            "offset": np.zeros((1, n, ny, 1)), "increment": np.zeros((1, n, ny, d)),
-        }  # fmt: skip
+            "output": np.zeros((len(arx.output_lags), n, ny, ny)),
+            "input": np.zeros((len(arx.input_lags), n, ny, arx.nu)),
+            "offset": np.zeros((1, n, ny, 1)),
+            "increment": np.zeros((1, n, ny, d)),
+        }
         row = 0
         for term in arx.terms:
             width = len(term.signals)
-            block = theta[row : row + width * n].reshape(width, n, ny).transpose(1, 2, 0)  # (function, output, signal)
+            block = (
+                theta[row : row + width * n].reshape(width, n, ny).transpose(1, 2, 0)
+            )  # (function, output, signal)
             blocks[term.kind][_position(arx, term)][:, :, list(term.signals)] = block
             row += width * n
         A, B, c, increments = blocks.values()
-        return cls(arx.basis, tuple(arx.input_lags), A, B, c[0, :, :, 0], increments[0, :, :, 0] if d == 1 else increments[0])
+        return cls(
+            arx.basis,
+            tuple(arx.input_lags),
+            A,
+            B,
+            c[0, :, :, 0],
+            increments[0, :, :, 0] if d == 1 else increments[0],
+        )
 
     def theta(self, arx: LPVARX) -> Array:
         """(n_regressors, ny) in the order of the regressors: the inverse of `of`."""
         increments = self.d.reshape(1, *self.c.shape, -1)
-        source = {"output": self.A, "input": self.B, "offset": self.c[None, :, :, None], "increment": increments}
-        blocks = [source[t.kind][_position(arx, t)][:, :, list(t.signals)].transpose(2, 0, 1).reshape(-1, arx.ny) for t in arx.terms]
+        source = {
+            "output": self.A,
+            "input": self.B,
+            "offset": self.c[None, :, :, None],
+            "increment": increments,
+        }
+        blocks = [
+            source[t.kind][_position(arx, t)][:, :, list(t.signals)]
+            .transpose(2, 0, 1)
+            .reshape(-1, arx.ny)
+            for t in arx.terms
+        ]
         return np.where(arx.free, np.vstack(blocks), 0.0)
 
     def at(self, p: object) -> CoefficientValues:
-        """Values at p (a number or an array in the unit of the scheduling signal; several parameters along the last axis).
+        """Values at p (a number or an array in the unit of the scheduling signal; several
+        parameters along the last axis).
 
         Raises `InputError` outside the basis.
         """
@@ -82,15 +110,18 @@ class Coefficients:
     def form(self, name: str) -> CoefficientValues:
         """Coefficients of the functions of another form, arranged as A, B, c, d are.
 
-        For polynomials (and products of them): "monomial" (1, p, p^2, ... in the unit of p), "scaled" (powers of x in [-1, 1] over the
-        range), "chebyshev", "legendre", "orthonormal", "bernstein".
+        For polynomials (and products of them): "monomial" (1, p, p^2, ... in the unit of p),
+        "scaled" (powers of x in [-1, 1] over the range), "chebyshev", "legendre", "orthonormal",
+        "bernstein".
         """
         T = self.basis.form(name)
         A, B = (np.einsum("jm,ijyz->imyz", T, M) for M in (self.A, self.B))
         return CoefficientValues(A, B, *(np.tensordot(T.T, M, axes=1) for M in (self.c, self.d)))
 
     def monomial(self) -> CoefficientValues:
-        """Coefficients of 1, p, p^2, ... (p in its own unit), arranged as A, B, c, d are; polynomial bases only."""
+        """Coefficients of 1, p, p^2, ... (p in its own unit), arranged as A, B, c, d are;
+        polynomial bases only.
+        """
         return self.form("monomial")
 
 

@@ -1,4 +1,6 @@
-"""Which coefficients the data determine: one rule for a batch of regressors and for the factor of a recursion."""
+"""Which coefficients the data determine: one rule for a batch of regressors and for the factor of a
+recursion.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ from symheli.lpv import FunctionSpace
 from symheli.lpv.arrays import Array
 
 PRIOR = 32.0
-"""What a recursion that keeps nothing awake pretends to know: so many eps samples, with a regressor at its largest, of coefficient 0."""
+"""What a recursion that keeps nothing awake pretends to know: so many eps samples, with a regressor
+at its largest, of coefficient 0.
+"""
 
 BEYOND = 1000.0
 """A coefficient is determined where the data say so many times more than what is pretended."""
@@ -17,10 +21,12 @@ BEYOND = 1000.0
 def determined(d: Array, energy: Array, fed: Array, beyond: float = BEYOND) -> Array:
     """Which columns of a regressor matrix stand out of the span of those before it, (n,) of bool.
 
-    `d` (n,) is the squared distance of each column from that span (the squared diagonal of the triangular factor), `energy` (n,) its
-    squared length, both by the weights of the samples; `fed` (n,) is what of `d` is only pretended. A column is determined where d
-    exceeds eps energy (below, rounding decides: the distance is then 1.5e-8 of the length, in double precision) and `beyond` fed. Columns
-    are taken in the order of the structure, so that of several that depend on each other the first ones are determined.
+    `d` (n,) is the squared distance of each column from that span (the squared diagonal of the
+    triangular factor), `energy` (n,) its squared length, both by the weights of the samples; `fed`
+    (n,) is what of `d` is only pretended. A column is determined where d exceeds eps energy (below,
+    rounding decides: the distance is then 1.5e-8 of the length, in double precision) and `beyond`
+    fed. Columns are taken in the order of the structure, so that of several that depend on each
+    other the first ones are determined.
 
     The dtype of `d` says the precision. The same rule stands in rls.c, `is_known`.
     """
@@ -28,7 +34,8 @@ def determined(d: Array, energy: Array, fed: Array, beyond: float = BEYOND) -> A
 
 
 def determined_columns(phi: Array, basis: FunctionSpace) -> Array:
-    """The rule for a batch of regressors phi (m, n), signal after signal each times the functions of `basis`.
+    """The rule for a batch of regressors phi (m, n), signal after signal each times the functions
+    of `basis`.
 
     As a recursion applies it that forgets nothing: samples weigh the same.
     """
@@ -43,8 +50,16 @@ def determined_columns(phi: Array, basis: FunctionSpace) -> Array:
 
 
 def largest(basis: FunctionSpace) -> Array:
-    """(n,) how large each function of a basis becomes, on a grid over its range; 1 for one that is zero there."""
+    """(n,) how large each function of a basis becomes, on a grid over its range; 1 for one that is
+    zero there.
+    """
     points = 257 if basis.dimension == 1 else max(round(4096 ** (1 / basis.dimension)), 2)
-    axes = np.meshgrid(*(np.linspace(low, high, points) for low, high in basis.ranges), indexing="ij")
-    values = np.abs(basis(axes[0] if basis.dimension == 1 else np.stack(axes, axis=-1))).reshape(-1, basis.size).max(axis=0)
+    axes = np.meshgrid(
+        *(np.linspace(low, high, points) for low, high in basis.ranges), indexing="ij"
+    )
+    values = (
+        np.abs(basis(axes[0] if basis.dimension == 1 else np.stack(axes, axis=-1)))
+        .reshape(-1, basis.size)
+        .max(axis=0)
+    )
     return np.where(values > 0, values, 1.0)

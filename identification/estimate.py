@@ -23,23 +23,38 @@ from identification.regressors import Regression, as_records, stacked, units_of
 from identification.ridge import Ridge, ridge
 from identification.self_check import check_least_squares, check_recursion
 from identification.structure import LPVARX, require_structure
-from symheli.errors import ConvergenceWarning, DataWarning, ExcitationError, InputError, UnknownNameError
+from symheli.errors import (
+    ConvergenceWarning,
+    DataWarning,
+    ExcitationError,
+    InputError,
+    UnknownNameError,
+)
 from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
 
 Method = Literal["ls", "rls", "ridge", "lasso", "iv", "riv", "oe"]
 Options = Ridge | Lasso | Refined | OutputError
 METHODS: tuple[str, ...] = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
-OPTIONS: dict[str, type[Options]] = {"ridge": Ridge, "lasso": Lasso, "riv": Refined, "oe": OutputError}
+OPTIONS: dict[str, type[Options]] = {
+    "ridge": Ridge,
+    "lasso": Lasso,
+    "riv": Refined,
+    "oe": OutputError,
+}
 NOT_SETTLED = {
-    "riv": 'a plant that is unstable in open loop needs instruments=("name", ...), the external excitation; where the model is simpler '
-    'than the plant, method "iv" is the better one',
+    "riv": (
+        'a plant that is unstable in open loop needs instruments=("name", ...), the external'
+        ' excitation; where the model is simpler than the plant, method "iv" is the better one'
+    ),
     "oe": "allow more evaluations, or fit a smaller structure",
 }
 """What to try where an iteration stops early."""
 
 PENALISED = ("ridge", "lasso")
-"""Methods whose penalty decides what the data leave open: the excitation report travels with the model and refuses nothing."""
+"""Methods whose penalty decides what the data leave open: the excitation report travels with the
+model and refuses nothing.
+"""
 
 NOISE_FREE = 1e-6
 """A residual below this part of every output biases no estimate."""
@@ -56,23 +71,29 @@ def fit(
     instruments: Sequence[str] | Instruments = (),
     options: Options | None = None,
 ) -> LPVARXModel:
-    """Identify the coefficients of `structure` from one record or several (same sample period and units).
+    """Identify the coefficients of `structure` from one record or several (same sample period and
+    units).
 
-    "ls": least squares over all samples. "rls": the same, sample by sample, the older ones weighted by `forgetting` to
-    the power of their age, or as `Constant`, `Variable`, `Directional` say. "ridge", "lasso": with a price on coefficients
-    (options `Ridge`, `Lasso`). Noise on the outputs biases all of these.
+    "ls": least squares over all samples. "rls": the same, sample by sample, the older ones weighted
+    by `forgetting` to the power of their age, or as `Constant`, `Variable`, `Directional` say.
+    "ridge", "lasso": with a price on coefficients (options `Ridge`, `Lasso`). Noise on the outputs
+    biases all of these.
 
-    "iv": instrumental variables: `instruments` names the external excitation signals (or is an `Instruments` with its window):
-    in closed loop what is added to the stabilised inputs, in open loop the inputs; `details["first_stage_F"]` says how strong they are.
-    "riv": the same refined with the simulated response (`Refined`); in closed loop it needs `instruments` too, and then the plant may
-    be unstable. "oe": the closest free run (`OutputError`), from the least-squares or (with `instruments`) instrumental-variables
-    estimate and its refinement; in closed loop coloured noise biases it.
+    "iv": instrumental variables: `instruments` names the external excitation signals (or is an
+    `Instruments` with its window): in closed loop what is added to the stabilised inputs, in open
+    loop the inputs; `details["first_stage_F"]` says how strong they are. "riv": the same refined
+    with the simulated response (`Refined`); in closed loop it needs `instruments` too, and then the
+    plant may be unstable. "oe": the closest free run (`OutputError`), from the least-squares or
+    (with `instruments`) instrumental-variables estimate and its refinement; in closed loop coloured
+    noise biases it.
 
-    Raises `ExcitationError` (with a report) where the data cannot determine every coefficient (ridge and lasso: where the
-    penalty does not either), `UnknownNameError` for signals the record lacks, `InputError` where p leaves the range of the
-    basis or an option does not fit the method, `AccuracyError` where "ls" or "rls" fail the check that their residual is orthogonal
-    to every regressor. Warns (`ConvergenceWarning`) where an iteration does not settle, and (`DataWarning`) where the scheduling signal
-    tells the model its own answer, the samples are means and the delay is not 0, or instruments are weak.
+    Raises `ExcitationError` (with a report) where the data cannot determine every coefficient
+    (ridge and lasso: where the penalty does not either), `UnknownNameError` for signals the record
+    lacks, `InputError` where p leaves the range of the basis or an option does not fit the method,
+    `AccuracyError` where "ls" or "rls" fail the check that their residual is orthogonal to every
+    regressor. Warns (`ConvergenceWarning`) where an iteration does not settle, and (`DataWarning`)
+    where the scheduling signal tells the model its own answer, the samples are means and the delay
+    is not 0, or instruments are weak.
     """
     require_structure(structure)
     records = as_records(records)
@@ -102,22 +123,48 @@ def fit(
             if forgetting == 1.0 or forgetting == Constant(1.0):
                 check_least_squares(structure, data.phi, data.y, theta, method)
         case _ if method == "iv":
-            theta, weakest = instrumental_variables(structure, records, data, Instruments.of(instruments))
+            theta, weakest = instrumental_variables(
+                structure, records, data, Instruments.of(instruments)
+            )
             details = {"first_stage_F": weakest.F, "weakest": weakest.direction}
-            _warn_of_weakness(weakest, np.sqrt(np.mean((data.y - data.phi @ theta) ** 2, axis=0) / np.mean(data.y**2, axis=0).clip(TINY)))
+            _warn_of_weakness(
+                weakest,
+                np.sqrt(
+                    np.mean((data.y - data.phi @ theta) ** 2, axis=0)
+                    / np.mean(data.y**2, axis=0).clip(TINY)
+                ),
+            )
         case _:
             theta = least_squares_by_group(structure, data.phi, data.y)
             check_least_squares(structure, data.phi, data.y, theta, method)
     if not details.get("converged", True):
-        warnings.warn(f"{method!r} did not settle: {NOT_SETTLED[method]}", ConvergenceWarning, stacklevel=2)
+        warnings.warn(
+            f"{method!r} did not settle: {NOT_SETTLED[method]}", ConvergenceWarning, stacklevel=2
+        )
     if covariance is None:
         covariance = residual_covariance(structure, data.phi, data.y, theta)
     return LPVARXModel(
-        structure, theta, records[0].dt, outputs, inputs, scheduling, covariance, len(data.phi), data.dropped, method, report, details
+        structure,
+        theta,
+        records[0].dt,
+        outputs,
+        inputs,
+        scheduling,
+        covariance,
+        len(data.phi),
+        data.dropped,
+        method,
+        report,
+        details,
     )
 
 
-def _check(method: str, forgetting: float | Forgetting, instruments: Sequence[str] | Instruments, options: Options | None) -> None:
+def _check(
+    method: str,
+    forgetting: float | Forgetting,
+    instruments: Sequence[str] | Instruments,
+    options: Options | None,
+) -> None:
     if method not in METHODS:
         raise UnknownNameError("method", method, METHODS)
     if method != "rls" and forgetting != 1.0:
@@ -133,44 +180,71 @@ def _check(method: str, forgetting: float | Forgetting, instruments: Sequence[st
 def _warn_of_weakness(weakest: FirstStage, residual: Array) -> None:
     if weakest.F < WEAK and np.any(residual > NOISE_FREE):
         warnings.warn(
-            f"the instruments are weak (first-stage F {weakest.F:.2g}, usual least {WEAK:g}): along {weakest.direction} the estimate is "
-            f"nearly as biased as least squares; excite more, name more instruments, widen their window, or lower the order or the degree",
-            DataWarning, stacklevel=3,
-        )  # fmt: skip
+            f"the instruments are weak (first-stage F {weakest.F:.2g}, usual least {WEAK:g}): along"
+            f" {weakest.direction} the estimate is nearly as biased as least squares; excite more,"
+            " name more instruments, widen their window, or lower the order or the degree",
+            DataWarning,
+            stacklevel=3,
+        )
 
 
-def _start(structure: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Sequence[str] | Instruments) -> Array:
+def _start(
+    structure: LPVARX,
+    records: Sequence[FlightRecord],
+    data: Regression,
+    instruments: Sequence[str] | Instruments,
+) -> Array:
     if instruments:
         return instrumental_variables(structure, records, data, Instruments.of(instruments))[0]
     return least_squares_by_group(structure, data.phi, data.y)
 
 
 def _refined(
-    structure: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Sequence[str] | Instruments, options: Refined
+    structure: LPVARX,
+    records: Sequence[FlightRecord],
+    data: Regression,
+    instruments: Sequence[str] | Instruments,
+    options: Refined,
 ) -> tuple[Array, dict[str, Any]]:
     start, exogenous = _start(structure, records, data, instruments), None
     if instruments:
         records, exogenous = explained(structure, records, Instruments.of(instruments))
     found = refined_instruments(structure, records, exogenous, start, options)
-    return found.theta, {"iterations": found.iterations, "converged": found.converged, "noise": found.noise.tolist()}
+    return found.theta, {
+        "iterations": found.iterations,
+        "converged": found.converged,
+        "noise": found.noise.tolist(),
+    }
 
 
 def _output_error(
-    structure: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Sequence[str] | Instruments, options: OutputError
+    structure: LPVARX,
+    records: Sequence[FlightRecord],
+    data: Regression,
+    instruments: Sequence[str] | Instruments,
+    options: OutputError,
 ) -> tuple[Array, dict[str, Any]]:
     starts = [_start(structure, records, data, instruments)]
     try:
-        starts.append(_refined(structure, records, data, instruments, Refined(iterations=10, tolerance=1e-3))[0])
+        starts.append(
+            _refined(structure, records, data, instruments, Refined(iterations=10, tolerance=1e-3))[
+                0
+            ]
+        )
     except ExcitationError:  # a refinement that fails leaves the first start
         pass
     found = output_error(structure, records, starts, options)
     return found.theta, {
-        "evaluations": found.evaluations, "converged": found.converged, "message": found.message,
+        "evaluations": found.evaluations,
+        "converged": found.converged,
+        "message": found.message,
         "simulation_covariance": found.simulation_covariance.tolist(),
-    }  # fmt: skip
+    }
 
 
-def _recursive(structure: LPVARX, data: Regression, forgetting: float | Forgetting) -> tuple[Array, Array]:
+def _recursive(
+    structure: LPVARX, data: Regression, forgetting: float | Forgetting
+) -> tuple[Array, Array]:
     online = RecursiveLeastSquares(structure, forgetting).online()
     for phi, y in zip(data.phi, data.y, strict=True):
         online.absorb(phi, y)

@@ -1,4 +1,6 @@
-"""Which experiment tells most: candidates compared by the information their records would hold, within limits."""
+"""Which experiment tells most: candidates compared by the information their records would hold,
+within limits.
+"""
 
 from __future__ import annotations
 
@@ -19,9 +21,10 @@ from symheli.lpv.arrays import Array
 class Experiment:
     """A candidate with its information.
 
-    `factor` (n, n), upper triangular, with R' R = phi' phi, the information of the regressors (never squared: it would lose half its
-    digits); `bounds` (n,): standard errors it allows for residuals of unit variance (infinite where it leaves a coefficient
-    open). `exceeded`: {signal: largest value} beyond its limit.
+    `factor` (n, n), upper triangular, with R' R = phi' phi, the information of the regressors
+    (never squared: it would lose half its digits); `bounds` (n,): standard errors it allows for
+    residuals of unit variance (infinite where it leaves a coefficient open). `exceeded`: {signal:
+    largest value} beyond its limit.
     """
 
     name: str
@@ -42,7 +45,8 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The chosen experiments in order, and the standard errors (n,) they allow together for residuals of unit variance.
+    """The chosen experiments in order, and the standard errors (n,) they allow together for
+    residuals of unit variance.
 
     `gains`: the growth of log det of the information with each, per regressor, from the second on.
     """
@@ -56,14 +60,20 @@ class Plan:
         return standard_errors(_triangle(*(e.factor for e in self.experiments)))
 
 
-def compare_experiments(structure: LPVARX, candidates: Mapping[str, FlightRecord], limits: Mapping[str, float]) -> tuple[Experiment, ...]:
-    """The information in each candidate's record (simulated, or flown), for a structure whose equations share their regressors.
+def compare_experiments(
+    structure: LPVARX, candidates: Mapping[str, FlightRecord], limits: Mapping[str, float]
+) -> tuple[Experiment, ...]:
+    """The information in each candidate's record (simulated, or flown), for a structure whose
+    equations share their regressors.
 
-    `limits` {signal: largest absolute value} in the units of the record. A record that leaves the range of the basis is refused
-    (`InputError`). Order as given.
+    `limits` {signal: largest absolute value} in the units of the record. A record that leaves the
+    range of the basis is refused (`InputError`). Order as given.
     """
     if len(structure.groups) > 1:
-        raise InputError("compare_experiments needs equations that share their regressors; compare one output at a time")
+        raise InputError(
+            "compare_experiments needs equations that share their regressors; compare one output at"
+            " a time"
+        )
     records = dict(zip(candidates, as_records(candidates.values()), strict=True))
     out = []
     for name, record in records.items():
@@ -73,23 +83,31 @@ def compare_experiments(structure: LPVARX, candidates: Mapping[str, FlightRecord
             if top > limit:
                 exceeded[signal] = top
         phi = regression(structure, record).phi
-        out.append(Experiment(name, float(record.time[-1] - record.time[0]), _triangle(phi), exceeded))
+        out.append(
+            Experiment(name, float(record.time[-1] - record.time[0]), _triangle(phi), exceeded)
+        )
     return tuple(out)
 
 
 def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
-    """At most `count` allowed experiments, one after the other, each the one that most increases log det of the information per second.
+    """At most `count` allowed experiments, one after the other, each the one that most increases
+    log det of the information per second.
 
-    (A sequential D-optimal design: independent of the units of the coefficients.) Raises `ExcitationError` where none is allowed.
-    Source: Fedorov (1972), Theory of Optimal Experiments; for flight tests Morelli (2012).
+    (A sequential D-optimal design: independent of the units of the coefficients.) Raises
+    `ExcitationError` where none is allowed. Source: Fedorov (1972), Theory of Optimal Experiments;
+    for flight tests Morelli (2012).
     """
     if count < 1:
         raise InputError(f"count: expected at least one experiment, got {count}")
     left = [e for e in experiments if e.allowed]
     if not left:
         worst = "; ".join(f"{e.name}: {', '.join(e.exceeded)}" for e in experiments)
-        raise ExcitationError(f"no candidate keeps its limits ({worst}); lower the amplitudes or widen the limits")
-    scale = np.maximum(np.max([np.linalg.norm(e.factor, axis=0) for e in left], axis=0), np.finfo(float).tiny)
+        raise ExcitationError(
+            f"no candidate keeps its limits ({worst}); lower the amplitudes or widen the limits"
+        )
+    scale = np.maximum(
+        np.max([np.linalg.norm(e.factor, axis=0) for e in left], axis=0), np.finfo(float).tiny
+    )
     total, chosen, gains = np.zeros_like(left[0].factor), [], []
     for _ in range(min(count, len(left))):
         value = {e.name: _logdet(_triangle(total, e.factor) / scale) for e in left}
@@ -104,7 +122,9 @@ def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
 
 
 def standard_errors(factor: Array) -> Array:
-    """sqrt(diag((R'R)^-1)) (n,) of a factor R (n, n), infinite for coefficients whose direction it leaves open."""
+    """sqrt(diag((R'R)^-1)) (n,) of a factor R (n, n), infinite for coefficients whose direction it
+    leaves open.
+    """
     scale = column_scale(factor)
     _, values, directions = np.linalg.svd(factor / scale)
     open_ = values <= RANK_TOLERANCE * values[0]
@@ -120,5 +140,9 @@ def _triangle(*factors: Array) -> Array:
 
 
 def _logdet(factor: Array) -> float:
-    """Log determinant of R'R, singular values no lower than what rounding leaves of the largest possible one."""
-    return float(2 * np.sum(np.log(np.maximum(np.linalg.svd(factor, compute_uv=False), RANK_TOLERANCE))))
+    """Log determinant of R'R, singular values no lower than what rounding leaves of the largest
+    possible one.
+    """
+    return float(
+        2 * np.sum(np.log(np.maximum(np.linalg.svd(factor, compute_uv=False), RANK_TOLERANCE)))
+    )

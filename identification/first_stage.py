@@ -10,23 +10,30 @@ from identification.excitation import RANK_TOLERANCE, column_scale, direction_in
 from symheli.lpv.arrays import Array
 
 WEAK = 10.0
-"""A first-stage F below this leaves more than about a tenth of the bias of least squares. Source: Staiger and Stock (1997)."""
+"""A first-stage F below this leaves more than about a tenth of the bias of least squares. Source:
+Staiger and Stock (1997).
+"""
 
 
 class FirstStage(NamedTuple):
-    """`F` of the direction of the regressors that the instruments explain worst, and that `direction` in words."""
+    """`F` of the direction of the regressors that the instruments explain worst, and that
+    `direction` in words.
+    """
 
     F: float
     direction: str
 
 
 def first_stage(phi: Array, Q: Array, names: tuple[str, ...], own: Array) -> FirstStage:
-    """Of regressors phi (m, n) on instruments with the orthonormal basis Q (m, k); those of `own` (n,) instrument themselves.
+    """Of regressors phi (m, n) on instruments with the orthonormal basis Q (m, k); those of `own`
+    (n,) instrument themselves.
 
-    The least eigenvalue of what k - k_own instruments explain of the regressors against what they do not, per degree of freedom, that of
-    `own` taken off both: F = (m - k)/(k - k_own) rho^2/(1 - rho^2), rho the smallest canonical correlation; infinite where nothing is
-    left to explain. It takes what is not explained for white, and counts slow dynamics beyond the window of the instruments among it.
-    Source: Cragg and Donald, Econometric Theory 9 (1993); Stock and Yogo (2005).
+    The least eigenvalue of what k - k_own instruments explain of the regressors against what they
+    do not, per degree of freedom, that of `own` taken off both: F = (m - k)/(k - k_own) rho^2/(1 -
+    rho^2), rho the smallest canonical correlation; infinite where nothing is left to explain. It
+    takes what is not explained for white, and counts slow dynamics beyond the window of the
+    instruments among it. Source: Cragg and Donald, Econometric Theory 9 (1993); Stock and Yogo
+    (2005).
     """
     scale = column_scale(phi)
     X = phi / scale

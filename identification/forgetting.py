@@ -1,4 +1,6 @@
-"""How a recursive estimator lets old samples go, so that it follows what changes and never winds up when nothing excites it."""
+"""How a recursive estimator lets old samples go, so that it follows what changes and never winds up
+when nothing excites it.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +17,13 @@ FLOOR = 1e-3
 class Constant:
     """A sample k steps old has the weight factor^k; `factor` in (0, 1], 1 forgets nothing.
 
-    `floor` keeps the filter awake when excitation stops: the information on a coefficient never falls below that of `floor`
-    samples with its regressor at its largest. It is fed in coefficient by coefficient, as a measurement saying "as it is now",
-    which moves no coefficient, and from the first sample on, so that a cold start makes none wild; 0 turns it off. With factor 1
-    there is nothing to make up for, and the floor is that of rounding, 32 eps samples. At the floor the gain is large:
-    noise of a fraction r of the largest regressors moves the coefficients within floor / r^2 samples. Raises `InputError` out of range.
+    `floor` keeps the filter awake when excitation stops: the information on a coefficient never
+    falls below that of `floor` samples with its regressor at its largest. It is fed in coefficient
+    by coefficient, as a measurement saying "as it is now", which moves no coefficient, and from the
+    first sample on, so that a cold start makes none wild; 0 turns it off. With factor 1 there is
+    nothing to make up for, and the floor is that of rounding, 32 eps samples. At the floor the gain
+    is large: noise of a fraction r of the largest regressors moves the coefficients within floor /
+    r^2 samples. Raises `InputError` out of range.
     """
 
     factor: float = 1.0
@@ -27,23 +31,29 @@ class Constant:
 
     def __post_init__(self) -> None:
         if not 0 < self.factor <= 1:
-            raise InputError(f"forgetting: expected a factor in (0, 1], got {self.factor!r}; 0.99 forgets within 100 samples")
+            raise InputError(
+                f"forgetting: expected a factor in (0, 1], got {self.factor!r}; 0.99 forgets within"
+                " 100 samples"
+            )
         check_floor(self.floor)
 
 
 @dataclass(frozen=True)
 class Variable:
-    """Memory between `longest` and `shortest` samples, shorter when the innovations outgrow what they usually are.
+    """Memory between `longest` and `shortest` samples, shorter when the innovations outgrow what
+    they usually are.
 
-    The factor is 1 - q / longest, q the power of the innovations over the last `recent` samples against that over the last
-    `usual` (mean over the outputs of a group), held between the two memories: what came before a jump of the plant that multiplies the
-    power by q is forgotten within longest / q samples, and no faster than `shortest`. In steady noise it is as steady as the longest
-    memory (7 % worse at most over 21 plants and noises); a jump hardly seen above the noise is followed hardly faster than by it. Louder
-    noise and outliers shorten the memory as a jump does. `floor` as for `Constant`. Windows and memories in samples,
-    at least 1. Raises `InputError` out of range.
-    Source: Fortescue, Kershenbaum and Ydstie (1981), Implementation of self-tuning regulators with variable forgetting factors;
-    powers estimated from the innovations as in Paleologu, Benesty and Ciochina (2008), A robust variable forgetting factor
-    recursive least-squares algorithm for system identification.
+    The factor is 1 - q / longest, q the power of the innovations over the last `recent` samples
+    against that over the last `usual` (mean over the outputs of a group), held between the two
+    memories: what came before a jump of the plant that multiplies the power by q is forgotten
+    within longest / q samples, and no faster than `shortest`. In steady noise it is as steady as
+    the longest memory (7 % worse at most over 21 plants and noises); a jump hardly seen above the
+    noise is followed hardly faster than by it. Louder noise and outliers shorten the memory as a
+    jump does. `floor` as for `Constant`. Windows and memories in samples, at least 1. Raises
+    `InputError` out of range. Source: Fortescue, Kershenbaum and Ydstie (1981), Implementation of
+    self-tuning regulators with variable forgetting factors; powers estimated from the innovations
+    as in Paleologu, Benesty and Ciochina (2008), A robust variable forgetting factor recursive
+    least-squares algorithm for system identification.
     """
 
     longest: float = 1000.0
@@ -59,21 +69,25 @@ class Variable:
                 raise InputError(f"{name}: expected a number of samples > 1, got {value!r}")
         if self.shortest > self.longest or self.recent > self.usual:
             raise InputError(
-                f"expected shortest <= longest and recent <= usual, got {self.shortest} and {self.longest}, {self.recent} and {self.usual}"
+                f"expected shortest <= longest and recent <= usual, got {self.shortest} and"
+                f" {self.longest}, {self.recent} and {self.usual}"
             )
         check_floor(self.floor)
 
 
 @dataclass(frozen=True)
 class Directional:
-    """The information along each new regressor is multiplied by `factor` before it is taken in; all other directions keep theirs.
+    """The information along each new regressor is multiplied by `factor` before it is taken in; all
+    other directions keep theirs.
 
-    What is not excited is not forgotten, so that nothing winds up. With n regressors about n / (1 - factor) samples are
-    remembered in directions that are excited alike, more in weaker ones: a jump of the plant is followed more slowly there. A
-    sample whose regressors all stay below `quiet` of their largest so far forgets nothing: noise does not wash out what flight
-    has taught (a constant regressor, such as an offset, is never quiet). Raises `InputError` out of range.
-    Source: Cao and Schwartz (2000), A directional forgetting algorithm based on the decomposition of the information matrix; the
-    threshold as in Lai and Bernstein (2024), SIFt-RLS: subspace of information forgetting recursive least squares.
+    What is not excited is not forgotten, so that nothing winds up. With n regressors about n / (1 -
+    factor) samples are remembered in directions that are excited alike, more in weaker ones: a jump
+    of the plant is followed more slowly there. A sample whose regressors all stay below `quiet` of
+    their largest so far forgets nothing: noise does not wash out what flight has taught (a constant
+    regressor, such as an offset, is never quiet). Raises `InputError` out of range. Source: Cao and
+    Schwartz (2000), A directional forgetting algorithm based on the decomposition of the
+    information matrix; the threshold as in Lai and Bernstein (2024), SIFt-RLS: subspace of
+    information forgetting recursive least squares.
     """
 
     factor: float = 0.95

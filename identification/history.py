@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """`time` (n,) in s, `coefficients` (n, n_regressors, ny) after each sample, `innovations` (n, ny), NaN where no regressor was complete.
+    """`time` (n,) in s, `coefficients` (n, n_regressors, ny) after each sample, `innovations` (n,
+    ny), NaN where no regressor was complete.
 
-    `state` after the last sample (go on from it with `update`), `dropped` samples without a regressor.
+    `state` after the last sample (go on from it with `update`), `dropped` samples without a
+    regressor.
     """
 
     structure: LPVARX
@@ -36,6 +38,14 @@ class History:
     def model(self) -> LPVARXModel:
         """The model at the end, its coefficients solved from the triangular factor."""
         return LPVARXModel(
-            self.structure, self.state.solve(), self.dt, self.outputs, self.inputs, self.scheduling, self.state.residual_covariance,
-            self.state.count, self.dropped, "rls",
-        )  # fmt: skip
+            self.structure,
+            self.state.solve(),
+            self.dt,
+            self.outputs,
+            self.inputs,
+            self.scheduling,
+            self.state.residual_covariance,
+            self.state.count,
+            self.dropped,
+            "rls",
+        )

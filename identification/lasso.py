@@ -20,10 +20,11 @@ from symheli.lpv.arrays import Array
 class Lasso:
     """How many coefficients are kept.
 
-    `weight` in [0, 1] is the price on the absolute value of a coefficient (in columns of mean square 1) as a fraction of the
-    smallest price at which all are zero; None: the point of the path with the smallest extended Bayesian information criterion, for
-    each output, less the coefficients without which the criterion is smaller still. `refit` replaces the shrunk coefficients by least
-    squares on those kept.
+    `weight` in [0, 1] is the price on the absolute value of a coefficient (in columns of mean
+    square 1) as a fraction of the smallest price at which all are zero; None: the point of the path
+    with the smallest extended Bayesian information criterion, for each output, less the
+    coefficients without which the criterion is smaller still. `refit` replaces the shrunk
+    coefficients by least squares on those kept.
     """
 
     weight: float | None = None
@@ -31,11 +32,16 @@ class Lasso:
 
     def __post_init__(self) -> None:
         if self.weight is not None and not 0 <= self.weight <= 1:
-            raise InputError(f"weight: expected a fraction in [0, 1], or None for the information criterion, got {self.weight!r}")
+            raise InputError(
+                "weight: expected a fraction in [0, 1], or None for the information criterion, got"
+                f" {self.weight!r}"
+            )
 
 
 def lasso(arx: LPVARX, data: Regression, options: Lasso) -> tuple[Array, Array]:
-    """theta (n_regressors, ny), zero where a coefficient was not kept, and the weight (ny,) of each output."""
+    """theta (n_regressors, ny), zero where a coefficient was not kept, and the weight (ny,) of each
+    output.
+    """
     theta, weights = np.zeros((arx.n_regressors, arx.ny)), np.zeros(arx.ny)
     for group in arx.groups:
         regressors = arx.regressors(group)
@@ -43,20 +49,33 @@ def lasso(arx: LPVARX, data: Regression, options: Lasso) -> tuple[Array, Array]:
         scale = column_scale(X) / np.sqrt(len(X))
         for y in group.outputs:
             prices, path = lasso_path(X / scale, data.y[:, y])
-            b, price = _by_criterion(X / scale, data.y[:, y], prices, path) if options.weight is None else _at(options.weight, prices, path)
+            b, price = (
+                _by_criterion(X / scale, data.y[:, y], prices, path)
+                if options.weight is None
+                else _at(options.weight, prices, path)
+            )
             if options.refit:
-                kept = np.flatnonzero(b) if options.weight is not None else _pruned(X / scale, data.y[:, y], np.flatnonzero(b))
+                kept = (
+                    np.flatnonzero(b)
+                    if options.weight is not None
+                    else _pruned(X / scale, data.y[:, y], np.flatnonzero(b))
+                )
                 b = _refitted(X / scale, data.y[:, y], kept)
-            theta[regressors, y], weights[y] = b / scale, price / max(prices[0], np.finfo(float).tiny)
+            theta[regressors, y], weights[y] = (
+                b / scale,
+                price / max(prices[0], np.finfo(float).tiny),
+            )
     return theta, weights
 
 
 def lasso_path(X: Array, y: Array) -> tuple[Array, Array]:
-    """All minimisers of |y - X b|^2 / (2 m) + price |b|_1: prices (K,), falling to 0, and b (K, n) at them; straight lines between.
+    """All minimisers of |y - X b|^2 / (2 m) + price |b|_1: prices (K,), falling to 0, and b (K, n)
+    at them; straight lines between.
 
-    The path is followed exactly, corner by corner: a coefficient joins where its correlation with the residual reaches the price,
-    and leaves where it passes zero. A column that depends on those kept (to 1e-11) never joins.
-    Source: Efron, Hastie, Johnstone and Tibshirani (2004), Annals of Statistics 32, 407-499, with the lasso modification.
+    The path is followed exactly, corner by corner: a coefficient joins where its correlation with
+    the residual reaches the price, and leaves where it passes zero. A column that depends on those
+    kept (to 1e-11) never joins. Source: Efron, Hastie, Johnstone and Tibshirani (2004), Annals of
+    Statistics 32, 407-499, with the lasso modification.
     """
     m, n = X.shape
     R = np.asarray(np.linalg.qr(np.column_stack([X, y]), mode="r"))
@@ -84,7 +103,9 @@ def lasso_path(X: Array, y: Array) -> tuple[Array, Array]:
         signs = np.sign(correlation[active])
         direction = solve_triangular(T, solve_triangular(T, signs, trans=1))
         slope = R.T @ (R[:, active] @ direction)
-        step, left = _next_corner(price, correlation, slope, b[active], direction, active, barred, left)
+        step, left = _next_corner(
+            price, correlation, slope, b[active], direction, active, barred, left
+        )
         b = b.copy()
         b[active] += step * direction
         price -= step
@@ -97,9 +118,18 @@ def lasso_path(X: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _next_corner(
-    price: float, correlation: Array, slope: Array, b: Array, direction: Array, active: list[int], barred: Array, left: int
+    price: float,
+    correlation: Array,
+    slope: Array,
+    b: Array,
+    direction: Array,
+    active: list[int],
+    barred: Array,
+    left: int,
 ) -> tuple[float, int]:
-    """How far the price falls until a coefficient joins, leaves (then which, else -1), or nothing is left to pay."""
+    """How far the price falls until a coefficient joins, leaves (then which, else -1), or nothing
+    is left to pay.
+    """
     step, leaves = price, -1
     for j in range(len(correlation)):
         if j in active or barred[j]:
@@ -107,7 +137,11 @@ def _next_corner(
         for sign in (1.0, -1.0):
             closing = 1.0 - sign * slope[j]
             gap = price - sign * correlation[j]
-            if closing > 1e-12 and (gap > 1e-9 * price or j != left) and 1e-12 * price < gap / closing < step:
+            if (
+                closing > 1e-12
+                and (gap > 1e-9 * price or j != left)
+                and 1e-12 * price < gap / closing < step
+            ):
                 step = gap / closing
     for i, j in enumerate(active):
         if direction[i] and 0 < -b[i] / direction[i] < step:
@@ -117,7 +151,9 @@ def _next_corner(
 
 def _depends(R: Array, columns: list[int]) -> bool:
     T = np.asarray(np.linalg.qr(R[:, columns], mode="r"))
-    return len(columns) > T.shape[0] or abs(T[-1, -1]) <= RANK_TOLERANCE * np.linalg.norm(R[:, columns[-1]])
+    return len(columns) > T.shape[0] or abs(T[-1, -1]) <= RANK_TOLERANCE * np.linalg.norm(
+        R[:, columns[-1]]
+    )
 
 
 def _at(weight: float, prices: Array, path: Array) -> tuple[Array, float]:
@@ -137,7 +173,9 @@ def _by_criterion(X: Array, y: Array, prices: Array, path: Array) -> tuple[Array
 
 
 def _pruned(X: Array, y: Array, kept: Array) -> Array:
-    """`kept` without the coefficients whose loss makes the criterion smaller, the best loss first."""
+    """`kept` without the coefficients whose loss makes the criterion smaller, the best loss
+    first.
+    """
     score = _criterion(X, y, kept)
     while len(kept):
         less = [np.delete(kept, i) for i in range(len(kept))]
@@ -150,15 +188,20 @@ def _pruned(X: Array, y: Array, kept: Array) -> Array:
 
 
 def _criterion(X: Array, y: Array, kept: Array) -> float:
-    """m log(residual) + k log(m) + 2 log(n over k) of least squares with k of n coefficients: BIC that counts the models of that size.
+    """m log(residual) + k log(m) + 2 log(n over k) of least squares with k of n coefficients: BIC
+    that counts the models of that size.
 
     Source: Chen and Chen (2008), Biometrika 95, 759-771.
     """
     m, n = X.shape
     error = y - X @ _refitted(X, y, kept)
-    floor = (1e-12 * np.linalg.norm(y)) ** 2  # below this the residual is rounding and must not be rewarded
+    floor = (
+        1e-12 * np.linalg.norm(y)
+    ) ** 2  # below this the residual is rounding and must not be rewarded
     residual = max(float(error @ error), floor, np.finfo(float).tiny)
-    return float(m * np.log(residual / m) + len(kept) * np.log(m) + 2 * np.log(float(comb(n, len(kept)))))
+    return float(
+        m * np.log(residual / m) + len(kept) * np.log(m) + 2 * np.log(float(comb(n, len(kept))))
+    )
 
 
 def _refitted(X: Array, y: Array, kept: Array) -> Array:

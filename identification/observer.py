@@ -9,17 +9,21 @@ import numpy as np
 from symheli.lpv.arrays import Array
 
 DOUBT = 1e-4
-"""Variance of what drives the model beside its inputs, as a share of that of the noise on the outputs: small enough to whiten it, and
-enough to stay awake while a plant is stable, so that the estimate does not run away when it becomes unstable."""
+"""Variance of what drives the model beside its inputs, as a share of that of the noise on the
+outputs: small enough to whiten it, and enough to stay awake while a plant is stable, so that the
+estimate does not run away when it becomes unstable.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """For y = x + v, x(k) = -A(k) [x(k-1); x(k-2); ...] + known(k): A (n, ny, na ny), `gain` (n, na ny, ny) of the past on the innovation.
+    """For y = x + v, x(k) = -A(k) [x(k-1); x(k-2); ...] + known(k): A (n, ny, na ny), `gain` (n, na
+    ny, ny) of the past on the innovation.
 
-    While the plant is stable the gain is small, and the innovation is v; where it is unstable the poles of the observer are its own
-    mirrored at the unit circle, which leaves white noise white. Source of the mirrored filter: Forssell and Ljung (2000), Identification
-    of unstable systems using output error and Box-Jenkins model structures, IEEE Trans. Automatic Control 45.
+    While the plant is stable the gain is small, and the innovation is v; where it is unstable the
+    poles of the observer are its own mirrored at the unit circle, which leaves white noise white.
+    Source of the mirrored filter: Forssell and Ljung (2000), Identification of unstable systems
+    using output error and Box-Jenkins model structures, IEEE Trans. Automatic Control 45.
     """
 
     A: Array
@@ -27,7 +31,9 @@ class Observer:
 
     @classmethod
     def of(cls, A: Array, size: Array) -> Observer:
-        """The time-varying Kalman gain for white noise v with standard deviations `size` (ny,), from a past measured with that noise."""
+        """The time-varying Kalman gain for white noise v with standard deviations `size` (ny,),
+        from a past measured with that noise.
+        """
         n, ny, width = A.shape
         R = np.diag(size**2)
         P, drive = np.kron(np.eye(width // ny), R), np.zeros((width, width))
@@ -44,7 +50,9 @@ class Observer:
         return cls(A, gain)
 
     def innovations(self, equation_error: Array) -> Array:
-        """What the observer does not foresee of y, (n, ny, m), where A y = known + `equation_error` (n, ny, m); linear in it."""
+        """What the observer does not foresee of y, (n, ny, m), where A y = known + `equation_error`
+        (n, ny, m); linear in it.
+        """
         n, ny, m = equation_error.shape
         width = self.A.shape[2]
         out, past = np.empty_like(equation_error), np.zeros((width, m))

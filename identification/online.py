@@ -16,24 +16,34 @@ from symheli.lpv.arrays import Array
 
 
 class Online:
-    """An estimator at work: `update` changes it in place and copies nothing; `state` is a value to keep, save or go on from.
+    """An estimator at work: `update` changes it in place and copies nothing; `state` is a value to
+    keep, save or go on from.
 
-    Made by `RecursiveLeastSquares.online`. The first update with float64 arrays of the right shape costs microseconds where the
-    kernel is compiled; anything else that is a number works, more slowly.
+    Made by `RecursiveLeastSquares.online`. The first update with float64 arrays of the right shape
+    costs microseconds where the kernel is compiled; anything else that is a number works, more
+    slowly.
     """
 
     def __init__(self, configuration: Configuration, kernel: Any, state: RLSState):
         self._configuration, self._kernel, self._start = configuration, kernel, state
-        self._state, self._work = (aligned(size, configuration.dtype) for size in configuration.sizes)
+        self._state, self._work = (
+            aligned(size, configuration.dtype) for size in configuration.sizes
+        )
         self._state[:] = state.memory
-        self._status = (DETERMINED if state.determined else 0) | (SATURATED if state.saturated else 0)
-        self._views = None if len(configuration.groups) > 1 else _coefficients(configuration, self._state)
+        self._status = (DETERMINED if state.determined else 0) | (
+            SATURATED if state.saturated else 0
+        )
+        self._views = (
+            None if len(configuration.groups) > 1 else _coefficients(configuration, self._state)
+        )
 
     def update(self, y: object, u: object, p: object) -> bool:
-        """Take in y (ny,), u (nu,), p of one instant; True where a complete regressor was there and the coefficients moved.
+        """Take in y (ny,), u (nu,), p of one instant; True where a complete regressor was there and
+        the coefficients moved.
 
-        A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises `InputError` for wrong shapes,
-        infinite values and p outside the basis; the coefficients are then as before and the lags start afresh.
+        A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises
+        `InputError` for wrong shapes, infinite values and p outside the basis; the coefficients are
+        then as before and the lags start afresh.
         """
         try:
             self._status = status = self._kernel.update(self._state, self._work, y, u, p)
@@ -44,23 +54,30 @@ class Online:
         return status & LEARNT != 0
 
     def absorb(self, phi: Array, y: Array) -> bool:
-        """Take in one regressor phi (n,) with the outputs y (ny,) it must explain; the lags are left alone.
+        """Take in one regressor phi (n,) with the outputs y (ny,) it must explain; the lags are
+        left alone.
 
-        Raises `InputError` for wrong shapes. In real time every check counts: that the numbers are finite is left to who builds phi, a NaN
-        stays for good. `RecursiveLeastSquares.absorb` checks.
+        Raises `InputError` for wrong shapes. In real time every check counts: that the numbers are
+        finite is left to who builds phi, a NaN stays for good. `RecursiveLeastSquares.absorb`
+        checks.
         """
         try:
             self._status = self._kernel.absorb(self._state, self._work, phi, y)
         except (TypeError, ValueError, BufferError):
             arx = self._configuration.structure
-            self._status = self._kernel.absorb(self._state, self._work, vector(phi, arx.n_regressors, "phi"), vector(y, arx.ny, "y"))
+            self._status = self._kernel.absorb(
+                self._state,
+                self._work,
+                vector(phi, arx.n_regressors, "phi"),
+                vector(y, arx.ny, "y"),
+            )
         return True
 
     def run(self, samples: Array, history: bool = True) -> tuple[Array, Array | None, Array | None]:
         """Take in rows [y, u, p] (k, ny + nu + parameters), p within the basis.
 
-        Returns which of them taught something (k,), and with `history` the innovations (k, ny), NaN elsewhere, and the
-        coefficients after each (k, n, ny).
+        Returns which of them taught something (k,), and with `history` the innovations (k, ny), NaN
+        elsewhere, and the coefficients after each (k, n, ny).
         """
         samples = np.ascontiguousarray(samples, float)
         arx, k = self._configuration.structure, len(samples)
@@ -68,7 +85,9 @@ class Online:
         if samples.shape != (k, width):
             raise InputError(f"samples: expected shape (any, {width}), got {samples.shape}")
         if not self._configuration.factors:
-            samples = np.hstack([samples, functions(self._configuration, samples[:, arx.ny + arx.nu :])])
+            samples = np.hstack(
+                [samples, functions(self._configuration, samples[:, arx.ny + arx.nu :])]
+            )
         statuses, dtype = np.zeros(k, np.int32), self._configuration.dtype
         innovations = np.full((k, arx.ny), np.nan, dtype) if history else None
         coefficients = np.empty((k, arx.n_regressors, arx.ny), dtype) if history else None
@@ -85,7 +104,9 @@ class Online:
 
     @property
     def coefficients(self) -> Array:
-        """(n, ny) as they are now: a view of what `update` changes where all outputs share their regressors, else a copy."""
+        """(n, ny) as they are now: a view of what `update` changes where all outputs share their
+        regressors, else a copy.
+        """
         return twin.theta(self._configuration, self._state) if self._views is None else self._views
 
     @property
@@ -96,13 +117,17 @@ class Online:
 
     @property
     def gain(self) -> Array:
-        """How the coefficients of an output moved per unit of its innovation: (n,), or (n, ny) where outputs have different regressors."""
+        """How the coefficients of an output moved per unit of its innovation: (n,), or (n, ny)
+        where outputs have different regressors.
+        """
         c = self._configuration
         if len(c.groups) == 1:
             return self._work[c.groups[0].in_work["gain"]][: c.groups[0].n]
         out = np.zeros((c.structure.n_regressors, c.structure.ny), c.dtype)
         for layout in c.groups:
-            out[c.structure.regressors(layout.group)[:, None], layout.group.outputs] = self._work[layout.in_work["gain"]][: layout.n, None]
+            out[c.structure.regressors(layout.group)[:, None], layout.group.outputs] = self._work[
+                layout.in_work["gain"]
+            ][: layout.n, None]
         return out
 
     @property
@@ -154,7 +179,9 @@ def vector(value: object, size: int, name: str) -> Array:
 
 
 def functions(configuration: Configuration, p: Array) -> Array:
-    """The basis (k, size) at p (k, parameters), NaN where p is not finite: for functions the kernel cannot evaluate."""
+    """The basis (k, size) at p (k, parameters), NaN where p is not finite: for functions the kernel
+    cannot evaluate.
+    """
     basis = configuration.structure.basis
     out, known = np.full((len(p), basis.size), np.nan), np.isfinite(p).all(axis=1)
     out[known] = basis(p[known, 0] if basis.dimension == 1 else p[known])
@@ -164,12 +191,19 @@ def functions(configuration: Configuration, p: Array) -> Array:
 def complain(configuration: Configuration, y: object, u: object, p: object) -> None:
     """Raises the `InputError` for a sample the kernel refused."""
     arx = configuration.structure
-    largest = twin.Limits.of(float if configuration.dtype is np.float64 else configuration.dtype).largest
-    for name, array in (("y", vector(y, arx.ny, "y")), ("u", vector(u, arx.nu, "u")), ("p", vector(p, len(arx.parameters), "p"))):
+    largest = twin.Limits.of(
+        float if configuration.dtype is np.float64 else configuration.dtype
+    ).largest
+    for name, array in (
+        ("y", vector(y, arx.ny, "y")),
+        ("u", vector(u, arx.nu, "u")),
+        ("p", vector(p, len(arx.parameters), "p")),
+    ):
         if np.isinf(array).any():
             raise InputError(f"{name} is infinite; mark a missing sample as NaN")
         if (np.abs(array) > largest).any():
             raise InputError(
-                f"{name} is {array[np.argmax(np.abs(array))]:.3g}, beyond {largest:.0e}, where squares overflow; check its unit"
+                f"{name} is {array[np.argmax(np.abs(array))]:.3g}, beyond {largest:.0e}, where"
+                " squares overflow; check its unit"
             )
     arx.basis(vector(p, len(arx.parameters), "p"))

@@ -18,10 +18,11 @@ from symheli.lpv.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One structure: fits in percent by output one step, `horizon` samples and a free run ahead, mean over validation records.
+    """One structure: fits in percent by output one step, `horizon` samples and a free run ahead,
+    mean over validation records.
 
-    `bic` (Bayesian information criterion of the training residuals, smaller is better; NaN where refused); `refused`: why the data do
-    not determine it, empty where they do.
+    `bic` (Bayesian information criterion of the training residuals, smaller is better; NaN where
+    refused); `refused`: why the data do not determine it, empty where they do.
     """
 
     structure: LPVARX
@@ -50,10 +51,14 @@ class OrderScan:
     horizon: int
 
     def best(self, by: str = "ahead") -> Trial:
-        """The trial of the largest median fit over the outputs "one_step", "ahead" or in "free_run"; or of the least "bic"."""
+        """The trial of the largest median fit over the outputs "one_step", "ahead" or in
+        "free_run"; or of the least "bic".
+        """
         tried = [t for t in self.trials if not t.refused]
         if not tried:
-            raise ExcitationError(f"the data determine none of the structures: {self.trials[0].refused}")
+            raise ExcitationError(
+                f"the data determine none of the structures: {self.trials[0].refused}"
+            )
         if by == "bic":
             return min(tried, key=lambda t: t.bic)
         if by not in ("one_step", "ahead", "free_run"):
@@ -64,46 +69,73 @@ class OrderScan:
         outputs = self.trials[0].structure.outputs
         head = "  ".join(f"{y:>22s}" for y in outputs)
         lines = [
-            f"fit in percent: one step / {self.horizon} samples / free run (worse: below -1000, inf: diverges)",
+            (
+                f"fit in percent: one step / {self.horizon} samples / free run (worse: below -1000,"
+                " inf: diverges)"
+            ),
             f"{'na':>3s} {'degree':>6s} {'BIC':>10s}  {head}",
         ]
         for t in self.trials:
             if t.refused:
                 lines.append(f"{t.na:3d} {t.degree:6d} {'':>10s}  refused: {t.refused}")
                 continue
-            fits = "  ".join(" /".join(map(_cell, three)) for three in zip(t.one_step, t.ahead, t.free_run, strict=True))
+            fits = "  ".join(
+                " /".join(map(_cell, three))
+                for three in zip(t.one_step, t.ahead, t.free_run, strict=True)
+            )
             lines.append(f"{t.na:3d} {t.degree:6d} {t.bic:10.0f}  {fits}")
         return "\n".join(lines)
 
 
 def _cell(fit: float) -> str:
-    return f"{fit:6.1f}" if fit > -1000 else f"{'worse':>6s}" if np.isfinite(fit) else f"{'inf':>6s}"
+    return (
+        f"{fit:6.1f}" if fit > -1000 else f"{'worse':>6s}" if np.isfinite(fit) else f"{'inf':>6s}"
+    )
 
 
 def order_scan(
-    structure: LPVARX, training: FlightRecord | Iterable[FlightRecord], validation: FlightRecord | Iterable[FlightRecord], *,
-    orders: Sequence[int] = (1, 2, 3, 4), degrees: Sequence[int] = (0, 1, 2, 3), horizon: int = 50,
+    structure: LPVARX,
+    training: FlightRecord | Iterable[FlightRecord],
+    validation: FlightRecord | Iterable[FlightRecord],
+    *,
+    orders: Sequence[int] = (1, 2, 3, 4),
+    degrees: Sequence[int] = (0, 1, 2, 3),
+    horizon: int = 50,
     hold_p: bool = False,
-) -> OrderScan:  # fmt: skip
-    """Fit `structure` with every na = nb of `orders` and every polynomial degree, by least squares, and judge it on other records.
+) -> OrderScan:
+    """Fit `structure` with every na = nb of `orders` and every polynomial degree, by least squares,
+    and judge it on other records.
 
-    Degree 0 is the LTI model; nb follows na. `hold_p` as in `LPVARXModel.predict`: for a measured p.
-    Raises `InputError` where the basis is no polynomial of one parameter.
+    Degree 0 is the LTI model; nb follows na. `hold_p` as in `LPVARXModel.predict`: for a measured
+    p. Raises `InputError` where the basis is no polynomial of one parameter.
     """
     basis = structure.basis
     if not isinstance(basis, Polynomial):
-        raise InputError(f"an order scan varies the degree of a polynomial basis; this one is {basis}")
+        raise InputError(
+            f"an order scan varies the degree of a polynomial basis; this one is {basis}"
+        )
     if not (orders and degrees):
         raise InputError("orders, degrees: name at least one of each")
     train, test = as_records(training), as_records(validation)
     trials = []
     for degree, na in product(degrees, orders):
-        trial = replace(structure, na=na, nb=na if structure.inputs else 0, basis=Polynomial(degree, basis.low, basis.high))
+        trial = replace(
+            structure,
+            na=na,
+            nb=na if structure.inputs else 0,
+            basis=Polynomial(degree, basis.low, basis.high),
+        )
         trials.append(_judge(trial, train, test, horizon, hold_p))
     return OrderScan(tuple(trials), horizon)
 
 
-def _judge(structure: LPVARX, train: Sequence[FlightRecord], test: Sequence[FlightRecord], horizon: int, hold_p: bool) -> Trial:
+def _judge(
+    structure: LPVARX,
+    train: Sequence[FlightRecord],
+    test: Sequence[FlightRecord],
+    horizon: int,
+    hold_p: bool,
+) -> Trial:
     nothing = np.full(structure.ny, np.nan)
     try:
         model = fit(structure, train)
@@ -115,7 +147,13 @@ def _judge(structure: LPVARX, train: Sequence[FlightRecord], test: Sequence[Flig
     sign, logdet = np.linalg.slogdet(error.T @ error / n)
     bic = n * logdet + int(structure.free.sum()) * np.log(n) if sign > 0 else -np.inf
     steps = [
-        np.mean([model.score(record, horizon=h, hold_p=hold_p and h is not None).array for record in test], axis=0)
+        np.mean(
+            [
+                model.score(record, horizon=h, hold_p=hold_p and h is not None).array
+                for record in test
+            ],
+            axis=0,
+        )
         for h in (1, horizon, None)
     ]
     return Trial(structure, float(bic), *steps)

@@ -8,13 +8,16 @@ from symheli.errors import InputError, UnknownNameError
 
 Table = tuple[tuple[int, ...], ...]
 Orders = int | Mapping[str, "int | Mapping[str, int]"] | Sequence[Sequence[int]]
-"""One number; {output: number}; for inputs {input: number}; {output: {signal: number}}; or rows, one an output."""
+"""One number; {output: number}; for inputs {input: number}; {output: {signal: number}}; or rows,
+one an output.
+"""
 
 
 def table(value: Orders, name: str, outputs: tuple[str, ...], signals: tuple[str, ...]) -> Table:
     """The order of each signal (column) in the equation of each output (row).
 
-    Raises `InputError` for a number that is no order or a name left out, `UnknownNameError` for one that is not a signal.
+    Raises `InputError` for a number that is no order or a name left out, `UnknownNameError` for one
+    that is not a signal.
     """
     if isinstance(value, Mapping):
         if outputs != signals and signals and set(value) <= set(signals):
@@ -24,14 +27,23 @@ def table(value: Orders, name: str, outputs: tuple[str, ...], signals: tuple[str
         return tuple(_row(value[y], f"{name} of {y}", signals) for y in outputs)
     if isinstance(value, Sequence) and not isinstance(value, str):
         rows = tuple(value)
-        if len(rows) != len(outputs) or any(not isinstance(r, Sequence) or len(r) != len(signals) for r in rows):
-            raise InputError(f"{name}: expected one row an output with {len(signals)} numbers each, got {value!r:.80}")
+        if len(rows) != len(outputs) or any(
+            not isinstance(r, Sequence) or len(r) != len(signals) for r in rows
+        ):
+            raise InputError(
+                f"{name}: expected one row an output with {len(signals)} numbers each, got"
+                f" {value!r:.80}"
+            )
         return tuple(tuple(_order(v, name) for v in row) for row in rows)
     return tuple((_order(value, name),) * len(signals) for _ in outputs)
 
 
-def compact(value: Orders, name: str, outputs: tuple[str, ...], signals: tuple[str, ...]) -> int | Table:
-    """One number where all entries agree, the table otherwise: equal structures compare equal however they were written."""
+def compact(
+    value: Orders, name: str, outputs: tuple[str, ...], signals: tuple[str, ...]
+) -> int | Table:
+    """One number where all entries agree, the table otherwise: equal structures compare equal
+    however they were written.
+    """
     rows = table(value, name, outputs, signals)
     entries = {v for row in rows for v in row}
     if not entries:
@@ -46,16 +58,23 @@ def _row(value: object, name: str, signals: tuple[str, ...]) -> tuple[int, ...]:
     return (_order(value, name),) * len(signals)
 
 
-def _complete(value: Mapping[str, object], name: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:
+def _complete(
+    value: Mapping[str, object], name: str, names: tuple[str, ...], known: tuple[str, ...]
+) -> None:
     for key in value:
         if key not in names:
             raise UnknownNameError(f"signal in {name}", key, known)
     missing = [n for n in names if n not in value]
     if missing:
-        raise InputError(f"{name}: say a number for {', '.join(missing)} too (an order of 0 leaves a signal out)")
+        raise InputError(
+            f"{name}: say a number for {', '.join(missing)} too (an order of 0 leaves a signal out)"
+        )
 
 
 def _order(value: object, name: str) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise InputError(f"{name}: expected an integer >= 0, a mapping by signal name or one row an output, got {value!r:.80}")
+        raise InputError(
+            f"{name}: expected an integer >= 0, a mapping by signal name or one row an output, got"
+            f" {value!r:.80}"
+        )
     return value

@@ -18,9 +18,11 @@ from symheli.lpv.arrays import Array
 
 @dataclass(frozen=True)
 class OutputError:
-    """`initial`: the outputs each stretch starts from are "estimated" with the coefficients, or taken as "measured".
+    """`initial`: the outputs each stretch starts from are "estimated" with the coefficients, or
+    taken as "measured".
 
-    `evaluations` of the simulation at most, `tolerance` on the relative change of cost and coefficients.
+    `evaluations` of the simulation at most, `tolerance` on the relative change of cost and
+    coefficients.
     """
 
     initial: Literal["estimated", "measured"] = "estimated"
@@ -31,12 +33,17 @@ class OutputError:
         if self.initial not in ("estimated", "measured"):
             raise InputError(f'initial: expected "estimated" or "measured", got {self.initial!r}')
         if self.evaluations < 1 or not 0 < self.tolerance < 1:
-            raise InputError(f"expected evaluations >= 1 and a tolerance in (0, 1), got {self.evaluations} and {self.tolerance}")
+            raise InputError(
+                f"expected evaluations >= 1 and a tolerance in (0, 1), got {self.evaluations} and"
+                f" {self.tolerance}"
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class OutputErrorResult:
-    """theta (n_regressors, ny), the covariance (ny, ny) of the simulation error, and how the search ended."""
+    """theta (n_regressors, ny), the covariance (ny, ny) of the simulation error, and how the search
+    ended.
+    """
 
     theta: Array
     simulation_covariance: Array
@@ -46,7 +53,9 @@ class OutputErrorResult:
 
 
 class SimulationError:
-    """Residuals, each output divided by its spread, and their exact derivatives, as functions of coefficients and initial outputs."""
+    """Residuals, each output divided by its spread, and their exact derivatives, as functions of
+    coefficients and initial outputs.
+    """
 
     def __init__(self, arx: LPVARX, runs: Sequence[Stretch], *, estimated: bool):
         self.arx, self.runs, self.estimated = arx, runs, estimated
@@ -57,7 +66,9 @@ class SimulationError:
         self.na = len(arx.output_lags)
 
     def start(self, theta: Array) -> Array:
-        """The unknowns for coefficients theta and measured initial outputs (0 where one is missing)."""
+        """The unknowns for coefficients theta and measured initial outputs (0 where one is
+        missing).
+        """
         pasts = [np.nan_to_num(run.past[:, 0]) for run in self.runs] if self.estimated else []
         return np.concatenate([theta[self.row, self.output], *pasts])
 
@@ -68,7 +79,9 @@ class SimulationError:
         return theta
 
     def residuals(self, unknowns: Array) -> Array:
-        """(measurements,) simulated less measured, initial outputs first where they are estimated; infinite where a run diverges."""
+        """(measurements,) simulated less measured, initial outputs first where they are estimated;
+        infinite where a run diverges.
+        """
         theta, parts = self.theta(unknowns), []
         for i, run in enumerate(self.runs):
             model = self._from(run, i, unknowns)
@@ -82,7 +95,9 @@ class SimulationError:
             model = self._from(run, i, unknowns)
             phi = model.with_outputs(model.free_run(theta)).regressors()
             spread = model.spread(theta, phi, np.eye(width) if self.estimated else None)
-            full = np.zeros((len(spread) + (self.na if self.estimated else 0), self.arx.ny, len(unknowns)))
+            full = np.zeros(
+                (len(spread) + (self.na if self.estimated else 0), self.arx.ny, len(unknowns))
+            )
             full[-len(spread) :, :, :n] = spread[:, :, :n]
             if self.estimated:
                 own = slice(n + i * width, n + (i + 1) * width)
@@ -104,19 +119,29 @@ class SimulationError:
     def _measured(self, run: Stretch) -> Array:
         """Initial outputs, newest first, where they are estimated, then the targets."""
         m = self.arx.memory
-        return np.vstack([run.y[m - self.na : m][::-1], run.target]) if self.estimated else run.target
+        return (
+            np.vstack([run.y[m - self.na : m][::-1], run.target]) if self.estimated else run.target
+        )
 
     def _kept(self, run: Stretch, past: Array, response: Array) -> Array:
         target = self._measured(run)
-        simulated = np.vstack([past.reshape(self.na, self.arx.ny), response]) if self.estimated else response
+        simulated = (
+            np.vstack([past.reshape(self.na, self.arx.ny), response])
+            if self.estimated
+            else response
+        )
         return ((simulated - target) / self.scale)[np.isfinite(target)]
 
 
-def output_error(arx: LPVARX, records: Sequence[FlightRecord], starts: Sequence[Array], options: OutputError) -> OutputErrorResult:
-    """Minimise the simulation error over coefficients (and initial outputs) from the best of the coefficients `starts`.
+def output_error(
+    arx: LPVARX, records: Sequence[FlightRecord], starts: Sequence[Array], options: OutputError
+) -> OutputErrorResult:
+    """Minimise the simulation error over coefficients (and initial outputs) from the best of the
+    coefficients `starts`.
 
-    The maximum-likelihood estimate for white Gaussian noise on the outputs. A start whose free run diverges is first drawn
-    in (`contracted`). Exact derivatives; trust-region reflective search of SciPy.
+    The maximum-likelihood estimate for white Gaussian noise on the outputs. A start whose free run
+    diverges is first drawn in (`contracted`). Exact derivatives; trust-region reflective search of
+    SciPy.
 
     Raises `ExcitationError` where the records hold no stretch to simulate.
     """
@@ -124,17 +149,32 @@ def output_error(arx: LPVARX, records: Sequence[FlightRecord], starts: Sequence[
     if options.initial == "measured":
         runs = [run for run in runs if np.isfinite(run.past).all()]
     if not runs:
-        raise ExcitationError(f"no unbroken stretch of more than {arx.memory} samples of inputs and scheduling to simulate")
+        raise ExcitationError(
+            f"no unbroken stretch of more than {arx.memory} samples of inputs and scheduling to"
+            " simulate"
+        )
     problem = SimulationError(arx, runs, estimated=options.initial == "estimated")
     candidates = [problem.start(contracted(arx, theta, runs)) for theta in starts]
-    best = min(candidates, key=lambda unknowns: float(np.sum(np.square(problem.residuals(unknowns)))))
+    best = min(
+        candidates, key=lambda unknowns: float(np.sum(np.square(problem.residuals(unknowns))))
+    )
     found = least_squares(
-        problem.residuals, best, jac=problem.jacobian,  # type: ignore[arg-type]
-        method="trf", x_scale="jac", max_nfev=options.evaluations,
-        ftol=options.tolerance, xtol=options.tolerance, gtol=options.tolerance,
-    )  # fmt: skip
+        problem.residuals,
+        best,
+        jac=problem.jacobian,  # type: ignore[arg-type]
+        method="trf",
+        x_scale="jac",
+        max_nfev=options.evaluations,
+        ftol=options.tolerance,
+        xtol=options.tolerance,
+        gtol=options.tolerance,
+    )
     theta = problem.theta(found.x)
-    error = np.concatenate([run.target - problem._from(run, i, found.x).free_run(theta) for i, run in enumerate(runs)])
+    error = np.concatenate(
+        [run.target - problem._from(run, i, found.x).free_run(theta) for i, run in enumerate(runs)]
+    )
     error = error[np.isfinite(error).all(axis=1)]
     covariance = error.T @ error / max(len(error) - len(problem.row) // arx.ny, 1)
-    return OutputErrorResult(theta, covariance, int(found.nfev), bool(found.status > 0), str(found.message))
+    return OutputErrorResult(
+        theta, covariance, int(found.nfev), bool(found.status > 0), str(found.message)
+    )

@@ -19,7 +19,9 @@ DIVERGED = 1e100
 
 @dataclass(frozen=True, eq=False)
 class Recursion:
-    """y(k) = -sum_i A[k, i-1] y(k-i) + known[k] along a record: A (n, na, ny, ny), known (n, ny), NaN without a full past."""
+    """y(k) = -sum_i A[k, i-1] y(k-i) + known[k] along a record: A (n, na, ny, ny), known (n, ny),
+    NaN without a full past.
+    """
 
     y: Array
     A: Array
@@ -29,20 +31,35 @@ class Recursion:
 
     @classmethod
     def along(cls, arx: LPVARX, theta: Array, record: FlightRecord) -> Recursion:
-        """The coefficients at every sample of `record`, and all that inputs and scheduling contribute."""
+        """The coefficients at every sample of `record`, and all that inputs and scheduling
+        contribute.
+        """
         s = Samples.of(arx, record)
-        n, na, split = len(record), len(arx.output_lags), sum(len(t.signals) for t in arx.terms if t.kind == "output") * arx.basis.size
+        n, na, split = (
+            len(record),
+            len(arx.output_lags),
+            sum(len(t.signals) for t in arx.terms if t.kind == "output") * arx.basis.size,
+        )
         by_lag = Coefficients.of(arx, theta).A
         A, known = np.full((n, na, arx.ny, arx.ny), np.nan), np.full((n, arx.ny), np.nan)
         for part in s.segments:
             rows = slice(part.start + arx.memory, part.stop)
             if rows.start >= rows.stop:
                 continue
-            exogenous = regressor_rows(arx, s.y[part], s.u[part], s.p[part], s.f[part], kinds=("input", "offset", "increment"))
+            exogenous = regressor_rows(
+                arx,
+                s.y[part],
+                s.u[part],
+                s.p[part],
+                s.f[part],
+                kinds=("input", "offset", "increment"),
+            )
             known[rows] = exogenous @ theta[split:]
             for i in arx.output_lags:
                 back = i if arx.scheduling_at == "lag" else 0
-                A[rows, i - 1] = np.tensordot(s.f[rows.start - back : rows.stop - back], by_lag[i - 1], axes=1)
+                A[rows, i - 1] = np.tensordot(
+                    s.f[rows.start - back : rows.stop - back], by_lag[i - 1], axes=1
+                )
         return cls(s.y, A, known, s.segments, arx.memory)
 
     @property
@@ -52,10 +69,11 @@ class Recursion:
 
 
 def predict(run: Recursion, horizon: int) -> Array:
-    """Predictions (n, ny) of y(t) from outputs up to t - horizon, inputs and p up to t; NaN where not available.
+    """Predictions (n, ny) of y(t) from outputs up to t - horizon, inputs and p up to t; NaN where
+    not available.
 
-    All starts advance together: P_j(t) = known(t) - sum_i A_i(t) P_{max(j-i, 0)}(t-i), where P_0 = y and P_j(t) is the
-    prediction of y(t) made j steps before.
+    All starts advance together: P_j(t) = known(t) - sum_i A_i(t) P_{max(j-i, 0)}(t-i), where P_0 =
+    y and P_j(t) is the prediction of y(t) made j steps before.
     """
     require_horizon(horizon)
     ahead = [run.y]
@@ -70,9 +88,11 @@ def predict(run: Recursion, horizon: int) -> Array:
 
 
 def predict_holding(arx: LPVARX, theta: Array, record: FlightRecord, horizon: int) -> Array:
-    """Predictions (n, ny) of y(t) from outputs and p up to t - horizon and inputs up to t, p held at its last known value.
+    """Predictions (n, ny) of y(t) from outputs and p up to t - horizon and inputs up to t, p held
+    at its last known value.
 
-    As an autopilot predicts that schedules on a measurement: the coefficients stay, and p does not change. NaN as in `predict`.
+    As an autopilot predicts that schedules on a measurement: the coefficients stay, and p does not
+    change. NaN as in `predict`.
     """
     require_horizon(horizon)
     s, starts = Samples.of(arx, record), _starts(arx, record.segments(), horizon)
@@ -82,17 +102,28 @@ def predict_holding(arx: LPVARX, theta: Array, record: FlightRecord, horizon: in
             new, row = np.zeros((len(starts), arx.ny)), 0
             for term in arx.terms:
                 count, step = len(term.signals), j - term.lag
-                block, row = theta[row : row + count * size].reshape(count, size, arx.ny), row + count * size
+                block, row = (
+                    theta[row : row + count * size].reshape(count, size, arx.ny),
+                    row + count * size,
+                )
                 match term.kind:
                     case "output":
-                        signal = -(s.y[starts + step] if step <= 0 else ahead[step])[:, list(term.signals)]
+                        signal = -(s.y[starts + step] if step <= 0 else ahead[step])[
+                            :, list(term.signals)
+                        ]
                     case "input":
                         signal = s.u[starts + step][:, list(term.signals)]
                     case "offset":
                         signal = np.ones((len(starts), 1))
                     case "increment":
                         continue
-                new += np.einsum("ks,kf,sfy->ky", signal, s.f[starts + min(j - term.p_lag, 0)], block, optimize=True)
+                new += np.einsum(
+                    "ks,kf,sfy->ky",
+                    signal,
+                    s.f[starts + min(j - term.p_lag, 0)],
+                    block,
+                    optimize=True,
+                )
             ahead[j] = np.clip(new, -DIVERGED, DIVERGED)
     out = np.full_like(s.y, np.nan)
     out[starts + horizon] = ahead[horizon]
@@ -101,21 +132,28 @@ def predict_holding(arx: LPVARX, theta: Array, record: FlightRecord, horizon: in
 
 def _starts(arx: LPVARX, segments: tuple[slice, ...], horizon: int) -> Array:
     """The last known sample of every prediction that has a past and an end in one segment."""
-    parts = [np.arange(part.start + max(arx.memory - 1, 0), part.stop - horizon) for part in segments]
+    parts = [
+        np.arange(part.start + max(arx.memory - 1, 0), part.stop - horizon) for part in segments
+    ]
     return np.concatenate(parts).astype(int)
 
 
 def require_horizon(horizon: object) -> None:
     """Raises `InputError` unless `horizon` is a number of steps."""
     if not isinstance(horizon, int | np.integer) or isinstance(horizon, bool) or horizon < 1:
-        raise InputError(f"horizon: expected a whole number of steps >= 1, got {horizon!r}; a free run is simulate()")
+        raise InputError(
+            f"horizon: expected a whole number of steps >= 1, got {horizon!r}; a free run is"
+            " simulate()"
+        )
 
 
 def simulate(run: Recursion) -> Array:
-    """Free response (n, ny): each segment starts from its first measured outputs, then only inputs and p are used.
+    """Free response (n, ny): each segment starts from its first measured outputs, then only inputs
+    and p are used.
 
-    NaN before a run has its initial outputs and where inputs or p are missing (it starts again, from measured outputs,
-    behind them); a run that diverges is infinite from there to the end of its segment.
+    NaN before a run has its initial outputs and where inputs or p are missing (it starts again,
+    from measured outputs, behind them); a run that diverges is infinite from there to the end of
+    its segment.
     """
     out = np.full_like(run.y, np.nan)
     with np.errstate(all="ignore"):
@@ -151,14 +189,17 @@ def _flagged(y: Array) -> Array:
 
 
 def fit_percent(y: object, yhat: object) -> Array:
-    """100 (1 - |y - yhat| / |y - mean y|) per output (ny,), dimensionless: 100 is perfect, 0 no better than the mean.
+    """100 (1 - |y - yhat| / |y - mean y|) per output (ny,), dimensionless: 100 is perfect, 0 no
+    better than the mean.
 
-    y and yhat (n, ny) or (n,). Rows where either is NaN are left out, output by output; -inf where yhat diverged, NaN
-    where no row is left. Raises `InputError` where the shapes differ.
+    y and yhat (n, ny) or (n,). Rows where either is NaN are left out, output by output; -inf where
+    yhat diverged, NaN where no row is left. Raises `InputError` where the shapes differ.
     """
     y, yhat = np.asarray(y, float), np.asarray(yhat, float)
     if y.shape != yhat.shape or y.ndim not in (1, 2):
-        raise InputError(f"expected two arrays of one shape (n, outputs), got {y.shape} and {yhat.shape}")
+        raise InputError(
+            f"expected two arrays of one shape (n, outputs), got {y.shape} and {yhat.shape}"
+        )
     columns = zip(y.reshape(len(y), -1).T, yhat.reshape(len(y), -1).T, strict=True)
     return np.array([_fit(a, b) for a, b in columns])
 

@@ -1,4 +1,6 @@
-"""Recursive least squares as a square-root information filter: one triangular factor for all outputs that share a regressor."""
+"""Recursive least squares as a square-root information filter: one triangular factor for all
+outputs that share a regressor.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,14 @@ from typing import Any, Literal
 import numpy as np
 
 from identification import kernel, saved_state
-from identification.forgetting import FLOOR, Constant, Directional, Forgetting, Variable, check_floor
+from identification.forgetting import (
+    FLOOR,
+    Constant,
+    Directional,
+    Forgetting,
+    Variable,
+    check_floor,
+)
 from identification.history import History
 from identification.kernel.configuration import Configuration
 from identification.online import Online, vector
@@ -26,21 +35,27 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 
 @dataclass(frozen=True)
 class RecursiveLeastSquares:
-    """Forgetting least squares, sample by sample: `init`, `update`, or `run` over a record; `online` for real time.
+    """Forgetting least squares, sample by sample: `init`, `update`, or `run` over a record;
+    `online` for real time.
 
-    Each sample rotates the row [phi', y'] into [sqrt(l) R, sqrt(l) Z] by square-root-free Givens rotations; the covariance is never
-    formed, so nothing can lose its definiteness. Outputs share the factor, which nothing but data enters. The coefficients solve
-    R theta = Z: from sample to sample they move along the gain g = R^-1 (R^-T phi), theta += g (y - theta' phi)', and are solved anew
-    as soon as a running bound of the rounding errors along it is no longer small, so that they are at every sample those of batch
-    least squares on the weighted samples so far. What these leave open is kept small by rows that are pretended: each coefficient is
-    0, with the weight of 32 eps samples with its regressor at its largest (without forgetting; else see `Constant`). `determined` says
-    whether anything is left open, by the rule of `identification.determined`.
+    Each sample rotates the row [phi', y'] into [sqrt(l) R, sqrt(l) Z] by square-root-free Givens
+    rotations; the covariance is never formed, so nothing can lose its definiteness. Outputs share
+    the factor, which nothing but data enters. The coefficients solve R theta = Z: from sample to
+    sample they move along the gain g = R^-1 (R^-T phi), theta += g (y - theta' phi)', and are
+    solved anew as soon as a running bound of the rounding errors along it is no longer small, so
+    that they are at every sample those of batch least squares on the weighted samples so far. What
+    these leave open is kept small by rows that are pretended: each coefficient is 0, with the
+    weight of 32 eps samples with its regressor at its largest (without forgetting; else see
+    `Constant`). `determined` says whether anything is left open, by the rule of
+    `identification.determined`.
 
-    `forgetting` is a factor l in (0, 1] (a sample k steps old has the weight l^k; then `floor` is that of `Constant`), or one of
-    `Constant`, `Variable`, `Directional`. `precision` "single" computes as an autopilot without double precision would.
+    `forgetting` is a factor l in (0, 1] (a sample k steps old has the weight l^k; then `floor` is
+    that of `Constant`), or one of `Constant`, `Variable`, `Directional`. `precision` "single"
+    computes as an autopilot without double precision would.
 
-    The arithmetic is C where a compiler was there when symheli was installed, else NumPy, with one `CompilerWarning`: the same
-    operations in the same order. Raises `InputError` for an option out of range.
+    The arithmetic is C where a compiler was there when symheli was installed, else NumPy, with one
+    `CompilerWarning`: the same operations in the same order. Raises `InputError` for an option out
+    of range.
     """
 
     structure: LPVARX
@@ -54,9 +69,15 @@ class RecursiveLeastSquares:
             raise InputError(f'precision: expected "double" or "single", got {self.precision!r}')
         if isinstance(self.forgetting, Constant | Variable | Directional):
             if self.floor is not None:
-                raise InputError(f"floor: belongs to a forgetting factor; give it to {type(self.forgetting).__name__} instead")
+                raise InputError(
+                    "floor: belongs to a forgetting factor; give it to"
+                    f" {type(self.forgetting).__name__} instead"
+                )
         elif not isinstance(self.forgetting, int | float | np.floating):
-            raise InputError(f"forgetting: expected a factor, Constant, Variable or Directional, got {self.forgetting!r}")
+            raise InputError(
+                "forgetting: expected a factor, Constant, Variable or Directional, got"
+                f" {self.forgetting!r}"
+            )
         else:
             check_floor(FLOOR if self.floor is None else self.floor)
             Constant(float(self.forgetting))
@@ -71,7 +92,9 @@ class RecursiveLeastSquares:
 
     def init(self) -> RLSState:
         """The state that knows nothing."""
-        state, work = (np.zeros(size, self.configuration.dtype) for size in self.configuration.sizes)
+        state, work = (
+            np.zeros(size, self.configuration.dtype) for size in self.configuration.sizes
+        )
         self._kernel.start(state, work)
         return RLSState(self.configuration, state)
 
@@ -80,10 +103,11 @@ class RecursiveLeastSquares:
         return Online(self.configuration, self._kernel, self._own(state))
 
     def update(self, state: RLSState, y: object, u: object, p: object) -> tuple[RLSState, RLSInfo]:
-        """Take in the sample y (ny,), u (nu,), p of one instant; returns the new state and what it did.
+        """Take in the sample y (ny,), u (nu,), p of one instant; returns the new state and what it
+        did.
 
-        A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises `InputError` for wrong
-        shapes, infinite values and p outside the basis.
+        A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises
+        `InputError` for wrong shapes, infinite values and p outside the basis.
         """
         online = self.online(state)
         return _outcome(online, online.update(y, u, p))
@@ -100,13 +124,17 @@ class RecursiveLeastSquares:
         return _outcome(online, online.absorb(phi, y))
 
     def run(self, record: FlightRecord, state: RLSState | None = None) -> History:
-        """Every sample of a record in turn, from `state` or from nothing; lags never reach across a gap.
+        """Every sample of a record in turn, from `state` or from nothing; lags never reach across a
+        gap.
 
         The same as `update` sample by sample.
         """
         arx, records = self.structure, as_records(record)
         if len(records) != 1:
-            raise InputError(f"run takes one record, got {len(records)}; go on from its state: run(second, run(first).state)")
+            raise InputError(
+                f"run takes one record, got {len(records)}; go on from its state: run(second,"
+                " run(first).state)"
+            )
         record = records[0]
         s, online = Samples.of(arx, record), self.online(state)
         rows = np.column_stack([s.y, s.u, s.p])
@@ -115,20 +143,32 @@ class RecursiveLeastSquares:
         for segment in s.segments:
             online.forget_past()
             parts.append(online.run(rows[segment]))
-        learnt, innovations, coefficients = (np.concatenate(part) for part in zip(*parts, strict=True))
+        learnt, innovations, coefficients = (
+            np.concatenate(part) for part in zip(*parts, strict=True)
+        )
         return History(
-            structure=arx, time=record.time, coefficients=coefficients.astype(float, copy=False),
-            innovations=innovations.astype(float, copy=False), state=online.state, dt=record.dt,
-            outputs=units_of(arx.outputs, [record]), inputs=units_of(arx.inputs, [record]),
-            scheduling=units_of(arx.parameters, [record]), dropped=int(len(record) - learnt.sum()),
-        )  # fmt: skip
+            structure=arx,
+            time=record.time,
+            coefficients=coefficients.astype(float, copy=False),
+            innovations=innovations.astype(float, copy=False),
+            state=online.state,
+            dt=record.dt,
+            outputs=units_of(arx.outputs, [record]),
+            inputs=units_of(arx.inputs, [record]),
+            scheduling=units_of(arx.parameters, [record]),
+            dropped=int(len(record) - learnt.sum()),
+        )
 
     def save(self, state: RLSState, path: str | os.PathLike[str]) -> None:
-        """Write `state` to a file from which `load` brings it back to the last bit; an old file is replaced at once or not at all."""
+        """Write `state` to a file from which `load` brings it back to the last bit; an old file is
+        replaced at once or not at all.
+        """
         saved_state.save(self._own(state), path)
 
     def load(self, path: str | os.PathLike[str]) -> RLSState:
-        """The state in a file of `save`. Raises `InputError` for a damaged file, or one of another structure, forgetting or precision."""
+        """The state in a file of `save`. Raises `InputError` for a damaged file, or one of another
+        structure, forgetting or precision.
+        """
         return saved_state.load(self.configuration, path)
 
     @cached_property
@@ -139,13 +179,24 @@ class RecursiveLeastSquares:
         if state is None:
             return self.init()
         if not isinstance(state, RLSState):
-            raise InputError(f"state: expected one from init, update, run or load, got {state!r:.80}")
-        if state.configuration.structure != self.structure or state.memory.dtype != self.configuration.dtype:
-            raise InputError("state: it belongs to an estimator with another structure or precision; start with init()")
+            raise InputError(
+                f"state: expected one from init, update, run or load, got {state!r:.80}"
+            )
+        if (
+            state.configuration.structure != self.structure
+            or state.memory.dtype != self.configuration.dtype
+        ):
+            raise InputError(
+                "state: it belongs to an estimator with another structure or precision; start with"
+                " init()"
+            )
         return state
 
 
 def _outcome(online: Online, available: bool) -> tuple[RLSState, RLSInfo]:
     state = online.state
-    innovation, gain = (part.astype(float) if available else np.full(part.shape, np.nan) for part in (online.innovation, online.gain))
+    innovation, gain = (
+        part.astype(float) if available else np.full(part.shape, np.nan)
+        for part in (online.innovation, online.gain)
+    )
     return state, RLSInfo(available, innovation, gain, state.theta, state.determined)

@@ -1,4 +1,6 @@
-"""Ridge regression: coefficients the data hardly determine are held small, or held constant in p."""
+"""Ridge regression: coefficients the data hardly determine are held small, or held constant in
+p.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,12 @@ GRID = np.linspace(-14.0, 4.0, 37)
 class Ridge:
     """What is penalised, and how much.
 
-    The penalty of one lagged signal with the coefficient a(p) is its mean square times the mean of a(p)^2 over the range of the
-    basis (`towards="zero"`), or of the variation of a(p) about its mean there (`towards="constant"`, the default: the more weight,
-    the closer to the LTI model). It is measured in the output squared, as the mean squared residual is, and depends neither on
-    the units nor on the functions chosen to write a(p). `weight` multiplies it; None: by generalised cross-validation, for each output.
+    The penalty of one lagged signal with the coefficient a(p) is its mean square times the mean of
+    a(p)^2 over the range of the basis (`towards="zero"`), or of the variation of a(p) about its
+    mean there (`towards="constant"`, the default: the more weight, the closer to the LTI model). It
+    is measured in the output squared, as the mean squared residual is, and depends neither on the
+    units nor on the functions chosen to write a(p). `weight` multiplies it; None: by generalised
+    cross-validation, for each output.
     """
 
     weight: float | None = None
@@ -35,7 +39,9 @@ class Ridge:
 
     def __post_init__(self) -> None:
         if self.weight is not None and not (np.isfinite(self.weight) and self.weight >= 0):
-            raise InputError(f"weight: expected a number >= 0, or None for cross-validation, got {self.weight!r}")
+            raise InputError(
+                f"weight: expected a number >= 0, or None for cross-validation, got {self.weight!r}"
+            )
         if self.towards not in ("constant", "zero"):
             raise InputError(f'towards: expected "constant" or "zero", got {self.towards!r}')
 
@@ -58,7 +64,9 @@ def ridge(arx: LPVARX, data: Regression, options: Ridge) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """|Z - R b|^2 + m weight |L b|^2 in scaled columns, R'R = X'X; `rest` what no b explains, m samples."""
+    """|Z - R b|^2 + m weight |L b|^2 in scaled columns, R'R = X'X; `rest` what no b explains, m
+    samples.
+    """
 
     R: Array
     Z: Array
@@ -72,11 +80,20 @@ class _Problem:
         X = data.phi[:, arx.regressors(group)]
         scale = column_scale(X) / np.sqrt(max(len(X), 1))
         (root, whitened), size = _penalty_roots(arx.basis, options.towards), arx.basis.size
-        blocks = [X[:, j : j + size] @ whitened for j in range(0, X.shape[1], size)]  # one lagged signal each, in orthonormal functions
+        blocks = [
+            X[:, j : j + size] @ whitened for j in range(0, X.shape[1], size)
+        ]  # one lagged signal each, in orthonormal functions
         sizes = [np.linalg.norm(block) / np.sqrt(size * max(len(X), 1)) for block in blocks]
         Q, R = np.linalg.qr(X / scale)
         Z = Q.T @ data.y
-        return cls(R, Z, block_diag(*(s * root for s in sizes)) / scale, np.sum((data.y - Q @ Z) ** 2, axis=0), len(X), scale)
+        return cls(
+            R,
+            Z,
+            block_diag(*(s * root for s in sizes)) / scale,
+            np.sum((data.y - Q @ Z) ** 2, axis=0),
+            len(X),
+            scale,
+        )
 
     def solve(self, weight: float, y: int) -> Array:
         """Coefficients (n,) of one output."""
@@ -84,7 +101,8 @@ class _Problem:
         diagonal = np.abs(np.diagonal(T))
         if diagonal.min(initial=np.inf) <= 1e-13 * diagonal.max(initial=0.0):
             raise ExcitationError(
-                "data and penalty do not determine every coefficient; raise the weight, penalise towards zero, or excite the inputs"
+                "data and penalty do not determine every coefficient; raise the weight, penalise"
+                " towards zero, or excite the inputs"
             )
         return solve_triangular(T, Z) / self.scale
 
@@ -93,7 +111,12 @@ class _Problem:
         scores = [self._score(10.0**d, y) for d in GRID]
         best = int(np.argmin(scores))
         around = (GRID[max(best - 1, 0)], GRID[min(best + 1, len(GRID) - 1)])
-        found = minimize_scalar(lambda d: self._score(10.0**d, y), bounds=around, method="bounded", options={"xatol": 0.01})
+        found = minimize_scalar(
+            lambda d: self._score(10.0**d, y),
+            bounds=around,
+            method="bounded",
+            options={"xatol": 0.01},
+        )
         return float(10.0 ** (found.x if found.fun < scores[best] else GRID[best]))
 
     def _score(self, weight: float, y: int) -> float:
@@ -113,11 +136,20 @@ class _Problem:
 
 
 def _penalty_roots(basis: FunctionSpace, towards: str) -> tuple[Array, Array]:
-    """L with |L a|^2 the mean square over the box of sum_j a_j f_j, or its variance, and W such that the functions W'f are orthonormal."""
-    nodes, weights = np.polynomial.legendre.leggauss(128 if basis.dimension == 1 else max(round(4096 ** (1 / basis.dimension)), 8))
+    """L with |L a|^2 the mean square over the box of sum_j a_j f_j, or its variance, and W such
+    that the functions W'f are orthonormal.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(
+        128 if basis.dimension == 1 else max(round(4096 ** (1 / basis.dimension)), 8)
+    )
     axes = [0.5 * (low + high) + 0.5 * (high - low) * nodes for low, high in basis.ranges]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, basis.dimension)
-    mass = np.prod(np.stack(np.meshgrid(*[weights / 2] * basis.dimension, indexing="ij"), axis=-1).reshape(-1, basis.dimension), axis=1)
+    mass = np.prod(
+        np.stack(np.meshgrid(*[weights / 2] * basis.dimension, indexing="ij"), axis=-1).reshape(
+            -1, basis.dimension
+        ),
+        axis=1,
+    )
     f = basis(grid[:, 0] if basis.dimension == 1 else grid)
     values, vectors = np.linalg.eigh(f.T @ (mass[:, None] * f))
     whitened = vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))

@@ -17,7 +17,9 @@ from symheli.lpv.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class RLSState:
-    """All the estimator remembers; every update returns a new one. `memory` is the kernel's, the properties are what it means."""
+    """All the estimator remembers; every update returns a new one. `memory` is the kernel's, the
+    properties are what it means.
+    """
 
     configuration: Configuration
     memory: Array
@@ -34,11 +36,15 @@ class RLSState:
     def factor(self) -> Array:
         """(n + ny, n + ny), upper triangular, [[R, Z], [0, S]].
 
-        R'R is the weighted information of the regressors, R theta = Z, and S'S the weighted sum of squared residuals. Raises
-        `InputError` where outputs have different regressors, hence several factors: see `factors`.
+        R'R is the weighted information of the regressors, R theta = Z, and S'S the weighted sum of
+        squared residuals. Raises `InputError` where outputs have different regressors, hence
+        several factors: see `factors`.
         """
         if len(self.configuration.groups) > 1:
-            raise InputError(f"this structure has {len(self.configuration.groups)} groups of outputs, each with its factor: see factors")
+            raise InputError(
+                f"this structure has {len(self.configuration.groups)} groups of outputs, each with"
+                " its factor: see factors"
+            )
         return self.factors[0]
 
     @property
@@ -46,7 +52,11 @@ class RLSState:
         """The factor of each group of outputs that share a regressor."""
         names = [f"factor {g}" for g in range(len(self.configuration.groups))]
         return tuple(
-            self._remember(name, self._factor(layout)) if name not in self._learnt else self._learnt[name]
+            (
+                self._remember(name, self._factor(layout))
+                if name not in self._learnt
+                else self._learnt[name]
+            )
             for name, layout in zip(names, self.configuration.groups, strict=True)
         )
 
@@ -59,10 +69,14 @@ class RLSState:
 
     @property
     def peak(self) -> Array:
-        """(n,) largest regressors to expect: each signal at its largest so far, times each function at its largest."""
+        """(n,) largest regressors to expect: each signal at its largest so far, times each function
+        at its largest.
+        """
         out = np.zeros(self.configuration.structure.n_regressors)
         for layout in self.configuration.groups:
-            out[self.configuration.structure.regressors(layout.group)] = self._part(layout, "peak")[: layout.n]
+            out[self.configuration.structure.regressors(layout.group)] = self._part(layout, "peak")[
+                : layout.n
+            ]
         return out
 
     @property
@@ -88,32 +102,47 @@ class RLSState:
 
     @property
     def saturated(self) -> bool:
-        """Whether an ordinary sample is lost to rounding: in single precision that never forgets, after 8.4e6 samples."""
+        """Whether an ordinary sample is lost to rounding: in single precision that never forgets,
+        after 8.4e6 samples.
+        """
         return max(self._header(at.WEIGHT)) * float(np.finfo(self.configuration.dtype).eps) >= 1
 
     def solve(self) -> Array:
-        """The least-squares coefficients (n, ny), R theta = Z, in double precision; `theta` agrees with them to rounding."""
+        """The least-squares coefficients (n, ny), R theta = Z, in double precision; `theta` agrees
+        with them to rounding.
+        """
         structure = self.configuration.structure
         out = np.zeros((structure.n_regressors, structure.ny))
         for layout in self.configuration.groups:
-            n, triangle = layout.n, layout.triangle.full(self._part(layout, "triangle").astype(float))
+            n, triangle = (
+                layout.n,
+                layout.triangle.full(self._part(layout, "triangle").astype(float)),
+            )
             where = structure.regressors(layout.group)[:, None], layout.group.outputs
             out[where] = solve_triangular(triangle[:n, :n], triangle[:n, n:], unit_diagonal=True)
         return out
 
     @property
     def residual_covariance(self) -> Array:
-        """Weighted covariance (ny, ny) of the residuals, per degree of freedom left; 0 between outputs with different regressors."""
+        """Weighted covariance (ny, ny) of the residuals, per degree of freedom left; 0 between
+        outputs with different regressors.
+        """
         ny = self.configuration.structure.ny
         out = np.zeros((ny, ny))
-        for layout, factor, weight in zip(self.configuration.groups, self.factors, self._header(at.WEIGHT), strict=True):
+        for layout, factor, weight in zip(
+            self.configuration.groups, self.factors, self._header(at.WEIGHT), strict=True
+        ):
             S = factor[layout.n :, layout.n :]
-            out[np.ix_(layout.group.outputs, layout.group.outputs)] = S.T @ S / max(weight - layout.n, 1.0)
+            out[np.ix_(layout.group.outputs, layout.group.outputs)] = (
+                S.T @ S / max(weight - layout.n, 1.0)
+            )
         return out
 
     def _factor(self, layout: GroupLayout) -> Array:
         d = self._part(layout, "d")[layout.triangle.used].astype(float)
-        return np.sqrt(d)[:, None] * layout.triangle.full(self._part(layout, "triangle").astype(float))
+        return np.sqrt(d)[:, None] * layout.triangle.full(
+            self._part(layout, "triangle").astype(float)
+        )
 
     def _part(self, layout: GroupLayout, name: str) -> Array:
         return self.memory[layout.in_state[name]]
@@ -128,10 +157,12 @@ class RLSState:
 
 
 class RLSInfo(NamedTuple):
-    """What one sample did: `innovation` (ny,) y minus its prediction before the update, `gain`, `coefficients` (n, ny).
+    """What one sample did: `innovation` (ny,) y minus its prediction before the update, `gain`,
+    `coefficients` (n, ny).
 
-    `gain` (n,) is how the coefficients of an output move per unit of its innovation; (n, ny) where outputs have different
-    regressors. Without a complete regressor (`available` False) innovation and gain are NaN and nothing was learnt.
+    `gain` (n,) is how the coefficients of an output move per unit of its innovation; (n, ny) where
+    outputs have different regressors. Without a complete regressor (`available` False) innovation
+    and gain are NaN and nothing was learnt.
     """
 
     available: bool

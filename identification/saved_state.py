@@ -21,29 +21,46 @@ SCHEMA, VERSION = "symheli recursive estimator", 3
 
 
 def save(state: RLSState, path: str | os.PathLike[str]) -> None:
-    """Write `state` with what it belongs to. Raises `SymheliError` where the disk is full or the folder cannot be written."""
+    """Write `state` with what it belongs to. Raises `SymheliError` where the disk is full or the
+    folder cannot be written.
+    """
     numbers = [float(value).hex() for value in state.memory]
     content = {
-        "schema": SCHEMA, "version": VERSION, **description(state.configuration), "digest": _digest(numbers), "memory": numbers,
-    }  # fmt: skip
+        "schema": SCHEMA,
+        "version": VERSION,
+        **description(state.configuration),
+        "digest": _digest(numbers),
+        "memory": numbers,
+    }
     write_text(path, json.dumps(content, indent=1) + "\n")
 
 
 def load(configuration: Configuration, path: str | os.PathLike[str]) -> RLSState:
-    """The state in `path`; raises `InputError` unless it is whole and belongs to an estimator of this configuration."""
+    """The state in `path`; raises `InputError` unless it is whole and belongs to an estimator of
+    this configuration.
+    """
     content = _read(Path(path))
     if content.get("schema") != SCHEMA:
         raise InputError(f"{path}: expected a file of {SCHEMA!r}, got {content.get('schema')!r}")
     if content.get("version") != VERSION:
-        raise InputError(f"{path}: version {content.get('version')!r} of the format, this program reads {VERSION}")
+        raise InputError(
+            f"{path}: version {content.get('version')!r} of the format, this program reads"
+            f" {VERSION}"
+        )
     for part, expected in description(configuration).items():
         _require_same(path, part, expected, content.get(part))
     numbers = content.get("memory")
     if not isinstance(numbers, list) or _digest(numbers) != content.get("digest"):
-        raise InputError(f"{path}: the numbers do not match their digest, the file is damaged; take an older copy")
+        raise InputError(
+            f"{path}: the numbers do not match their digest, the file is damaged; take an older"
+            " copy"
+        )
     memory = np.array([float.fromhex(value) for value in numbers], configuration.dtype)
     if memory.shape != (configuration.sizes[0],) or not np.isfinite(memory).all():
-        raise InputError(f"{path}: expected {configuration.sizes[0]} finite numbers, got {len(memory)}, or some that are not finite")
+        raise InputError(
+            f"{path}: expected {configuration.sizes[0]} finite numbers, got {len(memory)}, or some"
+            " that are not finite"
+        )
     return RLSState(configuration, memory)
 
 
@@ -57,9 +74,17 @@ def description(configuration: Configuration) -> dict[str, Any]:
 
 
 def _fields(value: Any) -> dict[str, str]:
-    """Fields that are not at their default: a later version may add one without making old files unreadable."""
-    given = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if getattr(value, f.name) != f.default}
-    return {name: re.sub(r" at 0x[0-9a-f]+", "", repr(value)) for name, value in given.items()}  # functions go by their name
+    """Fields that are not at their default: a later version may add one without making old files
+    unreadable.
+    """
+    given = {
+        f.name: getattr(value, f.name)
+        for f in dataclasses.fields(value)
+        if getattr(value, f.name) != f.default
+    }
+    return {
+        name: re.sub(r" at 0x[0-9a-f]+", "", repr(value)) for name, value in given.items()
+    }  # functions go by their name
 
 
 def _require_same(path: str | os.PathLike[str], part: str, expected: Any, got: Any) -> None:
@@ -67,8 +92,14 @@ def _require_same(path: str | os.PathLike[str], part: str, expected: Any, got: A
         return
     if isinstance(expected, dict) and isinstance(got, dict):
         name = next(n for n in (*expected, *got) if expected.get(n) != got.get(n))
-        part, expected, got = f"{part}, {name}", expected.get(name, "the default"), got.get(name, "the default")
-    raise InputError(f"{path}: the state belongs to another estimator: {part} is {got}, expected {expected}")
+        part, expected, got = (
+            f"{part}, {name}",
+            expected.get(name, "the default"),
+            got.get(name, "the default"),
+        )
+    raise InputError(
+        f"{path}: the state belongs to another estimator: {part} is {got}, expected {expected}"
+    )
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -77,7 +108,9 @@ def _read(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
     except ValueError as error:
-        raise InputError(f"{path}: not a whole file of {SCHEMA!r} ({error}); take an older copy") from error
+        raise InputError(
+            f"{path}: not a whole file of {SCHEMA!r} ({error}); take an older copy"
+        ) from error
     if not isinstance(content, dict):
         raise InputError(f"{path}: not a file of {SCHEMA!r}")
     return content

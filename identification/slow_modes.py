@@ -1,4 +1,6 @@
-"""Modes far slower than the samples: what noise leaves of them, and the rate at which they would be seen."""
+"""Modes far slower than the samples: what noise leaves of them, and the rate at which they would be
+seen.
+"""
 
 from __future__ import annotations
 
@@ -22,16 +24,18 @@ LOST = 0.25
 """Of the rate of decay or growth, |Re s|: an error beyond leaves a mode unknown."""
 
 SHARES = (0.5, 0.8, 0.9)
-"""Parts of the noise that are taken off the information to see whether a pole stays. All of it would leave directions that noise alone
-determines with nothing, and what stands there would be chance."""
+"""Parts of the noise that are taken off the information to see whether a pole stays. All of it
+would leave directions that noise alone determines with nothing, and what stands there would be
+chance.
+"""
 
 
 @dataclass(frozen=True)
 class SlowMode:
     """A slow pole `s` (complex, 1/s) of the model at the scheduling `p` (one number a parameter).
 
-    `standard_error` (1/s) of the pole, from that of the coefficients; `shift` (1/s): how far it moves when least squares is told that
-    the residuals are noise of the sensors.
+    `standard_error` (1/s) of the pole, from that of the coefficients; `shift` (1/s): how far it
+    moves when least squares is told that the residuals are noise of the sensors.
     """
 
     p: tuple[float, ...]
@@ -51,7 +55,9 @@ class SlowMode:
 
     @property
     def period(self) -> float:
-        """The sample period (s) at which the mode, as fast as it may be, would not be slow: 0.1 / max(|s|, error)."""
+        """The sample period (s) at which the mode, as fast as it may be, would not be slow: 0.1 /
+        max(|s|, error).
+        """
         return SLOW / max(abs(self.s), self.error)
 
 
@@ -69,25 +75,35 @@ class SlowModes:
 
     def __str__(self) -> str:
         if not self.lost:
-            return f"slow modes: {f'{len(self.modes)}, decay or growth of each known to a quarter' if self.modes else 'none'}"
+            known = f"{len(self.modes)}, decay or growth of each known to a quarter"
+            return f"slow modes: {known if self.modes else 'none'}"
         worst = max(self.lost, key=lambda m: m.error / abs(m.s))
-        at, together = ", ".join(f"{value:.3g}" for value in worst.p), max(round(worst.period / self.dt), 2)
+        at, together = (
+            ", ".join(f"{value:.3g}" for value in worst.p),
+            max(round(worst.period / self.dt), 2),
+        )
         return (
-            f"slow modes: NOT known at {1 / self.dt:.3g} Hz: the pole {worst.s:.2g} 1/s at p = {at} is uncertain by "
-            f"{2 * worst.standard_error:.2g} (two standard errors) and moves by {worst.shift:.2g} where the residuals are taken for noise "
-            f"of the sensors; for this mode identify at about {1 / (self.dt * together):.2g} Hz (means of {together} samples, delay 0), "
-            f"or by instruments"
+            f"slow modes: NOT known at {1 / self.dt:.3g} Hz: the pole {worst.s:.2g} 1/s at p = {at}"
+            f" is uncertain by {2 * worst.standard_error:.2g} (two standard errors) and moves by"
+            f" {worst.shift:.2g} where the residuals are taken for noise of the sensors; for this"
+            f" mode identify at about {1 / (self.dt * together):.2g} Hz (means of {together}"
+            " samples, delay 0), or by instruments"
         )
 
 
-def slow_modes(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord], points: int = 5) -> SlowModes:
-    """The poles with |log z| < 0.1 of a least-squares model at `points` quantiles of p, and what noise leaves of them.
+def slow_modes(
+    model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord], points: int = 5
+) -> SlowModes:
+    """The poles with |log z| < 0.1 of a least-squares model at `points` quantiles of p, and what
+    noise leaves of them.
 
-    Noise of variance s_j^2 on output j adds N, blocks s_j^2 sum f f' at its lags, to the information Phi' Phi, and draws slow poles away
-    from 1 or the unit circle; s_j^2 is what leaves residuals of the size there are. The shift is the largest that
-    (Phi' Phi - c N)^-1 Phi' y makes with c = 0.5, 0.8, 0.9. Standard errors follow the poles to first order. Where the residuals are
-    gusts, not sensors, the shift is too large. Raises `InputError` for models that are not of least squares.
-    Source: Soderstrom (2007), Errors-in-variables methods in system identification, Automatica 43, sec. 5 (bias compensation).
+    Noise of variance s_j^2 on output j adds N, blocks s_j^2 sum f f' at its lags, to the
+    information Phi' Phi, and draws slow poles away from 1 or the unit circle; s_j^2 is what leaves
+    residuals of the size there are. The shift is the largest that (Phi' Phi - c N)^-1 Phi' y makes
+    with c = 0.5, 0.8, 0.9. Standard errors follow the poles to first order. Where the residuals are
+    gusts, not sensors, the shift is too large. Raises `InputError` for models that are not of least
+    squares. Source: Soderstrom (2007), Errors-in-variables methods in system identification,
+    Automatica 43, sec. 5 (bias compensation).
     """
     records = as_records(records)
     joint, data = uncertainty(model, records).joint, stacked(model.structure, records)
@@ -100,7 +116,14 @@ def slow_modes(model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord
             if z.imag >= 0 and 0 < abs(np.log(z)) < SLOW:
                 shift = max(float(np.min(np.abs(np.log(poles) - np.log(z)))) for poles in moved)
                 error = _standard_error(model, joint, row, z)
-                found.append(SlowMode(tuple(map(float, row)), complex(np.log(z) / model.dt), error, shift / model.dt))
+                found.append(
+                    SlowMode(
+                        tuple(map(float, row)),
+                        complex(np.log(z) / model.dt),
+                        error,
+                        shift / model.dt,
+                    )
+                )
     return SlowModes(tuple(found), model.dt)
 
 
@@ -108,14 +131,22 @@ def _compensated(model: LPVARXModel, data: Regression) -> list[Array]:
     """theta (n, ny) with each of `SHARES` of the noise taken off."""
     arx, theta, size = model.structure, model.theta, model.structure.basis.size
     f, phi = arx.basis(data.p), data.phi
-    lagged = [(slice(i * size, (i + 1) * size), e.channel) for i, e in enumerate(arx.entries) if e.kind == "output"]
+    lagged = [
+        (slice(i * size, (i + 1) * size), e.channel)
+        for i, e in enumerate(arx.entries)
+        if e.kind == "output"
+    ]
     # white noise v on the outputs leaves residuals v(k) + sum A_i v(k-i)
     gain = np.eye(arx.ny)
     for block, channel in lagged:
         gain[:, channel] += np.mean((f @ theta[block]) ** 2, axis=0)
     variance = nnls(gain, np.mean((data.y - phi @ theta) ** 2, axis=0))[0]
     scale = column_scale(phi)
-    P, Q, N = phi.T @ phi / np.outer(scale, scale), phi.T @ data.y / scale[:, None], np.zeros((len(scale), len(scale)))
+    P, Q, N = (
+        phi.T @ phi / np.outer(scale, scale),
+        phi.T @ data.y / scale[:, None],
+        np.zeros((len(scale), len(scale))),
+    )
     for block, channel in lagged:
         N[block, block] = variance[channel] * (f.T @ f) / np.outer(scale[block], scale[block])
     out = []
@@ -124,7 +155,10 @@ def _compensated(model: LPVARXModel, data: Regression) -> list[Array]:
         for group in arx.groups:
             rows, columns = arx.regressors(group), np.array(group.outputs)
             square = (P - share * N)[rows[:, None], rows]
-            new[rows[:, None], columns] = np.linalg.lstsq(square, Q[rows[:, None], columns], rcond=None)[0] / scale[rows, None]
+            new[rows[:, None], columns] = (
+                np.linalg.lstsq(square, Q[rows[:, None], columns], rcond=None)[0]
+                / scale[rows, None]
+            )
         out.append(new)
     return out
 
@@ -140,8 +174,14 @@ def _poles(model: LPVARXModel, p: Array) -> Array:
 
 
 def _standard_error(model: LPVARXModel, joint: Array, p: Array, z: complex) -> float:
-    """Of log z / dt. With M(z) = I + sum A_i z^-i, l' M = 0 and M r = 0: dz = -(l' sum dA_i z^-i r)/(l' M'(z) r)."""
-    arx, A, f = model.structure, model.coefficients.at(_argument(p)).A, np.ravel(model.structure.basis(_argument(p)))
+    """Of log z / dt. With M(z) = I + sum A_i z^-i, l' M = 0 and M r = 0: dz = -(l' sum dA_i z^-i
+    r)/(l' M'(z) r).
+    """
+    arx, A, f = (
+        model.structure,
+        model.coefficients.at(_argument(p)).A,
+        np.ravel(model.structure.basis(_argument(p))),
+    )
     powers = [z ** -float(i) for i in range(1, len(A) + 1)]
     M = np.eye(arx.ny) + sum(a * w for a, w in zip(A, powers, strict=True))
     slope = sum(-i * a * w / z for i, (a, w) in enumerate(zip(A, powers, strict=True), start=1))
@@ -150,7 +190,9 @@ def _standard_error(model: LPVARXModel, joint: Array, p: Array, z: complex) -> f
     gradient, size = np.zeros((arx.ny, arx.n_regressors), complex), arx.basis.size
     for i, e in enumerate(arx.entries):
         if e.kind == "output":
-            gradient[:, i * size : (i + 1) * size] = -np.outer(left, right[e.channel] * powers[e.lag - 1] * f)
+            gradient[:, i * size : (i + 1) * size] = -np.outer(
+                left, right[e.channel] * powers[e.lag - 1] * f
+            )
     gradient /= left @ slope @ right
     variance = np.einsum("yi,yizj,zj->", gradient, joint, gradient.conj()).real
     return float(np.sqrt(max(variance, 0.0)) / abs(z) / model.dt)

@@ -1,4 +1,6 @@
-"""What is to be identified: which signals, which lags, which functions of the scheduling parameters."""
+"""What is to be identified: which signals, which lags, which functions of the scheduling
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from symheli.lpv.arrays import Array
 
 
 class Term(NamedTuple):
-    """One block of regressors: signals of one kind at one lag (samples), each times the basis at p(k - p_lag).
+    """One block of regressors: signals of one kind at one lag (samples), each times the basis at
+    p(k - p_lag).
 
     `signals` are positions among the outputs, the inputs or the scheduling parameters.
     """
@@ -28,7 +31,9 @@ class Term(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """One signal of a term, by its position `channel` among those of its kind; it takes one regressor for each function of the basis."""
+    """One signal of a term, by its position `channel` among those of its kind; it takes one
+    regressor for each function of the basis.
+    """
 
     kind: Literal["output", "input", "offset", "increment"]
     channel: int
@@ -37,7 +42,9 @@ class Entry(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Outputs whose equations have the same regressors: positions in `LPVARX.outputs` and in `LPVARX.entries`, ascending."""
+    """Outputs whose equations have the same regressors: positions in `LPVARX.outputs` and in
+    `LPVARX.entries`, ascending.
+    """
 
     outputs: tuple[int, ...]
     entries: tuple[int, ...]
@@ -45,34 +52,38 @@ class Group(NamedTuple):
 
 @dataclass(frozen=True)
 class LPVARX:
-    """Linear difference equation whose coefficients are functions of scheduling parameters p, any number of inputs and outputs.
+    """Linear difference equation whose coefficients are functions of scheduling parameters p, any
+    number of inputs and outputs.
 
-        y(k) = -sum_{i=1..na} A_i(p) y(k-i) + sum_{j=0..nb-1} B_j(p) u(k-delay-j) + c(p) + d(p) (p(k) - p(k-1))
+        y(k) = -sum_{i=1..na} A_i(p) y(k-i) + sum_{j=0..nb-1} B_j(p) u(k-delay-j)
+               + c(p) + d(p) (p(k) - p(k-1))
 
-    y (ny,) are the signals `outputs`, u (nu,) the signals `inputs`, in their own units; A_i (ny, ny), B_j (ny, nu),
-    c (ny,) and d (ny, parameters) are combinations of the functions of `basis`. `delay` 0 is direct feedthrough. One
-    formulation covers one or many inputs and outputs.
+    y (ny,) are the signals `outputs`, u (nu,) the signals `inputs`, in their own units; A_i (ny,
+    ny), B_j (ny, nu), c (ny,) and d (ny, parameters) are combinations of the functions of `basis`.
+    `delay` 0 is direct feedthrough. One formulation covers one or many inputs and outputs.
 
-    `na`, `nb` and `delay` are numbers for all signals, or tables: {output: number} says it for the equation of each output,
-    {input: number} (nb, delay) for each input in all equations, {output: {signal: number}} for each signal in each equation; rows of
-    numbers, one an output, say the same. Order 0 leaves a signal out of an equation.
+    `na`, `nb` and `delay` are numbers for all signals, or tables: {output: number} says it for the
+    equation of each output, {input: number} (nb, delay) for each input in all equations, {output:
+    {signal: number}} for each signal in each equation; rows of numbers, one an output, say the
+    same. Order 0 leaves a signal out of an equation.
 
     `scheduling` names one parameter, or several: then `basis` is a `Product`.
 
-    A scheduling parameter may be an output or an input too. For an output only "lag" without `offset_rate` is causal then, and the offset's
-    functions of p repeat some of the output's.
+    A scheduling parameter may be an output or an input too. For an output only "lag" without
+    `offset_rate` is causal then, and the offset's functions of p repeat some of the output's.
 
-    `scheduling_at="lag"` (default): each coefficient is taken at p(k - lag of its term), c and d at p(k-1): the form
-    that has a minimal state-space realization with static dependence. "now": every coefficient at p(k), as in Budiyono
-    and Sutarto, eqs 9-14.
+    `scheduling_at="lag"` (default): each coefficient is taken at p(k - lag of its term), c and d at
+    p(k-1): the form that has a minimal state-space realization with static dependence. "now": every
+    coefficient at p(k), as in Budiyono and Sutarto, eqs 9-14.
 
-    `offset` adds c(p), the moving trim. `offset_rate` adds d(p) times the change of p over the step that leads to y(k):
-    causal, so that batch and recursive estimates see the same number, and free of the sample period. For whole outputs
-    that move about a trim x0(p), d(p) is x0'(p) to first order in the step; d(p) dt multiplies dp/dt.
+    `offset` adds c(p), the moving trim. `offset_rate` adds d(p) times the change of p over the step
+    that leads to y(k): causal, so that batch and recursive estimates see the same number, and free
+    of the sample period. For whole outputs that move about a trim x0(p), d(p) is x0'(p) to first
+    order in the step; d(p) dt multiplies dp/dt.
 
-    Raises `InputError` for repeated or missing names, negative orders, a basis of another number of parameters, an unknown
-    `scheduling_at` or an output that would predict itself.
-    Source: Bamieh and Giarre (2002), Identification of linear parameter varying models.
+    Raises `InputError` for repeated or missing names, negative orders, a basis of another number of
+    parameters, an unknown `scheduling_at` or an output that would predict itself. Source: Bamieh
+    and Giarre (2002), Identification of linear parameter varying models.
     """
 
     outputs: tuple[str, ...]
@@ -95,15 +106,23 @@ class LPVARX:
         if both:
             raise InputError(f"a signal is either an output or an input; both: {', '.join(both)}")
         for name, signals in (("na", self.outputs), ("nb", self.inputs), ("delay", self.inputs)):
-            object.__setattr__(self, name, compact(getattr(self, name), name, self.outputs, signals))
+            object.__setattr__(
+                self, name, compact(getattr(self, name), name, self.outputs, signals)
+            )
         parameters = _names(self.scheduling, "scheduling")
-        object.__setattr__(self, "scheduling", parameters[0] if len(parameters) == 1 else parameters)
+        object.__setattr__(
+            self, "scheduling", parameters[0] if len(parameters) == 1 else parameters
+        )
         if not isinstance(self.basis, FunctionSpace):
-            raise InputError(f"basis: expected a basis such as Polynomial(degree=2, low=0, high=13), got {self.basis!r}")
+            raise InputError(
+                "basis: expected a basis such as Polynomial(degree=2, low=0, high=13), got"
+                f" {self.basis!r}"
+            )
         if self.basis.dimension != len(parameters):
             raise InputError(
-                f"scheduling names {len(parameters)} parameters ({', '.join(parameters)}) and the basis has {self.basis.dimension}; "
-                f"bases of several parameters are products: Product((Polynomial(...), Polynomial(...)))"
+                f"scheduling names {len(parameters)} parameters ({', '.join(parameters)}) and the"
+                f" basis has {self.basis.dimension}; bases of several parameters are products:"
+                " Product((Polynomial(...), Polynomial(...)))"
             )
         if self.scheduling_at not in ("lag", "now"):
             raise InputError(f'scheduling_at: expected "lag" or "now", got {self.scheduling_at!r}')
@@ -111,7 +130,8 @@ class LPVARX:
         if known and (self.offset_rate or self.scheduling_at == "now"):
             what = "offset_rate" if self.offset_rate else 'scheduling_at="now"'
             raise InputError(
-                f"{known[0]} is an output and schedules the coefficients: with {what} its own value at k would predict it; "
+                f"{known[0]} is an output and schedules the coefficients: with {what} its own value"
+                " at k would predict it; "
                 f'leave offset_rate out and take scheduling_at="lag", or schedule on a command'
             )
         for flag in ("offset", "offset_rate"):
@@ -119,7 +139,10 @@ class LPVARX:
                 raise InputError(f"{flag}: expected True or False, got {getattr(self, flag)!r}")
         empty = [y for y, used in zip(self.outputs, self.free.T, strict=True) if not used.any()]
         if empty:
-            raise InputError(f"nothing to identify for {', '.join(empty)}: give na >= 1, or nb >= 1 with inputs, or offset=True")
+            raise InputError(
+                f"nothing to identify for {', '.join(empty)}: give na >= 1, or nb >= 1 with inputs,"
+                " or offset=True"
+            )
 
     @property
     def ny(self) -> int:
@@ -143,9 +166,14 @@ class LPVARX:
 
     @cached_property
     def input_lag_ranges(self) -> tuple[tuple[range, ...], ...]:
-        """The lags of each input (column) in the equation of each output (row): delay .. delay + nb - 1."""
+        """The lags of each input (column) in the equation of each output (row): delay .. delay + nb
+        - 1.
+        """
         orders, delays = (table(v, "nb", self.outputs, self.inputs) for v in (self.nb, self.delay))
-        return tuple(tuple(range(d, d + n) for n, d in zip(*rows, strict=True)) for rows in zip(orders, delays, strict=True))
+        return tuple(
+            tuple(range(d, d + n) for n, d in zip(*rows, strict=True))
+            for rows in zip(orders, delays, strict=True)
+        )
 
     @cached_property
     def output_lags(self) -> range:
@@ -165,14 +193,23 @@ class LPVARX:
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """The blocks of regressors in their order: outputs, inputs, offset, increment of p; those some equation has."""
+        """The blocks of regressors in their order: outputs, inputs, offset, increment of p; those
+        some equation has.
+        """
         return tuple(self._terms())
 
     def _terms(self) -> Iterator[Term]:
         at_lag = self.scheduling_at == "lag"
-        for kind, lags, count in (("output", self.output_lags, self.ny), ("input", self.input_lags, self.nu)):
+        for kind, lags, count in (
+            ("output", self.output_lags, self.ny),
+            ("input", self.input_lags, self.nu),
+        ):
             for lag in lags:
-                signals = tuple(s for s in range(count) if any(self._has(kind, lag, s, y) for y in range(self.ny)))
+                signals = tuple(
+                    s
+                    for s in range(count)
+                    if any(self._has(kind, lag, s, y) for y in range(self.ny))
+                )
                 if signals:
                     yield Term(kind, lag, lag if at_lag else 0, signals)  # type: ignore[arg-type]
         if self.offset:
@@ -196,10 +233,14 @@ class LPVARX:
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
-        """Which outputs share their regressors: all of them, unless orders or delays differ between equations."""
+        """Which outputs share their regressors: all of them, unless orders or delays differ between
+        equations.
+        """
         members: dict[tuple[int, ...], list[int]] = {}
         for y in range(self.ny):
-            used = tuple(i for i, e in enumerate(self.entries) if self._has(e.kind, e.lag, e.channel, y))
+            used = tuple(
+                i for i, e in enumerate(self.entries) if self._has(e.kind, e.lag, e.channel, y)
+            )
             members.setdefault(used, []).append(y)
         return tuple(Group(tuple(outputs), entries) for entries, outputs in members.items())
 
@@ -210,7 +251,9 @@ class LPVARX:
 
     @cached_property
     def free(self) -> Array:
-        """(n_regressors, ny), true where the equation of the output (column) has the regressor (row)."""
+        """(n_regressors, ny), true where the equation of the output (column) has the regressor
+        (row).
+        """
         out = np.zeros((self.n_regressors, self.ny), dtype=bool)
         for group in self.groups:
             out[self.regressors(group)[:, None], group.outputs] = True
@@ -230,23 +273,30 @@ class LPVARX:
 
     @cached_property
     def n_regressors(self) -> int:
-        """Length of the regressor: unknown coefficients of each output, where all outputs have the same."""
+        """Length of the regressor: unknown coefficients of each output, where all outputs have the
+        same.
+        """
         return self.basis.size * len(self.entries)
 
     @cached_property
     def regressor_names(self) -> tuple[str, ...]:
         """One name a regressor, such as "theta(k-1) f2(airspeed(k-1))"."""
         return tuple(
-            f"{name}{_at(t.lag) if t.kind in ('output', 'input') else ''} f{j}({', '.join(p + _at(t.p_lag) for p in self.parameters)})"
+            f"{name}{_at(t.lag) if t.kind in ('output', 'input') else ''}"
+            f" f{j}({', '.join(p + _at(t.p_lag) for p in self.parameters)})"
             for t in self.terms
             for name in self.channels(t)
             for j in range(self.basis.size)
         )
 
     def lti(self) -> LPVARX:
-        """The same signals, orders and delays with constant coefficients: the baseline that scheduling must beat."""
+        """The same signals, orders and delays with constant coefficients: the baseline that
+        scheduling must beat.
+        """
         constants: list[Basis] = [Polynomial(0, low, high) for low, high in self.basis.ranges]
-        return replace(self, basis=constants[0] if len(constants) == 1 else Product(tuple(constants)))
+        return replace(
+            self, basis=constants[0] if len(constants) == 1 else Product(tuple(constants))
+        )
 
 
 def _at(lag: int) -> str:
@@ -256,11 +306,16 @@ def _at(lag: int) -> str:
 def require_structure(value: object) -> None:
     """Raises `InputError` for anything but a structure."""
     if not isinstance(value, LPVARX):
-        raise InputError(f"structure: expected LPVARX(outputs=..., inputs=..., scheduling=..., ...), got {value!r:.80}")
+        raise InputError(
+            "structure: expected LPVARX(outputs=..., inputs=..., scheduling=..., ...), got"
+            f" {value!r:.80}"
+        )
 
 
 def _names(value: object, group: str) -> tuple[str, ...]:
-    names: tuple[Any, ...] = (value,) if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+    names: tuple[Any, ...] = (
+        (value,) if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+    )
     if not all(isinstance(n, str) for n in names):
         raise InputError(f"{group}: expected names of signals, got {value!r}")
     if len(set(names)) != len(names):

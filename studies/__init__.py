@@ -1,6 +1,7 @@
 """The stories: command line, the transition study, its report.
 
-The matrices here are small: one BLAS thread is fastest, and threads that wait for each other on a busy machine are not.
+The matrices here are small: one BLAS thread is fastest, and threads that wait for each other on a
+busy machine are not.
 """
 
 import os

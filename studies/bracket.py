@@ -1,7 +1,9 @@
-"""The lateral loop closed from both sides: gain and stability against permitted acceleration, proven above and flown below.
+"""The lateral loop closed from both sides: gain and stability against permitted acceleration,
+proven above and flown below.
 
-P(p) is the ordinary proof; P(p, lag) remembers where the airspeed came from; the lower bound is an explicit airspeed and gust.
-Of the interpolated model, of the exact one, or, on the servo channel, of the identified models beside both.
+P(p) is the ordinary proof; P(p, lag) remembers where the airspeed came from; the lower bound is an
+explicit airspeed and gust. Of the interpolated model, of the exact one, or, on the servo channel,
+of the identified models beside both.
 """
 
 from __future__ import annotations
@@ -29,9 +31,23 @@ SLOW = Relaxation(memory=1.2, segments=(12,), grading=1.5, memory_segments=4, me
 FAST = Relaxation(memory=0.6, segments=(12,), grading=1.5, memory_segments=4, memory_degree=3)
 FASTEST = Relaxation(memory=0.5, segments=(12,), grading=1.5, memory_segments=6, memory_degree=3)
 FURTHEST = Relaxation(memory=0.45, segments=(12,), grading=1.5, memory_segments=8, memory_degree=3)
-"""The faster the airspeed turns round, the shorter the lag that tells most, and the finer P has to be across."""
+"""The faster the airspeed turns round, the shorter the lag that tells most, and the finer P has to
+be across.
+"""
 
-GAINS = {0.01: SLOW, 0.1: SLOW, 0.3: SLOW, 1.0: SLOW, 2.0: FAST, 3.0: FAST, 3.5: FAST, 4.0: FAST, 4.5: FAST, 5.0: FAST, 6.0: FASTEST}
+GAINS = {
+    0.01: SLOW,
+    0.1: SLOW,
+    0.3: SLOW,
+    1.0: SLOW,
+    2.0: FAST,
+    3.0: FAST,
+    3.5: FAST,
+    4.0: FAST,
+    4.5: FAST,
+    5.0: FAST,
+    6.0: FASTEST,
+}
 """Accelerations (m/s^2) at which gains are bracketed, and the memory that proves them."""
 
 FEWER = {rate: GAINS[rate] for rate in (0.1, 1.0, 3.0, 4.5, 6.0)}
@@ -57,7 +73,8 @@ PATIENT = Solver(time_limit=3600.0)
 
 
 class Bracket(NamedTuple):
-    """Gains at one acceleration (m/s^2): flown, proven with a memory, proven with P(p); inf: nothing proven, or growth.
+    """Gains at one acceleration (m/s^2): flown, proven with a memory, proven with P(p); inf:
+    nothing proven, or growth.
 
     `covered`: proven with P(p) for every model within the remainder; NaN: there is none.
     """
@@ -76,26 +93,45 @@ class Bracket(NamedTuple):
 
 
 def bracket(
-    loop: LPVStateSpace, rate: float, relaxation: Relaxation, search: Search | None = None, rest: Remainder | None = None
+    loop: LPVStateSpace,
+    rate: float,
+    relaxation: Relaxation,
+    search: Search | None = None,
+    rest: Remainder | None = None,
 ) -> Bracket:
-    """The gain at one acceleration from both sides; `exact`: the better proof, and that of the cover, pass rational arithmetic."""
+    """The gain at one acceleration from both sides; `exact`: the better proof, and that of the
+    cover, pass rational arithmetic.
+    """
     plain = synthesis.l2_gain(loop, rate, search=None)
-    memory = synthesis.l2_gain(loop, rate, relaxation=relaxation, search=search or Search(seconds=math.inf), solver=PATIENT)
+    memory = synthesis.l2_gain(
+        loop, rate, relaxation=relaxation, search=search or Search(seconds=math.inf), solver=PATIENT
+    )
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
     if rest and plain.verified:
-        covered, proof = covered_gain(loop, rest, rate, COVER, synthesis.l2_gain(loop, rate, relaxation=COVER, search=None).gamma)
+        covered, proof = covered_gain(
+            loop,
+            rest,
+            rate,
+            COVER,
+            synthesis.l2_gain(loop, rate, relaxation=COVER, search=None).gamma,
+        )
     exact = better.verify(rigorous=True) and (proof is None or proof.verify(rigorous=True))
     return Bracket(rate, memory.lower, memory.gamma, plain.gamma, exact, covered)
 
 
 def proves(loop: LPVStateSpace, rate: float, relaxation: Relaxation) -> bool:
     """Whether this form of V proves stability at this acceleration, in exact arithmetic."""
-    return synthesis.stability(loop, rate, relaxation=relaxation, search=None, solver=PATIENT).verify(rigorous=True)
+    return synthesis.stability(
+        loop, rate, relaxation=relaxation, search=None, solver=PATIENT
+    ).verify(rigorous=True)
 
 
 def measure(
-    loop: LPVStateSpace, gains: dict[float, Relaxation], stable: dict[str, Any], rest: Remainder | None = None
+    loop: LPVStateSpace,
+    gains: dict[float, Relaxation],
+    stable: dict[str, Any],
+    rest: Remainder | None = None,
 ) -> Iterator[tuple[str, Any]]:
     """(what, result) of everything the page shows, as it is found."""
     yield "gain, frozen", synthesis.frozen_gain(loop).gamma
@@ -103,7 +139,10 @@ def measure(
     tests = {"constant P": jump.gamma}
     if isinstance(loop.basis, Polynomial):
         lft = loop.to_lft().reduce()
-        tests |= {f"LFT {name}": synthesis.lft_gain(lft, name, search=None).gamma for name in synthesis.SCALINGS}
+        tests |= {
+            f"LFT {name}": synthesis.lft_gain(lft, name, search=None).gamma
+            for name in synthesis.SCALINGS
+        }
     yield "airspeed jumps", {"lower": jump.lower, **tests}
     for rate in GROWING:
         found = synthesis.lower_bound(loop, rate)
@@ -125,17 +164,28 @@ def curve(found: dict[str, Any], title: str) -> GainCurve:
             flown[rate] = math.inf
     tests = dict(found["airspeed jumps"])
     flown |= {0.0: found["gain, frozen"], math.inf: tests.pop("lower")}
-    proven = {form: {row["rate"]: row[key] for row in rows} for form, key in (("P(p, lag)", "memory"), ("P(p)", "plain"))}
+    proven = {
+        form: {row["rate"]: row[key] for row in rows}
+        for form, key in (("P(p, lag)", "memory"), ("P(p)", "plain"))
+    }
     return GainCurve(title, "(rad/s, rad)/(m/s)", found["gain, frozen"], flown, proven, tests)
 
 
 def main() -> None:
     """Print the bracket of the X-Cell's lateral loop."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--model", choices=("interpolated", "exact", "identified"), default="interpolated")
-    parser.add_argument("--quick", action="store_true", help="growth, the gain at 3 m/s^2 and P(p) only; identified: fewer accelerations")
+    parser.add_argument(
+        "--model", choices=("interpolated", "exact", "identified"), default="interpolated"
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="growth, the gain at 3 m/s^2 and P(p) only; identified: fewer accelerations",
+    )
     parser.add_argument("--json", action="store_true", help="print what a program would read")
-    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw gain against acceleration")
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE", help="draw gain against acceleration"
+    )
     options = parsed(parser, "bracket.md")
     heli = Helicopter.load("xcell60", governor="ideal")
     if options.model == "identified":

@@ -14,14 +14,28 @@ from studies.output import Output, as_json
 from symheli.errors import SymheliError
 
 VERBS = (
-    "study", "vehicles", "trim", "linearize", "derivatives", "envelope", "identify", "margins", "certify", "export", "campaign", "pays",
-    "design", "doctor",
-)  # fmt: skip
+    "study",
+    "vehicles",
+    "trim",
+    "linearize",
+    "derivatives",
+    "envelope",
+    "identify",
+    "margins",
+    "certify",
+    "export",
+    "campaign",
+    "pays",
+    "design",
+    "doctor",
+)
 """Each is the module of that name in `studies.commands`."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one verb; the exit status: 0 done, 1 failed with one sentence on stderr, 2 wrong usage, 130 interrupted."""
+    """Run one verb; the exit status: 0 done, 1 failed with one sentence on stderr, 2 wrong usage,
+    130 interrupted.
+    """
     try:
         arguments = parser().parse_args(argv)
     except SystemExit as stop:  # argparse has said what is wrong
@@ -48,13 +62,18 @@ def parser() -> argparse.ArgumentParser:
     """The parser with every verb."""
     from symheli import __version__
 
-    whole = argparse.ArgumentParser(prog="symheli", description="Helicopter models, LPV identification, certified gains.")
+    whole = argparse.ArgumentParser(
+        prog="symheli", description="Helicopter models, LPV identification, certified gains."
+    )
     whole.add_argument("--version", action="version", version=f"symheli {__version__}")
     verbs = whole.add_subparsers(dest="verb", required=True, metavar="VERB")
     for verb in VERBS:
         module = importlib.import_module(f"studies.commands.{verb}")
         sub = verbs.add_parser(verb, help=module.HELP, description=module.HELP)
-        sub.set_defaults(run=module.run, kept=lambda _: "nothing was written, files that were there are unchanged")
+        sub.set_defaults(
+            run=module.run,
+            kept=lambda _: "nothing was written, files that were there are unchanged",
+        )
         module.configure(sub)
         sub.add_argument("--json", action="store_true", help="print what a program would read")
     return whole

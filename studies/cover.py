@@ -1,4 +1,6 @@
-"""A gain for every model within a measured distance of an LPV model: the distance enters as a disturbance of states and inputs."""
+"""A gain for every model within a measured distance of an LPV model: the distance enters as a
+disturbance of states and inputs.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,8 @@ ROOMS = (1.001, 1.01, 1.1)
 
 @dataclass(frozen=True)
 class Remainder:
-    """[A B] of every covered model is that of the LPV model plus diag(rows) Delta diag(columns), |Delta| <= 1.
+    """[A B] of every covered model is that of the LPV model plus diag(rows) Delta diag(columns),
+    |Delta| <= 1.
 
     rows (nx,), columns (nx + nu,); `largest` is the largest entry measured.
     """
@@ -35,7 +38,9 @@ class Remainder:
     def of(cls, missed: Array) -> Remainder:
         """`SAFETY` times what was measured, `missed` (K, nx, nx + nu)."""
         size = np.abs(missed).max(axis=0)
-        floor = 1e-6 * size.max() or 1e-300  # every row and column is covered, if only by a millionth
+        floor = (
+            1e-6 * size.max() or 1e-300
+        )  # every row and column is covered, if only by a millionth
         rows, columns = np.ones(size.shape[0]), np.ones(size.shape[1])
         for _ in range(10):  # rows columns' >= size; settles in a few rounds
             rows = np.sqrt(rows * np.maximum((size / columns).max(axis=1), floor))
@@ -45,14 +50,20 @@ class Remainder:
 
 
 def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
-    """A model whose gain g <= 1 proves g `gain` for every model that differs from `lpv` by the remainder.
+    """A model whose gain g <= 1 proves g `gain` for every model that differs from `lpv` by the
+    remainder.
 
-    dx/dt = A x + B u + rows d, z = columns (x, u), d = Delta z, with inputs (gain u, t d) and outputs (y, t z). Then
-    |y|^2 + t^2 |z|^2 <= g^2 (gain^2 |u|^2 + t^2 |d|^2) and |d| <= |z| give |y| <= g gain |u|. The scale t balances d to y with u to z.
+    dx/dt = A x + B u + rows d, z = columns (x, u), d = Delta z, with inputs (gain u, t d) and
+    outputs (y, t z). Then
+    |y|^2 + t^2 |z|^2 <= g^2 (gain^2 |u|^2 + t^2 |d|^2) and |d| <= |z| give |y| <= g gain |u|. The
+    scale t balances d to y with u to z.
     """
     nx, nu, ny = len(lpv.states), len(lpv.inputs), len(lpv.outputs)
     one = lpv.basis.fit(*_constant(lpv))
-    noise, seen = np.multiply.outer(one, np.diag(rest.rows)), np.multiply.outer(one, np.diag(rest.columns))
+    noise, seen = (
+        np.multiply.outer(one, np.diag(rest.rows)),
+        np.multiply.outer(one, np.diag(rest.columns)),
+    )
     d, z = tuple(f"d_{s}" for s in lpv.states), tuple(f"z_{s}" for s in (*lpv.states, *lpv.inputs))
     plain = replace(lpv, trim=None, residuals=None)
     heard = replace(plain, B=noise, D=np.zeros((len(one), ny, nx)), inputs=d)
@@ -61,15 +72,25 @@ def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
     above = np.concatenate([lpv.D / gain, heard.D / t], axis=2)
     below = np.concatenate([t * felt.D / gain, np.zeros((len(one), nx + nu, nx))], axis=2)
     return replace(
-        plain, B=np.concatenate([lpv.B / gain, noise / t], axis=2), C=np.concatenate([lpv.C, t * felt.C], axis=1),
-        D=np.concatenate([above, below], axis=1), inputs=(*lpv.inputs, *d), outputs=(*lpv.outputs, *z),
-    )  # fmt: skip
+        plain,
+        B=np.concatenate([lpv.B / gain, noise / t], axis=2),
+        C=np.concatenate([lpv.C, t * felt.C], axis=1),
+        D=np.concatenate([above, below], axis=1),
+        inputs=(*lpv.inputs, *d),
+        outputs=(*lpv.outputs, *z),
+    )
 
 
-def covered_gain(lpv: LPVStateSpace, rest: Remainder, rate: float, relaxation: Relaxation, gain: float) -> tuple[float, Certificate | None]:
-    """(gain proven for `lpv` and every remainder, the certificate of `covering`) near its own `gain`; (inf, None) where none is."""
+def covered_gain(
+    lpv: LPVStateSpace, rest: Remainder, rate: float, relaxation: Relaxation, gain: float
+) -> tuple[float, Certificate | None]:
+    """(gain proven for `lpv` and every remainder, the certificate of `covering`) near its own
+    `gain`; (inf, None) where none is.
+    """
     for room in ROOMS:
-        certificate = synthesis.l2_gain(covering(lpv, rest, room * gain), rate, relaxation=relaxation, search=None)
+        certificate = synthesis.l2_gain(
+            covering(lpv, rest, room * gain), rate, relaxation=relaxation, search=None
+        )
         if certificate.gamma <= 1:
             return room * gain * certificate.gamma, certificate
     return math.inf, None
@@ -77,5 +98,10 @@ def covered_gain(lpv: LPVStateSpace, rest: Remainder, rate: float, relaxation: R
 
 def _constant(lpv: LPVStateSpace) -> tuple[Array, Array]:
     """Points from which the coefficients of the constant 1 are fitted."""
-    p = np.concatenate([q.low + (q.high - q.low) * np.linspace(0.01, 0.99, lpv.basis.size + 1) for q in lpv.basis.pieces()])
+    p = np.concatenate(
+        [
+            q.low + (q.high - q.low) * np.linspace(0.01, 0.99, lpv.basis.size + 1)
+            for q in lpv.basis.pieces()
+        ]
+    )
     return p, np.ones(len(p))

@@ -17,7 +17,9 @@ SHOWN = ("X_u", "Z_w", "M_u", "M_w", "Y_v", "L_v", "N_v", "N_r")
 
 
 def plot(table: DerivativeTable, ax: Axes | None = None, names: Sequence[str] = SHOWN) -> Axes:
-    """Each of `names` against airspeed, divided by its largest magnitude, which the legend gives with its unit."""
+    """Each of `names` against airspeed, divided by its largest magnitude, which the legend gives
+    with its unit.
+    """
     if ax is None:
         import matplotlib.pyplot as plt
 
@@ -26,7 +28,9 @@ def plot(table: DerivativeTable, ax: Axes | None = None, names: Sequence[str] = 
         values = table[name]
         largest = float(np.abs(values).max()) or 1.0
         unit = next(s.unit for s in table if s == name)
-        ax.plot(table.airspeeds, values / largest, marker=".", label=f"{name}, {largest:.3g} {unit}")
+        ax.plot(
+            table.airspeeds, values / largest, marker=".", label=f"{name}, {largest:.3g} {unit}"
+        )
     ax.axhline(0.0, color="#8a949e", linewidth=0.8)
     ax.set_xlabel("airspeed (m/s)")
     ax.set_ylabel("derivative by its largest magnitude")

@@ -1,7 +1,9 @@
-"""The lateral loop of the exact linearizations: polynomials between the corners of the model, free to jump at them.
+"""The lateral loop of the exact linearizations: polynomials between the corners of the model, free
+to jump at them.
 
-The linearizations are smooth between two corners (a stall, an edge of the wake) and may jump at one. A polynomial through
-many of them on each interval misses so little that `studies.cover` can carry it through a proof.
+The linearizations are smooth between two corners (a stall, an edge of the wake) and may jump at
+one. A polynomial through many of them on each interval misses so little that `studies.cover` can
+carry it through a proof.
 """
 
 from __future__ import annotations
@@ -32,7 +34,9 @@ LONGEST = 3.0
 
 @dataclass(frozen=True)
 class Patches(PiecewisePolynomial):
-    """Powers up to `degree` on each interval between the `breaks`, zero elsewhere: nothing joins them, a model may jump at a break."""
+    """Powers up to `degree` on each interval between the `breaks`, zero elsewhere: nothing joins
+    them, a model may jump at a break.
+    """
 
     degree: int
     breaks: tuple[float, ...]
@@ -72,7 +76,9 @@ class Patches(PiecewisePolynomial):
 
 @dataclass(frozen=True)
 class ExactLateral:
-    """v p r phi b1 under d_lat, d_ped, v_w: exact models at `nodes`, others to judge by at `between`, on the intervals of `basis`."""
+    """v p r phi b1 under d_lat, d_ped, v_w: exact models at `nodes`, others to judge by at
+    `between`, on the intervals of `basis`.
+    """
 
     basis: Patches
     nodes: LinearFamily
@@ -80,25 +86,48 @@ class ExactLateral:
 
     @classmethod
     def of(cls, heli: Helicopter, low: float = 0.0, high: float = 13.0) -> ExactLateral:
-        """From `low` to `high` m/s, cut at the corners of the model and where an interval would exceed `LONGEST`."""
+        """From `low` to `high` m/s, cut at the corners of the model and where an interval would
+        exceed `LONGEST`.
+        """
         found = _family(heli, np.linspace(low, high, max(2, math.ceil(4 * (high - low))))).kinks
         ends = [low, *sorted(c for places in found.values() for c in places), high]
-        breaks = [float(p) for a, b in pairwise(ends) for p in np.linspace(a, b, math.ceil((b - a) / LONGEST) + 1)[:-1]]
+        breaks = [
+            float(p)
+            for a, b in pairwise(ends)
+            for p in np.linspace(a, b, math.ceil((b - a) / LONGEST) + 1)[:-1]
+        ]
         basis = Patches(DEGREE, (*breaks, high))
-        return cls(basis, _family(heli, basis.points(2 * DEGREE + 2)), _family(heli, basis.points(4 * DEGREE + 5)))
+        return cls(
+            basis,
+            _family(heli, basis.points(2 * DEGREE + 2)),
+            _family(heli, basis.points(4 * DEGREE + 5)),
+        )
 
     def loop(self, channel: Channel = "gust", dt: float | None = None) -> LPVStateSpace:
-        """The loop of `studies.lateral_loop` with exact models; `dt` (s): each held for so long, sampled."""
+        """The loop of `studies.lateral_loop` with exact models; `dt` (s): each held for so long,
+        sampled.
+        """
         family = self.nodes if dt is None else self.nodes.discretize(dt)
-        A, B, C, D = (self.basis.fit(family.airspeeds, M) for M in (family.A, family.B, family.C, family.D))
+        A, B, C, D = (
+            self.basis.fit(family.airspeeds, M) for M in (family.A, family.B, family.C, family.D)
+        )
         scheduling = Scheduling("airspeed", "m/s", self.basis.low, self.basis.high)
-        return close(LPVStateSpace(self.basis, A, B, C, D, scheduling, family.states, family.inputs, family.outputs, dt), channel)
+        return close(
+            LPVStateSpace(
+                self.basis, A, B, C, D, scheduling, family.states, family.inputs, family.outputs, dt
+            ),
+            channel,
+        )
 
     def missed(self, loop: LPVStateSpace, channel: Channel = "gust") -> Array:
-        """[A B] of the exact loop minus that of `loop` at the models in between, (K, nx, nx + nu)."""
+        """[A B] of the exact loop minus that of `loop` at the models in between, (K, nx, nx +
+        nu).
+        """
         family = self.between if loop.dt is None else self.between.discretize(loop.dt)
         exact = close(family.interpolate("linear"), channel)
-        there, here = (np.concatenate(model.matrices(family.airspeeds)[:2], axis=2) for model in (exact, loop))
+        there, here = (
+            np.concatenate(model.matrices(family.airspeeds)[:2], axis=2) for model in (exact, loop)
+        )
         return there - here
 
 

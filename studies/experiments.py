@@ -1,4 +1,6 @@
-"""Which flight to fly for identification: candidate excitations and airspeed schedules, flown in the model and compared."""
+"""Which flight to fly for identification: candidate excitations and airspeed schedules, flown in
+the model and compared.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ AMPLITUDES = (0.5, 1.0, 1.5)
 
 @dataclass(frozen=True)
 class Candidate:
-    """An excitation of the axis's inputs along a transition of peak acceleration `acceleration` (m/s^2)."""
+    """An excitation of the axis's inputs along a transition of peak acceleration `acceleration`
+    (m/s^2).
+    """
 
     kind: str
     band: tuple[float, float]
@@ -34,44 +38,70 @@ class Candidate:
     @property
     def name(self) -> str:
         """In words."""
-        return f"{self.kind} {self.band[0]:g}-{self.band[1]:g} Hz x{self.amplitude:g}, {self.acceleration:g} m/s^2"
+        return (
+            f"{self.kind} {self.band[0]:g}-{self.band[1]:g} Hz x{self.amplitude:g},"
+            f" {self.acceleration:g} m/s^2"
+        )
 
     def fly(self, heli: Helicopter, axis: Axis, autopilot: Autopilot, seed: int) -> FlightRecord:
         """Hover to the top of the range and back, only the axis's inputs excited."""
         amplitude = {name: self.amplitude * AMPLITUDE[name] for name in axis.inputs}
         excitation = Excitation(amplitude, self.kind, self.band, seed)  # type: ignore[arg-type]
-        return fly(heli, AirspeedSchedule.transition(0.0, TOP, self.acceleration, hold=2.0), excitation=excitation, autopilot=autopilot)
+        return fly(
+            heli,
+            AirspeedSchedule.transition(0.0, TOP, self.acceleration, hold=2.0),
+            excitation=excitation,
+            autopilot=autopilot,
+        )
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Every candidate that stayed in the air with its information, those lost with the reason, and the plan."""
+    """Every candidate that stayed in the air with its information, those lost with the reason, and
+    the plan.
+    """
 
     experiments: tuple[Experiment, ...]
     lost: dict[str, str]
     plan: Plan
 
     def table(self) -> str:
-        """Candidates, the most certain first: predicted standard errors against the best, and what they exceed."""
+        """Candidates, the most certain first: predicted standard errors against the best, and what
+        they exceed.
+        """
         best = np.median(self.plan.experiments[0].bounds)
         ranked = sorted(self.experiments, key=lambda e: (not e.allowed, float(np.median(e.bounds))))
         lines = [f"{'candidate':44s}{'seconds':>9s}{'median error':>14s}   exceeds"]
         for e in ranked:
             beyond = ", ".join(f"{signal} {value:.2f}" for signal, value in e.exceeded.items())
-            lines.append(f"{e.name:44s}{e.duration:9.0f}{np.median(e.bounds) / best:13.2f}x   {beyond}")
+            lines.append(
+                f"{e.name:44s}{e.duration:9.0f}{np.median(e.bounds) / best:13.2f}x   {beyond}"
+            )
         lines += [f"{name:44s}{'lost':>9s}" for name in self.lost]
         lines += ["", "fly, in this order:", *(f"  {e.name}" for e in self.plan.experiments)]
-        lines.append(f"together: median standard error {np.median(self.plan.bounds) / best:.2f} of that of the first alone")
+        lines.append(
+            f"together: median standard error {np.median(self.plan.bounds) / best:.2f} of that of"
+            " the first alone"
+        )
         return "\n".join(lines)
 
 
-CANDIDATES = tuple(Candidate(*choice) for choice in product(KINDS, BANDS, AMPLITUDES, ACCELERATIONS))
+CANDIDATES = tuple(
+    Candidate(*choice) for choice in product(KINDS, BANDS, AMPLITUDES, ACCELERATIONS)
+)
 
 
 def design(
-    vehicle: str, axis: Axis, count: int, limits: dict[str, float], candidates: Sequence[Candidate] = CANDIDATES, seed: int = 0
+    vehicle: str,
+    axis: Axis,
+    count: int,
+    limits: dict[str, float],
+    candidates: Sequence[Candidate] = CANDIDATES,
+    seed: int = 0,
 ) -> Comparison:
-    """Fly every candidate and choose `count` of them within `limits` {signal: largest absolute value, SI}."""
+    """Fly every candidate and choose `count` of them within `limits` {signal: largest absolute
+    value, SI}.
+    """
     heli = Helicopter.load(vehicle, governor="ideal")
     autopilot = autopilot_for(heli)
     records, lost = {}, {}

@@ -1,4 +1,6 @@
-"""The equations of motion as C99 without dependencies: source, header with names and units, a check and a CMake stub."""
+"""The equations of motion as C99 without dependencies: source, header with names and units, a check
+and a CMake stub.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +19,18 @@ _CMAKE_MARK = "# Written by symheli export c; rewritten by it while this line st
 
 
 def write_c(heli: Helicopter, path: Path) -> tuple[Path, ...]:
-    """Write `heli` to `path` (ending in .c), its header, NAME_check.c and CMakeLists.txt beside it; returns what was written.
+    """Write `heli` to `path` (ending in .c), its header, NAME_check.c and CMakeLists.txt beside it;
+    returns what was written.
 
     A CMakeLists.txt of somebody else is left alone.
     """
     if path.suffix != ".c":
         raise InputError(f"{path}: expected a name that ends in .c")
-    header, check, cmake = path.with_suffix(".h"), path.with_name(f"{path.stem}_check.c"), path.with_name("CMakeLists.txt")
+    header, check, cmake = (
+        path.with_suffix(".h"),
+        path.with_name(f"{path.stem}_check.c"),
+        path.with_name("CMakeLists.txt"),
+    )
     written = [
         write_text(path, source(heli, header.name)),
         write_text(header, declarations(heli, path.stem)),
@@ -41,7 +48,9 @@ def source(heli: Helicopter, header: str) -> str:
     generator = casadi.CodeGenerator("rhs.c", {"with_header": False, "verbose": False})
     generator.add(heli.rhs)
     generator.add(heli.flight_rhs)
-    return _SOURCE.format(title=_title(heli), header=header, generated=generator.dump(), n=len(heli.flight_states))
+    return _SOURCE.format(
+        title=_title(heli), header=header, generated=generator.dump(), n=len(heli.flight_states)
+    )
 
 
 _SOURCE = """/* {title}: equations of motion; see {header} for the meaning of every entry. */
@@ -88,11 +97,17 @@ void heli_flight_step(double *x, const double *u, const double *wind, double h)
 def declarations(heli: Helicopter, stem: str) -> str:
     """The header: index and unit of every state, input, wind component, and the functions."""
     return _HEADER.format(
-        title=_title(heli), source=heli.vehicle.source, density=heli.density, governor=heli.governor,
+        title=_title(heli),
+        source=heli.vehicle.source,
+        density=heli.density,
+        governor=heli.governor,
         guard=re.sub(r"\W", "_", f"{stem}_h").upper(),
-        states=_indices("X", heli.states), flight=_indices("FLIGHT", heli.flight_states),
-        inputs=_indices("U", heli.inputs, heli.travel.tolist()), wind=_indices("WIND", heli.wind), earth=_indices("EARTH", EARTH_WIND),
-    )  # fmt: skip
+        states=_indices("X", heli.states),
+        flight=_indices("FLIGHT", heli.flight_states),
+        inputs=_indices("U", heli.inputs, heli.travel.tolist()),
+        wind=_indices("WIND", heli.wind),
+        earth=_indices("EARTH", EARTH_WIND),
+    )
 
 
 _HEADER = """/* {title}
@@ -162,5 +177,8 @@ def _title(heli: Helicopter) -> str:
 
 
 def _indices(prefix: str, names: Sequence[Signal], travel: Sequence[float] | None = None) -> str:
-    lines = [f"#define RHS_{prefix}_{s} {i} /* {s.unit}{f', +-{travel[i]:g}' if travel else ''} */" for i, s in enumerate(names)]
+    lines = [
+        f"#define RHS_{prefix}_{s} {i} /* {s.unit}{f', +-{travel[i]:g}' if travel else ''} */"
+        for i, s in enumerate(names)
+    ]
     return "\n".join([*lines, f"#define RHS_N_{prefix} {len(names)}"])

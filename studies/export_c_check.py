@@ -1,4 +1,6 @@
-"""A C program that carries cases computed here and says whether the exported code reproduces them."""
+"""A C program that carries cases computed here and says whether the exported code reproduces
+them.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +10,43 @@ from symheli import Helicopter
 
 CASES = 12
 STEP = 0.005  # s
-_SIZE = {"u": 6.0, "v": 1.5, "w": 1.0, "p": 0.5, "q": 0.5, "r": 0.5, "phi": 0.3, "theta": 0.3, "a1": 0.03, "b1": 0.03, "om_i": 20.0}
+_SIZE = {
+    "u": 6.0,
+    "v": 1.5,
+    "w": 1.0,
+    "p": 0.5,
+    "q": 0.5,
+    "r": 0.5,
+    "phi": 0.3,
+    "theta": 0.3,
+    "a1": 0.03,
+    "b1": 0.03,
+    "om_i": 20.0,
+}
 """Spread of each state (SI) over the cases; what is not named here (quaternion, position) has 1."""
 
 
 def check_program(heli: Helicopter, header: str) -> str:
-    """Cases of `heli_rhs`, `heli_flight_rhs` and `heli_flight_step`, drawn from a fixed seed: flight, wind, saturations."""
+    """Cases of `heli_rhs`, `heli_flight_rhs` and `heli_flight_step`, drawn from a fixed seed:
+    flight, wind, saturations.
+    """
     rng = np.random.default_rng(0)
     blocks = {"rhs_cases": [], "flight_cases": [], "step_cases": []}
     for _ in range(CASES):
-        inputs = 0.5 * heli.travel * rng.uniform(-1, 1, len(heli.inputs)) + 0.5 * heli.travel * np.array([0, 0, 1, 1])
+        inputs = 0.5 * heli.travel * rng.uniform(
+            -1, 1, len(heli.inputs)
+        ) + 0.5 * heli.travel * np.array([0, 0, 1, 1])
         wind = 2.0 * rng.standard_normal(3)
         x, flight = _state(heli, heli.states, rng), _state(heli, heli.flight_states, rng)
         flight[6:10] /= np.linalg.norm(flight[6:10])
         blocks["rhs_cases"].append((x, inputs, wind, heli.numeric("rhs")(x, inputs, wind)[0]))
-        blocks["flight_cases"].append((flight, inputs, wind, heli.numeric("flight_rhs")(flight, inputs, wind)[0]))
+        blocks["flight_cases"].append(
+            (flight, inputs, wind, heli.numeric("flight_rhs")(flight, inputs, wind)[0])
+        )
         blocks["step_cases"].append((flight, inputs, wind, _step(heli, flight, inputs, wind)))
     tables = "\n".join(
-        f"static const double {name}[{CASES}][{sum(map(len, rows[0]))}] = {{\n{_rows(rows)}\n}};" for name, rows in blocks.items()
+        f"static const double {name}[{CASES}][{sum(map(len, rows[0]))}] = {{\n{_rows(rows)}\n}};"
+        for name, rows in blocks.items()
     )
     return _PROGRAM.format(header=header, cases=CASES, step=STEP, tables=tables)
 
@@ -55,7 +76,9 @@ def _step(heli: Helicopter, x: np.ndarray, u: np.ndarray, wind: np.ndarray) -> n
 
 
 def _rows(rows: list) -> str:
-    return ",\n".join("    {" + ", ".join(repr(float(v)) for v in np.concatenate(row)) + "}" for row in rows)
+    return ",\n".join(
+        "    {" + ", ".join(repr(float(v)) for v in np.concatenate(row)) + "}" for row in rows
+    )
 
 
 _PROGRAM = """/* Does the exported code reproduce what Python computed? Exit status 0: every entry to 1e-12 of max(1, its size). */

@@ -1,4 +1,6 @@
-"""The recursive estimator of one structure as C99 for an autopilot: sizes fixed, names and units in the header, a check, a CMake stub."""
+"""The recursive estimator of one structure as C99 for an autopilot: sizes fixed, names and units in
+the header, a check, a CMake stub.
+"""
 
 from __future__ import annotations
 
@@ -18,27 +20,39 @@ from symheli.lpv.arrays import Array
 
 _CMAKE_MARK = "# Written by symheli export estimator; rewritten by it while this line stays."
 TOLERANCE = {"double": 1e-9, "single": 1e-3}
-"""What another compiler or processor may differ by, relative to max(1, size): it may contract products and sums."""
+"""What another compiler or processor may differ by, relative to max(1, size): it may contract
+products and sums.
+"""
 
 
-def write_estimator(rls: RecursiveLeastSquares, units: Mapping[str, str], folder: Path, name: str = "estimator") -> tuple[Path, ...]:
-    """Write rls.h, rls.c, NAME.h, NAME.c, NAME_check.c and CMakeLists.txt into `folder`; returns the paths written.
+def write_estimator(
+    rls: RecursiveLeastSquares, units: Mapping[str, str], folder: Path, name: str = "estimator"
+) -> tuple[Path, ...]:
+    """Write rls.h, rls.c, NAME.h, NAME.c, NAME_check.c and CMakeLists.txt into `folder`; returns
+    the paths written.
 
-    `units` of every signal. A CMakeLists.txt of somebody else is left alone. Raises `InputError` for a name that is no C identifier,
-    a signal without unit and functions of p that are not piecewise polynomial.
+    `units` of every signal. A CMakeLists.txt of somebody else is left alone. Raises `InputError`
+    for a name that is no C identifier, a signal without unit and functions of p that are not
+    piecewise polynomial.
     """
     require_identifier(name)
     arx = rls.structure
     if missing := [s for s in (*arx.outputs, *arx.inputs, *arx.parameters) if s not in units]:
         raise InputError(f"units: none given for {', '.join(missing)}")
     if not rls.configuration.factors:
-        raise InputError("functions brought along cannot be written in C; identify with a polynomial or spline basis")
+        raise InputError(
+            "functions brought along cannot be written in C; identify with a polynomial or spline"
+            " basis"
+        )
     source = Path(kernel.__file__).parent
     precision = "#define RLS_H\n" + (
-        "#ifndef RLS_SINGLE\n#define RLS_SINGLE /* chosen at export */\n#endif\n" * (rls.precision == "single")
+        "#ifndef RLS_SINGLE\n#define RLS_SINGLE /* chosen at export */\n#endif\n"
+        * (rls.precision == "single")
     )
     files = {
-        "rls.h": (source / "rls.h").read_text(encoding="utf-8").replace("#define RLS_H\n", precision),
+        "rls.h": (
+            (source / "rls.h").read_text(encoding="utf-8").replace("#define RLS_H\n", precision)
+        ),
         "rls.c": (source / "rls.c").read_text(encoding="utf-8"),
         f"{name}.h": header(rls, units, name),
         f"{name}.c": implementation(rls, name),
@@ -55,66 +69,110 @@ def header(rls: RecursiveLeastSquares, units: Mapping[str, str], name: str) -> s
     arx, c, up = rls.structure, rls.configuration, name.upper()
     ranges = dict(zip(arx.parameters, arx.basis.ranges, strict=True))
     groups = [
-        f"   {', '.join(arx.outputs[j] for j in layout.group.outputs)}: {layout.n} regressors, factor of order {layout.n + layout.m}"
+        f"   {', '.join(arx.outputs[j] for j in layout.group.outputs)}: {layout.n} regressors,"
+        f" factor of order {layout.n + layout.m}"
         for layout in c.groups
     ]
     blocks = [
         [f"#define {up}_Y_{s} {i} /* {units[s]} */" for i, s in enumerate(arx.outputs)],
         [f"#define {up}_U_{s} {i} /* {units[s]} */" for i, s in enumerate(arx.inputs)],
-        [f"#define {up}_P_{s} {i} /* {units[s]}, {low:g} to {high:g} */" for i, (s, (low, high)) in enumerate(ranges.items())],
-        [f"#define {up}_R_{identifier(r)} {i} /* {r} */" for i, r in enumerate(arx.regressor_names)],
+        [
+            f"#define {up}_P_{s} {i} /* {units[s]}, {low:g} to {high:g} */"
+            for i, (s, (low, high)) in enumerate(ranges.items())
+        ],
+        [
+            f"#define {up}_R_{identifier(r)} {i} /* {r} */"
+            for i, r in enumerate(arx.regressor_names)
+        ],
     ]
     state, work = c.sizes
     return _HEADER.format(
-        name=name, up=up, ny=arx.ny, nu=arx.nu, np=len(arx.parameters), n=arx.n_regressors, memory=arx.memory, state=state, work=work,
-        bytes=(state + work) * np.dtype(c.dtype).itemsize, precision=rls.precision, forgetting=c.forgetting, basis=arx.basis,
-        at="its own lag" if arx.scheduling_at == "lag" else "the present", groups="\n".join(groups),
+        name=name,
+        up=up,
+        ny=arx.ny,
+        nu=arx.nu,
+        np=len(arx.parameters),
+        n=arx.n_regressors,
+        memory=arx.memory,
+        state=state,
+        work=work,
+        bytes=(state + work) * np.dtype(c.dtype).itemsize,
+        precision=rls.precision,
+        forgetting=c.forgetting,
+        basis=arx.basis,
+        at="its own lag" if arx.scheduling_at == "lag" else "the present",
+        groups="\n".join(groups),
         signals="\n\n".join("\n".join(block) for block in blocks if block),
-    )  # fmt: skip
+    )
 
 
 def implementation(rls: RecursiveLeastSquares, name: str) -> str:
     """The configuration as constants, and the memory."""
     c, arx = rls.configuration, rls.structure
     kind, *values = numbers(c.forgetting)
-    entries = ", ".join(f"{{RLS_{KINDS[k].upper()}, {channel}, {lag}, {p_lag}}}" for k, channel, lag, p_lag in c.entries.tolist())
+    entries = ", ".join(
+        f"{{RLS_{KINDS[k].upper()}, {channel}, {lag}, {p_lag}}}"
+        for k, channel, lag, p_lag in c.entries.tolist()
+    )
     lines = [f"static const rls_entry entries[] = {{{entries}}};"]
     for g, layout in enumerate(c.groups):
         lines.append(table("int", f"outputs_{g}", layout.group.outputs))
         lines.append(table("int", f"entries_{g}", layout.group.entries))
-    groups = ", ".join(f"{{{y.m}, {len(y.group.entries)}, outputs_{g}, entries_{g}}}" for g, y in enumerate(c.groups))
+    groups = ", ".join(
+        f"{{{y.m}, {len(y.group.entries)}, outputs_{g}, entries_{g}}}"
+        for g, y in enumerate(c.groups)
+    )
     lines.append(f"static const rls_group groups[] = {{{groups}}};")
     factors = []
     for i, factor in enumerate(c.factors):
         functions, degree, pieces, slack, knots, bernstein = factor.arguments
         lines.append(table("rls_real", f"knots_{i}", literals(knots, c.dtype)))
         lines.append(table("rls_real", f"bernstein_{i}", literals(bernstein.reshape(-1), c.dtype)))
-        factors.append(f"{{{functions}, {degree}, {pieces}, {literals([slack], c.dtype)[0]}, knots_{i}, bernstein_{i}}}")
+        factors.append(
+            f"{{{functions}, {degree}, {pieces}, {literals([slack], c.dtype)[0]}, knots_{i},"
+            f" bernstein_{i}}}"
+        )
     lines.append(f"static const rls_factor factors[] = {{{', '.join(factors)}}};")
     lines.append(table("int", "products", c.index.reshape(-1).tolist()))
     lines.append(table("rls_real", "largest", literals(c.largest, c.dtype)))
     kinds = ("RLS_CONSTANT", "RLS_VARIABLE", "RLS_DIRECTIONAL")
     return _IMPLEMENTATION.format(
-        name=name, up=name.upper(), tables="\n".join(lines), memory=arx.memory, entries=len(c.entries), groups=len(c.groups),
-        functions=arx.basis.size, factors=len(factors), forgetting=f"{{{kinds[kind]}, {', '.join(literals(values, c.dtype))}}}",
-    )  # fmt: skip
+        name=name,
+        up=name.upper(),
+        tables="\n".join(lines),
+        memory=arx.memory,
+        entries=len(c.entries),
+        groups=len(c.groups),
+        functions=arx.basis.size,
+        factors=len(factors),
+        forgetting=f"{{{kinds[kind]}, {', '.join(literals(values, c.dtype))}}}",
+    )
 
 
 def check_program(rls: RecursiveLeastSquares, name: str) -> str:
-    """A record of a fixed seed, one sample missing, with the innovations and coefficients that come out here."""
+    """A record of a fixed seed, one sample missing, with the innovations and coefficients that come
+    out here.
+    """
     c, arx = rls.configuration, rls.structure
     rows = samples(arx.ny + arx.nu, arx.basis.ranges, arx.memory + 3 * arx.basis.size + 20)
     learnt, *history = rls.online().run(rows)
     innovations, coefficients = map(np.asarray, history)
     return _CHECK.format(
-        name=name, up=name.upper(), rows=len(rows), tolerance=TOLERANCE[rls.precision], learnt=int(learnt.sum()),
-        samples=c_text.rows(rows, c.dtype), innovations=c_text.rows(innovations[learnt], c.dtype),
+        name=name,
+        up=name.upper(),
+        rows=len(rows),
+        tolerance=TOLERANCE[rls.precision],
+        learnt=int(learnt.sum()),
+        samples=c_text.rows(rows, c.dtype),
+        innovations=c_text.rows(innovations[learnt], c.dtype),
         theta=c_text.rows(coefficients[-1], c.dtype),
-    )  # fmt: skip
+    )
 
 
 def samples(signals: int, ranges: Iterable[tuple[float, float]], count: int) -> Array:
-    """Rows of `signals` normal numbers and a point of the ranges, the sample in the middle missing: numbers to compute with, no flight."""
+    """Rows of `signals` normal numbers and a point of the ranges, the sample in the middle missing:
+    numbers to compute with, no flight.
+    """
     rng = np.random.default_rng(0)
     points = [low + (high - low) * rng.uniform(size=count) for low, high in ranges]
     rows = np.column_stack([rng.standard_normal((count, signals)), *points])

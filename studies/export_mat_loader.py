@@ -1,4 +1,6 @@
-"""MATLAB functions that rebuild the exported family: `ss` array and `lpvss` model with names, units and trim offsets."""
+"""MATLAB functions that rebuild the exported family: `ss` array and `lpvss` model with names, units
+and trim offsets.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""An identified model as C99 for an autopilot or a simulator: one step ahead or in free run, with a check of what Python computed."""
+"""An identified model as C99 for an autopilot or a simulator: one step ahead or in free run, with a
+check of what Python computed.
+"""
 
 from __future__ import annotations
 
@@ -16,19 +18,30 @@ from symheli.lpv import FlightRecord
 from symheli.lpv.arrays import Array
 
 
-def write_model(model: LPVARXModel, folder: Path, name: str = "model", precision: str = "double") -> tuple[Path, ...]:
+def write_model(
+    model: LPVARXModel, folder: Path, name: str = "model", precision: str = "double"
+) -> tuple[Path, ...]:
     """Write NAME.h, NAME.c and NAME_check.c into `folder`; returns the paths written.
 
-    No allocation, no library. Raises `InputError` for a name that is no C identifier, another precision than "double" or "single", and
-    functions of p that are not piecewise polynomial.
+    No allocation, no library. Raises `InputError` for a name that is no C identifier, another
+    precision than "double" or "single", and functions of p that are not piecewise polynomial.
     """
     require_identifier(name)
     if precision not in TOLERANCE:
         raise InputError(f'precision: expected "double" or "single", got {precision!r}')
-    c = Configuration(model.structure, Constant(1.0), np.float32 if precision == "single" else np.float64)
+    c = Configuration(
+        model.structure, Constant(1.0), np.float32 if precision == "single" else np.float64
+    )
     if not c.factors:
-        raise InputError("functions brought along cannot be written in C; identify with a polynomial or spline basis")
-    files = {f"{name}.h": header(model, c, name), f"{name}.c": implementation(model, c, name), f"{name}_check.c": check(model, c, name)}
+        raise InputError(
+            "functions brought along cannot be written in C; identify with a polynomial or spline"
+            " basis"
+        )
+    files = {
+        f"{name}.h": header(model, c, name),
+        f"{name}.c": implementation(model, c, name),
+        f"{name}_check.c": check(model, c, name),
+    }
     return tuple(write_text(folder / file, content) for file, content in files.items())
 
 
@@ -40,14 +53,27 @@ def header(model: LPVARXModel, c: Configuration, name: str) -> str:
         [f"#define {up}_U_{identifier(s)} {i} /* {s.unit} */" for i, s in enumerate(model.inputs)],
         [
             f"#define {up}_P_{identifier(s)} {i} /* {s.unit}, {low:g} to {high:g} */"
-            for i, (s, (low, high)) in enumerate(zip(model.parameters, arx.basis.ranges, strict=True))
+            for i, (s, (low, high)) in enumerate(
+                zip(model.parameters, arx.basis.ranges, strict=True)
+            )
         ],
     ]
     return _HEADER.format(
-        name=name, up=up, ny=arx.ny, nu=arx.nu, np=len(arx.parameters), nf=arx.basis.size, memory=arx.memory, dt=model.dt,
-        room=max(arx.nu, 1), real="float" if c.dtype is np.float32 else "double", basis=arx.basis, method=model.method,
-        at="of their lag" if arx.scheduling_at == "lag" else "now", signals="\n\n".join("\n".join(b) for b in blocks if b),
-    )  # fmt: skip
+        name=name,
+        up=up,
+        ny=arx.ny,
+        nu=arx.nu,
+        np=len(arx.parameters),
+        nf=arx.basis.size,
+        memory=arx.memory,
+        dt=model.dt,
+        room=max(arx.nu, 1),
+        real="float" if c.dtype is np.float32 else "double",
+        basis=arx.basis,
+        method=model.method,
+        at="of their lag" if arx.scheduling_at == "lag" else "now",
+        signals="\n\n".join("\n".join(b) for b in blocks if b),
+    )
 
 
 def implementation(model: LPVARXModel, c: Configuration, name: str) -> str:
@@ -55,36 +81,67 @@ def implementation(model: LPVARXModel, c: Configuration, name: str) -> str:
     factors = [f.arguments for f in c.factors]
     numbers = [[functions, degree, pieces] for functions, degree, pieces, *_ in factors]
     starts = np.cumsum([[0, 0], *([f[4].size, f[5].size] for f in factors[:-1])], axis=0)
-    entries = ", ".join(f"{{{kind}, {channel}, {lag}, {p_lag}}}" for kind, channel, lag, p_lag in c.entries.tolist())
+    entries = ", ".join(
+        f"{{{kind}, {channel}, {lag}, {p_lag}}}" for kind, channel, lag, p_lag in c.entries.tolist()
+    )
     tables = [
         f"static const struct {{ int kind, channel, lag, p_lag; }} entries[] = {{{entries}}};",
         f"static const real theta[][{name.upper()}_NY] = {{\n{rows(model.theta, c.dtype)}\n}};",
         "static const struct { int functions, degree, pieces, knot, bernstein; } factors[] = {"
-        + ", ".join(f"{{{', '.join(map(str, [*n, *s]))}}}" for n, s in zip(numbers, starts.tolist(), strict=True)) + "};",
+        + ", ".join(
+            f"{{{', '.join(map(str, [*n, *s]))}}}"
+            for n, s in zip(numbers, starts.tolist(), strict=True)
+        )
+        + "};",
         table("real", "slack", literals([f[3] for f in factors], c.dtype)),
         table("real", "knots", literals(np.concatenate([f[4] for f in factors]), c.dtype)),
-        table("real", "bernstein", literals(np.concatenate([f[5].reshape(-1) for f in factors]), c.dtype)),
+        table(
+            "real",
+            "bernstein",
+            literals(np.concatenate([f[5].reshape(-1) for f in factors]), c.dtype),
+        ),
         table("int", "products", c.index.reshape(-1).tolist()),
-    ]  # fmt: skip
+    ]
     return _IMPLEMENTATION.format(
-        name=name, up=name.upper(), tables="\n".join(tables), entries=len(c.entries), kinds=", ".join(k.upper() for k in KINDS),
-        order=max(f[1] for f in factors) + 1, most=max(f[0] for f in factors), factors=len(factors),
-    )  # fmt: skip
+        name=name,
+        up=name.upper(),
+        tables="\n".join(tables),
+        entries=len(c.entries),
+        kinds=", ".join(k.upper() for k in KINDS),
+        order=max(f[1] for f in factors) + 1,
+        most=max(f[0] for f in factors),
+        factors=len(factors),
+    )
 
 
 def check(model: LPVARXModel, c: Configuration, name: str) -> str:
-    """A record of a fixed seed, one sample missing, with one-step predictions, and the free run up to the missing sample."""
+    """A record of a fixed seed, one sample missing, with one-step predictions, and the free run up
+    to the missing sample.
+    """
     arx = model.structure
     wide, count = arx.ny + arx.nu, 2 * arx.memory + 60
     given = samples(wide, arx.basis.ranges, count).astype(c.dtype).astype(float)
-    record = FlightRecord(model.dt * np.arange(count), given, (*model.outputs, *model.inputs, *model.parameters))
+    record = FlightRecord(
+        model.dt * np.arange(count), given, (*model.outputs, *model.inputs, *model.parameters)
+    )
     complete = np.logical_and.reduce(np.isfinite(given), axis=1)
-    there = [k for k in range(arx.memory, count) if complete[k - arx.memory : k].all() and np.isfinite(given[k, arx.ny :]).all()]
+    there = [
+        k
+        for k in range(arx.memory, count)
+        if complete[k - arx.memory : k].all() and np.isfinite(given[k, arx.ny :]).all()
+    ]
     return _CHECK.format(
-        name=name, up=name.upper(), rows=count, tolerance=TOLERANCE["single" if c.dtype is np.float32 else "double"], there=len(there),
-        width=given.shape[1], samples=rows(given, c.dtype), predicted=rows(model.predict(record, 1)[there], c.dtype),
-        half=count // 2, simulated=rows(_free_run(model, record, count // 2), c.dtype),
-    )  # fmt: skip
+        name=name,
+        up=name.upper(),
+        rows=count,
+        tolerance=TOLERANCE["single" if c.dtype is np.float32 else "double"],
+        there=len(there),
+        width=given.shape[1],
+        samples=rows(given, c.dtype),
+        predicted=rows(model.predict(record, 1)[there], c.dtype),
+        half=count // 2,
+        simulated=rows(_free_run(model, record, count // 2), c.dtype),
+    )
 
 
 def _free_run(model: LPVARXModel, record: FlightRecord, stop: int) -> Array:

@@ -17,16 +17,29 @@ HOLD = -0.02
 
 
 def lateral_loop(
-    heli: Helicopter, low: float = 0.0, high: float = 13.0, channel: Literal["gust", "inputs"] = "gust", degree: int = 3, points: int = 27
+    heli: Helicopter,
+    low: float = 0.0,
+    high: float = 13.0,
+    channel: Literal["gust", "inputs"] = "gust",
+    degree: int = 3,
+    points: int = 27,
 ) -> LPVStateSpace:
-    """v p r phi b1 from `low` to `high` m/s under attitude hold, element-wise polynomials of `degree` through `points` airspeeds.
+    """v p r phi b1 from `low` to `high` m/s under attitude hold, element-wise polynomials of
+    `degree` through `points` airspeeds.
 
-    channel "gust": lateral gust v_w (m/s) -> r (rad/s), phi (rad); "inputs": disturbances added to d_lat, d_ped (rad) -> the same.
+    channel "gust": lateral gust v_w (m/s) -> r (rad/s), phi (rad); "inputs": disturbances added to
+    d_lat, d_ped (rad) -> the same.
     """
     family = symheli.sweep(heli, np.linspace(low, high, points), inputs=("d_lat", "d_ped", "v_w"))  # type: ignore[arg-type]
-    return close(family.select(STATES, ("d_lat", "d_ped", "v_w")).interpolate("polynomial", degree), channel)
+    return close(
+        family.select(STATES, ("d_lat", "d_ped", "v_w")).interpolate("polynomial", degree), channel
+    )
 
 
 def close(lateral: LPVStateSpace, channel: Literal["gust", "inputs"]) -> LPVStateSpace:
-    """Attitude hold around any lateral model (continuous or sampled) that has the channel's inputs and the outputs r and phi."""
-    return lateral.feedback({("d_lat", "phi"): HOLD}).select(inputs=CHANNELS[channel], outputs=OUTPUTS)
+    """Attitude hold around any lateral model (continuous or sampled) that has the channel's inputs
+    and the outputs r and phi.
+    """
+    return lateral.feedback({("d_lat", "phi"): HOLD}).select(
+        inputs=CHANNELS[channel], outputs=OUTPUTS
+    )

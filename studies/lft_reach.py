@@ -1,6 +1,8 @@
-"""How much of the airspeed range the LFT tests can prove, beside a Lyapunov function that varies with the airspeed.
+"""How much of the airspeed range the LFT tests can prove, beside a Lyapunov function that varies
+with the airspeed.
 
-An LFT test lets the airspeed jump. Shrinking the range until the test succeeds shows what that assumption costs.
+An LFT test lets the airspeed jump. Shrinking the range until the test succeeds shows what that
+assumption costs.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ from symheli import Helicopter, LPVStateSpace, Scheduling
 from synthesis import Search, Status
 
 TESTS = ("small gain", "D", "DG")
-"""Full blocks are left out: for one parameter they prove what D/G scalings prove, which `tests/synthesis` checks."""
+"""Full blocks are left out: for one parameter they prove what D/G scalings prove, which
+`tests/synthesis` checks.
+"""
 
 RATE = 3.0
 """Acceleration (m/s^2) at which a varying P(p) is asked for the whole range."""
@@ -32,7 +36,9 @@ NARROW = ((0.0, 0.5), (0.0, 1.0), (0.0, 1.5), (5.5, 7.5), (3.0, 10.0))
 
 
 class Reach(NamedTuple):
-    """The largest range [low, high] m/s found on which `test` succeeds, and the first wider one on which it failed."""
+    """The largest range [low, high] m/s found on which `test` succeeds, and the first wider one on
+    which it failed.
+    """
 
     test: str
     low: float
@@ -53,11 +59,21 @@ def proven(loop: LPVStateSpace, test: str) -> bool:
 
 def grows(loop: LPVStateSpace, search: Search | None = None) -> bool:
     """Whether a jumping airspeed is found along which the state grows: no test can succeed then."""
-    return synthesis.stability(loop, math.inf, search=search or Search(seconds=math.inf)).status is Status.GROWING
+    return (
+        synthesis.stability(loop, math.inf, search=search or Search(seconds=math.inf)).status
+        is Status.GROWING
+    )
 
 
-def largest(test: str, widen: Callable[[float], tuple[float, float]], succeeds: Callable[[float, float], bool], width: float) -> Reach:
-    """Bisection over a half-range or upper end in (0, width], to 1 % of it or 0.01 m/s; ranges are nested, so it is monotone."""
+def largest(
+    test: str,
+    widen: Callable[[float], tuple[float, float]],
+    succeeds: Callable[[float, float], bool],
+    width: float,
+) -> Reach:
+    """Bisection over a half-range or upper end in (0, width], to 1 % of it or 0.01 m/s; ranges are
+    nested, so it is monotone.
+    """
     if succeeds(*widen(width)):
         return Reach(test, *widen(width), None)
     good, bad = 0.0, width
@@ -71,36 +87,57 @@ def largest(test: str, widen: Callable[[float], tuple[float, float]], succeeds: 
 def from_hover(loop: LPVStateSpace, test: str) -> Reach:
     """The largest [low end of the loop, V] that this LFT test proves."""
     s = loop.scheduling
-    return largest(test, lambda v: (s.low, s.low + v), lambda a, b: proven(on(loop, a, b), test), s.high - s.low)
+    return largest(
+        test,
+        lambda v: (s.low, s.low + v),
+        lambda a, b: proven(on(loop, a, b), test),
+        s.high - s.low,
+    )
 
 
 def about(loop: LPVStateSpace, middle: float, test: str) -> Reach:
     """The largest [middle - h, middle + h] that this LFT test proves."""
     s = loop.scheduling
     return largest(
-        test, lambda h: (middle - h, middle + h), lambda a, b: proven(on(loop, a, b), test), min(middle - s.low, s.high - middle)
+        test,
+        lambda h: (middle - h, middle + h),
+        lambda a, b: proven(on(loop, a, b), test),
+        min(middle - s.low, s.high - middle),
     )
 
 
 def growing_from_hover(loop: LPVStateSpace, search: Search | None = None) -> Reach:
-    """Where the search stops finding a jumping airspeed in [low end, V] along which the state grows: `failed` is the least such range."""
+    """Where the search stops finding a jumping airspeed in [low end, V] along which the state
+    grows: `failed` is the least such range.
+    """
     s = loop.scheduling
-    return largest("no growth found", lambda v: (s.low, s.low + v), lambda a, b: not grows(on(loop, a, b), search), s.high - s.low)
+    return largest(
+        "no growth found",
+        lambda v: (s.low, s.low + v),
+        lambda a, b: not grows(on(loop, a, b), search),
+        s.high - s.low,
+    )
 
 
 def gains(loop: LPVStateSpace, low: float, high: float) -> dict[str, Any]:
-    """The gain that each test, and P(p) at `RATE`, proves on [low, high] m/s (else its status), and the largest frozen one."""
+    """The gain that each test, and P(p) at `RATE`, proves on [low, high] m/s (else its status), and
+    the largest frozen one.
+    """
     narrow = on(loop, low, high)
     lft = narrow.to_lft().reduce()
     varying = synthesis.l2_gain(narrow, RATE, search=Search(seconds=math.inf))
-    certificates: dict[str, Any] = {test: synthesis.lft_gain(lft, test, search=None) for test in synthesis.SCALINGS}
+    certificates: dict[str, Any] = {
+        test: synthesis.lft_gain(lft, test, search=None) for test in synthesis.SCALINGS
+    }
     certificates[f"P(p) at {RATE:g} m/s^2"] = varying
     found = {test: c.gamma if c.verified else c.status.name for test, c in certificates.items()}
     return {**found, "lower bound at that rate": varying.lower, "frozen": varying.frozen}
 
 
 def measure(
-    loop: LPVStateSpace, middles: tuple[float, ...] = MIDDLES, narrow: tuple[tuple[float, float], ...] = NARROW
+    loop: LPVStateSpace,
+    middles: tuple[float, ...] = MIDDLES,
+    narrow: tuple[tuple[float, float], ...] = NARROW,
 ) -> Iterator[tuple[str, Any]]:
     """(name, result) of everything the page shows for one loop, as it is found."""
     s = loop.scheduling
@@ -119,32 +156,55 @@ def measure(
 def main() -> None:
     """Print everything, for both loops of the X-Cell."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="the lateral loop, grown from hover only")
+    parser.add_argument(
+        "--quick", action="store_true", help="the lateral loop, grown from hover only"
+    )
     parser.add_argument("--json", action="store_true", help="print what a program would read")
     options = parsed(parser, "lft.md")
     heli = Helicopter.load("xcell60", governor="ideal")
-    loops = {"lateral": lateral_loop(heli)} | ({} if options.quick else {"longitudinal": longitudinal_loop(heli)})
+    loops = {"lateral": lateral_loop(heli)} | (
+        {} if options.quick else {"longitudinal": longitudinal_loop(heli)}
+    )
     found: dict[str, dict[str, Any]] = {}
     for name, loop in loops.items():
         found[name] = {}
         for what, result in measure(loop, *(((), ()) if options.quick else (MIDDLES, NARROW))):
             progress(f"{name}: {what}: {_words(result)}")
             found[name][what] = result
-    rows = [[f"{name}: {what}", _words(result)] for name, results in found.items() for what, result in results.items()]
+    rows = [
+        [f"{name}: {what}", _words(result)]
+        for name, results in found.items()
+        for what, result in results.items()
+    ]
     print(as_json(found) if options.json else columns(rows, left=2))
     if options.write:
-        keep(DOCS / "lft.md", "reach", "\n\n".join(tables(loop, results) for loop, results in found.items()), processor())
+        keep(
+            DOCS / "lft.md",
+            "reach",
+            "\n\n".join(tables(loop, results) for loop, results in found.items()),
+            processor(),
+        )
 
 
 def tables(loop: str, results: dict[str, Any]) -> str:
-    """The gains proven of one loop, range by range, and the largest ranges that each test proves stable, in Markdown."""
-    proven_gains = {what.removeprefix("gains on "): found for what, found in results.items() if what.startswith("gains on ")}
+    """The gains proven of one loop, range by range, and the largest ranges that each test proves
+    stable, in Markdown.
+    """
+    proven_gains = {
+        what.removeprefix("gains on "): found
+        for what, found in results.items()
+        if what.startswith("gains on ")
+    }
     reached: dict[str, dict[str, str]] = {}
     for what, found in results.items():
         if "test" in found:
             where, test = what.rsplit(", ", 1)
             reached.setdefault(where, {})[test] = _range(found)
-    return "\n\n".join(_table(title, rows) for title, rows in ((f"{loop}: gain on", proven_gains), (f"{loop}: stable", reached)) if rows)
+    return "\n\n".join(
+        _table(title, rows)
+        for title, rows in ((f"{loop}: gain on", proven_gains), (f"{loop}: stable", reached))
+        if rows
+    )
 
 
 def _table(title: str, rows: dict[str, dict[str, Any]]) -> str:

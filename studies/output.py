@@ -20,7 +20,9 @@ class Output:
 
 
 def as_json(data: Any) -> str:
-    """JSON of mappings, sequences, arrays and numbers; what is not finite becomes the string "inf", "-inf" or "nan"."""
+    """JSON of mappings, sequences, arrays and numbers; what is not finite becomes the string "inf",
+    "-inf" or "nan".
+    """
     return json.dumps(plain(data), indent=2, allow_nan=False)
 
 
@@ -47,5 +49,11 @@ def progress(message: str) -> None:
 def columns(rows: list[list[str]], left: int = 1, gap: str = "  ") -> str:
     """Rows of text as aligned columns, the first `left` flush left, the others flush right."""
     widths = [max(len(row[i]) for row in rows if i < len(row)) for i in range(max(map(len, rows)))]
-    lines = (gap.join(c.ljust(w) if i < left else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths, strict=False))) for row in rows)
+    lines = (
+        gap.join(
+            c.ljust(w) if i < left else c.rjust(w)
+            for i, (c, w) in enumerate(zip(row, widths, strict=False))
+        )
+        for row in rows
+    )
     return "\n".join(line.rstrip() for line in lines)

@@ -1,4 +1,6 @@
-"""Where scheduling pays: LPV beside LTI models of the same order, identified from transitions in wind and noise."""
+"""Where scheduling pays: LPV beside LTI models of the same order, identified from transitions in
+wind and noise.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ CONDITIONS = {
 
 @dataclass(frozen=True)
 class Line:
-    """One output of one axis in one condition: fits in percent by horizon (seeds,), LPV and LTI; on how many seeds scheduling pays."""
+    """One output of one axis in one condition: fits in percent by horizon (seeds,), LPV and LTI; on
+    how many seeds scheduling pays.
+    """
 
     condition: str
     axis: str
@@ -39,8 +43,12 @@ class Line:
         return len(self.lpv[HORIZONS[0]])
 
 
-def where_scheduling_pays(seeds: int, vehicle: str, conditions: Mapping[str, FlightPlan] = CONDITIONS) -> Iterator[Line]:
-    """In each condition fly with the default seed and `seeds` others, fit, and judge on another transition."""
+def where_scheduling_pays(
+    seeds: int, vehicle: str, conditions: Mapping[str, FlightPlan] = CONDITIONS
+) -> Iterator[Line]:
+    """In each condition fly with the default seed and `seeds` others, fit, and judge on another
+    transition.
+    """
     heli = Helicopter.load(vehicle, governor="ideal")
     autopilot = autopilot_for(heli)
     for condition, plan in conditions.items():
@@ -51,32 +59,53 @@ def where_scheduling_pays(seeds: int, vehicle: str, conditions: Mapping[str, Fli
             for axis in AXES:
                 found[axis.name].append(compare(axis.structure(), training, test))
             print(f"  {condition}: seed {seed} of {seeds}", file=sys.stderr, flush=True)
-        yield from (_line(condition, axis.name, output, found[axis.name]) for axis in AXES for output in axis.outputs)
+        yield from (
+            _line(condition, axis.name, output, found[axis.name])
+            for axis in AXES
+            for output in axis.outputs
+        )
 
 
 def _line(condition: str, axis: str, output: str, runs: list[Comparison]) -> Line:
     def over_seeds(model: int) -> dict[str, np.ndarray]:
-        return {h: np.array([(run.models[model].held_out or {})[h][output] for run in runs]) for h in HORIZONS}
+        return {
+            h: np.array([(run.models[model].held_out or {})[h][output] for run in runs])
+            for h in HORIZONS
+        }
 
-    return Line(condition, axis, output, over_seeds(0), over_seeds(1), sum(run.pays(output) for run in runs))
+    return Line(
+        condition, axis, output, over_seeds(0), over_seeds(1), sum(run.pays(output) for run in runs)
+    )
 
 
 def table(lines: Sequence[Line]) -> str:
-    """Medians over the seeds, LPV / LTI; then the worst of them, each model on the flight it does worst on."""
+    """Medians over the seeds, LPV / LTI; then the worst of them, each model on the flight it does
+    worst on.
+    """
     head = "".join(f"{h:>20s}" for h in HORIZONS)
-    return "\n".join([
-        f"held-out fit in percent, LPV / LTI of the same order, median of {lines[0].seeds} pairs of flights",
-        f"scheduling pays: more than {PAYS:g} point better 1 s ahead and not worse in free run, on how many of them",
-        f"{'':10s}{head}{'pays':>10s}",
-        *_rows(lines, np.median, lambda line: f"{line.pays:7d}/{line.seeds}"),
-        "",
-        f"the same, worst of {lines[0].seeds} pairs of flights",
-        f"{'':10s}{head}",
-        *_rows(lines, np.min, lambda _: ""),
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            (
+                f"held-out fit in percent, LPV / LTI of the same order, median of {lines[0].seeds}"
+                " pairs of flights"
+            ),
+            (
+                f"scheduling pays: more than {PAYS:g} point better 1 s ahead and not worse in free"
+                " run, on how many of them"
+            ),
+            f"{'':10s}{head}{'pays':>10s}",
+            *_rows(lines, np.median, lambda line: f"{line.pays:7d}/{line.seeds}"),
+            "",
+            f"the same, worst of {lines[0].seeds} pairs of flights",
+            f"{'':10s}{head}",
+            *_rows(lines, np.min, lambda _: ""),
+        ]
+    )
 
 
-def _rows(lines: Sequence[Line], over: Callable[[np.ndarray], Any], end: Callable[[Line], str]) -> Iterator[str]:
+def _rows(
+    lines: Sequence[Line], over: Callable[[np.ndarray], Any], end: Callable[[Line], str]
+) -> Iterator[str]:
     group = ("", "")
     for line in lines:
         if (line.condition, line.axis) != group:
@@ -84,7 +113,10 @@ def _rows(lines: Sequence[Line], over: Callable[[np.ndarray], Any], end: Callabl
                 yield line.condition
             group = line.condition, line.axis
             yield f" {line.axis}"
-        cells = "".join(f"{percent(float(over(line.lpv[h]))):>10s} /{percent(float(over(line.lti[h]))):>8s}" for h in HORIZONS)
+        cells = "".join(
+            f"{percent(float(over(line.lpv[h]))):>10s} /{percent(float(over(line.lti[h]))):>8s}"
+            for h in HORIZONS
+        )
         yield f"  {line.output:8s}{cells}{end(line)}"
 
 
@@ -92,8 +124,14 @@ def data(lines: Sequence[Line]) -> list[dict[str, Any]]:
     """Every fit of every seed."""
     return [
         {
-            "condition": line.condition, "axis": line.axis, "output": line.output, "pays": line.pays, "seeds": line.seeds, "unit": "%",
-            "lpv": {h: v.tolist() for h, v in line.lpv.items()}, "lti": {h: v.tolist() for h, v in line.lti.items()},
+            "condition": line.condition,
+            "axis": line.axis,
+            "output": line.output,
+            "pays": line.pays,
+            "seeds": line.seeds,
+            "unit": "%",
+            "lpv": {h: v.tolist() for h, v in line.lpv.items()},
+            "lti": {h: v.tolist() for h, v in line.lti.items()},
         }
         for line in lines
-    ]  # fmt: skip
+    ]

@@ -1,4 +1,6 @@
-"""Exact, interpolated and identified model side by side: gains of the servo channel, which all of them have, at 50 Hz."""
+"""Exact, interpolated and identified model side by side: gains of the servo channel, which all of
+them have, at 50 Hz.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +27,13 @@ SEGMENTS = (8,)
 
 
 def measure_servo(heli: Helicopter, quick: bool = False) -> list[Bound]:
-    """Bounds of every model: flown, P(p), constant P and, for polynomial models, the LFT tests; identified as in the study, seed 0."""
+    """Bounds of every model: flown, P(p), constant P and, for polynomial models, the LFT tests;
+    identified as in the study, seed 0.
+    """
     plan, autopilot = FlightPlan(0, ramps=Effort().ramps), autopilot_for(heli)
-    gentle = axes.identify(LATERAL, plan.gentle(heli, autopilot, Effort().gentle_ramps), "rls", order=2)
+    gentle = axes.identify(
+        LATERAL, plan.gentle(heli, autopilot, Effort().gentle_ramps), "rls", order=2
+    )
     aggressive = axes.identify(LATERAL, plan.training(heli, autopilot), "rls")
     inputs = ("d_lat", "d_ped")
     family = symheli.sweep(heli, np.linspace(0.0, TOP, 27), inputs=inputs)  # type: ignore[arg-type]
@@ -54,4 +60,6 @@ def found_of(found: list[Bound]) -> dict[str, Any]:
 def curves_of(found: list[Bound]) -> list[GainCurve]:
     """One curve a model that is stable when frozen."""
     stable = dict.fromkeys(b.model for b in found if math.isfinite(b.certificate.frozen))
-    return [guarantees.gain_curve(found, model, "servo", f"Servo channel, {model}") for model in stable]
+    return [
+        guarantees.gain_curve(found, model, "servo", f"Servo channel, {model}") for model in stable
+    ]

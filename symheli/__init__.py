@@ -1,6 +1,8 @@
-"""Helicopter models from hover to forward flight: symbolic equations in, exact linear families and LPV models out.
+"""Helicopter models from hover to forward flight: symbolic equations in, exact linear families and
+LPV models out.
 
-Everything is loaded when first used: `import symheli` brings in neither CasADi nor a plotting library.
+Everything is loaded when first used: `import symheli` brings in neither CasADi nor a plotting
+library.
 """
 
 from __future__ import annotations
@@ -13,14 +15,29 @@ if TYPE_CHECKING:
     from symheli.derivative_table import DerivativeTable, derivatives
     from symheli.environment import Dryden, Gust, Wind, standard_atmosphere
     from symheli.equilibrium import TrimPoint, trim
-    from symheli.errors import ExcitationError, InputError, SymheliError, TrimError, UnknownNameError
+    from symheli.errors import (
+        ExcitationError,
+        InputError,
+        SymheliError,
+        TrimError,
+        UnknownNameError,
+    )
     from symheli.flight import AirspeedSchedule, Excitation, Sensor, Servo, fly
     from symheli.grid_sweep import sweep_grid
     from symheli.helicopter import Helicopter
     from symheli.identified import identified_model
     from symheli.integrate import Trajectory, simulate, simulate_batch
     from symheli.linearization import linearize
-    from symheli.lpv import LFT, FlightRecord, LinearFamily, LinearGrid, LinearModel, LPVStateSpace, Scheduling, Signal
+    from symheli.lpv import (
+        LFT,
+        FlightRecord,
+        LinearFamily,
+        LinearGrid,
+        LinearModel,
+        LPVStateSpace,
+        Scheduling,
+        Signal,
+    )
     from symheli.stitched_model import StitchedModel
     from symheli.trim_grid import TrimMap, trim_map
 
@@ -39,9 +56,22 @@ _HOME = {
     **dict.fromkeys(("Dryden", "Gust", "Wind", "standard_atmosphere"), "symheli.environment"),
     **dict.fromkeys(("fly", "AirspeedSchedule", "Excitation", "Sensor", "Servo"), "symheli.flight"),
     **dict.fromkeys(
-        ("LFT", "FlightRecord", "LinearFamily", "LinearGrid", "LinearModel", "LPVStateSpace", "Scheduling", "Signal"), "symheli.lpv"
+        (
+            "LFT",
+            "FlightRecord",
+            "LinearFamily",
+            "LinearGrid",
+            "LinearModel",
+            "LPVStateSpace",
+            "Scheduling",
+            "Signal",
+        ),
+        "symheli.lpv",
     ),
-    **dict.fromkeys(("SymheliError", "InputError", "UnknownNameError", "TrimError", "ExcitationError"), "symheli.errors"),
+    **dict.fromkeys(
+        ("SymheliError", "InputError", "UnknownNameError", "TrimError", "ExcitationError"),
+        "symheli.errors",
+    ),
 }
 
 __all__ = [

@@ -18,14 +18,20 @@ _MEANINGLESS = 1e-7  # a switching function that stays below this is zero, not s
 
 
 def sweep(
-    heli: Helicopter, airspeeds: Sequence[float], *, climb_rate: float = 0.0, inputs: Sequence[str] | None = None,
+    heli: Helicopter,
+    airspeeds: Sequence[float],
+    *,
+    climb_rate: float = 0.0,
+    inputs: Sequence[str] | None = None,
     start: LinearFamily | None = None,
-) -> LinearFamily:  # fmt: skip
-    """Trim and linearize at each of `airspeeds` (m/s, increasing), each trim started from the one before.
+) -> LinearFamily:
+    """Trim and linearize at each of `airspeeds` (m/s, increasing), each trim started from the one
+    before.
 
-    `inputs` as in `linearize`. `start`: a family at the same airspeeds whose trims are near, to start from instead. `.kinks` of
-    the result lists, by cause, the airspeeds between the first and the last at which the linear models have a corner (a wake
-    edge, a limit, a flow reversal). Raises `TrimError`, `InputError`.
+    `inputs` as in `linearize`. `start`: a family at the same airspeeds whose trims are near, to
+    start from instead. `.kinks` of the result lists, by cause, the airspeeds between the first and
+    the last at which the linear models have a corner (a wake edge, a limit, a flow reversal).
+    Raises `TrimError`, `InputError`.
     """
     speeds = [float(v) for v in np.atleast_1d(airspeeds)]
     if not speeds or any(b <= a for a, b in pairwise(speeds)):
@@ -41,14 +47,18 @@ def sweep(
 
 
 def kink_speeds(heli: Helicopter, points: Sequence[TrimPoint]) -> Mapping[str, tuple[float, ...]]:
-    """Airspeeds (m/s) between neighbouring trims at which a switching function changes sign, to 1e-6 m/s, by cause."""
+    """Airspeeds (m/s) between neighbouring trims at which a switching function changes sign, to
+    1e-6 m/s, by cause.
+    """
     values = [heli.in_air(p.density).switches(p.x.array, p.u.array, p.wind.array) for p in points]
     kinks: dict[str, tuple[float, ...]] = {}
     for name in values[0]:
         if name.endswith("vortex ring"):  # a flag, not a corner
             continue
         found = []
-        for before, after, a, b in zip(points[:-1], points[1:], values[:-1], values[1:], strict=True):
+        for before, after, a, b in zip(
+            points[:-1], points[1:], values[:-1], values[1:], strict=True
+        ):
             if a[name] * b[name] < 0 and min(abs(a[name]), abs(b[name])) > _MEANINGLESS:
                 found.append(_crossing(heli, name, before, after))
         if found:

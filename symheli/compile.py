@@ -17,21 +17,38 @@ import casadi
 from symheli.errors import CompilerWarning
 
 FLAGS = (
-    "-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-slp-vectorize", "-fPIC", "-shared",
-)  # fmt: skip
-"""Flags given to the compiler; none changes a number: no contraction, only errno and exception flags are given up. Pairs of
-scalars are not packed into vectors: one flight takes 1.3 times as long with that."""
+    "-O3",
+    "-march=native",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fno-tree-slp-vectorize",
+    "-fPIC",
+    "-shared",
+)
+"""Flags given to the compiler; none changes a number: no contraction, only errno and exception
+flags are given up. Pairs of scalars are not packed into vectors: one flight takes 1.3 times as long
+with that.
+"""
 
 
 def cache_directory() -> Path:
-    """Where compiled functions are kept: $SYMHELI_CACHE, else symheli in $XDG_CACHE_HOME or ~/.cache."""
+    """Where compiled functions are kept: $SYMHELI_CACHE, else symheli in $XDG_CACHE_HOME or
+    ~/.cache.
+    """
     given = os.environ.get("SYMHELI_CACHE")
-    return Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symheli"
+    return (
+        Path(given)
+        if given
+        else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "symheli"
+    )
 
 
 @functools.cache
 def compiler() -> str | None:
-    """Path of the C compiler ($CC, else cc, gcc or clang), None where there is none or SYMHELI_COMPILE=0."""
+    """Path of the C compiler ($CC, else cc, gcc or clang), None where there is none or
+    SYMHELI_COMPILE=0.
+    """
     if os.environ.get("SYMHELI_COMPILE") == "0":
         return None
     for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
@@ -43,12 +60,17 @@ def compiler() -> str | None:
 @functools.cache
 def _warn_once(reason: str) -> None:
     warnings.warn(
-        f"{reason}: CasADi's virtual machine and NumPy are used, several times slower, with the same numbers", CompilerWarning, stacklevel=4
+        f"{reason}: CasADi's virtual machine and NumPy are used, several times slower, with the"
+        " same numbers",
+        CompilerWarning,
+        stacklevel=4,
     )
 
 
 def compiled(function: casadi.Function) -> casadi.Function:
-    """The same function as machine code, or unchanged (with one `CompilerWarning`) where that is not possible."""
+    """The same function as machine code, or unchanged (with one `CompilerWarning`) where that is
+    not possible.
+    """
     generator = casadi.CodeGenerator("symheli_code.c")
     generator.add(function)
     path = library(generator.dump(), function.name())
@@ -62,18 +84,23 @@ def compiled(function: casadi.Function) -> casadi.Function:
 
 
 def library(source: str, name: str) -> Path | None:
-    """C source as a shared library, or None (with one `CompilerWarning`) where that is not possible.
+    """C source as a shared library, or None (with one `CompilerWarning`) where that is not
+    possible.
 
-    It is kept in `cache_directory()` under a hash of source, compiler, flags and processor, and written under a temporary
-    name first: no half-written library is ever loaded.
+    It is kept in `cache_directory()` under a hash of source, compiler, flags and processor, and
+    written under a temporary name first: no half-written library is ever loaded.
     """
     cc = compiler()
     if cc is None:
         _warn_once(
-            "no C compiler is used (install gcc or clang, or set CC)" if os.environ.get("SYMHELI_COMPILE") != "0" else "SYMHELI_COMPILE=0"
+            "no C compiler is used (install gcc or clang, or set CC)"
+            if os.environ.get("SYMHELI_COMPILE") != "0"
+            else "SYMHELI_COMPILE=0"
         )
         return None
-    key = hashlib.sha256("\n".join((source, cc, *FLAGS, platform.processor(), platform.machine(), _cpu())).encode()).hexdigest()[:32]
+    key = hashlib.sha256(
+        "\n".join((source, cc, *FLAGS, platform.processor(), platform.machine(), _cpu())).encode()
+    ).hexdigest()[:32]
     kept = cache_directory() / f"{name}-{key}.so"
     try:
         if not kept.is_file():
@@ -81,13 +108,22 @@ def library(source: str, name: str) -> Path | None:
             with tempfile.TemporaryDirectory(prefix="symheli-") as scratch:
                 code, built = Path(scratch) / "code.c", Path(scratch) / "code.so"
                 code.write_text(source)
-                subprocess.run([cc, *FLAGS, str(code), "-o", str(built), "-lm"], check=True, capture_output=True, timeout=300)
+                subprocess.run(
+                    [cc, *FLAGS, str(code), "-o", str(built), "-lm"],
+                    check=True,
+                    capture_output=True,
+                    timeout=300,
+                )
                 with tempfile.NamedTemporaryFile(dir=kept.parent, delete=False) as target:
                     target.write(built.read_bytes())
             os.replace(target.name, kept)
         return kept
     except (OSError, subprocess.SubprocessError) as error:
-        detail = error.stderr.decode(errors="replace")[-300:] if isinstance(error, subprocess.CalledProcessError) else str(error)
+        detail = (
+            error.stderr.decode(errors="replace")[-300:]
+            if isinstance(error, subprocess.CalledProcessError)
+            else str(error)
+        )
         _warn_once(f"compiling {name} failed ({detail.strip()})")
         return None
 
@@ -98,7 +134,18 @@ def _cpu() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
-        command = [compiler() or "", "-march=native", "-dM", "-E", "-x", "c", os.devnull]  # what native means here, as macros
-        return platform.platform() + subprocess.run(command, capture_output=True, text=True, timeout=60).stdout
+        command = [
+            compiler() or "",
+            "-march=native",
+            "-dM",
+            "-E",
+            "-x",
+            "c",
+            os.devnull,
+        ]  # what native means here, as macros
+        return (
+            platform.platform()
+            + subprocess.run(command, capture_output=True, text=True, timeout=60).stdout
+        )
     telling = ("model name", "flags", "Features", "CPU implementer", "CPU part")
     return "\n".join(sorted({line for line in lines if line.startswith(telling)}))

@@ -1,4 +1,6 @@
-"""Stability and control derivatives along the transition, in the field's nomenclature: X_u ... N_ped, L_b1."""
+"""Stability and control derivatives along the transition, in the field's nomenclature: X_u ...
+N_ped, L_b1.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from symheli.lpv.signal import Signal
 from symheli.lpv.units import quotient
 
 ROW = {"u": "X", "v": "Y", "w": "Z", "p": "L", "q": "M", "r": "N"}
-"""Symbol of the force or moment by the state whose derivative it makes; other states keep their name, as in a1dot_u."""
+"""Symbol of the force or moment by the state whose derivative it makes; other states keep their
+name, as in a1dot_u.
+"""
 
 KINEMATIC = {
     ("u", "q"): ("w", 1),
@@ -25,15 +29,19 @@ KINEMATIC = {
     ("w", "p"): ("v", 1),
     ("w", "q"): ("u", -1),
 }
-"""Entry of A: (trim velocity, sign) of what is added to leave the force: u' = v r - w q + X/m, so A[u, q] = X_q - w0."""
+"""Entry of A: (trim velocity, sign) of what is added to leave the force: u' = v r - w q + X/m, so
+A[u, q] = X_q - w0.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class DerivativeTable:
-    """Derivatives (K, n) at K `airspeeds` (m/s): `names` are `Signal`s with units, table["M_q"] is (K,).
+    """Derivatives (K, n) at K `airspeeds` (m/s): `names` are `Signal`s with units, table["M_q"] is
+    (K,).
 
-    Forces by mass and moments by moment of inertia: X_u = d(X/m)/du in 1/s, N_ped = d(N/Izz)/d d_ped in 1/s^2. With the governor
-    "ideal" the yaw inertia includes the rotor, whose speed it holds.
+    Forces by mass and moments by moment of inertia: X_u = d(X/m)/du in 1/s, N_ped = d(N/Izz)/d
+    d_ped in 1/s^2. With the governor "ideal" the yaw inertia includes the rotor, whose speed it
+    holds.
     """
 
     airspeeds: Array
@@ -42,7 +50,11 @@ class DerivativeTable:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
-        object.__setattr__(self, "values", frozen(self.values, "derivatives", (len(self.airspeeds), len(self.names))))
+        object.__setattr__(
+            self,
+            "values",
+            frozen(self.values, "derivatives", (len(self.airspeeds), len(self.names))),
+        )
 
     def __getitem__(self, name: str) -> Array:
         """One derivative along the airspeeds (K,)."""
@@ -59,25 +71,44 @@ class DerivativeTable:
         return comma_separated([(Signal("airspeed"), self.airspeeds), *columns])
 
     def __str__(self) -> str:
-        """One line a derivative, one column an airspeed; derivatives that are zero throughout are left out."""
-        shown = [(name, row) for name, row in zip(self.names, self.values.T, strict=True) if np.any(row)]
+        """One line a derivative, one column an airspeed; derivatives that are zero throughout are
+        left out.
+        """
+        shown = [
+            (name, row) for name, row in zip(self.names, self.values.T, strict=True) if np.any(row)
+        ]
         width = max(len(f"{name}") for name in self.names)
         units = max(len(name.unit) for name in self.names)
         head = f"{'':{width}s}  {'m/s':{units}s}" + "".join(f"{v:>11.4g}" for v in self.airspeeds)
-        return "\n".join([head, *(f"{name!s:{width}s}  {name.unit:{units}s}" + "".join(f"{v:>11.4g}" for v in row) for name, row in shown)])
+        return "\n".join(
+            [
+                head,
+                *(
+                    f"{name!s:{width}s}  {name.unit:{units}s}" + "".join(f"{v:>11.4g}" for v in row)
+                    for name, row in shown
+                ),
+            ]
+        )
 
 
 def derivatives(family: LinearFamily) -> DerivativeTable:
-    """The derivatives of a `sweep` in straight flight: entries of A and B without gravity and the kinematic terms w0, v0, u0.
+    """The derivatives of a `sweep` in straight flight: entries of A and B without gravity and the
+    kinematic terms w0, v0, u0.
 
     Raises `InputError` for discrete models and for trims that turn.
     """
     if family.dt is not None:
-        raise InputError(f"derivatives are those of continuous models; this family has dt = {family.dt} s")
+        raise InputError(
+            f"derivatives are those of continuous models; this family has dt = {family.dt} s"
+        )
     for point in family.known_trims("a table of derivatives"):
-        if any(abs(point.x[rate]) > 1e-9 for rate in ("p", "q", "r") if rate in point.x):  # straight to the accuracy of a trim
+        if any(
+            abs(point.x[rate]) > 1e-9 for rate in ("p", "q", "r") if rate in point.x
+        ):  # straight to the accuracy of a trim
             raise InputError("derivatives are tabulated for straight flight; this family turns")
-    columns = [s for s in family.states if s not in ("phi", "theta")]  # these enter by gravity and kinematics alone
+    columns = [
+        s for s in family.states if s not in ("phi", "theta")
+    ]  # these enter by gravity and kinematics alone
     names, values = [], []
     for i, state in enumerate(family.states):
         if state in ("phi", "theta"):
@@ -91,6 +122,8 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
             names.append(Signal(f"{symbol}_{column}", quotient(unit, column.unit)))
             values.append(entry)
         for j, control in enumerate(family.inputs):
-            names.append(Signal(f"{symbol}_{control.removeprefix('d_')}", quotient(unit, control.unit)))
+            names.append(
+                Signal(f"{symbol}_{control.removeprefix('d_')}", quotient(unit, control.unit))
+            )
             values.append(family.B[:, i, j])
     return DerivativeTable(family.airspeeds, tuple(names), np.column_stack(values) + 0.0)

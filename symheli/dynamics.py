@@ -1,4 +1,6 @@
-"""The equations of motion: rigid body, drivetrain and the sum of the parts, with every parameter an input."""
+"""The equations of motion: rigid body, drivetrain and the sum of the parts, with every parameter an
+input.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,15 @@ from symheli.drivetrain import Drive, ideal_governor, pi_governor
 from symheli.errors import InputError
 from symheli.lpv.signal import Signal, signals
 from symheli.part import Part
-from symheli.rigid_body import GRAVITY, body_to_earth, euler_rates, gravity_euler, quaternion_rates, rotation, translation
+from symheli.rigid_body import (
+    GRAVITY,
+    body_to_earth,
+    euler_rates,
+    gravity_euler,
+    quaternion_rates,
+    rotation,
+    translation,
+)
 from symheli.symbolic import SX, Function, column, dense, jacobian, replaced
 
 VELOCITY = signals(("u", "v", "w", "p", "q", "r"))
@@ -45,10 +55,12 @@ class Sum(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Dynamics:
-    """The equations of one arrangement of parts, without numbers: airframes that differ in numbers alone share them, compiled code too.
+    """The equations of one arrangement of parts, without numbers: airframes that differ in numbers
+    alone share them, compiled code too.
 
-    entries: {section: {entry: name of the parameter it takes}}. `parameters`: their names and units in the order of the
-    argument `par`, air density first. governor, printed, smoothing: as in `Helicopter`.
+    entries: {section: {entry: name of the parameter it takes}}. `parameters`: their names and units
+    in the order of the argument `par`, air density first. governor, printed, smoothing: as in
+    `Helicopter`.
     """
 
     parts: Mapping[str, Part]
@@ -85,7 +97,8 @@ class Dynamics:
             if not ready:
                 lacking = sorted({n for part in waiting.values() for n in part.needs} - made)
                 raise InputError(
-                    f"{', '.join(waiting)} need flow that no part makes before them: {', '.join(lacking)}; known: {', '.join(sorted(made))}"
+                    f"{', '.join(waiting)} need flow that no part makes before them:"
+                    f" {', '.join(lacking)}; known: {', '.join(sorted(made))}"
                 )
             for name in ready:
                 order.append(waiting.pop(name))
@@ -93,17 +106,28 @@ class Dynamics:
         return tuple(order)
 
     def function(self, name: Name, values: Sequence[float] | None = None) -> Function:
-        """(x, u, wind, par) -> ..., or with `values` of the parameters written into it (x, u, wind) -> ...; see `Helicopter`."""
+        """(x, u, wind, par) -> ..., or with `values` of the parameters written into it (x, u, wind)
+        -> ...; see `Helicopter`.
+        """
         states = self.flight_states if name == "flight_rhs" else self.states
-        arguments = {"x": SX.sym("x", len(states)), "u": SX.sym("u", len(INPUTS)), "wind": SX.sym("wind", 3)}
+        arguments = {
+            "x": SX.sym("x", len(states)),
+            "u": SX.sym("u", len(INPUTS)),
+            "wind": SX.sym("wind", 3),
+        }
         par: Any = values
         if values is None:
             par = arguments["par"] = SX.sym("par", len(self.parameters))
         x, u, wind = arguments["x"], arguments["u"], arguments["wind"]
-        outputs = {"rhs": self._rhs, "flight_rhs": self._flight_rhs, "jacobian": self._jacobian, "diagnostics": self._diagnostics}[name](
-            x, u, wind, par
+        outputs = {
+            "rhs": self._rhs,
+            "flight_rhs": self._flight_rhs,
+            "jacobian": self._jacobian,
+            "diagnostics": self._diagnostics,
+        }[name](x, u, wind, par)
+        return Function(
+            name, list(arguments.values()), list(outputs.values()), list(arguments), list(outputs)
         )
-        return Function(name, list(arguments.values()), list(outputs.values()), list(arguments), list(outputs))
 
     def _rhs(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
         return {"xdot": self.euler(x, u, wind, par, self.inflow_solver)[0]}
@@ -112,14 +136,20 @@ class Dynamics:
         return {"xdot": self.quaternion(x, u, wind, par, self.inflow_solver)[0]}
 
     def _jacobian(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
-        blocks = self.derived(lambda solver: self.euler(x, u, wind, par, solver), lambda xdot: [jacobian(xdot, z) for z in (x, u, wind)])
+        blocks = self.derived(
+            lambda solver: self.euler(x, u, wind, par, solver),
+            lambda xdot: [jacobian(xdot, z) for z in (x, u, wind)],
+        )
         return dict(zip(("A", "B", "E"), blocks, strict=True))
 
-    def derived(self, form: Callable[[Callable[..., Any]], tuple[SX, Sum]], derive: Callable[[SX], list[SX]]) -> list[SX]:
-        """derive(xdot) of form(solver) -> xdot, sum, `euler` or `quaternion` at a point; exact through the implicit inflow.
+    def derived(
+        self, form: Callable[[Callable[..., Any]], tuple[SX, Sum]], derive: Callable[[SX], list[SX]]
+    ) -> list[SX]:
+        """derive(xdot) of form(solver) -> xdot, sum, `euler` or `quaternion` at a point; exact
+        through the implicit inflow.
 
-        The inflow enters as a symbol advanced by one Newton step: its derivative there is that of the root. Only then is the
-        solved value put in its place.
+        The inflow enters as a symbol advanced by one Newton step: its derivative there is that of
+        the root. Only then is the solved value put in its place.
         """
         lam = form(self.inflow_solver)[1].lam
         symbol = SX.sym("lam", len(lam))
@@ -132,40 +162,74 @@ class Dynamics:
 
     def _diagnostics(self, x: SX, u: SX, wind: SX, par: Any) -> dict[str, SX]:
         xdot, total = self.euler(x, u, wind, par, self.inflow_solver)
-        # a rotor held at constant speed is turned with the body: the engine's torque and its reaction on the body say so
+        # a rotor held at constant speed is turned with the body: the engine's torque and its
+        # reaction on the body say so
         held = total.added_inertia * xdot[5]
-        wrench = dict(zip("XYZLMN", (*total.force, *total.moment[:2], total.moment[2] - held), strict=True))
-        values = {**total.flow, "Q_e": total.flow["Q_e"] + held, **wrench, **{f"switch {k}": v for k, v in total.switches.items()}}
+        wrench = dict(
+            zip("XYZLMN", (*total.force, *total.moment[:2], total.moment[2] - held), strict=True)
+        )
+        values = {
+            **total.flow,
+            "Q_e": total.flow["Q_e"] + held,
+            **wrench,
+            **{f"switch {k}": v for k, v in total.switches.items()},
+        }
         return {name.replace(" ", "_"): dense(v) for name, v in values.items()}
 
-    # --- the sum of the parts; floats, arrays and CasADi expressions alike ---------------------------------------
+    # --- the sum of the parts; floats, arrays and CasADi expressions alike -----------------------
 
-    def euler(self, x: Any, u: Any, wind: Any, par: Any, solver: Callable[..., Any]) -> tuple[Any, Sum]:
-        """State derivative in Euler form, wind in body axes, with `solver` for the inflow (`symheli.inflow`); and the sum of the parts."""
+    def euler(
+        self, x: Any, u: Any, wind: Any, par: Any, solver: Callable[..., Any]
+    ) -> tuple[Any, Sum]:
+        """State derivative in Euler form, wind in body axes, with `solver` for the inflow
+        (`symheli.inflow`); and the sum of the parts.
+        """
         air = _triple(lambda i: x[i] - wind[i])
         phi, theta = x[6], x[7]
-        accelerations, own, total = self._accelerations(x, air, gravity_euler(phi, theta), self._own(x, 8), u, par, solver)
+        accelerations, own, total = self._accelerations(
+            x, air, gravity_euler(phi, theta), self._own(x, 8), u, par, solver
+        )
         attitude = euler_rates(phi, theta, x[3], x[4], x[5])[:2]
         return column([*accelerations, *attitude, *own]), total
 
-    def quaternion(self, x: Any, u: Any, wind: Any, par: Any, solver: Callable[..., Any]) -> tuple[Any, Sum]:
+    def quaternion(
+        self, x: Any, u: Any, wind: Any, par: Any, solver: Callable[..., Any]
+    ) -> tuple[Any, Sum]:
         """State derivative in quaternion form, wind in earth axes; and the sum of the parts."""
         quaternion = (x[6], x[7], x[8], x[9])
         R = body_to_earth(*quaternion)
         air = _triple(lambda i: x[i] - sum(R[j][i] * wind[j] for j in range(3)))
         gravity = _triple(lambda i: R[2][i] * GRAVITY)
-        accelerations, own, total = self._accelerations(x, air, gravity, self._own(x, 13), u, par, solver)
+        accelerations, own, total = self._accelerations(
+            x, air, gravity, self._own(x, 13), u, par, solver
+        )
         position = [sum(R[j][i] * x[i] for i in range(3)) for j in range(3)]
-        return column([*accelerations, *quaternion_rates(*quaternion, x[3], x[4], x[5]), *position, *own]), total
+        return (
+            column(
+                [*accelerations, *quaternion_rates(*quaternion, x[3], x[4], x[5]), *position, *own]
+            ),
+            total,
+        )
 
     def accelerations(self, x: Any, u: Any, wind: Any, par: Any) -> list[Any]:
-        """u' v' w' p' q' r' and the derivatives of the own states, Euler form, as a list: no CasADi where the arguments are floats."""
+        """u' v' w' p' q' r' and the derivatives of the own states, Euler form, as a list: no CasADi
+        where the arguments are floats.
+        """
         air = _triple(lambda i: x[i] - wind[i])
-        body, own, _ = self._accelerations(x, air, gravity_euler(x[6], x[7]), self._own(x, 8), u, par, self.inflow_solver)
+        body, own, _ = self._accelerations(
+            x, air, gravity_euler(x[6], x[7]), self._own(x, 8), u, par, self.inflow_solver
+        )
         return [*body, *own]
 
     def _accelerations(
-        self, x: Any, air: Triple, gravity: Triple, own: dict[str, Any], u: Any, par: Any, solver: Callable[..., Any]
+        self,
+        x: Any,
+        air: Triple,
+        gravity: Triple,
+        own: dict[str, Any],
+        u: Any,
+        par: Any,
+        solver: Callable[..., Any],
     ) -> tuple[list[Any], list[Any], Sum]:
         """(u' v' w' p' q' r'), derivatives of the own states, and the sum."""
         parameters = self._sections(par)
@@ -180,11 +244,22 @@ class Dynamics:
         return [*linear, *angular], [derivatives[s] for s in self.own_states], total
 
     def _sum(
-        self, air: Triple, rates: Triple, own: dict[str, Any], u: Any, parameters: Mapping[str, SimpleNamespace], density: Any,
+        self,
+        air: Triple,
+        rates: Triple,
+        own: dict[str, Any],
+        u: Any,
+        parameters: Mapping[str, SimpleNamespace],
+        density: Any,
         solver: Callable[..., Any],
-    ) -> Sum:  # fmt: skip
+    ) -> Sum:
         drivetrain = parameters["drivetrain"]
-        motion = Motion(*air, *rates, Om=own["Om"] if self.governor == "pi" else drivetrain.nominal_speed, rho=density)
+        motion = Motion(
+            *air,
+            *rates,
+            Om=own["Om"] if self.governor == "pi" else drivetrain.nominal_speed,
+            rho=density,
+        )
         controls = {str(name): u[i] for i, name in enumerate(INPUTS)}
         lam: list[Any] = []
 
@@ -201,18 +276,33 @@ class Dynamics:
         shaft_torque = sum(effect.shaft_torque for effect in effects)
         drive = self.drive(drivetrain, shaft_torque, own)
         force = _triple(lambda i: sum(effect.force[i] for effect in effects))
-        moment = _triple(lambda i: sum(effect.moment[i] for effect in effects) - (drive.torque if i == 2 else 0.0))
+        moment = _triple(
+            lambda i: (
+                sum(effect.moment[i] for effect in effects) - (drive.torque if i == 2 else 0.0)
+            )
+        )
         return Sum(
-            force, moment,
-            {name: value for effect in effects for name, value in effect.rates.items()} | drive.rates,
-            drive.added_inertia, drive.speed_follows_yaw, {**flow.values, "Q_e": drive.torque},
-            {name: value for effect in effects for name, value in effect.switches.items()}, lam,
-        )  # fmt: skip
+            force,
+            moment,
+            {name: value for effect in effects for name, value in effect.rates.items()}
+            | drive.rates,
+            drive.added_inertia,
+            drive.speed_follows_yaw,
+            {**flow.values, "Q_e": drive.torque},
+            {name: value for effect in effects for name, value in effect.switches.items()},
+            lam,
+        )
 
     def drive(
-        self, par: SimpleNamespace, shaft_torque: Any, own: Mapping[str, Any], name: Callable[[str, Any], Any] = unnamed
-    ) -> Drive:  # fmt: skip
-        """Engine torque and rotor speed with this governor; `own` has Om and om_i where it is "pi", `name` is as in `Flow`."""
+        self,
+        par: SimpleNamespace,
+        shaft_torque: Any,
+        own: Mapping[str, Any],
+        name: Callable[[str, Any], Any] = unnamed,
+    ) -> Drive:
+        """Engine torque and rotor speed with this governor; `own` has Om and om_i where it is "pi",
+        `name` is as in `Flow`.
+        """
         if self.governor == "pi":
             return pi_governor(par, shaft_torque, own["Om"], own["om_i"], name)
         return ideal_governor(par, shaft_torque)
@@ -225,8 +315,15 @@ class Dynamics:
     def _sections(self, par: Any) -> dict[str, SimpleNamespace]:
         """The parameters as the parts read them: `par.radius`."""
         at = {str(name): par[i] for i, name in enumerate(self.parameters)}
-        extra = {"printed": self.printed, "smoothing": self.smoothing, "weight": at[self.entries["body"]["mass"]] * GRAVITY}
-        return {section: SimpleNamespace(**{e: at[name] for e, name in of.items()}, **extra) for section, of in self.entries.items()}
+        extra = {
+            "printed": self.printed,
+            "smoothing": self.smoothing,
+            "weight": at[self.entries["body"]["mass"]] * GRAVITY,
+        }
+        return {
+            section: SimpleNamespace(**{e: at[name] for e, name in of.items()}, **extra)
+            for section, of in self.entries.items()
+        }
 
     def _own(self, x: Any, first: int) -> dict[str, Any]:
         return {str(s): x[first + i] for i, s in enumerate(self.own_states)}

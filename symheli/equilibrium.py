@@ -20,15 +20,18 @@ from symheli.lpv.units import quotient
 TOLERANCE = 1e-9
 """Largest residual of any equation at a trim, in its SI unit."""
 ROUNDING = 1e-13
-"""Residual below which another Newton step would only move roundings of accelerations of the size of gravity."""
+"""Residual below which another Newton step would only move roundings of accelerations of the size
+of gravity.
+"""
 
 
 @dataclass(frozen=True)
 class TrimPoint(OperatingPoint):
     """An operating point with the flight condition it answers and how well.
 
-    residual: of every equation by state name, in the unit of its derivative. on_stops: inputs at (to 0.1 %) or beyond their travel.
-    vortex_ring: a rotor is where momentum theory promises no accuracy. wind: body axes, m/s. density: of the air, kg/m^3.
+    residual: of every equation by state name, in the unit of its derivative. on_stops: inputs at
+    (to 0.1 %) or beyond their travel. vortex_ring: a rotor is where momentum theory promises no
+    accuracy. wind: body axes, m/s. density: of the air, kg/m^3.
     """
 
     condition: FlightCondition
@@ -40,7 +43,9 @@ class TrimPoint(OperatingPoint):
 
     @property
     def success(self) -> bool:
-        """Every residual, recomputed, below `TOLERANCE`: an equilibrium of the equations, whatever deflection it takes."""
+        """Every residual, recomputed, below `TOLERANCE`: an equilibrium of the equations, whatever
+        deflection it takes.
+        """
         return bool(np.all(np.abs(self.residual.array) < TOLERANCE))
 
     @property
@@ -53,26 +58,46 @@ class TrimPoint(OperatingPoint):
         notes = [_stops(self)] if self.on_stops else []
         notes += ["vortex ring: no accuracy promised"] if self.vortex_ring else []
         status = "trimmed" if self.success else "NOT trimmed"
-        return "; ".join([f"{status} at {self.condition} (largest residual {worst[0]:.1e} in d{worst[1]}/dt)", *notes])
+        return "; ".join(
+            [
+                f"{status} at {self.condition} (largest residual {worst[0]:.1e} in d{worst[1]}/dt)",
+                *notes,
+            ]
+        )
 
 
 def trim(
-    heli: Helicopter, airspeed: float, *, climb_rate: float = 0.0, turn_rate: float = 0.0, sideslip: float = 0.0,
-    wind: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0), acceleration: float = 0.0, altitude: float | None = None,
-    start: TrimPoint | None = None, throw: bool = True, continuation: bool = True,
-) -> TrimPoint:  # fmt: skip
+    heli: Helicopter,
+    airspeed: float,
+    *,
+    climb_rate: float = 0.0,
+    turn_rate: float = 0.0,
+    sideslip: float = 0.0,
+    wind: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+    acceleration: float = 0.0,
+    altitude: float | None = None,
+    start: TrimPoint | None = None,
+    throw: bool = True,
+    continuation: bool = True,
+) -> TrimPoint:
     """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.
 
-    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start` or a hover guess; where
-    that fails, by `continuation` from hover and from other guesses. Success is judged on the recomputed residual of every
-    equation. A control beyond its travel is no failure (the equations hold; `on_stops` names it, `attainable` is False): what
-    would be needed, and by how much, is worth knowing. Raises `TrimError` carrying the best point; with throw=False that
-    point is returned instead.
+    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start`
+    or a hover guess; where that fails, by `continuation` from hover and from other guesses. Success
+    is judged on the recomputed residual of every equation. A control beyond its travel is no
+    failure (the equations hold; `on_stops` names it, `attainable` is False): what would be needed,
+    and by how much, is worth knowing. Raises `TrimError` carrying the best point; with throw=False
+    that point is returned instead.
     """
     condition = FlightCondition(
-        float(airspeed), float(climb_rate), float(turn_rate), float(sideslip),
-        (float(wind[0]), float(wind[1]), float(wind[2])), float(acceleration), None if altitude is None else float(altitude),
-    )  # fmt: skip
+        float(airspeed),
+        float(climb_rate),
+        float(turn_rate),
+        float(sideslip),
+        (float(wind[0]), float(wind[1]), float(wind[2])),
+        float(acceleration),
+        None if altitude is None else float(altitude),
+    )
     heli = heli if altitude is None else heli.at_altitude(float(altitude))
     problem = _Problem(heli, condition)
     best = problem.solve(problem.guess() if start is None else problem.unknowns_of(start))
@@ -93,12 +118,16 @@ def _miss(point: TrimPoint) -> float:
 
 
 def _stops(point: TrimPoint) -> str:
-    return "at or beyond the stop: " + ", ".join(f"{name} = {point.u[name]:.3g} rad" for name in point.on_stops)
+    return "at or beyond the stop: " + ", ".join(
+        f"{name} = {point.u[name]:.3g} rad" for name in point.on_stops
+    )
 
 
 def _failure(heli: Helicopter, best: TrimPoint) -> str:
     """What the best point misses, equation by equation, the worst first."""
-    misses = sorted(zip(best.residual.array, best.residual.signals, strict=True), key=lambda miss: -abs(miss[0]))
+    misses = sorted(
+        zip(best.residual.array, best.residual.signals, strict=True), key=lambda miss: -abs(miss[0])
+    )
     table = ", ".join(f"d{s}/dt = {r:.2e} {quotient(s.unit, 's')}" for r, s in misses)
     return "; ".join(
         [
@@ -119,24 +148,40 @@ def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
     throttle = heli.vehicle.values("drivetrain")["governor_ki"] * point.x["om_i"]
     if throttle >= 1:
         return ["full throttle: the engine lacks power"]
-    return ["throttle closed: the air drives the rotor, whose speed no governor holds"] if throttle <= 0 else []
+    return (
+        ["throttle closed: the air drives the rotor, whose speed no governor holds"]
+        if throttle <= 0
+        else []
+    )
 
 
 def _jumps(heli: Helicopter, point: TrimPoint) -> list[str]:
-    """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as a trim would step across."""
+    """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as a
+    trim would step across.
+    """
     switches = heli.switches(point.x.array, point.u.array, point.wind.array)
-    near = [name.partition("jump ")[2] for name, value in switches.items() if "jump " in name and abs(value) < 0.1]
+    near = [
+        name.partition("jump ")[2]
+        for name, value in switches.items()
+        if "jump " in name and abs(value) < 0.1
+    ]
     return [f"the equations jump here, {name}: there may be no equilibrium" for name in near]
 
 
-def _continue_from_hover(heli: Helicopter, condition: FlightCondition, steps: int = 12) -> TrimPoint:
+def _continue_from_hover(
+    heli: Helicopter, condition: FlightCondition, steps: int = 12
+) -> TrimPoint:
     point: TrimPoint | None = None
     for share in np.linspace(0.0, 1.0, steps + 1):
         stage = FlightCondition(
-            share * condition.airspeed, share * condition.climb_rate, share * condition.turn_rate, condition.sideslip,
-            (share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]), share * condition.acceleration,
+            share * condition.airspeed,
+            share * condition.climb_rate,
+            share * condition.turn_rate,
+            condition.sideslip,
+            (share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]),
+            share * condition.acceleration,
             condition.altitude,
-        )  # fmt: skip
+        )
         problem = _Problem(heli, stage)
         point = problem.solve(problem.guess() if point is None else problem.unknowns_of(point))
     assert point is not None  # noqa: S101
@@ -149,7 +194,10 @@ class _Problem:
     def __init__(self, heli: Helicopter, condition: FlightCondition):
         self.heli, self.condition = heli, condition
         self.air, self.turn = condition.air_velocity, np.array([0.0, 0.0, condition.turn_rate])
-        self.wind, self.push = np.array(condition.wind), np.array([condition.acceleration, 0.0, 0.0])
+        self.wind, self.push = (
+            np.array(condition.wind),
+            np.array([condition.acceleration, 0.0, 0.0]),
+        )
         self.own = [s for s in heli.states[8:] if s != "Om"]
         self.equations = [i for i, s in enumerate(heli.states) if s not in ("phi", "theta", "om_i")]
         self.free = [heli.states.index(Signal(s)) for s in ("phi", "theta", *self.own)]
@@ -159,14 +207,25 @@ class _Problem:
         start = dict.fromkeys((str(s) for s in self.own), 0.0)
         if "om_i" in start:
             drivetrain = self.heli.vehicle.values("drivetrain")
-            # throttle that holds about 130 W/kg of rotor and profile power, typical of a small helicopter in hover
-            start["om_i"] = min(130.0 * mass / drivetrain["max_power"], 0.9) / drivetrain["governor_ki"]
+            # throttle that holds about 130 W/kg of rotor and profile power, typical of a small
+            # helicopter in hover
+            start["om_i"] = (
+                min(130.0 * mass / drivetrain["max_power"], 0.9) / drivetrain["governor_ki"]
+            )
         return np.array([0.07, 0.0, *start.values(), 0.0, 0.0, 0.1, 0.25])
 
     def other_guesses(self) -> list[np.ndarray]:
-        """Starts away from hover: nose and bank to either side, the rotor working hard or windmilling."""
+        """Starts away from hover: nose and bank to either side, the rotor working hard or
+        windmilling.
+        """
         guesses = []
-        for phi, theta, d_col in ((0.07, -0.4, 0.15), (0.07, 0.4, 0.02), (0.6, 0.0, 0.12), (-0.6, 0.0, 0.12), (0.0, 0.0, -0.02)):
+        for phi, theta, d_col in (
+            (0.07, -0.4, 0.15),
+            (0.07, 0.4, 0.02),
+            (0.6, 0.0, 0.12),
+            (-0.6, 0.0, 0.12),
+            (0.0, 0.0, -0.02),
+        ):
             guess = self.guess()
             guess[[0, 1, -2]] = phi, theta, d_col
             guesses.append(guess)
@@ -195,27 +254,46 @@ class _Problem:
     def jacobian(self, z: np.ndarray) -> np.ndarray:
         A, B, E = self.heli.numeric("jacobian")(*self.state(z))
         J = np.concatenate([A[:, self.free], B], axis=1)
-        for column in (0, 1):  # the attitude also turns velocity, rates, wind and the demanded acceleration into body axes
+        # the attitude also turns velocity, rates, wind and the demanded acceleration into body axes
+        for column in (0, 1):
             dR = _heading_to_body(z[0], z[1], derivative=column)
             dwind = dR @ self.wind
-            J[:, column] += A[:, :3] @ (dR @ self.air + dwind) + A[:, 3:6] @ (dR @ self.turn) + E @ dwind
+            J[:, column] += (
+                A[:, :3] @ (dR @ self.air + dwind) + A[:, 3:6] @ (dR @ self.turn) + E @ dwind
+            )
             J[:3, column] -= dR @ self.push
         return J[self.equations]
 
     def solve(self, start: np.ndarray) -> TrimPoint:
-        """Newton's method from `start`; MINPACK's hybrid method where it stops descending, then Newton again."""
+        """Newton's method from `start`; MINPACK's hybrid method where it stops descending, then
+        Newton again.
+        """
         z = self.newton(start)
         if np.abs(self.residual(z)).max() >= TOLERANCE:
-            found = root(lambda z: self.residual(z)[self.equations], start, jac=self.jacobian, method="hybr", options={"xtol": 1e-14})
+            found = root(
+                lambda z: self.residual(z)[self.equations],
+                start,
+                jac=self.jacobian,
+                method="hybr",
+                options={"xtol": 1e-14},
+            )
             z = min((z, self.newton(found.x)), key=lambda z: float(np.abs(self.residual(z)).max()))
         return self.point(z)
 
     def within_travel(self) -> TrimPoint:
-        """The point of least residual with controls in their travel and the attitude short of +-80 deg, from the hover guess."""
+        """The point of least residual with controls in their travel and the attitude short of +-80
+        deg, from the hover guess.
+        """
         start, n = self.guess(), len(self.free)
         bound = np.concatenate([np.full(2, 1.4), np.full(n - 2, np.inf), self.heli.travel])
         start = np.clip(start, -0.9 * bound, 0.9 * bound)
-        found = least_squares(lambda z: self.residual(z)[self.equations], start, self.jacobian, bounds=(-bound, bound), max_nfev=200)  # type: ignore[arg-type]
+        found = least_squares(
+            lambda z: self.residual(z)[self.equations],
+            start,
+            self.jacobian,
+            bounds=(-bound, bound),
+            max_nfev=200,
+        )  # type: ignore[arg-type]
         return self.point(found.x)
 
     def newton(self, z: np.ndarray, steps: int = 12) -> np.ndarray:
@@ -226,7 +304,11 @@ class _Problem:
                 better = z - np.linalg.solve(self.jacobian(z), residual[self.equations])
             except np.linalg.LinAlgError:
                 break
-            left = self.residual(better) if np.all(np.isfinite(better)) else np.full_like(residual, np.inf)
+            left = (
+                self.residual(better)
+                if np.all(np.isfinite(better))
+                else np.full_like(residual, np.inf)
+            )
             if not np.abs(left).max() < np.abs(residual).max():
                 break
             z, residual = better, left
@@ -240,15 +322,29 @@ class _Problem:
         xdot = heli.numeric("rhs")(x, u, wind)[0]
         switches = heli.switches(x, u, wind)
         return TrimPoint(
-            NamedVector(heli.states, x), NamedVector(heli.inputs, u), NamedVector(heli.states, xdot), self.condition.airspeed,
-            condition=self.condition, residual=NamedVector(heli.states, self.residual(z)), wind=NamedVector(heli.wind, wind),
-            on_stops=tuple(str(s) for s, value, limit in zip(heli.inputs, u, heli.travel, strict=True) if abs(value) >= 0.999 * limit),
-            vortex_ring=any(value > 0 for name, value in switches.items() if name.endswith("vortex ring")), density=heli.density,
-        )  # fmt: skip
+            NamedVector(heli.states, x),
+            NamedVector(heli.inputs, u),
+            NamedVector(heli.states, xdot),
+            self.condition.airspeed,
+            condition=self.condition,
+            residual=NamedVector(heli.states, self.residual(z)),
+            wind=NamedVector(heli.wind, wind),
+            on_stops=tuple(
+                str(s)
+                for s, value, limit in zip(heli.inputs, u, heli.travel, strict=True)
+                if abs(value) >= 0.999 * limit
+            ),
+            vortex_ring=any(
+                value > 0 for name, value in switches.items() if name.endswith("vortex ring")
+            ),
+            density=heli.density,
+        )
 
 
 def _heading_to_body(phi: float, theta: float, derivative: int | None = None) -> np.ndarray:
-    """Rotation (3, 3) from forward-right-down axes of the heading to body axes; derivative 0: by phi, 1: by theta."""
+    """Rotation (3, 3) from forward-right-down axes of the heading to body axes; derivative 0: by
+    phi, 1: by theta.
+    """
     cp, sp, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
     if derivative == 0:
         return np.array([[0.0, 0.0, 0.0], [cp * st, -sp, cp * ct], [-sp * st, -cp, -sp * ct]])

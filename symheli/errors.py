@@ -21,12 +21,18 @@ class UnknownNameError(InputError):
     def __init__(self, kind: str, name: object, known: Iterable[str]):
         known = [str(k) for k in known]
         near = difflib.get_close_matches(str(name), known, n=3, cutoff=0.4)
-        hint = f"did you mean {' or '.join(repr(str(n)) for n in near)}?" if near else "known: " + ", ".join(known)
+        hint = (
+            f"did you mean {' or '.join(repr(str(n)) for n in near)}?"
+            if near
+            else "known: " + ", ".join(known)
+        )
         super().__init__(f"unknown {kind} {str(name)!r}; {hint}")
 
 
 class TrimError(SymheliError):
-    """No equilibrium was found; `result` holds the best point and the residual of every equation."""
+    """No equilibrium was found; `result` holds the best point and the residual of every
+    equation.
+    """
 
     def __init__(self, message: str, result: Any = None):
         super().__init__(message)
@@ -34,7 +40,9 @@ class TrimError(SymheliError):
 
 
 class ExcitationError(SymheliError):
-    """The data cannot determine what was asked of them; `report` says which direction is missing."""
+    """The data cannot determine what was asked of them; `report` says which direction is
+    missing.
+    """
 
     def __init__(self, message: str, report: Any = None):
         super().__init__(message)
@@ -50,15 +58,21 @@ class SolverError(SymheliError):
 
 
 class AccuracyError(SymheliError):
-    """A result does not pass the check of its own computation: it is not what it claims to be and is not returned."""
+    """A result does not pass the check of its own computation: it is not what it claims to be and
+    is not returned.
+    """
 
 
 class ConvergenceWarning(UserWarning):
-    """An iteration stopped before it settled; the result is its last value, and may be worse than where it started."""
+    """An iteration stopped before it settled; the result is its last value, and may be worse than
+    where it started.
+    """
 
 
 class PrecisionWarning(UserWarning):
-    """The numbers asked for cannot hold what they are to say: rounding takes most of their digits."""
+    """The numbers asked for cannot hold what they are to say: rounding takes most of their
+    digits.
+    """
 
 
 class CompilerWarning(UserWarning):
@@ -66,4 +80,6 @@ class CompilerWarning(UserWarning):
 
 
 class DataWarning(UserWarning):
-    """Data, or a model made of them, may not mean what they seem to; the message says what was seen and what to do."""
+    """Data, or a model made of them, may not mean what they seem to; the message says what was seen
+    and what to do.
+    """

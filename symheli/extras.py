@@ -1,4 +1,6 @@
-"""Packages that not every use needs: imported where they are used, missed by the name of what brings them."""
+"""Packages that not every use needs: imported where they are used, missed by the name of what
+brings them.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,8 @@ from symheli.errors import InputError
 
 @contextmanager
 def extra(name: str, purpose: str) -> Iterator[None]:
-    """Around the import of a package of the extra `name`: `InputError` that says how to get it where it is missing.
+    """Around the import of a package of the extra `name`: `InputError` that says how to get it
+    where it is missing.
 
     with extra("logs", "reading a ULog file"):
         import pyulog

@@ -14,10 +14,11 @@ from symheli.errors import InputError
 class FlightCondition:
     """What is asked of a trim.
 
-    airspeed (m/s, of the whole motion through the air, climb included), climb_rate (m/s, up), turn_rate (rad/s, to the right),
-    sideslip (rad, of the horizontal airspeed, from the right), wind (north, east, down as seen by a nose pointing north, m/s),
-    acceleration (m/s^2, horizontal, along the nose's heading: a quasi-steady point of an accelerating flight, 0 for an
-    equilibrium), altitude (m in the standard atmosphere, None: in the air of the helicopter).
+    airspeed (m/s, of the whole motion through the air, climb included), climb_rate (m/s, up),
+    turn_rate (rad/s, to the right), sideslip (rad, of the horizontal airspeed, from the right),
+    wind (north, east, down as seen by a nose pointing north, m/s), acceleration (m/s^2, horizontal,
+    along the nose's heading: a quasi-steady point of an accelerating flight, 0 for an equilibrium),
+    altitude (m in the standard atmosphere, None: in the air of the helicopter).
     """
 
     airspeed: float
@@ -29,15 +30,25 @@ class FlightCondition:
     altitude: float | None = None
 
     def __post_init__(self) -> None:
-        values = [self.airspeed, self.climb_rate, self.turn_rate, self.sideslip, self.acceleration, *self.wind, self.altitude or 0.0]
+        values = [
+            self.airspeed,
+            self.climb_rate,
+            self.turn_rate,
+            self.sideslip,
+            self.acceleration,
+            *self.wind,
+            self.altitude or 0.0,
+        ]
         if not all(math.isfinite(v) for v in values):
             raise InputError(f"a flight condition needs finite numbers, got {self!r}")
         if self.airspeed < 0:
-            raise InputError(f"airspeed must be >= 0 m/s, got {self.airspeed}; rearward flight is sideslip = pi")
+            raise InputError(
+                f"airspeed must be >= 0 m/s, got {self.airspeed}; rearward flight is sideslip = pi"
+            )
         if abs(self.climb_rate) > self.airspeed:
             raise InputError(
-                f"|climb_rate| = {abs(self.climb_rate)} m/s exceeds the airspeed of {self.airspeed} m/s, which includes it: "
-                "straight up is airspeed = climb_rate"
+                f"|climb_rate| = {abs(self.climb_rate)} m/s exceeds the airspeed of {self.airspeed}"
+                " m/s, which includes it: straight up is airspeed = climb_rate"
             )
         if self.turn_rate and any(self.wind):
             raise InputError("a turn in wind is not steady; trim it in still air")
@@ -46,11 +57,20 @@ class FlightCondition:
     def air_velocity(self) -> np.ndarray:
         """Velocity through the air, forward right down with respect to the heading (3,), m/s."""
         level = math.sqrt(max(self.airspeed**2 - self.climb_rate**2, 0.0))
-        return np.array([level * math.cos(self.sideslip), level * math.sin(self.sideslip), -self.climb_rate])
+        return np.array(
+            [level * math.cos(self.sideslip), level * math.sin(self.sideslip), -self.climb_rate]
+        )
 
     def __str__(self) -> str:
         words = [f"{self.airspeed:g} m/s"]
-        words += [f"{'climbing' if self.climb_rate > 0 else 'descending'} at {abs(self.climb_rate):g} m/s"] if self.climb_rate else []
+        words += (
+            [
+                f"{'climbing' if self.climb_rate > 0 else 'descending'} at"
+                f" {abs(self.climb_rate):g} m/s"
+            ]
+            if self.climb_rate
+            else []
+        )
         words += [f"turning at {self.turn_rate:g} rad/s"] if self.turn_rate else []
         words += [f"sideslip {self.sideslip:g} rad"] if self.sideslip else []
         words += ["wind ({:g}, {:g}, {:g}) m/s".format(*self.wind)] if any(self.wind) else []

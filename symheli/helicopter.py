@@ -32,13 +32,16 @@ DENSITY = Signal("density", "kg/m^3")
 
 @dataclass(frozen=True)
 class Helicopter:
-    """An airframe with a governor in air of constant density, as CasADi functions with named signals.
+    """An airframe with a governor in air of constant density, as CasADi functions with named
+    signals.
 
-    `states` (Euler form: u v w p q r phi theta, component states a1 b1, and Om om_i where `governor` is "pi"), `inputs`
-    (d_lon d_lat d_col d_ped) and `wind` (u_w v_w w_w, body axes) are `Signal`s that carry their unit; SI and radians.
+    `states` (Euler form: u v w p q r phi theta, component states a1 b1, and Om om_i where
+    `governor` is "pi"), `inputs` (d_lon d_lat d_col d_ped) and `wind` (u_w v_w w_w, body axes) are
+    `Signal`s that carry their unit; SI and radians.
 
-    governor: "pi" (engine and governor dynamics, 12 states) or "ideal" (rotor speed held exactly, 10 states).
-    density: air density, kg/m^3. printed: names from `PRINTED`. smoothing: rounds wake edges and force limits (0: as printed).
+    governor: "pi" (engine and governor dynamics, 12 states) or "ideal" (rotor speed held exactly,
+    10 states). density: air density, kg/m^3. printed: names from `PRINTED`. smoothing: rounds wake
+    edges and force limits (0: as printed).
     """
 
     vehicle: Vehicle
@@ -51,7 +54,9 @@ class Helicopter:
         if self.governor not in ("pi", "ideal"):
             raise UnknownNameError("governor", self.governor, ("pi", "ideal"))
         if not (np.isfinite(self.density) and self.density > 0):
-            raise InputError(f"density must be positive (kg/m^3; 1.225 at sea level), got {self.density}")
+            raise InputError(
+                f"density must be positive (kg/m^3; 1.225 at sea level), got {self.density}"
+            )
         if not self.smoothing >= 0:
             raise InputError(f"smoothing must be >= 0, got {self.smoothing}")
         for name in self.printed:
@@ -67,27 +72,39 @@ class Helicopter:
         printed: Sequence[str] = (),
         smoothing: float = 0.0,
     ) -> Helicopter:
-        """By the name of a packaged airframe (`symheli.vehicle.vehicles()`) or the path of a vehicle TOML file."""
-        return cls(load_vehicle(vehicle), governor, float(density), frozenset(printed), float(smoothing))
+        """By the name of a packaged airframe (`symheli.vehicle.vehicles()`) or the path of a
+        vehicle TOML file.
+        """
+        return cls(
+            load_vehicle(vehicle), governor, float(density), frozenset(printed), float(smoothing)
+        )
 
     def __getstate__(self) -> dict[str, Any]:
-        """The airframe and its options, without what was built from them: CasADi's functions cross no process border."""
+        """The airframe and its options, without what was built from them: CasADi's functions cross
+        no process border.
+        """
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
-    # --- other numbers, same equations -------------------------------------------------------------------------
+    # --- other numbers, same equations -----------------------------------------------------------
 
     @property
     def parameters(self) -> NamedVector:
-        """Every number of the model by name, in SI: "density", "body.mass", "main_rotor.radius", ..."""
+        """Every number of the model by name, in SI: "density", "body.mass", "main_rotor.radius",
+        ...
+        """
         return NamedVector(self.dynamics.parameters, np.array(self._values))
 
     def with_parameters(self, changes: Mapping[str, float]) -> Helicopter:
-        """The same helicopter with other numbers, {"body.mass": 9.0, "density": 1.1} in SI; names as in `parameters`.
+        """The same helicopter with other numbers, {"body.mass": 9.0, "density": 1.1} in SI; names
+        as in `parameters`.
 
-        Nothing is built or compiled anew: the compiled functions take the parameters as an argument.
+        Nothing is built or compiled anew: the compiled functions take the parameters as an
+        argument.
         """
         density = changes.get(DENSITY, self.density)
-        vehicle = self.vehicle.with_values({name: value for name, value in changes.items() if name != DENSITY})
+        vehicle = self.vehicle.with_values(
+            {name: value for name, value in changes.items() if name != DENSITY}
+        )
         return self._sharing(replace(self, vehicle=vehicle, density=density))
 
     def in_air(self, density: float) -> Helicopter:
@@ -95,13 +112,17 @@ class Helicopter:
         return self if density == self.density else self.with_parameters({"density": density})
 
     def at_altitude(self, altitude: float) -> Helicopter:
-        """The same helicopter in the air of the standard atmosphere at `altitude` (m above sea level)."""
+        """The same helicopter in the air of the standard atmosphere at `altitude` (m above sea
+        level).
+        """
         return self.in_air(standard_atmosphere(altitude).density)
 
     def scaled(self, factor: float) -> Helicopter:
-        """The dynamically similar helicopter whose lengths are `factor` N times these, in the same air; see `Vehicle.scaled`.
+        """The dynamically similar helicopter whose lengths are `factor` N times these, in the same
+        air; see `Vehicle.scaled`.
 
-        Its trim at sqrt(N) times the airspeed is the same in angles, its eigenvalues are N^-0.5 times these.
+        Its trim at sqrt(N) times the airspeed is the same in angles, its eigenvalues are N^-0.5
+        times these.
         """
         return self._sharing(replace(self, vehicle=self.vehicle.scaled(factor)))
 
@@ -115,10 +136,15 @@ class Helicopter:
         own = self.vehicle.quantities
         return Dynamics(
             self.vehicle.components,
-            {s: {e: q.ref or f"{s}.{e}" for e, q in entries.items()} for s, entries in self.vehicle.sections.items()},
+            {
+                s: {e: q.ref or f"{s}.{e}" for e, q in entries.items()}
+                for s, entries in self.vehicle.sections.items()
+            },
             (DENSITY, *(Signal(name, q.unit) for name, q in own.items())),
-            self.governor, self.printed, self.smoothing,
-        )  # fmt: skip
+            self.governor,
+            self.printed,
+            self.smoothing,
+        )
 
     @cached_property
     def _functions(self) -> dict[str, Function]:
@@ -129,7 +155,7 @@ class Helicopter:
     def _values(self) -> list[float]:
         return [self.density, *(q.value for q in self.vehicle.quantities.values())]
 
-    # --- signals -----------------------------------------------------------------------------------------------
+    # --- signals ---------------------------------------------------------------------------------
 
     @cached_property
     def states(self) -> tuple[Signal, ...]:
@@ -138,7 +164,9 @@ class Helicopter:
 
     @cached_property
     def flight_states(self) -> tuple[Signal, ...]:
-        """States of the quaternion form: velocities and rates, quaternion (scalar first), position north east down, the rest."""
+        """States of the quaternion form: velocities and rates, quaternion (scalar first), position
+        north east down, the rest.
+        """
         return self.dynamics.flight_states
 
     @property
@@ -162,33 +190,42 @@ class Helicopter:
         """Commanded rotor speed, rad/s."""
         return self.vehicle.sections["drivetrain"]["nominal_speed"].value
 
-    # --- functions ---------------------------------------------------------------------------------------------
+    # --- functions -------------------------------------------------------------------------------
 
     @cached_property
     def rhs(self) -> Function:
-        """(x, u, wind) -> xdot in Euler form; wind in body axes. Symbolic: call it with numbers or CasADi expressions."""
+        """(x, u, wind) -> xdot in Euler form; wind in body axes. Symbolic: call it with numbers or
+        CasADi expressions.
+        """
         return self.dynamics.function("rhs", self._values)
 
     @cached_property
     def flight_rhs(self) -> Function:
-        """(x, u, wind) -> xdot in quaternion form with position; wind in earth axes (north east down)."""
+        """(x, u, wind) -> xdot in quaternion form with position; wind in earth axes (north east
+        down).
+        """
         return self.dynamics.function("flight_rhs", self._values)
 
     @cached_property
     def jacobian(self) -> Function:
-        """(x, u, wind) -> A (nx, nx), B (nx, 4), E (nx, 3): derivatives of xdot, algorithmic, exact through the implicit inflow."""
+        """(x, u, wind) -> A (nx, nx), B (nx, 4), E (nx, 3): derivatives of xdot, algorithmic, exact
+        through the implicit inflow.
+        """
         return self.dynamics.function("jacobian", self._values)
 
     @cached_property
     def diagnostics(self) -> Function:
-        """(x, u, wind) -> every flow quantity and switching function by name (see `Effect`), and the total force X Y Z (N) and
-        moment L M N (N m) of the air and the engine's reaction on the body."""
+        """(x, u, wind) -> every flow quantity and switching function by name (see `Effect`), and
+        the total force X Y Z (N) and moment L M N (N m) of the air and the engine's reaction on the
+        body.
+        """
         return self.dynamics.function("diagnostics", self._values)
 
     @cached_property
     def implicit(self) -> Function:
-        """(x, u, wind, lam) -> xdot, balance: as `rhs`, with the inflow ratio of each rotor given, and the residual of its
-        momentum balance, which is 0 where lam is the inflow."""
+        """(x, u, wind, lam) -> xdot, balance: as `rhs`, with the inflow ratio of each rotor given,
+        and the residual of its momentum balance, which is 0 where lam is the inflow.
+        """
         lam: list[SX] = []
 
         def unknown() -> SX:
@@ -197,13 +234,28 @@ class Helicopter:
 
         x, u, w = SX.sym("x", len(self.states)), SX.sym("u", 4), SX.sym("wind", 3)
         xdot, balance = self.with_inflow(x, u, w, unknown)
-        return Function("implicit", [x, u, w, column(lam)], [xdot, balance], ["x", "u", "wind", "lam"], ["xdot", "balance"])
+        return Function(
+            "implicit",
+            [x, u, w, column(lam)],
+            [xdot, balance],
+            ["x", "u", "wind", "lam"],
+            ["xdot", "balance"],
+        )
 
-    def with_inflow(self, x: Any, u: Any, wind: Any, unknown: Callable[[], Any], par: Sequence[Any] | None = None) -> tuple[Any, Any]:
-        """(xdot, balance) of the Euler form in CasADi or SymPy expressions; `unknown()` makes the inflow ratio of the next rotor.
+    def with_inflow(
+        self,
+        x: Any,
+        u: Any,
+        wind: Any,
+        unknown: Callable[[], Any],
+        par: Sequence[Any] | None = None,
+    ) -> tuple[Any, Any]:
+        """(xdot, balance) of the Euler form in CasADi or SymPy expressions; `unknown()` makes the
+        inflow ratio of the next rotor.
 
-        `balance` is the residual of each rotor's momentum balance, 0 where the unknown is its inflow ratio. `par` has an
-        expression for each of `parameters`, whose values are taken without it.
+        `balance` is the residual of each rotor's momentum balance, 0 where the unknown is its
+        inflow ratio. `par` has an expression for each of `parameters`, whose values are taken
+        without it.
         """
         balance: list[Any] = []
 
@@ -216,19 +268,25 @@ class Helicopter:
         return xdot, column(balance)
 
     def sympy(self) -> RightHandSide:
-        """The Euler form in SymPy, with symbols for parameters and inflow; see `symheli.equations.RightHandSide`."""
+        """The Euler form in SymPy, with symbols for parameters and inflow; see
+        `symheli.equations.RightHandSide`.
+        """
         from symheli.equations import right_hand_side
 
         return right_hand_side(self)
 
     def latex(self, standalone: bool = False) -> str:
-        """Every component's equations and parameters in LaTeX: the body of a document, or with `standalone` all of one."""
+        """Every component's equations and parameters in LaTeX: the body of a document, or with
+        `standalone` all of one.
+        """
         from symheli.equations import latex
 
         return latex(self, standalone=standalone)
 
     def compiled(self, name: Name) -> Function:
-        """One of the functions as machine code where a C compiler is there: the same numbers, faster, numbers only."""
+        """One of the functions as machine code where a C compiler is there: the same numbers,
+        faster, numbers only.
+        """
         function = self._compiled(name)
         symbols = [casadi.MX.sym(function.name_in(i), *function.size_in(i)) for i in range(3)]
         outputs = function.call([*symbols, casadi.DM(self._values)], False, False)
@@ -250,4 +308,8 @@ class Helicopter:
         """Value of every switching function at a point."""
         function = self.numeric("diagnostics")
         values = zip(function.function.name_out(), function(x, u, wind), strict=True)
-        return {name.removeprefix("switch_").replace("_", " "): float(v[0]) for name, v in values if name.startswith("switch_")}
+        return {
+            name.removeprefix("switch_").replace("_", " "): float(v[0])
+            for name, v in values
+            if name.startswith("switch_")
+        }

@@ -13,17 +13,29 @@ from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.signal import indices
 
 
-def linearize(heli: Helicopter, point: TrimPoint, *, inputs: Sequence[str] | None = None, allow_accelerating: bool = False) -> LinearModel:
-    """A, B of the Euler form about `point` by algorithmic differentiation through the implicit inflow; C = I, D = 0.
+def linearize(
+    heli: Helicopter,
+    point: TrimPoint,
+    *,
+    inputs: Sequence[str] | None = None,
+    allow_accelerating: bool = False,
+) -> LinearModel:
+    """A, B of the Euler form about `point` by algorithmic differentiation through the implicit
+    inflow; C = I, D = 0.
 
-    The air is that of the point. `inputs` defaults to the four controls; gust velocities u_w v_w w_w (body axes, m/s) may be
-    named too. A point that is not an equilibrium is refused with `InputError` unless `allow_accelerating`.
+    The air is that of the point. `inputs` defaults to the four controls; gust velocities u_w v_w
+    w_w (body axes, m/s) may be named too. A point that is not an equilibrium is refused with
+    `InputError` unless `allow_accelerating`.
     """
     if not allow_accelerating and not np.all(np.abs(point.xdot.array) < TOLERANCE):
-        raise InputError(f"linearize needs an equilibrium: {point}; pass allow_accelerating=True for a model about a trajectory point")
+        raise InputError(
+            f"linearize needs an equilibrium: {point}; pass allow_accelerating=True for a model"
+            " about a trajectory point"
+        )
     if point.x.signals != heli.states:
         raise InputError(
-            f"the point has states {', '.join(point.x.signals)}, the helicopter {', '.join(heli.states)}: trim this helicopter"
+            f"the point has states {', '.join(point.x.signals)}, the helicopter"
+            f" {', '.join(heli.states)}: trim this helicopter"
         )
     heli = heli.in_air(point.density)
     A, B, E = heli.numeric("jacobian")(point.x.array, point.u.array, point.wind.array)
@@ -32,5 +44,12 @@ def linearize(heli: Helicopter, point: TrimPoint, *, inputs: Sequence[str] | Non
     B = np.hstack([B, E])[:, columns]
     n = len(heli.states)
     return LinearModel(
-        A, B, np.eye(n), np.zeros((n, len(columns))), heli.states, tuple(names[i] for i in columns), heli.states, point=point
+        A,
+        B,
+        np.eye(n),
+        np.zeros((n, len(columns))),
+        heli.states,
+        tuple(names[i] for i in columns),
+        heli.states,
+        point=point,
     )

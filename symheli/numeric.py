@@ -1,4 +1,6 @@
-"""CasADi functions called with NumPy arrays, without the cost of building CasADi matrices at each call."""
+"""CasADi functions called with NumPy arrays, without the cost of building CasADi matrices at each
+call.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +13,23 @@ from symheli.errors import InputError
 
 
 class Numeric:
-    """`function(*arguments)` with float arrays in and a list of float arrays out: vectors (n,), matrices (n, m).
+    """`function(*arguments)` with float arrays in and a list of float arrays out: vectors (n,),
+    matrices (n, m).
 
-    `last`: values of the function's last arguments, the same at every call. Reuses its buffers: one thread at a time. Every
-    argument is broadcast to the size the function expects.
+    `last`: values of the function's last arguments, the same at every call. Reuses its buffers: one
+    thread at a time. Every argument is broadcast to the size the function expects.
     """
 
     def __init__(self, function: casadi.Function, *last: Any):
-        sparse = [function.name_out(i) for i in range(function.n_out()) if not function.sparsity_out(i).is_dense()]
+        sparse = [
+            function.name_out(i)
+            for i in range(function.n_out())
+            if not function.sparsity_out(i).is_dense()
+        ]
         if sparse:
-            raise InputError(f"{function.name()}: outputs {', '.join(sparse)} are sparse; densify them first")
+            raise InputError(
+                f"{function.name()}: outputs {', '.join(sparse)} are sparse; densify them first"
+            )
         self.function = function
         arguments = [np.zeros(function.size_in(i), order="F") for i in range(function.n_in())]
         self._results = [np.zeros(function.size_out(i), order="F") for i in range(function.n_out())]
@@ -45,6 +54,9 @@ class Numeric:
                 else:
                     array[...] = value
             except ValueError as error:
-                raise InputError(f"{self.function.name()}: expected an argument of shape {array.shape}, got {np.shape(value)}") from error
+                raise InputError(
+                    f"{self.function.name()}: expected an argument of shape {array.shape}, got"
+                    f" {np.shape(value)}"
+                ) from error
         self._evaluate()
         return [r[:, 0].copy() if r.shape[1] == 1 else r.copy() for r in self._results]

@@ -1,4 +1,6 @@
-"""A component in its place in one airframe: where it sits, what drives it, and under which names it speaks."""
+"""A component in its place in one airframe: where it sits, what drives it, and under which names it
+speaks.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +13,19 @@ from symheli.components import Component, Effect, Flow, Motion
 from symheli.lpv.signal import Signal
 
 PLACE = {"x": "m", "y": "m", "z": "m"}
-"""Optional entries of a component's section: its reference point from the c.g., body axes (x forward, y right, z down)."""
+"""Optional entries of a component's section: its reference point from the c.g., body axes (x
+forward, y right, z down).
+"""
 
 
 @dataclass(frozen=True)
 class Part:
     """One section of a vehicle file.
 
-    suffix: added to the names of its states, flow and switches; empty for the first of a kind, "_" + section for the others.
-    controls: {control of the component: {control of the vehicle: gain}} where they differ. flow: {needed: name it is
-    taken from} where they differ. placed: whether it has an x, y or z. given: the component's optional entries it has.
+    suffix: added to the names of its states, flow and switches; empty for the first of a kind, "_"
+    + section for the others. controls: {control of the component: {control of the vehicle: gain}}
+    where they differ. flow: {needed: name it is taken from} where they differ. placed: whether it
+    has an x, y or z. given: the component's optional entries it has.
     """
 
     section: str
@@ -72,14 +77,33 @@ class Part:
         """The flow it makes, as the vehicle names it."""
         return tuple(name + self.suffix for name in self.component.makes)
 
-    def evaluate(self, par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
-        """Its effect about the c.g. and under the vehicle's names; arguments as in `Component.evaluate`, of the vehicle."""
+    def evaluate(
+        self,
+        par: SimpleNamespace,
+        motion: Motion,
+        controls: Mapping[str, Any],
+        own: Mapping[str, Any],
+        flow: Flow,
+    ) -> Effect:
+        """Its effect about the c.g. and under the vehicle's names; arguments as in
+        `Component.evaluate`, of the vehicle.
+        """
         inner = self.component.evaluate(
             par,
             _moved(motion, par) if self.placed else motion,
-            {**controls, **{name: sum(gain * controls[c] for c, gain in mix.items()) for name, mix in self.controls.items()}},
+            {
+                **controls,
+                **{
+                    name: sum(gain * controls[c] for c, gain in mix.items())
+                    for name, mix in self.controls.items()
+                },
+            },
             {str(s): own[f"{s}{self.suffix}"] for s in self.component.states},
-            Flow(flow.inflow, {name: flow[self.flow.get(name, name)] for name in self.component.needs}, flow.name),
+            Flow(
+                flow.inflow,
+                {name: flow[self.flow.get(name, name)] for name in self.component.needs},
+                flow.name,
+            ),
         )
         prefix = f"{self.section} " if self.suffix else ""
         return Effect(

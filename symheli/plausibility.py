@@ -15,7 +15,9 @@ POSITIVE = {
 }
 
 
-def impossibilities(sections: Mapping[str, Mapping[str, Quantity]], parts: Mapping[str, Part]) -> Iterator[tuple[str, str, str]]:
+def impossibilities(
+    sections: Mapping[str, Mapping[str, Quantity]], parts: Mapping[str, Part]
+) -> Iterator[tuple[str, str, str]]:
     """(section, entry, what is wrong) of every quantity that cannot be."""
     for section, entries in sections.items():
         positive = POSITIVE.get(section) or parts[section].positive
@@ -31,4 +33,11 @@ def impossibilities(sections: Mapping[str, Mapping[str, Quantity]], parts: Mappi
     for largest, *others in permutations(inertia):
         both = sum(inertia[axis] for axis in others)
         if others == sorted(others) and inertia[largest] > both * (1 + 1e-12):
-            yield "body", largest, f"no body has {largest} = {inertia[largest]:g} > {' + '.join(others)} = {both:g} kg m^2"
+            yield (
+                "body",
+                largest,
+                (
+                    f"no body has {largest} = {inertia[largest]:g} > {' + '.join(others)} ="
+                    f" {both:g} kg m^2"
+                ),
+            )

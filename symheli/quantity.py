@@ -15,8 +15,9 @@ KEYS = ("value", "unit", "source", "assumed", "ref")
 
 
 class Quantity(NamedTuple):
-    """A value in SI, its SI unit, where it was published, whether it is an assumption (`source` then says why), and the name
-    of the entry it is taken from where it has no value of its own."""
+    """A value in SI, its SI unit, where it was published, whether it is an assumption (`source`
+    then says why), and the name of the entry it is taken from where it has no value of its own.
+    """
 
     value: float
     unit: str
@@ -31,7 +32,10 @@ def read_quantity(where: str, table: Any, unit: str) -> Quantity:
     `where` begins the message of every `InputError`: file, line and entry.
     """
     if not isinstance(table, Mapping):
-        raise InputError(f"{where}: a bare number has no unit: write {{ value = {table}, unit = {unit!r}, source = ... }}")
+        raise InputError(
+            f"{where}: a bare number has no unit: write {{ value = {table}, unit = {unit!r}, source"
+            " = ... }"
+        )
     for key in table:
         if key not in KEYS:
             raise InputError(f"{where}: {UnknownNameError('key', key, KEYS)}")
@@ -48,12 +52,20 @@ def read_quantity(where: str, table: Any, unit: str) -> Quantity:
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
     if powers != dimension(unit):
-        raise InputError(f"{where}: expected {unit}{_others(unit)}, got {value} {given}, which is another kind of quantity")
+        raise InputError(
+            f"{where}: expected {unit}{_others(unit)}, got {value} {given}, which is another kind"
+            " of quantity"
+        )
     if not isinstance(table.get("assumed", False), bool):
         raise InputError(f"{where}: assumed must be true or false, got {table['assumed']!r}")
     if not table.get("source"):
-        raise InputError(f"{where}: every number needs a source; of an assumed one (assumed = true) the source says why this value")
-    return Quantity(factor * float(value), unit, str(table["source"]), bool(table.get("assumed", False)))
+        raise InputError(
+            f"{where}: every number needs a source; of an assumed one (assumed = true) the source"
+            " says why this value"
+        )
+    return Quantity(
+        factor * float(value), unit, str(table["source"]), bool(table.get("assumed", False))
+    )
 
 
 def _others(unit: str) -> str:
@@ -68,4 +80,6 @@ def _misspelt(given: str, value: float, unit: str) -> str:
     if not near:
         return start
     factor = to_si(near[0])[0]
-    return f"{start}; did you mean {near[0]!r}" + (f", {value:g} {near[0]} = {factor * value:.6g} {unit}?" if near[0] != unit else "?")
+    return f"{start}; did you mean {near[0]!r}" + (
+        f", {value:g} {near[0]} = {factor * value:.6g} {unit}?" if near[0] != unit else "?"
+    )

@@ -11,9 +11,18 @@ GRAVITY = 9.81
 
 
 def translation(
-    u: Any, v: Any, w: Any, p: Any, q: Any, r: Any, gravity: tuple[Any, Any, Any], force: tuple[Any, Any, Any], mass: Any
+    u: Any,
+    v: Any,
+    w: Any,
+    p: Any,
+    q: Any,
+    r: Any,
+    gravity: tuple[Any, Any, Any],
+    force: tuple[Any, Any, Any],
+    mass: Any,
 ) -> Any:
-    """(u', v', w') in m/s^2: V' = -omega x V + g + F/m. `gravity` in body axes (m/s^2), `force` in N.
+    """(u', v', w') in m/s^2: V' = -omega x V + g + F/m. `gravity` in body axes (m/s^2), `force` in
+    N.
 
     Source: Budiyono & Sutarto, eqs 1 and 3.
     """
@@ -24,11 +33,20 @@ def translation(
     )
 
 
-def rotation(p: Any, q: Any, r: Any, moment: tuple[Any, Any, Any], Ixx: Any, Iyy: Any, Izz: Any, added_yaw_inertia: Any = 0.0) -> Any:
+def rotation(
+    p: Any,
+    q: Any,
+    r: Any,
+    moment: tuple[Any, Any, Any],
+    Ixx: Any,
+    Iyy: Any,
+    Izz: Any,
+    added_yaw_inertia: Any = 0.0,
+) -> Any:
     """(p', q', r') in rad/s^2: I omega' = -omega x I omega + M with Ixz = 0; `moment` in N m.
 
-    `added_yaw_inertia` (kg m^2) is that of a rotor held at constant speed relative to the body: it reacts on r' only.
-    Source: Budiyono & Sutarto, eqs 2 and 3.
+    `added_yaw_inertia` (kg m^2) is that of a rotor held at constant speed relative to the body: it
+    reacts on r' only. Source: Budiyono & Sutarto, eqs 2 and 3.
     """
     return (
         (q * r * (Iyy - Izz) + moment[0]) / Ixx,
@@ -43,7 +61,9 @@ def gravity_euler(phi: Any, theta: Any) -> tuple[Any, Any, Any]:
 
 
 def euler_rates(phi: Any, theta: Any, p: Any, q: Any, r: Any) -> tuple[Any, Any, Any]:
-    """(phi', theta', psi') in rad/s; singular at theta = +-90 deg. Source: Budiyono & Sutarto, eq. 4."""
+    """(phi', theta', psi') in rad/s; singular at theta = +-90 deg. Source: Budiyono & Sutarto, eq.
+    4.
+    """
     turn = q * sin(phi) + r * cos(phi)
     return p + tan(theta) * turn, q * cos(phi) - r * sin(phi), turn / cos(theta)
 
@@ -57,8 +77,12 @@ def body_to_earth(q0: Any, q1: Any, q2: Any, q3: Any) -> tuple[tuple[Any, Any, A
     )
 
 
-def quaternion_rates(q0: Any, q1: Any, q2: Any, q3: Any, p: Any, q: Any, r: Any) -> tuple[Any, Any, Any, Any]:
-    """Derivative (1/s) of the scalar-first attitude quaternion: half its product with (0, p, q, r)."""
+def quaternion_rates(
+    q0: Any, q1: Any, q2: Any, q3: Any, p: Any, q: Any, r: Any
+) -> tuple[Any, Any, Any, Any]:
+    """Derivative (1/s) of the scalar-first attitude quaternion: half its product with (0, p, q,
+    r).
+    """
     return (
         0.5 * (-q1 * p - q2 * q - q3 * r),
         0.5 * (q0 * p + q2 * r - q3 * q),

@@ -1,7 +1,9 @@
-"""The one door to CasADi: functions that take floats, NumPy arrays, CasADi and SymPy expressions alike.
+"""The one door to CasADi: functions that take floats, NumPy arrays, CasADi and SymPy expressions
+alike.
 
-The physics is written once with these. Branches are arithmetic (`where`, `minimum`), roots and quotients are guarded
-at their source, so that values and derivatives stay finite in hover and at zero inflow.
+The physics is written once with these. Branches are arithmetic (`where`, `minimum`), roots and
+quotients are guarded at their source, so that values and derivatives stay finite in hover and at
+zero inflow.
 """
 
 from __future__ import annotations
@@ -13,9 +15,24 @@ import numpy as np
 from casadi import SX, Function
 
 __all__ = [
-    "SX", "Function", "absolute", "adjoint_product", "clip", "column", "cos", "dense", "jacobian", "maximum", "minimum", "replaced", "sin",
-    "sqrt", "tan", "tangent_product", "where",
-]  # fmt: skip
+    "SX",
+    "Function",
+    "absolute",
+    "adjoint_product",
+    "clip",
+    "column",
+    "cos",
+    "dense",
+    "jacobian",
+    "maximum",
+    "minimum",
+    "replaced",
+    "sin",
+    "sqrt",
+    "tan",
+    "tangent_product",
+    "where",
+]
 
 _SYMBOLIC = (casadi.SX, casadi.MX, casadi.DM)
 
@@ -66,7 +83,11 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
     library = _library(condition, yes, no)
     if library is casadi:
         return casadi.if_else(condition, yes, no)
-    return np.where(condition, yes, no) if library is np else library.Piecewise((yes, condition), (no, True))
+    return (
+        np.where(condition, yes, no)
+        if library is np
+        else library.Piecewise((yes, condition), (no, True))
+    )
 
 
 def minimum(a: Any, b: Any) -> Any:
@@ -82,7 +103,9 @@ def maximum(a: Any, b: Any) -> Any:
 
 
 def clip(x: Any, low: Any, high: Any, smoothing: float = 0.0) -> Any:
-    """x limited to [low, high]; a tie takes x. `smoothing` > 0 (in the unit of x) rounds both corners by about that much."""
+    """x limited to [low, high]; a tie takes x. `smoothing` > 0 (in the unit of x) rounds both
+    corners by about that much.
+    """
     if smoothing == 0.0:
         return minimum(maximum(x, low), high)
 
@@ -104,7 +127,9 @@ def jacobian(expression: Any, variable: Any) -> Any:
 
 
 def tangent_product(expression: Any, variables: list[Any], directions: list[Any]) -> Any:
-    """Change of the expression (n,) when every variable moves along its direction, by forward differentiation, without Jacobians."""
+    """Change of the expression (n,) when every variable moves along its direction, by forward
+    differentiation, without Jacobians.
+    """
     return dense(casadi.jtimes(expression, casadi.vertcat(*variables), casadi.vertcat(*directions)))
 
 

@@ -21,8 +21,9 @@ POWER = Signal("power", "W")
 class TrimMap:
     """Trims at n `airspeeds` (of the whole motion, m/s) and m `climb_rates` (m/s, up).
 
-    points: (n, m) of `TrimPoint`, None where the climb rate exceeds the airspeed. power: engine torque times rotor speed (n, m),
-    W, NaN where there is no point. map["theta"] is any state, input or "power" over the grid (n, m).
+    points: (n, m) of `TrimPoint`, None where the climb rate exceeds the airspeed. power: engine
+    torque times rotor speed (n, m), W, NaN where there is no point. map["theta"] is any state,
+    input or "power" over the grid (n, m).
     """
 
     airspeeds: Array
@@ -36,7 +37,9 @@ class TrimMap:
         shape = (len(self.airspeeds), len(self.climb_rates))
         object.__setattr__(self, "power", frozen(self.power, "power", shape, finite=False))
         if len(self.points) != shape[0] or any(len(row) != shape[1] for row in self.points):
-            raise InputError(f"expected points of shape {shape}, one for each airspeed and climb rate")
+            raise InputError(
+                f"expected points of shape {shape}, one for each airspeed and climb rate"
+            )
 
     @property
     def success(self) -> Array:
@@ -60,7 +63,9 @@ class TrimMap:
 
     @property
     def level_speeds(self) -> Array:
-        """Horizontal part of the airspeed (n, m), m/s; NaN where the climb rate exceeds the airspeed."""
+        """Horizontal part of the airspeed (n, m), m/s; NaN where the climb rate exceeds the
+        airspeed.
+        """
         square = self.airspeeds[:, None] ** 2 - self.climb_rates**2
         return np.sqrt(np.where(self.possible, np.maximum(square, 0.0), np.nan))
 
@@ -94,29 +99,41 @@ class TrimMap:
         speeds, rates = np.meshgrid(self.airspeeds, self.climb_rates, indexing="ij")
         columns = [(Signal("airspeed"), speeds[keep]), (Signal("climb_rate", "m/s"), rates[keep])]
         columns += [(name, self[name][keep]) for name in self.signals]
-        columns += [(Signal(flag), getattr(self, flag)[keep]) for flag in ("success", "attainable", "vortex_ring")]
+        columns += [
+            (Signal(flag), getattr(self, flag)[keep])
+            for flag in ("success", "attainable", "vortex_ring")
+        ]
         return comma_separated(columns)
 
     def _flags(self, name: str) -> Array:
-        return np.array([[point is not None and getattr(point, name) for point in row] for row in self.points])
+        return np.array(
+            [[point is not None and getattr(point, name) for point in row] for row in self.points]
+        )
 
 
-def trim_map(heli: Helicopter, airspeeds: Sequence[float] | Array, climb_rates: Sequence[float] | Array) -> TrimMap:
-    """Trim at every pair of `airspeeds` and `climb_rates` (m/s, both increasing), each from the neighbours already found.
+def trim_map(
+    heli: Helicopter, airspeeds: Sequence[float] | Array, climb_rates: Sequence[float] | Array
+) -> TrimMap:
+    """Trim at every pair of `airspeeds` and `climb_rates` (m/s, both increasing), each from the
+    neighbours already found.
 
-    The airspeed is that of the whole motion: straight down is climb_rate = -airspeed. Failures are kept, not raised: see
-    `success`, `attainable` and `vortex_ring` of the result.
+    The airspeed is that of the whole motion: straight down is climb_rate = -airspeed. Failures are
+    kept, not raised: see `success`, `attainable` and `vortex_ring` of the result.
     """
     speeds, rates = _increasing(airspeeds, "airspeeds"), _increasing(climb_rates, "climb_rates")
     if not np.any(np.abs(rates) <= speeds[-1]):
         raise InputError("every climb rate exceeds the largest airspeed, which includes it")
     points: list[list[TrimPoint | None]] = [[None] * len(rates) for _ in speeds]
     power = np.full((len(speeds), len(rates)), np.nan)
-    outwards = np.argsort(np.abs(rates), kind="stable")  # level flight first: the easiest trims start the others
+    outwards = np.argsort(
+        np.abs(rates), kind="stable"
+    )  # level flight first: the easiest trims start the others
     for i, speed in enumerate(speeds):
         for j in outwards:
             if abs(rates[j]) <= speed:
-                point = points[i][j] = _from_neighbours(heli, float(speed), float(rates[j]), _neighbours(points, i, int(j)))
+                point = points[i][j] = _from_neighbours(
+                    heli, float(speed), float(rates[j]), _neighbours(points, i, int(j))
+                )
                 power[i, j] = _power(heli, point)
     return TrimMap(speeds, rates, tuple(map(tuple, points)), power)
 
@@ -129,7 +146,9 @@ def _neighbours(points: list[list[TrimPoint | None]], i: int, j: int) -> Iterato
                 yield point
 
 
-def _from_neighbours(heli: Helicopter, speed: float, rate: float, neighbours: Iterator[TrimPoint]) -> TrimPoint:
+def _from_neighbours(
+    heli: Helicopter, speed: float, rate: float, neighbours: Iterator[TrimPoint]
+) -> TrimPoint:
     for start in neighbours:
         point = trim(heli, speed, climb_rate=rate, start=start, throw=False, continuation=False)
         if point.success:

@@ -35,7 +35,12 @@ class Vehicle:
     @property
     def quantities(self) -> dict[str, Quantity]:
         """{"section.entry": quantity} of every entry that has a value of its own."""
-        return {f"{s}.{e}": q for s, entries in self.sections.items() for e, q in entries.items() if not q.ref}
+        return {
+            f"{s}.{e}": q
+            for s, entries in self.sections.items()
+            for e, q in entries.items()
+            if not q.ref
+        }
 
     @property
     def assumed(self) -> list[str]:
@@ -43,39 +48,56 @@ class Vehicle:
         return [name for name, quantity in self.quantities.items() if quantity.assumed]
 
     def with_values(self, changes: Mapping[str, float], source: str = "set by hand") -> Vehicle:
-        """The same airframe with other values (SI), {"body.mass": 9.0}; entries that refer to a changed one follow it."""
+        """The same airframe with other values (SI), {"body.mass": 9.0}; entries that refer to a
+        changed one follow it.
+        """
         for name, value in changes.items():
             if name not in self.quantities:
                 raise UnknownNameError("parameter", name, self.quantities)
             if not isinstance(value, int | float) or not math.isfinite(value):
-                raise InputError(f"{name}: expected a finite number in {self.quantities[name].unit}, got {value!r}")
+                raise InputError(
+                    f"{name}: expected a finite number in {self.quantities[name].unit}, got"
+                    f" {value!r}"
+                )
         changed = self._map(
-            lambda name, q: q._replace(value=float(changes[name]), source=f"{source}, was {q.value:g}") if name in changes else q
+            lambda name, q: (
+                q._replace(value=float(changes[name]), source=f"{source}, was {q.value:g}")
+                if name in changes
+                else q
+            )
         )
         for section, entry, wrong in impossibilities(changed.sections, changed.components):
             raise InputError(f"{self.title}, {section}.{entry}: {wrong}")
         return changed
 
     def scaled(self, factor: float) -> Vehicle:
-        """The Froude-scaled airframe: lengths times `factor` N, masses N^3, times sqrt(N), so that gravity and air density stay.
+        """The Froude-scaled airframe: lengths times `factor` N, masses N^3, times sqrt(N), so that
+        gravity and air density stay.
 
-        The exponent of each entry follows from its unit: mass 3, length 1, time 1/2, so inertias N^5, stiffness N^4,
-        power N^3.5, rotor speed N^-0.5, while angles and ratios stay.
+        The exponent of each entry follows from its unit: mass 3, length 1, time 1/2, so inertias
+        N^5, stiffness N^4, power N^3.5, rotor speed N^-0.5, while angles and ratios stay.
         """
         if not (math.isfinite(factor) and factor > 0):
-            raise InputError(f"scaling needs a factor > 0 (length of the copy by length of the original), got {factor}")
+            raise InputError(
+                "scaling needs a factor > 0 (length of the copy by length of the original), got"
+                f" {factor}"
+            )
 
         def scale(_: str, q: Quantity) -> Quantity:
             powers = dimension(q.unit)
             exponent = 3 * powers.get("kg", 0) + powers.get("m", 0) + powers.get("s", 0) / 2
-            return q._replace(value=q.value * factor**exponent, source=f"{q.source}; Froude-scaled by {factor:g}")
+            return q._replace(
+                value=q.value * factor**exponent, source=f"{q.source}; Froude-scaled by {factor:g}"
+            )
 
         return replace(self._map(scale), title=f"{self.title}, Froude-scaled by {factor:g}")
 
     def _map(self, change: Callable[[str, Quantity], Quantity]) -> Vehicle:
         """Every quantity changed; one that refers to another is changed as the other."""
         sections = {
-            section: {entry: change(q.ref or f"{section}.{entry}", q) for entry, q in entries.items()}
+            section: {
+                entry: change(q.ref or f"{section}.{entry}", q) for entry, q in entries.items()
+            }
             for section, entries in self.sections.items()
         }
         return replace(self, sections=sections)
@@ -84,20 +106,40 @@ class Vehicle:
 def vehicles() -> list[str]:
     """Names of the airframes that come with the package."""
     files = [p.name for p in resources.files("symheli.vehicles").iterdir()]
-    return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml") and not name.endswith(ENDING))
+    return sorted(
+        name.removesuffix(".toml")
+        for name in files
+        if name.endswith(".toml") and not name.endswith(ENDING)
+    )
 
 
 def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
-    """Read a packaged airframe by name, or any TOML file by path. Raises `InputError` naming file, line, entry and unit."""
+    """Read a packaged airframe by name, or any TOML file by path. Raises `InputError` naming file,
+    line, entry and unit.
+    """
     given = os.fspath(name_or_path)
     if given.endswith(".toml"):
         path = Path(given)
         if not path.is_file():
-            raise InputError(f"no vehicle file at {given}; packaged airframes: {', '.join(vehicles())}")
+            raise InputError(
+                f"no vehicle file at {given}; packaged airframes: {', '.join(vehicles())}"
+            )
         file, name = VehicleFile(given, path.read_text(encoding="utf-8"), path.parent), path.stem
     else:
         if given not in vehicles():
             raise UnknownNameError("vehicle", given, vehicles())
-        file, name = VehicleFile(given, (resources.files("symheli.vehicles") / f"{given}.toml").read_text(encoding="utf-8")), given
+        file, name = (
+            VehicleFile(
+                given,
+                (resources.files("symheli.vehicles") / f"{given}.toml").read_text(encoding="utf-8"),
+            ),
+            given,
+        )
     parts = file.parts()
-    return Vehicle(name, str(file.tables.get("title", name)), str(file.tables.get("source", "")), file.quantities(parts), parts)
+    return Vehicle(
+        name,
+        str(file.tables.get("title", name)),
+        str(file.tables.get("source", "")),
+        file.quantities(parts),
+        parts,
+    )

@@ -16,7 +16,13 @@ from symheli.plausibility import impossibilities
 from symheli.quantity import Quantity, read_quantity
 
 BODY = {"mass": "kg", "Ixx": "kg m^2", "Iyy": "kg m^2", "Izz": "kg m^2"}
-DRIVETRAIN = {"nominal_speed": "rad/s", "inertia": "kg m^2", "max_power": "W", "governor_kp": "s/rad", "governor_ki": "1/rad"}
+DRIVETRAIN = {
+    "nominal_speed": "rad/s",
+    "inertia": "kg m^2",
+    "max_power": "W",
+    "governor_kp": "s/rad",
+    "governor_ki": "1/rad",
+}
 CONTROLS = dict.fromkeys(("d_lon", "d_lat", "d_col", "d_ped"), "rad")
 FIXED = {"body": BODY, "drivetrain": DRIVETRAIN, "controls": CONTROLS}
 """Sections every airframe has, {entry: unit}; every other section is a component."""
@@ -42,14 +48,29 @@ class VehicleFile:
         for section, table in self._sections().items():
             if section not in FIXED:
                 if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", section):
-                    raise InputError(f"{self.where(section)}: a section is named with letters, digits and single underscores")
+                    raise InputError(
+                        f"{self.where(section)}: a section is named with letters, digits and single"
+                        " underscores"
+                    )
                 component = self._component(section, table)
-                names = {f"[{table.get('component', section)}]", *component.states, *component.makes}
+                names = {
+                    f"[{table.get('component', section)}]",
+                    *component.states,
+                    *component.makes,
+                }
                 suffix = f"_{section}" if names & taken else ""
                 taken |= {f"{name}{suffix}" for name in names}
                 mix, flow = self._controls(section, table), self._flow(section, table, component)
                 given = tuple(entry for entry in component.optional if entry in table)
-                parts[section] = Part(section, component, suffix, mix, flow, any(axis in table for axis in PLACE), given)
+                parts[section] = Part(
+                    section,
+                    component,
+                    suffix,
+                    mix,
+                    flow,
+                    any(axis in table for axis in PLACE),
+                    given,
+                )
         return parts
 
     def quantities(self, parts: Mapping[str, Part]) -> dict[str, dict[str, Quantity]]:
@@ -63,7 +84,9 @@ class VehicleFile:
             units = FIXED.get(section) or parts[section].parameters
             for entry in table:
                 if entry not in (*units, *(() if section in FIXED else (*WIRING, *PLACE))):
-                    raise InputError(f"{self.where(section, entry)}: {UnknownNameError('entry', entry, units)}")
+                    raise InputError(
+                        f"{self.where(section, entry)}: {UnknownNameError('entry', entry, units)}"
+                    )
             wanted[section] = units
         out: dict[str, dict[str, Quantity]] = {section: {} for section in wanted}
         for by_reference in (False, True):  # values first: a wrong one is reported where it stands
@@ -82,7 +105,9 @@ class VehicleFile:
         return f"{self.path}, line {line}, {name}" if line else f"{self.path}, {name}"
 
     def _line(self, section: str, entry: str) -> int | None:
-        """Line of `entry =` below [section], of `section.entry =`, or of [section.entry]; of [section] without an entry."""
+        """Line of `entry =` below [section], of `section.entry =`, or of [section.entry]; of
+        [section] without an entry.
+        """
         wanted = [section, entry] if entry else [section]
         header: list[str] = []
         for number, line in enumerate(self.lines, 1):
@@ -105,13 +130,18 @@ class VehicleFile:
         if table is None and entry in PLACE:
             return Quantity(0.0, unit, "not given: at the c.g.")
         if table is None:
-            raise InputError(f"{where}: missing; add {entry} = {{ value = ..., unit = {unit!r}, source = ... }}")
+            raise InputError(
+                f"{where}: missing; add {entry} = {{ value = ..., unit = {unit!r}, source = ... }}"
+            )
         if _refers(table):
             other_section, _, other_entry = str(table["ref"]).partition(".")
             target = self.tables.get(other_section, {})
             target = target.get(other_entry) if isinstance(target, Mapping) else None
             if len(table) > 1 or not isinstance(target, Mapping) or "ref" in target:
-                raise InputError(f"{where}: {{ ref = 'section.entry' }} must name an entry with a value and say nothing else, got {table}")
+                raise InputError(
+                    f"{where}: {{ ref = 'section.entry' }} must name an entry with a value and say"
+                    f" nothing else, got {table}"
+                )
             return read_quantity(where, target, unit)._replace(ref=str(table["ref"]))
         return read_quantity(where, table, unit)
 
@@ -119,28 +149,44 @@ class VehicleFile:
         try:
             return find(str(table.get("component", section)), self.folder)
         except UnknownNameError as error:
-            raise InputError(f"{self.where(section, 'component')}: {error}; or name a file: component = './{section}.py'") from error
+            raise InputError(
+                f"{self.where(section, 'component')}: {error}; or name a file: component ="
+                f" './{section}.py'"
+            ) from error
         except InputError as error:
             raise InputError(f"{self.where(section, 'component')}: {error}") from error
 
     def _controls(self, section: str, table: Mapping[str, Any]) -> dict[str, dict[str, float]]:
         where, mixes = self.where(section, "controls"), table.get("controls", {})
-        if not isinstance(mixes, Mapping) or not all(isinstance(mix, Mapping) for mix in mixes.values()):
+        if not isinstance(mixes, Mapping) or not all(
+            isinstance(mix, Mapping) for mix in mixes.values()
+        ):
             raise InputError(
-                f"{where}: expected {{ d_col = {{ d_col = 1.0, d_lon = 0.2 }} }}, for a control of the part its mix; got {mixes}"
+                f"{where}: expected {{ d_col = {{ d_col = 1.0, d_lon = 0.2 }} }}, for a control of"
+                f" the part its mix; got {mixes}"
             )
         for name in (*mixes, *(control for mix in mixes.values() for control in mix)):
             if name not in CONTROLS:
                 raise InputError(f"{where}: {UnknownNameError('control', name, CONTROLS)}")
         for gain in (gain for mix in mixes.values() for gain in mix.values()):
-            if isinstance(gain, bool) or not isinstance(gain, int | float) or not math.isfinite(gain):
+            if (
+                isinstance(gain, bool)
+                or not isinstance(gain, int | float)
+                or not math.isfinite(gain)
+            ):
                 raise InputError(f"{where}: a gain must be a finite number (rad/rad), got {gain!r}")
-        return {name: {control: float(gain) for control, gain in mix.items()} for name, mix in mixes.items()}
+        return {
+            name: {control: float(gain) for control, gain in mix.items()}
+            for name, mix in mixes.items()
+        }
 
     def _flow(self, section: str, table: Mapping[str, Any], component: Component) -> dict[str, str]:
         where, flow = self.where(section, "flow"), table.get("flow", {})
         if not isinstance(flow, Mapping):
-            raise InputError(f"{where}: expected {{ V_imr = 'V_imr_aft_rotor' }}: for a flow the part needs, whose it takes, got {flow!r}")
+            raise InputError(
+                f"{where}: expected {{ V_imr = 'V_imr_aft_rotor' }}: for a flow the part needs,"
+                f" whose it takes, got {flow!r}"
+            )
         for name in flow:
             if name not in component.needs:
                 raise InputError(f"{where}: {UnknownNameError('flow', name, component.needs)}")

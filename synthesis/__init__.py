@@ -1,4 +1,5 @@
-"""Guarantees for LPV models: certified gains and stability, each with a proof that is verified after the solver.
+"""Guarantees for LPV models: certified gains and stability, each with a proof that is verified
+after the solver.
 
 No solver is loaded by importing this package.
 """
@@ -11,7 +12,16 @@ from synthesis.frozen import FrozenGain, frozen_gain
 from synthesis.generalized_h2 import generalized_h2
 from synthesis.handling_qualities import Bandwidth, bandwidth
 from synthesis.l2_gain import l2_gain, stability
-from synthesis.lft import SCALINGS, BoxGain, LFTCertificate, Multiplier, Trial, frozen_box_gain, lft_gain, lft_stability
+from synthesis.lft import (
+    SCALINGS,
+    BoxGain,
+    LFTCertificate,
+    Multiplier,
+    Trial,
+    frozen_box_gain,
+    lft_gain,
+    lft_stability,
+)
 from synthesis.lower_bound import LowerBound, Search, lower_bound
 from synthesis.lyapunov import MemoryLyapunov, SplineLyapunov
 from synthesis.margins import Margins, disk_margin, loop, margins

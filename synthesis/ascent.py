@@ -1,10 +1,11 @@
 """The worst p(t): ascent on a whole periodic trajectory, one linear program a step.
 
-The gradient of growth or gain with respect to p at every node comes from the adjoint along the cycle. The linear program
-moves all nodes (and the period) to where the linearised objective is largest within range, rate and a trust region: its
-vertices are the bang-bang arcs and rests of Pontryagin's principle. Source: conditional gradients, Frank and Wolfe,
-"An algorithm for quadratic programming", Naval Research Logistics Quarterly 3 (1956); worst-case trajectories as in
-Tierno, Murray, Doyle and Gregory, J. Guidance, Control, and Dynamics 20 (1997).
+The gradient of growth or gain with respect to p at every node comes from the adjoint along the
+cycle. The linear program moves all nodes (and the period) to where the linearised objective is
+largest within range, rate and a trust region: its vertices are the bang-bang arcs and rests of
+Pontryagin's principle. Source: conditional gradients, Frank and Wolfe, "An algorithm for quadratic
+programming", Naval Research Logistics Quarterly 3 (1956); worst-case trajectories as in Tierno,
+Murray, Doyle and Gregory, J. Guidance, Control, and Dynamics 20 (1997).
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ SHORTEST_REACH = 1e-3
 
 
 SHORTEST_PERIOD = 0.01
-"""No cycle becomes shorter than this fraction of the longest: a p that is faster than every mode acts by its mean."""
+"""No cycle becomes shorter than this fraction of the longest: a p that is faster than every mode
+acts by its mean.
+"""
 
 
 class Objective(NamedTuple):
@@ -53,7 +56,9 @@ GAIN = Objective(gain, False)
 
 
 def on_nodes(trajectory: Trajectory, nodes: int, dt: float | None) -> Trajectory:
-    """The cycle on an even number of equal intervals, about `nodes`; in discrete time each a whole number of samples."""
+    """The cycle on an even number of equal intervals, about `nodes`; in discrete time each a whole
+    number of samples.
+    """
     time, p = trajectory
     period, nodes = float(time[-1] - time[0]), 2 * math.ceil(nodes / 2)
     spacing = period / nodes
@@ -66,9 +71,17 @@ def on_nodes(trajectory: Trajectory, nodes: int, dt: float | None) -> Trajectory
 
 
 def ascend(
-    lpv: Scheduled, rate: float, start: Trajectory, objective: Objective, longest: float, evaluations: int, budget: Budget = UNLIMITED
-) -> tuple[Trajectory, float]:  # fmt: skip
-    """(cycle, measure of it) from `start` on equal intervals: no cycle longer than `longest` s, so many gradients, within the `budget`."""
+    lpv: Scheduled,
+    rate: float,
+    start: Trajectory,
+    objective: Objective,
+    longest: float,
+    evaluations: int,
+    budget: Budget = UNLIMITED,
+) -> tuple[Trajectory, float]:
+    """(cycle, measure of it) from `start` on equal intervals: no cycle longer than `longest` s, so
+    many gradients, within the `budget`.
+    """
     s = lpv.scheduling
     width = s.high - s.low
     best, reach = start, REACH
@@ -76,11 +89,16 @@ def ascend(
     for _ in range(evaluations - 1):
         if reach < SHORTEST_REACH or not math.isfinite(here.value) or budget.over:
             break
-        trial = _step(best, gradient, rate, (s.low, s.high), reach * width, longest, fixed=lpv.dt is not None)
+        trial = _step(
+            best, gradient, rate, (s.low, s.high), reach * width, longest, fixed=lpv.dt is not None
+        )
         if trial is None:
             break
         there, new_gradient = _gradient(lpv, trial, objective)
-        if objective.score(there.value, trial.time[-1]) > objective.score(here.value, best.time[-1]) + 1e-9:
+        if (
+            objective.score(there.value, trial.time[-1])
+            > objective.score(here.value, best.time[-1]) + 1e-9
+        ):
             best, here, gradient, reach = trial, there, new_gradient, min(1.5 * reach, 2 * REACH)
         else:
             reach /= 3.0
@@ -88,10 +106,11 @@ def ascend(
 
 
 def _gradient(lpv: Scheduled, cycle: Trajectory, objective: Objective) -> tuple[Sensitivity, Array]:
-    """The measure, and the gradient (N + 1,) of the score: by p at each node, and by the logarithm of the period.
+    """The measure, and the gradient (N + 1,) of the score: by p at each node, and by the logarithm
+    of the period.
 
-    The steps are differenced, which costs three more evaluations: every second node moves at once, so that each step
-    feels one of them alone.
+    The steps are differenced, which costs three more evaluations: every second node moves at once,
+    so that each step feels one of them alone.
     """
     time, p = cycle
     s, count, period = lpv.scheduling, len(time) - 1, float(time[-1])
@@ -104,11 +123,16 @@ def _gradient(lpv: Scheduled, cycle: Trajectory, objective: Objective) -> tuple[
     out = np.zeros(count + 1)
     for parity in (0, 1):
         moved = np.arange(count + 1) % 2 == parity
-        change = found.along(_along(lpv, Trajectory(time, p + np.where(moved, shift, 0.0))).step - system.step)
+        change = found.along(
+            _along(lpv, Trajectory(time, p + np.where(moved, shift, 0.0))).step - system.step
+        )
         node = interval + (interval % 2 != parity)
         np.add.at(out, node % count, change / shift[node])
     if lpv.dt is None:
-        stretched = found.along(_along(lpv, Trajectory(time * (1 + 1e-6), p)).step - system.step).sum() / 1e-6
+        stretched = (
+            found.along(_along(lpv, Trajectory(time * (1 + 1e-6), p)).step - system.step).sum()
+            / 1e-6
+        )
         out[-1] = stretched - (found.value if objective.a_second else 0.0)
     return found, out / (period if objective.a_second else 1.0)
 
@@ -118,22 +142,38 @@ def _along(lpv: Scheduled, cycle: Trajectory) -> Steps:
 
 
 def _step(
-    cycle: Trajectory, gradient: Array, rate: float, limits: tuple[float, float], reach: float, longest: float, *, fixed: bool
-) -> Trajectory | None:  # fmt: skip
-    """The best vertex within `reach`; the period may change by reach/range of 0.4 unless `fixed`. None where the program fails."""
+    cycle: Trajectory,
+    gradient: Array,
+    rate: float,
+    limits: tuple[float, float],
+    reach: float,
+    longest: float,
+    *,
+    fixed: bool,
+) -> Trajectory | None:
+    """The best vertex within `reach`; the period may change by reach/range of 0.4 unless `fixed`.
+    None where the program fails.
+    """
     time, p = cycle
     low, high = limits
     count, spacing = len(time) - 1, float(time[1])
     change = 0.0 if fixed else min(0.4 * reach / (high - low), 0.5)
     longer = max(min(change, longest / float(time[-1]) - 1.0), 0.0)
     shorter = max(min(change, 1.0 - SHORTEST_PERIOD * longest / float(time[-1])), 0.0)
-    bounds = [*zip(np.maximum(low, p[:-1] - reach), np.minimum(high, p[:-1] + reach), strict=True), (-shorter, longer)]
+    bounds = [
+        *zip(np.maximum(low, p[:-1] - reach), np.minimum(high, p[:-1] + reach), strict=True),
+        (-shorter, longer),
+    ]
     matrix, right = None, None
     if math.isfinite(rate):
-        next_minus_this = sparse.diags([np.full(count, -1.0), np.ones(count - 1)], [0, 1], shape=(count, count)).tolil()  # type: ignore[list-item]
+        next_minus_this = sparse.diags(
+            [np.full(count, -1.0), np.ones(count - 1)], [0, 1], shape=(count, count)
+        ).tolil()  # type: ignore[list-item]
         next_minus_this[count - 1, 0] += 1.0
         stretch = np.full((count, 1), -rate * spacing)
-        matrix = sparse.bmat([[next_minus_this, stretch], [-next_minus_this, stretch]], format="csc")
+        matrix = sparse.bmat(
+            [[next_minus_this, stretch], [-next_minus_this, stretch]], format="csc"
+        )
         right = np.full(2 * count, rate * spacing)
     result: Any = linprog(-gradient, A_ub=matrix, b_ub=right, bounds=bounds, method="highs")
     if result.x is None:

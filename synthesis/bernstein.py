@@ -1,9 +1,11 @@
-"""Polynomials in Bernstein form on an interval: products, restriction, elevation, in any arithmetic.
+"""Polynomials in Bernstein form on an interval: products, restriction, elevation, in any
+arithmetic.
 
-A matrix polynomial of degrees (a, b) in two variables x, s in [0, 1] is an array (a + 1, b + 1, n, m) of its
-Bernstein coefficients; one variable is b = 0. A polynomial lies in the convex hull of its coefficients, so definite
-coefficients mean a definite polynomial on the whole interval. Every function takes floats and exact rationals
-(NumPy object arrays) alike. Source: Farouki, "The Bernstein polynomial basis: a centennial retrospective" (2012).
+A matrix polynomial of degrees (a, b) in two variables x, s in [0, 1] is an array (a + 1, b + 1, n,
+m) of its Bernstein coefficients; one variable is b = 0. A polynomial lies in the convex hull of its
+coefficients, so definite coefficients mean a definite polynomial on the whole interval. Every
+function takes floats and exact rationals (NumPy object arrays) alike. Source: Farouki, "The
+Bernstein polynomial basis: a centennial retrospective" (2012).
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ Array = np.ndarray
 
 
 def blossom(arguments: Sequence[Any]) -> Array:
-    """Weights (d + 1,) of the Bernstein coefficients in the blossom at d local arguments (symmetric, affine in each).
+    """Weights (d + 1,) of the Bernstein coefficients in the blossom at d local arguments
+    (symmetric, affine in each).
 
     blossom(t, ..., t) gives the value at t; blossom(a, .., b, ..) the coefficients over [a, b].
     """
@@ -31,12 +34,15 @@ def blossom(arguments: Sequence[Any]) -> Array:
 
 
 def restriction(degree: int, a: Any, b: Any) -> Array:
-    """Matrix (d + 1, d + 1) from the coefficients over [0, 1] to those over [a, b] (local coordinates)."""
+    """Matrix (d + 1, d + 1) from the coefficients over [0, 1] to those over [a, b] (local
+    coordinates).
+    """
     return np.array([blossom([a] * (degree - k) + [b] * k) for k in range(degree + 1)])
 
 
 def composition(degree: int, corners: Sequence[Sequence[Any]]) -> Array:
-    """Array (d + 1, d + 1, d + 1): coefficients [i, k] in (x, s) of f(t(x, s)) from those of f, last axis.
+    """Array (d + 1, d + 1, d + 1): coefficients [i, k] in (x, s) of f(t(x, s)) from those of f,
+    last axis.
 
     t is bilinear with t = corners[e][f] (local coordinates of f) at x = e, s = f.
     """
@@ -46,13 +52,20 @@ def composition(degree: int, corners: Sequence[Sequence[Any]]) -> Array:
         out[i][k] = out[i][k] + blossom([corners[e][f] for e, f in choice])
     if degree == 0:
         return np.array(out)
-    return np.array([[out[i][k] / (comb(degree, i) * comb(degree, k)) for k in range(degree + 1)] for i in range(degree + 1)])
+    return np.array(
+        [
+            [out[i][k] / (comb(degree, i) * comb(degree, k)) for k in range(degree + 1)]
+            for i in range(degree + 1)
+        ]
+    )
 
 
 def binomials(degrees: Sequence[int]) -> Array:
     """C(a, i) C(b, k) as an array (a + 1, b + 1, 1, 1)."""
     a, b = degrees
-    return np.array([[comb(a, i) * comb(b, k) for k in range(b + 1)] for i in range(a + 1)], dtype=object)[:, :, None, None]
+    return np.array(
+        [[comb(a, i) * comb(b, k) for k in range(b + 1)] for i in range(a + 1)], dtype=object
+    )[:, :, None, None]
 
 
 def _weighted(F: Array) -> Array:
@@ -62,11 +75,15 @@ def _weighted(F: Array) -> Array:
 
 def _unweighted(F: Array) -> Array:
     weights = binomials((F.shape[0] - 1, F.shape[1] - 1))
-    return np.asarray(_exact_quotient(F, weights)) if F.dtype == object else F / weights.astype(float)
+    return (
+        np.asarray(_exact_quotient(F, weights)) if F.dtype == object else F / weights.astype(float)
+    )
 
 
 # the integer 0 of an empty sum must not become the float 0.0
-_exact_quotient = np.frompyfunc(lambda numerator, weight: numerator if numerator == 0 else numerator / weight, 2, 1)
+_exact_quotient = np.frompyfunc(
+    lambda numerator, weight: numerator if numerator == 0 else numerator / weight, 2, 1
+)
 
 
 def multiply(F: Array, G: Array) -> Array:

@@ -10,8 +10,8 @@ discrete time, P+ = P(p(k+1)), |p(k+1) - p(k)| <= rate dt:
     [A'P+A - P + C'C   A'P+B + C'D      ]
     [B'P+A + D'C       B'P+B + D'D - g I]  < 0.
 
-Source: Wu, Yang, Packard and Becker, "Induced L2-norm control for LPV systems with bounded parameter variation
-rates", Int. J. Robust and Nonlinear Control 6 (1996), theorem 3.1.
+Source: Wu, Yang, Packard and Becker, "Induced L2-norm control for LPV systems with bounded
+parameter variation rates", Int. J. Robust and Nonlinear Control 6 (1996), theorem 3.1.
 """
 
 from __future__ import annotations
@@ -31,10 +31,12 @@ Array = np.ndarray
 
 
 class Blocks(NamedTuple):
-    """LMI blocks F = sum_j linear[., j] P_columns[j] + constant - weight g diag(0, I), svec'd along the last axis.
+    """LMI blocks F = sum_j linear[., j] P_columns[j] + constant - weight g diag(0, I), svec'd along
+    the last axis.
 
-    `columns` (k,) says which coefficients of P are involved; `linear` (m, k, n (n + 1)/2, L), `constant` (m, L), of
-    matrices (N, N) with L = N (N + 1)/2; `weight` (m,) > 0. `likely`: expected to be among the binding ones.
+    `columns` (k,) says which coefficients of P are involved; `linear` (m, k, n (n + 1)/2, L),
+    `constant` (m, L), of matrices (N, N) with L = N (N + 1)/2; `weight` (m,) > 0. `likely`:
+    expected to be among the binding ones.
     """
 
     columns: Array
@@ -55,11 +57,17 @@ class Blocks(NamedTuple):
 
     def keep(self, which: Array) -> Blocks:
         """Only these of the m blocks."""
-        return self._replace(linear=self.linear[which], constant=self.constant[which], weight=self.weight[which])
+        return self._replace(
+            linear=self.linear[which], constant=self.constant[which], weight=self.weight[which]
+        )
 
 
-def continuous_blocks(cells: Sequence[Cell], knots: Array, degree: int, rate: float, extra: int) -> Iterator[Blocks]:
-    """The blocks of every cell for both signs of the rate; `extra` raises the degree of the Bernstein form."""
+def continuous_blocks(
+    cells: Sequence[Cell], knots: Array, degree: int, rate: float, extra: int
+) -> Iterator[Blocks]:
+    """The blocks of every cell for both signs of the rate; `extra` raises the degree of the
+    Bernstein form.
+    """
     for cell in cells:
         A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
         E = basis(A.shape[1])
@@ -79,11 +87,20 @@ def continuous_blocks(cells: Sequence[Cell], knots: Array, degree: int, rate: fl
         slope = elevation_matrix(len(slope) - 1, d) @ slope
         for nu in (-rate, rate) if rate > 0 else (0.0,):
             drift = nu * slope[:, :, None, None] * direct
-            yield Blocks(cell.segment * degree + np.arange(degree + 1), linear + drift, constant, np.ones(d + 1))
+            yield Blocks(
+                cell.segment * degree + np.arange(degree + 1),
+                linear + drift,
+                constant,
+                np.ones(d + 1),
+            )
 
 
-def discrete_blocks(strips: Sequence[Strip], knots: Array, degree: int, extra: int) -> Iterator[Blocks]:
-    """The blocks of every strip. Likely to bind: the border lines of the widest cell of each segment and piece."""
+def discrete_blocks(
+    strips: Sequence[Strip], knots: Array, degree: int, extra: int
+) -> Iterator[Blocks]:
+    """The blocks of every strip. Likely to bind: the border lines of the widest cell of each
+    segment and piece.
+    """
     widest: dict[tuple[int, float], float] = {}
     for cell in (strip.cell for strip in strips):
         place = (cell.segment, cell.piece.low)
@@ -109,7 +126,14 @@ def discrete_blocks(strips: Sequence[Strip], knots: Array, degree: int, extra: i
         up = elevation_matrix(degree + 2 * dM, d)
         now = here[:, :, None, None] * direct
         for k in range(degree + 1):
-            after_k = np.einsum("qm,mri,ij,rvl->qjvl", up, product_weights(2 * dM, degree), after[:, k], operator, optimize=True)
+            after_k = np.einsum(
+                "qm,mri,ij,rvl->qjvl",
+                up,
+                product_weights(2 * dM, degree),
+                after[:, k],
+                operator,
+                optimize=True,
+            )
             first = min(strip.next_segment, cell.segment)
             count = (abs(strip.next_segment - cell.segment) + 1) * degree + 1
             linear = np.zeros((len(after_k), count, *after_k.shape[2:]))
@@ -121,19 +145,31 @@ def discrete_blocks(strips: Sequence[Strip], knots: Array, degree: int, extra: i
 
 
 def assemble(
-    blocks: Sequence[Blocks], states: int, inputs: int, unknowns: int, margin: float, floor: float, null: Array | None = None
-) -> ConeProgram:  # fmt: skip
-    """minimise g subject to every block <= -margin diag(I, 0) and every coefficient of P >= floor I.
+    blocks: Sequence[Blocks],
+    states: int,
+    inputs: int,
+    unknowns: int,
+    margin: float,
+    floor: float,
+    null: Array | None = None,
+) -> ConeProgram:
+    """minimise g subject to every block <= -margin diag(I, 0) and every coefficient of P >= floor
+    I.
 
-    Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability. Both I are times the weight
-    of the block. `null` (s, L): symmetric matrices that may be added to each block, with weights of its own.
-    The unknowns: P, coefficient by coefficient; the weights of `null`, block by block; g or t.
+    Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability.
+    Both I are times the weight of the block. `null` (s, L): symmetric matrices that may be added to
+    each block, with weights of its own. The unknowns: P, coefficient by coefficient; the weights of
+    `null`, block by block; g or t.
     """
     N, nv = states + inputs, states * (states + 1) // 2
     of_P, of_block = unknowns * nv, 0 if null is None else len(null)
     eye, zero = np.eye(states), np.zeros((states, inputs))
     gain = -svec(np.block([[0 * eye, zero], [zero.T, np.eye(inputs)]])) if inputs else svec(eye)
-    back_off = margin * svec(np.block([[eye, zero], [zero.T, np.zeros((inputs, inputs))]])) if inputs else 0 * gain
+    back_off = (
+        margin * svec(np.block([[eye, zero], [zero.T, np.zeros((inputs, inputs))]]))
+        if inputs
+        else 0 * gain
+    )
     L = len(gain)
     weights = np.concatenate([block.weight for block in blocks])
     columns = of_P + of_block * len(weights) + 1
@@ -147,12 +183,17 @@ def assemble(
         index.append(where[0] + top)
         pointer.append(place[where[1]])
         top += m * L
-    lmi = sparse.coo_matrix((np.concatenate(data), (np.concatenate(index), np.concatenate(pointer))), shape=(top, of_P))
+    lmi = sparse.coo_matrix(
+        (np.concatenate(data), (np.concatenate(index), np.concatenate(pointer))), shape=(top, of_P)
+    )
     parts: list[Any] = [lmi]
     if null is not None:
         parts.append(sparse.kron(sparse.identity(len(weights)), sparse.csc_matrix(null.T)))
     A = [sparse.hstack([*parts, sparse.csc_matrix(np.outer(weights, gain).reshape(-1, 1))])]
-    b = [-np.concatenate([block.constant for block in blocks]).ravel() - np.outer(weights, back_off).ravel()]
+    b = [
+        -np.concatenate([block.constant for block in blocks]).ravel()
+        - np.outer(weights, back_off).ravel()
+    ]
     positive = sparse.hstack([-sparse.identity(of_P), sparse.csc_matrix((of_P, columns - of_P))])
     identities = np.tile(svec(eye), unknowns)
     for sign, bound in ((1, -floor),) if inputs else ((1, 0), (-1, 1)):
@@ -194,7 +235,13 @@ def slope_over(degree: int, here: Array, width: float) -> Array:
 def bordered(top: Array, side: Array) -> Array:
     """[top side; side' 0]."""
     corner = np.zeros((*side.shape[:-2], side.shape[-1], side.shape[-1]))
-    return np.concatenate([np.concatenate([top, side], axis=-1), np.concatenate([np.swapaxes(side, -1, -2), corner], axis=-1)], axis=-2)
+    return np.concatenate(
+        [
+            np.concatenate([top, side], axis=-1),
+            np.concatenate([np.swapaxes(side, -1, -2), corner], axis=-1),
+        ],
+        axis=-2,
+    )
 
 
 def output_terms(cell: Cell) -> Array:

@@ -30,7 +30,12 @@ class Budget:
 
     def tell(self, stage: str, *values: object) -> None:
         """Log a stage, with the time that is left."""
-        logger.info("search from below: " + stage + ", %.1f of %.3g s left", *values, self.left, self.seconds)
+        logger.info(
+            "search from below: " + stage + ", %.1f of %.3g s left",
+            *values,
+            self.left,
+            self.seconds,
+        )
 
 
 UNLIMITED = Budget()
@@ -41,4 +46,9 @@ def said(seconds: float | None, spent: float) -> tuple[str, ...]:
     if seconds is None:
         return ("no trajectory was looked for: what no proof can beat is the worst frozen model",)
     ended = ", which ended the search" if spent >= seconds else ""
-    return (f"bad trajectories were looked for during at most {seconds:g} s{ended}: the bound they give can only become sharper",)
+    return (
+        (
+            f"bad trajectories were looked for during at most {seconds:g} s{ended}: the bound they"
+            " give can only become sharper"
+        ),
+    )

@@ -12,7 +12,9 @@ from synthesis.verify import Evidence
 
 
 class Attempt(NamedTuple):
-    """One try: segments and degree of P, its margin, the solver's word, and the bound verified from it (inf: none)."""
+    """One try: segments and degree of P, its margin, the solver's word, and the bound verified from
+    it (inf: none).
+    """
 
     segments: int
     degree: int
@@ -21,12 +23,16 @@ class Attempt(NamedTuple):
     gamma: float
 
     def __str__(self) -> str:
-        return f"{self.segments} segments of degree {self.degree}, margin {self.margin:.0e}: {self.answer}"
+        return (
+            f"{self.segments} segments of degree {self.degree}, margin {self.margin:.0e}:"
+            f" {self.answer}"
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Certificate(Verdict):
-    """A bound on an LPV model in one parameter, "l2 gain" or "stability", with its proof and its hypotheses.
+    """A bound on an LPV model in one parameter, "l2 gain" or "stability", with its proof and its
+    hypotheses.
 
     lyapunov    V = x' P(p) x, None where there is none
     unit        of p
@@ -44,7 +50,13 @@ class Certificate(Verdict):
     @property
     def _setting(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"
-        limit = "arbitrarily fast" if math.isinf(self.rate) else "frozen" if self.rate == 0 else f"at most {self.rate:g}{unit} per second"
+        limit = (
+            "arbitrarily fast"
+            if math.isinf(self.rate)
+            else "frozen"
+            if self.rate == 0
+            else f"at most {self.rate:g}{unit} per second"
+        )
         return f"p {limit}"
 
     @property

@@ -1,7 +1,8 @@
 """What a proof asserts, as polynomials with Bernstein coefficients in any arithmetic.
 
-The inequalities are written out here once more, but what they are written on is shared with the assembly of the cone program: the
-pieces of the model, cells and strips, restriction and composition by blossoms. An error there both would believe; `pointwise` would not.
+The inequalities are written out here once more, but what they are written on is shared with the
+assembly of the cone program: the pieces of the model, cells and strips, restriction and composition
+by blossoms. An error there both would believe; `pointwise` would not.
 """
 
 from __future__ import annotations
@@ -24,16 +25,20 @@ Number = Callable[[float], Any]
 
 
 class Form(NamedTuple):
-    """Bernstein coefficients (a + 1, b + 1, N, N) of a block with g = 0, and those of the positive weight of g, (a + 1, b + 1)."""
+    """Bernstein coefficients (a + 1, b + 1, N, N) of a block with g = 0, and those of the positive
+    weight of g, (a + 1, b + 1).
+    """
 
     block: Array
     weight: Array
 
 
 class Claim(NamedTuple):
-    """What is to be verified: the pieces of the model, P, the rate (units of p per second) and dt (s, None: continuous).
+    """What is to be verified: the pieces of the model, P, the rate (units of p per second) and dt
+    (s, None: continuous).
 
-    `elevation` raises the degree of the Bernstein forms, which brings their coefficients closer to the values.
+    `elevation` raises the degree of the Bernstein forms, which brings their coefficients closer to
+    the values.
     """
 
     pieces: tuple[ModelPiece, ...]
@@ -44,13 +49,17 @@ class Claim(NamedTuple):
 
     @property
     def meaningful(self) -> bool:
-        """False where a P that varies meets a p that may jump in continuous time: dV/dt has no bound then.
+        """False where a P that varies meets a p that may jump in continuous time: dV/dt has no
+        bound then.
 
-        False also where this form of V is not written for the model: a memory or a higher order in discrete time or with channels.
+        False also where this form of V is not written for the model: a memory or a higher order in
+        discrete time or with channels.
         """
         if isinstance(self.P, MemoryLyapunov):
             return self.dt is None and math.isfinite(self.rate)
-        if self.P.order > 1 and (self.dt is not None or any(piece.B.shape[2] or len(piece.C[0]) for piece in self.pieces)):
+        if self.P.order > 1 and (
+            self.dt is not None or any(piece.B.shape[2] or len(piece.C[0]) for piece in self.pieces)
+        ):
             return False
         return self.dt is not None or self.P.degree == 0 or math.isfinite(self.rate)
 
@@ -60,16 +69,25 @@ class Claim(NamedTuple):
 
 
 def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
-    """Every block over the whole range, with g = 0. `number` turns a double into the arithmetic of the proof."""
+    """Every block over the whole range, with g = 0. `number` turns a double into the arithmetic of
+    the proof.
+    """
     P, used = claim.P, 0
-    slack = None if P.slack is None else null_matrix(_exact(P.slack, number), claim.pieces[0].A.shape[1], P.order)
+    slack = (
+        None
+        if P.slack is None
+        else null_matrix(_exact(P.slack, number), claim.pieces[0].A.shape[1], P.order)
+    )
     for block, weight in _polynomials(claim, number):
         degrees = (block.shape[0] - 1 + claim.elevation, block.shape[1] - 1)
         block = elevate(block, degrees)
         if slack is not None:
             own = slack[used : used + len(block)]
             # where P carries too little of it the blocks stand as they are
-            block, used = np.concatenate([block[: len(own)] + own[:, None], block[len(own) :]]), used + len(own)
+            block, used = (
+                np.concatenate([block[: len(own)] + own[:, None], block[len(own) :]]),
+                used + len(own),
+            )
         yield Form(block, elevate(weight[..., None, None], degrees)[..., 0, 0])
 
 
@@ -94,7 +112,10 @@ def _continuous(cell: Cell, P: SplineLyapunov, rate: float, number: Number) -> I
     a, b, width = _local(cell.low, cell.high, P.knots, cell.segment, number)
     Pc = _apply(restriction(P.degree, a, b), _exact(P.segment(cell.segment), number))[:, None]
     still = multiply(transpose(A), Pc)
-    still, side = [still, transpose(still), multiply(transpose(C), C)], [multiply(Pc, B), multiply(transpose(C), D)]
+    still, side = (
+        [still, transpose(still), multiply(transpose(C), C)],
+        [multiply(Pc, B), multiply(transpose(C), D)],
+    )
     corner = [multiply(transpose(D), D)]
     if P.degree == 0 or rate == 0:
         yield _stack(still, side, corner)
@@ -104,18 +125,29 @@ def _continuous(cell: Cell, P: SplineLyapunov, rate: float, number: Number) -> I
         yield _stack([*still, nu * slope], side, corner)
 
 
-def _remembering(cell: Cell, P: MemoryLyapunov, rate: float, number: Number) -> Iterator[tuple[Array, Array]]:
-    """Blocks times height(p) = upper - lower, in (x, y): along the cell, and across one segment of the lead."""
+def _remembering(
+    cell: Cell, P: MemoryLyapunov, rate: float, number: Number
+) -> Iterator[tuple[Array, Array]]:
+    """Blocks times height(p) = upper - lower, in (x, y): along the cell, and across one segment of
+    the lead.
+    """
     A, B, C, D = _model(cell, number, 1)
     a, b, width = _local(cell.low, cell.high, P.knots, cell.segment, number)
     j, region = cell.segment, P.region
     low, high = (
-        [number(float(v[j])) + t * (number(float(v[j + 1])) - number(float(v[j]))) for t in (a, b)] for v in (region.lower, region.upper)
+        [number(float(v[j])) + t * (number(float(v[j + 1])) - number(float(v[j]))) for t in (a, b)]
+        for v in (region.lower, region.upper)
     )
-    lower, height = np.array(low)[:, None], np.array([u - v for u, v in zip(high, low, strict=True)])[:, None]
+    lower, height = (
+        np.array(low)[:, None],
+        np.array([u - v for u, v in zip(high, low, strict=True)])[:, None],
+    )
     span = (b - a) * width
     rise, widening = (low[1] - low[0]) / span, (height[1, 0] - height[0, 0]) / span
-    outer = [_scaled(height, F) for F in (multiply(transpose(C), C), multiply(transpose(C), D), multiply(transpose(D), D))]
+    outer = [
+        _scaled(height, F)
+        for F in (multiply(transpose(C), C), multiply(transpose(C), D), multiply(transpose(D), D))
+    ]
     for i, ends in enumerate(pairwise(P.lead_knots)):
         share = np.array([[number(float(s)) for s in ends]])
         patch = _exact(P.patch(j, i), number)
@@ -137,7 +169,10 @@ def _discrete(strip: Strip, P: SplineLyapunov, number: Number) -> Array:
     A, B, C, D = _model(cell, number, 1)
     a, b, _ = _local(cell.low, cell.high, P.knots, cell.segment, number)
     now = _apply(restriction(P.degree, a, b), _exact(P.segment(cell.segment), number))[:, None]
-    bottom, top = number(float(P.knots[strip.next_segment])), number(float(P.knots[strip.next_segment + 1]))
+    bottom, top = (
+        number(float(P.knots[strip.next_segment])),
+        number(float(P.knots[strip.next_segment + 1])),
+    )
     corners = [[(number(q) - bottom) / (top - bottom) for q in pair] for pair in strip.corners]
     after = _apply(composition(P.degree, corners), _exact(P.segment(strip.next_segment), number))
     left_A, left_B = multiply(transpose(A), after), multiply(transpose(B), after)
@@ -152,11 +187,16 @@ def _model(cell: Cell, number: Number, order: int) -> list[Array]:
     """A, B, C, D over the cell; for `order` > 1 the generator of the monomials, and no channels."""
     low, high = number(cell.piece.low), number(cell.piece.high)
     a, b = (number(cell.low) - low) / (high - low), (number(cell.high) - low) / (high - low)
-    coefficients = [_exact(M, number) for M in (cell.piece.A, cell.piece.B, cell.piece.C, cell.piece.D)]
+    coefficients = [
+        _exact(M, number) for M in (cell.piece.A, cell.piece.B, cell.piece.C, cell.piece.D)
+    ]
     if order > 1:
         coefficients[0] = generator(coefficients[0], order)
         N = coefficients[0].shape[1]
-        coefficients[1:3] = [np.zeros((1, N, 0), dtype=coefficients[0].dtype), np.zeros((1, 0, N), dtype=coefficients[0].dtype)]
+        coefficients[1:3] = [
+            np.zeros((1, N, 0), dtype=coefficients[0].dtype),
+            np.zeros((1, 0, N), dtype=coefficients[0].dtype),
+        ]
     return [_apply(restriction(len(M) - 1, a, b), M)[:, None] for M in coefficients]
 
 
@@ -166,15 +206,23 @@ def _exact(values: Array, number: Number) -> Array:
     return np.asarray(np.frompyfunc(number, 1, 1)(np.asarray(values, dtype=float)), dtype=object)
 
 
-def _local(low: float, high: float, knots: Array, segment: int, number: Number) -> tuple[Any, Any, Any]:
+def _local(
+    low: float, high: float, knots: Array, segment: int, number: Number
+) -> tuple[Any, Any, Any]:
     bottom, top = number(float(knots[segment])), number(float(knots[segment + 1]))
-    return (number(low) - bottom) / (top - bottom), (number(high) - bottom) / (top - bottom), top - bottom
+    return (
+        (number(low) - bottom) / (top - bottom),
+        (number(high) - bottom) / (top - bottom),
+        top - bottom,
+    )
 
 
 def _apply(weights: Array, coefficients: Array) -> Array:
     """sum_j weights[..., j] coefficients[j], in any arithmetic."""
     flat = coefficients.reshape(len(coefficients), -1)
-    return (weights.reshape(-1, weights.shape[-1]) @ flat).reshape(*weights.shape[:-1], *coefficients.shape[1:])
+    return (weights.reshape(-1, weights.shape[-1]) @ flat).reshape(
+        *weights.shape[:-1], *coefficients.shape[1:]
+    )
 
 
 def _scaled(f: Array, F: Array) -> Array:
@@ -185,7 +233,10 @@ def _scaled(f: Array, F: Array) -> Array:
 def _stack(top: list[Array], side: list[Array], corner: list[Array]) -> Array:
     every = [*top, *side, *corner]
     degrees = (max(F.shape[0] for F in every) - 1, max(F.shape[1] for F in every) - 1)
-    sums = [sum((elevate(F, degrees) for F in part[1:]), elevate(part[0], degrees)) for part in (top, side, corner)]
+    sums = [
+        sum((elevate(F, degrees) for F in part[1:]), elevate(part[0], degrees))
+        for part in (top, side, corner)
+    ]
     upper = np.concatenate([sums[0], sums[1]], axis=-1)
     lower = np.concatenate([transpose(sums[1]), sums[2]], axis=-1)
     return np.concatenate([upper, lower], axis=-2)

@@ -1,10 +1,11 @@
 """Semidefinite programs in conic form, and the solvers that take them.
 
-    minimise c' x  subject to  b - A x in a product of positive semidefinite cones (vectors as in `symmetric`), after some
-    rows, where asked for, that are zero.
+    minimise c' x  subject to  b - A x in a product of positive semidefinite cones
 
-Clarabel and SCS are called directly; CVXOPT, MOSEK, SDPA and COPT, where installed, through cvxpy. Whatever a solver
-answers is a candidate: nothing is believed before it is verified.
+(vectors as in `symmetric`), after some rows, where asked for, that are zero.
+
+Clarabel and SCS are called directly; CVXOPT, MOSEK, SDPA and COPT, where installed, through cvxpy.
+Whatever a solver answers is a candidate: nothing is believed before it is verified.
 """
 
 from __future__ import annotations
@@ -44,10 +45,12 @@ class Answer(Enum):
 class Solver:
     """Which solver, and when it stops.
 
-    `name` as cvxpy spells it; `tolerance` on residuals and gap (relative); `iterations` at most; `time_limit` in s. What is
-    None is set to what suits the solver: 1e-8, 200 and 600 s; SCS, a first-order method, 1e-5 and 20000, since the gain is
-    recomputed from P afterwards and more digits cost minutes; no time limit for CVXOPT and SDPA, which have no option for one.
-    Raises `InputError` for a setting out of range or without an option, `SolverError` for a solver that is not installed.
+    `name` as cvxpy spells it; `tolerance` on residuals and gap (relative); `iterations` at most;
+    `time_limit` in s. What is None is set to what suits the solver: 1e-8, 200 and 600 s; SCS, a
+    first-order method, 1e-5 and 20000, since the gain is recomputed from P afterwards and more
+    digits cost minutes; no time limit for CVXOPT and SDPA, which have no option for one. Raises
+    `InputError` for a setting out of range or without an option, `SolverError` for a solver that is
+    not installed.
     """
 
     name: str = "CLARABEL"
@@ -58,21 +61,34 @@ class Solver:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(self.name).upper())
         if self.name not in installed_solvers():
-            raise SolverError(f"solver {self.name!r} is not available; installed here: {', '.join(installed_solvers())}")
+            raise SolverError(
+                f"solver {self.name!r} is not available; installed here:"
+                f" {', '.join(installed_solvers())}"
+            )
         for setting, usual in _USUAL.items():
             given = getattr(self, setting)
             if given is None:
                 usual = _FIRST_ORDER.get(setting, usual) if self.name == "SCS" else usual
                 object.__setattr__(self, setting, usual if setting in _OPTIONS[self.name] else None)
             elif setting not in _OPTIONS[self.name]:
-                raise InputError(f"{self.name} has no option for {setting}, got {given}; leave it None or take another solver")
+                raise InputError(
+                    f"{self.name} has no option for {setting}, got {given}; leave it None or take"
+                    " another solver"
+                )
             elif not 0 < given < (1 if setting == "tolerance" else math.inf):
-                raise InputError(f"expected 0 < tolerance < 1, iterations >= 1 and time_limit > 0 s, got {setting} = {given}")
+                raise InputError(
+                    "expected 0 < tolerance < 1, iterations >= 1 and time_limit > 0 s, got"
+                    f" {setting} = {given}"
+                )
 
     @property
     def options(self) -> dict[str, Any]:
         """The settings in the solver's own words, as they are handed to it."""
-        return {option: getattr(self, setting) for setting, options in _OPTIONS[self.name].items() for option in options}
+        return {
+            option: getattr(self, setting)
+            for setting, options in _OPTIONS[self.name].items()
+            for option in options
+        }
 
     @property
     def version(self) -> str:
@@ -81,28 +97,56 @@ class Solver:
 
     def __str__(self) -> str:
         limit = "no time limit" if self.time_limit is None else f"{self.time_limit:g} s"
-        return f"{self.name} {self.version}, tolerance {self.tolerance:g}, at most {self.iterations} iterations, {limit}"
+        return (
+            f"{self.name} {self.version}, tolerance {self.tolerance:g}, at most {self.iterations}"
+            f" iterations, {limit}"
+        )
 
 
-_PACKAGES = {"CLARABEL": "clarabel", "SCS": "scs", "CVXOPT": "cvxopt", "MOSEK": "mosek", "SDPA": "sdpa-python", "COPT": "coptpy"}
+_PACKAGES = {
+    "CLARABEL": "clarabel",
+    "SCS": "scs",
+    "CVXOPT": "cvxopt",
+    "MOSEK": "mosek",
+    "SDPA": "sdpa-python",
+    "COPT": "coptpy",
+}
 
 
 _USUAL: dict[str, Any] = {"tolerance": 1e-8, "iterations": 200, "time_limit": 600.0}
 _FIRST_ORDER: dict[str, Any] = {"tolerance": 1e-5, "iterations": 20000}
 
 _OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
-    "CLARABEL": {"tolerance": ("tol_gap_abs", "tol_gap_rel", "tol_feas"), "iterations": ("max_iter",), "time_limit": ("time_limit",)},
-    "SCS": {"tolerance": ("eps_abs", "eps_rel"), "iterations": ("max_iters",), "time_limit": ("time_limit_secs",)},
+    "CLARABEL": {
+        "tolerance": ("tol_gap_abs", "tol_gap_rel", "tol_feas"),
+        "iterations": ("max_iter",),
+        "time_limit": ("time_limit",),
+    },
+    "SCS": {
+        "tolerance": ("eps_abs", "eps_rel"),
+        "iterations": ("max_iters",),
+        "time_limit": ("time_limit_secs",),
+    },
     "CVXOPT": {"tolerance": ("abstol", "reltol", "feastol"), "iterations": ("max_iters",)},
     "MOSEK": {
-        "tolerance": ("MSK_DPAR_INTPNT_CO_TOL_REL_GAP", "MSK_DPAR_INTPNT_CO_TOL_PFEAS", "MSK_DPAR_INTPNT_CO_TOL_DFEAS"),
+        "tolerance": (
+            "MSK_DPAR_INTPNT_CO_TOL_REL_GAP",
+            "MSK_DPAR_INTPNT_CO_TOL_PFEAS",
+            "MSK_DPAR_INTPNT_CO_TOL_DFEAS",
+        ),
         "iterations": ("MSK_IPAR_INTPNT_MAX_ITERATIONS",),
         "time_limit": ("MSK_DPAR_OPTIMIZER_MAX_TIME",),
     },
     "SDPA": {"tolerance": ("epsilonStar", "epsilonDash"), "iterations": ("maxIteration",)},
-    "COPT": {"tolerance": ("RelGap", "FeasTol", "DualTol"), "iterations": ("BarIterLimit",), "time_limit": ("TimeLimit",)},
+    "COPT": {
+        "tolerance": ("RelGap", "FeasTol", "DualTol"),
+        "iterations": ("BarIterLimit",),
+        "time_limit": ("TimeLimit",),
+    },
 }
-"""What each solver calls tolerance, iterations and time limit; a setting that is missing has no option."""
+"""What each solver calls tolerance, iterations and time limit; a setting that is missing has no
+option.
+"""
 
 
 def installed_solvers() -> tuple[str, ...]:
@@ -120,7 +164,9 @@ def installed_solvers() -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class ConeProgram:
-    """minimise c' x subject to b - A x in the product of semidefinite cones of `sizes`; the first `equalities` rows are zero."""
+    """minimise c' x subject to b - A x in the product of semidefinite cones of `sizes`; the first
+    `equalities` rows are zero.
+    """
 
     c: Array
     A: sparse.csc_matrix
@@ -131,7 +177,9 @@ class ConeProgram:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A solver's answer and point `x`, None where it gave none; `seconds` of solving, `message` in the solver's words."""
+    """A solver's answer and point `x`, None where it gave none; `seconds` of solving, `message` in
+    the solver's words.
+    """
 
     answer: Answer
     x: Array | None
@@ -141,7 +189,10 @@ class Candidate:
 
 def solve(program: ConeProgram, solver: Solver) -> Candidate:
     """The solver's candidate. Never raises for a failed solve: that is an answer."""
-    method: Callable[[ConeProgram, Solver], tuple[Answer, Any, str]] = {"CLARABEL": _clarabel, "SCS": _scs}.get(solver.name, _cvxpy)
+    method: Callable[[ConeProgram, Solver], tuple[Answer, Any, str]] = {
+        "CLARABEL": _clarabel,
+        "SCS": _scs,
+    }.get(solver.name, _cvxpy)
     start = time.perf_counter()
     answer, x, message = _interruptible(method, program, solver)
     x = None if x is None else np.asarray(x, dtype=float)
@@ -151,11 +202,17 @@ def solve(program: ConeProgram, solver: Solver) -> Candidate:
 
 
 SHORT = 3e8
-"""Operations of an iteration that takes some tenths of a second: Clarabel and SCS can be interrupted between two."""
+"""Operations of an iteration that takes some tenths of a second: Clarabel and SCS can be
+interrupted between two.
+"""
 
 
-def _interruptible(method: Callable[[ConeProgram, Solver], Any], program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
-    """Here where the solver looks up often enough, else in a process that an interrupt can end: starting it takes half a second."""
+def _interruptible(
+    method: Callable[[ConeProgram, Solver], Any], program: ConeProgram, solver: Solver
+) -> tuple[Answer, Any, str]:
+    """Here where the solver looks up often enough, else in a process that an interrupt can end:
+    starting it takes half a second.
+    """
     operations = (sum(length(n) ** 3 for n in program.sizes) + len(program.c) ** 3) / 3
     if method is not _cvxpy and operations < SHORT:
         return method(program, solver)
@@ -166,18 +223,29 @@ def _interruptible(method: Callable[[ConeProgram, Solver], Any], program: ConePr
 
 
 MEMORY = 4e9
-"""Bytes beyond which a program is left alone by an interior-point method: the operating system would end the process."""
+"""Bytes beyond which a program is left alone by an interior-point method: the operating system
+would end the process.
+"""
 
 
 def _bytes(program: ConeProgram) -> float:
-    """What the scaling matrices of the cones take, in an interior-point method; their factors take a few times as much."""
+    """What the scaling matrices of the cones take, in an interior-point method; their factors take
+    a few times as much.
+    """
     return 8.0 * sum(length(n) ** 2 for n in program.sizes)
 
 
 def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     if _bytes(program) > MEMORY / 4:
-        words = f"not tried: cones of size {max(program.sizes)} would need several times {_bytes(program) / 1e9:.2g} GB"
-        return Answer.UNTRIED, None, f"{words}; a lower degree, fewer segments, Bernstein coefficients or SCS need less"
+        words = (
+            f"not tried: cones of size {max(program.sizes)} would need several times"
+            f" {_bytes(program) / 1e9:.2g} GB"
+        )
+        return (
+            Answer.UNTRIED,
+            None,
+            f"{words}; a lower degree, fewer segments, Bernstein coefficients or SCS need less",
+        )
     clarabel: Any = importlib.import_module("clarabel")  # its stubs hide the classes
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -188,7 +256,9 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     n = len(program.c)
 
     def work(stop: Event) -> Any:
-        engine = clarabel.DefaultSolver(sparse.csc_matrix((n, n)), program.c, program.A, program.b, cones, settings)
+        engine = clarabel.DefaultSolver(
+            sparse.csc_matrix((n, n)), program.c, program.A, program.b, cones, settings
+        )
         engine.set_termination_callback(lambda _: stop.is_set())
         return engine.solve()
 
@@ -203,12 +273,15 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
 def _scs(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     import scs
 
-    # the same vectors: SCS stacks the lower triangle by columns, which is the upper one by rows; reorder
+    # the same vectors: SCS stacks the lower triangle by columns, which is the upper one by rows;
+    # reorder
     starts = program.equalities + np.cumsum([0, *(length(n) for n in program.sizes)])
     blocks = [_scs_order(n) + start for n, start in zip(program.sizes, starts[:-1], strict=True)]
     order = np.concatenate([np.arange(program.equalities), *blocks])
     data = {"A": program.A.tocsr()[order].tocsc(), "b": program.b[order], "c": program.c}
-    engine = scs.SCS(data, {"z": program.equalities, "s": list(program.sizes)}, verbose=False, **solver.options)
+    engine = scs.SCS(
+        data, {"z": program.equalities, "s": list(program.sizes)}, verbose=False, **solver.options
+    )
     solution = engine.solve()
     word = str(solution["info"]["status"])
     if word == "interrupted":  # SCS hears the keyboard itself
@@ -237,14 +310,23 @@ def _cvxpy(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
     for n, group in groupby(program.sizes):
         expand = basis(n).reshape(length(n), n * n).T
         for _ in group:
-            constraints.append(cp.reshape(expand @ s[start : start + length(n)], (n, n), order="C") >> 0)
+            constraints.append(
+                cp.reshape(expand @ s[start : start + length(n)], (n, n), order="C") >> 0
+            )
             start += length(n)
     problem = cp.Problem(cp.Minimize(program.c @ x), constraints)
     try:
         # cvxpy hands MOSEK's parameters on under a name of their own
-        problem.solve(solver=solver.name, **({"mosek_params": solver.options} if solver.name == "MOSEK" else solver.options))
+        problem.solve(
+            solver=solver.name,
+            **({"mosek_params": solver.options} if solver.name == "MOSEK" else solver.options),
+        )
     except CvxpyError as error:
         return Answer.FAILED, None, str(error)
     if problem.status in ("infeasible", "infeasible_inaccurate"):
         return Answer.INFEASIBLE, None, problem.status
-    return (Answer.SOLVED if problem.status == "optimal" else Answer.FAILED), x.value, str(problem.status)
+    return (
+        (Answer.SOLVED if problem.status == "optimal" else Answer.FAILED),
+        x.value,
+        str(problem.status),
+    )

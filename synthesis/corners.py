@@ -1,9 +1,11 @@
-"""The worst trapezoids: ascent on the levels at which p rests and the times it stays there, corners where they are.
+"""The worst trapezoids: ascent on the levels at which p rests and the times it stays there, corners
+where they are.
 
-Between two levels p moves as fast as it may, or jumps. An ascent on equal nodes (`ascent`) finds any shape but blurs a jump, or a
-steep ramp in a long cycle, over one interval; here every corner is exact. With jumps the gradient by the length of a rest is the
-Hamiltonian w' A x of Pontryagin's principle, constant along the rest. Source: Margaliot, "Stability analysis of switched systems
-using variational principles: an introduction", Automatica 42 (2006).
+Between two levels p moves as fast as it may, or jumps. An ascent on equal nodes (`ascent`) finds
+any shape but blurs a jump, or a steep ramp in a long cycle, over one interval; here every corner is
+exact. With jumps the gradient by the length of a rest is the Hamiltonian w' A x of Pontryagin's
+principle, constant along the rest. Source: Margaliot, "Stability analysis of switched systems using
+variational principles: an introduction", Automatica 42 (2006).
 """
 
 from __future__ import annotations
@@ -41,11 +43,16 @@ class Corners(NamedTuple):
         """Time from each level to the next, s (k,)."""
         if math.isinf(rate):
             return np.zeros(len(self.levels))
-        # equal levels are joined by a ramp too, of next to no time, so that the number of steps never changes
-        return np.maximum(np.abs(np.roll(self.levels, -1) - self.levels) / rate, 1e-9 * self.rests.sum())
+        # equal levels are joined by a ramp too, of next to no time, so that the number of steps
+        # never changes
+        return np.maximum(
+            np.abs(np.roll(self.levels, -1) - self.levels) / rate, 1e-9 * self.rests.sum()
+        )
 
     def twice(self) -> Corners:
-        """Two cycles in one, the second unlike the first: by symmetry equal ones would stay equal."""
+        """Two cycles in one, the second unlike the first: by symmetry equal ones would stay
+        equal.
+        """
         uneven = np.repeat([1.2, 0.8], len(self.rests))
         return Corners(np.tile(self.levels, 2), np.tile(self.rests, 2) * uneven)
 
@@ -57,7 +64,9 @@ class Corners(NamedTuple):
 
 
 class _Path(NamedTuple):
-    """A model along corners in a fixed number of steps for every rest and ramp (2 k,), of which some last no time."""
+    """A model along corners in a fixed number of steps for every rest and ramp (2 k,), of which
+    some last no time.
+    """
 
     lpv: Scheduled
     rate: float
@@ -76,15 +85,29 @@ class _Path(NamedTuple):
 
     def steps(self, corners: Corners) -> Steps:
         time, p = corners.cycle(self.rate)
-        inner = [t0 + (t1 - t0) * np.arange(n) / n for t0, t1, n in zip(time[:-1], time[1:], self.counts, strict=True)]
-        values = [p0 + (p1 - p0) * np.arange(n) / n for p0, p1, n in zip(p[:-1], p[1:], self.counts, strict=True)]
-        return steps(self.lpv, np.append(np.concatenate(inner), time[-1]), np.append(np.concatenate(values), p[-1]), float(time[-1]))
+        inner = [
+            t0 + (t1 - t0) * np.arange(n) / n
+            for t0, t1, n in zip(time[:-1], time[1:], self.counts, strict=True)
+        ]
+        values = [
+            p0 + (p1 - p0) * np.arange(n) / n
+            for p0, p1, n in zip(p[:-1], p[1:], self.counts, strict=True)
+        ]
+        return steps(
+            self.lpv,
+            np.append(np.concatenate(inner), time[-1]),
+            np.append(np.concatenate(values), p[-1]),
+            float(time[-1]),
+        )
 
 
-def gradient(lpv: Scheduled, corners: Corners, rate: float, objective: Objective, longest: float) -> tuple[float, Array, Array]:
+def gradient(
+    lpv: Scheduled, corners: Corners, rate: float, objective: Objective, longest: float
+) -> tuple[float, Array, Array]:
     """(score, its gradient by the rests (k,) and by the levels (k,)); `longest` step in s.
 
-    All rests are stretched at once, then every second level is moved: each step feels one of them alone.
+    All rests are stretched at once, then every second level is moved: each step feels one of them
+    alone.
     """
     k, s = len(corners.levels), lpv.scheduling
     path = _Path.along(lpv, corners, rate, longest)
@@ -100,7 +123,9 @@ def gradient(lpv: Scheduled, corners: Corners, rate: float, objective: Objective
         difference = found.along(path.steps(other).step - system.step)
         return np.bincount(part, difference, 2 * k)
 
-    of_rests = change(corners._replace(rests=corners.rests * (1 + SHIFT)))[::2] / (SHIFT * corners.rests)
+    of_rests = change(corners._replace(rests=corners.rests * (1 + SHIFT)))[::2] / (
+        SHIFT * corners.rests
+    )
     of_levels, longer = np.zeros(k), np.zeros(k)
     for parity in (0, 1):
         moved = np.arange(k) % 2 == parity
@@ -117,10 +142,17 @@ def gradient(lpv: Scheduled, corners: Corners, rate: float, objective: Objective
 
 
 def climb(
-    lpv: Scheduled, rate: float, start: Corners, objective: Objective, longest: float, period: float, evaluations: int,
+    lpv: Scheduled,
+    rate: float,
+    start: Corners,
+    objective: Objective,
+    longest: float,
+    period: float,
+    evaluations: int,
     budget: Budget = UNLIMITED,
-) -> Corners:  # fmt: skip
-    """The best corners an ascent from `start` meets, in steps of at most `longest` s and cycles of about `period` s at most.
+) -> Corners:
+    """The best corners an ascent from `start` meets, in steps of at most `longest` s and cycles of
+    about `period` s at most.
 
     It ends at once where the measure is infinite. Continuous time.
     """
@@ -145,9 +177,9 @@ def climb(
     at = np.concatenate([(start.levels - s.middle) / s.radius, start.rests / unit])
     # as far from the middle of the start as a cycle has time for
     middle, swing = 0.5 * (start.levels.min() + start.levels.max()), 0.5 * rate * period / k
-    bounds = [tuple(np.clip((middle + np.array([-swing, swing]) - s.middle) / s.radius, -1.0, 1.0))] * k + [
-        (least / unit, 2 * room / unit)
-    ] * k
+    bounds = [
+        tuple(np.clip((middle + np.array([-swing, swing]) - s.middle) / s.radius, -1.0, 1.0))
+    ] * k + [(least / unit, 2 * room / unit)] * k
     options: Any = {"maxfun": evaluations, "maxiter": evaluations}
     try:
         minimize(cost, at, jac=True, method="L-BFGS-B", bounds=bounds, options=options)

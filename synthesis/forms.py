@@ -1,4 +1,6 @@
-"""The forms of V that a proof can take: what is unknown in each, its LMI blocks, and the V they lead to."""
+"""The forms of V that a proof can take: what is unknown in each, its LMI blocks, and the V they
+lead to.
+"""
 
 from __future__ import annotations
 
@@ -32,22 +34,24 @@ KINDS = ("bernstein", "sos", "vertices", "grid")
 class Relaxation:
     """The form of P(p) and of the LMIs.
 
-    `kind` is how an LMI is imposed for every p: "bernstein", "sos" (sums of squares), "vertices" or "grid" (proves nothing);
-    docs/relaxations.md says what each promises.
+    `kind` is how an LMI is imposed for every p: "bernstein", "sos" (sums of squares), "vertices" or
+    "grid" (proves nothing); docs/relaxations.md says what each promises.
 
-    P is a continuous spline of `degree` (None: 3 in continuous, 2 in discrete time) on K segments, K from `segments`
-    (None: 16, 32 in continuous, 8, 16 in discrete time) in turn until the bound is proven and gamma <= `accept` times the
-    lower bound. Knots low + (high - low)(k/K)^`grading`. A constant P has no knots, but its LMIs are cut there (None: 8).
-    `elevation` raises the Bernstein degree of the LMIs, or that of the sums of squares; `subdivision` halves every range that
-    often before the Bernstein coefficients are taken; `points` a parameter in every region for the grid.
-    Several parameters: degree None is 2 in continuous and 1 in discrete time, segments (1,), `total_degree` limits the sum
-    of the degrees. `margins`: state blocks are held below -margin I in scaled
-    coordinates, tried in turn. `floor`: P >= floor I.
+    P is a continuous spline of `degree` (None: 3 in continuous, 2 in discrete time) on K segments,
+    K from `segments` (None: 16, 32 in continuous, 8, 16 in discrete time) in turn until the bound
+    is proven and gamma <= `accept` times the lower bound. Knots low + (high - low)(k/K)^`grading`.
+    A constant P has no knots, but its LMIs are cut there (None: 8). `elevation` raises the
+    Bernstein degree of the LMIs, or that of the sums of squares; `subdivision` halves every range
+    that often before the Bernstein coefficients are taken; `points` a parameter in every region for
+    the grid. Several parameters: degree None is 2 in continuous and 1 in discrete time, segments
+    (1,), `total_degree` limits the sum of the degrees. `margins`: state blocks are held below
+    -margin I in scaled coordinates, tried in turn. `floor`: P >= floor I.
 
-    `order` m > 1: V of degree 2m in the states, for `stability` in continuous time; costs grow with the sixth power of
-    the number of monomials of degree m. `memory`: V = x' P(p, p - q) x with q the lag of p of so many seconds (about the
-    time in which the worst p turns round), in continuous time; across, P has `memory_degree` on `memory_segments` segments.
-    Either way P has the degree and segments above in p (None: 2 on 4, then 8 with an order; 3 on 12 with a memory).
+    `order` m > 1: V of degree 2m in the states, for `stability` in continuous time; costs grow with
+    the sixth power of the number of monomials of degree m. `memory`: V = x' P(p, p - q) x with q
+    the lag of p of so many seconds (about the time in which the worst p turns round), in continuous
+    time; across, P has `memory_degree` on `memory_segments` segments. Either way P has the degree
+    and segments above in p (None: 2 on 4, then 8 with an order; 3 on 12 with a memory).
     """
 
     degree: int | None = None
@@ -71,22 +75,45 @@ class Relaxation:
             raise InputError(f"degree of P must be 0 .. 4, got {self.degree}")
         if self.segments is not None and (not self.segments or min(self.segments) < 1):
             raise InputError(f"segments must be a tuple of integers >= 1, got {self.segments}")
-        if self.grading < 1 or self.elevation < 0 or self.floor < 0 or not self.margins or min(self.margins) < 0 or self.accept < 1:
-            raise InputError("expected grading >= 1, elevation >= 0, floor >= 0, margins >= 0 and accept >= 1")
+        if (
+            self.grading < 1
+            or self.elevation < 0
+            or self.floor < 0
+            or not self.margins
+            or min(self.margins) < 0
+            or self.accept < 1
+        ):
+            raise InputError(
+                "expected grading >= 1, elevation >= 0, floor >= 0, margins >= 0 and accept >= 1"
+            )
         if self.order not in (1, 2, 3) or (self.order > 1 and self.memory is not None):
-            raise InputError(f"expected order 1, 2 or 3, and no memory beside an order > 1, got {self.order} and memory {self.memory}")
-        if self.memory is not None and not (self.memory > 0 and self.memory_segments >= 1 and self.memory_degree in (1, 2, 3, 4)):
+            raise InputError(
+                f"expected order 1, 2 or 3, and no memory beside an order > 1, got {self.order} and"
+                f" memory {self.memory}"
+            )
+        if self.memory is not None and not (
+            self.memory > 0 and self.memory_segments >= 1 and self.memory_degree in (1, 2, 3, 4)
+        ):
             raise InputError("expected memory > 0 s, memory_segments >= 1 and memory_degree 1 .. 4")
         if self.kind not in KINDS:
             raise UnknownNameError("relaxation", self.kind, KINDS)
-        if self.subdivision < 0 or self.points < 2 or (self.total_degree is not None and self.total_degree < 0):
+        if (
+            self.subdivision < 0
+            or self.points < 2
+            or (self.total_degree is not None and self.total_degree < 0)
+        ):
             raise InputError("expected subdivision >= 0, points >= 2 and total_degree >= 0 or None")
         if self.needs_box and (self.order > 1 or self.memory is not None):
-            raise InputError("order and memory go with plain Bernstein coefficients: leave kind, subdivision and total_degree alone")
+            raise InputError(
+                "order and memory go with plain Bernstein coefficients: leave kind, subdivision and"
+                " total_degree alone"
+            )
 
     @property
     def needs_box(self) -> bool:
-        """Whether this is more than plain Bernstein coefficients for one parameter: see `synthesis.polynomial`."""
+        """Whether this is more than plain Bernstein coefficients for one parameter: see
+        `synthesis.polynomial`.
+        """
         return self.kind != "bernstein" or self.subdivision > 0 or self.total_degree is not None
 
     def check(self, dt: float | None, *, with_gain: bool) -> None:
@@ -94,11 +121,15 @@ class Relaxation:
         if dt is not None and (self.order > 1 or self.memory is not None):
             name, value = ("order", self.order) if self.order > 1 else ("memory", self.memory)
             raise InputError(
-                f"an order > 1 or a memory is for continuous time; this model is sampled every {dt:g} s: leave {name}={value} out, "
-                "or analyse the model before discretize(), as one in continuous time"
+                "an order > 1 or a memory is for continuous time; this model is sampled every"
+                f" {dt:g} s: leave {name}={value} out, or analyse the model before discretize(), as"
+                " one in continuous time"
             )
         if with_gain and self.order > 1:
-            raise InputError("an order > 1 proves stability only: a V of that degree does not balance energies; for a gain use a memory")
+            raise InputError(
+                "an order > 1 proves stability only: a V of that degree does not balance energies;"
+                " for a gain use a memory"
+            )
 
 
 class Problem(NamedTuple):
@@ -129,14 +160,27 @@ class Problem(NamedTuple):
 def scaled_problem(lpv: LPVStateSpace, rate: float, gain: float, *, with_gain: bool) -> Problem:
     """The model scaled for an expected `gain`; without channels where only stability is asked."""
     if not with_gain:
-        lpv = replace(lpv, B=lpv.B[:, :, :0], C=lpv.C[:, :0], D=lpv.D[:, :0, :0], inputs=(), outputs=(), trim=None, residuals=None)
+        lpv = replace(
+            lpv,
+            B=lpv.B[:, :, :0],
+            C=lpv.C[:, :0],
+            D=lpv.D[:, :0, :0],
+            inputs=(),
+            outputs=(),
+            trim=None,
+            residuals=None,
+        )
     units, pieces = scaling(lpv, gain), model_pieces(lpv)
-    scaled = tuple(piece.scaled(units.left, units.right, units.channel, units.time) for piece in pieces)
+    scaled = tuple(
+        piece.scaled(units.left, units.right, units.channel, units.time) for piece in pieces
+    )
     return Problem(lpv, rate, pieces, scaled, units, with_gain)
 
 
 class Form(ABC):
-    """A V with unknown coefficients, in the scaled units of a problem: `size` is that of P, `degree` that in p on the `knots`."""
+    """A V with unknown coefficients, in the scaled units of a problem: `size` is that of P,
+    `degree` that in p on the `knots`.
+    """
 
     knots: Array
     degree: int
@@ -184,7 +228,11 @@ class Quadratic(Form):
         """One block per Bernstein coefficient, cell or strip, and sign of the rate."""
         if problem.lpv.dt is None:
             rate = problem.scaled_rate if self.degree else 0.0
-            return list(continuous_blocks(cells(problem.scaled, self.knots), self.knots, self.degree, rate, extra))
+            return list(
+                continuous_blocks(
+                    cells(problem.scaled, self.knots), self.knots, self.degree, rate, extra
+                )
+            )
         regions = strips(problem.scaled, self.knots, problem.step if self.degree else 0.0)
         return list(discrete_blocks(regions, self.knots, self.degree, extra))
 
@@ -194,7 +242,9 @@ class Quadratic(Form):
 
 
 class HigherOrder(Quadratic):
-    """V = z' P(p) z with the monomials z of degree `order` in the states: a sum-of-squares proof for each coefficient."""
+    """V = z' P(p) z with the monomials z of degree `order` in the states: a sum-of-squares proof
+    for each coefficient.
+    """
 
     states: int
     order: int
@@ -209,7 +259,12 @@ class HigherOrder(Quadratic):
         """As for a quadratic V, of the linear system that the monomials follow."""
         N = self.size
         lifted = tuple(
-            q._replace(A=generator(q.A, self.order), B=np.zeros((1, N, 0)), C=np.zeros((1, 0, N)), D=np.zeros((1, 0, 0)))
+            q._replace(
+                A=generator(q.A, self.order),
+                B=np.zeros((1, N, 0)),
+                C=np.zeros((1, 0, N)),
+                D=np.zeros((1, 0, 0)),
+            )
             for q in problem.scaled
         )
         return super().blocks(problem._replace(scaled=lifted), extra)
@@ -223,7 +278,9 @@ class HigherOrder(Quadratic):
         size = null_size(self.states, self.order)
         # of one state there is one monomial, and nothing to add
         slack = x[self.unknowns * length(self.size) : -1].reshape(-1, size) if size else None
-        return SplineLyapunov(self.knots, self.degree, smat(self.coefficients(x), self.size), self.order, slack)
+        return SplineLyapunov(
+            self.knots, self.degree, smat(self.coefficients(x), self.size), self.order, slack
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +310,17 @@ class Remembering(Form):
     def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
         """One block per Bernstein coefficient in p and across, patch, and sign of the rate."""
         regions = cells(problem.scaled, self.knots)
-        return list(memory_blocks(regions, self.region, self.lead_knots, self.degree, self.lead_degree, problem.scaled_rate, extra))
+        return list(
+            memory_blocks(
+                regions,
+                self.region,
+                self.lead_knots,
+                self.degree,
+                self.lead_degree,
+                problem.scaled_rate,
+                extra,
+            )
+        )
 
     def lyapunov(self, x: Array) -> MemoryLyapunov:
         """V at the solver's point x."""
@@ -268,7 +335,19 @@ def forms(problem: Problem, relaxation: Relaxation) -> Iterator[Form]:
     constant = math.isinf(problem.rate) or relaxation.degree == 0
     usual = 2 if relaxation.order > 1 or sampled else 3
     degree = 0 if constant and not remembers else (relaxation.degree or usual)
-    default = (8,) if not degree else (12,) if remembers else (4, 8) if relaxation.order > 1 else (8, 16) if sampled else (16, 32)
+    default = (
+        (8,)
+        if not degree
+        else (
+            (12,)
+            if remembers
+            else (4, 8)
+            if relaxation.order > 1
+            else (8, 16)
+            if sampled
+            else (16, 32)
+        )
+    )
     for segments in relaxation.segments or default:
         knots = _knots(problem, relaxation, segments, degree)
         if remembers:
@@ -285,7 +364,11 @@ def forms(problem: Problem, relaxation: Relaxation) -> Iterator[Form]:
 def constant_form(problem: Problem, relaxation: Relaxation) -> Form:
     """A constant P, which proves for every rate what it proves for jumps."""
     n, knots = len(problem.lpv.states), _knots(problem, relaxation, 8, 0)
-    return HigherOrder(knots, 0, n, relaxation.order) if relaxation.order > 1 else Quadratic(knots, 0, n)
+    return (
+        HigherOrder(knots, 0, n, relaxation.order)
+        if relaxation.order > 1
+        else Quadratic(knots, 0, n)
+    )
 
 
 def _knots(problem: Problem, relaxation: Relaxation, segments: int, degree: int) -> Array:
@@ -293,4 +376,11 @@ def _knots(problem: Problem, relaxation: Relaxation, segments: int, degree: int)
     breaks = [piece.low for piece in problem.pieces[1:]]
     if degree and 2.5 * problem.step >= high - low:
         return np.array([low, high])
-    return graded_knots(low, high, segments, relaxation.grading, breaks, shortest=2.5 * problem.step if degree else 0.0)
+    return graded_knots(
+        low,
+        high,
+        segments,
+        relaxation.grading,
+        breaks,
+        shortest=2.5 * problem.step if degree else 0.0,
+    )

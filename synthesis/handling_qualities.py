@@ -13,8 +13,10 @@ from symheli.lpv import LinearModel
 
 
 class Bandwidth(NamedTuple):
-    """phase_bandwidth: where 45 deg of phase are left; gain_bandwidth: where 6 dB of gain are left before omega_180, at which the
-    response lags 180 deg (rad/s, inf where the band ends before); phase_delay (s): how fast the phase falls beyond omega_180."""
+    """phase_bandwidth: where 45 deg of phase are left; gain_bandwidth: where 6 dB of gain are left
+    before omega_180, at which the response lags 180 deg (rad/s, inf where the band ends before);
+    phase_delay (s): how fast the phase falls beyond omega_180.
+    """
 
     phase_bandwidth: float
     gain_bandwidth: float
@@ -32,15 +34,22 @@ class Bandwidth(NamedTuple):
         return self.phase_bandwidth
 
 
-def bandwidth(model: LinearModel, band: tuple[float, float] = (1.0, 60.0), points: int = 2000) -> Bandwidth:
-    """ADS-33 bandwidth and phase delay of the attitude response `model` (one input, one output: rad per rad of stick).
+def bandwidth(
+    model: LinearModel, band: tuple[float, float] = (1.0, 60.0), points: int = 2000
+) -> Bandwidth:
+    """ADS-33 bandwidth and phase delay of the attitude response `model` (one input, one output: rad
+    per rad of stick).
 
-    `band` (rad/s) is searched; its lower end lies above the phugoid, where attitude already integrates rate (phase near -90 deg);
-    a response of opposite sign is turned round. Put servos and delays into the model first. Raises `InputError`.
-    Source: ADS-33E-PRF (2000), figure 5 (definitions of bandwidth and phase delay).
+    `band` (rad/s) is searched; its lower end lies above the phugoid, where attitude already
+    integrates rate (phase near -90 deg); a response of opposite sign is turned round. Put servos
+    and delays into the model first. Raises `InputError`. Source: ADS-33E-PRF (2000), figure 5
+    (definitions of bandwidth and phase delay).
     """
     if len(model.inputs) != 1 or len(model.outputs) != 1:
-        raise InputError(f"bandwidth is that of one attitude to one stick, got {len(model.inputs)} inputs and {len(model.outputs)} outputs")
+        raise InputError(
+            f"bandwidth is that of one attitude to one stick, got {len(model.inputs)} inputs and"
+            f" {len(model.outputs)} outputs"
+        )
     low, high = band
     if not 0 < low < high:
         raise InputError(f"band: expected 0 < low < high rad/s, got {band}")
@@ -63,7 +72,9 @@ def bandwidth(model: LinearModel, band: tuple[float, float] = (1.0, 60.0), point
         return abs(complex(model.frequency_response([omega])[0, 0, 0]))
 
     def first(values: np.ndarray, function, level: float, end: float) -> float:
-        below = np.flatnonzero((values[1:] <= level) & (values[:-1] > level) & (grid[1:] <= end * (1 + 1e-9)))
+        below = np.flatnonzero(
+            (values[1:] <= level) & (values[:-1] > level) & (grid[1:] <= end * (1 + 1e-9))
+        )
         if not len(below):
             return math.inf
         k = int(below[0])

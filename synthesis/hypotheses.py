@@ -1,4 +1,6 @@
-"""What every certificate rests on, in sentences: how far the model is from what it was fitted to, and which code is trusted."""
+"""What every certificate rests on, in sentences: how far the model is from what it was fitted to,
+and which code is trusted.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +11,21 @@ from symheli.lpv import LPVStateSpace
 Array = np.ndarray
 
 NOTHING = 1e-12
-"""Entries below this fraction of both their row's and their column's largest are rounding, and so is their misfit."""
+"""Entries below this fraction of both their row's and their column's largest are rounding, and so
+is their misfit.
+"""
 
 VERIFIED = (
-    "verified in floating point: {what}; verify(rigorous=True) proves it in exact arithmetic, and looks at some p once more through "
-    "the model's own matrices: {shared} are shared by the search for P and the proof"
+    "verified in floating point: {what}; verify(rigorous=True) proves it in exact arithmetic, and"
+    " looks at some p once more through the model's own matrices: {shared} are shared by the search"
+    " for P and the proof"
 )
 
 
 def fitted(model: object) -> tuple[str, ...]:
-    """The misfit of an interpolated or sampled model, which is among the hypotheses; nothing for a model that was given as it is."""
+    """The misfit of an interpolated or sampled model, which is among the hypotheses; nothing for a
+    model that was given as it is.
+    """
     if not isinstance(model, LPVStateSpace) or model.residuals is None:
         return ()
     s = model.scheduling
@@ -29,10 +36,21 @@ def fitted(model: object) -> tuple[str, ...]:
             continue
         size, off = np.abs(own).max(axis=0), np.abs(residual).max(axis=0)
         size = np.maximum(size, off)
-        real = size > NOTHING * np.minimum(size.max(axis=0, keepdims=True), size.max(axis=1, keepdims=True))
+        real = size > NOTHING * np.minimum(
+            size.max(axis=0, keepdims=True), size.max(axis=1, keepdims=True)
+        )
         ratio = np.where(real & (size > 0), off / np.where(size > 0, size, 1.0), 0.0)
         if ratio.max() > worst:
             worst, (i, j) = float(ratio.max()), np.unravel_index(int(ratio.argmax()), ratio.shape)
             place = f", in {name}[{i + 1}, {j + 1}]"
-    what = "the interpolated model" if model.dt is None else f"the sampled model (p held over each {model.dt:g} s, entries fitted in p)"
-    return (f"of {what}: an entry differs from what it was fitted to by at most {100 * worst:.2g} % of its largest value{place}",)
+    what = (
+        "the interpolated model"
+        if model.dt is None
+        else f"the sampled model (p held over each {model.dt:g} s, entries fitted in p)"
+    )
+    return (
+        (
+            f"of {what}: an entry differs from what it was fitted to by at most {100 * worst:.2g} %"
+            f" of its largest value{place}"
+        ),
+    )

@@ -1,4 +1,6 @@
-"""Work in native code that an interrupt from the keyboard ends at once: such code does not hear it, and one iteration may take minutes."""
+"""Work in native code that an interrupt from the keyboard ends at once: such code does not hear it,
+and one iteration may take minutes.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,18 @@ T = TypeVar("T")
 PATIENCE = 1.0
 """Seconds that interrupted work has to end."""
 
-CHILD = "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); from synthesis.interruptible import answer; answer()"
+CHILD = (
+    "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); from synthesis.interruptible"
+    " import answer; answer()"
+)
 
 
 def in_thread(work: Callable[[threading.Event], T]) -> T:
-    """work(stop) in a thread of its own, for work that releases Python's lock; what it raises is raised here.
+    """work(stop) in a thread of its own, for work that releases Python's lock; what it raises is
+    raised here.
 
-    An interrupt sets `stop`, at which the work must look often, and is raised here when it has ended, or `PATIENCE` later.
+    An interrupt sets `stop`, at which the work must look often, and is raised here when it has
+    ended, or `PATIENCE` later.
     """
     stop, done, outcome = threading.Event(), threading.Event(), []
 
@@ -51,13 +58,19 @@ def in_thread(work: Callable[[threading.Event], T]) -> T:
 
 
 def in_process(function: Callable[..., T], *arguments: Any) -> T:
-    """function(*arguments) in a process of its own, for work that keeps Python's lock; what it raises is raised here.
+    """function(*arguments) in a process of its own, for work that keeps Python's lock; what it
+    raises is raised here.
 
-    The function is one of a module, arguments and result can be pickled. An interrupt ends the process. Raises `SolverError`
-    where it ends without an answer.
+    The function is one of a module, arguments and result can be pickled. An interrupt ends the
+    process. Raises `SolverError` where it ends without an answer.
     """
     request = pickle.dumps(sys.path) + pickle.dumps((function, arguments))
-    process = subprocess.Popen([sys.executable, "-c", CHILD], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", CHILD],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
     try:
         reply, _ = process.communicate(request)
     except BaseException:
@@ -65,7 +78,10 @@ def in_process(function: Callable[..., T], *arguments: Any) -> T:
         process.wait()
         raise
     if process.returncode:
-        raise SolverError(f"the solver's process ended with code {process.returncode} and no answer; it may have run out of memory")
+        raise SolverError(
+            f"the solver's process ended with code {process.returncode} and no answer; it may have"
+            " run out of memory"
+        )
     value, error = pickle.loads(reply)
     if error is not None:
         raise error

@@ -1,8 +1,10 @@
-"""What a linear system does along one cycle, repeated for ever: its growth and its gain, with their sensitivities.
+"""What a linear system does along one cycle, repeated for ever: its growth and its gain, with their
+sensitivities.
 
-Over one cycle of N steps z_k = [x; v] -> [x(k+1); y], lifted: x(+) = F x + G v, y = H x + J v with all v and all y of the
-cycle stacked. The growth is the largest Floquet multiplier, an eigenvalue of F; the gain is the largest norm of
-J + H (z - F)^-1 G on |z| = 1. Source: Bittanti and Colaneri, "Periodic Systems" (2009), sections 6.2 and 9.1.
+Over one cycle of N steps z_k = [x; v] -> [x(k+1); y], lifted: x(+) = F x + G v, y = H x + J v with
+all v and all y of the cycle stacked. The growth is the largest Floquet multiplier, an eigenvalue of
+F; the gain is the largest norm of J + H (z - F)^-1 G on |z| = 1. Source: Bittanti and Colaneri,
+"Periodic Systems" (2009), sections 6.2 and 9.1.
 """
 
 from __future__ import annotations
@@ -18,13 +20,17 @@ from synthesis.waves import Steps
 Array = np.ndarray
 
 LANCZOS_STEPS = 30
-"""Most steps for the norm at one frequency: what is missing after them makes the bound smaller, never wrong."""
+"""Most steps for the norm at one frequency: what is missing after them makes the bound smaller,
+never wrong.
+"""
 RESIDUAL = 1e-3
 """They end where the residual of the squared norm is this fraction of it."""
 
 
 class Sensitivity(NamedTuple):
-    """A `value` and its change d value = Re sum_k left_k' dstep_k right_k; left (N, nx + r), right (N, nx + nu)."""
+    """A `value` and its change d value = Re sum_k left_k' dstep_k right_k; left (N, nx + r), right
+    (N, nx + nu).
+    """
 
     value: float
     left: Array
@@ -65,11 +71,14 @@ def multiplier(system: Steps) -> float:
 
 
 def growth(system: Steps) -> Sensitivity:
-    """Logarithm of the largest multiplier, by its left and right eigenvectors carried around the cycle."""
+    """Logarithm of the largest multiplier, by its left and right eigenvectors carried around the
+    cycle.
+    """
     n, (N, rows, columns) = system.states, system.step.shape
     values, vectors = np.linalg.eig(system.transition)
     k = int(np.abs(values).argmax())
-    # the left eigenvector belonging to it, w' v = 1; the pseudo-inverse keeps a defective multiplier from failing
+    # the left eigenvector belonging to it, w' v = 1; the pseudo-inverse keeps a defective
+    # multiplier from failing
     x, w = vectors[:, k], np.linalg.pinv(vectors)[k]
     left, right = np.zeros((N, rows), dtype=complex), np.zeros((N, columns), dtype=complex)
     A = system.step[:, :n, :n]
@@ -84,7 +93,9 @@ def growth(system: Steps) -> Sensitivity:
 
 
 def worst_input(system: Steps, lifted: Lifted | None = None) -> tuple[float, float, Array]:
-    """(gain, phase advance a cycle in rad, worst input (N, nu), complex) of the repeated cycle; gain inf where the state grows."""
+    """(gain, phase advance a cycle in rad, worst input (N, nu), complex) of the repeated cycle;
+    gain inf where the state grows.
+    """
     n, N = system.states, len(system.step)
     m = system.step.shape[2] - n
     F, G, H, J = lifted or Lifted.of(system)
@@ -92,10 +103,13 @@ def worst_input(system: Steps, lifted: Lifted | None = None) -> tuple[float, flo
     if np.abs(multipliers).max() >= 1:
         return math.inf, 0.0, np.zeros((N, m))
     leading = multipliers[np.argsort(-np.abs(multipliers))[:3]]
-    angles = np.unique(np.round(np.abs(np.concatenate([np.angle(leading), [0.0, math.pi / 2, math.pi]])), 6))
+    angles = np.unique(
+        np.round(np.abs(np.concatenate([np.angle(leading), [0.0, math.pi / 2, math.pi]])), 6)
+    )
 
     def norm(angle: float) -> tuple[float, Array]:
-        # complex vectors as two real columns: a complex product would copy the large real matrices every time
+        # complex vectors as two real columns: a complex product would copy the large real matrices
+        # every time
         inverse = np.linalg.inv(np.exp(1j * angle) * np.eye(n) - F)
 
         def squared(v: Array) -> Array:
@@ -113,7 +127,9 @@ def worst_input(system: Steps, lifted: Lifted | None = None) -> tuple[float, flo
 
 
 def gain(system: Steps) -> Sensitivity:
-    """Logarithm of the gain, with the worst response and its adjoint; the phase advance a cycle is held."""
+    """Logarithm of the gain, with the worst response and its adjoint; the phase advance a cycle is
+    held.
+    """
     n, N = system.states, len(system.step)
     lifted = Lifted.of(system)
     value, angle, v = worst_input(system, lifted)
@@ -141,7 +157,9 @@ def gain(system: Steps) -> Sensitivity:
 
 
 def ratio_from_rest(lifted: Lifted, v: Array, rounds: int) -> tuple[float, Array]:
-    """(|y|/|v|, v) from rest over len(v) cycles, v (cycles, N nu), after `rounds` of forward and adjoint passes."""
+    """(|y|/|v|, v) from rest over len(v) cycles, v (cycles, N nu), after `rounds` of forward and
+    adjoint passes.
+    """
     F, G, H, J = lifted
     ratio, best = 0.0, v
     for _ in range(rounds):
@@ -164,7 +182,9 @@ def ratio_from_rest(lifted: Lifted, v: Array, rounds: int) -> tuple[float, Array
 
 
 def _largest(squared: Callable[[Array], Array], size: int) -> tuple[float, Array]:
-    """(largest eigenvalue, its vector) of a positive semidefinite operator from below, by Lanczos with full reorthogonalisation."""
+    """(largest eigenvalue, its vector) of a positive semidefinite operator from below, by Lanczos
+    with full reorthogonalisation.
+    """
     start = np.random.default_rng(0).standard_normal((2, size))
     v = start[0] + 1j * start[1]
     basis, image = np.zeros((2, min(LANCZOS_STEPS, size), size), dtype=complex)

@@ -11,11 +11,15 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import Scheduling
 
 Rate = float | Sequence[float] | Mapping[str, float] | None
-"""In units of p per second: one for all parameters, one for each in order, or {name: rate}; the parameter's own where none is given."""
+"""In units of p per second: one for all parameters, one for each in order, or {name: rate}; the
+parameter's own where none is given.
+"""
 
 
 def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
-    """One rate a parameter; raises `InputError` for a wrong number of them or one that is not >= 0, `UnknownNameError` for a name."""
+    """One rate a parameter; raises `InputError` for a wrong number of them or one that is not >= 0,
+    `UnknownNameError` for a name.
+    """
     names = [s.name for s in parameters]
     found: list[Any]
     if rate is None:
@@ -26,7 +30,11 @@ def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
                 raise UnknownNameError("scheduling parameter", name, names)
         found = [rate.get(s.name, s.rate) for s in parameters]
     else:
-        found = list(rate) if isinstance(rate, Sequence | np.ndarray) and not isinstance(rate, str) else [rate] * len(names)
+        found = (
+            list(rate)
+            if isinstance(rate, Sequence | np.ndarray) and not isinstance(rate, str)
+            else [rate] * len(names)
+        )
     try:
         numbers = tuple(float(value) for value in found)
     except (TypeError, ValueError):
@@ -34,6 +42,7 @@ def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
     if len(numbers) != len(names) or not all(value >= 0 for value in numbers):
         units = ", ".join(f"{s.name} ({s.unit}/s)" for s in parameters)
         raise InputError(
-            f"rate must be >= 0 (math.inf: as fast as it likes), one for all, one for each of {units}, or by name, got {rate!r}"
+            "rate must be >= 0 (math.inf: as fast as it likes), one for all, one for each of"
+            f" {units}, or by name, got {rate!r}"
         )
     return numbers

@@ -1,4 +1,6 @@
-"""One constant change of coordinates in which the numbers of an LMI are of order one, whatever the units of the states."""
+"""One constant change of coordinates in which the numbers of an LMI are of order one, whatever the
+units of the states.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,17 @@ from synthesis.symmetric import symmetrized
 Array = np.ndarray
 
 UNSEEN = 0.3
-"""Every state is driven and seen by this fraction of what inputs and outputs do: what they do not reach needs a scale too."""
+"""Every state is driven and seen by this fraction of what inputs and outputs do: what they do not
+reach needs a scale too.
+"""
 DECOUPLED = 1e-3
-"""Balancing leaves a coupling alone where both of its directions are below this fraction of the states' own pace."""
+"""Balancing leaves a coupling alone where both of its directions are below this fraction of the
+states' own pace.
+"""
 NOTHING = 1e-6
-"""A gain below this fraction of the response of the states is what cancellation leaves, and no scale of anything."""
+"""A gain below this fraction of the response of the states is what cancellation leaves, and no
+scale of anything.
+"""
 START = 0.1
 """Fraction of that response from which a proof then sets out."""
 FAR = 30.0
@@ -35,10 +43,11 @@ T = TypeVar("T")
 
 
 class Scaling(NamedTuple):
-    """x = right z, left = right^-1, outputs in units of `channel`, time in units of `time` (s; 1 in discrete time).
+    """x = right z, left = right^-1, outputs in units of `channel`, time in units of `time` (s; 1 in
+    discrete time).
 
-    `weight` (n, n): in the coordinates weight^-1 z the state block of the LMI is near -I where P is near I: slow and fast
-    states then count alike.
+    `weight` (n, n): in the coordinates weight^-1 z the state block of the LMI is near -I where P is
+    near I: slow and fast states then count alike.
     """
 
     left: Array
@@ -64,7 +73,9 @@ class Scaling(NamedTuple):
 
 
 def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
-    """From the model at mid-range, and what drives and shows the states all over it; `gain` is the expected one."""
+    """From the model at mid-range, and what drives and shows the states all over it; `gain` is the
+    expected one.
+    """
     s = lpv.scheduling
     return model_scaling(lpv.at(s.middle), gain, lpv.matrices(np.linspace(s.low, s.high, 9)))
 
@@ -72,9 +83,9 @@ def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
 def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = None) -> Scaling:
     """The same from one frozen model, with the size of its matrices `elsewhere` (K, ...).
 
-    The Lyapunov function of order one is the sum of that by the outputs and the inverse of the Gramian of the inputs, between
-    which those of the bounded real lemma lie: both go with the coordinates, so that units cancel. A model that is not stable is
-    made so by a shift.
+    The Lyapunov function of order one is the sum of that by the outputs and the inverse of the
+    Gramian of the inputs, between which those of the bounded real lemma lie: both go with the
+    coordinates, so that units cancel. A model that is not stable is made so by a shift.
     """
     n, continuous = len(model.states), model.dt is None
     every = elsewhere or Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D)))
@@ -94,11 +105,16 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     level = np.exp(0.5 * (np.linalg.slogdet(Wo)[1] + np.linalg.slogdet(Wc)[1]) / n)
     X = symmetrized(Wo / level + level * inverse)
     side = inverse @ reached
-    Q = seen.T @ seen / level + level * (side @ side.T if continuous else inverse - A.T @ inverse @ A)
+    Q = seen.T @ seen / level + level * (
+        side @ side.T if continuous else inverse - A.T @ inverse @ A
+    )
     root = linalg.inv(linalg.cholesky(X))
     weight = _inverse_root(root.T @ symmetrized(Q) @ root * (time if continuous else 1.0))
     channel = _channel(gain, float(np.sqrt(np.trace(Wc) * np.trace(Wo))))
-    size_B, size_C = np.linalg.norm(weight @ linalg.solve(root, B)), np.linalg.norm(C @ root @ weight) / channel
+    size_B, size_C = (
+        np.linalg.norm(weight @ linalg.solve(root, B)),
+        np.linalg.norm(C @ root @ weight) / channel,
+    )
     # P = alpha I with alpha = |C|/|B| weighs inputs and outputs alike; put it into the coordinates
     alpha = size_C / size_B if size_B > 0 and size_C > 0 else 1.0
     right = D[:, None] * root / np.sqrt(alpha)
@@ -106,9 +122,11 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
 
 
 def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected: float) -> list[T]:
-    """What `found(expected)` brings, (result, bound, scale it was found in); again in the scale of the bound while that is far off.
+    """What `found(expected)` brings, (result, bound, scale it was found in); again in the scale of
+    the bound while that is far off.
 
-    The frozen gain is a scale that no search changes, but a moving p may have a gain of another order.
+    The frozen gain is a scale that no search changes, but a moving p may have a gain of another
+    order.
     """
     results: list[T] = []
     least = 0.0
@@ -123,15 +141,20 @@ def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected:
 
 
 def balance(A: Array, B: Array, C: Array) -> Array:
-    """d (n,) such that what enters each state of z = x/d from other states and inputs is as large as what leaves it.
+    """d (n,) such that what enters each state of z = x/d from other states and inputs is as large
+    as what leaves it.
 
-    A (n, n) of sizes, its diagonal the states' own. Osborne's balancing of the whole system matrix; a state that is
-    reached or seen by nothing else ends at `DECOUPLED`.
+    A (n, n) of sizes, its diagonal the states' own. Osborne's balancing of the whole system matrix;
+    a state that is reached or seen by nothing else ends at `DECOUPLED`.
     """
     n = len(A)
     d, own = np.ones(n), np.abs(np.diag(A))
     own = np.where(own > 0, own, max(float(np.abs(A).max(initial=0.0)), 1.0))
-    A, into, out = np.abs(A - np.diag(np.diag(A))), np.linalg.norm(B, axis=1), np.linalg.norm(C, axis=0)
+    A, into, out = (
+        np.abs(A - np.diag(np.diag(A))),
+        np.linalg.norm(B, axis=1),
+        np.linalg.norm(C, axis=0),
+    )
     for _ in range(SWEEPS):
         # inputs and outputs in the units in which they are as large as one another
         ratio = _size(out * d) / _size(into / d)
@@ -147,7 +170,9 @@ def balance(A: Array, B: Array, C: Array) -> Array:
 
 
 def _channel(gain: float, response: float) -> float:
-    """The gain expected; where that is nothing beside the `response` of the states to inputs and outputs, a gain to begin with."""
+    """The gain expected; where that is nothing beside the `response` of the states to inputs and
+    outputs, a gain to begin with.
+    """
     return gain if math.isfinite(gain) and gain > NOTHING * response else START * response
 
 
@@ -165,13 +190,19 @@ def _pace(A: Array) -> Array:
 def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
     """A with its poles moved inside the stability region by as little as the Gramians need."""
     if continuous:
-        shift = float(poles.real.max()) + 1e-6 * float(np.abs(poles).min() or np.abs(poles).max() or 1.0)
+        shift = float(poles.real.max()) + 1e-6 * float(
+            np.abs(poles).min() or np.abs(poles).max() or 1.0
+        )
         return A - max(shift, 0.0) * np.eye(len(A))
     return A / max(1.0, float(np.abs(poles).max()) * (1 + 1e-6))
 
 
 def _gramian(A: Array, B: Array, continuous: bool) -> Array:
-    X = linalg.solve_continuous_lyapunov(A, -B @ B.T) if continuous else linalg.solve_discrete_lyapunov(A, B @ B.T)
+    X = (
+        linalg.solve_continuous_lyapunov(A, -B @ B.T)
+        if continuous
+        else linalg.solve_discrete_lyapunov(A, B @ B.T)
+    )
     values, vectors = linalg.eigh(symmetrized(X))
     return (vectors * np.maximum(values, 1e-12 * abs(values[-1]))) @ vectors.T
 

@@ -9,7 +9,9 @@ from symheli.lpv import Matrices, Scheduling
 
 
 class Scheduled(Protocol):
-    """A linear model whose matrices depend on one parameter: an LPVStateSpace, or an LFT of one parameter."""
+    """A linear model whose matrices depend on one parameter: an LPVStateSpace, or an LFT of one
+    parameter.
+    """
 
     @property
     def scheduling(self) -> Scheduling:

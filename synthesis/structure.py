@@ -1,4 +1,6 @@
-"""What a proof must look like before any inequality is asked of it: each check gives the fault in words, None where there is none."""
+"""What a proof must look like before any inequality is asked of it: each check gives the fault in
+words, None where there is none.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,12 @@ def numbers(values: Any, name: str) -> Array:
 
 def ascending(knots: Array, name: str = "knots") -> str | None:
     """Two knots or more, finite, each larger than the one before."""
-    if knots.ndim != 1 or len(knots) < 2 or not np.all(np.isfinite(knots)) or not np.all(np.diff(knots) > 0):
+    if (
+        knots.ndim != 1
+        or len(knots) < 2
+        or not np.all(np.isfinite(knots))
+        or not np.all(np.diff(knots) > 0)
+    ):
         return f"{name} must be two or more finite numbers in ascending order, got {knots}"
     return None
 
@@ -37,7 +44,10 @@ def ascending(knots: Array, name: str = "knots") -> str | None:
 def covering(knots: Array, low: float, high: float, name: str = "p") -> str | None:
     """The knots reach from one end of the range to the other."""
     if knots[0] != low or knots[-1] != high:
-        return f"P is known for {name} in [{knots[0]:.6g}, {knots[-1]:.6g}], the model holds on [{low:.6g}, {high:.6g}]"
+        return (
+            f"P is known for {name} in [{knots[0]:.6g}, {knots[-1]:.6g}], the model holds on"
+            f" [{low:.6g}, {high:.6g}]"
+        )
     return None
 
 
@@ -48,7 +58,9 @@ def whole(value: Any, least: int, name: str) -> str | None:
     return None
 
 
-def symmetric(coefficients: Array, shape: Sequence[int], name: str = "Lyapunov coefficients") -> str | None:
+def symmetric(
+    coefficients: Array, shape: Sequence[int], name: str = "Lyapunov coefficients"
+) -> str | None:
     """Finite matrices, exactly symmetric, in an array of this shape."""
     if coefficients.shape != tuple(shape):
         return f"expected {name} of shape {tuple(shape)}, got {coefficients.shape}"
@@ -60,12 +72,18 @@ def symmetric(coefficients: Array, shape: Sequence[int], name: str = "Lyapunov c
 
 
 def coordinates(left: Any, right: Any, units: Sequence[Any], size: int) -> str | None:
-    """`left` and `right` (size, size) inverse to each other, every one of the `units` a finite number > 0."""
+    """`left` and `right` (size, size) inverse to each other, every one of the `units` a finite
+    number > 0.
+    """
     try:
         left, right, sizes = numbers(left, "left"), numbers(right, "right"), numbers(units, "units")
     except InputError as error:
         return str(error)
-    if left.shape != (size, size) or right.shape != (size, size) or not np.all(np.isfinite([*left.ravel(), *right.ravel(), *sizes])):
+    if (
+        left.shape != (size, size)
+        or right.shape != (size, size)
+        or not np.all(np.isfinite([*left.ravel(), *right.ravel(), *sizes]))
+    ):
         return f"coordinates must be finite matrices of shape {(size, size)}"
     # 1e-3: far above what inverting loses, and enough for `right` to be regular
     if not np.all(sizes > 0) or np.abs(left @ right - np.eye(size)).max(initial=0.0) > 1e-3:

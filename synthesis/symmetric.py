@@ -1,4 +1,6 @@
-"""Symmetric matrices as vectors: the upper triangle column by column, off-diagonal entries times sqrt(2)."""
+"""Symmetric matrices as vectors: the upper triangle column by column, off-diagonal entries times
+sqrt(2).
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def _indices(n: int) -> tuple[Array, Array, Array]:
 
 
 def svec(M: Array) -> Array:
-    """Vectors (..., n (n + 1) / 2) of symmetric matrices (..., n, n); <M, N> = svec(M) . svec(N)."""
+    """Vectors (..., n (n + 1) / 2) of symmetric matrices (..., n, n); <M, N> = svec(M) .
+    svec(N).
+    """
     rows, columns, weight = _indices(M.shape[-1])
     return M[..., rows, columns] * weight
 
@@ -36,7 +40,9 @@ def smat(v: Array, n: int) -> Array:
 
 
 def symmetrized(M: Array) -> Array:
-    """The symmetric part of matrices (..., n, n): rounding leaves a product that ought to be symmetric a little skew."""
+    """The symmetric part of matrices (..., n, n): rounding leaves a product that ought to be
+    symmetric a little skew.
+    """
     return 0.5 * (M + np.swapaxes(M, -1, -2))
 
 

@@ -1,8 +1,9 @@
 """Forms of degree 2m as quadratic forms in the monomials of degree m, and the freedom that leaves.
 
-z(x) holds the monomials x^a, |a| = m, of n variables, N = C(n + m - 1, m) of them. A form z' M z does not determine M: the
-symmetric matrices with z' L z = 0 are added at will (the Gram method, Choi, Lam and Reznick 1995). All arrays here are of
-integers, so that every identity is exact in any arithmetic.
+z(x) holds the monomials x^a, |a| = m, of n variables, N = C(n + m - 1, m) of them. A form z' M z
+does not determine M: the symmetric matrices with z' L z = 0 are added at will (the Gram method,
+Choi, Lam and Reznick 1995). All arrays here are of integers, so that every identity is exact in any
+arithmetic.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ def _derivation(n: int, m: int) -> tuple[tuple[int, int, int, int, int], ...]:
 
 
 def generator(A: Array, m: int) -> Array:
-    """Matrices (..., N, N) of dz/dt = generator z where dx/dt = A x, A (..., n, n) in any arithmetic."""
+    """Matrices (..., N, N) of dz/dt = generator z where dx/dt = A x, A (..., n, n) in any
+    arithmetic.
+    """
     if m == 1:
         return A
     N = len(monomials(A.shape[-1], m))
@@ -88,7 +91,9 @@ def null_size(n: int, m: int) -> int:
 
 
 def null_matrix(weights: Array, n: int, m: int) -> Array:
-    """The matrix L (..., N, N) with z' L z = 0 of these weights (..., null_size), in any arithmetic."""
+    """The matrix L (..., N, N) with z' L z = 0 of these weights (..., null_size), in any
+    arithmetic.
+    """
     N = len(monomials(n, m))
     out = np.zeros((*weights.shape[:-1], N, N), dtype=weights.dtype)
     for k, entries in enumerate(_pairs(n, m)):

@@ -1,4 +1,6 @@
-"""What every analysis answers: the truth between two bounds, under which hypotheses, and by which route."""
+"""What every analysis answers: the truth between two bounds, under which hypotheses, and by which
+route.
+"""
 
 from __future__ import annotations
 
@@ -23,16 +25,25 @@ class Status(Enum):
 
     PROVEN = "proven on the whole interval"
     UNSTABLE = "no certificate exists: a model frozen at some p is not stable"
-    GROWING = "no certificate exists: a scheduling trajectory within the limits makes the state grow"
-    INFEASIBLE = "no Lyapunov function of this form exists, to the solver's accuracy; the model may still be stable"
-    UNPROVEN = "unproven on a grid: the inequalities hold at its points, between them nothing is known"
+    GROWING = (
+        "no certificate exists: a scheduling trajectory within the limits makes the state grow"
+    )
+    INFEASIBLE = (
+        "no Lyapunov function of this form exists, to the solver's accuracy; the model may still be"
+        " stable"
+    )
+    UNPROVEN = (
+        "unproven on a grid: the inequalities hold at its points, between them nothing is known"
+    )
     FAILED = "solver failed: what it returned could not be verified"
     UNTRIED = "not tried: the programs of this form are too large for the solver; nothing is known"
 
     @classmethod
     def without_proof(cls, answer: Answer) -> Status:
         """What is known where nothing was proven and the last program tried was answered so."""
-        return {Answer.INFEASIBLE: cls.INFEASIBLE, Answer.UNTRIED: cls.UNTRIED}.get(answer, cls.FAILED)
+        return {Answer.INFEASIBLE: cls.INFEASIBLE, Answer.UNTRIED: cls.UNTRIED}.get(
+            answer, cls.FAILED
+        )
 
 
 class Seconds(NamedTuple):
@@ -44,13 +55,18 @@ class Seconds(NamedTuple):
     bounds: float = 0.0
 
     def __str__(self) -> str:
-        return f"build {self.build:.2f} s, solve {self.solve:.2f} s, verify {self.verify:.2f} s, bounds {self.bounds:.2f} s"
+        return (
+            f"build {self.build:.2f} s, solve {self.solve:.2f} s, verify {self.verify:.2f} s,"
+            f" bounds {self.bounds:.2f} s"
+        )
 
 
 class Trajectory(NamedTuple):
-    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines between them; a jump has one time twice.
+    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines between
+    them; a jump has one time twice.
 
-    Discrete time: one p for every sample. A cycle is to be repeated. Several parameters: `p` (n, m).
+    Discrete time: one p for every sample. A cycle is to be repeated. Several parameters: `p` (n,
+    m).
     """
 
     time: Array
@@ -58,10 +74,14 @@ class Trajectory(NamedTuple):
 
 
 class Judge(Protocol):
-    """A model with its hypotheses, against which a Lyapunov function (with its multipliers) and a bound are checked."""
+    """A model with its hypotheses, against which a Lyapunov function (with its multipliers) and a
+    bound are checked.
+    """
 
     def fault(self, proof: Any, kind: Kind, rates: tuple[float, ...], /) -> str | None:
-        """What is wrong with the form of the proof, or keeps it from being about this claim; None where nothing does."""
+        """What is wrong with the form of the proof, or keeps it from being about this claim; None
+        where nothing does.
+        """
         ...
 
     def floating(self, proof: Any, bound: float, /) -> bool:
@@ -75,23 +95,21 @@ class Judge(Protocol):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Verdict(ABC):
-    """A bound that holds for every p(t) within its range and rates, with its proof and its hypotheses.
+    """A bound that holds for every p(t) within its range and rates, with its proof and its
+    hypotheses.
 
-    kind          "l2 gain", "energy-to-peak gain", "decay rate" or "stability"
-    gamma         proven upper bound of a gain; inf where nothing was proven; NaN for the other kinds
-    lower         no upper bound can be smaller: from trajectories actually computed (inf: the state grows)
-    alpha         proven decay rate, 1/s: |x(t)| <= c exp(-alpha t) |x(0)|; -inf where nothing was proven; NaN for other kinds
-    upper         no larger decay rate can be proven, 1/s
-    frozen        the same from p constant alone; NaN for stability
-    status        a `Status`; its value is a sentence
-    verified      recomputed in floating point from the model and the proof alone
-    rates         bound on the rate of each parameter, in its units per second (inf: arbitrary; 0: frozen)
-    hypotheses    what the bound rests on, in sentences
-    solver        name, version and tolerance
-    seconds       wall time of each stage
-    conditioning  largest condition number of P in scaled coordinates, inf where there is none
-    attempts      every cone program that was tried; printed as a line each
-    worst         scheduling trajectory behind `lower` or `upper`, None where p is constant there
+    kind          "l2 gain", "energy-to-peak gain", "decay rate" or "stability" gamma         proven
+    upper bound of a gain; inf where nothing was proven; NaN for the other kinds lower         no
+    upper bound can be smaller: from trajectories actually computed (inf: the state grows) alpha
+    proven decay rate, 1/s: |x(t)| <= c exp(-alpha t) |x(0)|; -inf where nothing was proven; NaN for
+    other kinds upper         no larger decay rate can be proven, 1/s frozen        the same from p
+    constant alone; NaN for stability status        a `Status`; its value is a sentence verified
+    recomputed in floating point from the model and the proof alone rates         bound on the rate
+    of each parameter, in its units per second (inf: arbitrary; 0: frozen) hypotheses    what the
+    bound rests on, in sentences solver        name, version and tolerance seconds       wall time
+    of each stage conditioning  largest condition number of P in scaled coordinates, inf where there
+    is none attempts      every cone program that was tried; printed as a line each worst
+    scheduling trajectory behind `lower` or `upper`, None where p is constant there
     """
 
     kind: Kind
@@ -113,7 +131,8 @@ class Verdict(ABC):
     def __post_init__(self) -> None:
         """The form of the claim, then the order of the bounds.
 
-        Raises `InputError` for what is no claim, `CertificateError` where two numbers contradict each other: one of them is wrong.
+        Raises `InputError` for what is no claim, `CertificateError` where two numbers contradict
+        each other: one of them is wrong.
         """
         self._check_form()
         sign, moving = (-1.0, "upper bound") if self.kind == "decay rate" else (1.0, "lower bound")
@@ -123,23 +142,34 @@ class Verdict(ABC):
         for name, bound in ((f"frozen {what}", self.frozen), (moving, self.limit)):
             if self.verified and sign * (bound - self.proven) > slack:
                 raise CertificateError(
-                    f"the {name} {bound:.9g} contradicts the certified {self.kind} {self.proven:.9g}; one of the two is wrong"
+                    f"the {name} {bound:.9g} contradicts the certified {self.kind}"
+                    f" {self.proven:.9g}; one of the two is wrong"
                 )
         if sign * (self.frozen - self.limit) > 1e-9 * abs(self.frozen):
-            raise CertificateError(f"the {moving} {self.limit:.9g} forgets the frozen {what} {self.frozen:.9g}")
+            raise CertificateError(
+                f"the {moving} {self.limit:.9g} forgets the frozen {what} {self.frozen:.9g}"
+            )
         if self.verified and self.status is not Status.PROVEN:
             raise CertificateError(f"a verified certificate cannot have the status {self.status}")
         if self.verified and self.kind == "decay rate" and not self.alpha >= 0:
-            raise CertificateError(f"a decay rate of {self.alpha:.6g} is growth, and proves nothing")
+            raise CertificateError(
+                f"a decay rate of {self.alpha:.6g} is growth, and proves nothing"
+            )
 
     def _check_form(self) -> None:
         if not isinstance(self.kind, str) or self.kind not in get_args(Kind):
-            raise InputError(f"expected one of the kinds {', '.join(get_args(Kind))}, got {self.kind!r:.60}")
+            raise InputError(
+                f"expected one of the kinds {', '.join(get_args(Kind))}, got {self.kind!r:.60}"
+            )
         if not isinstance(self.rates, tuple):
-            raise InputError(f"expected a tuple of rates, one each parameter, got {self.rates!r:.60}")
+            raise InputError(
+                f"expected a tuple of rates, one each parameter, got {self.rates!r:.60}"
+            )
         for bound in (self.gamma, self.lower, self.alpha, self.upper, self.frozen, *self.rates):
             if not isinstance(bound, float):
-                raise InputError(f"bounds and rates must be floats (NaN where there is none), got {bound!r:.60}")
+                raise InputError(
+                    f"bounds and rates must be floats (NaN where there is none), got {bound!r:.60}"
+                )
 
     @property
     def proven(self) -> float:
@@ -153,20 +183,28 @@ class Verdict(ABC):
 
     @property
     def gap(self) -> float:
-        """gamma / lower, or upper / alpha: 1 means exact, inf that nothing is known; NaN for stability."""
-        above, below = (self.upper, self.alpha) if self.kind == "decay rate" else (self.gamma, self.lower)
+        """gamma / lower, or upper / alpha: 1 means exact, inf that nothing is known; NaN for
+        stability.
+        """
+        above, below = (
+            (self.upper, self.alpha) if self.kind == "decay rate" else (self.gamma, self.lower)
+        )
         return above / below if below > 0 else math.nan if math.isnan(below) else math.inf
 
     @property
     def rate(self) -> float:
-        """The rate of the one parameter; the largest of `rates` where there are several, 0 where there is none."""
+        """The rate of the one parameter; the largest of `rates` where there are several, 0 where
+        there is none.
+        """
         return max(self.rates, default=0.0)
 
     def verify(self, rigorous: bool = False) -> bool:
-        """Verify proof and bound anew; `rigorous`: in exact rational arithmetic (python-flint makes it fast).
+        """Verify proof and bound anew; `rigorous`: in exact rational arithmetic (python-flint makes
+        it fast).
 
-        Exact: the doubles of the model, of the proof, of rates and bound are taken as the rationals they are, and LDL'
-        factorisations decide; nothing between grid points is left out. Without a proof nothing is verified.
+        Exact: the doubles of the model, of the proof, of rates and bound are taken as the rationals
+        they are, and LDL' factorisations decide; nothing between grid points is left out. Without a
+        proof nothing is verified.
         """
         proof, judge = self._proof
         if proof is None or judge is None or self.fault is not None:
@@ -184,7 +222,9 @@ class Verdict(ABC):
 
     @property
     def fault(self) -> str | None:
-        """Why the claim cannot be what was proven, by its form alone: a sentence, None where nothing is wrong or nothing is proven."""
+        """Why the claim cannot be what was proven, by its form alone: a sentence, None where
+        nothing is wrong or nothing is proven.
+        """
         proof, judge = self._proof
         if proof is None or judge is None:
             return None
@@ -217,9 +257,14 @@ class Verdict(ABC):
     def __str__(self) -> str:
         lines = [f"{self.kind}, {self._setting}: {self.status.value}"]
         if self.kind.endswith("gain"):
-            lines.append(f"  frozen {self.frozen:.6g} <= lower {self.lower:.6g} <= gain <= {self.gamma:.6g}")
+            lines.append(
+                f"  frozen {self.frozen:.6g} <= lower {self.lower:.6g} <= gain <= {self.gamma:.6g}"
+            )
         elif self.kind == "decay rate":
-            lines.append(f"  {self.alpha:.6g} <= decay rate <= {self.upper:.6g} <= frozen {self.frozen:.6g}, 1/s")
+            lines.append(
+                f"  {self.alpha:.6g} <= decay rate <= {self.upper:.6g} <= frozen"
+                f" {self.frozen:.6g}, 1/s"
+            )
         if self._form is not None:
             lines.append(f"  {self._form}, condition number {self.conditioning:.2g}")
         lines.append(f"  {self.solver}; {self.seconds}")

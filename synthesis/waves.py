@@ -1,4 +1,6 @@
-"""Periodic scheduling trajectories, and the linear time-varying system an LPV model becomes along one."""
+"""Periodic scheduling trajectories, and the linear time-varying system an LPV model becomes along
+one.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ GAUSS = math.sqrt(3.0) / 6.0
 
 
 class Wave(NamedTuple):
-    """p dwells at `bottom` and at `top` (s each) and ramps between them in `ramp` s (0: it jumps), over and over."""
+    """p dwells at `bottom` and at `top` (s each) and ramps between them in `ramp` s (0: it jumps),
+    over and over.
+    """
 
     bottom: float
     top: float
@@ -43,9 +47,11 @@ class Wave(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """z_k = [x; v] -> [x(k+1); y_k] = step[k] z_k, scaled so that |v|^2 and |y|^2 are energies. step (N, nx + r, nx + nu).
+    """z_k = [x; v] -> [x(k+1); y_k] = step[k] z_k, scaled so that |v|^2 and |y|^2 are energies.
+    step (N, nx + r, nx + nu).
 
-    In continuous time v is held over a step, and y stacks the outputs at its two Gauss points. `time` (N + 1,) in s.
+    In continuous time v is held over a step, and y stacks the outputs at its two Gauss points.
+    `time` (N + 1,) in s.
     """
 
     step: Array
@@ -62,24 +68,29 @@ class Steps(NamedTuple):
 
 
 def samples(trajectory: Trajectory, dt: float) -> Trajectory:
-    """One value of p a sample, from the start to one sample before the end: a cycle can be repeated as it is."""
+    """One value of p a sample, from the start to one sample before the end: a cycle can be repeated
+    as it is.
+    """
     time, p = trajectory
     at = time[0] + dt * np.arange(max(1, round((time[-1] - time[0]) / dt)))
     return Trajectory(at, np.interp(at, time, p))
 
 
 def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1) -> Steps:
-    """The model along straight lines between the corners (`time`, `p`), in steps of at most `longest` s, each cut in `split`.
+    """The model along straight lines between the corners (`time`, `p`), in steps of at most
+    `longest` s, each cut in `split`.
 
-    Continuous: fourth-order Magnus exponentials, exact where p rests (Hairer, Lubich and Wanner, IV.7). Discrete: its
-    own samples at multiples of dt.
+    Continuous: fourth-order Magnus exponentials, exact where p rests (Hairer, Lubich and Wanner,
+    IV.7). Discrete: its own samples at multiples of dt.
     """
     n = len(lpv.states)
     if lpv.dt is not None:
         sampled = samples(Trajectory(time, p), lpv.dt)
         A, B, C, D = lpv.matrices(_clip(lpv, sampled.p))
         at = np.append(sampled.time, sampled.time[-1] + lpv.dt)
-        return Steps(np.concatenate([np.concatenate([A, B], 2), np.concatenate([C, D], 2)], 1), at, n)
+        return Steps(
+            np.concatenate([np.concatenate([A, B], 2), np.concatenate([C, D], 2)], 1), at, n
+        )
     starts, widths, p0, slope = [], [], [], []
     for t0, t1, q0, q1 in zip(time[:-1], time[1:], p[:-1], p[1:], strict=True):
         if t1 - t0 <= 1e-12 * max(longest, 1e-300):

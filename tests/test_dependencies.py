@@ -1,4 +1,6 @@
-"""What is imported is declared: by itself where it is always needed, else as an extra whose name the message gives."""
+"""What is imported is declared: by itself where it is always needed, else as an extra whose name
+the message gives.
+"""
 
 import ast
 import re
@@ -28,7 +30,9 @@ def names(requirements):
 @cache
 def declared():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    return names(project["dependencies"]), {key: names(value) for key, value in project["optional-dependencies"].items()}
+    return names(project["dependencies"]), {
+        key: names(value) for key, value in project["optional-dependencies"].items()
+    }
 
 
 def parents(tree):
@@ -53,7 +57,11 @@ def imports(tree):
             yield from ((node, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             yield node, node.module
-        elif isinstance(node, ast.Call) and ast.unparse(node.func) == "importlib.import_module" and isinstance(node.args[0], ast.Constant):
+        elif (
+            isinstance(node, ast.Call)
+            and ast.unparse(node.func) == "importlib.import_module"
+            and isinstance(node.args[0], ast.Constant)
+        ):
             yield node, node.args[0].value
 
 
@@ -74,11 +82,18 @@ def complaint(source):
             continue
         said = [match[1] for text in around if (match := re.match(r"extra\('(\w+)'", text))]
         if not said or package not in extras.get(said[0], ()):
-            return f"{module} is no core dependency: import it inside `with extra(...)` of the extra that brings it"
+            return (
+                f"{module} is no core dependency: import it inside `with extra(...)` of the extra"
+                " that brings it"
+            )
     return ""
 
 
-@pytest.mark.parametrize("path", [p for room in ROOMS for p in sorted((ROOT / room).rglob("*.py"))], ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize(
+    "path",
+    [p for room in ROOMS for p in sorted((ROOT / room).rglob("*.py"))],
+    ids=lambda p: str(p.relative_to(ROOT)),
+)
 def test_every_import_is_declared(path):
     assert not complaint(path.read_text(encoding="utf-8"))
 
@@ -97,5 +112,10 @@ def test_an_import_that_nothing_declares_is_found():
 
 
 def test_a_missing_extra_is_named_with_what_it_is_for():
-    with pytest.raises(InputError, match=r"reading stars needs astrolabe: pip install 'symheli\[logs\]'"), extra("logs", "reading stars"):
+    with (
+        pytest.raises(
+            InputError, match=r"reading stars needs astrolabe: pip install 'symheli\[logs\]'"
+        ),
+        extra("logs", "reading stars"),
+    ):
         import astrolabe  # noqa: F401

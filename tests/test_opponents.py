@@ -1,4 +1,6 @@
-"""The helicopter written again by hand for the benchmarks: an independent check of the equations, and a fair race."""
+"""The helicopter written again by hand for the benchmarks: an independent check of the equations,
+and a fair race.
+"""
 
 import shutil
 import sys
@@ -22,12 +24,18 @@ ROUNDING = {"rtol": 1e-12, "atol": 1e-12}
 
 
 def motions(n):
-    """Quaternion-form states in flight and out of control, inputs to beyond blade stall, wind; away from the vortex ring."""
+    """Quaternion-form states in flight and out of control, inputs to beyond blade stall, wind; away
+    from the vortex ring.
+    """
     rng = np.random.default_rng(1)
     for _ in range(n):
         x = rng.standard_normal(15) * [8, 2, 1.5, 1, 1, 1, 1, 1, 1, 1, 50, 50, 50, 0.05, 0.05]
         x[6:10] /= np.linalg.norm(x[6:10])
-        yield x, rng.standard_normal(4) * [0.05, 0.05, 0.08, 0.1] + [0, 0, 0.1, 0.2], rng.standard_normal(3)
+        yield (
+            x,
+            rng.standard_normal(4) * [0.05, 0.05, 0.08, 0.1] + [0, 0, 0.1, 0.2],
+            rng.standard_normal(3),
+        )
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +43,15 @@ def flight(ideal):
     """Start in trim at 4 m/s, one second of doublets."""
     point = symheli.trim(ideal, 4.0)
     cp, sp, ct, st = (f(a / 2) for a in point.x.array[6:8] for f in (np.cos, np.sin))
-    x0 = np.concatenate([point.x.array[:6], [cp * ct, sp * ct, cp * st, -sp * st], np.zeros(3), point.x.array[8:]])
-    doublet = np.concatenate([np.ones(10), -np.ones(10), np.zeros(30)])[:, None] * [0.02, -0.01, 0.01, 0.03]
+    x0 = np.concatenate(
+        [point.x.array[:6], [cp * ct, sp * ct, cp * st, -sp * st], np.zeros(3), point.x.array[8:]]
+    )
+    doublet = np.concatenate([np.ones(10), -np.ones(10), np.zeros(30)])[:, None] * [
+        0.02,
+        -0.01,
+        0.01,
+        0.03,
+    ]
     return x0, point.u.array + doublet, np.array([1.0, -2.0, 0.3])
 
 
@@ -52,11 +67,17 @@ def ours(ideal, flight):
 def test_equations_written_by_hand_from_the_source_agree(ideal):
     by_hand, rhs, stalled = build(), ideal.numeric("flight_rhs"), 0
     for x, u, wind in motions(400):
-        np.testing.assert_allclose(by_hand.quaternion(*x.tolist(), *u.tolist(), *wind.tolist()), rhs(x, u, wind)[0], **ROUNDING)
+        np.testing.assert_allclose(
+            by_hand.quaternion(*x.tolist(), *u.tolist(), *wind.tolist()),
+            rhs(x, u, wind)[0],
+            **ROUNDING,
+        )
     euler, rhs = by_hand.euler, ideal.numeric("rhs")
     for x, u, _ in motions(100):
         z = np.concatenate([x[:6], 0.5 * x[6:8], x[13:]])
-        np.testing.assert_allclose(euler(*z.tolist(), *u.tolist()), rhs(z, u, np.zeros(3))[0], **ROUNDING)
+        np.testing.assert_allclose(
+            euler(*z.tolist(), *u.tolist()), rhs(z, u, np.zeros(3))[0], **ROUNDING
+        )
         stalled += ideal.switches(z, u)["main rotor stall"] < 0
     assert 5 < stalled < 60  # the thrust limit was among what was compared
 
@@ -93,6 +114,8 @@ def test_python_control_finds_the_same_trims_and_models(ideal):
     speeds = [0.0, 5.0, 7.0]
     family = symheli.sweep(ideal, speeds)
     for k, (x, u, model) in enumerate(python_control_sweep.sweep(np.array(speeds))):
-        np.testing.assert_allclose(x, family.trims[k].x.array, atol=1e-7)  # the solver stops at 1.5e-8
+        np.testing.assert_allclose(
+            x, family.trims[k].x.array, atol=1e-7
+        )  # the solver stops at 1.5e-8
         np.testing.assert_allclose(u, family.trims[k].u.array, atol=1e-7)
         np.testing.assert_allclose(model.A, family.A[k], atol=5e-5)  # forward differences of 1e-6

@@ -12,7 +12,15 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("symheli", "identification", "synthesis", "studies")
-PACKAGES = ("symheli", "symheli.equations", "symheli.lpv", "symheli.environment", "symheli.flight", "identification", "synthesis")
+PACKAGES = (
+    "symheli",
+    "symheli.equations",
+    "symheli.lpv",
+    "symheli.environment",
+    "symheli.flight",
+    "identification",
+    "synthesis",
+)
 SHARED = ("symheli.lpv", "symheli.errors", "symheli.extras")
 """What identification and synthesis may see of the model's room."""
 
@@ -43,25 +51,38 @@ def test_every_public_name_exists_and_is_documented(package):
         assert inspect.getdoc(thing), f"{package}.{name} has no docstring"
         if inspect.isclass(thing):
             for member, value in vars(thing).items():
-                if member.startswith("_") or not (callable(value) or isinstance(value, property | classmethod | staticmethod)):
+                if member.startswith("_") or not (
+                    callable(value) or isinstance(value, property | classmethod | staticmethod)
+                ):
                     continue
-                assert inspect.getdoc(getattr(thing, member)), f"{package}.{name}.{member} has no docstring"
+                assert inspect.getdoc(getattr(thing, member)), (
+                    f"{package}.{name}.{member} has no docstring"
+                )
     assert list(module.__all__) == list(dict.fromkeys(module.__all__))
 
 
 def test_importing_the_packages_loads_no_heavy_library():
     heavy = "('casadi', 'cvxpy', 'matplotlib', 'pandas', 'control', 'sympy')"
-    code = f"import sys, symheli, symheli.lpv, identification, synthesis; print([m for m in {heavy} if m in sys.modules])"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    code = (
+        f"import sys, symheli, symheli.lpv, identification, synthesis; print([m for m in {heavy} if"
+        " m in sys.modules])"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.strip()
     assert loaded == "[]"
 
 
 def test_a_script_beside_a_folder_called_symheli_imports_the_package(tmp_path):
-    """As a script beside the clone does: a folder without __init__.py must not pass for the package."""
+    """As a script beside the clone does: a folder without __init__.py must not pass for the
+    package.
+    """
     for room in ROOMS:
         (tmp_path / room).mkdir()
     script = tmp_path / "script.py"
-    script.write_text("import identification, studies, symheli, synthesis\nsymheli.Helicopter, synthesis.l2_gain")
+    script.write_text(
+        "import identification, studies, symheli, synthesis\nsymheli.Helicopter, synthesis.l2_gain"
+    )
     subprocess.run([sys.executable, str(script)], check=True, capture_output=True, cwd=tmp_path)
 
 
@@ -83,7 +104,9 @@ def test_the_rooms_import_one_way(room):
 
 
 def test_the_value_types_know_no_physics():
-    """symheli.lpv is what the other rooms see: of its own room it may only use the errors, and the log readers when called."""
+    """symheli.lpv is what the other rooms see: of its own room it may only use the errors, and the
+    log readers when called.
+    """
     wrong = [
         f"{path.relative_to(ROOT)} imports {name}"
         for path in sources("symheli/lpv")
@@ -95,7 +118,11 @@ def test_the_value_types_know_no_physics():
 
 def test_no_import_runs_in_a_circle():
     """Between files, counting only what is imported when the file is loaded."""
-    files = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): p for room in ROOMS for p in sources(room)}
+    files = {
+        ".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): p
+        for room in ROOMS
+        for p in sources(room)
+    }
     edges = {name: set() for name in files}
     for name, path in files.items():
         for node in ast.parse(path.read_text(encoding="utf-8")).body:

@@ -22,7 +22,10 @@ class CFlight:
             code = ctypes.CDLL(str(library))
         self._rates, self._fly = code.rates, code.fly
         self._rates.argtypes, self._rates.restype = [_ARRAY] * 4, None
-        self._fly.argtypes, self._fly.restype = [ctypes.c_int, ctypes.c_int, ctypes.c_double, _ARRAY, _ARRAY, _ARRAY], None
+        self._fly.argtypes, self._fly.restype = (
+            [ctypes.c_int, ctypes.c_int, ctypes.c_double, _ARRAY, _ARRAY, _ARRAY],
+            None,
+        )
 
     def rates(self, x: np.ndarray, u: np.ndarray, wind: np.ndarray) -> np.ndarray:
         """Derivatives (15,)."""
@@ -30,8 +33,12 @@ class CFlight:
         self._rates(x, u, wind, out)
         return out
 
-    def fly(self, x0: np.ndarray, inputs: np.ndarray, wind: np.ndarray, dt: float, steps: int) -> np.ndarray:
-        """States (n + 1, 15) under inputs (n, 4) held for `dt` s each, by `steps` classical Runge-Kutta steps an input."""
+    def fly(
+        self, x0: np.ndarray, inputs: np.ndarray, wind: np.ndarray, dt: float, steps: int
+    ) -> np.ndarray:
+        """States (n + 1, 15) under inputs (n, 4) held for `dt` s each, by `steps` classical
+        Runge-Kutta steps an input.
+        """
         states = np.empty((len(inputs) + 1, 15))
         states[0] = x0
         self._fly(len(inputs), steps, dt, inputs, wind, states)

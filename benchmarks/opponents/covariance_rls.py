@@ -1,4 +1,6 @@
-"""Recursive least squares as others write it: the textbook update of P in NumPy, and padasip's filter once an output."""
+"""Recursive least squares as others write it: the textbook update of P in NumPy, and padasip's
+filter once an output.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ import numpy as np
 
 
 class CovarianceRLS:
-    """The textbook, vectorised, one P for all outputs (it loses its definiteness with raw monomials)."""
+    """The textbook, vectorised, one P for all outputs (it loses its definiteness with raw
+    monomials).
+    """
 
     def __init__(self, n: int, outputs: int):
         self.P, self.theta = 1e6 * np.eye(n), np.zeros((n, outputs))

@@ -1,7 +1,8 @@
-"""X-Cell .60 with the rotor speed held, written by hand from Gavrilets (2015) as docs/model.md reads it; plain floats.
+"""X-Cell .60 with the rotor speed held, written by hand from Gavrilets (2015) as docs/model.md
+reads it; plain floats.
 
-`build()` gives the functions as Python; `build(numba.njit)` the same functions compiled. Nothing here comes from symheli: that both
-agree is a check of both (see tests/benchmarks).
+`build()` gives the functions as Python; `build(numba.njit)` the same functions compiled. Nothing
+here comes from symheli: that both agree is a check of both (see tests/benchmarks).
 """
 
 from math import cos, pi, sin, sqrt, tan
@@ -33,8 +34,10 @@ CONVERGED = 1e-9  # Newton squares the error: after a step this small the next o
 
 
 class Equations(NamedTuple):
-    """quaternion(u v w p q r q0 q1 q2 q3 x_n x_e x_d a1 b1, d_lon d_lat d_col d_ped, wind n e d) -> 15 derivatives;
-    euler(u v w p q r phi theta a1 b1, d_lon d_lat d_col d_ped) -> 10 derivatives, in still air."""
+    """quaternion(u v w p q r q0 q1 q2 q3 x_n x_e x_d a1 b1, d_lon d_lat d_col d_ped, wind n e d) ->
+    15 derivatives; euler(u v w p q r phi theta a1 b1, d_lon d_lat d_col d_ped) -> 10 derivatives,
+    in still air.
+    """
 
     quaternion: object
     euler: object
@@ -45,12 +48,15 @@ def build(compile=lambda function: function):
 
     @compile
     def inflow(c0, c1, ct_max, mu2, mu_z):
-        """(lam0, C_T): 2 eta lam0 sqrt(mu^2 + (lam0 - mu_z)^2) = C_T = c0 - c1 lam0, or +-ct_max where the blades stall."""
+        """(lam0, C_T): 2 eta lam0 sqrt(mu^2 + (lam0 - mu_z)^2) = C_T = c0 - c1 lam0, or +-ct_max
+        where the blades stall.
+        """
         sign = 1.0
         if c0 < 0:  # thrust down: the mirror image
             sign, c0, mu_z = -1.0, -c0, -mu_z
         for stalled in range(2):
-            # above the root: the axial solution (exact for mu = 0), and the one with all flow edgewise
+            # above the root: the axial solution (exact for mu = 0), and the one with all flow
+            # edgewise
             if c0 > c1 * mu_z or mu_z <= 0:
                 b = 2 * ETA_W * mu_z - c1
                 lam = (b + sqrt(b * b + 8 * ETA_W * c0)) / (4 * ETA_W)
@@ -60,7 +66,9 @@ def build(compile=lambda function: function):
             for _ in range(50):
                 axial = lam - mu_z
                 root = sqrt(mu2 + axial * axial)
-                step = (2 * ETA_W * lam * root - c0 + c1 * lam) / (2 * ETA_W * (root + lam * axial / (root + 1e-300)) + c1)
+                step = (2 * ETA_W * lam * root - c0 + c1 * lam) / (
+                    2 * ETA_W * (root + lam * axial / (root + 1e-300)) + c1
+                )
                 lam -= step
                 if abs(step) < CONVERGED:
                     break
@@ -71,13 +79,17 @@ def build(compile=lambda function: function):
 
     @compile
     def aerodynamics(u, v, w, p, q, r, a1, b1, d_lon, d_lat, d_col, d_ped):
-        """Force (N), moment with the shaft's reaction (N m), a1', b1' from the velocity through the air and the controls."""
+        """Force (N), moment with the shaft's reaction (N m), a1', b1' from the velocity through the
+        air and the controls.
+        """
         # main rotor
         mu_x, mu_y, mu_z = u / TIP_MR, v / TIP_MR, w / TIP_MR
         mu2 = mu_x * mu_x + mu_y * mu_y
         mu = sqrt(mu2)
         half = 0.5 * A_MR * SIGMA_MR
-        lam0, ct = inflow(half * (d_col * (1 / 3 + 0.5 * mu2) + 0.5 * mu_z), 0.5 * half, CTMAX_MR, mu2, mu_z)
+        lam0, ct = inflow(
+            half * (d_col * (1 / 3 + 0.5 * mu2) + 0.5 * mu_z), 0.5 * half, CTMAX_MR, mu2, mu_z
+        )
         T = ct * FORCE_MR
         Q = (ct * (lam0 - mu_z) + CD0_MR * SIGMA_MR / 8 * (1 + 7 / 3 * mu2)) * FORCE_MR * R_MR
         v_i = lam0 * TIP_MR
@@ -102,14 +114,26 @@ def build(compile=lambda function: function):
         flow2 = u * u + w_tr * w_tr
         mu2_tr, muz_tr = flow2 / (TIP_TR * TIP_TR), v_tr / TIP_TR
         half_tr = 0.5 * A_TR * SIGMA_TR
-        lam_tr, ct_tr = inflow(half_tr * (d_ped * (1 / 3 + 0.5 * mu2_tr) + 0.5 * muz_tr), 0.5 * half_tr, CTMAX_TR, mu2_tr, muz_tr)
-        Q_tr = (ct_tr * (lam_tr - muz_tr) + CD0_TR * SIGMA_TR / 8 * (1 + 7 / 3 * mu2_tr)) * FORCE_TR * R_TR
+        lam_tr, ct_tr = inflow(
+            half_tr * (d_ped * (1 / 3 + 0.5 * mu2_tr) + 0.5 * muz_tr),
+            0.5 * half_tr,
+            CTMAX_TR,
+            mu2_tr,
+            muz_tr,
+        )
+        Q_tr = (
+            (ct_tr * (lam_tr - muz_tr) + CD0_TR * SIGMA_TR / 8 * (1 + 7 / 3 * mu2_tr))
+            * FORCE_TR
+            * R_TR
+        )
         Y_tail = -BLOCKAGE * ct_tr * FORCE_TR
 
         # vertical fin, at the tail rotor
         v_vf = v - EPS_VF * lam_tr * TIP_TR - L_TR * r
         limit = 0.5 * RHO * S_VF * (flow2 + v_vf * v_vf)
-        Y_tail += min(max(-0.5 * RHO * S_VF * (CLA_VF * sqrt(flow2) + abs(v_vf)) * v_vf, -limit), limit)
+        Y_tail += min(
+            max(-0.5 * RHO * S_VF * (CLA_VF * sqrt(flow2) + abs(v_vf)) * v_vf, -limit), limit
+        )
 
         # horizontal tail
         w_ht = w + L_HT * q - wake
@@ -126,20 +150,63 @@ def build(compile=lambda function: function):
             -Y_tail * L_TR - Q - N_TR * Q_tr,
             a1_dot,
             b1_dot,
-        )  # fmt: skip
+        )
 
     @compile
-    def quaternion(u, v, w, p, q, r, q0, q1, q2, q3, x_n, x_e, x_d, a1, b1, d_lon, d_lat, d_col, d_ped, w_n, w_e, w_d):
+    def quaternion(
+        u,
+        v,
+        w,
+        p,
+        q,
+        r,
+        q0,
+        q1,
+        q2,
+        q3,
+        x_n,
+        x_e,
+        x_d,
+        a1,
+        b1,
+        d_lon,
+        d_lat,
+        d_col,
+        d_ped,
+        w_n,
+        w_e,
+        w_d,
+    ):
         # body to earth
-        r00, r01, r02 = q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, 2 * (q1 * q2 - q0 * q3), 2 * (q1 * q3 + q0 * q2)
-        r10, r11, r12 = 2 * (q1 * q2 + q0 * q3), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, 2 * (q2 * q3 - q0 * q1)
-        r20, r21, r22 = 2 * (q1 * q3 - q0 * q2), 2 * (q2 * q3 + q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3
+        r00, r01, r02 = (
+            q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3,
+            2 * (q1 * q2 - q0 * q3),
+            2 * (q1 * q3 + q0 * q2),
+        )
+        r10, r11, r12 = (
+            2 * (q1 * q2 + q0 * q3),
+            q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3,
+            2 * (q2 * q3 - q0 * q1),
+        )
+        r20, r21, r22 = (
+            2 * (q1 * q3 - q0 * q2),
+            2 * (q2 * q3 + q0 * q1),
+            q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3,
+        )
         X, Y, Z, L, M, N, a1_dot, b1_dot = aerodynamics(
             u - (r00 * w_n + r10 * w_e + r20 * w_d),
             v - (r01 * w_n + r11 * w_e + r21 * w_d),
             w - (r02 * w_n + r12 * w_e + r22 * w_d),
-            p, q, r, a1, b1, d_lon, d_lat, d_col, d_ped,
-        )  # fmt: skip
+            p,
+            q,
+            r,
+            a1,
+            b1,
+            d_lon,
+            d_lat,
+            d_col,
+            d_ped,
+        )
         return (
             v * r - w * q + r20 * G + X / MASS,
             w * p - u * r + r21 * G + Y / MASS,
@@ -156,11 +223,13 @@ def build(compile=lambda function: function):
             r20 * u + r21 * v + r22 * w,
             a1_dot,
             b1_dot,
-        )  # fmt: skip
+        )
 
     @compile
     def euler(u, v, w, p, q, r, phi, theta, a1, b1, d_lon, d_lat, d_col, d_ped):
-        X, Y, Z, L, M, N, a1_dot, b1_dot = aerodynamics(u, v, w, p, q, r, a1, b1, d_lon, d_lat, d_col, d_ped)
+        X, Y, Z, L, M, N, a1_dot, b1_dot = aerodynamics(
+            u, v, w, p, q, r, a1, b1, d_lon, d_lat, d_col, d_ped
+        )
         s, c = sin(phi), cos(phi)
         return (
             v * r - w * q - G * sin(theta) + X / MASS,
@@ -173,6 +242,6 @@ def build(compile=lambda function: function):
             q * c - r * s,
             a1_dot,
             b1_dot,
-        )  # fmt: skip
+        )
 
     return Equations(quaternion, euler)

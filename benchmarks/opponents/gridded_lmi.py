@@ -1,4 +1,5 @@
-"""The gain of an LPV model as a user of cvxpy writes it: bounded real lemma on a grid, P a Legendre polynomial, Clarabel.
+"""The gain of an LPV model as a user of cvxpy writes it: bounded real lemma on a grid, P a Legendre
+polynomial, Clarabel.
 
 Nothing is said between grid points, and the solver's word is taken.
 """
@@ -14,8 +15,12 @@ from numpy.polynomial import legendre
 Matrices = Callable[[float], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
 
 
-def gain(matrices: Matrices, low: float, high: float, rate: float, degree: int = 6, points: int = 51) -> tuple[float, float]:
-    """(gain, seconds in the solver) of x' = A(p) x + B(p) u, y = C(p) x + D(p) u for |dp/dt| <= `rate` on `points` of [low, high]."""
+def gain(
+    matrices: Matrices, low: float, high: float, rate: float, degree: int = 6, points: int = 51
+) -> tuple[float, float]:
+    """(gain, seconds in the solver) of x' = A(p) x + B(p) u, y = C(p) x + D(p) u for |dp/dt| <=
+    `rate` on `points` of [low, high].
+    """
     A, B, C, D = matrices(low)
     n, m = B.shape
     P = [cp.Variable((n, n), symmetric=True) for _ in range(degree + 1)]

@@ -5,7 +5,9 @@ import numpy as np
 
 from benchmarks.opponents.equations import build
 
-COMPILE = numba.njit(error_model="numpy", fastmath=True)  # fastmath takes a quarter off the time here
+COMPILE = numba.njit(
+    error_model="numpy", fastmath=True
+)  # fastmath takes a quarter off the time here
 EQUATIONS = build(COMPILE)
 derivatives = EQUATIONS.quaternion
 
@@ -13,16 +15,38 @@ derivatives = EQUATIONS.quaternion
 @COMPILE
 def _rates(x, u, wind, out):
     d = derivatives(
-        x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14],
-        u[0], u[1], u[2], u[3], wind[0], wind[1], wind[2],
-    )  # fmt: skip
+        x[0],
+        x[1],
+        x[2],
+        x[3],
+        x[4],
+        x[5],
+        x[6],
+        x[7],
+        x[8],
+        x[9],
+        x[10],
+        x[11],
+        x[12],
+        x[13],
+        x[14],
+        u[0],
+        u[1],
+        u[2],
+        u[3],
+        wind[0],
+        wind[1],
+        wind[2],
+    )
     for i in range(15):
         out[i] = d[i]
 
 
 @COMPILE
 def fly(x0, inputs, wind, dt, steps):
-    """States (n + 1, 15) under inputs (n, 4) held for `dt` s each, by `steps` classical Runge-Kutta steps an input."""
+    """States (n + 1, 15) under inputs (n, 4) held for `dt` s each, by `steps` classical Runge-Kutta
+    steps an input.
+    """
     n, h = len(inputs), dt / steps
     states = np.empty((n + 1, 15))
     x, z = x0.copy(), np.empty(15)
@@ -50,7 +74,9 @@ def fly(x0, inputs, wind, dt, steps):
 
 @numba.njit(error_model="numpy", fastmath=True, parallel=True)
 def fly_many(x0, inputs, winds, dt, steps):
-    """Last states (m, 15) of m flights from x0 (m, 15) in winds (m, 3) under the same inputs (n, 4), on all cores."""
+    """Last states (m, 15) of m flights from x0 (m, 15) in winds (m, 3) under the same inputs (n,
+    4), on all cores.
+    """
     ends = np.empty((len(x0), 15))
     for j in numba.prange(len(x0)):
         ends[j] = fly(x0[j], inputs, winds[j], dt, steps)[-1]

@@ -1,4 +1,6 @@
-"""Trim and linearization along airspeed in python-control, on the hand-written equations in Python."""
+"""Trim and linearization along airspeed in python-control, on the hand-written equations in
+Python.
+"""
 
 from math import cos, sin
 
@@ -27,13 +29,23 @@ def helicopter():
         u_, v, w, _, _, _, phi, theta, _, _ = x.tolist()
         s, c = sin(phi), cos(phi)
         across = v * s + w * c
-        return np.array([u_ * cos(theta) + across * sin(theta), v * c - w * s, across * cos(theta) - u_ * sin(theta)])
+        return np.array(
+            [
+                u_ * cos(theta) + across * sin(theta),
+                v * c - w * s,
+                across * cos(theta) - u_ * sin(theta),
+            ]
+        )
 
-    return control.nlsys(update, output, name="helicopter", states=STATES, inputs=INPUTS, outputs=OUTPUTS)
+    return control.nlsys(
+        update, output, name="helicopter", states=STATES, inputs=INPUTS, outputs=OUTPUTS
+    )
 
 
 def sweep(airspeeds: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, control.StateSpace]]:
-    """Trim state, trim input and linear model at each airspeed (m/s), each trim started from the one before."""
+    """Trim state, trim input and linear model at each airspeed (m/s), each trim started from the
+    one before.
+    """
     system, (x, u), models = helicopter(), HOVER, []
     for speed in airspeeds:
         x, u = _find(system, x, u, y0=[speed, 0.0, 0.0], ix=_RATES, iy=_VELOCITIES, idx=_BALANCES)

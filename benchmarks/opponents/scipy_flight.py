@@ -18,9 +18,11 @@ def fly(
     rtol: float,
     unpack: Callable[[np.ndarray], Iterable] = np.ndarray.tolist,
 ) -> np.ndarray:
-    """States (n + 1, 15) under inputs (n, 4) held for `dt` s each; the integrator starts afresh where the input jumps.
+    """States (n + 1, 15) under inputs (n, 4) held for `dt` s each; the integrator starts afresh
+    where the input jumps.
 
-    `unpack` takes the state array apart: to Python floats, the fastest, or with `iter` to NumPy's, as it is mostly written.
+    `unpack` takes the state array apart: to Python floats, the fastest, or with `iter` to NumPy's,
+    as it is mostly written.
     """
     states = np.empty((len(inputs) + 1, 15))
     states[0] = x0

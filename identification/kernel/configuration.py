@@ -1,4 +1,6 @@
-"""What the kernel is told about a structure, and where in its memory everything lies; the same for C and NumPy."""
+"""What the kernel is told about a structure, and where in its memory everything lies; the same for
+C and NumPy.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,9 @@ class Triangle:
     @cached_property
     def blocks(self) -> tuple[slice, ...]:
         """Where each block of LANES rows lies, row after row."""
-        ends = np.cumsum([LANES * (self.wide - start) for start in range(0, self.wide, LANES)]).tolist()
+        ends = np.cumsum(
+            [LANES * (self.wide - start) for start in range(0, self.wide, LANES)]
+        ).tolist()
         return tuple(slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
 
     def full(self, packed: Array) -> Array:
@@ -71,7 +75,9 @@ class Triangle:
 
 @dataclass(frozen=True)
 class GroupLayout:
-    """Where the parts of a group of n regressors and m outputs lie, `state` and `work` numbers after the start of the whole."""
+    """Where the parts of a group of n regressors and m outputs lie, `state` and `work` numbers
+    after the start of the whole.
+    """
 
     group: Group
     n: int
@@ -89,16 +95,35 @@ class GroupLayout:
         """Slices of the state by name."""
         tall, high = padded(self.n), padded(self.m)
         sizes = {
-            "header": GROUP_HEADER, "triangle": self.triangle.size, "d": self.triangle.wide, "theta": self.m * tall, "peak": tall,
-            "energy": tall, "fed": tall, "recent": high, "usual": high, "power": high, "drift": high,
-        }  # fmt: skip
+            "header": GROUP_HEADER,
+            "triangle": self.triangle.size,
+            "d": self.triangle.wide,
+            "theta": self.m * tall,
+            "peak": tall,
+            "energy": tall,
+            "fed": tall,
+            "recent": high,
+            "usual": high,
+            "power": high,
+            "drift": high,
+        }
         return _slices(sizes, self.state)
 
     @cached_property
     def in_work(self) -> dict[str, slice]:
         """Slices of the scratch by name."""
         tall, high, wide = padded(self.n), padded(self.m), self.triangle.wide
-        return _slices({"phi": tall, "x": wide, "s": wide, "gain": tall, "solution": tall * high, "innovation": high}, self.work)
+        return _slices(
+            {
+                "phi": tall,
+                "x": wide,
+                "s": wide,
+                "gain": tall,
+                "solution": tall * high,
+                "innovation": high,
+            },
+            self.work,
+        )
 
     @property
     def end(self) -> tuple[int, int]:
@@ -108,7 +133,9 @@ class GroupLayout:
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """Functions of one parameter: `knots` (pieces + 1,), `bernstein` (pieces, functions, degree + 1), `slack` for rounding at the ends."""
+    """Functions of one parameter: `knots` (pieces + 1,), `bernstein` (pieces, functions, degree +
+    1), `slack` for rounding at the ends.
+    """
 
     knots: Array
     bernstein: Array
@@ -116,13 +143,17 @@ class Factor:
 
     @classmethod
     def of(cls, basis: Basis, dtype: type[np.floating]) -> Factor:
-        """Raises `InputError` where the functions are not piecewise polynomial; lower degrees are raised to the highest."""
+        """Raises `InputError` where the functions are not piecewise polynomial; lower degrees are
+        raised to the highest.
+        """
         pieces = basis.pieces()
         degree = max(piece.bernstein.shape[1] for piece in pieces) - 1
         knots = np.array([pieces[0].low, *(piece.high for piece in pieces)], dtype)
         rounding = 4 * float(np.finfo(dtype).eps) * max(abs(basis.low), abs(basis.high))
         slack = max(1e-9 * (basis.high - basis.low), rounding)
-        return cls(knots, np.array([_raised(piece.bernstein, degree) for piece in pieces], dtype), slack)
+        return cls(
+            knots, np.array([_raised(piece.bernstein, degree) for piece in pieces], dtype), slack
+        )
 
     @property
     def arguments(self) -> tuple:
@@ -142,15 +173,22 @@ class Configuration:
     @cached_property
     def entries(self) -> Array:
         """(entries, 4): kind, channel, lag, lag of p."""
-        return np.array([(KINDS.index(e.kind), e.channel, e.lag, e.p_lag) for e in self.structure.entries], np.int32)
+        return np.array(
+            [(KINDS.index(e.kind), e.channel, e.lag, e.p_lag) for e in self.structure.entries],
+            np.int32,
+        )
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
-        """Those of the basis, one a scheduling parameter; none where its functions are not piecewise polynomial."""
+        """Those of the basis, one a scheduling parameter; none where its functions are not
+        piecewise polynomial.
+        """
         basis = self.structure.basis
         factors = basis.factors if isinstance(basis, Product) else (basis,)
         try:
-            return tuple(Factor.of(factor, self.dtype) for factor in factors if isinstance(factor, Basis))
+            return tuple(
+                Factor.of(factor, self.dtype) for factor in factors if isinstance(factor, Basis)
+            )
         except InputError:
             return ()
 
@@ -169,11 +207,18 @@ class Configuration:
     @property
     def width(self) -> int:
         """Numbers kept of a sample: y, u, p, f(p)."""
-        return self.structure.ny + self.structure.nu + len(self.structure.parameters) + self.structure.basis.size
+        return (
+            self.structure.ny
+            + self.structure.nu
+            + len(self.structure.parameters)
+            + self.structure.basis.size
+        )
 
     @property
     def sample(self) -> int:
-        """Numbers the kernel takes of a sample: y, u, p, and f(p) where it does not know the functions."""
+        """Numbers the kernel takes of a sample: y, u, p, and f(p) where it does not know the
+        functions.
+        """
         return self.width - (self.structure.basis.size if self.factors else 0)
 
     @property
@@ -191,7 +236,9 @@ class Configuration:
         state = HEADER + padded(self.past.stop - HEADER)
         work = padded(arx.n_regressors) + padded(arx.ny)
         for group in arx.groups:
-            layout = GroupLayout(group, len(group.entries) * arx.basis.size, len(group.outputs), state, work)
+            layout = GroupLayout(
+                group, len(group.entries) * arx.basis.size, len(group.outputs), state, work
+            )
             yield layout
             state, work = layout.end
 
@@ -204,18 +251,38 @@ class Configuration:
     def arguments(self) -> tuple:
         """What `Kernel` is made from, compiled or not."""
         arx = self.structure
-        groups = tuple((len(g.outputs), np.array(g.outputs, np.int32), len(g.entries), np.array(g.entries, np.int32)) for g in arx.groups)
+        groups = tuple(
+            (
+                len(g.outputs),
+                np.array(g.outputs, np.int32),
+                len(g.entries),
+                np.array(g.entries, np.int32),
+            )
+            for g in arx.groups
+        )
         return (
-            arx.ny, arx.nu, len(arx.parameters), arx.memory, len(self.entries), self.entries, groups, arx.basis.size,
-            tuple(f.arguments for f in self.factors), sum((f.knots.size + f.bernstein.size for f in self.factors), self.largest.size),
-            self.index, self.largest, numbers(self.forgetting),
-        )  # fmt: skip
+            arx.ny,
+            arx.nu,
+            len(arx.parameters),
+            arx.memory,
+            len(self.entries),
+            self.entries,
+            groups,
+            arx.basis.size,
+            tuple(f.arguments for f in self.factors),
+            sum((f.knots.size + f.bernstein.size for f in self.factors), self.largest.size),
+            self.index,
+            self.largest,
+            numbers(self.forgetting),
+        )
 
 
 def _raised(coefficients: Array, degree: int) -> Array:
     while (d := coefficients.shape[1] - 1) < degree:
         share = np.arange(d + 2) / (d + 1)
-        coefficients = np.pad(coefficients, ((0, 0), (1, 0))) * share + np.pad(coefficients, ((0, 0), (0, 1))) * (1 - share)
+        coefficients = np.pad(coefficients, ((0, 0), (1, 0))) * share + np.pad(
+            coefficients, ((0, 0), (0, 1))
+        ) * (1 - share)
     return np.ascontiguousarray(coefficients)
 
 

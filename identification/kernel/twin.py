@@ -1,4 +1,6 @@
-"""The kernel in NumPy: the operations of rls.c in the same order on the same memory, for where no compiled one is installed."""
+"""The kernel in NumPy: the operations of rls.c in the same order on the same memory, for where no
+compiled one is installed.
+"""
 
 from __future__ import annotations
 
@@ -31,14 +33,24 @@ class Limits:
         """`real` is float or np.float32."""
         epsilon = real(np.finfo(real).eps)
         single = real is np.float32
-        return cls(epsilon, real(PRIOR) * epsilon, real(1e15 if single else 1e145), real(1e-36 if single else 1e-290))
+        return cls(
+            epsilon,
+            real(PRIOR) * epsilon,
+            real(1e15 if single else 1e145),
+            real(1e-36 if single else 1e-290),
+        )
 
 
 class View:
     """The parts of one group in a state and its scratch, by the names they have in rls.c."""
 
     def __init__(self, layout: GroupLayout, state: Array, work: Array):
-        self.n, self.m, self.wide, self.tall = layout.n, layout.m, layout.triangle.wide, at.padded(layout.n)
+        self.n, self.m, self.wide, self.tall = (
+            layout.n,
+            layout.m,
+            layout.triangle.wide,
+            at.padded(layout.n),
+        )
         self.outputs = slice(self.tall, self.tall + self.m)
         for memory, parts in ((state, layout.in_state), (work, layout.in_work)):
             for name, part in parts.items():
@@ -78,8 +90,12 @@ class Kernel:
         self._real: Any = float if configuration.dtype is np.float64 else configuration.dtype
         real, (kind, *values) = self._real, configuration.arguments[-1]
         self._limits, self._kind = Limits.of(real), kind
-        self._factor, self._lowest, self._recent, self._usual, self._quiet, self._floor = map(real, values)
-        self._columns = [configuration.structure.regressors(layout.group) for layout in configuration.groups]
+        self._factor, self._lowest, self._recent, self._usual, self._quiet, self._floor = map(
+            real, values
+        )
+        self._columns = [
+            configuration.structure.regressors(layout.group) for layout in configuration.groups
+        ]
 
     def sizes(self) -> tuple[int, int]:
         """Numbers in the state, numbers of scratch."""
@@ -95,10 +111,19 @@ class Kernel:
                 row[i % LANES] = 1
             view.fill_empty_rows()
 
-    def update(self, state: Array, work: Array, y: Array, u: Array, p: Any, f: Array | None = None) -> int:
-        """Take in one sample, with the functions f(p) where the configuration has no factors; returns the status bits."""
-        if (f is None) != bool(self._c.factors) or not all(isinstance(v, np.ndarray) and v.dtype == np.float64 for v in (y, u)):
-            raise TypeError("expected float64 arrays, and the functions only where the kernel does not know them")
+    def update(
+        self, state: Array, work: Array, y: Array, u: Array, p: Any, f: Array | None = None
+    ) -> int:
+        """Take in one sample, with the functions f(p) where the configuration has no factors;
+        returns the status bits.
+        """
+        if (f is None) != bool(self._c.factors) or not all(
+            isinstance(v, np.ndarray) and v.dtype == np.float64 for v in (y, u)
+        ):
+            raise TypeError(
+                "expected float64 arrays, and the functions only where the kernel does not know"
+                " them"
+            )
         if y.shape != (self._c.structure.ny,) or u.shape != (self._c.structure.nu,):
             raise ValueError("wrong number of outputs or inputs")
         parts = (y, u, np.atleast_1d(p)) if f is None else (y, u, np.atleast_1d(p), f)
@@ -108,13 +133,22 @@ class Kernel:
     def absorb(self, state: Array, work: Array, phi: Array, y: Array) -> int:
         """Take in one regressor and the outputs it must explain; returns the status bits."""
         sizes = (phi, self._c.structure.n_regressors), (y, self._c.structure.ny)
-        if not all(isinstance(v, np.ndarray) and v.dtype == np.float64 and v.shape == (n,) for v, n in sizes):
+        if not all(
+            isinstance(v, np.ndarray) and v.dtype == np.float64 and v.shape == (n,)
+            for v, n in sizes
+        ):
             raise TypeError("expected float64 arrays, a number for each regressor and each output")
         with np.errstate(all="ignore"):
             return self._absorb(state, work, phi.astype(self._c.dtype), y.astype(self._c.dtype))
 
     def run(
-        self, state: Array, work: Array, samples: Array, statuses: Array, innovations: Array | None, coefficients: Array | None
+        self,
+        state: Array,
+        work: Array,
+        samples: Array,
+        statuses: Array,
+        innovations: Array | None,
+        coefficients: Array | None,
     ) -> None:
         """Take in rows [y, u, p], or [y, u, p, f]; fills a row of each array for each."""
         ny, after = self._c.structure.ny, at.padded(self._c.structure.n_regressors)
@@ -130,7 +164,9 @@ class Kernel:
         c, arx = self._c, self._c.structure
         p = sample[arx.ny + arx.nu :][: len(arx.parameters)]
         refused = bool((np.abs(sample) > self._limits.largest).any())
-        refused = refused or any(is_outside(x, factor) for x, factor in zip(p, c.factors, strict=False))
+        refused = refused or any(
+            is_outside(x, factor) for x, factor in zip(p, c.factors, strict=False)
+        )
         if refused or np.isnan(sample).any():
             state[at.FILLED] = 0
             return self._status(state) | (REFUSED if refused else 0)
@@ -295,13 +331,17 @@ class Kernel:
     @property
     def _fastest(self) -> Any:
         """The fastest a coefficient forgets that nothing excites."""
-        return {CONSTANT: self._factor, VARIABLE: self._lowest, DIRECTIONAL: self._real(1)}[self._kind]
+        return {CONSTANT: self._factor, VARIABLE: self._lowest, DIRECTIONAL: self._real(1)}[
+            self._kind
+        ]
 
     def _wakefulness(self, n: int) -> Any:
         real = self._real
         if self._fastest == 1:
             return self._limits.prior
-        return max(self._limits.prior, real(2) * self._floor / max(power(self._fastest, n), real(1e-12)))
+        return max(
+            self._limits.prior, real(2) * self._floor / max(power(self._fastest, n), real(1e-12))
+        )
 
     def _replenish(self, a: View, samples: Any, j: int, kept_awake: bool) -> None:
         real = self._real
@@ -348,7 +388,9 @@ class Kernel:
             else:
                 inverse, value = self._renew_rows(a, start, rows, kept, inverse, value)
 
-    def _renew_rows(self, a: View, start: int, rows: int, kept: Any, inverse: Any, value: Any) -> tuple[Any, Any]:
+    def _renew_rows(
+        self, a: View, start: int, rows: int, kept: Any, inverse: Any, value: Any
+    ) -> tuple[Any, Any]:
         real, tiny, one, x = self._real, self._limits.tiny, self._real(1), a.x[start:]
         for i, row in enumerate(a.blocks[start // LANES][:rows]):
             f, d, gain = real(x[i]), kept * real(a.d[start + i]), real(0)
@@ -437,7 +479,9 @@ def running_sums(v: Array) -> Array:
 
 
 def times(rows: Array, b: Array) -> Array:
-    """rows (k, n) times b (n,), summed as in rls.c: LANES partial sums from the last column on, then these in pairs."""
+    """rows (k, n) times b (n,), summed as in rls.c: LANES partial sums from the last column on,
+    then these in pairs.
+    """
     s = (rows * b).reshape(len(rows), -1, LANES)[:, ::-1].sum(axis=1)
     s = s[:, :4] + s[:, 4:]
     s = s[:, :2] + s[:, 2:]
@@ -449,7 +493,9 @@ def find_gain(a: View) -> None:
     for start in range(a.tall - LANES, -1, -LANES):
         block = a.blocks[start // LANES]
         g = a.gain[start : start + LANES]
-        g[:] = a.s[start : start + LANES] - times(block[:, LANES : a.tall - start], a.gain[start + LANES :])
+        g[:] = a.s[start : start + LANES] - times(
+            block[:, LANES : a.tall - start], a.gain[start + LANES :]
+        )
         for i in range(LANES - 1, 0, -1):
             g[:i] -= block[:i, i] * g[i]
 
@@ -463,11 +509,18 @@ def solve_anew(a: View) -> None:
     """theta <- R^-1 Z, unless the factor is full."""
     if is_full(a.header):
         return
-    solution = np.array([row[a.outputs.start - i // LANES * LANES :][: a.m] for i, row in enumerate(a.rows[: a.tall])])
+    solution = np.array(
+        [
+            row[a.outputs.start - i // LANES * LANES :][: a.m]
+            for i, row in enumerate(a.rows[: a.tall])
+        ]
+    )
     for k in range(a.tall - 1, 0, -1):
         for start in range(0, k, LANES):
             rows = min(k - start, LANES)
-            solution[start : start + rows] -= a.blocks[start // LANES][:rows, k - start, None] * solution[k]
+            solution[start : start + rows] -= (
+                a.blocks[start // LANES][:rows, k - start, None] * solution[k]
+            )
     a.theta[:] = solution.T
     a.drift[:] = 0
     a.header[at.SINCE] = 0

@@ -12,8 +12,19 @@ HELP = "repeat the identification over many seeds: how much do the numbers scatt
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """How many, of which airframe."""
-    parser.add_argument("--vehicle", default="xcell60", metavar="NAME", help="packaged airframe or TOML file (default: %(default)s)")
-    parser.add_argument("--seeds", type=at_least_one, default=20, metavar="N", help="number of seeds (default: %(default)s)")
+    parser.add_argument(
+        "--vehicle",
+        default="xcell60",
+        metavar="NAME",
+        help="packaged airframe or TOML file (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=at_least_one,
+        default=20,
+        metavar="N",
+        help="number of seeds (default: %(default)s)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:

@@ -1,4 +1,6 @@
-"""symheli certify: a proven gain of the lateral loop while the airspeed changes at a bounded rate."""
+"""symheli certify: a proven gain of the lateral loop while the airspeed changes at a bounded
+rate.
+"""
 
 from __future__ import annotations
 
@@ -19,24 +21,69 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Rate, range and channel."""
     options.vehicle(parser)
     parser.add_argument(
-        "--rate", type=options.rate, default=3.0, metavar="M/S^2", help="largest |dV/dt|, m/s^2, or inf (default: %(default)s)"
+        "--rate",
+        type=options.rate,
+        default=3.0,
+        metavar="M/S^2",
+        help="largest |dV/dt|, m/s^2, or inf (default: %(default)s)",
     )
     parser.add_argument(
-        "--airspeeds", type=options.number, nargs=2, default=(0.0, 13.0), metavar=("LOW", "HIGH"), help="range, m/s (default: 0 13)"
+        "--airspeeds",
+        type=options.number,
+        nargs=2,
+        default=(0.0, 13.0),
+        metavar=("LOW", "HIGH"),
+        help="range, m/s (default: 0 13)",
     )
     parser.add_argument(
-        "--channel", choices=("gust", "inputs"), default="gust", help="lateral gust, or disturbances at the inputs, -> r, phi"
+        "--channel",
+        choices=("gust", "inputs"),
+        default="gust",
+        help="lateral gust, or disturbances at the inputs, -> r, phi",
     )
-    parser.add_argument("--lft", metavar="TEST", help="a classical LFT test instead: small gain, D, DG or full block; --rate plays no part")
-    parser.add_argument("--memory", type=options.positive, metavar="S", help="P depends on a lag of the airspeed of S seconds, too")
     parser.add_argument(
-        "--across", type=options.at_least_one, nargs=2, default=(3, 2), metavar=("L", "D"), help="segments and degree of the memory (3 2)"
+        "--lft",
+        metavar="TEST",
+        help="a classical LFT test instead: small gain, D, DG or full block; --rate plays no part",
     )
-    parser.add_argument("--order", type=options.at_least_one, default=1, metavar="M", help="V of degree 2M in the states, for --stability")
-    parser.add_argument("--segments", type=options.at_least_one, nargs="+", metavar="K", help="segments of P in airspeed, tried in turn")
-    parser.add_argument("--grading", type=options.positive, metavar="G", help="knots at (k/K)^G of the range (2; with a memory 1.5)")
+    parser.add_argument(
+        "--memory",
+        type=options.positive,
+        metavar="S",
+        help="P depends on a lag of the airspeed of S seconds, too",
+    )
+    parser.add_argument(
+        "--across",
+        type=options.at_least_one,
+        nargs=2,
+        default=(3, 2),
+        metavar=("L", "D"),
+        help="segments and degree of the memory (3 2)",
+    )
+    parser.add_argument(
+        "--order",
+        type=options.at_least_one,
+        default=1,
+        metavar="M",
+        help="V of degree 2M in the states, for --stability",
+    )
+    parser.add_argument(
+        "--segments",
+        type=options.at_least_one,
+        nargs="+",
+        metavar="K",
+        help="segments of P in airspeed, tried in turn",
+    )
+    parser.add_argument(
+        "--grading",
+        type=options.positive,
+        metavar="G",
+        help="knots at (k/K)^G of the range (2; with a memory 1.5)",
+    )
     parser.add_argument("--stability", action="store_true", help="stability only, no gain")
-    parser.add_argument("--rigorous", action="store_true", help="verify once more in exact rational arithmetic")
+    parser.add_argument(
+        "--rigorous", action="store_true", help="verify once more in exact rational arithmetic"
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -55,19 +102,36 @@ def run(arguments: argparse.Namespace) -> Output:
     else:
         progress(f"searching a Lyapunov function for |dV/dt| <= {arguments.rate:g} m/s^2")
         certify = synthesis.stability if arguments.stability else synthesis.l2_gain
-        cert, rate = certify(loop, rate=arguments.rate, relaxation=_relaxation(arguments)), arguments.rate
+        cert, rate = (
+            certify(loop, rate=arguments.rate, relaxation=_relaxation(arguments)),
+            arguments.rate,
+        )
     exact = None
     if arguments.rigorous:
         progress("verifying in rational arithmetic")
         exact = cert.verify(rigorous=True)
-    head = f"lateral loop of {arguments.vehicle}, d_lat = {HOLD:g} phi, {low:g} to {high:g} m/s, {arguments.channel} -> r, phi (SI)"
-    text = f"{head}\n{cert}" + ("" if exact is None else f"\n  exact verification: {'passed' if exact else 'not passed'}")
+    head = (
+        f"lateral loop of {arguments.vehicle}, d_lat = {HOLD:g} phi, {low:g} to {high:g} m/s,"
+        f" {arguments.channel} -> r, phi (SI)"
+    )
+    text = f"{head}\n{cert}" + (
+        "" if exact is None else f"\n  exact verification: {'passed' if exact else 'not passed'}"
+    )
     data = {
-        "loop": head, "kind": cert.kind, "rate": rate, "lft": arguments.lft, "gamma": cert.gamma, "lower": cert.lower,
+        "loop": head,
+        "kind": cert.kind,
+        "rate": rate,
+        "lft": arguments.lft,
+        "gamma": cert.gamma,
+        "lower": cert.lower,
         "frozen": cert.frozen,
-        "status": cert.status.name, "verified": cert.verified, "exact": exact, "hypotheses": cert.hypotheses, "solver": cert.solver,
+        "status": cert.status.name,
+        "verified": cert.verified,
+        "exact": exact,
+        "hypotheses": cert.hypotheses,
+        "solver": cert.solver,
         "seconds": cert.seconds._asdict(),
-    }  # fmt: skip
+    }
     return Output(text, data, status=0 if cert.verified and exact is not False else 1)
 
 
@@ -76,6 +140,10 @@ def _relaxation(arguments: argparse.Namespace) -> Relaxation:
 
     segments, (across, degree) = arguments.segments, arguments.across
     return Relaxation(
-        segments=tuple(segments) if segments else None, grading=arguments.grading or (1.5 if arguments.memory else 2.0),
-        order=arguments.order, memory=arguments.memory, memory_segments=across, memory_degree=degree,
-    )  # fmt: skip
+        segments=tuple(segments) if segments else None,
+        grading=arguments.grading or (1.5 if arguments.memory else 2.0),
+        order=arguments.order,
+        memory=arguments.memory,
+        memory_segments=across,
+        memory_degree=degree,
+    )

@@ -15,7 +15,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Vehicle, airspeeds, folder."""
     options.vehicle(parser)
     options.span(parser, "--airspeeds", (0.0, 15.0), 6, "airspeeds")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write derivatives.csv and, with matplotlib, derivatives.svg there")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="write derivatives.csv and, with matplotlib, derivatives.svg there",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -28,11 +33,19 @@ def run(arguments: argparse.Namespace) -> Output:
 
     low, high, n = arguments.airspeeds
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
-    table = symheli.derivatives(symheli.sweep(options.helicopter(arguments), np.linspace(low, high, int(n)).tolist()))
-    written = write(arguments.out, "derivatives", table.csv(), lambda: plot(table)) if arguments.out else []
+    table = symheli.derivatives(
+        symheli.sweep(options.helicopter(arguments), np.linspace(low, high, int(n)).tolist())
+    )
+    written = (
+        write(arguments.out, "derivatives", table.csv(), lambda: plot(table))
+        if arguments.out
+        else []
+    )
     text = "\n".join([str(table), *(f"wrote {path}" for path in written)])
     data = {
-        "airspeeds": table.airspeeds, "derivatives": {str(s): table[s] for s in table}, "units": {str(s): s.unit for s in table},
+        "airspeeds": table.airspeeds,
+        "derivatives": {str(s): table[s] for s in table},
+        "units": {str(s): s.unit for s in table},
         "written": written,
-    }  # fmt: skip
+    }
     return Output(text, data)

@@ -12,7 +12,18 @@ from studies.output import Output, columns
 
 HELP = "versions, C compiler, solvers, cache: what works on this computer"
 
-REQUIRED = ("casadi", "sympy", "mpmath", "numpy", "scipy", "control", "cvxpy", "clarabel", "matplotlib", "jinja2")
+REQUIRED = (
+    "casadi",
+    "sympy",
+    "mpmath",
+    "numpy",
+    "scipy",
+    "control",
+    "cvxpy",
+    "clarabel",
+    "matplotlib",
+    "jinja2",
+)
 OPTIONAL = {
     "pandas": "records from and to data frames",
     "pyulog": "reading PX4 logs",
@@ -34,23 +45,31 @@ def run(arguments: argparse.Namespace) -> Output:
     required, optional = {n: _version(n) for n in REQUIRED}, {n: _version(n) for n in OPTIONAL}
     cc, cache, problem = compiler(), cache_directory(), _unwritable(str(cache_directory()))
     solvers = installed_solvers()
-    rows = [["python", platform.python_version(), ""], *([n, v or "MISSING", "required"] for n, v in required.items())]
+    rows = [
+        ["python", platform.python_version(), ""],
+        *([n, v or "MISSING", "required"] for n, v in required.items()),
+    ]
     rows += [[n, v or "not installed", OPTIONAL[n]] for n, v in optional.items()]
     if cc:
         compiling = f"C compiler: {cc}; models run as machine code"
     elif os.environ.get("SYMHELI_COMPILE") == "0":
         compiling = (
-            "C compiler: switched off by SYMHELI_COMPILE=0; models run in the CasADi virtual machine, several times slower, same numbers"
+            "C compiler: switched off by SYMHELI_COMPILE=0; models run in the CasADi virtual"
+            " machine, several times slower, same numbers"
         )
     else:
         compiling = (
-            "C compiler: none found; models run in the CasADi virtual machine, several times slower, same numbers (install gcc or set CC)"
+            "C compiler: none found; models run in the CasADi virtual machine, several times"
+            " slower, same numbers (install gcc or set CC)"
         )
     level = next(iter(compiled_kernels("double"))) if compiled_kernel("double") else None
     said = (
         f"machine code, level {level}"
         if level
-        else "NumPy, the same numbers, many times slower (reinstall with a C compiler: pip install -e .)"
+        else (
+            "NumPy, the same numbers, many times slower (reinstall with a C compiler: pip install"
+            " -e .)"
+        )
     )
     text = "\n".join(
         (
@@ -63,12 +82,17 @@ def run(arguments: argparse.Namespace) -> Output:
     )
     missing = [n for n, v in required.items() if v is None]
     data = {
-        "python": platform.python_version(), "required": required, "optional": optional, "compiler": cc,
+        "python": platform.python_version(),
+        "required": required,
+        "optional": optional,
+        "compiler": cc,
         "compiled_estimator": level is not None,
         "estimator_level": level,
         "solvers": solvers,
-        "cache": str(cache), "cache_writable": not problem, "missing": missing,
-    }  # fmt: skip
+        "cache": str(cache),
+        "cache_writable": not problem,
+        "missing": missing,
+    }
     return Output(text, data, status=1 if missing or not solvers else 0)
 
 
@@ -85,4 +109,7 @@ def _unwritable(folder: str) -> str:
         with tempfile.NamedTemporaryFile(dir=folder):
             return ""
     except OSError as error:
-        return f"NOT writable, models run uncompiled: {error.strerror}; set SYMHELI_CACHE to a folder that is"
+        return (
+            f"NOT writable, models run uncompiled: {error.strerror}; set SYMHELI_CACHE to a folder"
+            " that is"
+        )

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from symheli import TrimMap
 
 HELP = "trims over airspeed and climb rate: what holds, what can be flown, where the vortex ring is"
-KEY = "letters: . trimmed and attainable, s needs a control at or beyond its stop, v vortex ring (no accuracy promised), x no trim"
+KEY = (
+    "letters: . trimmed and attainable, s needs a control at or beyond its stop, v vortex ring (no"
+    " accuracy promised), x no trim"
+)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +24,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     options.vehicle(parser)
     options.span(parser, "--airspeeds", (0.0, 20.0), 21, "airspeeds of the whole motion")
     options.span(parser, "--climb-rates", (-10.0, 10.0), 21, "climb rates, up")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write trim_map.csv and, with matplotlib, trim_map.svg there")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="write trim_map.csv and, with matplotlib, trim_map.svg there",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -32,10 +40,17 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.trim_map_figure import plot
     from studies.written import write
 
-    speeds, rates = (np.linspace(low, high, int(n)) for low, high, n in (arguments.airspeeds, arguments.climb_rates))
-    progress(f"trimming {arguments.vehicle} at {len(speeds)} airspeeds and {len(rates)} climb rates")
+    speeds, rates = (
+        np.linspace(low, high, int(n))
+        for low, high, n in (arguments.airspeeds, arguments.climb_rates)
+    )
+    progress(
+        f"trimming {arguments.vehicle} at {len(speeds)} airspeeds and {len(rates)} climb rates"
+    )
     found = symheli.trim_map(options.helicopter(arguments), speeds, rates)
-    written = write(arguments.out, "trim_map", found.csv(), lambda: plot(found)) if arguments.out else []
+    written = (
+        write(arguments.out, "trim_map", found.csv(), lambda: plot(found)) if arguments.out else []
+    )
     text = "\n".join([_picture(found), *_numbers(found), *(f"wrote {path}" for path in written)])
     return Output(text, {**_data(found), "written": written})
 
@@ -43,7 +58,12 @@ def run(arguments: argparse.Namespace) -> Output:
 def _picture(found: TrimMap) -> str:
     rows = [["climb m/s", *(f"{v:.3g}" for v in found.airspeeds), "airspeed m/s"]]
     for j in reversed(range(len(found.climb_rates))):
-        rows.append([f"{found.climb_rates[j]:.3g}", *(_letter(found, i, j) for i in range(len(found.airspeeds)))])
+        rows.append(
+            [
+                f"{found.climb_rates[j]:.3g}",
+                *(_letter(found, i, j) for i in range(len(found.airspeeds))),
+            ]
+        )
     return f"{columns(rows, left=0)}\n{KEY}; blank: the climb rate exceeds the airspeed"
 
 
@@ -63,21 +83,30 @@ def _numbers(found: TrimMap) -> list[str]:
 
     held = found.attainable & ~found.vortex_ring
     lines = [
-        f"{found.success.sum()} of {found.possible.sum()} points trim, {found.attainable.sum()} within the travel of the controls, "
-        f"{(found.vortex_ring & found.success).sum()} in a vortex ring"
+        f"{found.success.sum()} of {found.possible.sum()} points trim, {found.attainable.sum()}"
+        f" within the travel of the controls, {(found.vortex_ring & found.success).sum()} in a"
+        " vortex ring"
     ]
     level = int(np.abs(found.climb_rates).argmin())
     if held[:, level].any():
         power = np.where(held[:, level], found["power"][:, level], np.inf)
         best = int(power.argmin())
         rate = found.climb_rates[level]
-        lines.append(f"least power at climb rate {rate:g} m/s: {power[best]:.0f} W at {found.airspeeds[best]:.3g} m/s")
+        lines.append(
+            f"least power at climb rate {rate:g} m/s: {power[best]:.0f} W at"
+            f" {found.airspeeds[best]:.3g} m/s"
+        )
     return lines
 
 
 def _data(found: TrimMap) -> dict[str, Any]:
     return {
-        "airspeeds": found.airspeeds, "climb_rates": found.climb_rates, "units": {str(s): s.unit for s in found.signals},
-        "values": {str(s): found[s] for s in found.signals}, "possible": found.possible, "success": found.success,
-        "attainable": found.attainable, "vortex_ring": found.vortex_ring,
-    }  # fmt: skip
+        "airspeeds": found.airspeeds,
+        "climb_rates": found.climb_rates,
+        "units": {str(s): s.unit for s in found.signals},
+        "values": {str(s): found[s] for s in found.signals},
+        "possible": found.possible,
+        "success": found.success,
+        "attainable": found.attainable,
+        "vortex_ring": found.vortex_ring,
+    }

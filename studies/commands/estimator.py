@@ -14,16 +14,60 @@ if TYPE_CHECKING:
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Signals, orders, forgetting, precision."""
-    group = parser.add_argument_group("estimator", "C code that identifies the coefficients over airspeed in flight")
+    group = parser.add_argument_group(
+        "estimator", "C code that identifies the coefficients over airspeed in flight"
+    )
     add = group.add_argument
-    add("--outputs", type=options.names, default=("theta", "w", "u"), metavar="A,B", help="states to predict (default: theta,w,u)")
-    add("--inputs", type=options.names, default=("d_lon", "d_col"), metavar="C,D", help="inputs that drive them (default: d_lon,d_col)")
-    add("--na", type=options.count, default=3, metavar="N", help="lags of the outputs (default: %(default)s)")
-    add("--nb", type=options.count, default=3, metavar="N", help="lags of the inputs (default: %(default)s)")
-    add("--delay", type=options.count, default=1, metavar="N", help="first lag of the inputs (default: %(default)s)")
-    add("--degree", type=options.count, default=2, metavar="N", help="polynomial degree in airspeed (default: %(default)s)")
+    add(
+        "--outputs",
+        type=options.names,
+        default=("theta", "w", "u"),
+        metavar="A,B",
+        help="states to predict (default: theta,w,u)",
+    )
+    add(
+        "--inputs",
+        type=options.names,
+        default=("d_lon", "d_col"),
+        metavar="C,D",
+        help="inputs that drive them (default: d_lon,d_col)",
+    )
+    add(
+        "--na",
+        type=options.count,
+        default=3,
+        metavar="N",
+        help="lags of the outputs (default: %(default)s)",
+    )
+    add(
+        "--nb",
+        type=options.count,
+        default=3,
+        metavar="N",
+        help="lags of the inputs (default: %(default)s)",
+    )
+    add(
+        "--delay",
+        type=options.count,
+        default=1,
+        metavar="N",
+        help="first lag of the inputs (default: %(default)s)",
+    )
+    add(
+        "--degree",
+        type=options.count,
+        default=2,
+        metavar="N",
+        help="polynomial degree in airspeed (default: %(default)s)",
+    )
     add("--offset", action="store_true", help="with a moving trim c(p), for whole outputs")
-    add("--forgetting", type=options.number, default=1.0, metavar="L", help="factor a sample, in (0, 1] (default: 1)")
+    add(
+        "--forgetting",
+        type=options.number,
+        default=1.0,
+        metavar="L",
+        help="factor a sample, in (0, 1] (default: 1)",
+    )
     add("--directional", action="store_true", help="forget along the new regressor only")
     add("--single", action="store_true", help="float instead of double")
 
@@ -39,9 +83,19 @@ def write(arguments: argparse.Namespace, heli: Helicopter) -> tuple[Path, ...]:
         if name not in units:
             raise UnknownNameError("signal", name, units)
     arx = LPVARX(
-        arguments.outputs, arguments.inputs, "airspeed", arguments.na, arguments.nb, arguments.delay,
-        Polynomial(arguments.degree, *arguments.airspeeds), offset=arguments.offset,
-    )  # fmt: skip
-    way = Directional(arguments.forgetting) if arguments.directional else Constant(arguments.forgetting)
+        arguments.outputs,
+        arguments.inputs,
+        "airspeed",
+        arguments.na,
+        arguments.nb,
+        arguments.delay,
+        Polynomial(arguments.degree, *arguments.airspeeds),
+        offset=arguments.offset,
+    )
+    way = (
+        Directional(arguments.forgetting)
+        if arguments.directional
+        else Constant(arguments.forgetting)
+    )
     rls = RecursiveLeastSquares(arx, way, precision="single" if arguments.single else "double")
     return write_estimator(rls, units, arguments.out or Path("estimator"))

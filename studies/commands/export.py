@@ -9,7 +9,10 @@ from studies.commands import estimator, options
 from studies.output import Output
 from symheli.errors import InputError
 
-HELP = "C code of the equations of motion, of the recursive estimator or of an identified model, a MATLAB file, or equations in print"
+HELP = (
+    "C code of the equations of motion, of the recursive estimator or of an identified model, a"
+    " MATLAB file, or equations in print"
+)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -17,16 +20,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "format",
         choices=("c", "estimator", "model", "mat", "latex", "markdown"),
-        help="c: equations of motion and header; estimator: recursive identification as C for an autopilot; model: an identified model "
-        "(--model) as C; mat: linear models along airspeed; "
-        "latex, markdown: every component's equations to read",
+        help=(
+            "c: equations of motion and header; estimator: recursive identification as C for an"
+            " autopilot; model: an identified model (--model) as C; mat: linear models along"
+            " airspeed; latex, markdown: every component's equations to read"
+        ),
     )
     options.vehicle(parser)
     parser.add_argument(
         "--out",
         type=Path,
         metavar="PATH",
-        help="file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder (estimator, model)",
+        help=(
+            "file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder"
+            " (estimator, model)"
+        ),
     )
     parser.add_argument(
         "--airspeeds",
@@ -37,10 +45,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="range, m/s (default: 0 13)",
     )
     parser.add_argument(
-        "--points", type=options.at_least_one, default=14, metavar="N", help="airspeeds of the family (default: %(default)s)"
+        "--points",
+        type=options.at_least_one,
+        default=14,
+        metavar="N",
+        help="airspeeds of the family (default: %(default)s)",
     )
     estimator.configure(parser)
-    group = parser.add_argument_group("model", "C code that predicts and simulates what symheli identify --save kept; --single applies")
+    group = parser.add_argument_group(
+        "model",
+        "C code that predicts and simulates what symheli identify --save kept; --single applies",
+    )
     group.add_argument("--model", type=Path, metavar="FILE.json", help="the identified model")
 
 
@@ -60,12 +75,18 @@ def run(arguments: argparse.Namespace) -> Output:
         from studies.export_mat import write_mat
 
         low, high = arguments.airspeeds
-        written = write_mat(heli, low, high, arguments.points, arguments.out or Path(f"{name}_family.mat"))
+        written = write_mat(
+            heli, low, high, arguments.points, arguments.out or Path(f"{name}_family.mat")
+        )
     else:
         from studies.files import write_text
         from symheli.equations import markdown
 
-        content, suffix = (heli.latex(standalone=True), "tex") if arguments.format == "latex" else (markdown(heli), "md")
+        content, suffix = (
+            (heli.latex(standalone=True), "tex")
+            if arguments.format == "latex"
+            else (markdown(heli), "md")
+        )
         written = (write_text(arguments.out or Path(f"{name}_equations.{suffix}"), content),)
     return _said(written)
 
@@ -75,9 +96,13 @@ def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
     from studies.export_model import write_model
 
     if arguments.model is None:
-        raise InputError("name the model: --model FILE.json, as symheli identify LOG --save FILE.json writes it")
+        raise InputError(
+            "name the model: --model FILE.json, as symheli identify LOG --save FILE.json writes it"
+        )
     return write_model(
-        LPVARXModel.load(arguments.model), arguments.out or Path("model"), precision="single" if arguments.single else "double"
+        LPVARXModel.load(arguments.model),
+        arguments.out or Path("model"),
+        precision="single" if arguments.single else "double",
     )
 
 

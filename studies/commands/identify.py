@@ -31,11 +31,31 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Log, signals, structure, what is done to the record."""
     add = parser.add_argument
     add("log", type=Path, metavar="LOG", help="flight log")
-    add("--format", choices=("auto", "xplane", "csv", "mat"), default="auto", help="default: by extension and content")
-    add("--map", type=Path, metavar="FILE", help="TOML file that says which column is which signal, in which unit (docs/identify.md)")
+    add(
+        "--format",
+        choices=("auto", "xplane", "csv", "mat"),
+        default="auto",
+        help="default: by extension and content",
+    )
+    add(
+        "--map",
+        type=Path,
+        metavar="FILE",
+        help="TOML file that says which column is which signal, in which unit (docs/identify.md)",
+    )
     add("--time", metavar="COLUMN", help="time column of a table (default: t or time)")
-    add("--time-unit", choices=("s", "ms", "us", "ns"), default="s", help="unit of the time column (default: %(default)s)")
-    add("--dt", type=options.positive, metavar="S", help="sample period, s: of a log without time, or to resample to")
+    add(
+        "--time-unit",
+        choices=("s", "ms", "us", "ns"),
+        default="s",
+        help="unit of the time column (default: %(default)s)",
+    )
+    add(
+        "--dt",
+        type=options.positive,
+        metavar="S",
+        help="sample period, s: of a log without time, or to resample to",
+    )
     add(
         "--units",
         type=options.unit,
@@ -45,33 +65,94 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=UNIT",
         help="units of the columns, such as q=deg/s",
     )
-    add("--outputs", type=options.names, metavar="A,B", help="signals to predict (X-Plane: q,theta)")
-    add("--inputs", type=options.names, metavar="C,D", help="signals that drive them (X-Plane: stick_lon)")
+    add(
+        "--outputs", type=options.names, metavar="A,B", help="signals to predict (X-Plane: q,theta)"
+    )
+    add(
+        "--inputs",
+        type=options.names,
+        metavar="C,D",
+        help="signals that drive them (X-Plane: stick_lon)",
+    )
     add("--scheduling", metavar="P", help="scheduling signal (X-Plane: airspeed)")
-    add("--scheduling-from", type=options.names, metavar="U,V", help="schedule on the length of this vector")
-    add("--smooth-scheduling", type=options.positive, metavar="S", help="causal low-pass of the scheduling signal, time constant in s")
-    add("--scheduling-at", choices=("lag", "now"), default="lag", help="coefficients at p(k - lag) or p(k) (default: %(default)s)")
-    add("--commanded", action="store_true", help="the scheduling signal is known ahead; so are signals called ..._command")
-    add("--na", type=options.count, default=3, metavar="N", help="lags of the outputs (default: %(default)s)")
-    add("--nb", type=options.count, default=3, metavar="N", help="lags of the inputs (default: %(default)s)")
+    add(
+        "--scheduling-from",
+        type=options.names,
+        metavar="U,V",
+        help="schedule on the length of this vector",
+    )
+    add(
+        "--smooth-scheduling",
+        type=options.positive,
+        metavar="S",
+        help="causal low-pass of the scheduling signal, time constant in s",
+    )
+    add(
+        "--scheduling-at",
+        choices=("lag", "now"),
+        default="lag",
+        help="coefficients at p(k - lag) or p(k) (default: %(default)s)",
+    )
+    add(
+        "--commanded",
+        action="store_true",
+        help="the scheduling signal is known ahead; so are signals called ..._command",
+    )
+    add(
+        "--na",
+        type=options.count,
+        default=3,
+        metavar="N",
+        help="lags of the outputs (default: %(default)s)",
+    )
+    add(
+        "--nb",
+        type=options.count,
+        default=3,
+        metavar="N",
+        help="lags of the inputs (default: %(default)s)",
+    )
     add(
         "--delay",
         type=options.count,
         metavar="N",
-        help="first lag of the inputs (default: 1; 0, and one lag more, where samples are means or interpolated)",
+        help=(
+            "first lag of the inputs (default: 1; 0, and one lag more, where samples are means or"
+            " interpolated)"
+        ),
     )
-    add("--degree", type=options.count, default=2, metavar="N", help="polynomial degree in p; 0: LTI only (default: %(default)s)")
+    add(
+        "--degree",
+        type=options.count,
+        default=2,
+        metavar="N",
+        help="polynomial degree in p; 0: LTI only (default: %(default)s)",
+    )
     add("--orders", action="store_true", help="compare orders 1 to 4 and degrees 0 to 3 instead")
     add("--no-offset", action="store_true", help="no c(p): outputs are deviations already")
     add(
         "--offset-rate",
         choices=("auto", "yes", "no"),
         default="auto",
-        help="d(p) times the change of p, the moving trim; auto: tried, and kept where it predicts 1 s better in sample",
+        help=(
+            "d(p) times the change of p, the moving trim; auto: tried, and kept where it predicts 1"
+            " s better in sample"
+        ),
     )
     add("--method", choices=METHODS, default="ls", help="estimator (default: %(default)s)")
-    add("--instruments", type=options.names, default=(), metavar="E,F", help="external excitation, for --method iv, riv or oe")
-    add("--start", type=options.number, metavar="S", help="leave out what is before, s on the log's clock")
+    add(
+        "--instruments",
+        type=options.names,
+        default=(),
+        metavar="E,F",
+        help="external excitation, for --method iv, riv or oe",
+    )
+    add(
+        "--start",
+        type=options.number,
+        metavar="S",
+        help="leave out what is before, s on the log's clock",
+    )
     add("--stop", type=options.number, metavar="S", help="leave out what is after")
     add("--decimate", type=options.at_least_one, default=1, metavar="N", help="means of N samples")
     add(
@@ -80,16 +161,34 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help="first part of the time to fit, the rest is held out (default: 0.7)",
     )
-    add("--test", type=Path, metavar="LOG", help="another log of the same kind to hold out; LOG is fitted as a whole")
+    add(
+        "--test",
+        type=Path,
+        metavar="LOG",
+        help="another log of the same kind to hold out; LOG is fitted as a whole",
+    )
     add(
         "--plot",
         type=options.picture,
         metavar="FILE",
-        help="draw measured, one step, 1 s and free run into this .png, .svg or .pdf (needs matplotlib)",
+        help=(
+            "draw measured, one step, 1 s and free run into this .png, .svg or .pdf (needs"
+            " matplotlib)"
+        ),
     )
 
-    add("--bands", type=options.picture, metavar="FILE", help="draw every coefficient over the scheduling signal with its 95 %% band")
-    add("--save", type=options.model_file, metavar="FILE", help="write the model: .json (Python, symheli export model) or .mat (MATLAB)")
+    add(
+        "--bands",
+        type=options.picture,
+        metavar="FILE",
+        help="draw every coefficient over the scheduling signal with its 95 %% band",
+    )
+    add(
+        "--save",
+        type=options.model_file,
+        metavar="FILE",
+        help="write the model: .json (Python, symheli export model) or .mat (MATLAB)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -99,7 +198,13 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.log.comparison import compare, scheduling_range
     from studies.log.reading import format_of
 
-    kind: Any = "mapped" if arguments.map else format_of(arguments.log) if arguments.format == "auto" else arguments.format
+    kind: Any = (
+        "mapped"
+        if arguments.map
+        else format_of(arguments.log)
+        if arguments.format == "auto"
+        else arguments.format
+    )
     signals = _signals(arguments, kind)
     prepared = _prepared(arguments, arguments.log, signals, cut=True)
     record = prepared.record
@@ -108,36 +213,70 @@ def run(arguments: argparse.Namespace) -> Output:
     elif arguments.train is None:
         training, test = record, _prepared(arguments, arguments.test, signals, cut=False).record
     else:
-        raise InputError("--test holds out another log, --train a part of this one: give one of the two")
+        raise InputError(
+            "--test holds out another log, --train a part of this one: give one of the two"
+        )
     p = np.concatenate([part[prepared.scheduling] for part in (training, test) if part is not None])
     basis = Polynomial(arguments.degree, *scheduling_range(p, arguments.degree))
     delay, nb = arguments.delay, arguments.nb
     if delay is None:  # u(k) comes to the lags that there are
         delay, nb = (0, nb + 1) if record.resampled else (1, nb)
     structure = LPVARX(
-        signals.outputs, signals.inputs, prepared.scheduling, arguments.na, nb, delay, basis,
-        scheduling_at=arguments.scheduling_at, offset=not arguments.no_offset,
-    )  # fmt: skip
+        signals.outputs,
+        signals.inputs,
+        prepared.scheduling,
+        arguments.na,
+        nb,
+        delay,
+        basis,
+        scheduling_at=arguments.scheduling_at,
+        offset=not arguments.no_offset,
+    )
     hold = not (arguments.commanded or prepared.scheduling.endswith("_command"))
-    trim: Any = {"yes": "moving", "no": "still"}.get(arguments.offset_rate, "still" if arguments.no_offset else "auto")
+    trim: Any = {"yes": "moving", "no": "still"}.get(
+        arguments.offset_rate, "still" if arguments.no_offset else "auto"
+    )
     if arguments.orders:
         for option in ("plot", "bands", "save"):
             if getattr(arguments, option):
-                raise InputError(f"--{option} {ONE_MODEL[option]} one model; --orders compares many")
+                raise InputError(
+                    f"--{option} {ONE_MODEL[option]} one model; --orders compares many"
+                )
         if arguments.method != "ls":
             raise InputError("--orders compares models of least squares; leave --method out")
         return _orders(replace(structure, offset_rate=trim == "moving"), training, test, hold)
-    result = compare(structure, training, test, trim=trim, hold_p=hold, method=arguments.method, instruments=arguments.instruments)
-    facts = report.facts(arguments.log, kind, record, prepared.samples, prepared.samples - prepared.kept, result, arguments.test)
+    result = compare(
+        structure,
+        training,
+        test,
+        trim=trim,
+        hold_p=hold,
+        method=arguments.method,
+        instruments=arguments.instruments,
+    )
+    facts = report.facts(
+        arguments.log,
+        kind,
+        record,
+        prepared.samples,
+        prepared.samples - prepared.kept,
+        result,
+        arguments.test,
+    )
     text, data = report.text(facts, result), report.data(facts, result)
     written = list(_write(arguments, result))
     if written:
-        text, data = "\n".join([text, *(f"wrote {path}" for path in written)]), {**data, "written": written}
+        text, data = (
+            "\n".join([text, *(f"wrote {path}" for path in written)]),
+            {**data, "written": written},
+        )
     return Output(text, data)
 
 
 class _Signals(NamedTuple):
-    """What is predicted from what; `scheduling` None where it is made of others, or there is none."""
+    """What is predicted from what; `scheduling` None where it is made of others, or there is
+    none.
+    """
 
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -145,7 +284,9 @@ class _Signals(NamedTuple):
 
 
 class _Prepared(NamedTuple):
-    """A record ready to fit, the name of its scheduling signal, and how many samples were read and `kept` between start and stop."""
+    """A record ready to fit, the name of its scheduling signal, and how many samples were read and
+    `kept` between start and stop.
+    """
 
     record: FlightRecord
     scheduling: str
@@ -153,28 +294,44 @@ class _Prepared(NamedTuple):
     kept: int
 
 
-def _prepared(arguments: argparse.Namespace, log: Path, signals: _Signals, *, cut: bool) -> _Prepared:
-    """Read `log` and do to it what the options say, in the order of docs/identify.md; start and stop only where it is to be `cut`."""
+def _prepared(
+    arguments: argparse.Namespace, log: Path, signals: _Signals, *, cut: bool
+) -> _Prepared:
+    """Read `log` and do to it what the options say, in the order of docs/identify.md; start and
+    stop only where it is to be `cut`.
+    """
     from studies.log.reading import COMBINED, format_of, read
     from symheli.lpv import FlightRecord, conditioning
 
     combined, scheduling = arguments.scheduling_from, signals.scheduling
-    wanted = [*signals.outputs, *signals.inputs, *(combined or ((scheduling,) if scheduling else ())), *arguments.instruments]
+    wanted = [
+        *signals.outputs,
+        *signals.inputs,
+        *(combined or ((scheduling,) if scheduling else ())),
+        *arguments.instruments,
+    ]
     if arguments.map:
         record = FlightRecord.from_map(log, arguments.map)
     else:
         kind: Any = format_of(log) if arguments.format == "auto" else arguments.format
         record = read(
-            log, list(dict.fromkeys(wanted)), format=kind, dt=arguments.dt, time=arguments.time, units=dict(arguments.units),
+            log,
+            list(dict.fromkeys(wanted)),
+            format=kind,
+            dt=arguments.dt,
+            time=arguments.time,
+            units=dict(arguments.units),
             time_unit=arguments.time_unit,
-        )  # fmt: skip
+        )
     samples = len(record)
     if combined:
         record, scheduling = conditioning.with_norm(record, combined, COMBINED), COMBINED
     if not scheduling:
         scheduling = "constant"
         record = record.with_signals({scheduling: "1"}, **{scheduling: np.zeros(len(record))})
-    record = record.select(list(dict.fromkeys([*signals.outputs, *signals.inputs, scheduling, *arguments.instruments])))
+    record = record.select(
+        list(dict.fromkeys([*signals.outputs, *signals.inputs, scheduling, *arguments.instruments]))
+    )
     if cut:
         record = conditioning.cut(record, arguments.start, arguments.stop)
     kept = len(record)
@@ -197,7 +354,11 @@ def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
         model = result.scheduled
         if model.method in CERTAIN:
             model = replace(model, covariance=uncertainty(model, result.training).covariance)
-        yield model.save(arguments.save) if arguments.save.suffix == ".json" else model.save_mat(arguments.save)
+        yield (
+            model.save(arguments.save)
+            if arguments.save.suffix == ".json"
+            else model.save_mat(arguments.save)
+        )
 
 
 def _orders(structure: Any, training: Any, test: Any, hold_p: bool) -> Output:
@@ -206,25 +367,38 @@ def _orders(structure: Any, training: Any, test: Any, hold_p: bool) -> Output:
 
     if test is None:
         raise InputError("--orders judges on held-out samples: let --train leave some")
-    scan = order_scan(structure, training, test, horizon=max(round(1.0 / training.dt), 1), hold_p=hold_p)
+    scan = order_scan(
+        structure, training, test, horizon=max(round(1.0 / training.dt), 1), hold_p=hold_p
+    )
     rows = [
         {
-            "na": t.na, "degree": t.degree, "bic": t.bic, "refused": t.refused,
+            "na": t.na,
+            "degree": t.degree,
+            "bic": t.bic,
+            "refused": t.refused,
             "fit_percent": {"one step": t.one_step, "1 s": t.ahead, "free run": t.free_run},
         }
         for t in scan.trials
-    ]  # fmt: skip
+    ]
     return Output(f"held out, {scan}", {"outputs": list(structure.outputs), "trials": rows})
 
 
 def _signals(arguments: argparse.Namespace, kind: str) -> _Signals:
     default: dict[str, Any] = XPLANE if kind == "xplane" else {}
-    outputs, inputs = arguments.outputs or default.get("outputs"), arguments.inputs or default.get("inputs")
+    outputs, inputs = (
+        arguments.outputs or default.get("outputs"),
+        arguments.inputs or default.get("inputs"),
+    )
     scheduling = arguments.scheduling or default.get("scheduling")
     if not outputs or not inputs:
-        raise InputError("name what is to be predicted and what drives it: --outputs q,theta --inputs d_lon")
+        raise InputError(
+            "name what is to be predicted and what drives it: --outputs q,theta --inputs d_lon"
+        )
     if arguments.scheduling and arguments.scheduling_from:
         raise InputError("give --scheduling or --scheduling-from, not both")
     if not (scheduling or arguments.scheduling_from) and arguments.degree > 0:
-        raise InputError("name the scheduling signal with --scheduling or --scheduling-from, or fit an LTI model with --degree 0")
+        raise InputError(
+            "name the scheduling signal with --scheduling or --scheduling-from, or fit an LTI model"
+            " with --degree 0"
+        )
     return _Signals(outputs, inputs, None if arguments.scheduling_from else scheduling)

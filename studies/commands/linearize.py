@@ -28,27 +28,44 @@ def run(arguments: argparse.Namespace) -> Output:
     text = "\n\n".join(
         (
             str(point),
-            "A (rows: derivative of the state, SI and radians)\n" + _matrix(lin.A, lin.states, lin.states),
+            "A (rows: derivative of the state, SI and radians)\n"
+            + _matrix(lin.A, lin.states, lin.states),
             "B\n" + _matrix(lin.B, lin.states, lin.inputs),
             "poles\n" + _poles([z for z in poles if z.imag >= 0]),
             "stable" if lin.is_stable() else "not stable",
         )
     )
     data = {
-        "status": str(point), "A": lin.A, "B": lin.B, "states": [str(s) for s in lin.states], "inputs": [str(s) for s in lin.inputs],
-        "units": {str(s): s.unit for s in (*lin.states, *lin.inputs)}, "poles_rad_per_s": poles, "stable": lin.is_stable(),
-    }  # fmt: skip
+        "status": str(point),
+        "A": lin.A,
+        "B": lin.B,
+        "states": [str(s) for s in lin.states],
+        "inputs": [str(s) for s in lin.inputs],
+        "units": {str(s): s.unit for s in (*lin.states, *lin.inputs)},
+        "poles_rad_per_s": poles,
+        "stable": lin.is_stable(),
+    }
     return Output(text, data)
 
 
 def _matrix(M: np.ndarray, rows: tuple, cols: tuple) -> str:
-    return columns([["", *map(str, cols)], *([str(r), *(f"{v:.5g}" for v in line)] for r, line in zip(rows, M, strict=True))])
+    return columns(
+        [
+            ["", *map(str, cols)],
+            *([str(r), *(f"{v:.5g}" for v in line)] for r, line in zip(rows, M, strict=True)),
+        ]
+    )
 
 
 def _poles(poles: list) -> str:
     head = ["real, 1/s", "imaginary, rad/s", "frequency, rad/s", "damping ratio"]
     body = [
-        [f"{z.real:.5g}", f"+-{z.imag:.5g}" if z.imag > 0 else "0", f"{abs(z):.5g}", f"{-z.real / abs(z):.4f}" if abs(z) else "-"]
+        [
+            f"{z.real:.5g}",
+            f"+-{z.imag:.5g}" if z.imag > 0 else "0",
+            f"{abs(z):.5g}",
+            f"{-z.real / abs(z):.4f}" if abs(z) else "-",
+        ]
         for z in poles
     ]
     return columns([head, *body], left=0)

@@ -16,37 +16,86 @@ PICTURES = (".png", ".svg", ".pdf")
 
 def vehicle(parser: argparse.ArgumentParser, governor: str = "ideal") -> None:
     """--vehicle, --governor and --printed."""
-    parser.add_argument("--vehicle", default="xcell60", metavar="NAME", help="packaged airframe or TOML file (default: %(default)s)")
-    parser.add_argument("--governor", choices=("ideal", "pi"), default=governor, help="rotor speed held exactly, or engine and governor")
-    parser.add_argument("--printed", type=names, default=(), metavar="A,B", help="forms of the source in place of this project's decisions")
+    parser.add_argument(
+        "--vehicle",
+        default="xcell60",
+        metavar="NAME",
+        help="packaged airframe or TOML file (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--governor",
+        choices=("ideal", "pi"),
+        default=governor,
+        help="rotor speed held exactly, or engine and governor",
+    )
+    parser.add_argument(
+        "--printed",
+        type=names,
+        default=(),
+        metavar="A,B",
+        help="forms of the source in place of this project's decisions",
+    )
 
 
 def condition(parser: argparse.ArgumentParser) -> None:
     """The steady flight to trim."""
-    parser.add_argument("--airspeed", type=number, default=0.0, metavar="M/S", help="true airspeed, m/s (default: hover)")
+    parser.add_argument(
+        "--airspeed",
+        type=number,
+        default=0.0,
+        metavar="M/S",
+        help="true airspeed, m/s (default: hover)",
+    )
     parser.add_argument("--climb-rate", type=number, default=0.0, metavar="M/S", help="m/s, up")
-    parser.add_argument("--turn-rate", type=number, default=0.0, metavar="RAD/S", help="rad/s, to the right")
-    parser.add_argument("--altitude", type=number, metavar="M", help="in the standard atmosphere, m (default: sea-level density)")
-    parser.add_argument("--sideslip-deg", type=number, default=0.0, metavar="DEG", help="degrees, airspeed from the right")
+    parser.add_argument(
+        "--turn-rate", type=number, default=0.0, metavar="RAD/S", help="rad/s, to the right"
+    )
+    parser.add_argument(
+        "--altitude",
+        type=number,
+        metavar="M",
+        help="in the standard atmosphere, m (default: sea-level density)",
+    )
+    parser.add_argument(
+        "--sideslip-deg",
+        type=number,
+        default=0.0,
+        metavar="DEG",
+        help="degrees, airspeed from the right",
+    )
 
 
-def span(parser: argparse.ArgumentParser, name: str, default: tuple[float, float], points: int, what: str) -> None:
+def span(
+    parser: argparse.ArgumentParser, name: str, default: tuple[float, float], points: int, what: str
+) -> None:
     """LOW HIGH N: a range of speeds in m/s with its number of points."""
     parser.add_argument(
-        name, type=number, nargs=3, action=_Span, default=(*default, points), metavar=("LOW", "HIGH", "N"),
+        name,
+        type=number,
+        nargs=3,
+        action=_Span,
+        default=(*default, points),
+        metavar=("LOW", "HIGH", "N"),
         help=f"{what}, m/s, and how many (default: {default[0]:g} {default[1]:g} {points})",
-    )  # fmt: skip
+    )
 
 
 class _Span(argparse.Action):
     """Refuses a range that does not increase or has no points."""
 
     def __call__(
-        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option_string: str | None = None
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
     ) -> None:
         low, high, points = values
         if points != int(points) or points < 1 or low > high or (points > 1 and low == high):
-            parser.error(f"argument {option_string}: expected LOW < HIGH and a whole number of points, got {low:g} {high:g} {points:g}")
+            parser.error(
+                f"argument {option_string}: expected LOW < HIGH and a whole number of points, got"
+                f" {low:g} {high:g} {points:g}"
+            )
         setattr(namespace, self.dest, (low, high, int(points)))
 
 
@@ -54,7 +103,9 @@ def helicopter(arguments: argparse.Namespace) -> Helicopter:
     """The helicopter of --vehicle, --governor and --printed."""
     from symheli import Helicopter
 
-    return Helicopter.load(arguments.vehicle, governor=arguments.governor, printed=arguments.printed)
+    return Helicopter.load(
+        arguments.vehicle, governor=arguments.governor, printed=arguments.printed
+    )
 
 
 def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
@@ -63,9 +114,13 @@ def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
 
     heli = helicopter(arguments)
     point = trim(
-        heli, arguments.airspeed, climb_rate=arguments.climb_rate, turn_rate=arguments.turn_rate,
-        sideslip=math.radians(arguments.sideslip_deg), altitude=arguments.altitude,
-    )  # fmt: skip
+        heli,
+        arguments.airspeed,
+        climb_rate=arguments.climb_rate,
+        turn_rate=arguments.turn_rate,
+        sideslip=math.radians(arguments.sideslip_deg),
+        altitude=arguments.altitude,
+    )
     return heli, point
 
 
@@ -128,7 +183,9 @@ def picture(text: str) -> Path:
     """A file that matplotlib knows how to write."""
     path = Path(text)
     if path.suffix.lower() not in PICTURES:
-        raise argparse.ArgumentTypeError(f"expected a file that ends in {', '.join(PICTURES)}, got {text!r}")
+        raise argparse.ArgumentTypeError(
+            f"expected a file that ends in {', '.join(PICTURES)}, got {text!r}"
+        )
     return path
 
 
@@ -136,7 +193,9 @@ def model_file(text: str) -> Path:
     """A file for an identified model."""
     path = Path(text)
     if path.suffix not in (".json", ".mat"):
-        raise argparse.ArgumentTypeError(f"expected a file that ends in .json or .mat, got {text!r}")
+        raise argparse.ArgumentTypeError(
+            f"expected a file that ends in .json or .mat, got {text!r}"
+        )
     return path
 
 
@@ -157,4 +216,7 @@ def _float(text: str) -> float:
 
 def named(vector: Any) -> dict[str, dict[str, Any]]:
     """{name: {value, unit}} of a named vector."""
-    return {str(s): {"value": float(v), "unit": s.unit} for s, v in zip(vector.signals, vector.array, strict=True)}
+    return {
+        str(s): {"value": float(v), "unit": s.unit}
+        for s, v in zip(vector.signals, vector.array, strict=True)
+    }

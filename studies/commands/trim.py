@@ -23,7 +23,10 @@ def run(arguments: argparse.Namespace) -> Output:
     _, point = options.trimmed(arguments)
     rows = [["", "value", "unit", ""]]
     for title, vector in (("states", point.x), ("inputs", point.u)):
-        rows += [[title], *(["  " + str(s), f"{v:.6g}", s.unit, _degrees(v, s.unit)] for s, v in _items(vector))]
+        rows += [
+            [title],
+            *(["  " + str(s), f"{v:.6g}", s.unit, _degrees(v, s.unit)] for s, v in _items(vector)),
+        ]
     data = {
         "status": str(point),
         "airspeed": {"value": point.airspeed, "unit": "m/s"},
@@ -41,4 +44,8 @@ def _items(vector: Any) -> list[tuple[Any, float]]:
 
 
 def _degrees(value: float, unit: str) -> str:
-    return f"{math.degrees(value):.3f} {unit.replace('rad', 'deg')}" if unit in ("rad", "rad/s") else ""
+    return (
+        f"{math.degrees(value):.3f} {unit.replace('rad', 'deg')}"
+        if unit in ("rad", "rad/s")
+        else ""
+    )

@@ -6,7 +6,10 @@ import argparse
 
 from studies.output import Output
 
-HELP = "list the packaged airframes and identified models, their sources, and how much of each is assumed"
+HELP = (
+    "list the packaged airframes and identified models, their sources, and how much of each is"
+    " assumed"
+)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -18,12 +21,28 @@ def run(arguments: argparse.Namespace) -> Output:
     from symheli.identified import identified_model, identified_models
     from symheli.vehicle import load_vehicle, vehicles
 
-    airframes = [(name, v.title, v.source, len(v.quantities), v.assumed) for name in vehicles() for v in [load_vehicle(name)]]
-    models = [(name, m.title, m.source, len(m.parameters), m.assumed) for name in identified_models() for m in [identified_model(name)]]
+    airframes = [
+        (name, v.title, v.source, len(v.quantities), v.assumed)
+        for name in vehicles()
+        for v in [load_vehicle(name)]
+    ]
+    models = [
+        (name, m.title, m.source, len(m.parameters), m.assumed)
+        for name in identified_models()
+        for m in [identified_model(name)]
+    ]
     text = "\n".join(
-        ["airframes (symheli.Helicopter.load)", *map(_lines, airframes), "linear models (symheli.identified_model)", *map(_lines, models)]
+        [
+            "airframes (symheli.Helicopter.load)",
+            *map(_lines, airframes),
+            "linear models (symheli.identified_model)",
+            *map(_lines, models),
+        ]
     )
-    return Output(text, {"vehicles": list(map(_data, airframes)), "identified_models": list(map(_data, models))})
+    return Output(
+        text,
+        {"vehicles": list(map(_data, airframes)), "identified_models": list(map(_data, models))},
+    )
 
 
 Listed = tuple[str, str, str, int, list[str]]

@@ -22,25 +22,47 @@ CLOSE = 10.0
 
 
 def figure(result: Comparison) -> Figure:
-    """A row for each output of the first model, and one for its scheduling: the whole record, and the first 10 s of what is held out.
+    """A row for each output of the first model, and one for its scheduling: the whole record, and
+    the first 10 s of what is held out.
 
-    A dashed line marks where the held-out part begins; free runs start anew there and behind each gap. The titles give the fits of
-    each model on the held-out part (on all where nothing is), one step, 1 s and free run, in percent. The axes hold what was measured: a
-    prediction may leave them.
+    A dashed line marks where the held-out part begins; free runs start anew there and behind each
+    gap. The titles give the fits of each model on the held-out part (on all where nothing is), one
+    step, 1 s and free run, in percent. The axes hold what was measured: a prediction may leave
+    them.
     """
     model, parts = result.scheduled, [r for r in (result.training, result.test) if r is not None]
     heights = [1.9] * len(model.outputs) + [1.2]
     picture = empty_figure(11.0, 0.8 + sum(heights))
-    axes = picture.subplots(len(heights), 2, sharex="col", squeeze=False, gridspec_kw={"width_ratios": [3, 2], "height_ratios": heights})
+    axes = picture.subplots(
+        len(heights),
+        2,
+        sharex="col",
+        squeeze=False,
+        gridspec_kw={"width_ratios": [3, 2], "height_ratios": heights},
+    )
     shown = [*model.outputs, model.parameters[0]]
     for part in parts:
         drawn = {h: ahead(model, part, n, result.hold_p) for h, n in steps(model.dt).items()}
         for i, (row, name) in enumerate(zip(axes, shown, strict=True)):
             for ax in row:
-                draw(ax, part, part[name], color=MEASURED, linewidth=1.4, label="measured" if part is parts[0] else None)
+                draw(
+                    ax,
+                    part,
+                    part[name],
+                    color=MEASURED,
+                    linewidth=1.4,
+                    label="measured" if part is parts[0] else None,
+                )
                 shade_missing(ax, part, part[name])
                 for h, values in drawn.items() if i < len(model.outputs) else ():
-                    draw(ax, part, values[:, i], color=COLOURS[h], linewidth=0.9, label=h if part is parts[0] else None)
+                    draw(
+                        ax,
+                        part,
+                        values[:, i],
+                        color=COLOURS[h],
+                        linewidth=0.9,
+                        label=h if part is parts[0] else None,
+                    )
     for row, name in zip(axes, shown, strict=True):
         measured = np.concatenate([part[name] for part in parts])
         low, high = np.nanmin(measured), np.nanmax(measured)
@@ -53,10 +75,20 @@ def figure(result: Comparison) -> Figure:
             row[0].axvline(result.test.time[0], color=MARK, linewidth=1.0, linestyle="--")
     start, stop = parts[-1].time[0], parts[-1].time[-1]
     axes[0][1].set_xlim(start, min(start + CLOSE, stop))
-    axes[0][1].set_title("held out, from its beginning" if result.test is not None else "from the beginning", fontsize=9, loc="left")
+    axes[0][1].set_title(
+        "held out, from its beginning" if result.test is not None else "from the beginning",
+        fontsize=9,
+        loc="left",
+    )
     for ax in axes[-1]:
         ax.set_xlabel("time (s)")
-    picture.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    picture.legend(
+        *axes[0][0].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=4,
+        frameon=False,
+        fontsize=9,
+    )
     return picture
 
 
@@ -69,7 +101,9 @@ def save(picture: Figure, path: Path) -> Path:
 
 def _fits(models: tuple[Scored, ...], output: str) -> str:
     """Of each model in percent, the horizons in order."""
-    return ", ".join(
-        f"{scored.label} {' / '.join(percent(fit[output]) for fit in (scored.held_out or scored.in_sample).values())} %"
-        for scored in models
-    )
+
+    def shown(scored: Scored) -> str:
+        fits = (scored.held_out or scored.in_sample).values()
+        return " / ".join(percent(fit[output]) for fit in fits)
+
+    return ", ".join(f"{scored.label} {shown(scored)} %" for scored in models)

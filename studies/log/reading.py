@@ -20,12 +20,17 @@ TIMES = ("t", "time")
 
 
 def format_of(path: Path) -> Format:
-    """By extension, then by content: a MATLAB file, an X-Plane log ("name,unit |" in its first line), else a table."""
+    """By extension, then by content: a MATLAB file, an X-Plane log ("name,unit |" in its first
+    line), else a table.
+    """
     existing(path)
     if path.suffix.lower() == ".mat":
         return "mat"
     if path.suffix.lower() == ".ulg":
-        raise InputError(f"{path}: PX4 logs need topics: name them in a signal map, --map FILE.toml, or read it by FlightRecord.from_ulog")
+        raise InputError(
+            f"{path}: PX4 logs need topics: name them in a signal map, --map FILE.toml, or read it"
+            " by FlightRecord.from_ulog"
+        )
     with path.open("rb") as file:
         head = file.read(4096)
     if head.startswith(b"MATLAB"):
@@ -35,13 +40,20 @@ def format_of(path: Path) -> Format:
 
 
 def read(
-    path: Path, signals: Sequence[str], *, format: Format, dt: float | None, time: str | None, units: Mapping[str, str],
+    path: Path,
+    signals: Sequence[str],
+    *,
+    format: Format,
+    dt: float | None,
+    time: str | None,
+    units: Mapping[str, str],
     time_unit: str = "s",
-) -> FlightRecord:  # fmt: skip
+) -> FlightRecord:
     """The record, on a uniform step where `dt` (s) says so; a time column is in `time_unit`.
 
-    X-Plane logs declare their units. Elsewhere `units` declares those of `signals`; the names every room knows (u, q, theta,
-    ...) are SI unless declared otherwise. A time column and `dt` together resample. Raises `InputError`.
+    X-Plane logs declare their units. Elsewhere `units` declares those of `signals`; the names every
+    room knows (u, q, theta, ...) are SI unless declared otherwise. A time column and `dt` together
+    resample. Raises `InputError`.
     """
     if format == "xplane":
         return FlightRecord.from_xplane(path, dt)
@@ -53,13 +65,18 @@ def read(
         record = FlightRecord.from_mat(path, time or "t", declared, time_unit)
     else:
         column = time or _time_column(path, dt)
-        record = FlightRecord.from_csv(path, column, declared, dt if column is None else None, time_unit)
+        record = FlightRecord.from_csv(
+            path, column, declared, dt if column is None else None, time_unit
+        )
         time = column
     return record.resample(dt) if dt is not None and time is not None else record
 
 
 def _undeclared(name: str) -> str:
-    raise InputError(f"the unit of {name!r} is not known: --units {name}=UNIT, such as rad, deg/s, m/s, or 1 where it has none")
+    raise InputError(
+        f"the unit of {name!r} is not known: --units {name}=UNIT, such as rad, deg/s, m/s, or 1"
+        " where it has none"
+    )
 
 
 def _time_column(path: Path, dt: float | None) -> str | None:
@@ -71,5 +88,6 @@ def _time_column(path: Path, dt: float | None) -> str | None:
         return None
     found = f"{', '.join(map(repr, table.header))} (separated by {SEPARATORS[table.separator]})"
     raise InputError(
-        f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample period with --dt; found {found}"
+        f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample"
+        f" period with --dt; found {found}"
     )

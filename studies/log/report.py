@@ -17,9 +17,17 @@ CERTAIN = ("ls", "rls")
 
 
 def facts(
-    log: Path, kind: str, record: FlightRecord, rows: int, outside: int, result: Comparison, test_log: Path | None = None
+    log: Path,
+    kind: str,
+    record: FlightRecord,
+    rows: int,
+    outside: int,
+    result: Comparison,
+    test_log: Path | None = None,
 ) -> dict[str, Any]:
-    """What was read and used: `rows` in the file, `outside` --start and --stop, and what became of the rest; a log held out, if any."""
+    """What was read and used: `rows` in the file, `outside` --start and --stop, and what became of
+    the rest; a log held out, if any.
+    """
     model, test = result.scheduled, result.test
     scheduling = model.parameters[0]
     seen = result.training[scheduling]
@@ -54,9 +62,19 @@ def text(found: dict[str, Any], result: Comparison) -> str:
     """The whole answer for a reader."""
     fit = "fit in percent of the output's own variation (100: perfect, 0: no better than its mean)"
     parts = [
-        *_read(found), *_structure(found, result), "", str(result.scheduled.excitation), "", fit, _table(result), *_horizons(result), "",
-        *result.verdict(), "", *_certainty(result),
-    ]  # fmt: skip
+        *_read(found),
+        *_structure(found, result),
+        "",
+        str(result.scheduled.excitation),
+        "",
+        fit,
+        _table(result),
+        *_horizons(result),
+        "",
+        *result.verdict(),
+        "",
+        *_certainty(result),
+    ]
     return "\n".join(parts).rstrip()
 
 
@@ -73,12 +91,22 @@ def data(found: dict[str, Any], result: Comparison) -> dict[str, Any]:
     pays = {str(y): result.pays(str(y)) for y in result.scheduled.outputs} if judged else None
     certain = result.scheduled.method in CERTAIN
     return {
-        "read": found, "excitation": _excitation(result), "models": models, "judged": [scored.label for scored in result.judged],
-        "scheduling_pays": pays, "verdict": result.verdict(), "scheduling_held": result.hold_p, "scheduling_leak": result.leak,
-        "moving_trim": result.trim_note, "method": result.scheduled.method, "details": dict(result.scheduled.details),
-        "standard_errors": uncertainty(result.scheduled, result.training).standard_errors if certain else None,
+        "read": found,
+        "excitation": _excitation(result),
+        "models": models,
+        "judged": [scored.label for scored in result.judged],
+        "scheduling_pays": pays,
+        "verdict": result.verdict(),
+        "scheduling_held": result.hold_p,
+        "scheduling_leak": result.leak,
+        "moving_trim": result.trim_note,
+        "method": result.scheduled.method,
+        "details": dict(result.scheduled.details),
+        "standard_errors": (
+            uncertainty(result.scheduled, result.training).standard_errors if certain else None
+        ),
         "slow_modes": _slow(result) if certain else None,
-    }  # fmt: skip
+    }
 
 
 def _read(found: dict[str, Any]) -> list[str]:
@@ -86,33 +114,69 @@ def _read(found: dict[str, Any]) -> list[str]:
     lengths = ", ".join(map(str, parts[:8])) + (", ..." if len(parts) > 8 else "")
     units = ", ".join(f"{name} [{unit}]" for name, unit in found["signals"].items())
     return [
-        f"{found['log']} ({found['format']}): {found['rows_read']} rows, {found['rows_outside_start_stop']} of them outside --start/--stop",
-        f"  used: {found['samples']} samples, dt {found['dt']:.5g} s, from {found['start']:.5g} to {found['stop']:.5g} s",
-        f"  segments: {len(parts)}, of {lengths} samples; {found['samples_with_missing_values']} samples with missing values",
+        (
+            f"{found['log']} ({found['format']}): {found['rows_read']} rows,"
+            f" {found['rows_outside_start_stop']} of them outside --start/--stop"
+        ),
+        (
+            f"  used: {found['samples']} samples, dt {found['dt']:.5g} s, from {found['start']:.5g}"
+            f" to {found['stop']:.5g} s"
+        ),
+        (
+            f"  segments: {len(parts)}, of {lengths} samples;"
+            f" {found['samples_with_missing_values']} samples with missing values"
+        ),
         f"  signals: {units}",
     ]
 
 
 def _structure(found: dict[str, Any], result: Comparison) -> list[str]:
     arx = result.scheduled.structure
-    (low, high), (trained_low, trained_high) = found["scheduling_range"], found["scheduling_range_of_training"]
+    (low, high), (trained_low, trained_high) = (
+        found["scheduling_range"],
+        found["scheduling_range_of_training"],
+    )
     incomplete = found["training_samples_without_full_regressor"]
-    fitted, held = ("the first", "the last") if found["test_log"] is None else ("all", f"{found['test_log']}, all")
+    fitted, held = (
+        ("the first", "the last")
+        if found["test_log"] is None
+        else ("all", f"{found['test_log']}, all")
+    )
     return [
-        f"  fitted: {fitted} {found['training_samples']} samples, {incomplete} without a complete regressor, by {_method(result)}",
+        (
+            f"  fitted: {fitted} {found['training_samples']} samples, {incomplete} without a"
+            f" complete regressor, by {_method(result)}"
+        ),
         f"  held out: {held} {found['held_out_samples']} samples",
-        f"  range of {arx.scheduling} in all that was read, which the model covers: {low:.4g} to {high:.4g} {found['scheduling_unit']}",
-        f"  fitted on {trained_low:.4g} to {trained_high:.4g}; {found['held_out_samples_beyond_training']} held-out samples lie beyond",
-        f"  model: {', '.join(arx.outputs)} from {', '.join(arx.inputs)}, na {arx.na}, nb {arx.nb}, delay {arx.delay},"
-        f" coefficients at {arx.scheduling_at}, {'with' if arx.offset else 'without'} offset",
-        *([f"  samples are {found['resampled']}: y(k) may depend on u(k), which delay 0 allows"] if found["resampled"] else []),
+        (
+            f"  range of {arx.scheduling} in all that was read, which the model covers: {low:.4g}"
+            f" to {high:.4g} {found['scheduling_unit']}"
+        ),
+        (
+            f"  fitted on {trained_low:.4g} to {trained_high:.4g};"
+            f" {found['held_out_samples_beyond_training']} held-out samples lie beyond"
+        ),
+        (
+            f"  model: {', '.join(arx.outputs)} from {', '.join(arx.inputs)}, na {arx.na}, nb"
+            f" {arx.nb}, delay {arx.delay}, coefficients at {arx.scheduling_at},"
+            f" {'with' if arx.offset else 'without'} offset"
+        ),
+        *(
+            [f"  samples are {found['resampled']}: y(k) may depend on u(k), which delay 0 allows"]
+            if found["resampled"]
+            else []
+        ),
         *([f"  {result.trim_note}"] if result.trim_note else []),
     ]
 
 
 def _method(result: Comparison) -> str:
     model = result.scheduled
-    strength = f" (first-stage F {model.details['first_stage_F']:.3g})" if "first_stage_F" in model.details else ""
+    strength = (
+        f" (first-stage F {model.details['first_stage_F']:.3g})"
+        if "first_stage_F" in model.details
+        else ""
+    )
     return f"{model.method}{strength}"
 
 
@@ -124,17 +188,25 @@ def _horizons(result: Comparison) -> list[str]:
     if not result.hold_p:
         return [f"{p} is taken as known ahead, as a command is"]
     told = (
-        f"; {100 * result.leak:.0f} % of what is new in it is in the outputs of the same instant: free runs are told what they predict, "
-        "and are not counted" if result.told else ""
-    )  # fmt: skip
-    return [f"{p} is taken as measured: one step and 1 s hold it from the start of each prediction, free runs follow it{told}"]
+        f"; {100 * result.leak:.0f} % of what is new in it is in the outputs of the same instant:"
+        " free runs are told what they predict, and are not counted"
+        if result.told
+        else ""
+    )
+    return [
+        f"{p} is taken as measured: one step and 1 s hold it from the start of each prediction,"
+        f" free runs follow it{told}"
+    ]
 
 
 def _slow(result: Comparison) -> dict[str, Any]:
     found = slow_modes(result.scheduled, result.training)
     return {
         "lost": len(found.lost),
-        "modes": [{"p": m.p, "pole": m.s, "error": m.error, "lost": m.lost, "period": m.period} for m in found.modes],
+        "modes": [
+            {"p": m.p, "pole": m.s, "error": m.error, "lost": m.lost, "period": m.period}
+            for m in found.modes
+        ],
         "text": str(found),
     }
 
@@ -147,24 +219,41 @@ def _certainty(result: Comparison) -> list[str]:
     if model.method not in CERTAIN:
         return [analysis]
     known = uncertainty(model, result.training)
-    colour = ", ".join(f"{y} {factor:.1f}" for y, factor in zip(model.outputs, known.colour, strict=True))
+    colour = ", ".join(
+        f"{y} {factor:.1f}" for y, factor in zip(model.outputs, known.colour, strict=True)
+    )
     free = model.structure.free
     sure = np.abs(model.theta) > 2 * known.standard_errors
     count = f"{int(np.sum(sure & free))} of {int(free.sum())}"
     return [
         analysis,
-        f"coefficients more than two standard errors from zero: {count} (coloured residuals make the errors larger by: {colour})",
+        (
+            f"coefficients more than two standard errors from zero: {count} (coloured residuals"
+            f" make the errors larger by: {colour})"
+        ),
         str(slow_modes(model, result.training)),
     ]
 
 
 def _table(result: Comparison) -> str:
     parts = ["in sample"] + (["held out"] if result.test is not None else [])
-    rows = [["output", "model", *(f"{part}: {h}" if i == 0 else h for part in parts for i, h in enumerate(HORIZONS))]]
+    rows = [
+        [
+            "output",
+            "model",
+            *(f"{part}: {h}" if i == 0 else h for part in parts for i, h in enumerate(HORIZONS)),
+        ]
+    ]
     for output in map(str, result.scheduled.outputs):
         for scored in result.models:
             halves = [scored.in_sample, *([scored.held_out] if scored.held_out else [])]
-            rows.append([output, scored.label, *(percent(half[h][output]) for half in halves for h in HORIZONS)])
+            rows.append(
+                [
+                    output,
+                    scored.label,
+                    *(percent(half[h][output]) for half in halves for h in HORIZONS),
+                ]
+            )
     return columns(rows, left=2)
 
 

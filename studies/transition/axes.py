@@ -24,7 +24,9 @@ FROZEN_SPEEDS = (2.0, 7.0, 12.0)
 
 @dataclass(frozen=True)
 class Axis:
-    """What is identified: outputs from inputs; `mode` names the rotor mode it must find and the outputs with a pass mark."""
+    """What is identified: outputs from inputs; `mode` names the rotor mode it must find and the
+    outputs with a pass mark.
+    """
 
     name: str
     outputs: tuple[str, ...]
@@ -34,29 +36,59 @@ class Axis:
     """{output: (noise-free, 30 dB)} fit in percent, 1 s ahead."""
 
     def structure(self, order: int = 3, degree: int = 2, offset: bool = True) -> LPVARX:
-        """LPV-ARX of this axis at 50 Hz: `order` lags of everything, polynomial of `degree` in the commanded airspeed."""
+        """LPV-ARX of this axis at 50 Hz: `order` lags of everything, polynomial of `degree` in the
+        commanded airspeed.
+        """
         basis = Polynomial(degree, 0.0, TOP)
-        return LPVARX(self.outputs, self.inputs, SCHEDULING, order, order, 1, basis, offset=offset, offset_rate=offset)
+        return LPVARX(
+            self.outputs,
+            self.inputs,
+            SCHEDULING,
+            order,
+            order,
+            1,
+            basis,
+            offset=offset,
+            offset_rate=offset,
+        )
 
 
 LONGITUDINAL = Axis(
-    "longitudinal-vertical", ("u", "w", "q", "theta"), ("d_lon", "d_col"), "pitch/flap", {"q": (90.0, 80.0), "theta": (90.0, 80.0)}
+    "longitudinal-vertical",
+    ("u", "w", "q", "theta"),
+    ("d_lon", "d_col"),
+    "pitch/flap",
+    {"q": (90.0, 80.0), "theta": (90.0, 80.0)},
 )
-LATERAL = Axis("lateral-directional", ("v", "p", "r", "phi"), ("d_lat", "d_ped"), "roll/flap", {"p": (85.0, 80.0)})
+LATERAL = Axis(
+    "lateral-directional",
+    ("v", "p", "r", "phi"),
+    ("d_lat", "d_ped"),
+    "roll/flap",
+    {"p": (85.0, 80.0)},
+)
 LATERAL_WITH_COLLECTIVE = Axis(
-    "lateral-directional, other inputs measured", LATERAL.outputs, ("d_lat", "d_ped", "d_lon", "d_col"), "roll/flap", LATERAL.marks
+    "lateral-directional, other inputs measured",
+    LATERAL.outputs,
+    ("d_lat", "d_ped", "d_lon", "d_col"),
+    "roll/flap",
+    LATERAL.marks,
 )
 ALL = Axis(
-    "all axes (MIMO)", ("u", "v", "w", "p", "q", "r", "phi", "theta"), ("d_lon", "d_lat", "d_col", "d_ped"), "roll/flap",
+    "all axes (MIMO)",
+    ("u", "v", "w", "p", "q", "r", "phi", "theta"),
+    ("d_lon", "d_lat", "d_col", "d_ped"),
+    "roll/flap",
     {"q": (90.0, 80.0), "theta": (90.0, 80.0), "p": (85.0, 80.0)},
-)  # fmt: skip
+)
 AXES = (LONGITUDINAL, LATERAL)
 
 
 @dataclass(frozen=True)
 class Scores:
-    """Fit in percent of each output one step ahead, 1 s ahead and in free run, and the miss of the frozen rotor mode
-    (percent of its magnitude) at each of `FROZEN_SPEEDS`."""
+    """Fit in percent of each output one step ahead, 1 s ahead and in free run, and the miss of the
+    frozen rotor mode (percent of its magnitude) at each of `FROZEN_SPEEDS`.
+    """
 
     one_step: dict[str, float]
     one_second: dict[str, float]
@@ -65,13 +97,17 @@ class Scores:
 
 
 def rotor_mode(model: LinearModel, name: str) -> complex:
-    """The eigenvalue (rad/s) of the pitch/flap or roll/flap mode of the exact linear model: the two fastest oscillations."""
+    """The eigenvalue (rad/s) of the pitch/flap or roll/flap mode of the exact linear model: the two
+    fastest oscillations.
+    """
     fast = sorted((z for z in model.poles() if z.imag > 8), key=abs)
     return complex(fast[0] if name == "pitch/flap" else fast[-1])
 
 
 def mode_misses(heli: Helicopter, model: LPVARXModel, mode: str) -> dict[float, float]:
-    """Distance of the identified model's nearest eigenvalue to the exact rotor mode, percent of its magnitude, at frozen airspeeds."""
+    """Distance of the identified model's nearest eigenvalue to the exact rotor mode, percent of its
+    magnitude, at frozen airspeeds.
+    """
     misses = {}
     for speed in FROZEN_SPEEDS:
         exact = rotor_mode(symheli.linearize(heli, symheli.trim(heli, speed)), mode)
@@ -87,7 +123,9 @@ def scores(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord)
     def named(horizon: int | None) -> dict[str, float]:
         return {str(name): float(value) for name, value in model.score(test, horizon).items()}
 
-    return Scores(named(1), named(round(HORIZON / model.dt)), named(None), mode_misses(heli, model, axis.mode))
+    return Scores(
+        named(1), named(round(HORIZON / model.dt)), named(None), mode_misses(heli, model, axis.mode)
+    )
 
 
 def instruments(axis: Axis) -> tuple[str, ...]:
@@ -95,18 +133,28 @@ def instruments(axis: Axis) -> tuple[str, ...]:
     return tuple(f"e_{name}" for name in axis.inputs)
 
 
-def identify(axis: Axis, training: FlightRecord, method: str = "rls", order: int = 3, degree: int = 2) -> LPVARXModel:
+def identify(
+    axis: Axis, training: FlightRecord, method: str = "rls", order: int = 3, degree: int = 2
+) -> LPVARXModel:
     """Fit `axis` to a training flight; "iv" takes the excitation of its inputs as instruments.
 
-    What is added to the inputs is weak along the slow modes: the report says so where it shows what instruments find.
+    What is added to the inputs is weak along the slow modes: the report says so where it shows what
+    instruments find.
     """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "the instruments are weak", DataWarning)
-        return fit(axis.structure(order, degree), training, method=method, instruments=instruments(axis) if method == "iv" else ())  # type: ignore[arg-type]
+        return fit(
+            axis.structure(order, degree),
+            training,
+            method=method,
+            instruments=instruments(axis) if method == "iv" else (),
+        )  # type: ignore[arg-type]
 
 
 def update_time(axis: Axis, flight: FlightRecord) -> float:
-    """Processor time (s) of one recursive update of the axis's coefficients along a flight, lags and basis included."""
+    """Processor time (s) of one recursive update of the axis's coefficients along a flight, lags
+    and basis included.
+    """
     online = RecursiveLeastSquares(axis.structure()).online()
     rows = flight.columns((*axis.outputs, *axis.inputs, SCHEDULING))
     online.run(rows, history=False)

@@ -20,7 +20,9 @@ MODE_MARK = 3.0
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity over the seeds, in percent; `mark` is the pass mark, `largest` whether it bounds from above."""
+    """One quantity over the seeds, in percent; `mark` is the pass mark, `largest` whether it bounds
+    from above.
+    """
 
     name: str
     values: np.ndarray
@@ -52,26 +54,36 @@ class Campaign:
 
     def summary(self) -> str:
         """A table: default seed, median, worst, mark."""
-        lines = [f"{'':58s}{'default':>9s}{'median':>9s}{'worst':>9s}{'mark':>9s}   over {self.seeds} seeds and the default one, percent"]
+        lines = [
+            f"{'':58s}{'default':>9s}{'median':>9s}{'worst':>9s}{'mark':>9s}   over {self.seeds}"
+            " seeds and the default one, percent"
+        ]
         for r in self.rows:
             sign = "<=" if r.largest else ">="
             verdict = "" if r.passed else "   MISSED"
-            lines.append(f"{r.name:58s}{r.values[0]:9.2f}{np.median(r.values):9.2f}{r.worst:9.2f}{sign:>4s}{r.mark:5.0f}{verdict}")
+            lines.append(
+                f"{r.name:58s}{r.values[0]:9.2f}{np.median(r.values):9.2f}{r.worst:9.2f}{sign:>4s}{r.mark:5.0f}{verdict}"
+            )
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
         """Every value with its unit."""
         return {
             r.name: {
-                "values": {"value": r.values.tolist(), "unit": "%"}, "median": value(float(np.median(r.values)), "%"),
-                "worst": value(r.worst, "%"), "mark": value(r.mark, "%"), "passed": r.passed,
+                "values": {"value": r.values.tolist(), "unit": "%"},
+                "median": value(float(np.median(r.values)), "%"),
+                "worst": value(r.worst, "%"),
+                "mark": value(r.mark, "%"),
+                "passed": r.passed,
             }
             for r in self.rows
-        }  # fmt: skip
+        }
 
 
 def run_campaign(seeds: int = 20, vehicle: str = "xcell60") -> Campaign:
-    """Fly, identify and judge with the default seed and `seeds` others (new schedules, excitation and noise each)."""
+    """Fly, identify and judge with the default seed and `seeds` others (new schedules, excitation
+    and noise each).
+    """
     heli = Helicopter.load(vehicle, governor="ideal")
     autopilot = autopilot_for(heli)
     collected: dict[tuple[str, float, bool], list[float]] = {}
@@ -83,10 +95,21 @@ def run_campaign(seeds: int = 20, vehicle: str = "xcell60") -> Campaign:
                 result = axes.scores(heli, axis, axes.identify(axis, training, "ls"), test)
                 label = "noise-free" if noise_db is None else f"{noise_db:g} dB"
                 for output, marks in axis.marks.items():
-                    key = (f"{output}, 1 s ahead, {label} ({axis.name})", marks[noise_db is not None], False)
+                    key = (
+                        f"{output}, 1 s ahead, {label} ({axis.name})",
+                        marks[noise_db is not None],
+                        False,
+                    )
                     collected.setdefault(key, []).append(result.one_second[output])
                 if noise_db is None:
                     for speed, miss in result.mode_miss.items():
-                        collected.setdefault((f"{axis.mode} mode at {speed:g} m/s", MODE_MARK, True), []).append(miss)
+                        collected.setdefault(
+                            (f"{axis.mode} mode at {speed:g} m/s", MODE_MARK, True), []
+                        ).append(miss)
         print(f"  seed {seed} of {seeds}", file=sys.stderr, flush=True)
-    return Campaign(tuple(Row(name, np.array(v), mark, largest) for (name, mark, largest), v in collected.items()), seeds)
+    return Campaign(
+        tuple(
+            Row(name, np.array(v), mark, largest) for (name, mark, largest), v in collected.items()
+        ),
+        seeds,
+    )

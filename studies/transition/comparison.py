@@ -1,4 +1,6 @@
-"""Baseline and identified model on equal terms: predictions of a flight neither has seen, and frozen comparisons."""
+"""Baseline and identified model on equal terms: predictions of a flight neither has seen, and
+frozen comparisons.
+"""
 
 from __future__ import annotations
 
@@ -33,14 +35,17 @@ SCALES = {
 
 
 FAST = 3.0
-"""Frequency (rad/s) above which the fast modes are compared on their own: the slow modes lie below 1 rad/s."""
+"""Frequency (rad/s) above which the fast modes are compared on their own: the slow modes lie below
+1 rad/s.
+"""
 
 
 class BaselinePredictor:
     """Full-state prediction with an interpolated LPV model about its moving trim.
 
-    dx/dt = A(p) (x - x0(p)) + B(p) (u - u0(p)) - x0'(p) dp/dt in deviations; p is the commanded airspeed, as for the
-    identified model; flapping angles are known from the record. Without `drift` the last term is left out.
+    dx/dt = A(p) (x - x0(p)) + B(p) (u - u0(p)) - x0'(p) dp/dt in deviations; p is the commanded
+    airspeed, as for the identified model; flapping angles are known from the record. Without
+    `drift` the last term is left out.
     """
 
     def __init__(self, lpv: LPVStateSpace, record: FlightRecord, drift: bool = True):
@@ -54,15 +59,23 @@ class BaselinePredictor:
         w = -lpv.trim.state(p, 1) * speed[:, None] if drift else np.zeros_like(x0)  # type: ignore[union-attr]
         A, B, *_ = lpv.matrices(p)
         stacked = np.zeros((len(p), 2 * nx + nu, 2 * nx + nu))
-        stacked[:, :nx, :nx], stacked[:, :nx, nx : nx + nu], stacked[:, :nx, nx + nu :] = A, B, np.eye(nx)
+        stacked[:, :nx, :nx], stacked[:, :nx, nx : nx + nu], stacked[:, :nx, nx + nu :] = (
+            A,
+            B,
+            np.eye(nx),
+        )
         step = expm(stacked * dt)
         self.A, self.x0 = step[:, :nx, :nx], x0
         deviation = record.columns(inputs) - u0
-        self.push = np.einsum("kij,kj->ki", step[:, :nx, nx : nx + nu], deviation) + np.einsum("kij,kj->ki", step[:, :nx, nx + nu :], w)
+        self.push = np.einsum("kij,kj->ki", step[:, :nx, nx : nx + nu], deviation) + np.einsum(
+            "kij,kj->ki", step[:, :nx, nx + nu :], w
+        )
         self.states, self.x = lpv.states, record.columns(lpv.states)
 
     def predict(self, outputs: Sequence[str], horizon: int) -> Array:
-        """Outputs (n, ny) `horizon` samples ahead from every sample, NaN for the first `horizon`."""
+        """Outputs (n, ny) `horizon` samples ahead from every sample, NaN for the first
+        `horizon`.
+        """
         n = len(self.x)
         z = (self.x - self.x0)[: n - horizon]
         for h in range(horizon):
@@ -85,7 +98,9 @@ class BaselinePredictor:
 
 @dataclass(frozen=True)
 class Predictor:
-    """What one predictor achieved on the unseen flight: fits in percent by output, and the predictions for the figures."""
+    """What one predictor achieved on the unseen flight: fits in percent by output, and the
+    predictions for the figures.
+    """
 
     name: str
     one_step: dict[str, float]
@@ -104,34 +119,52 @@ class Comparison:
 
 
 def compare(
-    axis: Axis, identified: dict[str, LPVARXModel], baselines: dict[str, tuple[LPVStateSpace, bool]], test: FlightRecord
+    axis: Axis,
+    identified: dict[str, LPVARXModel],
+    baselines: dict[str, tuple[LPVStateSpace, bool]],
+    test: FlightRecord,
 ) -> Comparison:
-    """`identified` and `baselines` ({name: (model, with drift)}) predict the outputs of `axis` from the same samples on."""
+    """`identified` and `baselines` ({name: (model, with drift)}) predict the outputs of `axis` from
+    the same samples on.
+    """
     truth, horizon = test.columns(axis.outputs), round(HORIZON / test.dt)
 
     def judged(name: str, one: Array, ahead: Array, free: Array) -> Predictor:
         def fits(guess: Array) -> dict[str, float]:
-            return dict(zip(axis.outputs, (float(v) for v in fit_percent(truth, guess)), strict=True))
+            return dict(
+                zip(axis.outputs, (float(v) for v in fit_percent(truth, guess)), strict=True)
+            )
 
         return Predictor(name, fits(one), fits(ahead), fits(free), ahead)
 
     predictors = []
     for name, model in identified.items():
         columns = [model.outputs.index(y) for y in axis.outputs]  # type: ignore[arg-type]
-        one, ahead, free = model.predict(test, 1), model.predict(test, horizon), model.simulate(test)
+        one, ahead, free = (
+            model.predict(test, 1),
+            model.predict(test, horizon),
+            model.simulate(test),
+        )
         predictors.append(judged(name, one[:, columns], ahead[:, columns], free[:, columns]))
     start = max((model.structure.memory for model in identified.values()), default=0)
     for name, (lpv, drift) in baselines.items():
         model = BaselinePredictor(lpv, test, drift)
         predictors.append(
-            judged(name, model.predict(axis.outputs, 1), model.predict(axis.outputs, horizon), model.simulate(axis.outputs, start))
+            judged(
+                name,
+                model.predict(axis.outputs, 1),
+                model.predict(axis.outputs, horizon),
+                model.simulate(axis.outputs, start),
+            )
         )
     return Comparison(axis, test, tuple(predictors))
 
 
 @dataclass(frozen=True)
 class FrozenComparison:
-    """Exact, interpolated and identified model with airspeed held: poles (rad/s), responses and nu-gaps to the exact one."""
+    """Exact, interpolated and identified model with airspeed held: poles (rad/s), responses and
+    nu-gaps to the exact one.
+    """
 
     axis: Axis
     airspeeds: Array
@@ -147,11 +180,17 @@ class FrozenComparison:
     """Largest chordal distance above `FAST` rad/s, where the slow modes do not decide."""
     omega: Array
     responses: dict[str, Array]
-    """|G| (n,) of the first rate output from the first input at 7 m/s: exact, baseline, identified."""
+    """|G| (n,) of the first rate output from the first input at 7 m/s: exact, baseline,
+    identified.
+    """
 
 
-def compare_frozen(heli: Helicopter, axis: Axis, model: LPVARXModel, lpv: LPVStateSpace, airspeeds: Sequence[float]) -> FrozenComparison:
-    """Everything at sample period of the identified model, zero-order hold, inputs and outputs of `axis`."""
+def compare_frozen(
+    heli: Helicopter, axis: Axis, model: LPVARXModel, lpv: LPVStateSpace, airspeeds: Sequence[float]
+) -> FrozenComparison:
+    """Everything at sample period of the identified model, zero-order hold, inputs and outputs of
+    `axis`.
+    """
     poles: dict[str, list[Array]] = {"exact": [], "baseline": [], "identified": []}
     gaps, fast, misses = ({"baseline": [], "identified": []} for _ in range(3))
     rate = {"longitudinal-vertical": ("q", "d_lon")}.get(axis.name, ("p", "d_lat"))
@@ -160,7 +199,9 @@ def compare_frozen(heli: Helicopter, axis: Axis, model: LPVARXModel, lpv: LPVSta
         exact = symheli.linearize(heli, symheli.trim(heli, speed))
         at = {
             "exact": exact.discretize(model.dt).select(inputs=axis.inputs, outputs=axis.outputs),
-            "baseline": lpv.at(speed).discretize(model.dt).select(inputs=axis.inputs, outputs=axis.outputs),
+            "baseline": (
+                lpv.at(speed).discretize(model.dt).select(inputs=axis.inputs, outputs=axis.outputs)
+            ),
             "identified": model.at(speed).select(inputs=axis.inputs, outputs=axis.outputs),
         }
         mode = rotor_mode(exact, axis.mode)
@@ -171,14 +212,36 @@ def compare_frozen(heli: Helicopter, axis: Axis, model: LPVARXModel, lpv: LPVSta
             if name != "exact":
                 misses[name].append(100 * np.abs(s - mode).min() / abs(mode))
                 sizes = [SCALES[i] for i in axis.inputs], [SCALES[y] for y in axis.outputs]
-                gaps[name].append(nu_gap(at["exact"], frozen, input_scale=sizes[0], output_scale=sizes[1]))
+                gaps[name].append(
+                    nu_gap(at["exact"], frozen, input_scale=sizes[0], output_scale=sizes[1])
+                )
                 fast[name].append(
-                    chordal_distance(at["exact"], frozen, omega[omega >= FAST], input_scale=sizes[0], output_scale=sizes[1]).max()
+                    chordal_distance(
+                        at["exact"],
+                        frozen,
+                        omega[omega >= FAST],
+                        input_scale=sizes[0],
+                        output_scale=sizes[1],
+                    ).max()
                 )
             if abs(speed - 7.0) < 0.26:
-                responses[name] = np.abs(frozen.select(inputs=[rate[1]], outputs=[rate[0]]).frequency_response(omega)[:, 0, 0])
+                responses[name] = np.abs(
+                    frozen.select(inputs=[rate[1]], outputs=[rate[0]]).frequency_response(omega)[
+                        :, 0, 0
+                    ]
+                )
     return FrozenComparison(
-        axis, np.asarray(airspeeds, float), tuple(poles["exact"]), tuple(poles["baseline"]), tuple(poles["identified"]),
-        np.array(misses["baseline"]), np.array(misses["identified"]), np.array(gaps["baseline"]), np.array(gaps["identified"]),
-        np.array(fast["baseline"]), np.array(fast["identified"]), omega, responses,
-    )  # fmt: skip
+        axis,
+        np.asarray(airspeeds, float),
+        tuple(poles["exact"]),
+        tuple(poles["baseline"]),
+        tuple(poles["identified"]),
+        np.array(misses["baseline"]),
+        np.array(misses["identified"]),
+        np.array(gaps["baseline"]),
+        np.array(gaps["identified"]),
+        np.array(fast["baseline"]),
+        np.array(fast["identified"]),
+        omega,
+        responses,
+    )

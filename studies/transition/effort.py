@@ -22,24 +22,17 @@ class Effort:
     exact_rates: tuple[float, ...] = (0.0, 1.0, 3.0)
     longitudinal_rates: tuple[float, ...] = (0.0, 3.0, math.inf)
     thorough: bool = True
-    """Whether a P with a memory, the exact models and the LFT tests of the servo loops are part of it."""
+    """Whether a P with a memory, the exact models and the LFT tests of the servo loops are part of
+    it.
+    """
     servo_rates: tuple[float, ...] = (0.0, 3.0, 8.0, math.inf)
     servo_segments: tuple[int, ...] = (8,)
     search: Search = field(default_factory=Search)
-    """For the lateral gust, whose gain grows with the rate; elsewhere a glance finds the growth there is, and nothing above frozen."""
+    """For the lateral gust, whose gain grows with the rate; elsewhere a glance finds the growth
+    there is, and nothing above frozen.
+    """
 
     @classmethod
     def look(cls) -> Effort:
         """Shorter flights, fewer certificates of a simpler form."""
-        return cls(
-            6,
-            4,
-            (0.0, 3.0, math.inf),
-            (8,),
-            (),
-            (),
-            False,
-            (0.0, math.inf),
-            (4,),
-            GLANCE,
-        )
+        return cls(6, 4, (0.0, 3.0, math.inf), (8,), (), (), False, (0.0, math.inf), (4,), GLANCE)

@@ -23,19 +23,33 @@ DEGREES = 180 / math.pi
 
 CAPTION = {
     "trim": "Trim along the transition. Dotted lines: corners of the model.",
-    "interpolation": "Entries of A(p): exact linearizations (dots) and their interpolations. M_u and M_w jump where a limit of the "
-    "horizontal tail or the edge of the wake is crossed (dotted lines): no polynomial follows.",
-    "convergence": "Counterpart of the paper's figures 1, 3 and 5, {} loop: the 12 parameters of each output as the recursion runs, "
-    "each divided by the largest final value of its coefficient function.",
-    "outputs": "Counterpart of the paper's figures 2, 4 and 6, {} loop: system and one-step prediction on a fresh record; below, the "
-    "error. Triangles: the largest errors (spikes).",
+    "interpolation": (
+        "Entries of A(p): exact linearizations (dots) and their interpolations. M_u and M_w jump"
+        " where a limit of the horizontal tail or the edge of the wake is crossed (dotted lines):"
+        " no polynomial follows."
+    ),
+    "convergence": (
+        "Counterpart of the paper's figures 1, 3 and 5, {} loop: the 12 parameters of each output"
+        " as the recursion runs, each divided by the largest final value of its coefficient"
+        " function."
+    ),
+    "outputs": (
+        "Counterpart of the paper's figures 2, 4 and 6, {} loop: system and one-step prediction on"
+        " a fresh record; below, the error. Triangles: the largest errors (spikes)."
+    ),
     "flights": "The flight that is identified, and the transition that judges (noise-free).",
     "prediction": "{}: 1 s ahead on the unseen transition (noise-free).",
-    "frozen": "{} with airspeed held: poles from hover (pale) to 12.5 m/s (dark), response at 7 m/s, nu-gap to the exact model "
-    "(1: a mode is stable in one and unstable in the other); dotted: the chordal distance above {:g} rad/s, where slow modes do not "
-    "decide. Identified poles without a counterpart belong to lags the plant does not need.",
-    "gain": "What the rate is worth: L2 gain of the gust loops against permitted acceleration, from frozen to an airspeed that jumps, as "
-    "the LFT tests let it. Triangles: an airspeed history attains it. Grey: neither a gain is proven nor growth found.",
+    "frozen": (
+        "{} with airspeed held: poles from hover (pale) to 12.5 m/s (dark), response at 7 m/s,"
+        " nu-gap to the exact model (1: a mode is stable in one and unstable in the other); dotted:"
+        " the chordal distance above {:g} rad/s, where slow modes do not decide. Identified poles"
+        " without a counterpart belong to lags the plant does not need."
+    ),
+    "gain": (
+        "What the rate is worth: L2 gain of the gust loops against permitted acceleration, from"
+        " frozen to an airspeed that jumps, as the LFT tests let it. Triangles: an airspeed history"
+        " attains it. Grey: neither a gain is proven nor growth found."
+    ),
 }
 
 
@@ -45,10 +59,22 @@ def figures(study: Outcome) -> Iterator[tuple[str, str, Figure]]:
 
     matplotlib.use("Agg")
     style: dict[Any, Any] = {
-        "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.edgecolor": GREY, "axes.labelcolor": INK,
-        "axes.titlesize": 9.5, "axes.titlelocation": "left", "legend.frameon": False, "legend.fontsize": 8, "lines.linewidth": 1.3,
-        "axes.grid": True, "grid.color": "#e6e9ec", "grid.linewidth": 0.6, "svg.hashsalt": "symheli", "figure.constrained_layout.use": True,
-    }  # fmt: skip
+        "font.size": 9,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.edgecolor": GREY,
+        "axes.labelcolor": INK,
+        "axes.titlesize": 9.5,
+        "axes.titlelocation": "left",
+        "legend.frameon": False,
+        "legend.fontsize": 8,
+        "lines.linewidth": 1.3,
+        "axes.grid": True,
+        "grid.color": "#e6e9ec",
+        "grid.linewidth": 0.6,
+        "svg.hashsalt": "symheli",
+        "figure.constrained_layout.use": True,
+    }
     with matplotlib.rc_context(style):
         if study.baseline:
             yield "trim", CAPTION["trim"], trim(study)
@@ -67,7 +93,9 @@ def figures(study: Outcome) -> Iterator[tuple[str, str, Figure]]:
             yield "gain-against-rate", CAPTION["gain"], gain_curves(found)
 
 
-def _subplots(rows: int, columns: int, width: float, height: float, **options: Any) -> tuple[Figure, np.ndarray]:
+def _subplots(
+    rows: int, columns: int, width: float, height: float, **options: Any
+) -> tuple[Figure, np.ndarray]:
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(rows, columns, figsize=(width, height), squeeze=False, **options)
@@ -84,8 +112,12 @@ def trim(study: Outcome) -> Figure:
     """Attitude and controls against airspeed."""
     family = study.baseline.nodes  # type: ignore[union-attr]
     figure, axes = _subplots(1, 4, 11, 2.4, sharex=True)
-    for ax, name, where in zip(axes[0], ("theta", "phi", "d_col", "d_ped"), ("x", "x", "u", "u"), strict=True):
-        ax.plot(family.airspeeds, [DEGREES * getattr(t, where)[name] for t in family.trims], color=BLUE)
+    for ax, name, where in zip(
+        axes[0], ("theta", "phi", "d_col", "d_ped"), ("x", "x", "u", "u"), strict=True
+    ):
+        ax.plot(
+            family.airspeeds, [DEGREES * getattr(t, where)[name] for t in family.trims], color=BLUE
+        )
         ax.set_title(f"{name} (deg)")
         ax.set_xlabel("airspeed (m/s)")
         _kinks(ax, study)
@@ -98,10 +130,18 @@ def entries(study: Outcome) -> Figure:
     assert b is not None  # noqa: S101
     figure, axes = _subplots(1, 4, 11, 2.8)
     fine = np.linspace(b.nodes.airspeeds[0], b.nodes.airspeeds[-1], 400)
-    cubic, sextic, spline = (b.lpv[k].matrices(fine).A for k in ("polynomial 3", "polynomial 6", "spline"))
-    for ax, (row, column, title) in zip(axes[0], (("q", "u", "M_u"), ("q", "w", "M_w"), ("v", "v", "Y_v"), ("r", "v", "N_v")), strict=True):
+    cubic, sextic, spline = (
+        b.lpv[k].matrices(fine).A for k in ("polynomial 3", "polynomial 6", "spline")
+    )
+    for ax, (row, column, title) in zip(
+        axes[0],
+        (("q", "u", "M_u"), ("q", "w", "M_w"), ("v", "v", "Y_v"), ("r", "v", "N_v")),
+        strict=True,
+    ):
         i, j = b.nodes.states.index(row), b.nodes.states.index(column)  # type: ignore[arg-type]
-        ax.plot(b.between.airspeeds, b.between.A[:, i, j], ".", color=INK, markersize=3, label="exact")
+        ax.plot(
+            b.between.airspeeds, b.between.A[:, i, j], ".", color=INK, markersize=3, label="exact"
+        )
         ax.plot(fine, cubic[:, i, j], color=BLUE, label="cubic")
         ax.plot(fine, sextic[:, i, j], color=GREEN, label="degree 6", linewidth=1)
         ax.plot(fine, spline[:, i, j], color=ORANGE, label="spline", linewidth=1)
@@ -116,7 +156,9 @@ def convergence(e: Any) -> Figure:
     """Parameters over time, one panel an output."""
     figure, axes = _subplots(1, 3, 11, 2.8, sharex=True)
     for ax, c in zip(axes[0], e.channels, strict=True):
-        powers = 13.0 ** np.tile(np.arange(3), 4)  # a coefficient of p^k counts by its contribution at 13 m/s
+        powers = 13.0 ** np.tile(
+            np.arange(3), 4
+        )  # a coefficient of p^k counts by its contribution at 13 m/s
         shown = c.parameters * powers
         size = np.abs(shown[-1].reshape(4, 3)).max(axis=1).repeat(3)
         for k, name in enumerate(c.parameter_names):
@@ -143,13 +185,18 @@ def outputs(e: Any) -> Figure:
         guess = c.model.predict(e.test, 1)[:, 0]
         top, bottom = axes[0][column], axes[1][column]
         top.plot(e.test.time, e.test[c.output], color=INK, label="system", linewidth=1)
-        top.plot(e.test.time, guess, color=ORANGE, label="model, one step", linewidth=0.9, linestyle="--")
+        top.plot(
+            e.test.time, guess, color=ORANGE, label="model, one step", linewidth=0.9, linestyle="--"
+        )
         bottom.plot(e.test.time, e.test[c.output] - guess, color=RED, linewidth=0.8)
         for t, _ in c.spikes:
             k = int(np.argmin(np.abs(e.test.time - t)))
             bottom.plot(t, e.test[c.output][k] - guess[k], "v", color=INK, markersize=4)
         top.margins(y=0.18)
-        top.set_title(f"{c.output}: one step {c.fits['one step']:.0f} %, 1 s {c.fits['1 s']:.0f} %, free run {c.fits['free run']:.0f} %")
+        top.set_title(
+            f"{c.output}: one step {c.fits['one step']:.0f} %, 1 s {c.fits['1 s']:.0f} %, free run"
+            f" {c.fits['free run']:.0f} %"
+        )
         bottom.set_xlabel("time (s)")
     axes[0][0].legend(loc="upper right", ncols=2)
     axes[1][0].set_ylabel("error")
@@ -162,13 +209,29 @@ def flights(study: Outcome) -> Figure:
     for column, name in enumerate(("training, noise-free", "test, noise-free")):
         record = study.flights[name]
         axes[0][column].plot(record.time, record["airspeed"], color=BLUE, label="airspeed")
-        axes[0][column].plot(record.time, record["airspeed_command"], color=ORANGE, linestyle="--", label="command", linewidth=1)
+        axes[0][column].plot(
+            record.time,
+            record["airspeed_command"],
+            color=ORANGE,
+            linestyle="--",
+            label="command",
+            linewidth=1,
+        )
         axes[0][column].set_title(f"{name.split(',')[0]}: airspeed (m/s)")
         for signal, colour in (("theta", BLUE), ("phi", ORANGE)):
-            axes[1][column].plot(record.time, DEGREES * record[signal], color=colour, label=signal, linewidth=0.9)
+            axes[1][column].plot(
+                record.time, DEGREES * record[signal], color=colour, label=signal, linewidth=0.9
+            )
         axes[1][column].set_title("attitude (deg)")
-        for signal, colour in (("d_lon", BLUE), ("d_lat", ORANGE), ("d_col", GREEN), ("d_ped", RED)):
-            axes[2][column].plot(record.time, DEGREES * record[signal], color=colour, label=signal, linewidth=0.6)
+        for signal, colour in (
+            ("d_lon", BLUE),
+            ("d_lat", ORANGE),
+            ("d_col", GREEN),
+            ("d_ped", RED),
+        ):
+            axes[2][column].plot(
+                record.time, DEGREES * record[signal], color=colour, label=signal, linewidth=0.6
+            )
         axes[2][column].set_title("inputs (deg)")
         axes[2][column].set_xlabel("time (s)")
     for row in axes:
@@ -179,11 +242,23 @@ def flights(study: Outcome) -> Figure:
 def prediction(c: Any) -> Figure:
     """1 s ahead predictions of each output."""
     figure, axes = _subplots(len(c.axis.outputs), 1, 11, 1.55 * len(c.axis.outputs), sharex=True)
-    chosen = [p for p in c.predictors if p.name in ("LPV-ARX, two inputs", "LPV-ARX, other inputs measured", "baseline, cubic")]
+    chosen = [
+        p
+        for p in c.predictors
+        if p.name in ("LPV-ARX, two inputs", "LPV-ARX, other inputs measured", "baseline, cubic")
+    ]
     for k, (ax, output) in enumerate(zip(axes[:, 0], c.axis.outputs, strict=True)):
         ax.plot(c.record.time, c.record[output], color=INK, label="flight", linewidth=1.5)
-        for p, colour in zip(chosen, (BLUE, GREEN, ORANGE) if len(chosen) == 3 else (BLUE, ORANGE), strict=True):
-            ax.plot(c.record.time, p.one_second_series[:, k], color=colour, linewidth=1, label=f"{p.name}: {p.one_second[output]:.0f} %")
+        for p, colour in zip(
+            chosen, (BLUE, GREEN, ORANGE) if len(chosen) == 3 else (BLUE, ORANGE), strict=True
+        ):
+            ax.plot(
+                c.record.time,
+                p.one_second_series[:, k],
+                color=colour,
+                linewidth=1,
+                label=f"{p.name}: {p.one_second[output]:.0f} %",
+            )
         unit = c.record.signals[c.record.signals.index(output)].unit
         low, high = c.record[output].min(), c.record[output].max()
         ax.set_ylim(low - 0.4 * (high - low), high + 0.4 * (high - low))
@@ -205,7 +280,16 @@ def frozen(f: Any) -> Figure:
         for k, poles in enumerate(stack):
             shown = poles[(poles.imag >= 0) & (poles.real > -12) & (poles.imag < 30)]
             label = name if k == len(stack) - 1 else None
-            axes[0][0].plot(shown.real, shown.imag, marker, color=colour, markersize=4.5, fillstyle="none", alpha=shade[k], label=label)
+            axes[0][0].plot(
+                shown.real,
+                shown.imag,
+                marker,
+                color=colour,
+                markersize=4.5,
+                fillstyle="none",
+                alpha=shade[k],
+                label=label,
+            )
     axes[0][0].axvline(0, color=GREY, linewidth=0.8)
     axes[0][0].set_xlabel("real (rad/s)")
     axes[0][0].set_title("poles, imaginary part (rad/s)")
@@ -225,8 +309,12 @@ def frozen(f: Any) -> Figure:
     axes[0][1].legend()
     axes[0][2].plot(f.airspeeds, f.gap_baseline, "+-", color=ORANGE, label="baseline")
     axes[0][2].plot(f.airspeeds, f.gap_identified, "x-", color=BLUE, label="identified")
-    axes[0][2].plot(f.airspeeds, f.fast_baseline, "+:", color=ORANGE, label=f"baseline, above {FAST:g} rad/s")
-    axes[0][2].plot(f.airspeeds, f.fast_identified, "x:", color=BLUE, label=f"identified, above {FAST:g} rad/s")
+    axes[0][2].plot(
+        f.airspeeds, f.fast_baseline, "+:", color=ORANGE, label=f"baseline, above {FAST:g} rad/s"
+    )
+    axes[0][2].plot(
+        f.airspeeds, f.fast_identified, "x:", color=BLUE, label=f"identified, above {FAST:g} rad/s"
+    )
     axes[0][2].set_ylim(0, 1.05)
     axes[0][2].set_title("nu-gap to the exact model")
     axes[0][2].set_xlabel("airspeed (m/s)")
@@ -236,7 +324,9 @@ def frozen(f: Any) -> Figure:
 
 def gain_curves(curves: list[GainCurve]) -> Figure:
     """Gain against rate, one panel a loop."""
-    figure, axes = _subplots(1, len(curves), 7.5 if len(curves) == 1 else 11.5, 4.2, width_ratios=(1.5, 1)[: len(curves)])
+    figure, axes = _subplots(
+        1, len(curves), 7.5 if len(curves) == 1 else 11.5, 4.2, width_ratios=(1.5, 1)[: len(curves)]
+    )
     for ax, curve in zip(axes[0], curves, strict=True):
         draw(curve, ax)
     return figure

@@ -19,12 +19,16 @@ ACCELERATIONS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5, 3.0, 1.5, 4.0, 3.0, 2.0, 3.5)
 NOISE_DB = 30.0
 
 BREEZE, BREEZE_AT_20FT, ABOVE_GROUND = (-2.0, 1.0, 0.0), 7.7, 20.0
-"""A steady wind (north, east, down, m/s) and the turbulence of a mean wind of 15 kt ("light"), flown 20 m above ground."""
+"""A steady wind (north, east, down, m/s) and the turbulence of a mean wind of 15 kt ("light"),
+flown 20 m above ground.
+"""
 
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """Seeds and lengths that make the flights of one run; `noise_db` None flies without sensor noise, `windy` in the breeze above."""
+    """Seeds and lengths that make the flights of one run; `noise_db` None flies without sensor
+    noise, `windy` in the breeze above.
+    """
 
     seed: int = 0
     dt: float = 0.02
@@ -37,24 +41,56 @@ class FlightPlan:
         return replace(self, noise_db=db)
 
     def training(self, heli: Helicopter, autopilot: Autopilot) -> FlightRecord:
-        """Ramps between random airspeeds of [0, 13] m/s at 1.5 to 4 m/s^2, multisines on all four inputs."""
-        schedule = AirspeedSchedule.varied(0.0, TOP, ACCELERATIONS[: self.ramps], 1.5, seed=1000 + self.seed)
+        """Ramps between random airspeeds of [0, 13] m/s at 1.5 to 4 m/s^2, multisines on all four
+        inputs.
+        """
+        schedule = AirspeedSchedule.varied(
+            0.0, TOP, ACCELERATIONS[: self.ramps], 1.5, seed=1000 + self.seed
+        )
         return self._fly(heli, schedule, autopilot, 2000)
 
-    def test(self, heli: Helicopter, autopilot: Autopilot, acceleration: float = 3.2) -> FlightRecord:
-        """A transition no fit has seen: hover, 13 m/s, hover at 3.2 m/s^2, other multisines, other noise."""
-        return self._fly(heli, AirspeedSchedule.transition(0.0, TOP, acceleration, hold=2.0), autopilot, 3000)
+    def test(
+        self, heli: Helicopter, autopilot: Autopilot, acceleration: float = 3.2
+    ) -> FlightRecord:
+        """A transition no fit has seen: hover, 13 m/s, hover at 3.2 m/s^2, other multisines, other
+        noise.
+        """
+        return self._fly(
+            heli, AirspeedSchedule.transition(0.0, TOP, acceleration, hold=2.0), autopilot, 3000
+        )
 
     def gentle(self, heli: Helicopter, autopilot: Autopilot, ramps: int = 10) -> FlightRecord:
-        """Slow ramps (1 m/s^2) with long holds and lower frequencies: what the barely damped slow modes need to be seen."""
+        """Slow ramps (1 m/s^2) with long holds and lower frequencies: what the barely damped slow
+        modes need to be seen.
+        """
         schedule = AirspeedSchedule.varied(0.0, TOP, (1.0,) * ramps, 4.0, seed=4000 + self.seed)
         return self._fly(heli, schedule, autopilot, 5000, lowest=0.03)
 
-    def _fly(self, heli: Helicopter, schedule: AirspeedSchedule, autopilot: Autopilot, offset: int, lowest: float = 0.1) -> FlightRecord:
+    def _fly(
+        self,
+        heli: Helicopter,
+        schedule: AirspeedSchedule,
+        autopilot: Autopilot,
+        offset: int,
+        lowest: float = 0.1,
+    ) -> FlightRecord:
         seed = offset + self.seed
         excitation = Excitation(AMPLITUDE, "multisine", (lowest, 5.0), seed)
-        wind = Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed) if self.windy else Wind()
-        return fly(heli, schedule, dt=self.dt, excitation=excitation, noise_db=self.noise_db, seed=seed, wind=wind, autopilot=autopilot)
+        wind = (
+            Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed)
+            if self.windy
+            else Wind()
+        )
+        return fly(
+            heli,
+            schedule,
+            dt=self.dt,
+            excitation=excitation,
+            noise_db=self.noise_db,
+            seed=seed,
+            wind=wind,
+            autopilot=autopilot,
+        )
 
 
 def autopilot_for(heli: Helicopter, dt: float = 0.02) -> Autopilot:

@@ -10,16 +10,24 @@ from studies.transition.tables import Table, gain
 from synthesis import Status
 
 CHANNELS = {
-    "gust": "Lateral gust (m/s) to yaw rate and roll (rad/s, rad) under attitude hold, continuous time",
-    "longitudinal": "Longitudinal and vertical gusts (m/s) to pitch rate and pitch (rad/s, rad) under attitude hold, continuous time",
-    "servo": "Disturbances at roll cyclic ({d_lat} rad) and pedal ({d_ped} rad) to yaw rate ({r} rad/s) and roll ({phi} rad), 50 Hz".format(
-        **SIZES
+    "gust": (
+        "Lateral gust (m/s) to yaw rate and roll (rad/s, rad) under attitude hold, continuous time"
+    ),
+    "longitudinal": (
+        "Longitudinal and vertical gusts (m/s) to pitch rate and pitch (rad/s, rad) under attitude"
+        " hold, continuous time"
+    ),
+    "servo": (
+        "Disturbances at roll cyclic ({d_lat} rad) and pedal ({d_ped} rad) to yaw rate ({r} rad/s)"
+        " and roll ({phi} rad), 50 Hz".format(**SIZES)
     ),
 }
 
 
 def guarantee(found: Sequence[Bound], channel: str) -> Table:
-    """Gain against permitted acceleration: flown, and proven by each form; tests that let the airspeed jump hold at every acceleration."""
+    """Gain against permitted acceleration: flown, and proven by each form; tests that let the
+    airspeed jump hold at every acceleration.
+    """
     own = [b for b in found if b.channel == channel]
     gains = [b for b in own if b.certificate.kind == "l2 gain"]
     forms = [form for form in FORMS if any(b.form == form for b in gains)]
@@ -32,36 +40,62 @@ def guarantee(found: Sequence[Bound], channel: str) -> Table:
             flown = max(b.certificate.lower for b in now if b.certificate.kind == "l2 gain")
             frozen = next(iter(here.values())).certificate.frozen
             cells = [gain(proven(here[form])) if form in here else "" for form in forms]
-            table.rows.append([
-                model, rate_text(rate), _stable(now, jumping), "unstable" if math.isinf(frozen) else gain(frozen),
-                "grows" if math.isinf(flown) else gain(flown), *cells,
-            ])  # fmt: skip
-    table.remarks.append("Flown: the gain of a computed airspeed history, no bound can be smaller; none: nothing proven; blank: not tried.")
+            table.rows.append(
+                [
+                    model,
+                    rate_text(rate),
+                    _stable(now, jumping),
+                    "unstable" if math.isinf(frozen) else gain(frozen),
+                    "grows" if math.isinf(flown) else gain(flown),
+                    *cells,
+                ]
+            )
+    table.remarks.append(
+        "Flown: the gain of a computed airspeed history, no bound can be smaller; none: nothing"
+        " proven; blank: not tried."
+    )
     return table
 
 
 def not_about_the_helicopter(found: Sequence[Bound]) -> list[str]:
-    """Gains proven of an interpolated or identified model that a flown airspeed of the exact models exceeds, a sentence each."""
+    """Gains proven of an interpolated or identified model that a flown airspeed of the exact models
+    exceeds, a sentence each.
+    """
     gains = [b for b in found if b.certificate.kind == "l2 gain"]
     out = []
     for exact in (b for b in gains if b.model == "exact"):
-        others = [b for b in gains if b.model != "exact" and (b.channel, b.rate) == (exact.channel, exact.rate)]
+        others = [
+            b
+            for b in gains
+            if b.model != "exact" and (b.channel, b.rate) == (exact.channel, exact.rate)
+        ]
         flown = exact.certificate.lower
         for model in dict.fromkeys(b.model for b in others):
             least = min(proven(b) for b in others if b.model == model)
-            if least < flown and gain(least) != gain(flown):  # what no digit shown tells apart says nothing either way
-                who = "the exact models, frozen," if exact.rate == 0 else "flown airspeeds of the exact models"
+            if least < flown and gain(least) != gain(
+                flown
+            ):  # what no digit shown tells apart says nothing either way
+                who = (
+                    "the exact models, frozen,"
+                    if exact.rate == 0
+                    else "flown airspeeds of the exact models"
+                )
                 flight = "make their state grow" if math.isinf(flown) else f"reach {gain(flown)}"
                 out.append(
-                    f"{exact.channel.capitalize()} channel, {rate_text(exact.rate)}: {gain(least)} is proven of the {model} model, "
-                    f"and {who} {flight}: that proof says nothing of the helicopter."
+                    f"{exact.channel.capitalize()} channel, {rate_text(exact.rate)}: {gain(least)}"
+                    f" is proven of the {model} model, and {who} {flight}: that proof says nothing"
+                    " of the helicopter."
                 )
     return out
 
 
 def every(found: Sequence[Bound]) -> list[Table]:
     """One table a channel that has bounds."""
-    return [guarantee(found, channel) for channel in CHANNELS if any(b.channel == channel for b in found)]
+    return [
+        guarantee(found, channel)
+        for channel in CHANNELS
+        if any(b.channel == channel for b in found)
+    ]
 
 
 def _stable(now: list[Bound], jumping: dict[str, Bound]) -> str:
@@ -70,4 +104,6 @@ def _stable(now: list[Bound], jumping: dict[str, Bound]) -> str:
         return "no, even frozen"
     if any(math.isinf(b.certificate.lower) for b in now):
         return "no, it grows"
-    return "proven" if any(b.certificate.verified for b in (*now, *jumping.values())) else "not proven"
+    return (
+        "proven" if any(b.certificate.verified for b in (*now, *jumping.values())) else "not proven"
+    )

@@ -1,4 +1,6 @@
-"""What can be proven about the lateral loop: gain against permitted acceleration, for baseline and identified model."""
+"""What can be proven about the lateral loop: gain against permitted acceleration, for baseline and
+identified model.
+"""
 
 from __future__ import annotations
 
@@ -22,26 +24,39 @@ from synthesis import Certificate, LFTCertificate, Relaxation, Search
 from synthesis.frozen import norm
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
-"""A disturbance of this size (rad) and an output of this size (rad/s, rad) count as 1 on the servo channel; the gust channel is in SI."""
+"""A disturbance of this size (rad) and an output of this size (rad/s, rad) count as 1 on the servo
+channel; the gust channel is in SI.
+"""
 
 PERIOD = 0.02
 
 
 PLAIN, CONSTANT, MEMORY = "P(p)", "constant P", "P(p, lag)"
-LFT_TESTS = {"LFT full block": "full block", "LFT D/G": "DG", "LFT D": "D", "LFT small gain": "small gain"}
+LFT_TESTS = {
+    "LFT full block": "full block",
+    "LFT D/G": "DG",
+    "LFT D": "D",
+    "LFT small gain": "small gain",
+}
 FORMS = (MEMORY, PLAIN, CONSTANT, *LFT_TESTS)
 """Forms of a proof, the least conservative first; from `CONSTANT` on they let the airspeed jump."""
 
 MEMORIES = {
-    rate: Relaxation(memory=lag, segments=(8,), grading=1.5, memory_segments=across, memory_degree=3)
+    rate: Relaxation(
+        memory=lag, segments=(8,), grading=1.5, memory_segments=across, memory_degree=3
+    )
     for rate, lag, across in ((3.0, 0.6, 3), (4.5, 0.6, 3), (6.0, 0.5, 4))
 }
-"""Accelerations (m/s^2) at which a P with a memory is tried, on a coarser mesh than `studies.bracket`, which takes minutes."""
+"""Accelerations (m/s^2) at which a P with a memory is tried, on a coarser mesh than
+`studies.bracket`, which takes minutes.
+"""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """One certificate: which model, which channel, permitted acceleration (m/s^2), which of `FORMS`."""
+    """One certificate: which model, which channel, permitted acceleration (m/s^2), which of
+    `FORMS`.
+    """
 
     model: str
     channel: str
@@ -52,29 +67,48 @@ class Bound:
 
 def scaled(lpv: LPVStateSpace) -> LPVStateSpace:
     """Inputs and outputs measured in `SIZES`."""
-    inputs, outputs = np.array([SIZES[i] for i in lpv.inputs]), np.array([SIZES[y] for y in lpv.outputs])
+    inputs, outputs = (
+        np.array([SIZES[i] for i in lpv.inputs]),
+        np.array([SIZES[y] for y in lpv.outputs]),
+    )
 
     def measured(A: Array, B: Array, C: Array, D: Array) -> Matrices:
         return Matrices(A, B * inputs, C / outputs[:, None], D * inputs / outputs[:, None])
 
-    model = replace(lpv, **measured(lpv.A, lpv.B, lpv.C, lpv.D)._asdict(), residuals=None, trim=None)
+    model = replace(
+        lpv, **measured(lpv.A, lpv.B, lpv.C, lpv.D)._asdict(), residuals=None, trim=None
+    )
     origin = lpv.fitted_to
-    return model if origin is None else model.with_residuals(origin.nodes, measured(*origin.matrices))
+    return (
+        model if origin is None else model.with_residuals(origin.nodes, measured(*origin.matrices))
+    )
 
 
 def gust_loop(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
-    """Closed loop from a lateral gust v_w (m/s) to r (rad/s) and phi (rad), continuous, cubic element-wise fit."""
+    """Closed loop from a lateral gust v_w (m/s) to r (rad/s) and phi (rad), continuous, cubic
+    element-wise fit.
+    """
     return close(family.select(STATES, ["d_lat", "v_w"]).interpolate("polynomial", degree), "gust")
 
 
 def servo_loop(model: LPVStateSpace) -> LPVStateSpace:
-    """Closed loop from disturbances at d_lat and d_ped to r and phi, each in its size, sampled at 50 Hz."""
+    """Closed loop from disturbances at d_lat and d_ped to r and phi, each in its size, sampled at
+    50 Hz.
+    """
     return scaled(close(model, "inputs"))
 
 
-def servo_loops(heli: Helicopter | None, family: LinearFamily, gentle: LPVARXModel, aggressive: LPVARXModel) -> dict[str, LPVStateSpace]:
-    """The servo loop around the exact models (not without `heli`), their interpolation, and the models identified on either flight."""
-    exact = {"exact": scaled(ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD))} if heli is not None else {}
+def servo_loops(
+    heli: Helicopter | None, family: LinearFamily, gentle: LPVARXModel, aggressive: LPVARXModel
+) -> dict[str, LPVStateSpace]:
+    """The servo loop around the exact models (not without `heli`), their interpolation, and the
+    models identified on either flight.
+    """
+    exact = (
+        {"exact": scaled(ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD))}
+        if heli is not None
+        else {}
+    )
     return exact | {
         "baseline": servo_loop(sampled_baseline(family)),
         "identified, gentle flight": servo_loop(gentle.to_state_space()),
@@ -89,11 +123,17 @@ def has_lft(loop: LPVStateSpace) -> bool:
 
 def sampled_baseline(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
     """The lateral baseline at 50 Hz with the two lateral inputs."""
-    return family.select(STATES, ["d_lat", "d_ped"]).interpolate("polynomial", degree).discretize(PERIOD, degree=degree)
+    return (
+        family.select(STATES, ["d_lat", "d_ped"])
+        .interpolate("polynomial", degree)
+        .discretize(PERIOD, degree=degree)
+    )
 
 
 def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
-    """Largest H-infinity norm over the exact models of the family: gust loop, or servo loop at 50 Hz; inf where one is unstable."""
+    """Largest H-infinity norm over the exact models of the family: gust loop, or servo loop at 50
+    Hz; inf where one is unstable.
+    """
 
     def closed(model: LinearModel) -> LPVStateSpace:
         one = LPVStateSpace.polynomial(
@@ -110,30 +150,55 @@ def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
         return servo_loop(one) if sampled else close(one, "gust")
 
     lateral = family.select(STATES, ["d_lat", "d_ped"] if sampled else ["d_lat", "v_w"])
-    loops = [closed(lateral[k].discretize(PERIOD) if sampled else lateral[k]) for k in range(len(lateral))]
+    loops = [
+        closed(lateral[k].discretize(PERIOD) if sampled else lateral[k])
+        for k in range(len(lateral))
+    ]
     return max(norm(*loop.matrices(0.0), loop.dt)[0] for loop in loops)
 
 
 def bounds(
-    name: str, channel: str, lpv: LPVStateSpace, rates: Sequence[float], segments: tuple[int, ...], search: Search
+    name: str,
+    channel: str,
+    lpv: LPVStateSpace,
+    rates: Sequence[float],
+    segments: tuple[int, ...],
+    search: Search,
 ) -> Iterator[Bound]:
-    """One gain a rate (m/s^2), computed when asked for, and stability where no gain is proven and no growth was found.
+    """One gain a rate (m/s^2), computed when asked for, and stability where no gain is proven and
+    no growth was found.
 
-    `search` sets how hard the lower bound is looked for; among airspeeds that jump, a search that spares nothing is quick.
+    `search` sets how hard the lower bound is looked for; among airspeeds that jump, a search that
+    spares nothing is quick.
     """
     relaxation = Relaxation(segments=segments)
     for rate in rates:
         form = CONSTANT if math.isinf(rate) else PLAIN
-        certificate = synthesis.l2_gain(lpv, rate, relaxation=relaxation, search=Search(seconds=math.inf) if math.isinf(rate) else search)
+        certificate = synthesis.l2_gain(
+            lpv,
+            rate,
+            relaxation=relaxation,
+            search=Search(seconds=math.inf) if math.isinf(rate) else search,
+        )
         yield Bound(name, channel, rate, form, certificate)
         if not certificate.verified and math.isfinite(certificate.lower):
-            yield Bound(name, channel, rate, form, synthesis.stability(lpv, rate, relaxation=relaxation, search=None))
+            yield Bound(
+                name,
+                channel,
+                rate,
+                form,
+                synthesis.stability(lpv, rate, relaxation=relaxation, search=None),
+            )
 
 
-def memory_bounds(name: str, channel: str, lpv: LPVStateSpace, known: Sequence[float], search: Search) -> Iterator[Bound]:
+def memory_bounds(
+    name: str, channel: str, lpv: LPVStateSpace, known: Sequence[float], search: Search
+) -> Iterator[Bound]:
     """Gains by a P with a memory; the lower bound is looked for where it is not `known`."""
     for rate, relaxation in MEMORIES.items():
-        certificate = synthesis.l2_gain(lpv, rate, relaxation=relaxation, search=None if rate in known else search)
+        certificate = synthesis.l2_gain(
+            lpv, rate, relaxation=relaxation, search=None if rate in known else search
+        )
         yield Bound(name, channel, rate, MEMORY, certificate)
 
 
@@ -144,13 +209,20 @@ def lft_bounds(name: str, channel: str, lpv: LPVStateSpace) -> Iterator[Bound]:
         yield Bound(name, channel, math.inf, form, synthesis.lft_gain(lft, scaling, search=None))
 
 
-LOOPS = {"gust": "Lateral: gust to yaw rate and roll", "longitudinal": "Longitudinal: gusts to pitch rate and pitch"}
+LOOPS = {
+    "gust": "Lateral: gust to yaw rate and roll",
+    "longitudinal": "Longitudinal: gusts to pitch rate and pitch",
+}
 """Channels whose gain is drawn against acceleration."""
 
 
 def curves(found: Sequence[Bound]) -> list[GainCurve]:
     """The gain of the baseline in each of `LOOPS` that has bounds."""
-    return [gain_curve(found, "baseline", c, title) for c, title in LOOPS.items() if any(b.channel == c for b in found)]
+    return [
+        gain_curve(found, "baseline", c, title)
+        for c, title in LOOPS.items()
+        if any(b.channel == c for b in found)
+    ]
 
 
 def proven(b: Bound) -> float:
@@ -160,16 +232,27 @@ def proven(b: Bound) -> float:
 
 def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> GainCurve:
     """What the bounds of one loop say about its gain."""
-    own = [b for b in found if (b.model, b.channel, b.certificate.kind) == (model, channel, "l2 gain")]
+    own = [
+        b for b in found if (b.model, b.channel, b.certificate.kind) == (model, channel, "l2 gain")
+    ]
     flown: dict[float, float] = {}
     for b in own:
         flown[b.rate] = max(b.certificate.lower, flown.get(b.rate, 0.0))
     varying = {form: {b.rate: proven(b) for b in own if b.form == form} for form in (MEMORY, PLAIN)}
     jumping = {b.form: proven(b) for b in own if math.isinf(b.rate)}
     unit = "1" if channel == "servo" else "(rad/s, rad)/(m/s)"
-    return GainCurve(title, unit, own[0].certificate.frozen, flown, {form: g for form, g in varying.items() if g}, jumping)
+    return GainCurve(
+        title,
+        unit,
+        own[0].certificate.frozen,
+        flown,
+        {form: g for form, g in varying.items() if g},
+        jumping,
+    )
 
 
 def rate_text(rate: float) -> str:
     """The rate as a reader would say it."""
-    return "frozen" if rate == 0 else "as fast as it likes" if math.isinf(rate) else f"{rate:g} m/s^2"
+    return (
+        "frozen" if rate == 0 else "as fast as it likes" if math.isinf(rate) else f"{rate:g} m/s^2"
+    )

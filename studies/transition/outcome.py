@@ -31,7 +31,9 @@ class Outcome:
     scores: dict[tuple[str, str], Scores] = field(default_factory=dict)
     """Keys (axis name, "noise-free" or "30 dB")."""
     noisy_modes: dict[tuple[str, str], dict[float, float]] = field(default_factory=dict)
-    """Mode misses (percent, by airspeed) of order-2 models of the noisy flight: keys (axis name, method)."""
+    """Mode misses (percent, by airspeed) of order-2 models of the noisy flight: keys (axis name,
+    method).
+    """
     first_stage: dict[str, float] = field(default_factory=dict)
     """First-stage F of the instruments in the direction they explain worst, by axis."""
     update_times: dict[str, float] = field(default_factory=dict)

@@ -1,4 +1,6 @@
-"""The paper's own experiment: pitch cyclic to pitch, vertical and forward velocity by recursive least squares."""
+"""The paper's own experiment: pitch cyclic to pitch, vertical and forward velocity by recursive
+least squares.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +18,21 @@ PERIOD = 0.11408
 SAMPLES = 600
 OUTPUTS = ("theta", "w", "u")
 STATES = ("u", "w", "q", "theta", "a1")
-UNITS = {"theta": "rad", "w": "m/s", "u": "m/s", "d_lon": "rad", "e_d_lon": "rad", "airspeed": "m/s"}
+UNITS = {
+    "theta": "rad",
+    "w": "m/s",
+    "u": "m/s",
+    "d_lon": "rad",
+    "e_d_lon": "rad",
+    "airspeed": "m/s",
+}
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One output of the experiment: how its 12 parameters converged and how the model follows the system."""
+    """One output of the experiment: how its 12 parameters converged and how the model follows the
+    system.
+    """
 
     output: str
     model: LPVARXModel
@@ -30,10 +41,14 @@ class Channel:
     """Monomial coefficients over time (n, 12): a_1, a_2, a_3, b_2, each 1 p p^2."""
     parameter_names: tuple[str, ...]
     settled_after: float
-    """Time (s) after which every parameter stays within 5 % (of its largest coefficient function) of its final value."""
+    """Time (s) after which every parameter stays within 5 % (of its largest coefficient function)
+    of its final value.
+    """
     fits: dict[str, float]
     spikes: tuple[tuple[float, float], ...]
-    """(time s, |one-step error| in standard deviations of the error) of the largest errors on the fresh record."""
+    """(time s, |one-step error| in standard deviations of the error) of the largest errors on the
+    fresh record.
+    """
     spike_airspeed: float
     """p (m/s) where the largest error is."""
     spike_input: float
@@ -42,7 +57,9 @@ class Channel:
 
 @dataclass(frozen=True)
 class Experiment:
-    """Open or closed loop, with the record it was judged on and the reason why a cubic basis is refused."""
+    """Open or closed loop, with the record it was judged on and the reason why a cubic basis is
+    refused.
+    """
 
     loop: str
     training: FlightRecord
@@ -53,12 +70,20 @@ class Experiment:
 
 
 def discretized_baseline(family: LinearFamily, degree: int = 2) -> LPVStateSpace:
-    """Longitudinal baseline from pitch cyclic, quadratic in airspeed, discretized at the paper's period."""
-    return family.select(STATES, ["d_lon"], ["theta", "w", "u"]).interpolate("polynomial", degree).discretize(PERIOD, degree=degree)
+    """Longitudinal baseline from pitch cyclic, quadratic in airspeed, discretized at the paper's
+    period.
+    """
+    return (
+        family.select(STATES, ["d_lon"], ["theta", "w", "u"])
+        .interpolate("polynomial", degree)
+        .discretize(PERIOD, degree=degree)
+    )
 
 
 def fly_baseline(plant: LPVStateSpace, closed: bool, seed: int) -> FlightRecord:
-    """p(k) = 6.5 (1 + sin(pi k/3)) m/s and white d_lon of 0.01 rad on the discretized baseline, stabilised or not."""
+    """p(k) = 6.5 (1 + sin(pi k/3)) m/s and white d_lon of 0.01 rad on the discretized baseline,
+    stabilised or not.
+    """
     k = np.arange(SAMPLES)
     p = 0.5 * TOP * (1 + np.sin(np.pi * k / 3))
     e = 0.01 * np.random.default_rng(seed).standard_normal(SAMPLES)
@@ -73,15 +98,33 @@ def fly_baseline(plant: LPVStateSpace, closed: bool, seed: int) -> FlightRecord:
         u[i] = e[i] - (gain @ x)[0]
         y[i] = C[i] @ x
         x = A[i] @ x + B[i, :, 0] * u[i]
-    columns = {name: y[:, j] for j, name in enumerate(OUTPUTS)} | {"d_lon": u, "e_d_lon": e, "airspeed": p}
+    columns = {name: y[:, j] for j, name in enumerate(OUTPUTS)} | {
+        "d_lon": u,
+        "e_d_lon": e,
+        "airspeed": p,
+    }
     return FlightRecord.from_arrays(
-        PERIOD * k, UNITS, f"discretized baseline, {'closed' if closed else 'open'} loop, seed {seed}", **columns
+        PERIOD * k,
+        UNITS,
+        f"discretized baseline, {'closed' if closed else 'open'} loop, seed {seed}",
+        **columns,
     )
 
 
 def structure(output: str, degree: int = 2) -> LPVARX:
-    """Budiyono & Sutarto eqs 13-14: na = 3, one input coefficient at delay 2, polynomial in p, coefficients at p(k)."""
-    return LPVARX((output,), ("d_lon",), "airspeed", 3, 1, 2, Polynomial(degree, 0.0, TOP), scheduling_at="now")
+    """Budiyono & Sutarto eqs 13-14: na = 3, one input coefficient at delay 2, polynomial in p,
+    coefficients at p(k).
+    """
+    return LPVARX(
+        (output,),
+        ("d_lon",),
+        "airspeed",
+        3,
+        1,
+        2,
+        Polynomial(degree, 0.0, TOP),
+        scheduling_at="now",
+    )
 
 
 def run_experiment(family: LinearFamily, closed: bool, seed: int = 0) -> Experiment:
@@ -95,7 +138,12 @@ def run_experiment(family: LinearFamily, closed: bool, seed: int = 0) -> Experim
     except ExcitationError as error:
         refused = str(error)
     return Experiment(
-        "closed" if closed else "open", training, test, channels, refused, str(excitation_report(structure("theta"), training))
+        "closed" if closed else "open",
+        training,
+        test,
+        channels,
+        refused,
+        str(excitation_report(structure("theta"), training)),
     )
 
 
@@ -106,7 +154,11 @@ def _channel(output: str, training: FlightRecord, test: FlightRecord) -> Channel
     T = arx.basis.monomial  # type: ignore[attr-defined]
     theta = history.coefficients[:, :, 0].reshape(len(history.time), 4, 3)
     parameters = (theta @ T).reshape(len(history.time), 12)
-    names = tuple(f"{c}{'' if j == 0 else ' p' if j == 1 else ' p^2'}" for c in ("a1", "a2", "a3", "b2") for j in range(3))
+    names = tuple(
+        f"{c}{'' if j == 0 else ' p' if j == 1 else ' p^2'}"
+        for c in ("a1", "a2", "a3", "b2")
+        for j in range(3)
+    )
     fits = {
         "one step": float(model.score(test, 1)[output]),
         "1 s": float(model.score(test, round(1 / PERIOD))[output]),
@@ -119,7 +171,18 @@ def _channel(output: str, training: FlightRecord, test: FlightRecord) -> Channel
     k = int(largest[0])
     push = float(np.abs(test["d_lon"][max(k - 2, 0) : k]).max() / test["d_lon"].std())
     settled = _settling(history.time, theta)
-    return Channel(output, model, history.time, parameters, names, settled, fits, spikes, float(test["airspeed"][k]), push)
+    return Channel(
+        output,
+        model,
+        history.time,
+        parameters,
+        names,
+        settled,
+        fits,
+        spikes,
+        float(test["airspeed"][k]),
+        push,
+    )
 
 
 def _settling(time: np.ndarray, theta: np.ndarray) -> float:

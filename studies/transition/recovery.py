@@ -1,4 +1,6 @@
-"""Exact recovery: on data of a discrete polynomial LPV system the order-1 model gives A(p), B(p) back."""
+"""Exact recovery: on data of a discrete polynomial LPV system the order-1 model gives A(p), B(p)
+back.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ INPUTS = ("d_lon", "d_col")
 
 @dataclass(frozen=True)
 class Recovery:
-    """Largest error of any entry of A(p) and B(p) over the range; the misfit of the discrete fit is no error of the identification."""
+    """Largest error of any entry of A(p) and B(p) over the range; the misfit of the discrete fit is
+    no error of the identification.
+    """
 
     period: float
     degree: int
@@ -28,22 +32,38 @@ class Recovery:
     discretization_misfit: float
 
 
-def recover(family: LinearFamily, period: float = 0.02, degree: int = 3, samples: int = 1500, seed: int = 0) -> Recovery:
-    """Discretize at nodes, fit element-wise, fly with random p and inputs, identify, compare at 50 airspeeds."""
-    plant = replace(family.select(STATES, INPUTS).interpolate("polynomial", degree), residuals=None).discretize(period, degree=degree)
+def recover(
+    family: LinearFamily, period: float = 0.02, degree: int = 3, samples: int = 1500, seed: int = 0
+) -> Recovery:
+    """Discretize at nodes, fit element-wise, fly with random p and inputs, identify, compare at 50
+    airspeeds.
+    """
+    plant = replace(
+        family.select(STATES, INPUTS).interpolate("polynomial", degree), residuals=None
+    ).discretize(period, degree=degree)
     rng = np.random.default_rng(seed)
     p, u = rng.uniform(0.0, TOP, samples), 0.02 * rng.standard_normal((samples, len(INPUTS)))
     x, _ = simulate(plant, p, u)
     columns: dict[str, Any] = (
-        {name: x[:, i] for i, name in enumerate(STATES)} | {name: u[:, i] for i, name in enumerate(INPUTS)} | {"airspeed": p}
+        {name: x[:, i] for i, name in enumerate(STATES)}
+        | {name: u[:, i] for i, name in enumerate(INPUTS)}
+        | {"airspeed": p}
     )
-    record = FlightRecord.from_arrays(period * np.arange(samples), {n: UNITS[n] for n in columns}, **columns)
-    arx = LPVARX(STATES, INPUTS, "airspeed", 1, 1, 1, Polynomial(degree, 0.0, TOP), scheduling_at="lag")
+    record = FlightRecord.from_arrays(
+        period * np.arange(samples), {n: UNITS[n] for n in columns}, **columns
+    )
+    arx = LPVARX(
+        STATES, INPUTS, "airspeed", 1, 1, 1, Polynomial(degree, 0.0, TOP), scheduling_at="lag"
+    )
     found = fit(arx, record, method="rls").to_state_space()
     speeds = np.linspace(0.0, TOP, 50)
     (A, B, *_), (Ah, Bh, *_) = plant.matrices(speeds), found.matrices(speeds)
     misfit = plant.residuals
     assert misfit is not None  # noqa: S101  (discretize always says how well it fitted)
     return Recovery(
-        period, degree, float(np.abs(A - Ah).max()), float(np.abs(B - Bh).max()), float(max(np.abs(misfit.A).max(), np.abs(misfit.B).max()))
+        period,
+        degree,
+        float(np.abs(A - Ah).max()),
+        float(np.abs(B - Bh).max()),
+        float(max(np.abs(misfit.A).max(), np.abs(misfit.B).max())),
     )

@@ -23,11 +23,15 @@ TEMPLATE = "report.html.j2"
 
 def write_results(study: Outcome, out: Path) -> Path:
     """results.json with everything reached so far."""
-    return write_text(out / "results.json", json.dumps(to_dict(study), indent=1, allow_nan=False) + "\n")
+    return write_text(
+        out / "results.json", json.dumps(to_dict(study), indent=1, allow_nan=False) + "\n"
+    )
 
 
 def write_report(study: Outcome, out: Path) -> Path:
-    """results.json, figures/*.png and report.html (self-contained: figures inside), in this order: no number waits for a picture."""
+    """results.json, figures/*.png and report.html (self-contained: figures inside), in this order:
+    no number waits for a picture.
+    """
     import jinja2
     import matplotlib.pyplot as plt
 
@@ -40,7 +44,10 @@ def write_report(study: Outcome, out: Path) -> Path:
         figure.savefig(stream, format="png", dpi=130)
         plt.close(figure)
         write_bytes(out / "figures" / f"{name}.png", stream.getvalue())
-        pictures[name] = {"caption": caption, "data": base64.b64encode(stream.getvalue()).decode("ascii")}
+        pictures[name] = {
+            "caption": caption,
+            "data": base64.b64encode(stream.getvalue()).decode("ascii"),
+        }
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -48,13 +55,19 @@ def write_report(study: Outcome, out: Path) -> Path:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    page = environment.get_template(TEMPLATE).render(study=study, pictures=pictures, axes=AXES, t=tables, **_headline(study))
+    page = environment.get_template(TEMPLATE).render(
+        study=study, pictures=pictures, axes=AXES, t=tables, **_headline(study)
+    )
     return write_text(out / "report.html", page)
 
 
 def _headline(study: Outcome) -> dict[str, object]:
     """The numbers the first paragraph speaks of."""
-    gust = [b for b in study.bounds if (b.model, b.channel, b.certificate.kind) == ("baseline", "gust", "l2 gain")]
+    gust = [
+        b
+        for b in study.bounds
+        if (b.model, b.channel, b.certificate.kind) == ("baseline", "gust", "l2 gain")
+    ]
     proven = [b for b in gust if b.certificate.verified]
     hypotheses = list(dict.fromkeys(h for b in proven for h in b.certificate.hypotheses))
     return {
@@ -63,8 +76,16 @@ def _headline(study: Outcome) -> dict[str, object]:
         "not_about_the_helicopter": gain_tables.not_about_the_helicopter(study.bounds),
         "frozen_gain": next((b.certificate.frozen for b in gust), None),
         "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),
-        "jump": min((b for b in gust if math.isinf(b.rate)), key=lambda b: (b.certificate.gamma, -b.certificate.lower), default=None),
+        "jump": min(
+            (b for b in gust if math.isinf(b.rate)),
+            key=lambda b: (b.certificate.gamma, -b.certificate.lower),
+            default=None,
+        ),
         "inf": math.inf,
         "hypotheses": hypotheses,
-        "notes": {name: model.excitation for name, model in study.models.items() if model.excitation is not None},
+        "notes": {
+            name: model.excitation
+            for name, model in study.models.items()
+            if model.excitation is not None
+        },
     }

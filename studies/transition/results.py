@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 
 def value(number: float, unit: str) -> dict[str, Any]:
-    """{"value", "unit"}; infinite and undefined numbers as the strings "inf", "-inf", "nan" (JSON has none)."""
+    """{"value", "unit"}; infinite and undefined numbers as the strings "inf", "-inf", "nan" (JSON
+    has none).
+    """
     number = float(number)
     return {"value": number if math.isfinite(number) else str(number), "unit": unit}
 
@@ -38,8 +40,13 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         "quick": study.quick,
         "seed": study.seed,
         "complete": study.complete,
-        "versions": {name: version(name) for name in ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")}
-        | {"python": platform.python_version()},
+        "versions": (
+            {
+                name: version(name)
+                for name in ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
+            }
+            | {"python": platform.python_version()}
+        ),
         "stage time": named(study.seconds, "s"),
     }
     if study.baseline:
@@ -47,11 +54,14 @@ def to_dict(study: Outcome) -> dict[str, Any]:
     out["paper experiment"] = {e.loop: _experiment(e) for e in study.experiments}
     out["exact recovery"] = [
         {
-            "period": value(r.period, "s"), "degree": r.degree, "A error": value(r.A_error, "SI"), "B error": value(r.B_error, "SI"),
+            "period": value(r.period, "s"),
+            "degree": r.degree,
+            "A error": value(r.A_error, "SI"),
+            "B error": value(r.B_error, "SI"),
             "misfit of the discrete polynomial fit": value(r.discretization_misfit, "SI"),
         }
         for r in study.recoveries
-    ]  # fmt: skip
+    ]
     out["flights"] = {
         name: {
             "samples": len(record),
@@ -72,16 +82,26 @@ def to_dict(study: Outcome) -> dict[str, Any]:
     }
     out["time of one recursive update"] = named(study.update_times, "s")
     out["rotor mode miss at 30 dB, order 2"] = {
-        f"{axis}, {method}": named(misses, "%") for (axis, method), misses in study.noisy_modes.items()
+        f"{axis}, {method}": named(misses, "%")
+        for (axis, method), misses in study.noisy_modes.items()
     }
-    out["first-stage F of the instruments at 30 dB, worst direction"] = named(study.first_stage, "1")
-    out["comparison"] = {f"{axis}, {noise}": _comparison(c) for (axis, noise), c in study.comparisons.items()}
+    out["first-stage F of the instruments at 30 dB, worst direction"] = named(
+        study.first_stage, "1"
+    )
+    out["comparison"] = {
+        f"{axis}, {noise}": _comparison(c) for (axis, noise), c in study.comparisons.items()
+    }
     out["frozen comparison"] = {name: _frozen(f) for name, f in study.frozen.items()}
     out["frozen gain of the exact models"] = {
-        k: value(v, "(rad/s, rad)/(m/s)" if k == "gust" else "1") for k, v in study.exact_frozen.items()
+        k: value(v, "(rad/s, rad)/(m/s)" if k == "gust" else "1")
+        for k, v in study.exact_frozen.items()
     }
     out["largest frozen gain of the servo loops"] = {
-        name: {"gain": value(peak.gamma, "1"), "airspeed": value(peak.p, "m/s"), "frequency": value(peak.omega, "rad/s")}
+        name: {
+            "gain": value(peak.gamma, "1"),
+            "airspeed": value(peak.p, "m/s"),
+            "frequency": value(peak.omega, "rad/s"),
+        }
         for name, peak in study.frozen_peaks.items()
     }
     out["guarantees"] = [bound_to_dict(b) for b in study.bounds]
@@ -91,16 +111,25 @@ def to_dict(study: Outcome) -> dict[str, Any]:
 def _baseline(b: Baseline) -> dict[str, Any]:
     return {
         "nodes": {"value": b.nodes.airspeeds.tolist(), "unit": "m/s"},
-        "kinks": {name: {"value": list(speeds), "unit": "m/s"} for name, speeds in b.between.kinks.items()},
+        "kinks": {
+            name: {"value": list(speeds), "unit": "m/s"} for name, speeds in b.between.kinks.items()
+        },
         "LFT order": value(b.lft.order, "1"),
         "LFT order, reduced exactly": value(b.reduced.order, "1"),
         "LFT error, relative": value(b.lft_error, "1"),
         "entries": {
-            e.name: {"range": value(e.span, "SI"), "largest error in percent of the range": named(e.percent, "%")} for e in b.entries
+            e.name: {
+                "range": value(e.span, "SI"),
+                "largest error in percent of the range": named(e.percent, "%"),
+            }
+            for e in b.entries
         },
         "entries no polynomial fits": [e.name for e in b.unfit],
         "trim": {
-            str(name): {"value": [t.x[name] if name in t.x else t.u[name] for t in b.nodes.trims], "unit": name.unit}
+            str(name): {
+                "value": [t.x[name] if name in t.x else t.u[name] for t in b.nodes.trims],
+                "unit": name.unit,
+            }
             for name in (*b.nodes.states, *b.nodes.trims[0].u.signals)
         },
     }
@@ -114,10 +143,17 @@ def _experiment(e: Experiment) -> dict[str, Any]:
             c.output: {
                 "fit": named(c.fits, "%"),
                 "parameters settled after": value(c.settled_after, "s"),
-                "final parameters, powers of p in m/s": dict(zip(c.parameter_names, map(float, c.parameters[-1]), strict=True)),
-                "largest one-step errors": [{"time": value(t, "s"), "standard deviations": value(size, "1")} for t, size in c.spikes],
+                "final parameters, powers of p in m/s": dict(
+                    zip(c.parameter_names, map(float, c.parameters[-1]), strict=True)
+                ),
+                "largest one-step errors": [
+                    {"time": value(t, "s"), "standard deviations": value(size, "1")}
+                    for t, size in c.spikes
+                ],
                 "airspeed at the largest error": value(c.spike_airspeed, "m/s"),
-                "input behind the largest error, in its standard deviations": value(c.spike_input, "1"),
+                "input behind the largest error, in its standard deviations": value(
+                    c.spike_input, "1"
+                ),
             }
             for c in e.channels
         },
@@ -126,7 +162,11 @@ def _experiment(e: Experiment) -> dict[str, Any]:
 
 def _comparison(c: Comparison) -> dict[str, Any]:
     return {
-        p.name: {"one step": named(p.one_step, "%"), f"{HORIZON:g} s ahead": named(p.one_second, "%"), "free run": named(p.free_run, "%")}
+        p.name: {
+            "one step": named(p.one_step, "%"),
+            f"{HORIZON:g} s ahead": named(p.one_second, "%"),
+            "free run": named(p.free_run, "%"),
+        }
         for p in c.predictors
     }
 
@@ -138,14 +178,27 @@ def _frozen(f: FrozenComparison) -> dict[str, Any]:
     return {
         "airspeeds": {"value": f.airspeeds.tolist(), "unit": "m/s"},
         "poles [real, imaginary]": {
-            "exact": poles(f.exact_poles), "baseline": poles(f.baseline_poles), "identified": poles(f.identified_poles), "unit": "rad/s",
+            "exact": poles(f.exact_poles),
+            "baseline": poles(f.baseline_poles),
+            "identified": poles(f.identified_poles),
+            "unit": "rad/s",
         },
-        f"{f.axis.mode} mode miss": {"baseline": f.mode_miss_baseline.tolist(), "identified": f.mode_miss_identified.tolist(), "unit": "%"},
+        f"{f.axis.mode} mode miss": {
+            "baseline": f.mode_miss_baseline.tolist(),
+            "identified": f.mode_miss_identified.tolist(),
+            "unit": "%",
+        },
         f"largest chordal distance to the exact model above {FAST:g} rad/s": {
-            "baseline": f.fast_baseline.tolist(), "identified": f.fast_identified.tolist(), "unit": "1",
+            "baseline": f.fast_baseline.tolist(),
+            "identified": f.fast_identified.tolist(),
+            "unit": "1",
         },
-        "nu-gap to the exact model": {"baseline": f.gap_baseline.tolist(), "identified": f.gap_identified.tolist(), "unit": "1"},
-    }  # fmt: skip
+        "nu-gap to the exact model": {
+            "baseline": f.gap_baseline.tolist(),
+            "identified": f.gap_identified.tolist(),
+            "unit": "1",
+        },
+    }
 
 
 def bound_to_dict(b: Bound) -> dict[str, Any]:

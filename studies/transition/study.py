@@ -1,4 +1,6 @@
-"""The main job: from the helicopter's equations to certified gains, on the baseline and on the identified model."""
+"""The main job: from the helicopter's equations to certified gains, on the baseline and on the
+identified model.
+"""
 
 from __future__ import annotations
 
@@ -39,10 +41,14 @@ class Study(Outcome):
         return to_dict(self)
 
 
-def run_study(vehicle: str = "xcell60", out: Path | str = "study", quick: bool = False, seed: int = 0) -> Study:
-    """Run every stage, write results.json after each, and report.html with its figures into `out` at the end.
+def run_study(
+    vehicle: str = "xcell60", out: Path | str = "study", quick: bool = False, seed: int = 0
+) -> Study:
+    """Run every stage, write results.json after each, and report.html with its figures into `out`
+    at the end.
 
-    Progress goes to standard error. An interrupted run leaves the results of its finished stages; files are whole or absent.
+    Progress goes to standard error. An interrupted run leaves the results of its finished stages;
+    files are whole or absent.
     """
     out = Path(out)
     study = Study(vehicle, quick, seed)
@@ -64,10 +70,19 @@ def _stages(study: Study, effort: Effort) -> Iterator[tuple[str, Any]]:
     yield "Flying the transitions", lambda: _fly(study, effort)
     yield "Identifying and scoring", lambda: _identify(study)
     yield "Comparing with the baseline", lambda: _compare(study)
-    yield "Proving gains of the lateral gust loop (baseline and exact, continuous)", lambda: _prove_gust(study, effort)
+    yield (
+        "Proving gains of the lateral gust loop (baseline and exact, continuous)",
+        lambda: _prove_gust(study, effort),
+    )
     if effort.longitudinal_rates:
-        yield "Proving gains of the longitudinal gust loop (baseline, continuous)", lambda: _prove_longitudinal(study, effort)
-    yield "Proving gains of the servo loop (exact, baseline and identified, 50 Hz)", lambda: _prove_servo(study, effort)
+        yield (
+            "Proving gains of the longitudinal gust loop (baseline, continuous)",
+            lambda: _prove_longitudinal(study, effort),
+        )
+    yield (
+        "Proving gains of the servo loop (exact, baseline and identified, 50 Hz)",
+        lambda: _prove_servo(study, effort),
+    )
 
 
 @contextmanager
@@ -78,7 +93,11 @@ def _shown(title: str, seconds: dict[str, float]) -> Iterator[None]:
     begin = time.perf_counter()
     yield
     seconds[title] = time.perf_counter() - begin
-    print(f"\r  {title} ... {seconds[title]:.1f} s" if live else f"    {seconds[title]:.1f} s", file=sys.stderr, flush=True)
+    print(
+        f"\r  {title} ... {seconds[title]:.1f} s" if live else f"    {seconds[title]:.1f} s",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def _need(thing: Any) -> Any:
@@ -97,7 +116,9 @@ def _paper(study: Study) -> None:
 
 
 def _recovery(study: Study) -> None:
-    study.recoveries = [recover(_need(study.baseline).nodes, period, seed=study.seed) for period in (0.02, PERIOD)]
+    study.recoveries = [
+        recover(_need(study.baseline).nodes, period, seed=study.seed) for period in (0.02, PERIOD)
+    ]
 
 
 def _fly(study: Study, effort: Effort) -> None:
@@ -115,17 +136,22 @@ def _identify(study: Study) -> None:
     for noise in ("noise-free", "30 dB"):
         training, test = study.flights[f"training, {noise}"], study.flights[f"test, {noise}"]
         for axis in (LONGITUDINAL, LATERAL, LATERAL_WITH_COLLECTIVE, ALL):
-            # MIMO by batch least squares: the same numbers as the recursion, which is shown on the two-input axes
+            # MIMO by batch least squares: the same numbers as the recursion, which is shown on the
+            # two-input axes
             model = axes.identify(axis, training, "rls" if axis in AXES else "ls")
             study.models[f"{axis.name}, {noise}"] = model
             study.scores[axis.name, noise] = axes.scores(heli, axis, model, test)
-    study.update_times = {axis.name: axes.update_time(axis, study.flights["training, 30 dB"]) for axis in (*AXES, ALL)}
+    study.update_times = {
+        axis.name: axes.update_time(axis, study.flights["training, 30 dB"]) for axis in (*AXES, ALL)
+    }
     for axis in AXES:
         for method in ("ls", "iv"):
             model = axes.identify(axis, study.flights["training, 30 dB"], method, order=2)
             study.noisy_modes[axis.name, method] = axes.mode_misses(heli, model, axis.mode)
         study.first_stage[axis.name] = model.details["first_stage_F"]  # of "iv", the last
-    study.models["lateral, gentle"] = axes.identify(LATERAL, study.flights["gentle"], "rls", order=2)
+    study.models["lateral, gentle"] = axes.identify(
+        LATERAL, study.flights["gentle"], "rls", order=2
+    )
 
 
 def _compare(study: Study) -> None:
@@ -137,12 +163,21 @@ def _compare(study: Study) -> None:
     }
     for noise in ("noise-free", "30 dB"):
         for axis in AXES:
-            identified = {name: study.models[f"{which.name}, {noise}"] for name, which in _rivals(axis).items()}
-            study.comparisons[axis.name, noise] = compare(axis, identified, baselines, study.flights[f"test, {noise}"])
+            identified = {
+                name: study.models[f"{which.name}, {noise}"]
+                for name, which in _rivals(axis).items()
+            }
+            study.comparisons[axis.name, noise] = compare(
+                axis, identified, baselines, study.flights[f"test, {noise}"]
+            )
     for axis in AXES:
         speeds = [0.5, 1.0, 2.0, 3.0, 4.0, 5.5, 7.0, 8.5, 10.0, 11.5, 12.5]
         study.frozen[axis.name] = compare_frozen(
-            _need(study.heli), axis, study.models[f"{axis.name}, noise-free"], lpv["polynomial 3"], speeds
+            _need(study.heli),
+            axis,
+            study.models[f"{axis.name}, noise-free"],
+            lpv["polynomial 3"],
+            speeds,
         )
 
 
@@ -157,26 +192,41 @@ def _prove_gust(study: Study, effort: Effort) -> None:
     family = _need(study.baseline).nodes
     study.exact_frozen["gust"] = guarantees.exact_frozen_gain(family, sampled=False)
     loop = guarantees.gust_loop(family)
-    study.bounds += guarantees.bounds("baseline", "gust", loop, effort.gust_rates, effort.gust_segments, effort.search)
+    study.bounds += guarantees.bounds(
+        "baseline", "gust", loop, effort.gust_rates, effort.gust_segments, effort.search
+    )
     study.bounds += guarantees.lft_bounds("baseline", "gust", loop)
     if effort.thorough:
-        study.bounds += guarantees.memory_bounds("baseline", "gust", loop, effort.gust_rates, effort.search)
+        study.bounds += guarantees.memory_bounds(
+            "baseline", "gust", loop, effort.gust_rates, effort.search
+        )
         exact = ExactLateral.of(_need(study.heli)).loop("gust")
-        study.bounds += guarantees.bounds("exact", "gust", exact, effort.exact_rates, effort.gust_segments, effort.search)
+        study.bounds += guarantees.bounds(
+            "exact", "gust", exact, effort.exact_rates, effort.gust_segments, effort.search
+        )
 
 
 def _prove_longitudinal(study: Study, effort: Effort) -> None:
     loop = longitudinal_loop(_need(study.heli))
-    study.bounds += guarantees.bounds("baseline", "longitudinal", loop, effort.longitudinal_rates, effort.gust_segments, GLANCE)
+    study.bounds += guarantees.bounds(
+        "baseline", "longitudinal", loop, effort.longitudinal_rates, effort.gust_segments, GLANCE
+    )
     study.bounds += guarantees.lft_bounds("baseline", "longitudinal", loop)
 
 
 def _prove_servo(study: Study, effort: Effort) -> None:
     family = _need(study.baseline).nodes
     study.exact_frozen["servo"] = guarantees.exact_frozen_gain(family, sampled=True)
-    gentle, aggressive = study.models["lateral, gentle"], study.models[f"{LATERAL.name}, noise-free"]
-    for name, loop in guarantees.servo_loops(_need(study.heli) if effort.thorough else None, family, gentle, aggressive).items():
+    gentle, aggressive = (
+        study.models["lateral, gentle"],
+        study.models[f"{LATERAL.name}, noise-free"],
+    )
+    for name, loop in guarantees.servo_loops(
+        _need(study.heli) if effort.thorough else None, family, gentle, aggressive
+    ).items():
         study.frozen_peaks[name] = frozen_gain(loop)
-        study.bounds += guarantees.bounds(name, "servo", loop, effort.servo_rates, effort.servo_segments, GLANCE)
+        study.bounds += guarantees.bounds(
+            name, "servo", loop, effort.servo_rates, effort.servo_segments, GLANCE
+        )
         if effort.thorough and guarantees.has_lft(loop):
             study.bounds += guarantees.lft_bounds(name, "servo", loop)

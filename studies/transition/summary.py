@@ -17,19 +17,27 @@ def summary(study: Outcome) -> str:
         return "nothing was finished"
     b = study.baseline
     lines = [
-        f"Baseline: LFT of order {b.lft.order}, {b.reduced.order} when reduced, equal to the polynomial family within {b.lft_error:.0e}; "
-        f"{len(b.unfit)} entries no polynomial fits, worst {', '.join(e.name for e in b.unfit[:4])}"
+        f"Baseline: LFT of order {b.lft.order}, {b.reduced.order} when reduced, equal to the"
+        f" polynomial family within {b.lft_error:.0e}; {len(b.unfit)} entries no polynomial fits,"
+        f" worst {', '.join(e.name for e in b.unfit[:4])}"
     ]
     for r in study.recoveries:
-        lines.append(f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within {r.B_error:.0e}")
+        lines.append(
+            f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within"
+            f" {r.B_error:.0e}"
+        )
     sections = [_marks(study), *(table.text() for table in gain_tables.every(study.bounds))]
-    sections += ["\n".join(gain_tables.not_about_the_helicopter(study.bounds)), "\n".join(tables.verdicts(study))]
+    sections += [
+        "\n".join(gain_tables.not_about_the_helicopter(study.bounds)),
+        "\n".join(tables.verdicts(study)),
+    ]
     return "\n\n".join(["\n".join(lines), *(s for s in sections if s)])
 
 
 def _marks(study: Outcome) -> str:
     table = tables.Table(
-        "Identified on one transition, judged 1 s ahead on another (fit in percent)", ["output", "noise-free", "mark", "30 dB", "mark"]
+        "Identified on one transition, judged 1 s ahead on another (fit in percent)",
+        ["output", "noise-free", "mark", "30 dB", "mark"],
     )
     for axis in AXES:
         pair = [study.scores.get((axis.name, noise)) for noise in ("noise-free", "30 dB")]
@@ -39,6 +47,9 @@ def _marks(study: Outcome) -> str:
             marks = axis.marks.get(output)
             cells = []
             for k, score in enumerate(pair):
-                cells += [tables.percent(score.one_second[output]), f">= {marks[k]:.0f}" if marks else ""]  # type: ignore[union-attr]
+                cells += [
+                    tables.percent(score.one_second[output]),
+                    f">= {marks[k]:.0f}" if marks else "",
+                ]  # type: ignore[union-attr]
             table.rows.append([f"{output} ({axis.name})", *cells])
     return table.text()

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.transition.axes import ALL, FROZEN_SPEEDS, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
+from studies.transition.axes import (
+    ALL,
+    FROZEN_SPEEDS,
+    LATERAL,
+    LATERAL_WITH_COLLECTIVE,
+    LONGITUDINAL,
+    Axis,
+)
 from studies.transition.campaign import MODE_MARK
 
 if TYPE_CHECKING:
@@ -17,7 +24,9 @@ if TYPE_CHECKING:
 
 @dataclass
 class Table:
-    """Heading, column names, rows of text, and remarks below; `bold` marks cells (row, column) that stand out."""
+    """Heading, column names, rows of text, and remarks below; `bold` marks cells (row, column) that
+    stand out.
+    """
 
     title: str
     columns: list[str]
@@ -27,10 +36,15 @@ class Table:
 
     def text(self) -> str:
         """Aligned plain text."""
-        widths = [max(len(row[i]) for row in [self.columns, *self.rows]) for i in range(len(self.columns))]
+        widths = [
+            max(len(row[i]) for row in [self.columns, *self.rows]) for i in range(len(self.columns))
+        ]
         lines = [self.title]
         for row in [self.columns, *self.rows]:
-            first, *rest = (cell.ljust(w) if i == 0 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True)))
+            first, *rest = (
+                cell.ljust(w) if i == 0 else cell.rjust(w)
+                for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+            )
             lines.append("  " + "  ".join([first, *rest]))
         return "\n".join([*lines, *(f"  {remark}" for remark in self.remarks)])
 
@@ -50,14 +64,22 @@ def interpolation(study: Outcome) -> Table:
     assert study.baseline is not None  # noqa: S101
     kinds = ["polynomial 2", "polynomial 3", "polynomial 4", "polynomial 6", "spline", "linear"]
     table = Table(
-        "Entries of A(p), B(p) that no polynomial fits: largest error between the nodes, percent of the entry's range",
+        "Entries of A(p), B(p) that no polynomial fits: largest error between the nodes, percent of"
+        " the entry's range",
         ["entry", "range (SI)", *kinds],
     )
     for entry in study.baseline.unfit:
-        table.rows.append([entry.name, f"{entry.span:.3g}", *(f"{entry.percent[k]:.0f}" for k in kinds)])
-    kinks = sorted((speed, name) for name, speeds in study.baseline.between.kinks.items() for speed in speeds)
+        table.rows.append(
+            [entry.name, f"{entry.span:.3g}", *(f"{entry.percent[k]:.0f}" for k in kinds)]
+        )
+    kinks = sorted(
+        (speed, name) for name, speeds in study.baseline.between.kinks.items() for speed in speeds
+    )
     fitted = len(study.baseline.entries) - len(table.rows)
-    table.remarks.append(f"The other {fitted} varying entries are fitted within 10 % of their range by some degree up to 6.")
+    table.remarks.append(
+        f"The other {fitted} varying entries are fitted within 10 % of their range by some degree"
+        " up to 6."
+    )
     if kinks:
         table.remarks.append(
             "Corners of the model: "
@@ -70,8 +92,8 @@ def interpolation(study: Outcome) -> Table:
 def experiment(study: Outcome) -> Table:
     """The paper's experiment."""
     table = Table(
-        "The paper's experiment: pitch cyclic to one output, na = 3, nb = 1, delay 2, quadratic in p, "
-        "p(k) = 6.5 (1 + sin(pi k/3)) m/s, T = 0.11408 s; fit in percent on a fresh record",
+        "The paper's experiment: pitch cyclic to one output, na = 3, nb = 1, delay 2, quadratic in"
+        " p, p(k) = 6.5 (1 + sin(pi k/3)) m/s, T = 0.11408 s; fit in percent on a fresh record",
         [
             "loop, output",
             "one step",
@@ -87,8 +109,20 @@ def experiment(study: Outcome) -> Table:
     for e in study.experiments:
         for c in e.channels:
             time, size = c.spikes[0]
-            spike = [f"{size:.1f}", f"{time:.1f}", f"{c.spike_airspeed:.1f}", f"{c.spike_input:.1f}"]
-            table.rows.append([f"{e.loop}, {c.output}", *(percent(v) for v in c.fits.values()), f"{c.settled_after:.0f}", *spike])
+            spike = [
+                f"{size:.1f}",
+                f"{time:.1f}",
+                f"{c.spike_airspeed:.1f}",
+                f"{c.spike_input:.1f}",
+            ]
+            table.rows.append(
+                [
+                    f"{e.loop}, {c.output}",
+                    *(percent(v) for v in c.fits.values()),
+                    f"{c.settled_after:.0f}",
+                    *spike,
+                ]
+            )
     if study.experiments:
         table.remarks.append(f"A cubic basis is refused: {study.experiments[0].cubic_refused}.")
     return table
@@ -97,7 +131,8 @@ def experiment(study: Outcome) -> Table:
 def scores(study: Outcome, noise: str) -> Table:
     """Identified models on the unseen transition."""
     table = Table(
-        f"Identified LPV-ARX (order 3, quadratic in p, 50 Hz) on a transition it has not seen, {noise}: fit in percent",
+        "Identified LPV-ARX (order 3, quadratic in p, 50 Hz) on a transition it has not seen,"
+        f" {noise}: fit in percent",
         ["model, output", "one step", "1 s ahead", "free run", "mark (1 s)"],
     )
     for axis in (LONGITUDINAL, LATERAL, LATERAL_WITH_COLLECTIVE, ALL):
@@ -106,34 +141,54 @@ def scores(study: Outcome, noise: str) -> Table:
             continue
         for output in axis.outputs:
             mark = axis.marks.get(output)
-            wanted = f"{mark[noise != 'noise-free']:.0f}" if mark and axis in (LONGITUDINAL, LATERAL) else ""
-            table.rows.append([
-                f"{axis.name}: {output}", *(percent(fit[output]) for fit in (result.one_step, result.one_second, result.free_run)), wanted,
-            ])  # fmt: skip
+            wanted = (
+                f"{mark[noise != 'noise-free']:.0f}"
+                if mark and axis in (LONGITUDINAL, LATERAL)
+                else ""
+            )
+            table.rows.append(
+                [
+                    f"{axis.name}: {output}",
+                    *(
+                        percent(fit[output])
+                        for fit in (result.one_step, result.one_second, result.free_run)
+                    ),
+                    wanted,
+                ]
+            )
     return table
 
 
 def modes(study: Outcome) -> Table:
     """Frozen rotor modes."""
     table = Table(
-        f"Frozen rotor modes: distance of the identified eigenvalue to the exact one, percent (mark {MODE_MARK:g}, noise-free)",
+        "Frozen rotor modes: distance of the identified eigenvalue to the exact one, percent (mark"
+        f" {MODE_MARK:g}, noise-free)",
         ["axis, data", *(f"{v:g} m/s" for v in FROZEN_SPEEDS)],
     )
     for (axis, noise), result in study.scores.items():
         if axis in (LONGITUDINAL.name, LATERAL.name):
-            table.rows.append([f"{axis}, {noise}", *(f"{result.mode_miss[v]:.2f}" for v in FROZEN_SPEEDS)])
+            table.rows.append(
+                [f"{axis}, {noise}", *(f"{result.mode_miss[v]:.2f}" for v in FROZEN_SPEEDS)]
+            )
     words = {"ls": "least squares", "iv": "instrumental variables"}
     for (axis, method), misses in study.noisy_modes.items():
-        table.rows.append([f"{axis}, 30 dB, order 2, {words[method]}", *(f"{misses[v]:.2f}" for v in FROZEN_SPEEDS)])
+        table.rows.append(
+            [
+                f"{axis}, 30 dB, order 2, {words[method]}",
+                *(f"{misses[v]:.2f}" for v in FROZEN_SPEEDS),
+            ]
+        )
     table.remarks.append(
-        "Noise fed back through the autopilot biases least squares; more lags hide it, the excitation as instrument removes it from the "
-        "rotor modes."
+        "Noise fed back through the autopilot biases least squares; more lags hide it, the"
+        " excitation as instrument removes it from the rotor modes."
     )
     if study.first_stage:
         weakest = ", ".join(f"{F:.2g} ({axis})" for axis, F in study.first_stage.items())
         table.remarks.append(
-            f"In the direction they explain worst, the slow motion, these instruments have a first-stage F of {weakest}: below 10 they "
-            f"are weak, and what they say there is nearly as biased as least squares."
+            "In the direction they explain worst, the slow motion, these instruments have a"
+            f" first-stage F of {weakest}: below 10 they are weak, and what they say there is"
+            " nearly as biased as least squares."
         )
     return table
 
@@ -142,11 +197,20 @@ def comparison(study: Outcome, axis: Axis, noise: str) -> Table:
     """Who predicts best, 1 s ahead and in free run."""
     c = study.comparisons[axis.name, noise]
     table = Table(
-        f"{axis.name}, {noise}: one step / 1 s ahead / free run on the unseen transition, fit in percent (best 1 s in bold)",
+        f"{axis.name}, {noise}: one step / 1 s ahead / free run on the unseen transition, fit in"
+        " percent (best 1 s in bold)",
         ["predictor", *axis.outputs],
     )
     for p in c.predictors:
-        table.rows.append([p.name, *(" / ".join(percent(fit[y]) for fit in (p.one_step, p.one_second, p.free_run)) for y in axis.outputs)])
+        table.rows.append(
+            [
+                p.name,
+                *(
+                    " / ".join(percent(fit[y]) for fit in (p.one_step, p.one_second, p.free_run))
+                    for y in axis.outputs
+                ),
+            ]
+        )
     for j, y in enumerate(axis.outputs):
         ahead = [p.one_second[y] for p in c.predictors]
         if not np.isnan(ahead).all():
@@ -162,10 +226,21 @@ def verdicts(study: Outcome) -> list[str]:
         baseline = [p for p in c.predictors if "left out" not in p.name and p not in identified]
         sentences = []
         for y in c.axis.outputs:
-            one, two = max(identified, key=lambda p: p.one_second[y]), max(baseline, key=lambda p: p.one_second[y])
+            one, two = (
+                max(identified, key=lambda p: p.one_second[y]),
+                max(baseline, key=lambda p: p.one_second[y]),
+            )
             difference = one.one_second[y] - two.one_second[y]
-            who = "level" if abs(difference) < 1 else "the identified model" if difference > 0 else "the baseline"
-            sentences.append(f"{y}: {who}" + ("" if abs(difference) < 1 else f" by {abs(difference):.1f} points"))
+            who = (
+                "level"
+                if abs(difference) < 1
+                else "the identified model"
+                if difference > 0
+                else "the baseline"
+            )
+            sentences.append(
+                f"{y}: {who}" + ("" if abs(difference) < 1 else f" by {abs(difference):.1f} points")
+            )
         out.append(f"{c.axis.name}, {noise}, 1 s ahead: " + "; ".join(sentences) + ".")
     return out
 
@@ -173,28 +248,45 @@ def verdicts(study: Outcome) -> list[str]:
 def findings(study: Outcome) -> list[str]:
     """What the numbers of the identification and of the proofs say, in sentences."""
     out = []
-    plain, rich = study.scores.get((LATERAL.name, "noise-free")), study.scores.get((LATERAL_WITH_COLLECTIVE.name, "noise-free"))
+    plain, rich = (
+        study.scores.get((LATERAL.name, "noise-free")),
+        study.scores.get((LATERAL_WITH_COLLECTIVE.name, "noise-free")),
+    )
     if plain and rich:
         change = {y: rich.one_second[y] - plain.one_second[y] for y in LATERAL.outputs}
         out.append(
-            "Measuring the other inputs too (collective and pitch cyclic drive yaw through the rotor torque) changes the 1 s fit by "
+            "Measuring the other inputs too (collective and pitch cyclic drive yaw through the"
+            " rotor torque) changes the 1 s fit by "
             + ", ".join(f"{d:+.0f} points for {y}" for y, d in change.items())
             + "."
         )
     if study.update_times and study.flights:
-        each = ", ".join(f"{1e6 * seconds:.2g} us ({name})" for name, seconds in study.update_times.items())
+        each = ", ".join(
+            f"{1e6 * seconds:.2g} us ({name})" for name, seconds in study.update_times.items()
+        )
         regressors, period = ALL.structure().n_regressors, next(iter(study.flights.values())).dt
         share = 100 * study.update_times[ALL.name] / period
         out.append(
-            f"One recursive update took {each} of processor time; with {len(ALL.outputs)} outputs and {regressors} regressors each that is "
-            f"{share:.2g} % of the sample period: the recursion is not too heavy for real time."
+            f"One recursive update took {each} of processor time; with {len(ALL.outputs)} outputs"
+            f" and {regressors} regressors each that is {share:.2g} % of the sample period: the"
+            " recursion is not too heavy for real time."
             if share < 50
-            else f"One recursive update took {each} of processor time, {share:.0f} % of the sample period with all outputs."
+            else (
+                f"One recursive update took {each} of processor time, {share:.0f} % of the sample"
+                " period with all outputs."
+            )
         )
     for name, peak in study.frozen_peaks.items():
         if math.isfinite(peak.gamma):
-            out.append(f"Servo channel, {name}: the largest frozen gain is at {peak.p:.1f} m/s and {peak.omega:.2g} rad/s.")
-    gentle = {b.model: b.certificate for b in study.bounds if b.channel == "servo" and b.rate == 0 and b.certificate.kind == "l2 gain"}
+            out.append(
+                f"Servo channel, {name}: the largest frozen gain is at {peak.p:.1f} m/s and"
+                f" {peak.omega:.2g} rad/s."
+            )
+    gentle = {
+        b.model: b.certificate
+        for b in study.bounds
+        if b.channel == "servo" and b.rate == 0 and b.certificate.kind == "l2 gain"
+    }
     for name, c in gentle.items():
         if name.startswith("identified"):
             verdict = (
@@ -202,5 +294,8 @@ def findings(study: Outcome) -> list[str]:
                 if c.verified
                 else "not stable at every frozen airspeed: nothing can be proven"
             )
-            out.append(f"Attitude hold around the {name.replace('identified, ', 'model of the ')}: {verdict}.")
+            out.append(
+                f"Attitude hold around the {name.replace('identified, ', 'model of the ')}:"
+                f" {verdict}."
+            )
     return out

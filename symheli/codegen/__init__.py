@@ -1,4 +1,6 @@
-"""From CasADi functions to lists of scalar operations, and from those to C for one flight or many side by side, or NumPy."""
+"""From CasADi functions to lists of scalar operations, and from those to C for one flight or many
+side by side, or NumPy.
+"""
 
 from __future__ import annotations
 

@@ -7,22 +7,30 @@ from collections import Counter
 from symheli.codegen.program import Program
 
 Side = tuple[int, bool] | None
-"""A side of a selection: its position, and whether it is the one taken where the condition holds. None: always computed."""
+"""A side of a selection: its position, and whether it is the one taken where the condition holds.
+None: always computed.
+"""
 
 COST = {"sqrt": 10, "div": 10}
 """What an operation takes, in units of a product."""
 WORTHWHILE = 20
-"""Cost from which a side is worth a branch; below it both sides are computed faster than a wrong guess is repaired."""
+"""Cost from which a side is worth a branch; below it both sides are computed faster than a wrong
+guess is repaired.
+"""
 
 
 def branches(program: Program) -> list[Side]:
-    """For each operation the innermost side of a selection that all its users are on; sides that are not worth a branch are left out."""
+    """For each operation the innermost side of a selection that all its users are on; sides that
+    are not worth a branch are left out.
+    """
     homes = _homes(program)
     cost: Counter[Side] = Counter()
     for home, operation in zip(homes, program.operations, strict=True):
         cost[home] += 0 if operation.name in ("constant", "input") else COST.get(operation.name, 1)
     outer: dict[Side, Side] = {}
-    for side in sorted({home for home in homes if home is not None}):  # inner sides first: they come before what they are inside of
+    for side in sorted(
+        {home for home in homes if home is not None}
+    ):  # inner sides first: they come before what they are inside of
         if cost[side] < WORTHWHILE:
             outer[side] = homes[side[0]]
             cost[homes[side[0]]] += cost[side]
@@ -36,7 +44,9 @@ def branches(program: Program) -> list[Side]:
 
 
 def _homes(program: Program) -> list[Side]:
-    """The innermost side that all users of each operation are on, from the last operation to the first."""
+    """The innermost side that all users of each operation are on, from the last operation to the
+    first.
+    """
     count = len(program.operations)
     users: list[list[Side]] = [[] for _ in range(count)]
     homes: list[Side] = [None] * count
@@ -47,7 +57,9 @@ def _homes(program: Program) -> list[Side]:
         homes[k] = _common(users[k], homes)
         operation = program.operations[k]
         for place, a in enumerate(operation.arguments):
-            users[a].append((k, place == 1) if operation.name == "select" and place > 0 else homes[k])
+            users[a].append(
+                (k, place == 1) if operation.name == "select" and place > 0 else homes[k]
+            )
     return homes
 
 

@@ -7,12 +7,25 @@ from dataclasses import dataclass
 from symheli.codegen.branches import Side, branches
 from symheli.codegen.program import COMPARISONS, Operation, Program
 
-_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "ne": "!=", "and": "&", "or": "|"}
+_INFIX = {
+    "add": "+",
+    "sub": "-",
+    "mul": "*",
+    "div": "/",
+    "lt": "<",
+    "le": "<=",
+    "eq": "==",
+    "ne": "!=",
+    "and": "&",
+    "or": "|",
+}
 
 
 @dataclass(frozen=True)
 class Layout:
-    """`width` points in the lanes of vector registers, times `groups` of them interleaved to hide the latency of roots and quotients."""
+    """`width` points in the lanes of vector registers, times `groups` of them interleaved to hide
+    the latency of roots and quotients.
+    """
 
     width: int = 1
     groups: int = 1
@@ -24,7 +37,9 @@ class Layout:
 
     @property
     def prelude(self) -> str:
-        """What every generated source begins with: headers and the type of a scalar for all lanes."""
+        """What every generated source begins with: headers and the type of a scalar for all
+        lanes.
+        """
         return f"""#include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,19 +52,28 @@ typedef double lane[LANES];
 
 
 def c_function(program: Program, layout: Layout, name: str) -> str:
-    """`static void name(const lane *in0, ..., lane *out0, ...)`: a plain loop over lanes that the compiler turns into vector code.
+    """`static void name(const lane *in0, ..., lane *out0, ...)`: a plain loop over lanes that the
+    compiler turns into vector code.
 
-    Not inlined: the compiler takes a third of the time, and the code is as fast. Each lane goes through the same operations in
-    the same order, whatever the layout: its bits do not depend on its neighbours.
+    Not inlined: the compiler takes a third of the time, and the code is as fast. Each lane goes
+    through the same operations in the same order, whatever the layout: its bits do not depend on
+    its neighbours.
     """
     arguments = [f"const lane *restrict in{i}" for i in range(len(program.sizes))] + [
         f"lane *restrict out{i}" for i in range(len(program.outputs))
     ]
-    lines = [f"__attribute__((noinline)) static void {name}({', '.join(arguments)})", "{", f"  for (int l = 0; l < {layout.width}; ++l) {{"]
+    lines = [
+        f"__attribute__((noinline)) static void {name}({', '.join(arguments)})",
+        "{",
+        f"  for (int l = 0; l < {layout.width}; ++l) {{",
+    ]
     lines += _in_branches(program) if layout.lanes == 1 else _in_line(program, layout)
     for i, output in enumerate(program.outputs):
         for j, a in enumerate(output):
-            lines += [f"    out{i}[{j}][l + {g * layout.width}] = {_operand(program, a, g)};" for g in range(layout.groups)]
+            lines += [
+                f"    out{i}[{j}][l + {g * layout.width}] = {_operand(program, a, g)};"
+                for g in range(layout.groups)
+            ]
     return "\n".join([*lines, "  }", "}", ""])
 
 
@@ -64,7 +88,9 @@ def _in_line(program: Program, layout: Layout) -> list[str]:
 
 
 def _in_branches(program: Program) -> list[str]:
-    """For one point alone: operations that only one side of a selection needs are computed only where it is taken."""
+    """For one point alone: operations that only one side of a selection needs are computed only
+    where it is taken.
+    """
     homes = branches(program)
     inside: dict[Side, list[int]] = {}
     for k, operation in enumerate(program.operations):
@@ -94,7 +120,10 @@ def _in_branches(program: Program) -> list[str]:
 def _definition(program: Program, position: int, group: int, width: int) -> str:
     operation = program.operations[position]
     kind = "_Bool" if operation.name in COMPARISONS else "double"
-    return f"    const {kind} {_name(position, group)} = {_expression(program, operation, group, width)};"
+    return (
+        f"    const {kind} {_name(position, group)} ="
+        f" {_expression(program, operation, group, width)};"
+    )
 
 
 def _name(position: int, group: int) -> str:

@@ -1,4 +1,6 @@
-"""A program evaluated on NumPy arrays, many points at once, or on CasADi symbols: the same operations in the same order."""
+"""A program evaluated on NumPy arrays, many points at once, or on CasADi symbols: the same
+operations in the same order.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,13 @@ from symheli.codegen.program import Operation, Program
 from symheli.symbolic import absolute, dense, sqrt, where
 
 _OPERATIONS: dict[str, Callable[..., Any]] = {
-    **{"add": operator.add, "sub": operator.sub, "mul": operator.mul, "div": operator.truediv, "neg": operator.neg},
+    **{
+        "add": operator.add,
+        "sub": operator.sub,
+        "mul": operator.mul,
+        "div": operator.truediv,
+        "neg": operator.neg,
+    },
     **{"lt": operator.lt, "le": operator.le, "eq": operator.eq, "ne": operator.ne},
     **{"sqrt": sqrt, "fabs": absolute, "select": where},
     "min": lambda a, b: where(b < a, b, a),
@@ -26,9 +34,11 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def evaluate(program: Program, *inputs: Any) -> list[list[Any]]:
-    """The elements of each output; `inputs[i][j]` is entry j of input i: a float, an (N,) array or a CasADi symbol.
+    """The elements of each output; `inputs[i][j]` is entry j of input i: a float, an (N,) array or
+    a CasADi symbol.
 
-    On arrays the bits are those of the generated C. A side of a branch that is not taken may overflow silently.
+    On arrays the bits are those of the generated C. A side of a branch that is not taken may
+    overflow silently.
     """
     last_use = {a: k for k, o in enumerate(program.operations) for a in o.arguments}
     last_use |= {a: len(program.operations) for output in program.outputs for a in output}
@@ -38,18 +48,24 @@ def evaluate(program: Program, *inputs: Any) -> list[list[Any]]:
             values.append(_value(o, values, inputs))
             for a in o.arguments:
                 if last_use[a] == k:
-                    values[a] = None  # arrays that fit the cache are worth more than a complete list
+                    values[a] = (
+                        None  # arrays that fit the cache are worth more than a complete list
+                    )
     return [[values[a] for a in output] for output in program.outputs]
 
 
 def _value(o: Operation, values: Sequence[Any], inputs: Sequence[Any]) -> Any:
     if o.name == "input":
         return inputs[o.element[0]][o.element[1]]
-    return o.value if o.name == "constant" else _OPERATIONS[o.name](*(values[a] for a in o.arguments))
+    return (
+        o.value if o.name == "constant" else _OPERATIONS[o.name](*(values[a] for a in o.arguments))
+    )
 
 
 def as_casadi(program: Program) -> casadi.Function:
-    """The program as a CasADi function for its virtual machine: the same bits as the generated C, but for the sign of a zero."""
+    """The program as a CasADi function for its virtual machine: the same bits as the generated C,
+    but for the sign of a zero.
+    """
     symbols = [casadi.SX.sym(f"in{i}", size) for i, size in enumerate(program.sizes)]
     simplified = casadi.GlobalOptions.getSimplificationOnTheFly()
     casadi.GlobalOptions.setSimplificationOnTheFly(False)  # a (1/b) must not become a/b
@@ -57,4 +73,6 @@ def as_casadi(program: Program) -> casadi.Function:
         outputs = evaluate(program, *([s[j] for j in range(s.numel())] for s in symbols))
     finally:
         casadi.GlobalOptions.setSimplificationOnTheFly(simplified)
-    return casadi.Function(program.name, symbols, [dense(casadi.vertcat(*output)) for output in outputs])
+    return casadi.Function(
+        program.name, symbols, [dense(casadi.vertcat(*output)) for output in outputs]
+    )

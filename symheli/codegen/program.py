@@ -1,4 +1,6 @@
-"""The scalar operations of a CasADi function as data: one list, from which C source, NumPy and CasADi evaluate alike."""
+"""The scalar operations of a CasADi function as data: one list, from which C source, NumPy and
+CasADi evaluate alike.
+"""
 
 from __future__ import annotations
 
@@ -16,18 +18,24 @@ COMPARISONS = ("lt", "le", "eq", "ne", "not", "and", "or")
 ARITHMETIC = ("add", "sub", "mul", "div", "neg", "sqrt", "fabs")
 """Operations on numbers, each correctly rounded by IEEE 754."""
 EXTREMES = ("min", "max")
-"""The smaller and larger of two numbers, b < a ? b : a and a < b ? b : a: one machine instruction, and a first NaN stays."""
+"""The smaller and larger of two numbers, b < a ? b : a and a < b ? b : a: one machine instruction,
+and a first NaN stays.
+"""
 
 _TRANSLATED = ("sq", "twice", "inv", "sign", "if_else_zero", "assign")
-_NAMES = {getattr(casadi, f"OP_{name.upper()}"): name for name in (*ARITHMETIC, *COMPARISONS, *_TRANSLATED)}
+_NAMES = {
+    getattr(casadi, f"OP_{name.upper()}"): name
+    for name in (*ARITHMETIC, *COMPARISONS, *_TRANSLATED)
+}
 
 
 @dataclass(frozen=True)
 class Operation:
     """One scalar: the `name` of the operation and the positions of its `arguments` in the list.
 
-    name: "input" (with `element`: which input, which entry), "constant" (with `value`), "select" (condition, yes, no),
-    "number" (a condition as 1.0 or 0.0), one of `COMPARISONS`, `ARITHMETIC` or `EXTREMES`.
+    name: "input" (with `element`: which input, which entry), "constant" (with `value`), "select"
+    (condition, yes, no), "number" (a condition as 1.0 or 0.0), one of `COMPARISONS`, `ARITHMETIC`
+    or `EXTREMES`.
     """
 
     name: str
@@ -40,8 +48,8 @@ class Operation:
 class Program:
     """A function of vectors as a list of scalar operations, none repeated, none unused.
 
-    `sizes`: length of each input. `outputs`: for each output the positions of its entries. Whoever evaluates the list in
-    this order in IEEE double precision gets the same bits.
+    `sizes`: length of each input. `outputs`: for each output the positions of its entries. Whoever
+    evaluates the list in this order in IEEE double precision gets the same bits.
     """
 
     name: str
@@ -53,11 +61,14 @@ class Program:
         """Whether each operation depends on one of these inputs."""
         out: list[bool] = []
         for o in self.operations:
-            out.append(o.element[0] in inputs if o.name == "input" else any(out[a] for a in o.arguments))
+            out.append(
+                o.element[0] in inputs if o.name == "input" else any(out[a] for a in o.arguments)
+            )
         return out
 
     def split(self, varying: Sequence[int]) -> tuple[Program, Program]:
-        """(held, rest): what does not depend on the `varying` inputs, and the rest given it, so that held work is done once.
+        """(held, rest): what does not depend on the `varying` inputs, and the rest given it, so
+        that held work is done once.
 
         held(the other inputs) -> one vector; rest(varying inputs, that vector) -> outputs.
         """
@@ -65,18 +76,26 @@ class Program:
         handed = sorted(self._handed(depends))
         others = [i for i in range(len(self.sizes)) if i not in varying]
         held = replace(
-            self, name=f"{self.name}_held", sizes=tuple(self.sizes[i] for i in others), outputs=(tuple(handed),),
+            self,
+            name=f"{self.name}_held",
+            sizes=tuple(self.sizes[i] for i in others),
+            outputs=(tuple(handed),),
             operations=tuple(_renamed(o, others) for o in self.operations),
-        )  # fmt: skip
+        )
         given = {a: Operation("input", element=(len(varying), k)) for k, a in enumerate(handed)}
         rest = replace(
-            self, sizes=(*(self.sizes[i] for i in varying), len(handed)),
-            operations=tuple(given.get(k) or _renamed(o, varying) for k, o in enumerate(self.operations)),
-        )  # fmt: skip
+            self,
+            sizes=(*(self.sizes[i] for i in varying), len(handed)),
+            operations=tuple(
+                given.get(k) or _renamed(o, varying) for k, o in enumerate(self.operations)
+            ),
+        )
         return _without_unused(held), _without_unused(rest)
 
     def _handed(self, depends: Sequence[bool]) -> set[int]:
-        """Positions the dependent operations and the outputs need of the others; conditions are made again from their numbers."""
+        """Positions the dependent operations and the outputs need of the others; conditions are
+        made again from their numbers.
+        """
         wanted = [a for k, o in enumerate(self.operations) if depends[k] for a in o.arguments]
         wanted += [a for output in self.outputs for a in output]
         handed: set[int] = set()
@@ -96,21 +115,29 @@ def _renamed(operation: Operation, inputs: Sequence[int]) -> Operation:
     """An input operation counted among these inputs only; any other operation as it is."""
     if operation.name != "input" or operation.element[0] not in inputs:
         return operation
-    return replace(operation, element=(list(inputs).index(operation.element[0]), operation.element[1]))
+    return replace(
+        operation, element=(list(inputs).index(operation.element[0]), operation.element[1])
+    )
 
 
 def program(function: casadi.Function, varying: Sequence[int] | None = None) -> Program:
-    """The operations of an SX function of dense column vectors that needs no more than + - * / sqrt | |, comparisons and branches.
+    """The operations of an SX function of dense column vectors that needs no more than + - * / sqrt
+    | |, comparisons and branches.
 
-    Two sides of a branch become one selection; a divisor that is constant, used more than once, or independent of the `varying`
-    inputs (default: all vary; see `Program.split`) is inverted once: values differ from CasADi's by rounding. Raises `InputError`
-    where an operation has no such form (sin, exp, ...).
+    Two sides of a branch become one selection; a divisor that is constant, used more than once, or
+    independent of the `varying` inputs (default: all vary; see `Program.split`) is inverted once:
+    values differ from CasADi's by rounding. Raises `InputError` where an operation has no such form
+    (sin, exp, ...).
     """
     builder = _Builder()
     registers: dict[int, int] = {}
     outputs = [[builder.constant(0.0)] * function.size1_out(i) for i in range(function.n_out())]
     for i in range(function.n_instructions()):
-        code, to, of = function.instruction_id(i), function.instruction_output(i), function.instruction_input(i)
+        code, to, of = (
+            function.instruction_id(i),
+            function.instruction_output(i),
+            function.instruction_input(i),
+        )
         if code == casadi.OP_OUTPUT:
             outputs[to[0]][to[1]] = builder.number(registers[of[0]])
         elif code == casadi.OP_INPUT:
@@ -120,10 +147,15 @@ def program(function: casadi.Function, varying: Sequence[int] | None = None) -> 
         elif code in _NAMES:
             registers[to[0]] = builder.translate(_NAMES[code], [registers[a] for a in of])
         else:
-            raise InputError(f"{function.name()}: CasADi operation {code} cannot be written without the mathematical library")
+            raise InputError(
+                f"{function.name()}: CasADi operation {code} cannot be written without the"
+                " mathematical library"
+            )
     sizes = tuple(function.size1_in(i) for i in range(function.n_in()))
     read = Program(function.name(), sizes, tuple(builder.operations), tuple(map(tuple, outputs)))
-    return _without_unused(_divisors_inverted(read, range(len(sizes)) if varying is None else varying))
+    return _without_unused(
+        _divisors_inverted(read, range(len(sizes)) if varying is None else varying)
+    )
 
 
 class _Builder:
@@ -134,7 +166,12 @@ class _Builder:
         self._known: dict[tuple[object, ...], int] = {}
 
     def add(self, operation: Operation) -> int:
-        key = (operation.name, operation.arguments, operation.value.hex(), operation.element)  # hex: 0.0 and -0.0 differ
+        key = (
+            operation.name,
+            operation.arguments,
+            operation.value.hex(),
+            operation.element,
+        )  # hex: 0.0 and -0.0 differ
         if key not in self._known:
             self._known[key] = len(self.operations)
             self.operations.append(operation)
@@ -152,13 +189,20 @@ class _Builder:
         return self.apply("number", a) if self.operations[a].name in COMPARISONS else a
 
     def condition(self, a: int) -> int:
-        return a if self.operations[a].name in COMPARISONS else self.apply("ne", a, self.constant(0.0))
+        return (
+            a if self.operations[a].name in COMPARISONS else self.apply("ne", a, self.constant(0.0))
+        )
 
     def translate(self, name: str, arguments: list[int]) -> int:
         if name in ("not", "and", "or"):
             return self.apply(name, *map(self.condition, arguments))
         if name == "if_else_zero":
-            return self.apply("select", self.condition(arguments[0]), self.number(arguments[1]), self.constant(0.0))
+            return self.apply(
+                "select",
+                self.condition(arguments[0]),
+                self.number(arguments[1]),
+                self.constant(0.0),
+            )
         a = [self.number(k) for k in arguments]
         match name:
             case "assign":
@@ -171,16 +215,25 @@ class _Builder:
                 return self.apply("div", self.constant(1.0), a[0])
             case "sign":
                 zero = self.constant(0.0)
-                positive = self.apply("select", self.apply("lt", zero, a[0]), self.constant(1.0), zero)
-                return self.apply("select", self.apply("lt", a[0], zero), self.constant(-1.0), positive)
-            case "add" if (selection := self._selection(a[0], a[1]) or self._selection(a[1], a[0])) is not None:
+                positive = self.apply(
+                    "select", self.apply("lt", zero, a[0]), self.constant(1.0), zero
+                )
+                return self.apply(
+                    "select", self.apply("lt", a[0], zero), self.constant(-1.0), positive
+                )
+            case "add" if (
+                selection := self._selection(a[0], a[1]) or self._selection(a[1], a[0])
+            ) is not None:
                 return selection
         return self.apply(name, *a)
 
     def _selection(self, a: int, b: int) -> int | None:
         """(c ? yes : 0) + (not c ? no : 0) as c ? yes : no."""
         first, second, zero = self.operations[a], self.operations[b], self.constant(0.0)
-        if first.name == second.name == "select" and first.arguments[2] == second.arguments[2] == zero:
+        if (
+            first.name == second.name == "select"
+            and first.arguments[2] == second.arguments[2] == zero
+        ):
             condition, opposite = first.arguments[0], self.operations[second.arguments[0]]
             if opposite.name == "not" and opposite.arguments[0] == condition:
                 return self._extreme(condition, first.arguments[1], second.arguments[1])
@@ -194,8 +247,12 @@ class _Builder:
         return self.apply("select", condition, yes, no)
 
 
-def _rewritten(given: Program, rule: Callable[[_Builder, Operation, Operation], int | None]) -> Program:
-    """The program with operations replaced: rule(builder, operation as given, the same with new arguments) -> position or None."""
+def _rewritten(
+    given: Program, rule: Callable[[_Builder, Operation, Operation], int | None]
+) -> Program:
+    """The program with operations replaced: rule(builder, operation as given, the same with new
+    arguments) -> position or None.
+    """
     builder, moved = _Builder(), []
     for operation in given.operations:
         renumbered = replace(operation, arguments=tuple(moved[a] for a in operation.arguments))
@@ -206,7 +263,10 @@ def _rewritten(given: Program, rule: Callable[[_Builder, Operation, Operation], 
 
 
 def _divisors_inverted(given: Program, varying: Sequence[int]) -> Program:
-    uses, depends = Counter(o.arguments[1] for o in given.operations if o.name == "div"), given.depends(varying)
+    uses, depends = (
+        Counter(o.arguments[1] for o in given.operations if o.name == "div"),
+        given.depends(varying),
+    )
 
     def rule(builder: _Builder, before: Operation, after: Operation) -> int | None:
         if before.name != "div":
@@ -215,7 +275,11 @@ def _divisors_inverted(given: Program, varying: Sequence[int]) -> Program:
         if divisor.name == "constant" and divisor.value != 0.0:
             return builder.apply("mul", after.arguments[0], builder.constant(1.0 / divisor.value))
         if uses[before.arguments[1]] > 1 or not depends[before.arguments[1]]:
-            return builder.apply("mul", after.arguments[0], builder.apply("div", builder.constant(1.0), after.arguments[1]))
+            return builder.apply(
+                "mul",
+                after.arguments[0],
+                builder.apply("div", builder.constant(1.0), after.arguments[1]),
+            )
         return None
 
     return _rewritten(given, rule)
@@ -227,5 +291,12 @@ def _without_unused(given: Program) -> Program:
         if position in used:
             used.update(given.operations[position].arguments)
     new = {old: k for k, old in enumerate(sorted(used))}
-    operations = tuple(replace(o, arguments=tuple(new[a] for a in o.arguments)) for o in (given.operations[old] for old in sorted(used)))
-    return replace(given, operations=operations, outputs=tuple(tuple(new[a] for a in output) for output in given.outputs))
+    operations = tuple(
+        replace(o, arguments=tuple(new[a] for a in o.arguments))
+        for o in (given.operations[old] for old in sorted(used))
+    )
+    return replace(
+        given,
+        operations=operations,
+        outputs=tuple(tuple(new[a] for a in output) for output in given.outputs),
+    )

@@ -1,9 +1,9 @@
 """The parts of the airframe, one file each: pure functions from motion and controls to forces.
 
-A part is found by the name of its file: a new one is a new file that defines `COMPONENT`, here or beside the vehicle file, and
-a section in the vehicle file (docs/vehicles.md has an example).
-References: [G15] V. Gavrilets, "Dynamic Model for a Miniature Aerobatic Helicopter", Handbook of Unmanned Aerial Vehicles,
-Springer 2015.
+A part is found by the name of its file: a new one is a new file that defines `COMPONENT`, here or
+beside the vehicle file, and a section in the vehicle file (docs/vehicles.md has an example).
+References: [G15] V. Gavrilets, "Dynamic Model for a Miniature Aerobatic Helicopter", Handbook of
+Unmanned Aerial Vehicles, Springer 2015.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ __all__ = ["Component", "Effect", "Flow", "Motion", "find", "unnamed"]
 
 
 def find(name: str, folder: Path | None = None) -> Component:
-    """The component of the packaged file `name`, or of a user's "./name.py" relative to `folder` (the file is run).
+    """The component of the packaged file `name`, or of a user's "./name.py" relative to `folder`
+    (the file is run).
 
     Raises `UnknownNameError`, `InputError`.
     """
@@ -41,8 +42,13 @@ def _from_file(path: Path) -> Component:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise InputError(f"component file {path} does not run: {type(error).__name__}: {error}") from error
+        raise InputError(
+            f"component file {path} does not run: {type(error).__name__}: {error}"
+        ) from error
     component = getattr(module, "COMPONENT", None)
     if not isinstance(component, Component):
-        raise InputError(f"component file {path} must define COMPONENT = symheli.components.Component(...), got {component!r:.80}")
+        raise InputError(
+            f"component file {path} must define COMPONENT = symheli.components.Component(...), got"
+            f" {component!r:.80}"
+        )
     return component

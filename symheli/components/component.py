@@ -12,8 +12,10 @@ from symheli.lpv.signal import Signal
 
 
 class Motion(NamedTuple):
-    """Motion of the body through the air: velocity of the c.g. relative to the air u_a v_a w_a (m/s), body rates p q r
-    (rad/s), rotor speed Om relative to the body (rad/s), air density rho (kg/m^3)."""
+    """Motion of the body through the air: velocity of the c.g. relative to the air u_a v_a w_a
+    (m/s), body rates p q r (rad/s), rotor speed Om relative to the body (rad/s), air density rho
+    (kg/m^3).
+    """
 
     u_a: Any
     v_a: Any
@@ -32,11 +34,13 @@ def unnamed(symbol: str, value: Any) -> Any:
 
 @dataclass
 class Flow:
-    """Flow quantities made by components evaluated earlier, by name, and the inflow solver of the rotors.
+    """Flow quantities made by components evaluated earlier, by name, and the inflow solver of the
+    rotors.
 
-    `inflow(c0, c1, ct_max, mu2, mu_z, efficiency)` returns lam0 (see `symheli.inflow.solve`). `name(symbol, value)` gives an
-    intermediate value its symbol in the field's notation (LaTeX): where numbers are wanted it returns the value; where the
-    equations are printed it keeps the equation and returns the symbol.
+    `inflow(c0, c1, ct_max, mu2, mu_z, efficiency)` returns lam0 (see `symheli.inflow.solve`).
+    `name(symbol, value)` gives an intermediate value its symbol in the field's notation (LaTeX):
+    where numbers are wanted it returns the value; where the equations are printed it keeps the
+    equation and returns the symbol.
     """
 
     inflow: Callable[..., Any]
@@ -49,10 +53,12 @@ class Flow:
 
 @dataclass
 class Effect:
-    """What a part does, in body axes: force X Y Z (N) and moment L M N (N m) about its reference point (the c.g. unless the
-    vehicle places it elsewhere), the derivatives of its own states, the torque it takes from the main shaft (N m, referred
-    to the main rotor), the flow it makes, and switching functions whose sign changes mark a corner of the model (a jump where
-    the name begins with "jump": no equilibrium need exist beside it)."""
+    """What a part does, in body axes: force X Y Z (N) and moment L M N (N m) about its reference
+    point (the c.g. unless the vehicle places it elsewhere), the derivatives of its own states, the
+    torque it takes from the main shaft (N m, referred to the main rotor), the flow it makes, and
+    switching functions whose sign changes mark a corner of the model (a jump where the name begins
+    with "jump": no equilibrium need exist beside it).
+    """
 
     force: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
     moment: tuple[Any, Any, Any] = (0.0, 0.0, 0.0)
@@ -66,14 +72,17 @@ class Effect:
 class Component:
     """A part of the airframe: a pure function and what it must be given.
 
-    `parameters` {name: unit} come from the vehicle file, `optional` ones if they are there, those in `positive` must be > 0,
-    those in `counts` {name: least} whole numbers; `states` are its own; it may use the flow in `needs` and makes the flow in
-    `makes`. `evaluate(parameters, motion, controls, own, flow)` returns an `Effect` under these names: where a vehicle has two of a
-    kind or puts one off the c.g., `symheli.part.Part` translates. In print, `subscript` marks its forces and `symbols`
-    {parameter: LaTeX} its parameters; without, their names do.
+    `parameters` {name: unit} come from the vehicle file, `optional` ones if they are there, those
+    in `positive` must be > 0, those in `counts` {name: least} whole numbers; `states` are its own;
+    it may use the flow in `needs` and makes the flow in `makes`. `evaluate(parameters, motion,
+    controls, own, flow)` returns an `Effect` under these names: where a vehicle has two of a kind
+    or puts one off the c.g., `symheli.part.Part` translates. In print, `subscript` marks its forces
+    and `symbols` {parameter: LaTeX} its parameters; without, their names do.
     """
 
-    evaluate: Callable[[SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect]
+    evaluate: Callable[
+        [SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect
+    ]
     parameters: Mapping[str, str]
     states: tuple[Signal, ...] = ()
     needs: tuple[str, ...] = ()
@@ -86,4 +95,7 @@ class Component:
 
     def __post_init__(self) -> None:
         if reserved := {"x", "y", "z"} & set(self.parameters):
-            raise InputError(f"parameters {', '.join(sorted(reserved))}: every part has a place x y z already; choose other names")
+            raise InputError(
+                f"parameters {', '.join(sorted(reserved))}: every part has a place x y z already;"
+                " choose other names"
+            )

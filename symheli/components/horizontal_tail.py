@@ -10,13 +10,20 @@ from symheli.components.component import Component, Effect, Flow, Motion
 from symheli.symbolic import absolute, clip
 
 
-def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
-    """Lift Z_ht = -0.5 rho S_ht (C_La |u_a| w_ht + |w_ht| w_ht), limited to 0.5 rho S_ht (u_a^2 + w_ht^2); M_ht = Z_ht l_ht.
+def evaluate(
+    par: SimpleNamespace,
+    motion: Motion,
+    controls: Mapping[str, Any],
+    own: Mapping[str, Any],
+    flow: Flow,
+) -> Effect:
+    """Lift Z_ht = -0.5 rho S_ht (C_La |u_a| w_ht + |w_ht| w_ht), limited to 0.5 rho S_ht (u_a^2 +
+    w_ht^2); M_ht = Z_ht l_ht.
 
         w_ht = w_a + l_ht q - K_lam V_imr
 
-    Source: G15, horizontal tail; the sign is the stabilising one, the printed + contradicts the text and is the
-    option "horizontal_tail_lift".
+    Source: G15, horizontal tail; the sign is the stabilising one, the printed + contradicts the
+    text and is the option "horizontal_tail_lift".
     """
     w = flow.name("w_{ht}", motion.w_a + par.arm * motion.q - flow["w_wake"])
     scale = 0.5 * motion.rho * par.area

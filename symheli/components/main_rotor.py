@@ -12,26 +12,44 @@ from symheli.lpv.signal import Signal
 from symheli.symbolic import absolute, sqrt
 
 
-def flapping_slopes(mu2: Any, mu: Any, mu_x: Any, lam0: Any, d_col: Any, *, k_mu: Any, lift_slope: Any, solidity: Any) -> tuple[Any, Any]:
+def flapping_slopes(
+    mu2: Any,
+    mu: Any,
+    mu_x: Any,
+    lam0: Any,
+    d_col: Any,
+    *,
+    k_mu: Any,
+    lift_slope: Any,
+    solidity: Any,
+) -> tuple[Any, Any]:
     """(da1/dmu, da1/dmu_z), dimensionless.
 
         da1/dmu   = 2 K_mu (4 d_col/3 - lam0)
         da1/dmu_z = K_mu 16 mu^2 sign(mu) / [ (1 - mu^2/2)(8 |mu| + a sigma) ]
 
-    mu^2 sign(mu) is taken as mu mu_x with mu_x = u_a/(Om R): it has the sign of the forward speed and is smooth, and 0,
-    in hover. d_col in rad. Source: G15, flapping dynamics.
+    mu^2 sign(mu) is taken as mu mu_x with mu_x = u_a/(Om R): it has the sign of the forward speed
+    and is smooth, and 0, in hover. d_col in rad. Source: G15, flapping dynamics.
     """
     da1_dmu = 2 * k_mu * (4 * d_col / 3 - lam0)
     da1_dmu_z = k_mu * 16 * mu * mu_x / ((1 - mu2 / 2) * (8 * absolute(mu) + lift_slope * solidity))
     return da1_dmu, da1_dmu_z
 
 
-def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
-    """Forces and moments of the tilted thrust, flapping dynamics, shaft torque, induced velocity `V_imr` (m/s).
+def evaluate(
+    par: SimpleNamespace,
+    motion: Motion,
+    controls: Mapping[str, Any],
+    own: Mapping[str, Any],
+    flow: Flow,
+) -> Effect:
+    """Forces and moments of the tilted thrust, flapping dynamics, shaft torque, induced velocity
+    `V_imr` (m/s).
 
-    Source: G15, main rotor thrust, torque, flapping, forces and moments. The sign of db1/dmu_v is + (a hovering
-    rotor looks the same after a turn about its shaft); the printed - is the option "lateral_flapping". The options
-    "flapping_sign" (mu^2 sign(mu) is mu^2) and "thrust_limit" (2.5 m g) are printed forms too.
+    Source: G15, main rotor thrust, torque, flapping, forces and moments. The sign of db1/dmu_v is +
+    (a hovering rotor looks the same after a turn about its shaft); the printed - is the option
+    "lateral_flapping". The options "flapping_sign" (mu^2 sign(mu) is mu^2) and "thrust_limit" (2.5
+    m g) are printed forms too.
     """
     plane = disc(par.radius, par.chord, par.blades, motion.Om, motion.rho, flow)
     mu_x = flow.name(r"\mu_x", motion.u_a / plane.tip_speed)
@@ -60,8 +78,20 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     da1_dmu, da1_dmu_z = flow.name(r"a_{1\mu}", da1_dmu), flow.name(r"a_{1\mu_z}", da1_dmu_z)
     db1_dmu_v = flow.name(r"b_{1\mu}", -da1_dmu if "lateral_flapping" in par.printed else da1_dmu)
     rates = {
-        "a1": -motion.q + (-a1 + da1_dmu * mu_x + da1_dmu_z * mu_z + par.longitudinal_gain * speed_ratio2 * controls["d_lon"]) / tau,
-        "b1": -motion.p + (-b1 - db1_dmu_v * mu_y + par.lateral_gain * speed_ratio2 * controls["d_lat"]) / tau,
+        "a1": (
+            -motion.q
+            + (
+                -a1
+                + da1_dmu * mu_x
+                + da1_dmu_z * mu_z
+                + par.longitudinal_gain * speed_ratio2 * controls["d_lon"]
+            )
+            / tau
+        ),
+        "b1": (
+            -motion.p
+            + (-b1 - db1_dmu_v * mu_y + par.lateral_gain * speed_ratio2 * controls["d_lat"]) / tau
+        ),
     }
     stiffness = flow.name("K", par.hub_stiffness + thrust * par.hub_height)
     return Effect(
@@ -69,7 +99,13 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
         moment=(stiffness * b1, stiffness * a1, 0.0),
         rates=rates,
         shaft_torque=torque,
-        flow={"V_imr": lam0 * plane.tip_speed, "lam0": lam0, "C_T": ct, "T_mr": thrust, "Q_mr": torque},
+        flow={
+            "V_imr": lam0 * plane.tip_speed,
+            "lam0": lam0,
+            "C_T": ct,
+            "T_mr": thrust,
+            "Q_mr": torque,
+        },
         switches={"main rotor stall": stall, "vortex_ring": ring},
     )
 
@@ -94,7 +130,15 @@ COMPONENT = Component(
     },
     states=(Signal("a1"), Signal("b1")),
     makes=("V_imr", "lam0", "C_T", "T_mr", "Q_mr"),
-    positive=("radius", "chord", "lift_slope", "ct_max", "bar_lock_number", "nominal_speed", "inflow_efficiency"),
+    positive=(
+        "radius",
+        "chord",
+        "lift_slope",
+        "ct_max",
+        "bar_lock_number",
+        "nominal_speed",
+        "inflow_efficiency",
+    ),
     counts={"blades": 2},
     subscript="mr",
     symbols={

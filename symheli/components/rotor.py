@@ -12,8 +12,9 @@ from symheli.symbolic import absolute, clip, sqrt
 
 
 class Disc(NamedTuple):
-    """A rotor disc: radius (m), tip speed Om R (m/s), solidity sigma = blades c/(pi R) (dimensionless) and the force
-    rho (Om R)^2 pi R^2 (N), which is the thrust at C_T = 1."""
+    """A rotor disc: radius (m), tip speed Om R (m/s), solidity sigma = blades c/(pi R)
+    (dimensionless) and the force rho (Om R)^2 pi R^2 (N), which is the thrust at C_T = 1.
+    """
 
     radius: Any
     tip_speed: Any
@@ -22,7 +23,9 @@ class Disc(NamedTuple):
 
 
 def disc(radius: Any, chord: Any, blades: Any, Om: Any, rho: Any, flow: Flow) -> Disc:
-    """From radius and chord (m), number of blades, and speed Om (rad/s) in air of density rho (kg/m^3)."""
+    """From radius and chord (m), number of blades, and speed Om (rad/s) in air of density rho
+    (kg/m^3).
+    """
     solidity = flow.name(r"\sigma", blades * chord / (pi * radius))
     tip_speed = flow.name("V_{tip}", Om * radius)
     return Disc(radius, tip_speed, solidity, rho * tip_speed**2 * pi * radius**2)
@@ -34,8 +37,10 @@ def profile_torque_coefficient(mu2: Any, profile_drag: Any, solidity: Any) -> An
 
 
 class Load(NamedTuple):
-    """What a rotor does along and about its shaft: inflow ratio lam0 and C_T (dimensionless), thrust (N), torque (N m), and the
-    switching functions of blade stall (thrust limit) and vortex ring."""
+    """What a rotor does along and about its shaft: inflow ratio lam0 and C_T (dimensionless),
+    thrust (N), torque (N m), and the switching functions of blade stall (thrust limit) and vortex
+    ring.
+    """
 
     lam0: Any
     ct: Any
@@ -45,9 +50,11 @@ class Load(NamedTuple):
     vortex_ring: Any
 
 
-def load(disc: Disc, par: SimpleNamespace, ct_max: Any, pitch: Any, mu2: Any, mu_z: Any, flow: Flow) -> Load:
-    """Thrust (limited to +-`ct_max`) and torque of a rotor of collective `pitch` (rad) in flow of advance ratio^2 `mu2` and
-    axial ratio `mu_z`.
+def load(
+    disc: Disc, par: SimpleNamespace, ct_max: Any, pitch: Any, mu2: Any, mu_z: Any, flow: Flow
+) -> Load:
+    """Thrust (limited to +-`ct_max`) and torque of a rotor of collective `pitch` (rad) in flow of
+    advance ratio^2 `mu2` and axial ratio `mu_z`.
 
         C_Q = C_T (lam0 - mu_z) + (C_D0 sigma/8)(1 + 7/3 mu^2),  Q = C_Q rho (Om R)^2 pi R^3
 
@@ -59,10 +66,14 @@ def load(disc: Disc, par: SimpleNamespace, ct_max: Any, pitch: Any, mu2: Any, mu
     return _load(disc, par, lam0, ct, ct_max - absolute(c0 - c1 * lam0), mu2, mu_z, flow)
 
 
-def linear_load(disc: Disc, par: SimpleNamespace, ct_max: Any, pitch: Any, mu2: Any, mu_z: Any, flow: Flow) -> Load:
-    """As `load`, with thrust linear in pitch and axial flow; the slopes are those at the pitch `par.trim_pitch` without axial flow.
+def linear_load(
+    disc: Disc, par: SimpleNamespace, ct_max: Any, pitch: Any, mu2: Any, mu_z: Any, flow: Flow
+) -> Load:
+    """As `load`, with thrust linear in pitch and axial flow; the slopes are those at the pitch
+    `par.trim_pitch` without axial flow.
 
-        C_T = C_pitch pitch + C_mu_z mu_z, limited;  lam0 = mu_z - 2 [2 C_T/(a sigma) - pitch (1/3 + mu^2/2)]
+        C_T = C_pitch pitch + C_mu_z mu_z, limited
+        lam0 = mu_z - 2 [2 C_T/(a sigma) - pitch (1/3 + mu^2/2)]
 
     The slopes follow from momentum and thrust line at that point by implicit differentiation.
     Source: G15, tail rotor; the printed option "tail_rotor_linear".
@@ -74,7 +85,10 @@ def linear_load(disc: Disc, par: SimpleNamespace, ct_max: Any, pitch: Any, mu2: 
     rise = flow.name("D", 2 * efficiency(par) * (speed + trim**2 / speed))
     swept = 1 / 3 + 0.5 * mu2
     by_pitch = flow.name(r"C_{\theta}", half * swept / (1 + half / (2 * rise)))
-    by_flow = flow.name(r"C_{\mu_z}", half / 2 * (1 - 2 * efficiency(par) * trim**2 / (speed * rise)) / (1 + half / (2 * rise)))
+    by_flow = flow.name(
+        r"C_{\mu_z}",
+        half / 2 * (1 - 2 * efficiency(par) * trim**2 / (speed * rise)) / (1 + half / (2 * rise)),
+    )
     free = by_pitch * pitch + by_flow * mu_z
     ct = flow.name("C_T", clip(free, -ct_max, ct_max))
     lam0 = flow.name(r"\lambda", mu_z - 2 * (ct / half - pitch * swept))
@@ -86,8 +100,19 @@ def efficiency(par: SimpleNamespace) -> Any:
     return 1.0 if "ideal_inflow" in par.printed else par.inflow_efficiency
 
 
-def _load(disc: Disc, par: SimpleNamespace, lam0: Any, ct: Any, stall: Any, mu2: Any, mu_z: Any, flow: Flow) -> Load:
-    cq = flow.name("C_Q", ct * (lam0 - mu_z) + profile_torque_coefficient(mu2, par.profile_drag, disc.solidity))
+def _load(
+    disc: Disc,
+    par: SimpleNamespace,
+    lam0: Any,
+    ct: Any,
+    stall: Any,
+    mu2: Any,
+    mu_z: Any,
+    flow: Flow,
+) -> Load:
+    cq = flow.name(
+        "C_Q", ct * (lam0 - mu_z) + profile_torque_coefficient(mu2, par.profile_drag, disc.solidity)
+    )
     hover = sqrt(absolute(ct) / (2 * efficiency(par)) + 1e-20)
     return Load(
         lam0,

@@ -10,11 +10,18 @@ from symheli.components.component import Component, Effect, Flow, Motion
 from symheli.symbolic import clip, maximum, where
 
 
-def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
+def evaluate(
+    par: SimpleNamespace,
+    motion: Motion,
+    controls: Mapping[str, Any],
+    own: Mapping[str, Any],
+    flow: Flow,
+) -> Effect:
     """Downwash at the tail `w_wake` = K_lam V_imr (m/s).
 
         g_i = (l_tr - R_mr - R_tr)/h_tr, g_f = (l_tr - R_mr + R_tr)/h_tr, chi = u_a/(V_imr - w_a)
-        K_lam = 0 where V_imr <= w_a or chi <= g_i, 1.5 where chi >= g_f, else 1.5 (chi - g_i)/(g_f - g_i)
+        K_lam = 0 where V_imr <= w_a or chi <= g_i, 1.5 where chi >= g_f,
+                else 1.5 (chi - g_i)/(g_f - g_i)
 
     Source: G15, wake intensity factor. `smoothing` rounds both corners (in units of K_lam).
     """
@@ -27,7 +34,11 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
     k_lam = flow.name(r"K_\lambda", where(down < 0, clip(share, 0.0, 1.5, par.smoothing), 0.0))
     return Effect(
         flow={"w_wake": k_lam * flow["V_imr"], "K_lam": k_lam},
-        switches={"wake reaches the tail": chi - g_i, "tail fully in the wake": chi - g_f, "jump as the flow turns at the disc": -down},
+        switches={
+            "wake reaches the tail": chi - g_i,
+            "tail fully in the wake": chi - g_f,
+            "jump as the flow turns at the disc": -down,
+        },
     )
 
 
@@ -37,5 +48,10 @@ COMPONENT = Component(
     needs=("V_imr",),
     makes=("w_wake", "K_lam"),
     positive=("rotor_radius", "tail_radius", "tail_height"),
-    symbols={"rotor_radius": "R_{mr}", "tail_radius": "R_{tr}", "tail_arm": "l_{tr}", "tail_height": "h_{tr}"},
+    symbols={
+        "rotor_radius": "R_{mr}",
+        "tail_radius": "R_{tr}",
+        "tail_arm": "l_{tr}",
+        "tail_height": "h_{tr}",
+    },
 )

@@ -10,10 +10,18 @@ from symheli.components.component import Component, Effect, Flow, Motion
 from symheli.symbolic import absolute, clip, sqrt
 
 
-def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], own: Mapping[str, Any], flow: Flow) -> Effect:
-    """Side force Y_vf = -0.5 rho S_vf (C_La V_inf_tr + |v_vf|) v_vf, limited to 0.5 rho S_vf (V_inf_tr^2 + v_vf^2).
+def evaluate(
+    par: SimpleNamespace,
+    motion: Motion,
+    controls: Mapping[str, Any],
+    own: Mapping[str, Any],
+    flow: Flow,
+) -> Effect:
+    """Side force Y_vf = -0.5 rho S_vf (C_La V_inf_tr + |v_vf|) v_vf, limited to 0.5 rho S_vf
+    (V_inf_tr^2 + v_vf^2).
 
-        v_vf = v_a - eps_vf V_itr - l_tr r,  w_tr = w_a + l_tr q - K_lam V_imr,  V_inf_tr = sqrt(u_a^2 + w_tr^2)
+        v_vf = v_a - eps_vf V_itr - l_tr r,  w_tr = w_a + l_tr q - K_lam V_imr
+        V_inf_tr = sqrt(u_a^2 + w_tr^2)
         N_vf = -Y_vf l_tr,  L_vf = Y_vf h_tr
 
     Source: G15, vertical fin.
@@ -35,7 +43,13 @@ def evaluate(par: SimpleNamespace, motion: Motion, controls: Mapping[str, Any], 
 
 COMPONENT = Component(
     evaluate,
-    parameters={"area": "m^2", "lift_slope": "1/rad", "tail_rotor_wash": "1", "arm": "m", "height": "m"},
+    parameters={
+        "area": "m^2",
+        "lift_slope": "1/rad",
+        "tail_rotor_wash": "1",
+        "arm": "m",
+        "height": "m",
+    },
     needs=("w_wake", "V_itr"),
     subscript="vf",
     symbols={

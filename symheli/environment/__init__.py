@@ -1,4 +1,6 @@
-"""The air a helicopter flies in: its density with altitude, its steady motion, gusts and turbulence."""
+"""The air a helicopter flies in: its density with altitude, its steady motion, gusts and
+turbulence.
+"""
 
 from symheli.environment.atmosphere import Air, standard_atmosphere
 from symheli.environment.gust import Gust

@@ -25,19 +25,30 @@ class Air(NamedTuple):
 
 
 def standard_atmosphere(altitude: float, warmer: float = 0.0) -> Air:
-    """The air at a geometric `altitude` above sea level (m, -2000 .. 20000); `warmer` (K) than standard at the same pressure.
+    """The air at a geometric `altitude` above sea level (m, -2000 .. 20000); `warmer` (K) than
+    standard at the same pressure.
 
-    Hydrostatic equation with -6.5 K/km up to 11 km, constant temperature above. Raises `InputError` outside that range.
-    Source: U.S. Standard Atmosphere 1976 (the same as ISO 2533 up to there).
+    Hydrostatic equation with -6.5 K/km up to 11 km, constant temperature above. Raises `InputError`
+    outside that range. Source: U.S. Standard Atmosphere 1976 (the same as ISO 2533 up to there).
     """
     if not (math.isfinite(altitude) and -2000.0 <= altitude <= CEILING):
-        raise InputError(f"altitude: expected -2000 .. {CEILING:.0f} m above sea level, got {altitude}; feet times 0.3048 are metres")
+        raise InputError(
+            f"altitude: expected -2000 .. {CEILING:.0f} m above sea level, got {altitude}; feet"
+            " times 0.3048 are metres"
+        )
     height = EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude)
     low = min(height, TROPOPAUSE)
     temperature = SEA_LEVEL_TEMPERATURE + LAPSE_RATE * low
-    pressure = SEA_LEVEL_PRESSURE * (temperature / SEA_LEVEL_TEMPERATURE) ** (-GRAVITY / (GAS_CONSTANT * LAPSE_RATE))
+    pressure = SEA_LEVEL_PRESSURE * (temperature / SEA_LEVEL_TEMPERATURE) ** (
+        -GRAVITY / (GAS_CONSTANT * LAPSE_RATE)
+    )
     pressure *= math.exp(-GRAVITY * (height - low) / (GAS_CONSTANT * temperature))
     temperature += warmer
     if not temperature > 0:
         raise InputError(f"warmer: {warmer} K leaves a temperature of {temperature:g} K")
-    return Air(temperature, pressure, pressure / (GAS_CONSTANT * temperature), math.sqrt(HEAT_RATIO * GAS_CONSTANT * temperature))
+    return Air(
+        temperature,
+        pressure,
+        pressure / (GAS_CONSTANT * temperature),
+        math.sqrt(HEAT_RATIO * GAS_CONSTANT * temperature),
+    )

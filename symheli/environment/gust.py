@@ -12,10 +12,12 @@ from symheli.errors import InputError
 
 @dataclass(frozen=True)
 class Gust:
-    """A 1-cosine gust: velocity `peak`/2 (1 - cos(2 pi (t - start)/duration)), zero before and after.
+    """A 1-cosine gust: velocity `peak`/2 (1 - cos(2 pi (t - start)/duration)), zero before and
+    after.
 
-    peak: north, east, down (m/s); start and duration in s. `Gust.over` takes the gradient distance instead. Raises `InputError`.
-    Source: EASA CS-25.341 (a full cosine); MIL-F-8785C, 3.7.1.3 is its first half.
+    peak: north, east, down (m/s); start and duration in s. `Gust.over` takes the gradient distance
+    instead. Raises `InputError`. Source: EASA CS-25.341 (a full cosine); MIL-F-8785C, 3.7.1.3 is
+    its first half.
     """
 
     peak: tuple[float, float, float]
@@ -24,15 +26,27 @@ class Gust:
 
     def __post_init__(self) -> None:
         if len(self.peak) != 3 or not all(math.isfinite(v) for v in (*self.peak, self.start)):
-            raise InputError(f"a gust needs a finite peak (north, east, down, m/s) and start (s), got {self.peak}, {self.start}")
+            raise InputError(
+                "a gust needs a finite peak (north, east, down, m/s) and start (s), got"
+                f" {self.peak}, {self.start}"
+            )
         if not (math.isfinite(self.duration) and self.duration > 0):
-            raise InputError(f"duration: expected a positive number of seconds, got {self.duration}")
+            raise InputError(
+                f"duration: expected a positive number of seconds, got {self.duration}"
+            )
 
     @classmethod
-    def over(cls, gradient: float, airspeed: float, peak: tuple[float, float, float], start: float) -> Gust:
-        """The gust met at `airspeed` (m/s) that reaches its peak after `gradient` metres of flight through the air."""
+    def over(
+        cls, gradient: float, airspeed: float, peak: tuple[float, float, float], start: float
+    ) -> Gust:
+        """The gust met at `airspeed` (m/s) that reaches its peak after `gradient` metres of flight
+        through the air.
+        """
         if not (gradient > 0 and airspeed > 0):
-            raise InputError(f"expected a gradient distance > 0 m and an airspeed > 0 m/s, got {gradient} and {airspeed}")
+            raise InputError(
+                f"expected a gradient distance > 0 m and an airspeed > 0 m/s, got {gradient} and"
+                f" {airspeed}"
+            )
         return cls(peak, start, 2 * gradient / airspeed)
 
     def __call__(self, time: object) -> np.ndarray:

@@ -16,8 +16,9 @@ from symheli.errors import InputError
 class Wind:
     """`steady` wind (north, east, down, m/s) plus `gusts` plus `turbulence` drawn from `seed`.
 
-    Turbulence is laid along north, the heading flights keep: its first component is along the path. The mean wind inside
-    `turbulence` sets its strength only; give it in `steady` too where it shall blow.
+    Turbulence is laid along north, the heading flights keep: its first component is along the path.
+    The mean wind inside `turbulence` sets its strength only; give it in `steady` too where it shall
+    blow.
     """
 
     steady: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -27,7 +28,9 @@ class Wind:
 
     def __post_init__(self) -> None:
         if len(self.steady) != 3 or not all(math.isfinite(v) for v in self.steady):
-            raise InputError(f"steady: expected a finite wind (north, east, down), m/s, got {self.steady}")
+            raise InputError(
+                f"steady: expected a finite wind (north, east, down), m/s, got {self.steady}"
+            )
 
     @property
     def is_steady(self) -> bool:
@@ -35,7 +38,9 @@ class Wind:
         return not self.gusts and self.turbulence is None
 
     def history(self, time: object, airspeed: object) -> np.ndarray:
-        """Wind (n, 3), north east down, m/s, at `time` (n,) s, met at `airspeed` ((n,) or one, m/s)."""
+        """Wind (n, 3), north east down, m/s, at `time` (n,) s, met at `airspeed` ((n,) or one,
+        m/s).
+        """
         time = np.asarray(time, float)
         total = np.tile(np.array(self.steady, float), (len(time), 1))
         for gust in self.gusts:

@@ -6,4 +6,12 @@ from symheli.equations.document import latex, markdown
 from symheli.equations.from_casadi import evaluate, to_steps, to_sympy
 from symheli.equations.right_hand_side import RightHandSide, right_hand_side
 
-__all__ = ["RightHandSide", "evaluate", "latex", "markdown", "right_hand_side", "to_steps", "to_sympy"]
+__all__ = [
+    "RightHandSide",
+    "evaluate",
+    "latex",
+    "markdown",
+    "right_hand_side",
+    "to_steps",
+    "to_sympy",
+]

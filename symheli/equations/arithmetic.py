@@ -14,7 +14,7 @@ from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from symheli.equations.tape import Arithmetic
 
-# --- numbers with many digits ----------------------------------------------------------------------------------
+# --- numbers with many digits --------------------------------------------------------------------
 
 
 def _divide(a: Any, b: Any) -> Any:
@@ -59,7 +59,21 @@ _PLAIN: Mapping[int, Callable[..., Any]] = {
     casadi.OP_FABS: abs,
 }
 
-_NAMED = ("SQRT", "EXP", "LOG", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "SINH", "COSH", "TANH", "ATAN2")
+_NAMED = (
+    "SQRT",
+    "EXP",
+    "LOG",
+    "SIN",
+    "COS",
+    "TAN",
+    "ASIN",
+    "ACOS",
+    "ATAN",
+    "SINH",
+    "COSH",
+    "TANH",
+    "ATAN2",
+)
 """Operations that mpmath and SymPy have under the same name."""
 
 
@@ -88,11 +102,13 @@ MPMATH = Arithmetic(
 """mpmath's numbers, in the precision that is set when they are used."""
 
 
-# --- expressions -----------------------------------------------------------------------------------------------
+# --- expressions ---------------------------------------------------------------------------------
 
 
 def is_condition(value: Any) -> bool:
-    """Whether a SymPy object is true or false rather than a number; every symbol could be either and counts as a number."""
+    """Whether a SymPy object is true or false rather than a number; every symbol could be either
+    and counts as a number.
+    """
     return isinstance(value, sympy.core.relational.Relational | BooleanFunction | BooleanAtom)
 
 
@@ -110,7 +126,9 @@ def _of_numbers(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _relation(kind: Any) -> Callable[..., Any]:
-    """Not evaluated, unless between numbers: SymPy would try to decide the sign of large differences."""
+    """Not evaluated, unless between numbers: SymPy would try to decide the sign of large
+    differences.
+    """
 
     def relation(a: Any, b: Any) -> Any:
         a, b = _number(a), _number(b)
@@ -128,13 +146,20 @@ def _if_else_zero(condition: Any, x: Any) -> Any:
 
 def _exact(value: float) -> Any:
     """The binary number, as a fraction where it is finite."""
-    return sympy.Rational(*float(value).as_integer_ratio()) if np.isfinite(value) else sympy.sympify(value)
+    return (
+        sympy.Rational(*float(value).as_integer_ratio())
+        if np.isfinite(value)
+        else sympy.sympify(value)
+    )
 
 
 SYMPY = Arithmetic(
     _exact,
     {
-        **{code: _of_numbers(function) for code, function in (*_PLAIN.items(), *_named(sympy).items())},
+        **{
+            code: _of_numbers(function)
+            for code, function in (*_PLAIN.items(), *_named(sympy).items())
+        },
         casadi.OP_LT: _relation(sympy.Lt),
         casadi.OP_LE: _relation(sympy.Le),
         casadi.OP_EQ: _relation(sympy.Eq),

@@ -1,7 +1,7 @@
 """CasADi functions in SymPy, and evaluated with any number of digits.
 
-Both walk the instructions of the function (`Tape`) with an arithmetic of their own. Nothing is simplified on the way, and
-constants are the binary numbers CasADi holds, exactly: 0.1 is not 1/10.
+Both walk the instructions of the function (`Tape`) with an arithmetic of their own. Nothing is
+simplified on the way, and constants are the binary numbers CasADi holds, exactly: 0.1 is not 1/10.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from symheli.equations.tape import Arithmetic, Tape
 
 
 def evaluate(function: casadi.Function | Tape, *arguments: Any, digits: int = 50) -> list[Any]:
-    """Outputs of `function`, as mpmath matrices, at `arguments` (numbers, sequences or matrices) in `digits` decimal digits.
+    """Outputs of `function`, as mpmath matrices, at `arguments` (numbers, sequences or matrices) in
+    `digits` decimal digits.
 
-    A float argument is taken as the binary number it is. As in CasADi, 1/0 is inf and sqrt(-1) is NaN.
+    A float argument is taken as the binary number it is. As in CasADi, 1/0 is inf and sqrt(-1) is
+    NaN.
     """
     tape = function if isinstance(function, Tape) else Tape.of(function)
     with mpmath.workdps(digits):
@@ -32,16 +34,21 @@ def evaluate(function: casadi.Function | Tape, *arguments: Any, digits: int = 50
 def to_sympy(function: casadi.Function, *arguments: Any) -> list[sympy.Matrix]:
     """Outputs of `function` as SymPy matrices.
 
-    `arguments`: SymPy expressions or numbers, one sequence or matrix an input; without any, symbols named after the inputs
-    (x_0, x_1, ...). For a few hundred operations; SymPy takes no end of time over branches inside branches: see `to_steps`.
+    `arguments`: SymPy expressions or numbers, one sequence or matrix an input; without any, symbols
+    named after the inputs (x_0, x_1, ...). For a few hundred operations; SymPy takes no end of time
+    over branches inside branches: see `to_steps`.
     """
     return _in_sympy(function, arguments, SYMPY)
 
 
-def to_steps(function: casadi.Function, *arguments: Any) -> tuple[list[tuple[sympy.Symbol, sympy.Expr]], list[sympy.Matrix]]:
-    """Outputs of `function` of any size, as `sympy.cse` returns them: definitions (symbol, expression) in order, then matrices.
+def to_steps(
+    function: casadi.Function, *arguments: Any
+) -> tuple[list[tuple[sympy.Symbol, sympy.Expr]], list[sympy.Matrix]]:
+    """Outputs of `function` of any size, as `sympy.cse` returns them: definitions (symbol,
+    expression) in order, then matrices.
 
-    Every branch, sign and absolute value has a symbol of its own, so that no expression holds a branch inside a branch.
+    Every branch, sign and absolute value has a symbol of its own, so that no expression holds a
+    branch inside a branch.
     """
     definitions: list[tuple[sympy.Symbol, sympy.Expr]] = []
 
@@ -62,9 +69,16 @@ def to_steps(function: casadi.Function, *arguments: Any) -> tuple[list[tuple[sym
 _BRANCHES = (sympy.Piecewise, sympy.Abs, sympy.sign, sympy.Min, sympy.Max)
 
 
-def _in_sympy(function: casadi.Function, arguments: Sequence[Any], arithmetic: Arithmetic) -> list[sympy.Matrix]:
-    given = arguments or [_symbols(function.name_in(i), function.size_in(i)) for i in range(function.n_in())]
-    return [sympy.Matrix(rows) for rows in Tape.of(function).run([_rows(a, sympy.sympify) for a in given], arithmetic)]
+def _in_sympy(
+    function: casadi.Function, arguments: Sequence[Any], arithmetic: Arithmetic
+) -> list[sympy.Matrix]:
+    given = arguments or [
+        _symbols(function.name_in(i), function.size_in(i)) for i in range(function.n_in())
+    ]
+    return [
+        sympy.Matrix(rows)
+        for rows in Tape.of(function).run([_rows(a, sympy.sympify) for a in given], arithmetic)
+    ]
 
 
 def _symbols(name: str, size: tuple[int, int]) -> sympy.Matrix:
@@ -77,7 +91,9 @@ def _symbols(name: str, size: tuple[int, int]) -> sympy.Matrix:
 def _rows(argument: Any, convert: Callable[[Any], Any]) -> list[list[Any]]:
     """An argument as rows of numbers: a number is (1, 1), a sequence a column."""
     if isinstance(argument, mpmath.matrix | sympy.MatrixBase):
-        return [[convert(argument[i, j]) for j in range(argument.cols)] for i in range(argument.rows)]
+        return [
+            [convert(argument[i, j]) for j in range(argument.cols)] for i in range(argument.rows)
+        ]
     array = np.asarray(argument, dtype=object)
     columns = array.reshape(-1, 1) if array.ndim < 2 else array
     return [[convert(v) for v in row] for row in columns.tolist()]

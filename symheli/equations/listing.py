@@ -1,4 +1,6 @@
-"""Every component's equations as they are computed: the code is evaluated with symbols, and what it names is kept."""
+"""Every component's equations as they are computed: the code is evaluated with symbols, and what it
+names is kept.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,14 @@ if TYPE_CHECKING:
 _SYMBOLS = {
     "body": {"mass": "m", "Ixx": "I_{xx}", "Iyy": "I_{yy}", "Izz": "I_{zz}"},
     "drivetrain": {
-        "nominal_speed": r"\Omega_{nom}", "inertia": "I_{rot}", "max_power": "P_{max}", "governor_kp": "K_p", "governor_ki": "K_i",
+        "nominal_speed": r"\Omega_{nom}",
+        "inertia": "I_{rot}",
+        "max_power": "P_{max}",
+        "governor_kp": "K_p",
+        "governor_ki": "K_i",
     },
     "controls": {name: rf"{symbol_of(name)}" for name in ("d_lon", "d_lat", "d_col", "d_ped")},
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -39,7 +45,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Section:
-    """Equations (LaTeX, one a line) that belong together, what they are, where they come from, and their parameters."""
+    """Equations (LaTeX, one a line) that belong together, what they are, where they come from, and
+    their parameters.
+    """
 
     title: str
     text: str
@@ -49,7 +57,9 @@ class Section:
 
 @dataclass
 class _Notes:
-    """Keeps an equation for every value that gets a name; a flow solver that leaves the inflow a symbol."""
+    """Keeps an equation for every value that gets a name; a flow solver that leaves the inflow a
+    symbol.
+    """
 
     equations: list[str] = field(default_factory=list)
     known: dict[Any, sympy.Symbol] = field(default_factory=dict)
@@ -76,26 +86,54 @@ class _Notes:
 
 
 def listing(heli: Helicopter) -> tuple[Section, ...]:
-    """The equations of `heli`: rigid body, components in the order they are evaluated, drivetrain, attitude and position in flight."""
+    """The equations of `heli`: rigid body, components in the order they are evaluated, drivetrain,
+    attitude and position in flight.
+    """
     s = _symbols(heli)
     motion = Motion(*[vars(s)[name] for name in Motion._fields])
-    controls, own = ({str(name): vars(s)[str(name)] for name in names} for names in (heli.inputs, heli.states))
+    controls, own = (
+        {str(name): vars(s)[str(name)] for name in names} for names in (heli.inputs, heli.states)
+    )
     made: dict[str, Any] = {}
     sections, effects = [], {}
     for part in heli.dynamics.order:
         notes, subscript = _Notes(), (part.subscript or part.section).replace("_", ",")
-        effect = part.evaluate(_parameters(heli, part.section), motion, controls, own, Flow(notes.inflow, made, notes.name))
+        effect = part.evaluate(
+            _parameters(heli, part.section),
+            motion,
+            controls,
+            own,
+            Flow(notes.inflow, made, notes.name),
+        )
         for name, value in effect.flow.items():
             made[name] = notes.name(symbol_of(name), value)
         _outcome(notes, effect, subscript)
-        sections.append(Section(_title(part.section), _about(part.component), tuple(notes.equations), _table(heli, part.section)))
+        sections.append(
+            Section(
+                _title(part.section),
+                _about(part.component),
+                tuple(notes.equations),
+                _table(heli, part.section),
+            )
+        )
         effects[subscript] = effect
     return (_rigid_body(heli, s, effects), *sections, _drivetrain(heli, own, effects), _flight(s))
 
 
 def _symbols(heli: Helicopter) -> SimpleNamespace:
     """A symbol for every signal and every field of the motion, by the code's name."""
-    names = (*heli.states, *heli.inputs, *heli.wind, *Motion._fields, "psi", "Om", "q0", "q1", "q2", "q3")
+    names = (
+        *heli.states,
+        *heli.inputs,
+        *heli.wind,
+        *Motion._fields,
+        "psi",
+        "Om",
+        "q0",
+        "q1",
+        "q2",
+        "q3",
+    )
     return SimpleNamespace(**{str(name): real(symbol_of(str(name))) for name in names})
 
 
@@ -109,7 +147,10 @@ def _parameters(heli: Helicopter, section: str) -> SimpleNamespace:
 def _latex_of(heli: Helicopter, section: str) -> Mapping[str, str]:
     component = heli.vehicle.components.get(section)
     known = component.symbols if component else _SYMBOLS[section]
-    return {entry: known.get(entry, rf"\mathrm{{{entry}}}".replace("_", r"\_")) for entry in heli.vehicle.sections[section]}
+    return {
+        entry: known.get(entry, rf"\mathrm{{{entry}}}".replace("_", r"\_"))
+        for entry in heli.vehicle.sections[section]
+    }
 
 
 def _table(heli: Helicopter, section: str) -> tuple[Parameter, ...]:
@@ -128,7 +169,10 @@ def _about(component: Component) -> str:
     """First line of the component's file, and its source as its function states it."""
     text = component.evaluate.__globals__["__doc__"] or ""
     source = re.search(r"Source: (.*?)(?:\n\s*\n|$)", component.evaluate.__doc__ or "", re.DOTALL)
-    lines = [text.strip().partition("\n")[0], f"Source: {' '.join(source[1].split())}" if source else ""]
+    lines = [
+        text.strip().partition("\n")[0],
+        f"Source: {' '.join(source[1].split())}" if source else "",
+    ]
     return " ".join(line for line in lines if line)
 
 
@@ -144,7 +188,11 @@ def _outcome(notes: _Notes, effect: Effect, subscript: str) -> None:
 
 
 def _total(symbol: str, effects: Mapping[str, Effect], entry: Callable[[Effect], Any]) -> str:
-    terms = [upright(f"{symbol}_{{{subscript}}}") for subscript, effect in effects.items() if entry(effect) != 0]
+    terms = [
+        upright(f"{symbol}_{{{subscript}}}")
+        for subscript, effect in effects.items()
+        if entry(effect) != 0
+    ]
     return f"{symbol} = {' + '.join(terms) or 0}"
 
 
@@ -159,14 +207,20 @@ def _rigid_body(heli: Helicopter, s: SimpleNamespace, effects: Mapping[str, Effe
     X, Y, Z, L, M, N, Q_e = (real(name) for name in ("X", "Y", "Z", "L", "M", "N", "Q_e"))
     body, rates = _parameters(heli, "body"), (s.p, s.q, s.r)
     added = heli.dynamics.drive(_parameters(heli, "drivetrain"), Q_e, vars(s)).added_inertia
-    linear = rigid_body.translation(s.u, s.v, s.w, *rates, rigid_body.gravity_euler(s.phi, s.theta), (X, Y, Z), body.mass)
+    linear = rigid_body.translation(
+        s.u, s.v, s.w, *rates, rigid_body.gravity_euler(s.phi, s.theta), (X, Y, Z), body.mass
+    )
     angular = rigid_body.rotation(*rates, (L, M, N - Q_e), body.Ixx, body.Iyy, body.Izz, added)
     attitude = rigid_body.euler_rates(s.phi, s.theta, *rates)
-    for name, value in zip(("u", "v", "w", "p", "q", "r", "phi", "theta", "psi"), (*linear, *angular, *attitude), strict=True):
+    for name, value in zip(
+        ("u", "v", "w", "p", "q", "r", "phi", "theta", "psi"),
+        (*linear, *angular, *attitude),
+        strict=True,
+    ):
         notes.equal(dot(symbol_of(name)), value)
     text = (
-        "Body axes x forward, y right, z down; air-relative velocity, sum of the parts, translation, rotation, attitude. "
-        "Source: Budiyono and Sutarto, eqs 1 to 4."
+        "Body axes x forward, y right, z down; air-relative velocity, sum of the parts,"
+        " translation, rotation, attitude. Source: Budiyono and Sutarto, eqs 1 to 4."
     )
     return Section("Rigid body", text, tuple(notes.equations), _table(heli, "body"))
 
@@ -177,12 +231,22 @@ def _drivetrain(heli: Helicopter, own: Mapping[str, Any], effects: Mapping[str, 
     if drive.torque != real("Q_e"):
         notes.equal("Q_e", drive.torque)
     for name, value in drive.rates.items():
-        notes.equal(dot(symbol_of(name)), value + (drive.speed_follows_yaw * real(dot("r")) if name == "Om" else 0))
+        notes.equal(
+            dot(symbol_of(name)),
+            value + (drive.speed_follows_yaw * real(dot("r")) if name == "Om" else 0),
+        )
     if heli.governor == "ideal":
         notes.equal(symbol_of("Om"), real(_SYMBOLS["drivetrain"]["nominal_speed"]))
-    held = "The rotor speed is held exactly" if heli.governor == "ideal" else "Engine and proportional-integral governor"
+    held = (
+        "The rotor speed is held exactly"
+        if heli.governor == "ideal"
+        else "Engine and proportional-integral governor"
+    )
     return Section(
-        "Drivetrain", f"{held}. Source: G15, engine and rotor speed dynamics.", tuple(notes.equations), _table(heli, "drivetrain")
+        "Drivetrain",
+        f"{held}. Source: G15, engine and rotor speed dynamics.",
+        tuple(notes.equations),
+        _table(heli, "drivetrain"),
     )
 
 
@@ -190,8 +254,16 @@ def _flight(s: SimpleNamespace) -> Section:
     """Quaternion and position, integrated in flights in place of the Euler angles."""
     notes = _Notes()
     quaternion, velocity = (s.q0, s.q1, s.q2, s.q3), (s.u, s.v, s.w)
-    for name, value in zip(("q0", "q1", "q2", "q3"), rigid_body.quaternion_rates(*quaternion, s.p, s.q, s.r), strict=True):
+    for name, value in zip(
+        ("q0", "q1", "q2", "q3"),
+        rigid_body.quaternion_rates(*quaternion, s.p, s.q, s.r),
+        strict=True,
+    ):
         notes.equal(dot(symbol_of(name)), value)
     for name, row in zip(("x_n", "x_e", "x_d"), rigid_body.body_to_earth(*quaternion), strict=True):
         notes.equal(dot(symbol_of(name)), sum(a * b for a, b in zip(row, velocity, strict=True)))
-    return Section("Attitude and position in flight", "A unit quaternion, scalar first; north, east, down.", tuple(notes.equations))
+    return Section(
+        "Attitude and position in flight",
+        "A unit quaternion, scalar first; north, east, down.",
+        tuple(notes.equations),
+    )

@@ -1,4 +1,6 @@
-"""From the code's names and SymPy expressions to the field's symbols, in LaTeX that papers, GitHub and matplotlib can all set."""
+"""From the code's names and SymPy expressions to the field's symbols, in LaTeX that papers, GitHub
+and matplotlib can all set.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +12,18 @@ import sympy
 from sympy.printing.latex import LatexPrinter
 
 _GREEK = {
-    "d": r"\delta", "Om": r"\Omega", "om": r"\omega", "lam": r"\lambda",
+    "d": r"\delta",
+    "Om": r"\Omega",
+    "om": r"\omega",
+    "lam": r"\lambda",
     **{name: rf"\{name}" for name in ("phi", "theta", "psi", "rho", "mu")},
-}  # fmt: skip
+}
 
 
 def symbol_of(name: str) -> str:
-    r"""LaTeX of a name of the code: head and subscript, Greek where it stands for that: d_col is \delta_{col}, a1_aft is a_{1,aft}."""
+    r"""LaTeX of a name of the code: head and subscript, Greek where it stands for that: d_col is
+    \delta_{col}, a1_aft is a_{1,aft}.
+    """
     match = re.fullmatch(r"([A-Za-z]+?)(\d*)(?:_(\w+))?", name)
     if not match:
         return rf"\mathrm{{{name}}}".replace("_", r"\_")
@@ -37,22 +44,36 @@ def dot(latex: str) -> str:
 
 
 def upright(latex: str) -> str:
-    """Words in subscripts stand upright: V_{tip} as V_{\\mathrm{tip}}, but not the T and x of C_T and S_x."""
+    """Words in subscripts stand upright: V_{tip} as V_{\\mathrm{tip}}, but not the T and x of C_T
+    and S_x.
+    """
 
     def words(match: re.Match[str]) -> str:
-        return "_{" + re.sub(r"(?<!\\)\b(?!xx|yy|zz)[a-z]{2,}\b", lambda word: rf"\mathrm{{{word[0]}}}", match[1]) + "}"
+        return (
+            "_{"
+            + re.sub(
+                r"(?<!\\)\b(?!xx|yy|zz)[a-z]{2,}\b", lambda word: rf"\mathrm{{{word[0]}}}", match[1]
+            )
+            + "}"
+        )
 
     return re.sub(r"_\{([^{}]*)\}", words, latex)
 
 
 def printed(expression: Any) -> str:
-    """LaTeX of an expression whose symbols are named in LaTeX; floats that stand for fractions or multiples of pi print as those."""
+    """LaTeX of an expression whose symbols are named in LaTeX; floats that stand for fractions or
+    multiples of pi print as those.
+    """
     expression = sympy.sympify(expression)
-    return _Printer().doprint(expression.xreplace({number: _exact(number) for number in expression.atoms(sympy.Float)}))
+    return _Printer().doprint(
+        expression.xreplace({number: _exact(number) for number in expression.atoms(sympy.Float)})
+    )
 
 
 def _exact(number: sympy.Float) -> sympy.Expr:
-    """The small fraction, or fraction of pi, that a float stands for, to rounding; the float itself where there is none."""
+    """The small fraction, or fraction of pi, that a float stands for, to rounding; the float itself
+    where there is none.
+    """
     for unit in (sympy.Integer(1), sympy.pi, 1 / sympy.pi):
         value = float(number / unit)
         fraction = Fraction(value).limit_denominator(16)
@@ -62,7 +83,9 @@ def _exact(number: sympy.Float) -> sympy.Expr:
 
 
 class _Printer(LatexPrinter):
-    """SymPy's LaTeX without environments: branches on one line, limits as min and max, no symbol taken apart."""
+    """SymPy's LaTeX without environments: branches on one line, limits as min and max, no symbol
+    taken apart.
+    """
 
     def _print_Symbol(self, expr: sympy.Symbol, style: str = "plain") -> str:
         return upright(expr.name)
@@ -76,12 +99,19 @@ class _Printer(LatexPrinter):
     def _print_Piecewise(self, expr: sympy.Piecewise) -> str:
         *branches, last = ([self._print(part) for part in pair.args] for pair in expr.args)
         cases = [rf"{value} \quad \mathrm{{if}} \quad {condition}" for value, condition in branches]
-        return r"\left\lbrace " + r" ; \quad ".join([*cases, rf"{last[0]} \quad \mathrm{{otherwise}}"]) + r" \right\rbrace"
+        return (
+            r"\left\lbrace "
+            + r" ; \quad ".join([*cases, rf"{last[0]} \quad \mathrm{{otherwise}}"])
+            + r" \right\rbrace"
+        )
 
     def _limits(self, name: str, expr: sympy.Expr) -> str:
         return (
             rf"\{name}\left("
-            + ", ".join(self._print(argument) for argument in sorted(expr.args, key=sympy.count_ops, reverse=True))
+            + ", ".join(
+                self._print(argument)
+                for argument in sorted(expr.args, key=sympy.count_ops, reverse=True)
+            )
             + r"\right)"
         )
 

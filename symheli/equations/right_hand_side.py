@@ -14,9 +14,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RightHandSide:
-    """xdot = f(states, inputs, wind, inflow) with balance(...) = 0 for the inflow ratios, one a rotor, in order of the components.
+    """xdot = f(states, inputs, wind, inflow) with balance(...) = 0 for the inflow ratios, one a
+    rotor, in order of the components.
 
-    `parameters` {symbol: value in SI} names each parameter section.entry, and density; `xdot.subs(rhs.parameters)` puts the numbers in.
+    `parameters` {symbol: value in SI} names each parameter section.entry, and density;
+    `xdot.subs(rhs.parameters)` puts the numbers in.
     """
 
     states: tuple[sympy.Symbol, ...]
@@ -29,9 +31,16 @@ class RightHandSide:
 
 
 def right_hand_side(heli: Helicopter) -> RightHandSide:
-    """The Euler form of `heli` in body axes with a symbol for every one of its `parameters`, air density among them."""
-    parameters = {sympy.Symbol(str(name), real=True): value for name, value in heli.parameters.items()}
-    states, inputs, wind = (tuple(sympy.Symbol(str(name), real=True) for name in names) for names in (heli.states, heli.inputs, heli.wind))
+    """The Euler form of `heli` in body axes with a symbol for every one of its `parameters`, air
+    density among them.
+    """
+    parameters = {
+        sympy.Symbol(str(name), real=True): value for name, value in heli.parameters.items()
+    }
+    states, inputs, wind = (
+        tuple(sympy.Symbol(str(name), real=True) for name in names)
+        for names in (heli.states, heli.inputs, heli.wind)
+    )
     inflow: list[sympy.Symbol] = []
 
     def unknown() -> sympy.Symbol:

@@ -13,14 +13,18 @@ from symheli.errors import InputError
 
 
 class Arithmetic(NamedTuple):
-    """A kind of number: `constant` makes one from a float, `operations` has a function for every `casadi.OP_...` it knows."""
+    """A kind of number: `constant` makes one from a float, `operations` has a function for every
+    `casadi.OP_...` it knows.
+    """
 
     constant: Callable[[float], Any]
     operations: Mapping[int, Callable[..., Any]]
 
 
 class Instruction(NamedTuple):
-    """Store `operation` of the registers `operands` in the register `result`; a constant carries its `value` instead."""
+    """Store `operation` of the registers `operands` in the register `result`; a constant carries
+    its `value` instead.
+    """
 
     operation: int
     result: int
@@ -32,8 +36,8 @@ class Instruction(NamedTuple):
 class Tape:
     """The operations of an SX function in order.
 
-    `reads`: (register, argument, entry) of every scalar input used; `writes`: (output, row, column, register), in order of
-    writing among the instructions at `at`, since registers are used again.
+    `reads`: (register, argument, entry) of every scalar input used; `writes`: (output, row, column,
+    register), in order of writing among the instructions at `at`, since registers are used again.
     """
 
     name: str
@@ -44,16 +48,27 @@ class Tape:
 
     @classmethod
     def of(cls, function: casadi.Function) -> Tape:
-        """Read the instructions of `function`; one that is not made of SX is expanded first. Raises `InputError` where it cannot be."""
+        """Read the instructions of `function`; one that is not made of SX is expanded first. Raises
+        `InputError` where it cannot be.
+        """
         if not function.is_a("SXFunction"):
             function = function.expand()
-        outputs = [list(zip(*function.sparsity_out(i).get_triplet(), strict=True)) for i in range(function.n_out())]
-        entries_in = [list(zip(*function.sparsity_in(i).get_triplet(), strict=True)) for i in range(function.n_in())]
+        outputs = [
+            list(zip(*function.sparsity_out(i).get_triplet(), strict=True))
+            for i in range(function.n_out())
+        ]
+        entries_in = [
+            list(zip(*function.sparsity_in(i).get_triplet(), strict=True))
+            for i in range(function.n_in())
+        ]
         steps: list[Instruction | _Read | _Write] = []
         for k in range(function.n_instructions()):
             operation = function.instruction_id(k)
             if operation == casadi.OP_CALL:
-                raise InputError(f"{function.name()} calls what is no scalar operation (compiled code, a table, a solver)")
+                raise InputError(
+                    f"{function.name()} calls what is no scalar operation (compiled code, a table,"
+                    " a solver)"
+                )
             into, operands = function.instruction_output(k), function.instruction_input(k)
             if operation == casadi.OP_INPUT:
                 steps.append(_Read(into[0], operands[0], *entries_in[operands[0]][operands[1]]))
@@ -65,12 +80,19 @@ class Tape:
                 steps.append(Instruction(operation, into[0], tuple(operands)))
         sizes_in, sizes_out = (
             tuple(size(i) for i in range(n))
-            for size, n in ((function.size_in, function.n_in()), (function.size_out, function.n_out()))
-        )  # fmt: skip
+            for size, n in (
+                (function.size_in, function.n_in()),
+                (function.size_out, function.n_out()),
+            )
+        )
         return cls(function.name(), function.sz_w(), sizes_in, sizes_out, tuple(steps))
 
-    def run(self, arguments: Sequence[Sequence[Sequence[Any]]], arithmetic: Arithmetic) -> list[list[list[Any]]]:
-        """Every output as a list of rows, from every argument as a list of rows, in the given arithmetic."""
+    def run(
+        self, arguments: Sequence[Sequence[Sequence[Any]]], arithmetic: Arithmetic
+    ) -> list[list[list[Any]]]:
+        """Every output as a list of rows, from every argument as a list of rows, in the given
+        arithmetic.
+        """
         self._check(arguments)
         registers: list[Any] = [None] * self.registers
         zero = arithmetic.constant(0.0)
@@ -82,7 +104,10 @@ class Tape:
                     continue
                 carry_out = arithmetic.operations.get(step.operation)
                 if carry_out is None:
-                    raise InputError(f"{self.name} uses {operation_name(step.operation)}, which this arithmetic does not know")
+                    raise InputError(
+                        f"{self.name} uses {operation_name(step.operation)}, which this arithmetic"
+                        " does not know"
+                    )
                 registers[step.result] = carry_out(*[registers[i] for i in step.operands])
             elif isinstance(step, _Read):
                 registers[step.register] = arguments[step.argument][step.row][step.column]
@@ -92,11 +117,15 @@ class Tape:
 
     def _check(self, arguments: Sequence[Sequence[Sequence[Any]]]) -> None:
         if len(arguments) != len(self.sizes_in):
-            raise InputError(f"{self.name} takes {len(self.sizes_in)} arguments, got {len(arguments)}")
+            raise InputError(
+                f"{self.name} takes {len(self.sizes_in)} arguments, got {len(arguments)}"
+            )
         for number, (argument, size) in enumerate(zip(arguments, self.sizes_in, strict=True)):
             got = (len(argument), len(argument[0]) if len(argument) else 0)
             if got != size or any(len(row) != size[1] for row in argument):
-                raise InputError(f"{self.name}: argument {number} must have shape {size}, got {got}")
+                raise InputError(
+                    f"{self.name}: argument {number} must have shape {size}, got {got}"
+                )
 
 
 class _Read(NamedTuple):

@@ -7,4 +7,14 @@ from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import XCELL_SERVOS, Servo, ServoBank
 
-__all__ = ["XCELL_SERVOS", "AirspeedSchedule", "Autopilot", "Excitation", "Sensor", "Servo", "ServoBank", "fly", "gain_scheduled_lqr"]
+__all__ = [
+    "XCELL_SERVOS",
+    "AirspeedSchedule",
+    "Autopilot",
+    "Excitation",
+    "Sensor",
+    "Servo",
+    "ServoBank",
+    "fly",
+    "gain_scheduled_lqr",
+]

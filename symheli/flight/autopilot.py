@@ -16,16 +16,29 @@ from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.signal import Signal
 
 UNMEASURED = ("a1", "b1")
-SCALE = {"u": 1.5, "v": 1.5, "w": 1.0, "p": 1.0, "q": 1.0, "r": 0.7, "phi": 0.15, "theta": 0.15, "Om": 5.0, "om_i": 3.0}
+SCALE = {
+    "u": 1.5,
+    "v": 1.5,
+    "w": 1.0,
+    "p": 1.0,
+    "q": 1.0,
+    "r": 0.7,
+    "phi": 0.15,
+    "theta": 0.15,
+    "Om": 5.0,
+    "om_i": 3.0,
+}
 """Deviation of each state (SI) that counts as much as 0.01 rad of an input in the LQR weights."""
 INPUT_SCALE = 0.01
 
 
 @dataclass(frozen=True)
 class Autopilot:
-    """u = u0 - K(V)(x - x0) on the measured `states`, at sample period `dt` (s), gains (K, 4, nx) at `airspeeds` (m/s).
+    """u = u0 - K(V)(x - x0) on the measured `states`, at sample period `dt` (s), gains (K, 4, nx)
+    at `airspeeds` (m/s).
 
-    `radius`: largest closed-loop eigenvalue magnitude (one sample of delay included) over the design points, < 1.
+    `radius`: largest closed-loop eigenvalue magnitude (one sample of delay included) over the
+    design points, < 1.
     """
 
     airspeeds: np.ndarray
@@ -42,27 +55,44 @@ class Autopilot:
 
 
 SOFTER = (1.0, 0.5, 0.25, 0.125)
-"""Input scales tried in turn, as shares of `INPUT_SCALE`, until the loop with servos and delay is stable."""
+"""Input scales tried in turn, as shares of `INPUT_SCALE`, until the loop with servos and delay is
+stable.
+"""
 
 
 def gain_scheduled_lqr(
-    heli: Helicopter, low: float, high: float, dt: float, points: int = 14, servos: Mapping[str, Servo] | None = None
+    heli: Helicopter,
+    low: float,
+    high: float,
+    dt: float,
+    points: int = 14,
+    servos: Mapping[str, Servo] | None = None,
 ) -> Autopilot:
-    """LQR at `points` airspeeds from `low` to `high` (m/s) on the model with quasi-steady flapping, sampled at `dt` (s).
+    """LQR at `points` airspeeds from `low` to `high` (m/s) on the model with quasi-steady flapping,
+    sampled at `dt` (s).
 
-    Each gain is checked on the full model (flapping states, `servos` where given, one sample of delay) and softened until stable
-    there; raises `InputError` where it never is.
+    Each gain is checked on the full model (flapping states, `servos` where given, one sample of
+    delay) and softened until stable there; raises `InputError` where it never is.
     """
     family = sweep(heli, np.linspace(low, high, points))  # type: ignore[arg-type]
     design = family.residualize([s for s in UNMEASURED if s in family.states])
-    designs, plants = [design[k].discretize(dt) for k in range(len(design))], [_plant(family[k], servos, dt) for k in range(len(family))]
+    designs, plants = (
+        [design[k].discretize(dt) for k in range(len(design))],
+        [_plant(family[k], servos, dt) for k in range(len(family))],
+    )
     radius = np.inf
     for softer in SOFTER:
         gains = np.stack([_lqr(model, softer * INPUT_SCALE) for model in designs])
-        radius = max(_closed_loop_radius(plant, K, design.states) for plant, K in zip(plants, gains, strict=True))
+        radius = max(
+            _closed_loop_radius(plant, K, design.states)
+            for plant, K in zip(plants, gains, strict=True)
+        )
         if radius < 1:
             return Autopilot(family.airspeeds, gains, design.states, dt, radius)
-    raise InputError(f"the scheduled LQR is unstable on the full model at dt = {dt} s (eigenvalue {radius:.3f}); sample faster")
+    raise InputError(
+        f"the scheduled LQR is unstable on the full model at dt = {dt} s (eigenvalue {radius:.3f});"
+        " sample faster"
+    )
 
 
 def _lqr(model: LinearModel, input_scale: float) -> np.ndarray:
@@ -83,4 +113,9 @@ def _closed_loop_radius(plant: LinearModel, K: np.ndarray, measured: tuple[Signa
     feedback = -K @ np.array([[float(s == t) for t in plant.states] for s in measured])
     nu = len(feedback)
     delayed = np.block([[plant.A, plant.B], [feedback, np.zeros((nu, nu))]])  # u(k) = -K x(k-1)
-    return float(max(np.abs(np.linalg.eigvals(plant.A + plant.B @ feedback)).max(), np.abs(np.linalg.eigvals(delayed)).max()))
+    return float(
+        max(
+            np.abs(np.linalg.eigvals(plant.A + plant.B @ feedback)).max(),
+            np.abs(np.linalg.eigvals(delayed)).max(),
+        )
+    )

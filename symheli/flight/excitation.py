@@ -18,9 +18,10 @@ Kind = Literal["multisine", "prbs", "chirp"]
 class Excitation:
     """A signal for each input named in `amplitude` {input: rad}, in the band (low, high) Hz.
 
-    "multisine": harmonics of the record length with random phases, interleaved between inputs (orthogonal over the
-    record), root mean square = amplitude/sqrt(2); "prbs": +-amplitude, switched at random multiples of 1/(2 high) s;
-    "chirp": linear frequency sweeps of `period` s over the band, shifted in time between inputs. `seed` fixes the phases.
+    "multisine": harmonics of the record length with random phases, interleaved between inputs
+    (orthogonal over the record), root mean square = amplitude/sqrt(2); "prbs": +-amplitude,
+    switched at random multiples of 1/(2 high) s; "chirp": linear frequency sweeps of `period` s
+    over the band, shifted in time between inputs. `seed` fixes the phases.
     """
 
     amplitude: Mapping[str, float]
@@ -41,18 +42,28 @@ class Excitation:
         """{input: signal (n,) in rad} at uniformly sampled `time` (n,) s."""
         dt = float(time[1] - time[0])
         if self.band[1] > 0.5 / dt:
-            raise InputError(f"the band reaches {self.band[1]} Hz but {dt} s samples carry at most {0.5 / dt:.3g} Hz")
+            raise InputError(
+                f"the band reaches {self.band[1]} Hz but {dt} s samples carry at most"
+                f" {0.5 / dt:.3g} Hz"
+            )
         rng = np.random.default_rng(self.seed)
         shape = {"multisine": self._multisine, "prbs": self._prbs, "chirp": self._chirp}[self.kind]
-        return {name: size * shape(time, i, rng) for i, (name, size) in enumerate(self.amplitude.items())}
+        return {
+            name: size * shape(time, i, rng)
+            for i, (name, size) in enumerate(self.amplitude.items())
+        }
 
     def _multisine(self, time: np.ndarray, i: int, rng: np.random.Generator) -> np.ndarray:
         length = len(time) * float(time[1] - time[0])
-        harmonics = np.arange(np.ceil(self.band[0] * length), np.floor(self.band[1] * length) + 1)[i :: len(self.amplitude)]
+        harmonics = np.arange(np.ceil(self.band[0] * length), np.floor(self.band[1] * length) + 1)[
+            i :: len(self.amplitude)
+        ]
         phases = rng.uniform(0, 2 * np.pi, len(harmonics))
         spectrum = np.zeros(len(time) // 2 + 1, complex)
         spectrum[harmonics.astype(int)] = np.exp(1j * phases)
-        return np.fft.irfft(spectrum, len(time)) * len(time) / 2 * np.sqrt(1 / max(len(harmonics), 1))
+        return (
+            np.fft.irfft(spectrum, len(time)) * len(time) / 2 * np.sqrt(1 / max(len(harmonics), 1))
+        )
 
     def _prbs(self, time: np.ndarray, i: int, rng: np.random.Generator) -> np.ndarray:
         cell = np.floor((time - time[0]) * 2 * self.band[1]).astype(int)

@@ -27,24 +27,39 @@ from symheli.rigid_body import body_to_earth
 
 MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 CONTROL_PERIOD = 0.02  # s; slower sampling still flies at about this period
-INTEGRATION_STEP = 0.005  # s; the error over a flight stays below 1e-5 of each state's peak (see tests)
+INTEGRATION_STEP = (
+    0.005  # s; the error over a flight stays below 1e-5 of each state's peak (see tests)
+)
 
 
 def fly(
-    heli: Helicopter, schedule: AirspeedSchedule, *, dt: float = 0.02, excitation: Excitation | None = None, noise_db: float | None = None,
-    seed: int = 0, wind: Wind | Sequence[float] = (0.0, 0.0, 0.0), servos: Mapping[str, Servo] | None = None,
-    sensors: Mapping[str, Sensor] | None = None, autopilot: Autopilot | None = None,
-) -> FlightRecord:  # fmt: skip
-    """Fly `schedule` in the nonlinear model, stabilised by a gain-scheduled LQR, and record every `dt` seconds.
+    heli: Helicopter,
+    schedule: AirspeedSchedule,
+    *,
+    dt: float = 0.02,
+    excitation: Excitation | None = None,
+    noise_db: float | None = None,
+    seed: int = 0,
+    wind: Wind | Sequence[float] = (0.0, 0.0, 0.0),
+    servos: Mapping[str, Servo] | None = None,
+    sensors: Mapping[str, Sensor] | None = None,
+    autopilot: Autopilot | None = None,
+) -> FlightRecord:
+    """Fly `schedule` in the nonlinear model, stabilised by a gain-scheduled LQR, and record every
+    `dt` seconds.
 
-    The reference at each moment is the quasi-steady trim of the commanded airspeed and acceleration in the steady wind. `excitation`
-    is added to the inputs. `wind`: a `Wind` or a steady one (north east down, m/s), from the start. `servos`: one by input,
-    between command and blade pitch. The autopilot sees what is recorded of u v w p q r phi theta, through `sensors` by signal, or
-    through `noise_db`: white noise this many dB below each signal's own variation (the noise-free flight is flown first to know it).
+    The reference at each moment is the quasi-steady trim of the commanded airspeed and acceleration
+    in the steady wind. `excitation` is added to the inputs. `wind`: a `Wind` or a steady one (north
+    east down, m/s), from the start. `servos`: one by input, between command and blade pitch. The
+    autopilot sees what is recorded of u v w p q r phi theta, through `sensors` by signal, or
+    through `noise_db`: white noise this many dB below each signal's own variation (the noise-free
+    flight is flown first to know it).
 
-    The record holds the measured states, the flapping angles a1 b1 and rotor states (true), the four total inputs, the
-    excitation as e_d_lon .., `airspeed` (true, of the air) and `airspeed_command`; with servos the inputs are the deflections reached, and
-    d_lon_command .. what was asked; with a changing wind also wind_n, wind_e, wind_d. Raises `SymheliError` where the flight is lost.
+    The record holds the measured states, the flapping angles a1 b1 and rotor states (true), the
+    four total inputs, the excitation as e_d_lon .., `airspeed` (true, of the air) and
+    `airspeed_command`; with servos the inputs are the deflections reached, and d_lon_command ..
+    what was asked; with a changing wind also wind_n, wind_e, wind_d. Raises `SymheliError` where
+    the flight is lost.
     """
     if not dt > 0:
         raise InputError(f"dt must be a positive number of seconds, got {dt}")
@@ -56,8 +71,12 @@ def fly(
     if noise_db is None:
         return record
     spread = record.columns(MEASURED).std(axis=0) * 10 ** (-noise_db / 20)
-    noisy = flight.run({name: Sensor(noise=float(s)) for name, s in zip(MEASURED, spread, strict=True)}, seed)
-    return replace(noisy, note=record.note + f", noise {noise_db:g} dB below each signal, seed {seed}")
+    noisy = flight.run(
+        {name: Sensor(noise=float(s)) for name, s in zip(MEASURED, spread, strict=True)}, seed
+    )
+    return replace(
+        noisy, note=record.note + f", noise {noise_db:g} dB below each signal, seed {seed}"
+    )
 
 
 def _three(wind: Sequence[float]) -> tuple[float, float, float]:
@@ -88,11 +107,18 @@ class _Flight:
         self.speed, self.rate = schedule(self.time)
         self.wind = wind.history(self.time, self.speed)
         top = max(float(self.speed.max()), float(self.speed.min()) + 1.0)
-        self.autopilot = autopilot or gain_scheduled_lqr(heli, float(self.speed.min()), top, self.control_dt, servos=servos)
+        self.autopilot = autopilot or gain_scheduled_lqr(
+            heli, float(self.speed.min()), top, self.control_dt, servos=servos
+        )
         if not same_period(self.autopilot.dt, self.control_dt):
-            raise InputError(f"the autopilot was designed for {self.autopilot.dt} s, this flight controls every {self.control_dt:.6g} s")
+            raise InputError(
+                f"the autopilot was designed for {self.autopilot.dt} s, this flight controls every"
+                f" {self.control_dt:.6g} s"
+            )
         added = excitation(self.time) if excitation else {}
-        self.added = np.column_stack([added.get(str(name), np.zeros(self.samples)) for name in heli.inputs])
+        self.added = np.column_stack(
+            [added.get(str(name), np.zeros(self.samples)) for name in heli.inputs]
+        )
         self.x0, self.u0 = references(heli, self.time, self.speed, self.rate, np.array(wind.steady))
         if servos is None:
             self.servos = None
@@ -110,8 +136,15 @@ class _Flight:
         gains = np.stack([autopilot.gain(p) for p in self.speed])
         flight = flight_state(self.x0[0])
         servo = self.servos.init(self.u0[0]) if self.servos else None
-        truth, states = np.empty((self.samples, len(MEASURED))), np.empty((self.samples, len(heli.states)))
-        commands, inputs, air = np.empty((self.samples, 4)), np.empty((self.samples, 4)), np.empty(self.samples)
+        truth, states = (
+            np.empty((self.samples, len(MEASURED))),
+            np.empty((self.samples, len(heli.states))),
+        )
+        commands, inputs, air = (
+            np.empty((self.samples, 4)),
+            np.empty((self.samples, 4)),
+            np.empty(self.samples),
+        )
         for k in range(self.samples):
             states[k], air[k] = _euler_form(flight, self.wind[k])
             truth[k] = states[k, measured]
@@ -134,7 +167,9 @@ class _Flight:
                 )
         return self._record(states, inputs, commands, air)
 
-    def _record(self, states: np.ndarray, inputs: np.ndarray, commands: np.ndarray, air: np.ndarray) -> FlightRecord:
+    def _record(
+        self, states: np.ndarray, inputs: np.ndarray, commands: np.ndarray, air: np.ndarray
+    ) -> FlightRecord:
         keep = slice(None, None, self.per_sample)
         columns = {str(s): states[keep, i] for i, s in enumerate(self.heli.states)}
         columns |= {str(s): inputs[keep, i] for i, s in enumerate(self.heli.inputs)}
@@ -142,11 +177,19 @@ class _Flight:
         if self.servos is not None:
             columns |= {f"{s}_command": commands[keep, i] for i, s in enumerate(self.heli.inputs)}
         if not self.steady_air:
-            columns |= {name: self.wind[keep, i] for i, name in enumerate(("wind_n", "wind_e", "wind_d"))}
+            columns |= {
+                name: self.wind[keep, i] for i, name in enumerate(("wind_n", "wind_e", "wind_d"))
+            }
         columns |= {"airspeed": air[keep], "airspeed_command": self.speed[keep]}
         known = UNITS | {str(s): s.unit for s in self.heli.states}
-        units = {name: known[name if name in known else name.removeprefix("e_").removesuffix("_command")] for name in columns}
-        note = f"{self.heli.vehicle.title}, {self.heli.governor} governor, peak acceleration {np.abs(self.rate).max():.1f} m/s^2"
+        units = {
+            name: known[name if name in known else name.removeprefix("e_").removesuffix("_command")]
+            for name in columns
+        }
+        note = (
+            f"{self.heli.vehicle.title}, {self.heli.governor} governor, peak acceleration"
+            f" {np.abs(self.rate).max():.1f} m/s^2"
+        )
         return FlightRecord.from_arrays(self.time[keep], units, note, **columns)
 
 

@@ -13,8 +13,10 @@ from symheli.errors import InputError
 
 @dataclass(frozen=True)
 class AirspeedSchedule:
-    """Airspeed commands joined by half-cosine ramps: targets[i] (m/s) is reached with peak |dV/dt| = accelerations[i] (m/s^2) and
-    held for holds[i] (s); the flight starts at `start` (m/s), held for `lead` (s)."""
+    """Airspeed commands joined by half-cosine ramps: targets[i] (m/s) is reached with peak |dV/dt|
+    = accelerations[i] (m/s^2) and held for holds[i] (s); the flight starts at `start` (m/s), held
+    for `lead` (s).
+    """
 
     targets: tuple[float, ...]
     accelerations: tuple[float, ...]
@@ -24,35 +26,66 @@ class AirspeedSchedule:
 
     def __post_init__(self) -> None:
         if not len(self.targets) == len(self.accelerations) == len(self.holds):
-            raise InputError("an airspeed schedule needs as many accelerations and holds as targets")
+            raise InputError(
+                "an airspeed schedule needs as many accelerations and holds as targets"
+            )
         numbers = (*self.targets, *self.holds, self.start, self.lead)
-        if not all(math.isfinite(n) and n >= 0 for n in numbers) or not all(math.isfinite(a) and a > 0 for a in self.accelerations):
+        if not all(math.isfinite(n) and n >= 0 for n in numbers) or not all(
+            math.isfinite(a) and a > 0 for a in self.accelerations
+        ):
             raise InputError(f"airspeeds and holds must be >= 0, accelerations > 0; got {self}")
 
     @classmethod
     def transition(
-        cls, low: float = 0.0, high: float = 13.0, acceleration: float = 3.0, hold: float = 3.0, laps: int = 1
+        cls,
+        low: float = 0.0,
+        high: float = 13.0,
+        acceleration: float = 3.0,
+        hold: float = 3.0,
+        laps: int = 1,
     ) -> AirspeedSchedule:
-        """low -> high -> low (m/s), `laps` times, with this peak acceleration (m/s^2), held `hold` s at each end."""
+        """low -> high -> low (m/s), `laps` times, with this peak acceleration (m/s^2), held `hold`
+        s at each end.
+        """
         return cls((high, low) * laps, (acceleration,) * (2 * laps), (hold,) * (2 * laps), low)
 
     @classmethod
-    def varied(cls, low: float, high: float, accelerations: Sequence[float], hold: float, seed: int) -> AirspeedSchedule:
-        """One ramp an acceleration, alternating between random targets in the lower and upper third of [low, high], ends included."""
+    def varied(
+        cls, low: float, high: float, accelerations: Sequence[float], hold: float, seed: int
+    ) -> AirspeedSchedule:
+        """One ramp an acceleration, alternating between random targets in the lower and upper third
+        of [low, high], ends included.
+        """
         rng = np.random.default_rng(seed)
         third = (high - low) / 3
         targets = [high, low] + [
-            float(low + third * rng.random()) if i % 2 else float(high - third * rng.random()) for i in range(len(accelerations) - 2)
+            float(low + third * rng.random()) if i % 2 else float(high - third * rng.random())
+            for i in range(len(accelerations) - 2)
         ]
-        return cls(tuple(targets[: len(accelerations)]), tuple(accelerations), (hold,) * len(accelerations), low)
+        return cls(
+            tuple(targets[: len(accelerations)]),
+            tuple(accelerations),
+            (hold,) * len(accelerations),
+            low,
+        )
 
     @property
     def duration(self) -> float:
         """Length in s."""
-        return self.lead + sum(math.pi * abs(b - a) / (2 * peak) + hold for a, b, peak, hold in self._legs())
+        return self.lead + sum(
+            math.pi * abs(b - a) / (2 * peak) + hold for a, b, peak, hold in self._legs()
+        )
 
     def _legs(self) -> list[tuple[float, float, float, float]]:
-        return list(zip((self.start, *self.targets[:-1]), self.targets, self.accelerations, self.holds, strict=True))
+        return list(
+            zip(
+                (self.start, *self.targets[:-1]),
+                self.targets,
+                self.accelerations,
+                self.holds,
+                strict=True,
+            )
+        )
 
     def __call__(self, time: object) -> tuple[np.ndarray, np.ndarray]:
         """Commanded airspeed (m/s) and its rate (m/s^2) at `time` (n,) s."""
@@ -64,7 +97,11 @@ class AirspeedSchedule:
             if ramp > 0:
                 s = np.clip((t - begin) / ramp, 0.0, 1.0)
                 inside = (t >= begin) & (t <= begin + ramp)
-                speed = np.where(t >= begin, before + (after - before) * 0.5 * (1 - np.cos(np.pi * s)), speed)
-                rate = np.where(inside, (after - before) * 0.5 * np.pi / ramp * np.sin(np.pi * s), rate)
+                speed = np.where(
+                    t >= begin, before + (after - before) * 0.5 * (1 - np.cos(np.pi * s)), speed
+                )
+                rate = np.where(
+                    inside, (after - before) * 0.5 * np.pi / ramp * np.sin(np.pi * s), rate
+                )
             begin += ramp + hold
         return speed, rate

@@ -13,10 +13,12 @@ from symheli.errors import InputError, UnknownNameError
 
 @dataclass(frozen=True)
 class Sensor:
-    """Measured = true value `delay` s ago, sampled every `period` s and held, plus `bias` plus white `noise`, rounded to `quantum`.
+    """Measured = true value `delay` s ago, sampled every `period` s and held, plus `bias` plus
+    white `noise`, rounded to `quantum`.
 
-    noise (standard deviation), bias and quantum in the signal's own unit (SI, rad); period 0: every control sample. Delay and period
-    act in whole control samples, rounded up. Before the first sample the value at the start is read. Raises `InputError`.
+    noise (standard deviation), bias and quantum in the signal's own unit (SI, rad); period 0: every
+    control sample. Delay and period act in whole control samples, rounded up. Before the first
+    sample the value at the start is read. Raises `InputError`.
     """
 
     noise: float = 0.0
@@ -28,7 +30,9 @@ class Sensor:
     def __post_init__(self) -> None:
         for name in ("noise", "period", "delay", "quantum"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise InputError(f"{name}: expected a finite number >= 0, got {getattr(self, name)}")
+                raise InputError(
+                    f"{name}: expected a finite number >= 0, got {getattr(self, name)}"
+                )
         if not math.isfinite(self.bias):
             raise InputError(f"bias: expected a finite number, got {self.bias}")
 
@@ -40,9 +44,18 @@ class Sensor:
 
 
 class SensorBank:
-    """The sensors of several signals over a flight of `samples` instants `dt` s apart, with noise drawn from `seed`."""
+    """The sensors of several signals over a flight of `samples` instants `dt` s apart, with noise
+    drawn from `seed`.
+    """
 
-    def __init__(self, sensors: Mapping[str, Sensor], signals: Sequence[str], samples: int, dt: float, seed: int):
+    def __init__(
+        self,
+        sensors: Mapping[str, Sensor],
+        signals: Sequence[str],
+        samples: int,
+        dt: float,
+        seed: int,
+    ):
         """A signal without a sensor is read as it is."""
         for name in sensors:
             if name not in signals:
@@ -57,7 +70,9 @@ class SensorBank:
         self._quanta = np.array([s.quantum for s in bank])
 
     def read(self, k: int, history: np.ndarray) -> np.ndarray:
-        """Readings (n,) at instant k from the true values (samples, n), of which those after k are not looked at."""
+        """Readings (n,) at instant k from the true values (samples, n), of which those after k are
+        not looked at.
+        """
         reading = history[self._sources[k], self._columns] + self._offsets[k]
         coarse = self._quanta > 0
         reading[coarse] = np.round(reading[coarse] / self._quanta[coarse]) * self._quanta[coarse]

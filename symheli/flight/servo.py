@@ -16,11 +16,12 @@ from symheli.lpv.signal import Signal
 
 @dataclass(frozen=True)
 class Servo:
-    """H(s) = (s/zero + 1)/(s/pole + 1) wn^2/(s^2 + 2 z wn s + wn^2) behind a limited, quantised command; output within the travel.
+    """H(s) = (s/zero + 1)/(s/pole + 1) wn^2/(s^2 + 2 z wn s + wn^2) behind a limited, quantised
+    command; output within the travel.
 
-    natural_frequency wn, zero and pole in rad/s (both None: second order); damping z dimensionless; `rate`: fastest change
-    of the command it follows (rad/s of blade pitch, inf: no limit); `steps`: positions from stop to stop it resolves (None: all).
-    Raises `InputError`.
+    natural_frequency wn, zero and pole in rad/s (both None: second order); damping z dimensionless;
+    `rate`: fastest change of the command it follows (rad/s of blade pitch, inf: no limit); `steps`:
+    positions from stop to stop it resolves (None: all). Raises `InputError`.
     """
 
     natural_frequency: float
@@ -32,30 +33,58 @@ class Servo:
 
     def __post_init__(self) -> None:
         if not (self.natural_frequency > 0 and self.damping > 0 and self.rate > 0):
-            raise InputError("a servo needs natural_frequency > 0 rad/s, damping > 0 and rate > 0 rad/s")
-        if (self.zero is None) != (self.pole is None) or (self.zero is not None and not (self.zero > 0 and self.pole > 0)):  # type: ignore[operator]
+            raise InputError(
+                "a servo needs natural_frequency > 0 rad/s, damping > 0 and rate > 0 rad/s"
+            )
+        if (self.zero is None) != (self.pole is None) or (
+            self.zero is not None and not (self.zero > 0 and self.pole > 0)
+        ):  # type: ignore[operator]
             raise InputError("a servo's zero and pole are both given, > 0 rad/s, or both left out")
         if self.steps is not None and self.steps < 2:
             raise InputError(f"steps: expected at least 2 positions, got {self.steps}")
 
     def linear(self, name: str) -> LinearModel:
-        """From the input `<name>_command` to the output `name` (rad), without limits; states `<name>_servo1` .. ."""
+        """From the input `<name>_command` to the output `name` (rad), without limits; states
+        `<name>_servo1` .. .
+        """
         wn, z = self.natural_frequency, self.damping
-        A, B, C = np.array([[0, 1], [-(wn**2), -2 * z * wn]]), np.array([[0.0], [wn**2]]), np.array([[1.0, 0.0]])
+        A, B, C = (
+            np.array([[0, 1], [-(wn**2), -2 * z * wn]]),
+            np.array([[0.0], [wn**2]]),
+            np.array([[1.0, 0.0]]),
+        )
         if self.zero is not None and self.pole is not None:
-            # the lead-lag first: its output (1 - r) x + r command, r = pole/zero, drives the second order
+            # the lead-lag first: its output (1 - r) x + r command, r = pole/zero, drives the second
+            # order
             r = self.pole / self.zero
             A = np.block([[A, (1 - r) * B], [np.zeros((1, 2)), np.array([[-self.pole]])]])
             B, C = np.vstack([r * B, [[self.pole]]]), np.hstack([C, [[0.0]]])
-        states = tuple(Signal(f"{name}_servo{i + 1}", ("rad", "rad/s", "rad")[i]) for i in range(len(A)))
-        return LinearModel(A, B, C, np.zeros((1, 1)), states, (Signal(f"{name}_command", "rad"),), (Signal(name, "rad"),))
+        states = tuple(
+            Signal(f"{name}_servo{i + 1}", ("rad", "rad/s", "rad")[i]) for i in range(len(A))
+        )
+        return LinearModel(
+            A,
+            B,
+            C,
+            np.zeros((1, 1)),
+            states,
+            (Signal(f"{name}_command", "rad"),),
+            (Signal(name, "rad"),),
+        )
 
 
 CYCLIC = Servo(natural_frequency=36.0, damping=0.5, zero=104.0, pole=33.0, steps=150)
-"""Futaba S9402, loaded, of cyclic and collective. Source: G15, actuators (zero and pole printed in s, meant rad/s; no rate limit given)."""
+"""Futaba S9402, loaded, of cyclic and collective. Source: G15, actuators (zero and pole printed in
+s, meant rad/s; no rate limit given).
+"""
 TAIL = Servo(natural_frequency=2 * math.pi * 7.0, damping=0.6, steps=145)
 """Futaba S9450 of the tail: 0.3 deg steps over its travel. Source: G15, actuators."""
-XCELL_SERVOS: Mapping[str, Servo] = {"d_lon": CYCLIC, "d_lat": CYCLIC, "d_col": CYCLIC, "d_ped": TAIL}
+XCELL_SERVOS: Mapping[str, Servo] = {
+    "d_lon": CYCLIC,
+    "d_lat": CYCLIC,
+    "d_col": CYCLIC,
+    "d_ped": TAIL,
+}
 """The servos of the X-Cell .60 by input."""
 
 
@@ -69,7 +98,9 @@ class ServoState(NamedTuple):
 class ServoBank:
     """Several servos stepped together: `init` at rest, then `step` every `dt` seconds."""
 
-    def __init__(self, servos: Mapping[str, Servo], inputs: Sequence[str], travel: np.ndarray, dt: float):
+    def __init__(
+        self, servos: Mapping[str, Servo], inputs: Sequence[str], travel: np.ndarray, dt: float
+    ):
         """One servo for each of `inputs` with its `travel` (n,), rad, symmetric."""
         for name in servos:
             if name not in inputs:
@@ -78,25 +109,38 @@ class ServoBank:
         if missing:
             raise InputError(f"servos: none given for {', '.join(missing)}")
         self._servos = [servos[name] for name in inputs]
-        self._models = [servo.linear(name).discretize(dt) for servo, name in zip(self._servos, inputs, strict=True)]
+        self._models = [
+            servo.linear(name).discretize(dt)
+            for servo, name in zip(self._servos, inputs, strict=True)
+        ]
         self._travel = np.asarray(travel, float)
         self._change = np.array([servo.rate * dt for servo in self._servos])
-        self._quantum = np.array([2 * t / s.steps if s.steps else 0.0 for s, t in zip(self._servos, self._travel, strict=True)])
+        self._quantum = np.array(
+            [
+                2 * t / s.steps if s.steps else 0.0
+                for s, t in zip(self._servos, self._travel, strict=True)
+            ]
+        )
 
     def init(self, deflection: np.ndarray) -> ServoState:
         """Everything at rest at `deflection` (n,), rad."""
         x = tuple(
-            d * np.linalg.solve(np.eye(len(m.A)) - m.A, m.B[:, 0]) for m, d in zip(self._models, deflection, strict=True)
-        )  # fmt: skip
+            d * np.linalg.solve(np.eye(len(m.A)) - m.A, m.B[:, 0])
+            for m, d in zip(self._models, deflection, strict=True)
+        )
         return ServoState(x, np.array(deflection, float))
 
     def step(self, state: ServoState, command: np.ndarray) -> tuple[ServoState, np.ndarray]:
-        """The state after `dt` and the deflections (n,), rad, reached then, limited to the travel."""
+        """The state after `dt` and the deflections (n,), rad, reached then, limited to the
+        travel.
+        """
         wanted = np.clip(command, -self._travel, self._travel)
         coarse = self._quantum > 0
         wanted[coarse] = np.round(wanted[coarse] / self._quantum[coarse]) * self._quantum[coarse]
         followed = state.followed + np.clip(wanted - state.followed, -self._change, self._change)
-        x = tuple(m.A @ z + m.B[:, 0] * c for m, z, c in zip(self._models, state.x, followed, strict=True))
+        x = tuple(
+            m.A @ z + m.B[:, 0] * c for m, z, c in zip(self._models, state.x, followed, strict=True)
+        )
         return ServoState(x, followed), self.deflection(ServoState(x, followed))
 
     def deflection(self, state: ServoState) -> np.ndarray:

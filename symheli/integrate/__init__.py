@@ -1,4 +1,6 @@
-"""Flights from the equations of motion: one at a time or thousands, by three methods, with their derivatives both ways."""
+"""Flights from the equations of motion: one at a time or thousands, by three methods, with their
+derivatives both ways.
+"""
 
 from __future__ import annotations
 

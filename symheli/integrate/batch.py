@@ -22,14 +22,20 @@ from symheli.lpv.arrays import Array
 from symheli.lpv.signal import Signal, indices
 
 SIDE_BY_SIDE = Layout(width=8, groups=2)
-"""Flights in vector registers at a time: eight doubles fill the widest, two groups hide the latency of roots and quotients."""
+"""Flights in vector registers at a time: eight doubles fill the widest, two groups hide the latency
+of roots and quotients.
+"""
 CHUNK, CHUNK_IN_NUMPY = 64, 512
-"""Flights a worker takes at a time; in NumPy so many that the arrays of one stage still fit the cache."""
+"""Flights a worker takes at a time; in NumPy so many that the arrays of one stage still fit the
+cache.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """States (N, kept, nx) of `signals` at `times` (kept,) in s of N flights; with feedback, `inputs` (N, kept, 4) used then."""
+    """States (N, kept, nx) of `signals` at `times` (kept,) in s of N flights; with feedback,
+    `inputs` (N, kept, 4) used then.
+    """
 
     times: Array
     states: Array
@@ -50,36 +56,66 @@ class Batch:
 
     @property
     def lost(self) -> Array:
-        """Which flights (N,) left the range of numbers: their states are NaN or infinite from there on."""
+        """Which flights (N,) left the range of numbers: their states are NaN or infinite from there
+        on.
+        """
         return np.logical_not(np.isfinite(self.final).all(axis=1))
 
 
 def simulate_batch(
-    heli: Helicopter, x0: object, u: object, wind: object = (0.0, 0.0, 0.0), *, dt: float, method: RungeKutta4 | None = None,
-    parameters: Mapping[str, object] | None = None, feedback: Feedback | None = None, keep: Literal["final"] | int = "final",
+    heli: Helicopter,
+    x0: object,
+    u: object,
+    wind: object = (0.0, 0.0, 0.0),
+    *,
+    dt: float,
+    method: RungeKutta4 | None = None,
+    parameters: Mapping[str, object] | None = None,
+    feedback: Feedback | None = None,
+    keep: Literal["final"] | int = "final",
     workers: int | None = None,
-) -> Batch:  # fmt: skip
-    """N flights by the classical Runge-Kutta method, side by side in vector registers and over the cores.
+) -> Batch:
+    """N flights by the classical Runge-Kutta method, side by side in vector registers and over the
+    cores.
 
-    x0: (N, nx) or one (nx,) for all, in quaternion or Euler form (then heading north from the origin). u: (n, 4) or (N, n, 4), rad,
-    held for `dt` seconds each. wind: (3,), (n, 3), (N, n, 3) or (N, 1, 3), north east down, m/s. parameters: {"body.mass": (N,),
-    "density": ...} or a number for all, SI, in place of those of the helicopter. feedback: added at every sample, shared by all flights.
-    keep: only the "final" state, or every k-th sample from the start on.
+    x0: (N, nx) or one (nx,) for all, in quaternion or Euler form (then heading north from the
+    origin). u: (n, 4) or (N, n, 4), rad, held for `dt` seconds each. wind: (3,), (n, 3), (N, n, 3)
+    or (N, 1, 3), north east down, m/s. parameters: {"body.mass": (N,), "density": ...} or a number
+    for all, SI, in place of those of the helicopter. feedback: added at every sample, shared by all
+    flights. keep: only the "final" state, or every k-th sample from the start on.
 
-    A flight comes out the same to the bit whatever its neighbours, the number of `workers` (threads, default: the cores this process
-    may use) and the compiler or its absence. Memory: the arrays given and the result, (N, kept, nx) doubles. Ctrl-C stops within a
-    sample and raises `KeyboardInterrupt`. Raises `InputError` where something does not fit.
+    A flight comes out the same to the bit whatever its neighbours, the number of `workers`
+    (threads, default: the cores this process may use) and the compiler or its absence. Memory: the
+    arrays given and the result, (N, kept, nx) doubles. Ctrl-C stops within a sample and raises
+    `KeyboardInterrupt`. Raises `InputError` where something does not fit.
     """
     problem = many_flights(heli, x0, u, wind, dt, parameters or {})
     if keep != "final" and not (isinstance(keep, int) and 1 <= keep <= problem.samples):
-        raise InputError(f'keep must be "final" or a number of samples from 1 to {problem.samples}, got {keep!r}')
+        raise InputError(
+            f'keep must be "final" or a number of samples from 1 to {problem.samples}, got {keep!r}'
+        )
     if workers is not None and workers < 1:
         raise InputError(f"workers must be at least 1, got {workers}")
     if feedback is not None:
         feedback.check(heli, problem.samples)
     every = problem.samples if keep == "final" else keep
-    flights = Flights(equations(heli), problem, method or RungeKutta4(), feedback, every, keep == "final", SIDE_BY_SIDE)
-    _run(flights, workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else workers or os.cpu_count() or 1)
+    flights = Flights(
+        equations(heli),
+        problem,
+        method or RungeKutta4(),
+        feedback,
+        every,
+        keep == "final",
+        SIDE_BY_SIDE,
+    )
+    _run(
+        flights,
+        (
+            workers or len(os.sched_getaffinity(0))
+            if hasattr(os, "sched_getaffinity")
+            else workers or os.cpu_count() or 1
+        ),
+    )
     slots = np.arange(flights.states.shape[1]) + flights.skip_start
     return Batch(dt * every * slots, flights.states, heli.flight_states, flights.inputs)
 
@@ -87,7 +123,10 @@ def simulate_batch(
 def _run(flights: Flights, workers: int) -> None:
     chunk, count = CHUNK if compiler() else CHUNK_IN_NUMPY, flights.problem.count
     with ThreadPoolExecutor(workers) as pool:
-        running = [pool.submit(flights.run, first, min(first + chunk, count)) for first in range(0, count, chunk)]
+        running = [
+            pool.submit(flights.run, first, min(first + chunk, count))
+            for first in range(0, count, chunk)
+        ]
         try:
             wait(running, return_when=FIRST_EXCEPTION)
         except BaseException:

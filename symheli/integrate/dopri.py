@@ -1,4 +1,6 @@
-"""The pair of Dormand and Prince, orders 5 and 4, with proportional-integral control of the step."""
+"""The pair of Dormand and Prince, orders 5 and 4, with proportional-integral control of the
+step.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +23,11 @@ SCALE = {"m/s": 1.0, "rad/s": 1.0, "1": 0.1, "m": 1.0, "rad": 0.1}
 
 @dataclass(frozen=True)
 class DormandPrince:
-    """Steps whose estimated error stays below `absolute` times the usual size of a state (`SCALE`) plus `relative` times its value.
+    """Steps whose estimated error stays below `absolute` times the usual size of a state (`SCALE`)
+    plus `relative` times its value.
 
-    A step ends where a sample does, for inputs and wind jump there. `largest`: longest step, s. `most`: steps before it gives up.
-    The quaternion is brought back to unit length after each step.
+    A step ends where a sample does, for inputs and wind jump there. `largest`: longest step, s.
+    `most`: steps before it gives up. The quaternion is brought back to unit length after each step.
     """
 
     relative: float = 1e-8
@@ -43,7 +46,9 @@ class DormandPrince:
         return DORMAND_PRINCE
 
 
-def fly(equations: Equations, problem: Problem, method: DormandPrince) -> tuple[Array, Array, Array]:
+def fly(
+    equations: Equations, problem: Problem, method: DormandPrince
+) -> tuple[Array, Array, Array]:
     """States (n+1, nx), steps taken (m,) in s and their number in each sample (n,)."""
     n = problem.samples
     atol = np.array([method.absolute * SCALE[s.unit] for s in equations.states])
@@ -55,11 +60,24 @@ def fly(equations: Equations, problem: Problem, method: DormandPrince) -> tuple[
     library.fly.restype = ctypes.c_long
     while True:
         steps = np.empty(capacity)
-        arguments = structure({
-            "x0": problem.x0[0], "u": problem.u[0], "wind": problem.wind[0], "wind_sample": 3 if problem.wind.shape[1] > 1 else 0,
-            "p": problem.p[0], "atol": atol, "states": states, "steps": steps, "per_sample": per_sample,
-            "samples": n, "capacity": capacity, "dt": problem.dt, "rtol": method.relative, "largest": method.largest,
-        })  # fmt: skip
+        arguments = structure(
+            {
+                "x0": problem.x0[0],
+                "u": problem.u[0],
+                "wind": problem.wind[0],
+                "wind_sample": 3 if problem.wind.shape[1] > 1 else 0,
+                "p": problem.p[0],
+                "atol": atol,
+                "states": states,
+                "steps": steps,
+                "per_sample": per_sample,
+                "samples": n,
+                "capacity": capacity,
+                "dt": problem.dt,
+                "rtol": method.relative,
+                "largest": method.largest,
+            }
+        )
         taken = library.fly(ctypes.byref(arguments))
         if taken >= 0:
             return states, steps[:taken].copy(), per_sample.astype(int)
@@ -81,14 +99,22 @@ def _coefficients() -> str:
     a[:6, :6], a[6, :6] = DORMAND_PRINCE.a, DORMAND_PRINCE.b
     rows = ", ".join("{" + ", ".join(map(repr, row.tolist())) + "}" for row in a)
     return (
-        f"#define STAGES 7\nstatic const double A[7][7] = {{{rows}}}, E[7] = {{{', '.join(map(repr, DORMAND_PRINCE_ERROR.tolist()))}}};\n"
+        f"#define STAGES 7\nstatic const double A[7][7] = {{{rows}}}, E[7] ="
+        f" {{{', '.join(map(repr, DORMAND_PRINCE_ERROR.tolist()))}}};\n"
     )
 
 
-def _in_python(equations: Equations, problem: Problem, method: DormandPrince, atol: Array) -> tuple[Array, Array, Array]:
+def _in_python(
+    equations: Equations, problem: Problem, method: DormandPrince, atol: Array
+) -> tuple[Array, Array, Array]:
     """As dopri.c, operation by operation."""
     rows = [*DORMAND_PRINCE.a, DORMAND_PRINCE.b]
-    x, states, steps, per_sample = problem.x0[0], [problem.x0[0]], [], np.zeros(problem.samples, int)
+    x, states, steps, per_sample = (
+        problem.x0[0],
+        [problem.x0[0]],
+        [],
+        np.zeros(problem.samples, int),
+    )
     wanted, previous, p = min(problem.dt, method.largest), 1e-4, problem.p[0]
 
     def weighted(weights: Array, k: list[Array]) -> Array:
@@ -109,18 +135,26 @@ def _in_python(equations: Equations, problem: Problem, method: DormandPrince, at
             for row in rows[1:]:
                 end = x + h * weighted(row, k)
                 k.append(equations.rates(end, u, wind, p)[0])
-            scaled = h * weighted(DORMAND_PRINCE_ERROR, k) / (atol + method.relative * np.maximum(np.abs(x), np.abs(end)))
+            scaled = (
+                h
+                * weighted(DORMAND_PRINCE_ERROR, k)
+                / (atol + method.relative * np.maximum(np.abs(x), np.abs(end)))
+            )
             error = math.sqrt(sum((scaled * scaled).tolist()) / len(x))
             if not error <= 1:
                 wanted = h * max(0.9 * math.pow(error, -0.17) if error < 1e300 else 0.1, 0.2)
                 rejected = True
                 continue
-            grow = min(max(0.9 * math.pow(max(error, 1e-10), -0.17) * math.pow(previous, 0.04), 0.2), 5.0)
+            grow = min(
+                max(0.9 * math.pow(max(error, 1e-10), -0.17) * math.pow(previous, 0.04), 0.2), 5.0
+            )
             grow = min(grow, 1.0) if rejected else grow
             previous, rejected = max(error, 1e-4), False
             wanted = min(wanted if last and wanted > h * grow else h * grow, method.largest)
             end = end.copy()
-            end[6:10] *= 1.0 / math.sqrt(end[6] * end[6] + end[7] * end[7] + end[8] * end[8] + end[9] * end[9])
+            end[6:10] *= 1.0 / math.sqrt(
+                end[6] * end[6] + end[7] * end[7] + end[8] * end[8] + end[9] * end[9]
+            )
             x, left = end, 0.0 if last else left - h
             steps.append(h)
         per_sample[sample] = len(steps) - first

@@ -1,4 +1,6 @@
-"""The equations a flight needs, with every parameter an input: as programs, machine code, or CasADi functions."""
+"""The equations a flight needs, with every parameter an input: as programs, machine code, or CasADi
+functions.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +19,15 @@ from symheli.symbolic import SX, Function, adjoint_product, tangent_product
 
 Which = Literal["rates", "tangent_rates", "adjoint_rates"]
 VARYING = {"rates": (0,), "tangent_rates": (0, 4), "adjoint_rates": (0, 4)}
-"""Inputs of each function that change from stage to stage; u, wind, parameters and their changes are held for a sample."""
+"""Inputs of each function that change from stage to stage; u, wind, parameters and their changes
+are held for a sample.
+"""
 
 
 class Equations:
-    """Right-hand side of the quaternion form and its derivatives, with every parameter an input, each built when first used."""
+    """Right-hand side of the quaternion form and its derivatives, with every parameter an input,
+    each built when first used.
+    """
 
     def __init__(self, dynamics: Dynamics):
         self.states = dynamics.flight_states
@@ -43,7 +49,9 @@ class Equations:
         return self._programs[which]
 
     def virtual_machine(self, which: Which, columns: int = 1) -> Numeric:
-        """One of the functions in CasADi's virtual machine, with the bits of the machine code, on `columns` points at once."""
+        """One of the functions in CasADi's virtual machine, with the bits of the machine code, on
+        `columns` points at once.
+        """
         function = as_casadi(self._program(which))
         return Numeric(function if columns == 1 else function.map(columns))
 
@@ -58,27 +66,41 @@ class Equations:
         return self._functions["rates"]
 
     def machine_code(
-        self, kernel: str, which: Sequence[Which] = ("rates",), layout: Layout | None = None, head: str = ""
+        self,
+        kernel: str,
+        which: Sequence[Which] = ("rates",),
+        layout: Layout | None = None,
+        head: str = "",
     ) -> ctypes.CDLL | None:
-        """The C file `kernel` of this folder compiled behind these functions, None where there is no compiler."""
+        """The C file `kernel` of this folder compiled behind these functions, None where there is
+        no compiler.
+        """
         layout = layout or Layout()
         key = (kernel, layout)
         if key not in self._libraries:
             nx = len(self.states)
-            parts = [layout.prelude, f"#define NX {nx}\n#define NE {nx - 5}\n#define NP {len(self.parameters)}\n", head]
+            parts = [
+                layout.prelude,
+                f"#define NX {nx}\n#define NE {nx - 5}\n#define NP {len(self.parameters)}\n",
+                head,
+            ]
             for name in which:
                 held, rest = self.split(name)
                 prefix = name.removesuffix("rates")
                 parts.append(f"#define {prefix.upper()}NK {max(len(held.outputs[0]), 1)}\n")
                 parts += [c_function(held, layout, f"{prefix}held"), c_function(rest, layout, name)]
-            parts.append((resources.files("symheli.integrate") / kernel).read_text(encoding="utf-8"))
+            parts.append(
+                (resources.files("symheli.integrate") / kernel).read_text(encoding="utf-8")
+            )
             path = library("\n".join(parts), f"{kernel.removesuffix('.c')}-{layout.lanes}")
             self._libraries[key] = None if path is None else ctypes.CDLL(str(path))
         return self._libraries[key]
 
 
 def equations(heli: Helicopter) -> Equations:
-    """The equations of this helicopter's arrangement of parts, built once for all airframes that differ in numbers alone."""
+    """The equations of this helicopter's arrangement of parts, built once for all airframes that
+    differ in numbers alone.
+    """
     kept = vars(heli.dynamics)
     if "_equations" not in kept:
         kept["_equations"] = Equations(heli.dynamics)
@@ -86,9 +108,13 @@ def equations(heli: Helicopter) -> Equations:
 
 
 def _functions(dynamics: Dynamics) -> dict[str, Function]:
-    """(x, u, wind, p) -> xdot; (x, u, wind, p, dx, du, dwind) -> xdot, dxdot; (x, u, wind, p, x_bar) -> x_bar' d xdot/d(x, u, wind)."""
+    """(x, u, wind, p) -> xdot; (x, u, wind, p, dx, du, dwind) -> xdot, dxdot; (x, u, wind, p,
+    x_bar) -> x_bar' d xdot/d(x, u, wind).
+    """
     sizes = {"x": len(dynamics.flight_states), "u": 4, "wind": 3}
-    point, change = ([SX.sym(mark + name, size) for name, size in sizes.items()] for mark in ("", "d"))
+    point, change = (
+        [SX.sym(mark + name, size) for name, size in sizes.items()] for mark in ("", "d")
+    )
     p, bar = SX.sym("p", len(dynamics.parameters)), SX.sym("x_bar", sizes["x"])
     x, u, wind = point
 

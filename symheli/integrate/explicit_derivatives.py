@@ -1,4 +1,6 @@
-"""Derivatives of explicit Runge-Kutta flights: each step differentiated as it is written, in machine code or in NumPy."""
+"""Derivatives of explicit Runge-Kutta flights: each step differentiated as it is written, in
+machine code or in NumPy.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from symheli.lpv.arrays import Array
 
 FUNCTIONS = ("rates", "tangent_rates", "adjoint_rates")
 SIDE_BY_SIDE = Layout(width=8)
-"""Directions or functionals at a time; roots and quotients of eight take little longer than those of one."""
+"""Directions or functionals at a time; roots and quotients of eight take little longer than those
+of one.
+"""
 
 
 def tangent(equations: Equations, flown: Trajectory, dx0: Array, du: Array, dwind: Array) -> Array:
@@ -37,8 +41,14 @@ def adjoint(equations: Equations, flown: Trajectory, weights: Array) -> tuple[Ar
     library = equations.machine_code("sensitivity.c", FUNCTIONS, SIDE_BY_SIDE)
     if library is None:
         return _adjoint_in_numpy(equations, flown, weights)
-    bars = np.empty((weights.shape[1], m)), np.empty((*flown.inputs.shape, m)), np.empty((*flown.wind.shape, m))
-    _call(library.adjoint, flown, m, weights=weights, x_bar=bars[0], u_bar=bars[1], wind_bar=bars[2])
+    bars = (
+        np.empty((weights.shape[1], m)),
+        np.empty((*flown.inputs.shape, m)),
+        np.empty((*flown.wind.shape, m)),
+    )
+    _call(
+        library.adjoint, flown, m, weights=weights, x_bar=bars[0], u_bar=bars[1], wind_bar=bars[2]
+    )
     return bars
 
 
@@ -46,26 +56,45 @@ def _call(function: Callable[..., int], flown: Trajectory, m: int, **arrays: Arr
     tableau: Tableau = flown.method.tableau
     per_sample = np.asarray(flown.per_sample, ctypes.c_long)
     members = ("dx0", "du", "dwind", "dx", "weights", "x_bar", "u_bar", "wind_bar")
-    flight = {"states": flown.states, "u": flown.inputs, "wind": flown.wind, "p": flown.parameters.array, "steps": flown.steps}
-    arguments = structure({
-        **{name: np.ascontiguousarray(array) for name, array in flight.items()},
-        "per_sample": per_sample, "a": tableau.a, "b": tableau.b,
-        "samples": len(per_sample), "stages": tableau.stages, "longest": int(per_sample.max()), "width": m,
-        **{name: arrays.get(name) for name in members},
-    })  # fmt: skip
+    flight = {
+        "states": flown.states,
+        "u": flown.inputs,
+        "wind": flown.wind,
+        "p": flown.parameters.array,
+        "steps": flown.steps,
+    }
+    arguments = structure(
+        {
+            **{name: np.ascontiguousarray(array) for name, array in flight.items()},
+            "per_sample": per_sample,
+            "a": tableau.a,
+            "b": tableau.b,
+            "samples": len(per_sample),
+            "stages": tableau.stages,
+            "longest": int(per_sample.max()),
+            "width": m,
+            **{name: arrays.get(name) for name in members},
+        }
+    )
     if function(ctypes.byref(arguments)):
         raise SymheliError("not enough memory for the stages of one sample: use a smaller dt")
 
 
-def _stages(equations: Equations, flown: Trajectory, sample: int, steps: Array) -> list[list[Array]]:
-    """For each step of a sample the states of its stages, and its end before the quaternion is normalised."""
+def _stages(
+    equations: Equations, flown: Trajectory, sample: int, steps: Array
+) -> list[list[Array]]:
+    """For each step of a sample the states of its stages, and its end before the quaternion is
+    normalised.
+    """
     tableau: Tableau = flown.method.tableau
     x, out = flown.states[sample], []
     held = flown.inputs[sample], flown.wind[sample], flown.parameters.array
     for h in steps:
         k, stages = [], []
         for row in tableau.a:
-            stages.append(x + h * sum((w * slope for w, slope in zip(row, k, strict=False)), np.zeros_like(x)))
+            stages.append(
+                x + h * sum((w * slope for w, slope in zip(row, k, strict=False)), np.zeros_like(x))
+            )
             k.append(equations.rates(stages[-1], *held)[0])
         x = x + h * sum(w * slope for w, slope in zip(tableau.b, k, strict=True))
         out.append([*stages, x])
@@ -75,7 +104,9 @@ def _stages(equations: Equations, flown: Trajectory, sample: int, steps: Array) 
 
 
 def _normalised(change: Array, end: Array) -> Array:
-    """The derivative of q/|q| at the unnormalised `end` applied to `change` (nx, m); symmetric, so its own adjoint."""
+    """The derivative of q/|q| at the unnormalised `end` applied to `change` (nx, m); symmetric, so
+    its own adjoint.
+    """
     length = np.linalg.norm(end[6:10])
     unit = end[6:10, None] / length
     out = change.copy()
@@ -83,39 +114,75 @@ def _normalised(change: Array, end: Array) -> Array:
     return out
 
 
-def _tangent_in_numpy(equations: Equations, flown: Trajectory, dx0: Array, du: Array, dwind: Array) -> Array:
+def _tangent_in_numpy(
+    equations: Equations, flown: Trajectory, dx0: Array, du: Array, dwind: Array
+) -> Array:
     tableau: Tableau = flown.method.tableau
     m = dx0.shape[-1]
     rates = equations.virtual_machine("tangent_rates", m)
     dx, out, ends = dx0, [dx0], np.cumsum(flown.per_sample)
     for sample, (count, end) in enumerate(zip(flown.per_sample, ends, strict=True)):
-        held = [np.repeat(v[:, None], m, axis=1) for v in (flown.inputs[sample], flown.wind[sample], flown.parameters.array)]
+        held = [
+            np.repeat(v[:, None], m, axis=1)
+            for v in (flown.inputs[sample], flown.wind[sample], flown.parameters.array)
+        ]
         steps = flown.steps[end - count : end]
         for h, stages in zip(steps, _stages(equations, flown, sample, steps), strict=True):
             dk: list[Array] = []
             for row, y in zip(tableau.a, stages, strict=False):
-                dy = dx + h * sum((w * slope for w, slope in zip(row, dk, strict=False)), np.zeros_like(dx))
-                dk.append(_matrix(rates(*map(_vector, (np.repeat(y[:, None], m, axis=1), *held, dy, du[sample], dwind[sample])))[1], dx))
-            dx = _normalised(dx + h * sum(w * slope for w, slope in zip(tableau.b, dk, strict=True)), stages[-1])
+                dy = dx + h * sum(
+                    (w * slope for w, slope in zip(row, dk, strict=False)), np.zeros_like(dx)
+                )
+                dk.append(
+                    _matrix(
+                        rates(
+                            *map(
+                                _vector,
+                                (
+                                    np.repeat(y[:, None], m, axis=1),
+                                    *held,
+                                    dy,
+                                    du[sample],
+                                    dwind[sample],
+                                ),
+                            )
+                        )[1],
+                        dx,
+                    )
+                )
+            dx = _normalised(
+                dx + h * sum(w * slope for w, slope in zip(tableau.b, dk, strict=True)), stages[-1]
+            )
         out.append(dx)
     return np.array(out)
 
 
-def _adjoint_in_numpy(equations: Equations, flown: Trajectory, weights: Array) -> tuple[Array, Array, Array]:
+def _adjoint_in_numpy(
+    equations: Equations, flown: Trajectory, weights: Array
+) -> tuple[Array, Array, Array]:
     tableau: Tableau = flown.method.tableau
     m, n = weights.shape[-1], len(flown.inputs)
     rates = equations.virtual_machine("adjoint_rates", m)
     x_bar, u_bar, wind_bar = weights[n], np.zeros((n, 4, m)), np.zeros((n, 3, m))
     ends = np.cumsum(flown.per_sample)
     for sample in reversed(range(n)):
-        held = [np.repeat(v[:, None], m, axis=1) for v in (flown.inputs[sample], flown.wind[sample], flown.parameters.array)]
+        held = [
+            np.repeat(v[:, None], m, axis=1)
+            for v in (flown.inputs[sample], flown.wind[sample], flown.parameters.array)
+        ]
         steps = flown.steps[ends[sample] - flown.per_sample[sample] : ends[sample]]
-        for h, stages in reversed(list(zip(steps, _stages(equations, flown, sample, steps), strict=True))):
+        for h, stages in reversed(
+            list(zip(steps, _stages(equations, flown, sample, steps), strict=True))
+        ):
             x_bar = _normalised(x_bar, stages[-1])
             y_bar: dict[int, Array] = {}
             for s in reversed(range(tableau.stages)):
-                k_bar = h * (tableau.b[s] * x_bar + sum(tableau.a[j, s] * bar for j, bar in y_bar.items()))
-                bars = rates(*map(_vector, (np.repeat(stages[s][:, None], m, axis=1), *held, k_bar)))
+                k_bar = h * (
+                    tableau.b[s] * x_bar + sum(tableau.a[j, s] * bar for j, bar in y_bar.items())
+                )
+                bars = rates(
+                    *map(_vector, (np.repeat(stages[s][:, None], m, axis=1), *held, k_bar))
+                )
                 y_bar[s] = _matrix(bars[0], x_bar)
                 u_bar[sample] += _matrix(bars[1], u_bar[sample])
                 wind_bar[sample] += _matrix(bars[2], wind_bar[sample])

@@ -11,9 +11,11 @@ from symheli.lpv.arrays import Array, frozen
 
 @dataclass(frozen=True, eq=False)
 class Feedback:
-    """u(k) - K(k) (x - reference(k)), limited to `travel`: K (n, 4, nx), reference (n, nx) in Euler form, travel (4,) in rad.
+    """u(k) - K(k) (x - reference(k)), limited to `travel`: K (n, 4, nx), reference (n, nx) in Euler
+    form, travel (4,) in rad.
 
-    u is what the flight is given: nominal inputs and excitation together. Every flight of a batch shares K and the reference.
+    u is what the flight is given: nominal inputs and excitation together. Every flight of a batch
+    shares K and the reference.
     """
 
     gains: Array
@@ -30,4 +32,7 @@ class Feedback:
         """Raises `InputError` where it does not fit the helicopter and the length of the flight."""
         expected = (samples, 4, len(heli.states))
         if self.gains.shape != expected:
-            raise InputError(f"feedback: expected gains {expected} (samples, inputs, states of the Euler form), got {self.gains.shape}")
+            raise InputError(
+                f"feedback: expected gains {expected} (samples, inputs, states of the Euler form),"
+                f" got {self.gains.shape}"
+            )

@@ -1,4 +1,6 @@
-"""Derivatives of implicit flights: CasADi's own, through the implicit function theorem at each step's solution."""
+"""Derivatives of implicit flights: CasADi's own, through the implicit function theorem at each
+step's solution.
+"""
 
 from __future__ import annotations
 
@@ -23,23 +25,37 @@ def _sample(equations: Equations, flown: Trajectory) -> casadi.Function:
 def tangent(equations: Equations, flown: Trajectory, dx0: Array, du: Array, dwind: Array) -> Array:
     """Change of the states (n+1, nx, m) for dx0 (nx, m), du (n, 4, m), dwind (n, 3, m)."""
     names = ["x", "u", "wind", "p"]
-    step = _sample(equations, flown).factory("radau_tangent", [*names, "fwd:x", "fwd:u", "fwd:wind"], ["fwd:x_next"])
+    step = _sample(equations, flown).factory(
+        "radau_tangent", [*names, "fwd:x", "fwd:u", "fwd:wind"], ["fwd:x_next"]
+    )
     forward, out = Numeric(step), np.empty((*flown.states.shape, dx0.shape[-1]))
     out[0] = dx0
     for k in range(len(flown.inputs)):
         for i in range(dx0.shape[-1]):
-            out[k + 1, :, i] = forward(*_held(flown, k), out[k, :, i], du[k, :, i], dwind[k, :, i])[0]
+            out[k + 1, :, i] = forward(*_held(flown, k), out[k, :, i], du[k, :, i], dwind[k, :, i])[
+                0
+            ]
     return out
 
 
 def adjoint(equations: Equations, flown: Trajectory, weights: Array) -> tuple[Array, Array, Array]:
     """Gradients (nx, m), (n, 4, m), (n, 3, m) for weights (n+1, nx, m)."""
     names = ["x", "u", "wind", "p"]
-    step = _sample(equations, flown).factory("radau_adjoint", [*names, "adj:x_next"], ["adj:x", "adj:u", "adj:wind"])
+    step = _sample(equations, flown).factory(
+        "radau_adjoint", [*names, "adj:x_next"], ["adj:x", "adj:u", "adj:wind"]
+    )
     reverse, m = Numeric(step), weights.shape[-1]
-    x_bar, u_bar, wind_bar = weights[-1].copy(), np.empty((*flown.inputs.shape, m)), np.empty((*flown.wind.shape, m))
+    x_bar, u_bar, wind_bar = (
+        weights[-1].copy(),
+        np.empty((*flown.inputs.shape, m)),
+        np.empty((*flown.wind.shape, m)),
+    )
     for k in reversed(range(len(flown.inputs))):
         for i in range(m):
             bars = reverse(*_held(flown, k), x_bar[:, i])
-            x_bar[:, i], u_bar[k, :, i], wind_bar[k, :, i] = bars[0] + weights[k, :, i], bars[1], bars[2]
+            x_bar[:, i], u_bar[k, :, i], wind_bar[k, :, i] = (
+                bars[0] + weights[k, :, i],
+                bars[1],
+                bars[2],
+            )
     return x_bar, u_bar, wind_bar

@@ -16,7 +16,8 @@ from symheli.numeric import Numeric
 
 @dataclass(frozen=True)
 class Radau:
-    """Equal implicit steps of at most `step` seconds with `stages` collocation points (order 2 stages - 1), stable however stiff.
+    """Equal implicit steps of at most `step` seconds with `stages` collocation points (order 2
+    stages - 1), stable however stiff.
 
     The quaternion is brought back to unit length after each sample.
     """
@@ -32,27 +33,46 @@ class Radau:
 
 
 def sample_function(equations: Equations, dt: float, method: Radau) -> casadi.Function:
-    """(x, u, wind, p) -> x after one sample of `dt` seconds; CasADi differentiates it through the implicit function theorem."""
+    """(x, u, wind, p) -> x after one sample of `dt` seconds; CasADi differentiates it through the
+    implicit function theorem.
+    """
     rates = equations.function
     x, u, wind, p = (casadi.MX.sym(f"z{i}", rates.size1_in(i)) for i in range(4))
     held = casadi.vertcat(u, wind, p)
     steps = max(int(np.ceil(dt / method.step - 1e-9)), 1)
     options = {
-        "number_of_finite_elements": steps, "interpolation_order": method.stages, "collocation_scheme": "radau", "rootfinder": "newton",
+        "number_of_finite_elements": steps,
+        "interpolation_order": method.stages,
+        "collocation_scheme": "radau",
+        "rootfinder": "newton",
         "rootfinder_options": {"abstol": 1e-12, "error_on_fail": False},
-    }  # fmt: skip
-    integrator = casadi.integrator("radau", "collocation", {"x": x, "p": held, "ode": rates(x, u, wind, p)}, 0.0, dt, options)
+    }
+    integrator = casadi.integrator(
+        "radau", "collocation", {"x": x, "p": held, "ode": rates(x, u, wind, p)}, 0.0, dt, options
+    )
     end = integrator(x0=x, p=held)["xf"]
     quaternion = end[6:10]
     end = casadi.vertcat(end[:6], quaternion / casadi.norm_2(quaternion), end[10:])
-    return casadi.Function("radau_sample", [x, u, wind, p], [casadi.densify(end)], ["x", "u", "wind", "p"], ["x_next"])
+    return casadi.Function(
+        "radau_sample", [x, u, wind, p], [casadi.densify(end)], ["x", "u", "wind", "p"], ["x_next"]
+    )
 
 
 def fly(equations: Equations, problem: Problem, method: Radau) -> Array:
     """States (n+1, nx)."""
     sample, states = Numeric(sample_function(equations, problem.dt, method)), [problem.x0[0]]
     for k in range(problem.samples):
-        states.append(sample(states[-1], problem.u[0, k], problem.wind[0, min(k, problem.wind.shape[1] - 1)], problem.p[0])[0])
+        states.append(
+            sample(
+                states[-1],
+                problem.u[0, k],
+                problem.wind[0, min(k, problem.wind.shape[1] - 1)],
+                problem.p[0],
+            )[0]
+        )
         if not np.isfinite(states[-1]).all():
-            raise SymheliError(f"the implicit equations were not solved near {k * problem.dt:.6g} s: the flight is lost there")
+            raise SymheliError(
+                f"the implicit equations were not solved near {k * problem.dt:.6g} s: the flight is"
+                " lost there"
+            )
     return np.array(states)

@@ -21,7 +21,9 @@ from symheli.lpv.arrays import Array
 
 @dataclass(frozen=True)
 class RungeKutta4:
-    """Equal steps of at most `step` seconds, dt divided evenly; the quaternion is brought back to unit length after each."""
+    """Equal steps of at most `step` seconds, dt divided evenly; the quaternion is brought back to
+    unit length after each.
+    """
 
     step: float = 0.005
 
@@ -36,10 +38,12 @@ class RungeKutta4:
 
 
 class Flights:
-    """Flights of a problem, run in any order: states (N, kept, nx) and, under feedback, the inputs used (N, kept, 4).
+    """Flights of a problem, run in any order: states (N, kept, nx) and, under feedback, the inputs
+    used (N, kept, 4).
 
-    Every `every`-th sample is kept, the first one not where `skip_start`. The bits of a flight depend neither on the layout nor on
-    its neighbours, and are the same in machine code and in NumPy.
+    Every `every`-th sample is kept, the first one not where `skip_start`. The bits of a flight
+    depend neither on the layout nor on its neighbours, and are the same in machine code and in
+    NumPy.
     """
 
     def __init__(
@@ -64,23 +68,39 @@ class Flights:
 
     def _members(self) -> dict[str, object]:
         p, f = self.problem, self.feedback
-        flight = {name: math.prod(a.shape[1:]) if len(a) > 1 else 0 for name, a in (("u", p.u), ("wind", p.wind), ("p", p.p))}
+        flight = {
+            name: math.prod(a.shape[1:]) if len(a) > 1 else 0
+            for name, a in (("u", p.u), ("wind", p.wind), ("p", p.p))
+        }
         return {
             "x0": p.x0,
-            "u": p.u, "u_flight": flight["u"], "u_sample": 4,
-            "wind": p.wind, "wind_flight": flight["wind"], "wind_sample": 3 if p.wind.shape[1] > 1 else 0,
-            "p": p.p, "p_flight": flight["p"],
-            "gains": f and f.gains, "reference": f and f.reference, "travel": f and f.travel,
-            "states": self.states, "inputs": self.inputs,
-            "samples": p.samples, "substeps": self.substeps, "every": self.every, "skip_start": self.skip_start,
+            "u": p.u,
+            "u_flight": flight["u"],
+            "u_sample": 4,
+            "wind": p.wind,
+            "wind_flight": flight["wind"],
+            "wind_sample": 3 if p.wind.shape[1] > 1 else 0,
+            "p": p.p,
+            "p_flight": flight["p"],
+            "gains": f and f.gains,
+            "reference": f and f.reference,
+            "travel": f and f.travel,
+            "states": self.states,
+            "inputs": self.inputs,
+            "samples": p.samples,
+            "substeps": self.substeps,
+            "every": self.every,
+            "skip_start": self.skip_start,
             "step": self.step,
             "stop": self._stop,
-        }  # fmt: skip
+        }
 
     def run(self, first: int, last: int) -> None:
         """Fly flights first <= i < last; releases the interpreter's lock in machine code."""
         if self._library is not None:
-            self._library.fly(ctypes.byref(self._arguments), ctypes.c_long(first), ctypes.c_long(last))
+            self._library.fly(
+                ctypes.byref(self._arguments), ctypes.c_long(first), ctypes.c_long(last)
+            )
         else:
             self._in_numpy(slice(first, last))
 
@@ -132,7 +152,11 @@ def _step(rates: Callable[[Array], Array], x: Array, h: float) -> Array:
 def _fed_back(feedback: Feedback, k: int, x: Array, u: Array) -> Array:
     """As `feed_back` in rk4.c, with its order of operations and the same mathematical library."""
     q0, q1, q2, q3 = x[6:10]
-    sine, over, under = 2 * (q0 * q2 - q3 * q1), 2 * (q0 * q1 + q2 * q3), 1 - 2 * (q1 * q1 + q2 * q2)
+    sine, over, under = (
+        2 * (q0 * q2 - q3 * q1),
+        2 * (q0 * q1 + q2 * q3),
+        1 - 2 * (q1 * q1 + q2 * q2),
+    )
     phi = np.array([math.atan2(a, b) for a, b in zip(over, under, strict=True)])
     theta = np.array([math.asin(-1.0 if s < -1 else 1.0 if s > 1 else s) for s in sine])
     euler = [*x[:6], phi, theta, *x[13:]]

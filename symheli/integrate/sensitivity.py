@@ -1,4 +1,6 @@
-"""Derivatives of a simulated flight, forward and adjoint: of the numbers the method returned, along the very steps it took."""
+"""Derivatives of a simulated flight, forward and adjoint: of the numbers the method returned, along
+the very steps it took.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from symheli.lpv.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """Derivative of a functional with respect to the initial state `x0` (nx,), every input `u` (n, 4) and wind sample `wind` (n, 3).
+    """Derivative of a functional with respect to the initial state `x0` (nx,), every input `u` (n,
+    4) and wind sample `wind` (n, 3).
 
     With m functionals each has a further axis of length m at the end.
     """
@@ -28,36 +31,53 @@ class Gradient:
     wind: Array
 
 
-def tangent(heli: Helicopter, flown: Trajectory, dx0: object = None, du: object = None, dwind: object = None) -> Array:
-    """First-order change of the states (n+1, nx, m) for m directions: dx0 (nx, m), du (n, 4, m), dwind (n, 3, m), what is left out is 0.
+def tangent(
+    heli: Helicopter, flown: Trajectory, dx0: object = None, du: object = None, dwind: object = None
+) -> Array:
+    """First-order change of the states (n+1, nx, m) for m directions: dx0 (nx, m), du (n, 4, m),
+    dwind (n, 3, m), what is left out is 0.
 
-    Without the last axis one direction, (n+1, nx). `dx0=np.eye(nx)` gives the transition matrices. A quaternion stays of unit
-    length, so a change along it vanishes. Inputs made by feedback count as given: the derivative is that of the open loop.
+    Without the last axis one direction, (n+1, nx). `dx0=np.eye(nx)` gives the transition matrices.
+    A quaternion stays of unit length, so a change along it vanishes. Inputs made by feedback count
+    as given: the derivative is that of the open loop.
     """
     nx, n = len(flown.signals), len(flown.inputs)
     changes = {"dx0": (dx0, (nx,)), "du": (du, (n, 4)), "dwind": (dwind, (n, 3))}
-    given = {name: _directions(value, name, shape) for name, (value, shape) in changes.items() if value is not None}
+    given = {
+        name: _directions(value, name, shape)
+        for name, (value, shape) in changes.items()
+        if value is not None
+    }
     if not given:
         raise InputError("give at least one of dx0, du, dwind")
     single = all(value.ndim == len(changes[name][1]) for name, value in given.items())
-    widths = {value.shape[-1] if value.ndim > len(changes[name][1]) else 1 for name, value in given.items()}
+    widths = {
+        value.shape[-1] if value.ndim > len(changes[name][1]) else 1
+        for name, value in given.items()
+    }
     if len(widths) > 1:
         raise InputError(f"dx0, du and dwind must have as many directions, got {sorted(widths)}")
     m = widths.pop()
-    full = [np.ascontiguousarray(given.get(name, np.zeros((*shape, m))).reshape(*shape, m)) for name, (_, shape) in changes.items()]
+    full = [
+        np.ascontiguousarray(given.get(name, np.zeros((*shape, m))).reshape(*shape, m))
+        for name, (_, shape) in changes.items()
+    ]
     change = _method(flown).tangent(equations(heli), flown, *full)
     return change[..., 0] if single else change
 
 
 def gradient(heli: Helicopter, flown: Trajectory, weights: object) -> Gradient:
-    """Gradient of a functional of the trajectory, given its derivative `weights` (n+1, nx) with respect to the states at the samples.
+    """Gradient of a functional of the trajectory, given its derivative `weights` (n+1, nx) with
+    respect to the states at the samples.
 
-    For the final state only the last row is not zero. `weights` (n+1, nx, m): m functionals at once. By reverse differentiation: the cost
-    does not grow with the number of inputs.
+    For the final state only the last row is not zero. `weights` (n+1, nx, m): m functionals at
+    once. By reverse differentiation: the cost does not grow with the number of inputs.
     """
     full = _directions(weights, "weights", flown.states.shape)
     single = full.ndim == 2
-    bars = _method(flown).adjoint(equations(heli), flown, np.ascontiguousarray(full[..., None] if single else full))
+    bars = _method(flown).adjoint(
+        equations(heli), flown, np.ascontiguousarray(full[..., None] if single else full)
+    )
     return Gradient(*(bar[..., 0] if single else bar for bar in bars))
 
 
@@ -67,6 +87,13 @@ def _method(flown: Trajectory) -> ModuleType:
 
 def _directions(value: object, name: str, shape: tuple[int, ...]) -> Array:
     array = np.asarray(value, float)
-    if array.shape[: len(shape)] != shape or array.ndim > len(shape) + 1 or not np.isfinite(array).all():
-        raise InputError(f"{name}: expected finite numbers of shape {shape} or {(*shape, 'm')}, got {array.shape}")
+    if (
+        array.shape[: len(shape)] != shape
+        or array.ndim > len(shape) + 1
+        or not np.isfinite(array).all()
+    ):
+        raise InputError(
+            f"{name}: expected finite numbers of shape {shape} or {(*shape, 'm')}, got"
+            f" {array.shape}"
+        )
     return array

@@ -23,18 +23,26 @@ METHODS: dict[str, type[Method]] = {"rk4": RungeKutta4, "dopri": DormandPrince, 
 
 
 def simulate(
-    heli: Helicopter, x0: object, u: object, wind: object = (0.0, 0.0, 0.0), *, dt: float, method: str | Method = "rk4",
+    heli: Helicopter,
+    x0: object,
+    u: object,
+    wind: object = (0.0, 0.0, 0.0),
+    *,
+    dt: float,
+    method: str | Method = "rk4",
     feedback: Feedback | None = None,
-) -> Trajectory:  # fmt: skip
-    """Fly from `x0` with each row of `u` (n, 4), rad, held for `dt` seconds; the whole flight is one call into machine code.
+) -> Trajectory:
+    """Fly from `x0` with each row of `u` (n, 4), rad, held for `dt` seconds; the whole flight is
+    one call into machine code.
 
-    x0: a `TrimPoint`, or (nx,) in quaternion form, or in Euler form (then heading north from the origin). wind: (3,) or (n, 3), north
-    east down, m/s. feedback: with "rk4" only. For other numbers of the vehicle see
-    `Helicopter.with_parameters`: nothing is compiled anew.
+    x0: a `TrimPoint`, or (nx,) in quaternion form, or in Euler form (then heading north from the
+    origin). wind: (3,) or (n, 3), north east down, m/s. feedback: with "rk4" only. For other
+    numbers of the vehicle see `Helicopter.with_parameters`: nothing is compiled anew.
 
-    method: "rk4" (equal steps), "dopri" (steps by a tolerance), "radau" (implicit, for stiff equations) or one of `RungeKutta4`,
-    `DormandPrince`, `Radau` with options. Raises `InputError` where something does not fit, `SymheliError` where the flight leaves
-    the range of numbers or the method gives up.
+    method: "rk4" (equal steps), "dopri" (steps by a tolerance), "radau" (implicit, for stiff
+    equations) or one of `RungeKutta4`, `DormandPrince`, `Radau` with options. Raises `InputError`
+    where something does not fit, `SymheliError` where the flight leaves the range of numbers or the
+    method gives up.
     """
     made, problem, chosen = equations(heli), one_flight(heli, x0, u, wind, dt), _chosen(method)
     if feedback is not None:
@@ -45,11 +53,22 @@ def simulate(
     lost = ~np.isfinite(states).all(axis=1)
     if lost.any():
         raise SymheliError(
-            f"the flight left the range of numbers at {dt * int(lost.argmax()):.6g} s: milder inputs, or a shorter step, please"
+            f"the flight left the range of numbers at {dt * int(lost.argmax()):.6g} s: milder"
+            " inputs, or a shorter step, please"
         )
     wind_flown = np.broadcast_to(problem.wind[0], (problem.samples, 3))
     times = problem.dt * np.arange(problem.samples + 1)
-    return Trajectory(times, states, inputs, wind_flown, heli.flight_states, steps, per_sample, chosen, heli.parameters)
+    return Trajectory(
+        times,
+        states,
+        inputs,
+        wind_flown,
+        heli.flight_states,
+        steps,
+        per_sample,
+        chosen,
+        heli.parameters,
+    )
 
 
 def _chosen(method: str | Method) -> Method:
@@ -60,7 +79,9 @@ def _chosen(method: str | Method) -> Method:
     return METHODS[method]()
 
 
-def _flown(made: Equations, problem: Problem, method: Method, feedback: Feedback | None) -> tuple[Array, Array, Array, Array]:
+def _flown(
+    made: Equations, problem: Problem, method: Method, feedback: Feedback | None
+) -> tuple[Array, Array, Array, Array]:
     """States, inputs used, steps, steps of each sample."""
     n, u = problem.samples, problem.u[0]
     if isinstance(method, DormandPrince):
@@ -72,4 +93,9 @@ def _flown(made: Equations, problem: Problem, method: Method, feedback: Feedback
         return radau.fly(made, problem, method), u, steps, per_sample
     flights = Flights(made, problem, method, feedback, 1, False, Layout())
     flights.run(0, 1)
-    return flights.states[0], u if flights.inputs is None else flights.inputs[0, :-1], steps, per_sample
+    return (
+        flights.states[0],
+        u if flights.inputs is None else flights.inputs[0, :-1],
+        steps,
+        per_sample,
+    )

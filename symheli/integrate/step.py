@@ -10,15 +10,20 @@ from symheli.helicopter import Helicopter
 
 
 def runge_kutta(heli: Helicopter, dt: float, steps: int) -> casadi.Function:
-    """(x, u, wind) -> x after `dt` seconds with u and wind held, by `steps` classical Runge-Kutta steps (order 4).
+    """(x, u, wind) -> x after `dt` seconds with u and wind held, by `steps` classical Runge-Kutta
+    steps (order 4).
 
-    x is the quaternion form (`heli.flight_states`); wind in earth axes. The quaternion is brought back to unit length
-    after each step; its drift there is of the order of the integration error.
+    x is the quaternion form (`heli.flight_states`); wind in earth axes. The quaternion is brought
+    back to unit length after each step; its drift there is of the order of the integration error.
     """
     if not dt > 0 or steps < 1:
         raise InputError(f"expected dt > 0 s and at least one step, got dt={dt}, steps={steps}")
     f, h = heli.flight_rhs, dt / steps
-    x, u, wind = casadi.MX.sym("x", len(heli.flight_states)), casadi.MX.sym("u", 4), casadi.MX.sym("wind", 3)
+    x, u, wind = (
+        casadi.MX.sym("x", len(heli.flight_states)),
+        casadi.MX.sym("u", 4),
+        casadi.MX.sym("wind", 3),
+    )
     k1 = f(x, u, wind)
     k2 = f(x + h / 2 * k1, u, wind)
     k3 = f(x + h / 2 * k2, u, wind)
@@ -31,5 +36,7 @@ def runge_kutta(heli: Helicopter, dt: float, steps: int) -> casadi.Function:
         # one step after the other with the same input: a loop in the generated code
         chain = step.mapaccum("chain", steps, ["x"], ["x_next"])
         ends = chain(x, casadi.repmat(u, 1, steps), casadi.repmat(wind, 1, steps))
-        step = casadi.Function("rk4_flight", [x, u, wind], [ends[:, -1]], ["x", "u", "wind"], ["x_next"])
+        step = casadi.Function(
+            "rk4_flight", [x, u, wind], [ends[:, -1]], ["x", "u", "wind"], ["x_next"]
+        )
     return compiled(step)

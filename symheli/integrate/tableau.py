@@ -11,7 +11,9 @@ from symheli.lpv.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Tableau:
-    """k_s = f(x + h sum_j a[s, j] k_j), x_next = x + h sum_s b[s] k_s; a (stages, stages) strictly lower triangular, b (stages,)."""
+    """k_s = f(x + h sum_j a[s, j] k_j), x_next = x + h sum_s b[s] k_s; a (stages, stages) strictly
+    lower triangular, b (stages,).
+    """
 
     a: Array
     b: Array
@@ -42,7 +44,11 @@ DORMAND_PRINCE = _tableau(
     ],
     [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
 )
-"""Order 5 of the pair of Dormand and Prince (1980), without the seventh stage, which only the error estimate uses."""
+"""Order 5 of the pair of Dormand and Prince (1980), without the seventh stage, which only the error
+estimate uses.
+"""
 
-DORMAND_PRINCE_ERROR = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+DORMAND_PRINCE_ERROR = np.array(
+    [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]
+)
 """b of order 5 less b of order 4, seven stages: the last one is at the end of the step."""

@@ -1,4 +1,6 @@
-"""Tables with one header line: separated by commas, semicolons, tabs or blanks, with decimal points or commas."""
+"""Tables with one header line: separated by commas, semicolons, tabs or blanks, with decimal points
+or commas.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +15,23 @@ from symheli.logs.separated import SeparatedTable
 
 
 def read_csv(
-    path: str | os.PathLike[str], time: str | None, units: Mapping[str, str], dt: float | None = None, time_unit: str = "s"
+    path: str | os.PathLike[str],
+    time: str | None,
+    units: Mapping[str, str],
+    dt: float | None = None,
+    time_unit: str = "s",
 ) -> Table:
     """The columns named in `units`, as they stand, and the time in s.
 
-    `time` names the time column (in `time_unit`); None where the file has none: its rows are then `dt` (s) apart. Empty
-    cells are missing samples (NaN). Raises `InputError` for a file that is no table, a cell that is no number, or a time missing.
+    `time` names the time column (in `time_unit`); None where the file has none: its rows are then
+    `dt` (s) apart. Empty cells are missing samples (NaN). Raises `InputError` for a file that is no
+    table, a cell that is no number, or a time missing.
     """
     if (time is None) == (dt is None):
-        raise InputError("give the name of the time column, or time=None and the sample period dt in s: one of the two")
+        raise InputError(
+            "give the name of the time column, or time=None and the sample period dt in s: one of"
+            " the two"
+        )
     factor = seconds_in(time_unit)
     table = SeparatedTable.read(path)
     columns = table.columns((*units, *([time] if time else [])))
@@ -30,5 +40,8 @@ def read_csv(
         return positive(dt or 0.0) * np.arange(len(table.rows)), values, dict(units)
     seconds = factor * columns[time]
     if np.isnan(seconds).any():
-        raise InputError(f"{path}: the time is missing in row {int(np.flatnonzero(np.isnan(seconds))[0]) + 1} of column {time!r}")
+        raise InputError(
+            f"{path}: the time is missing in row {int(np.flatnonzero(np.isnan(seconds))[0]) + 1} of"
+            f" column {time!r}"
+        )
     return seconds, values, dict(units)

@@ -29,7 +29,9 @@ def text(path: str | os.PathLike[str]) -> str:
     file = existing(path)
     data = file.read_bytes()
     if b"\0" in data:
-        raise InputError(f"{file}: expected a text file, this one is binary (it contains zero bytes)")
+        raise InputError(
+            f"{file}: expected a text file, this one is binary (it contains zero bytes)"
+        )
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -12,11 +12,14 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.logs.files import Table, existing, seconds_in
 
 
-def read_mat(path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s") -> Table:
-    """The variables named in `units`, and `time` (there in `time_unit`) in s, from a file saved with -v7 or older.
+def read_mat(
+    path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s"
+) -> Table:
+    """The variables named in `units`, and `time` (there in `time_unit`) in s, from a file saved
+    with -v7 or older.
 
-    "log.theta" reaches into a struct.
-    Raises `InputError` for version 7.3, a file that is none of MATLAB's, and variables that are no vectors of one length.
+    "log.theta" reaches into a struct. Raises `InputError` for version 7.3, a file that is none of
+    MATLAB's, and variables that are no vectors of one length.
     """
     from scipy.io import loadmat
 
@@ -24,14 +27,18 @@ def read_mat(path: str | os.PathLike[str], time: str, units: Mapping[str, str], 
     try:
         content = loadmat(file, simplify_cells=True)
     except NotImplementedError as error:
-        raise InputError(f"{file}: MATLAB 7.3 files are not read; save it with save(..., '-v7')") from error
+        raise InputError(
+            f"{file}: MATLAB 7.3 files are not read; save it with save(..., '-v7')"
+        ) from error
     except Exception as error:
         raise InputError(f"{file}: not a MATLAB file ({error})") from error
     vectors = {name: _vector(content, name, file) for name in (time, *units)}
     n = len(vectors[time])
     for name, vector in vectors.items():
         if len(vector) != n:
-            raise InputError(f"{file}: {name!r} has {len(vector)} samples, the time {time!r} has {n}")
+            raise InputError(
+                f"{file}: {name!r} has {len(vector)} samples, the time {time!r} has {n}"
+            )
     return factor * vectors[time], {name: vectors[name] for name in units}, dict(units)
 
 

@@ -1,4 +1,6 @@
-"""Text tables as they come: which character separates, which is the decimal sign, where the names stand."""
+"""Text tables as they come: which character separates, which is the decimal sign, where the names
+stand.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,11 @@ MISSING = {"", "na", "n/a", "nan", "-nan", "null", "none", "#n/a"}
 
 @dataclass(frozen=True, eq=False)
 class SeparatedTable:
-    """The names in the header of a table and its rows of cells, without blanks around them; every row as long as the header.
+    """The names in the header of a table and its rows of cells, without blanks around them; every
+    row as long as the header.
 
-    `separator` one of `SEPARATORS`. Lines that begin with # are comments, unless the last of them above the numbers is the header.
+    `separator` one of `SEPARATORS`. Lines that begin with # are comments, unless the last of them
+    above the numbers is the header.
     """
 
     path: str
@@ -36,43 +40,69 @@ class SeparatedTable:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> SeparatedTable:
-        """Raises `InputError` that says what is no table about the file: no header, no rows, or the row that does not fit."""
+        """Raises `InputError` that says what is no table about the file: no header, no rows, or the
+        row that does not fit.
+        """
         lines = [line for line in text(path).splitlines() if line.strip()]
-        first = next((i for i, line in enumerate(lines) if not line.lstrip().startswith("#")), len(lines))
-        comments, lines = lines[:first], [line for line in lines[first:] if not line.lstrip().startswith("#")]
+        first = next(
+            (i for i, line in enumerate(lines) if not line.lstrip().startswith("#")), len(lines)
+        )
+        comments, lines = (
+            lines[:first],
+            [line for line in lines[first:] if not line.lstrip().startswith("#")],
+        )
         if lines and comments and _numeric(lines[0]):
             lines.insert(0, comments[-1].lstrip("# \t"))
         if not lines:
-            raise InputError(f"{path}: nothing but comments; expected a line of names, then rows of numbers")
+            raise InputError(
+                f"{path}: nothing but comments; expected a line of names, then rows of numbers"
+            )
         if _numeric(lines[0]):
-            raise InputError(f"{path}: the first line holds numbers, {lines[0].strip()[:40]!r}; expected the names of the columns there")
+            raise InputError(
+                f"{path}: the first line holds numbers, {lines[0].strip()[:40]!r}; expected the"
+                " names of the columns there"
+            )
         try:
             separator = _separator(lines[: LOOKED_AT + 1])
             header, *rows = _split(lines, separator)
         except csv.Error as error:
-            raise InputError(f"{path}: not a table: {error}; is a quotation mark left open?") from error
+            raise InputError(
+                f"{path}: not a table: {error}; is a quotation mark left open?"
+            ) from error
         width = len(header)
         for number, row in enumerate(rows, start=1):
             if any(row[width:]):
                 raise InputError(
-                    f"{path}: not a table: row {number} has {len(row)} cells, the header {width} names (separator: {SEPARATORS[separator]})"
-                    + ("; a comma cannot be both separator and decimal sign" if separator == "," else "")
+                    f"{path}: not a table: row {number} has {len(row)} cells, the header {width}"
+                    f" names (separator: {SEPARATORS[separator]})"
+                    + (
+                        "; a comma cannot be both separator and decimal sign"
+                        if separator == ","
+                        else ""
+                    )
                 )
         if not rows:
             raise InputError(f"{path}: a header but no rows")
-        return cls(os.fspath(path), tuple(header), [(row + [""] * (width - len(row)))[:width] for row in rows], separator)
+        return cls(
+            os.fspath(path),
+            tuple(header),
+            [(row + [""] * (width - len(row)))[:width] for row in rows],
+            separator,
+        )
 
     def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
         """The named columns as numbers (n,), NaN where a cell is empty.
 
-        A comma in numbers is the decimal sign where it does not separate. Raises `UnknownNameError` for a name the header lacks,
-        `InputError` for one that stands there twice and for the first cell that is no number.
+        A comma in numbers is the decimal sign where it does not separate. Raises `UnknownNameError`
+        for a name the header lacks, `InputError` for one that stands there twice and for the first
+        cell that is no number.
         """
         names = list(dict.fromkeys(names))
         for name in names:
             if self.header.count(name) > 1:
                 raise InputError(
-                    f"{self.path}: {self.header.count(name)} columns are called {name!r}; rename them, so that it is clear which is meant"
+                    f"{self.path}: {self.header.count(name)} columns are called {name!r}; rename"
+                    " them, so that it is clear which is meant"
                 )
             if name not in self.header:
                 raise UnknownNameError("column", name, self.header)
@@ -85,14 +115,23 @@ class SeparatedTable:
         for i, cell in enumerate(cells):
             value = _number(cell, comma)
             if value is None:
-                mixed = "; the decimal sign is a comma elsewhere in this file" if comma and _number(cell, False) is not None else ""
-                raise InputError(f"{self.path}: column {name!r}, row {i + 1}: expected a number, got {cell!r}{mixed}")
+                mixed = (
+                    "; the decimal sign is a comma elsewhere in this file"
+                    if comma and _number(cell, False) is not None
+                    else ""
+                )
+                raise InputError(
+                    f"{self.path}: column {name!r}, row {i + 1}: expected a number, got"
+                    f" {cell!r}{mixed}"
+                )
             out[i] = value
         return out
 
 
 def _number(cell: str, comma: bool) -> float | None:
-    """The number of a cell, None where it is none; with a decimal `comma` a point is no part of a number."""
+    """The number of a cell, None where it is none; with a decimal `comma` a point is no part of a
+    number.
+    """
     if cell.lower() in MISSING:
         return float("nan")
     if "_" in cell or (comma and "." in cell):
@@ -110,7 +149,9 @@ def _numeric(line: str) -> bool:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """The one that gives the header two names or more and every row as many cells; else that which gives the header most."""
+    """The one that gives the header two names or more and every row as many cells; else that which
+    gives the header most.
+    """
     widths = {s: [len(row) for row in _split(lines, s)] for s in SEPARATORS}
     for separator, (header, *rows) in widths.items():
         if header > 1 and all(row == header for row in rows):
@@ -121,4 +162,7 @@ def _separator(lines: Sequence[str]) -> str:
 def _split(lines: Iterable[str], separator: str) -> list[list[str]]:
     if separator == " ":
         return [line.split() for line in lines]
-    return [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator, skipinitialspace=True)]
+    return [
+        [cell.strip() for cell in row]
+        for row in csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    ]

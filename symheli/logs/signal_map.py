@@ -1,16 +1,18 @@
-"""A TOML file that says where a log keeps which signal, in which unit: written once for an aircraft, used for every flight of it.
+"""A TOML file that says where a log keeps which signal, in which unit: written once for an
+aircraft, used for every flight of it.
 
     format = "csv"          # csv, mat, xplane or ulog; by the log's extension where it is left out
     time = "time_us"        # time column of csv and mat
     time_unit = "us"
-    dt = 0.02               # s: resample to (needed for ulog, and for xplane and csv without a time)
+    dt = 0.02               # s: resample to (needed for ulog; xplane and csv without a time)
 
     [signals]
     q = { column = "gyro_y", unit = "deg/s", scale = -1 }
     airspeed = { column = "pitot", unit = "km/h", offset = 0.4 }
 
-A signal is (scale * column + offset) in `unit`. Columns of a ulog are "topic.field", those of a MATLAB file may reach into a struct
-("log.theta"), those of X-Plane are the names of `symheli.logs.xplane` and need no unit.
+A signal is (scale * column + offset) in `unit`. Columns of a ulog are "topic.field", those of a
+MATLAB file may reach into a struct ("log.theta"), those of X-Plane are the names of
+`symheli.logs.xplane` and need no unit.
 """
 
 from __future__ import annotations
@@ -34,7 +36,9 @@ ENTRY = ("column", "unit", "scale", "offset")
 
 @dataclass(frozen=True)
 class Source:
-    """Where one signal comes from: `column`, its `unit` (None: that of the log), scale * column + offset."""
+    """Where one signal comes from: `column`, its `unit` (None: that of the log), scale * column +
+    offset.
+    """
 
     column: str
     unit: str | None
@@ -64,7 +68,10 @@ class SignalMap:
                 raise UnknownNameError(f"entry of {path}", key, KEYS)
         given = table.get("signals")
         if not isinstance(given, dict) or not given:
-            raise InputError(f'{path}: a [signals] table is needed, such as q = {{ column = "gyro_y", unit = "deg/s" }}')
+            raise InputError(
+                f'{path}: a [signals] table is needed, such as q = {{ column = "gyro_y", unit ='
+                ' "deg/s" }'
+            )
         signals = {name: _source(entry, f"{path}, signals.{name}") for name, entry in given.items()}
         kind, dt = table.get("format"), table.get("dt")
         if kind is not None and kind not in (*FORMATS.values(), "xplane"):
@@ -94,20 +101,36 @@ class SignalMap:
                 return FlightRecord.from_xplane(log, self.dt)
             case "ulog":
                 if self.dt is None:
-                    raise InputError(f"{log}: the topics of a ULog have their own clocks; give dt (s) in the signal map to resample them")
-                return FlightRecord.from_ulog(log, {column: (*_topic(column), unit) for column, unit in declared.items()}, self.dt)
+                    raise InputError(
+                        f"{log}: the topics of a ULog have their own clocks; give dt (s) in the"
+                        " signal map to resample them"
+                    )
+                return FlightRecord.from_ulog(
+                    log,
+                    {column: (*_topic(column), unit) for column, unit in declared.items()},
+                    self.dt,
+                )
             case "mat":
                 if self.time is None:
                     raise InputError(f"{log}: name the time vector in the signal map: time = ...")
                 return FlightRecord.from_mat(log, self.time, declared, self.time_unit)
-        return FlightRecord.from_csv(log, self.time, declared, self.dt if self.time is None else None, self.time_unit)
+        return FlightRecord.from_csv(
+            log, self.time, declared, self.dt if self.time is None else None, self.time_unit
+        )
 
     def _unit(self, name: str, source: Source, record: FlightRecord) -> str:
-        found = record.signals[record.signals.index(source.column)].unit if source.column in record.signals else None  # type: ignore[arg-type]
+        found = (
+            record.signals[record.signals.index(source.column)].unit
+            if source.column in record.signals
+            else None
+        )  # type: ignore[arg-type]
         if source.unit is None:
             return found or "1"
         if found is not None and to_si(source.unit)[1] != found:
-            raise InputError(f"signals.{name}: {source.column} comes in {found}, which is no {source.unit}; correct or leave out the unit")
+            raise InputError(
+                f"signals.{name}: {source.column} comes in {found}, which is no {source.unit};"
+                " correct or leave out the unit"
+            )
         return source.unit
 
 
@@ -122,12 +145,17 @@ def _source(entry: Any, where: str) -> Source:
         to_si(unit)
     numbers = [entry.get("scale", 1.0), entry.get("offset", 0.0)]
     if not all(isinstance(n, int | float) and math.isfinite(n) for n in numbers) or numbers[0] == 0:
-        raise InputError(f"{where}: scale must be a number other than 0 and offset a number, got {numbers}")
+        raise InputError(
+            f"{where}: scale must be a number other than 0 and offset a number, got {numbers}"
+        )
     return Source(entry["column"], unit, float(numbers[0]), float(numbers[1]))
 
 
 def _topic(column: str) -> tuple[str, str]:
     topic, dot, field = column.partition(".")
     if not dot:
-        raise InputError(f'{column!r}: a column of a ULog is "topic.field", such as "vehicle_angular_velocity.xyz[1]"')
+        raise InputError(
+            f'{column!r}: a column of a ULog is "topic.field", such as'
+            ' "vehicle_angular_velocity.xyz[1]"'
+        )
     return topic, field

@@ -2,7 +2,7 @@
 
 | signal | from | unit |
 |---|---|---|
-| u, v, w | vX (east), vY (up), vZ (south), rotated by heading, pitch and roll: velocity over ground | m/s |
+| u, v, w | vX (east), vY (up), vZ (south) turned into body axes: velocity over ground | m/s |
 | p, q, r | P, Q, R | rad/s |
 | phi, theta, psi | roll, pitch, true heading (made continuous) | rad |
 | airspeed | true airspeed | m/s |
@@ -11,7 +11,8 @@
 | alpha, beta | alpha, beta | rad |
 | altitude, height | above sea level, above ground | m |
 
-A signal is there where the log has its columns. The sticks are not called d_lon ...: what angle they command is not in the log.
+A signal is there where the log has its columns. The sticks are not called d_lon ...: what angle
+they command is not in the log.
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ SOURCES = {
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """Rows under one header: raw columns by "name,unit" without padding, a repeated name with #2, #3 ..."""
+    """Rows under one header: raw columns by "name,unit" without padding, a repeated name with #2,
+    #3 ...
+    """
 
     columns: Mapping[str, np.ndarray]
 
@@ -66,19 +69,26 @@ class Segment:
 def read_xplane(path: str | os.PathLike[str], dt: float | None = None) -> Table:
     """Time (s), signals and units (table above) of a Data.txt, its sessions separated by gaps.
 
-    Every header starts a segment with columns of its own; empty segments and a last row cut short are left out. Rows are `dt` (s)
-    apart where it is given, else the log's own clock counts; a log with neither raises `InputError` with an estimate of
-    dt from the positions and velocities in it. A file that is no such log raises `InputError` that says why.
+    Every header starts a segment with columns of its own; empty segments and a last row cut short
+    are left out. Rows are `dt` (s) apart where it is given, else the log's own clock counts; a log
+    with neither raises `InputError` with an estimate of dt from the positions and velocities in it.
+    A file that is no such log raises `InputError` that says why.
     """
     segments = [s for s in _segments(path) if len(s)]
     if not segments:
         raise InputError(f"{path}: headers but no whole row of numbers")
     signals = [_signals(s.columns) for s in segments]
     if not any(signals):
-        raise InputError(f"{path}: none of the columns is known; found {', '.join(segments[0].columns)}")
+        raise InputError(
+            f"{path}: none of the columns is known; found {', '.join(segments[0].columns)}"
+        )
     times = [_clock(s, dt, path, segments) for s in segments]
     keep = [np.concatenate([[True], np.diff(np.maximum.accumulate(t)) > 0]) for t in times]
-    step = float(np.median(np.concatenate([np.diff(t[k]) for t, k in zip(times, keep, strict=True)]))) if dt is None else dt
+    step = (
+        float(np.median(np.concatenate([np.diff(t[k]) for t, k in zip(times, keep, strict=True)])))
+        if dt is None
+        else dt
+    )
     names = list(dict.fromkeys(name for s in signals for name in s))
     columns: dict[str, list[np.ndarray]] = {name: [] for name in names}
     clock, start = [], 0.0
@@ -86,8 +96,14 @@ def read_xplane(path: str | os.PathLike[str], dt: float | None = None) -> Table:
         clock.append(start + seconds[rows] - seconds[0])
         start = clock[-1][-1] + GAP * step
         for name in names:
-            columns[name].append(values[name][rows] if name in values else np.full(int(rows.sum()), np.nan))
-    return np.concatenate(clock), {n: np.concatenate(c) for n, c in columns.items()}, {n: _unit(n) for n in names}
+            columns[name].append(
+                values[name][rows] if name in values else np.full(int(rows.sum()), np.nan)
+            )
+    return (
+        np.concatenate(clock),
+        {n: np.concatenate(c) for n, c in columns.items()},
+        {n: _unit(n) for n in names},
+    )
 
 
 def _segments(path: str | os.PathLike[str]) -> list[Segment]:
@@ -95,14 +111,19 @@ def _segments(path: str | os.PathLike[str]) -> list[Segment]:
     lines = [(i, line) for i, line in enumerate(text(path).splitlines(), start=1) if line.strip()]
     headers = [j for j, (_, line) in enumerate(lines) if _is_header(line)]
     if not headers or headers[0] > 0:
-        raise InputError(f'{path}: not an X-Plane log: expected a header such as "____Q,rad/s | pitch,__deg |" in its first line')
+        raise InputError(
+            f'{path}: not an X-Plane log: expected a header such as "____Q,rad/s | pitch,__deg |"'
+            " in its first line"
+        )
     out = []
     for begin, end in zip(headers, [*headers[1:], len(lines)], strict=True):
         names = _names(_fields(lines[begin][1]))
         rows = [(i, _fields(line)) for i, line in lines[begin + 1 : end]]
         if rows and len(rows[-1][1]) < len(names):
             rows.pop()  # the simulator stopped in the middle of a line
-        table = np.array([_row(fields, len(names), i, path) for i, fields in rows]).reshape(len(rows), len(names))
+        table = np.array([_row(fields, len(names), i, path) for i, fields in rows]).reshape(
+            len(rows), len(names)
+        )
         out.append(Segment(dict(zip(names, table.T, strict=True))))
     return out
 
@@ -121,14 +142,19 @@ def _names(fields: list[str]) -> list[str]:
     names: list[str] = []
     for field in fields:
         name, _, unit = (part.strip("_ ") for part in field.partition(","))
-        again = sum(n.split(",")[0].split("#")[0] == name and n.split(",")[1] == unit for n in names)
+        again = sum(
+            n.split(",")[0].split("#")[0] == name and n.split(",")[1] == unit for n in names
+        )
         names.append(f"{name}#{again + 1},{unit}" if again else f"{name},{unit}")
     return names
 
 
 def _row(fields: list[str], width: int, line: int, path: object) -> list[float]:
     if len(fields) != width:
-        raise InputError(f"{path}, line {line}: expected {width} fields as in the header above, got {len(fields)}")
+        raise InputError(
+            f"{path}, line {line}: expected {width} fields as in the header above, got"
+            f" {len(fields)}"
+        )
     try:
         return [float(field) for field in fields]
     except ValueError as error:
@@ -153,11 +179,24 @@ def _signals(raw: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def body_velocity(
-    north: np.ndarray, east: np.ndarray, down: np.ndarray, phi: np.ndarray, theta: np.ndarray, psi: np.ndarray
+    north: np.ndarray,
+    east: np.ndarray,
+    down: np.ndarray,
+    phi: np.ndarray,
+    theta: np.ndarray,
+    psi: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """u, v, w (m/s) of a velocity in earth axes (m/s), by the Euler angles psi, theta, phi (rad) in that order."""
-    ahead, right = np.cos(psi) * north + np.sin(psi) * east, -np.sin(psi) * north + np.cos(psi) * east
-    u, below = np.cos(theta) * ahead - np.sin(theta) * down, np.sin(theta) * ahead + np.cos(theta) * down
+    """u, v, w (m/s) of a velocity in earth axes (m/s), by the Euler angles psi, theta, phi (rad) in
+    that order.
+    """
+    ahead, right = (
+        np.cos(psi) * north + np.sin(psi) * east,
+        -np.sin(psi) * north + np.cos(psi) * east,
+    )
+    u, below = (
+        np.cos(theta) * ahead - np.sin(theta) * down,
+        np.sin(theta) * ahead + np.cos(theta) * down,
+    )
     return u, np.cos(phi) * right + np.sin(phi) * below, -np.sin(phi) * right + np.cos(phi) * below
 
 
@@ -168,12 +207,18 @@ def _clock(segment: Segment, dt: float | None, path: object, segments: list[Segm
         if name in segment.columns:
             return segment.columns[name]
     estimate = estimated_period(segments)
-    hint = "" if estimate is None else f"; positions against velocities (dX against vX) suggest dt = {estimate:.3f} s"
+    hint = (
+        ""
+        if estimate is None
+        else f"; positions against velocities (dX against vX) suggest dt = {estimate:.3f} s"
+    )
     raise InputError(f"{path}: the log has no time column; give the sample period dt in s{hint}")
 
 
 def estimated_period(segments: list[Segment]) -> float | None:
-    """The step (s) that best explains the changes of X, Y, Z by vX, vY, vZ; None where the log lacks them or nothing moved."""
+    """The step (s) that best explains the changes of X, Y, Z by vX, vY, vZ; None where the log
+    lacks them or nothing moved.
+    """
     moved, speed = [np.zeros(0)], [np.zeros(0)]
     for columns in (s.columns for s in segments):
         for axis in "XYZ":

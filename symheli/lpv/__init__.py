@@ -1,10 +1,31 @@
 """The value types that every room shares: pure NumPy, no physics, no solver."""
 
-from symheli.lpv.bases import Basis, BSpline, FunctionSpace, Piece, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
+from symheli.lpv.bases import (
+    Basis,
+    BSpline,
+    FunctionSpace,
+    Piece,
+    PiecewiseLinear,
+    Polynomial,
+    Product,
+    Spline,
+    UserFunctions,
+)
 from symheli.lpv.conditioning import cut, decimate, low_pass, smooth, split, with_norm
 from symheli.lpv.delay import pade_delay
 from symheli.lpv.flight_record import FlightRecord
-from symheli.lpv.lft import LFT, Block, HoldError, Truncation, WellPosedness, append, connect, feedback, parallel, series
+from symheli.lpv.lft import (
+    LFT,
+    Block,
+    HoldError,
+    Truncation,
+    WellPosedness,
+    append,
+    connect,
+    feedback,
+    parallel,
+    series,
+)
 from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel

@@ -11,7 +11,9 @@ from symheli.lpv.signal import Signal
 
 
 def comma_separated(columns: Iterable[tuple[Signal, Array | Sequence[float]]]) -> str:
-    """One column a signal, all as long: the first line names them, the second gives their units; numbers to the last bit."""
+    """One column a signal, all as long: the first line names them, the second gives their units;
+    numbers to the last bit.
+    """
     columns = list(columns)
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

@@ -18,12 +18,18 @@ def with_norm(record: FlightRecord, parts: Sequence[str], name: str = "speed") -
     """With the signal `name`: the Euclidean length of `parts`, which must share one unit."""
     found = {record.signals[record.signals.index(part)].unit for part in parts}  # type: ignore[arg-type]
     if len(found) > 1:
-        raise InputError(f"a length needs one unit, {', '.join(parts)} come in {', '.join(sorted(found))}")
-    return record.with_signals({name: found.pop()}, **{name: np.linalg.norm(record.columns(parts), axis=1)})
+        raise InputError(
+            f"a length needs one unit, {', '.join(parts)} come in {', '.join(sorted(found))}"
+        )
+    return record.with_signals(
+        {name: found.pop()}, **{name: np.linalg.norm(record.columns(parts), axis=1)}
+    )
 
 
 def smooth(record: FlightRecord, name: str, seconds: float) -> FlightRecord:
-    """`name` after a causal first-order low-pass with this time constant (s), started anew in each segment and behind missing samples."""
+    """`name` after a causal first-order low-pass with this time constant (s), started anew in each
+    segment and behind missing samples.
+    """
     if not 0 < seconds < math.inf:
         raise InputError(f"seconds: expected a positive time constant, got {seconds}")
     signal, out = record[name], np.full(len(record), np.nan)
@@ -31,23 +37,39 @@ def smooth(record: FlightRecord, name: str, seconds: float) -> FlightRecord:
         state = math.nan
         for k in range(part.start, part.stop):
             step = record.time[k] - record.time[k - 1] if k > part.start else 0.0
-            state = signal[k] if not math.isfinite(state) else state + (1 - math.exp(-step / seconds)) * (signal[k] - state)
+            state = (
+                signal[k]
+                if not math.isfinite(state)
+                else state + (1 - math.exp(-step / seconds)) * (signal[k] - state)
+            )
             out[k] = state
     unit = record.signals[record.signals.index(name)].unit  # type: ignore[arg-type]
     return record.with_signals({name: unit}, **{name: out})
 
 
-def low_pass(record: FlightRecord, cutoff: float, order: int = 4, *, zero_phase: bool = False, leave: Sequence[str] = ()) -> FlightRecord:
-    """All signals but those of `leave` through one Butterworth filter of `order` with its corner at `cutoff` (Hz).
+def low_pass(
+    record: FlightRecord,
+    cutoff: float,
+    order: int = 4,
+    *,
+    zero_phase: bool = False,
+    leave: Sequence[str] = (),
+) -> FlightRecord:
+    """All signals but those of `leave` through one Butterworth filter of `order` with its corner at
+    `cutoff` (Hz).
 
-    One filter for all keeps a linear relation between inputs and outputs; coefficients that move with p keep it while p moves slowly
-    against the filter, so the scheduling signal is best left as it is. Causal, settled at the first sample of each stretch; `zero_phase`
-    runs it forwards and backwards (not for real time). Each unbroken stretch between missing samples is filtered by itself, signal by
-    signal. Raises `InputError` for a corner beyond half the sampling frequency.
+    One filter for all keeps a linear relation between inputs and outputs; coefficients that move
+    with p keep it while p moves slowly against the filter, so the scheduling signal is best left as
+    it is. Causal, settled at the first sample of each stretch; `zero_phase` runs it forwards and
+    backwards (not for real time). Each unbroken stretch between missing samples is filtered by
+    itself, signal by signal. Raises `InputError` for a corner beyond half the sampling frequency.
     """
     rate = 1 / record.dt
     if not 0 < cutoff < rate / 2 or order < 1:
-        raise InputError(f"cutoff: expected a frequency between 0 and {rate / 2:.4g} Hz (half the sampling frequency), got {cutoff}")
+        raise InputError(
+            f"cutoff: expected a frequency between 0 and {rate / 2:.4g} Hz (half the sampling"
+            f" frequency), got {cutoff}"
+        )
     if not isinstance(order, int | np.integer):
         raise InputError(f"order: expected a whole number >= 1, got {order!r}")
     for name in leave:
@@ -77,10 +99,12 @@ def _filtered(sos: Array, x: Array, zero_phase: bool) -> Array:
 
 
 def decimate(record: FlightRecord, n: int) -> FlightRecord:
-    """Means of `n` samples in a row, all signals alike: a linear relation between them is kept, noise and dt change.
+    """Means of `n` samples in a row, all signals alike: a linear relation between them is kept,
+    noise and dt change.
 
-    Within a mean the output has heard the input already: y(k) depends on u(k), whatever it did before. Identify with delay 0; the record
-    remembers (`resampled`), and `fit` warns. No other filter avoids it: between slow samples what is band-limited is known from both sides.
+    Within a mean the output has heard the input already: y(k) depends on u(k), whatever it did
+    before. Identify with delay 0; the record remembers (`resampled`), and `fit` warns. No other
+    filter avoids it: between slow samples what is band-limited is known from both sides.
     """
     if not isinstance(n, int | np.integer) or n < 1:
         raise InputError(f"expected a whole number of samples >= 1 to take together, got {n!r}")
@@ -91,10 +115,19 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
         rows = (part.stop - part.start) // n
         stop = part.start + rows * n
         times.append(record.time[part.start : stop].reshape(rows, n).mean(axis=1))
-        values.append(record.values[part.start : stop].reshape(rows, n, len(record.signals)).mean(axis=1))
+        values.append(
+            record.values[part.start : stop].reshape(rows, n, len(record.signals)).mean(axis=1)
+        )
     if sum(map(len, times)) < 2:
-        raise InputError(f"taking {n} samples together leaves fewer than two; the record has {len(record)}")
-    return replace(record, time=np.concatenate(times), values=np.concatenate(values), resampled=f"means of {n} samples")
+        raise InputError(
+            f"taking {n} samples together leaves fewer than two; the record has {len(record)}"
+        )
+    return replace(
+        record,
+        time=np.concatenate(times),
+        values=np.concatenate(values),
+        resampled=f"means of {n} samples",
+    )
 
 
 def cut(record: FlightRecord, start: float | None, stop: float | None) -> FlightRecord:
@@ -102,7 +135,10 @@ def cut(record: FlightRecord, start: float | None, stop: float | None) -> Flight
     low, high = -math.inf if start is None else start, math.inf if stop is None else stop
     keep = (record.time >= low) & (record.time < high)
     if keep.sum() < 2:
-        raise InputError(f"nothing is left between start and stop; the record goes from {record.time[0]:g} to {record.time[-1]:g} s")
+        raise InputError(
+            f"nothing is left between start and stop; the record goes from {record.time[0]:g} to"
+            f" {record.time[-1]:g} s"
+        )
     return record.rows(keep)
 
 
@@ -114,6 +150,7 @@ def split(record: FlightRecord, fraction: float) -> tuple[FlightRecord, FlightRe
         return record, None
     if early.sum() < 2 or (~early).sum() < 2:
         raise InputError(
-            f"a fraction of {fraction:g} leaves {int(early.sum())} samples to fit and {int((~early).sum())} to judge; record longer"
+            f"a fraction of {fraction:g} leaves {int(early.sum())} samples to fit and"
+            f" {int((~early).sum())} to judge; record longer"
         )
     return record.rows(early), record.rows(~early)

@@ -12,14 +12,21 @@ from symheli.lpv.signal import Signal
 
 
 def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:
-    """exp(-s T) for T = `seconds` from `<name>_command` to `name`: Pade's all-pass of `order`, in observer form.
+    """exp(-s T) for T = `seconds` from `<name>_command` to `name`: Pade's all-pass of `order`, in
+    observer form.
 
-    The phase is right to 1e-3 rad up to omega T of about `order` (4: up to 200 rad/s for 20 ms). Raises `InputError`.
+    The phase is right to 1e-3 rad up to omega T of about `order` (4: up to 200 rad/s for 20 ms).
+    Raises `InputError`.
     """
     if not (math.isfinite(seconds) and seconds > 0) or not 1 <= order <= 10:
-        raise InputError(f"expected a delay > 0 s and an order from 1 to 10, got {seconds} s and {order}")
+        raise InputError(
+            f"expected a delay > 0 s and an order from 1 to 10, got {seconds} s and {order}"
+        )
     # sum of c_k (sT)^k, c_k = (2n-k)! n! / ((2n)! k! (n-k)!), in scaled time s T
-    c = [math.comb(order, k) * math.factorial(2 * order - k) / math.factorial(2 * order) for k in range(order + 1)]
+    c = [
+        math.comb(order, k) * math.factorial(2 * order - k) / math.factorial(2 * order)
+        for k in range(order + 1)
+    ]
     denominator = np.array(c) / c[-1]
     numerator = denominator * (-1.0) ** np.arange(order + 1)
     direct = numerator[-1]
@@ -29,4 +36,6 @@ def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:
     C = np.eye(1, order)
     states = tuple(Signal(f"{name}_delay{i + 1}") for i in range(order))
     model_in = Signal(f"{name}_command", Signal(name).unit)
-    return LinearModel(A / seconds, B / seconds, C, np.full((1, 1), direct), states, (model_in,), (Signal(name),))
+    return LinearModel(
+        A / seconds, B / seconds, C, np.full((1, 1), direct), states, (model_in,), (Signal(name),)
+    )

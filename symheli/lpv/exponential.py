@@ -10,9 +10,11 @@ from symheli.lpv.arrays import Array
 
 
 def expm(M: Array) -> Array:
-    """Exponentials of the matrices (N, n, n), all at once: Taylor polynomial of degree 12, scaled and squared.
+    """Exponentials of the matrices (N, n, n), all at once: Taylor polynomial of degree 12, scaled
+    and squared.
 
-    At norm 1/2 the remainder is below 2e-14; SciPy's loops over the N matrices, ten times slower for small ones.
+    At norm 1/2 the remainder is below 2e-14; SciPy's loops over the N matrices, ten times slower
+    for small ones.
     """
     size = float(np.abs(M).sum(axis=-2).max(initial=0.0))
     squarings = max(0, math.ceil(math.log2(size / 0.5))) if size > 0.5 else 0

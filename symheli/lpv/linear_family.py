@@ -25,10 +25,12 @@ Kind = Literal["polynomial", "spline", "linear"]
 
 @dataclass(frozen=True, eq=False)
 class LinearFamily:
-    """K linear models at increasing `airspeeds` (m/s): A (K, nx, nx), B (K, nx, nu), C (K, ny, nx), D (K, ny, nu).
+    """K linear models at increasing `airspeeds` (m/s): A (K, nx, nx), B (K, nx, nu), C (K, ny, nx),
+    D (K, ny, nu).
 
-    `trims` holds the operating point of each; empty where the matrices come from elsewhere and none is known. `kinks` maps a name
-    of the physics (a saturation, an edge of a wake) to the airspeeds at which the models change with a corner.
+    `trims` holds the operating point of each; empty where the matrices come from elsewhere and none
+    is known. `kinks` maps a name of the physics (a saturation, an edge of a wake) to the airspeeds
+    at which the models change with a corner.
     """
 
     airspeeds: Array
@@ -50,51 +52,99 @@ class LinearFamily:
         if np.any(np.diff(self.airspeeds) <= 0):
             raise InputError("airspeeds must increase strictly")
         K, nx, nu, ny = len(self.airspeeds), len(self.states), len(self.inputs), len(self.outputs)
-        for name, shape in (("A", (K, nx, nx)), ("B", (K, nx, nu)), ("C", (K, ny, nx)), ("D", (K, ny, nu))):
+        for name, shape in (
+            ("A", (K, nx, nx)),
+            ("B", (K, nx, nu)),
+            ("C", (K, ny, nx)),
+            ("D", (K, ny, nu)),
+        ):
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
         if len(self.trims) not in (0, K):
-            raise InputError(f"expected {K} trims, one an airspeed, or none at all, got {len(self.trims)}")
+            raise InputError(
+                f"expected {K} trims, one an airspeed, or none at all, got {len(self.trims)}"
+            )
 
     @classmethod
     def from_models(
-        cls, airspeeds: Sequence[float] | Array, models: Sequence[LinearModel], kinks: Mapping[str, tuple[float, ...]] | None = None
+        cls,
+        airspeeds: Sequence[float] | Array,
+        models: Sequence[LinearModel],
+        kinks: Mapping[str, tuple[float, ...]] | None = None,
     ) -> LinearFamily:
-        """From linear models with equal names and sample period, one an airspeed (m/s); all with their operating point, or none."""
+        """From linear models with equal names and sample period, one an airspeed (m/s); all with
+        their operating point, or none.
+        """
         if not len(models) or len(models) != len(np.atleast_1d(np.asarray(airspeeds))):
             raise InputError(f"expected one model an airspeed, got {len(models)} models")
         first = models[0]
         for k, model in enumerate(models):
-            if (model.states, model.inputs, model.outputs, model.dt) != (first.states, first.inputs, first.outputs, first.dt):
-                raise InputError(f"models[{k}]: expected states, inputs, outputs and dt of models[0]; select or discretize first")
+            if (model.states, model.inputs, model.outputs, model.dt) != (
+                first.states,
+                first.inputs,
+                first.outputs,
+                first.dt,
+            ):
+                raise InputError(
+                    f"models[{k}]: expected states, inputs, outputs and dt of models[0]; select or"
+                    " discretize first"
+                )
         return cls(
-            np.asarray(airspeeds, float), np.stack([m.A for m in models]), np.stack([m.B for m in models]),
-            np.stack([m.C for m in models]), np.stack([m.D for m in models]),
-            first.states, first.inputs, first.outputs, tuple(m.point for m in models if m.point), first.dt, kinks or {},
-        )  # fmt: skip
+            np.asarray(airspeeds, float),
+            np.stack([m.A for m in models]),
+            np.stack([m.B for m in models]),
+            np.stack([m.C for m in models]),
+            np.stack([m.D for m in models]),
+            first.states,
+            first.inputs,
+            first.outputs,
+            tuple(m.point for m in models if m.point),
+            first.dt,
+            kinks or {},
+        )
 
     def __len__(self) -> int:
         return len(self.airspeeds)
 
     def __getitem__(self, k: int) -> LinearModel:
-        return LinearModel(self.A[k], self.B[k], self.C[k], self.D[k], self.states, self.inputs, self.outputs, self.dt, self._trim(k))
+        return LinearModel(
+            self.A[k],
+            self.B[k],
+            self.C[k],
+            self.D[k],
+            self.states,
+            self.inputs,
+            self.outputs,
+            self.dt,
+            self._trim(k),
+        )
 
     def known_trims(self, purpose: str) -> tuple[OperatingPoint, ...]:
         """The trims; raises `InputError` where there are none, which `purpose` needs."""
         if not self.trims:
-            raise InputError(f"{purpose} needs the trim at each airspeed, and this family has none; give its models a point, or sweep")
+            raise InputError(
+                f"{purpose} needs the trim at each airspeed, and this family has none; give its"
+                " models a point, or sweep"
+            )
         return self.trims
 
     def _trim(self, k: int) -> OperatingPoint | None:
         return self.trims[k] if self.trims else None
 
     def select(
-        self, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+        self,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
     ) -> LinearFamily:
-        """Keep these states (rows and columns of the others are deleted), inputs and outputs, in this order."""
+        """Keep these states (rows and columns of the others are deleted), inputs and outputs, in
+        this order.
+        """
         return self._map(lambda model: model.select(states, inputs, outputs))
 
     def residualize(self, states: Sequence[str]) -> LinearFamily:
-        """Remove these states by setting their derivatives to zero (quasi-steady), continuous time only."""
+        """Remove these states by setting their derivatives to zero (quasi-steady), continuous time
+        only.
+        """
         if self.dt is not None:
             raise InputError("residualize continuous models, then discretize")
         gone = indices(states, self.states, "state")
@@ -105,13 +155,20 @@ class LinearFamily:
             A, B, C, D = model.A, model.B, model.C[rows], model.D[rows]
             ss = A[np.ix_(gone, gone)]
             if is_singular(ss):
-                raise InputError(f"cannot residualize {', '.join(states)}: they do not settle (singular dynamics)")
+                raise InputError(
+                    f"cannot residualize {', '.join(states)}: they do not settle (singular"
+                    " dynamics)"
+                )
             X, U = np.linalg.solve(ss, A[np.ix_(gone, kept)]), np.linalg.solve(ss, B[gone])
             return replace(
-                model, A=A[np.ix_(kept, kept)] - A[np.ix_(kept, gone)] @ X, B=B[kept] - A[np.ix_(kept, gone)] @ U,
-                C=C[:, kept] - C[:, gone] @ X, D=D - C[:, gone] @ U,
-                states=tuple(self.states[i] for i in kept), outputs=tuple(self.outputs[i] for i in rows),
-            )  # fmt: skip
+                model,
+                A=A[np.ix_(kept, kept)] - A[np.ix_(kept, gone)] @ X,
+                B=B[kept] - A[np.ix_(kept, gone)] @ U,
+                C=C[:, kept] - C[:, gone] @ X,
+                D=D - C[:, gone] @ U,
+                states=tuple(self.states[i] for i in kept),
+                outputs=tuple(self.outputs[i] for i in rows),
+            )
 
         return self._map(reduce)
 
@@ -119,12 +176,15 @@ class LinearFamily:
         """Zero-order-hold equivalent of each model at sample period `dt` (s)."""
         return self._map(lambda model: model.discretize(dt))
 
-    def interpolate(self, kind: Kind = "polynomial", degree: int = 3, *, rate: float = math.inf) -> LPVStateSpace:
+    def interpolate(
+        self, kind: Kind = "polynomial", degree: int = 3, *, rate: float = math.inf
+    ) -> LPVStateSpace:
         """Element-wise interpolation of every entry of A, B, C, D over airspeed.
 
-        "polynomial": least-squares fit of `degree`; "spline": cubic through the nodes; "linear": straight lines.
-        `.residuals` of the result are fit minus node values. The trim schedule is always the cubic spline (linear
-        below four nodes), none without trims: its slope is the drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2.
+        "polynomial": least-squares fit of `degree`; "spline": cubic through the nodes; "linear":
+        straight lines. `.residuals` of the result are fit minus node values. The trim schedule is
+        always the cubic spline (linear below four nodes), none without trims: its slope is the
+        drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2.
         """
         low, high = float(self.airspeeds[0]), float(self.airspeeds[-1])
         if len(self) < 2:
@@ -142,17 +202,27 @@ class LinearFamily:
         exact = Matrices(self.A, self.B, self.C, self.D)
         fitted = Matrices(*(basis.fit(self.airspeeds, M) for M in exact))
         model = LPVStateSpace(
-            basis, *fitted, Scheduling("airspeed", "m/s", low, high, rate), self.states, self.inputs, self.outputs,
-            dt=self.dt, trim=self._schedule(nodes),
-        )  # fmt: skip
+            basis,
+            *fitted,
+            Scheduling("airspeed", "m/s", low, high, rate),
+            self.states,
+            self.inputs,
+            self.outputs,
+            dt=self.dt,
+            trim=self._schedule(nodes),
+        )
         return model.with_residuals(self.airspeeds, exact)
 
     def _schedule(self, nodes: tuple[float, ...]) -> TrimSchedule | None:
         if not self.trims:
             return None
         x0 = np.array([[trim.x[s] for s in self.states] for trim in self.trims])
-        u0 = np.array([[trim.u[i] if i in trim.u else 0.0 for i in self.inputs] for trim in self.trims])
+        u0 = np.array(
+            [[trim.u[i] if i in trim.u else 0.0 for i in self.inputs] for trim in self.trims]
+        )
         return TrimSchedule(Spline(nodes) if len(self) >= 4 else PiecewiseLinear(nodes), x0, u0)
 
     def _map(self, change) -> LinearFamily:
-        return LinearFamily.from_models(self.airspeeds, [change(self[k]) for k in range(len(self))], self.kinks)
+        return LinearFamily.from_models(
+            self.airspeeds, [change(self[k]) for k in range(len(self))], self.kinks
+        )

@@ -16,9 +16,11 @@ from symheli.lpv.signal import Signal
 
 @dataclass(frozen=True, eq=False)
 class LinearGrid:
-    """Models at n1 airspeeds (m/s) and n2 `values` of `axis` (a `Signal` with its unit), both increasing.
+    """Models at n1 airspeeds (m/s) and n2 `values` of `axis` (a `Signal` with its unit), both
+    increasing.
 
-    families: one `LinearFamily` over the same airspeeds a value. A is (n1, n2, nx, nx), B (n1, n2, nx, nu), C and D alike.
+    families: one `LinearFamily` over the same airspeeds a value. A is (n1, n2, nx, nx), B (n1, n2,
+    nx, nu), C and D alike.
     """
 
     axis: Signal
@@ -26,12 +28,18 @@ class LinearGrid:
     families: tuple[LinearFamily, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen(self.values, str(self.axis), (len(self.families),)))
+        object.__setattr__(
+            self, "values", frozen(self.values, str(self.axis), (len(self.families),))
+        )
         if len(self.values) == 0 or np.any(np.diff(self.values) <= 0):
             raise InputError(f"{self.axis}: expected increasing values, got {self.values.tolist()}")
         first = self.families[0]
         for family in self.families:
-            same = (family.states, family.inputs, family.outputs) == (first.states, first.inputs, first.outputs)
+            same = (family.states, family.inputs, family.outputs) == (
+                first.states,
+                first.inputs,
+                first.outputs,
+            )
             if not same or not np.array_equal(family.airspeeds, first.airspeeds):
                 raise InputError("a grid needs families with equal names at equal airspeeds")
 
@@ -85,11 +93,18 @@ class LinearGrid:
         return self.families[j][i]
 
     def family(self, **value: float) -> LinearFamily:
-        """The models over airspeed at one value of the axis, as in family(mass=8.2); it must be on the grid."""
+        """The models over airspeed at one value of the axis, as in family(mass=8.2); it must be on
+        the grid.
+        """
         if list(value) != [str(self.axis)]:
             raise UnknownNameError("axis", ", ".join(value) or "(none)", [str(self.axis)])
         wanted = value[str(self.axis)]
         miss = np.abs(self.values - wanted)
-        if not miss.min() <= 1e-9 * max(abs(wanted), np.ptp(self.values)):  # the same number, rounded otherwise
-            raise InputError(f"{self.axis} = {wanted} {self.axis.unit} is not on the grid: {', '.join(f'{v:g}' for v in self.values)}")
+        if not miss.min() <= 1e-9 * max(
+            abs(wanted), np.ptp(self.values)
+        ):  # the same number, rounded otherwise
+            raise InputError(
+                f"{self.axis} = {wanted} {self.axis.unit} is not on the grid:"
+                f" {', '.join(f'{v:g}' for v in self.values)}"
+            )
         return self.families[int(miss.argmin())]

@@ -20,10 +20,11 @@ from symheli.lpv.signal import Signal, indices, signals
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """dx/dt = A x + B u, y = C x + D u (dt None) or x(k+1) = A x + B u (dt in s), in deviations from `point`.
+    """dx/dt = A x + B u, y = C x + D u (dt None) or x(k+1) = A x + B u (dt in s), in deviations
+    from `point`.
 
-    A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) in SI units and radians; `states`, `inputs`, `outputs` are
-    `Signal`s: strings that carry their unit.
+    A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) in SI units and radians; `states`, `inputs`,
+    `outputs` are `Signal`s: strings that carry their unit.
     """
 
     A: Array
@@ -55,20 +56,31 @@ class LinearModel:
         return bool(np.all(np.real(poles) < 0) if self.dt is None else np.all(np.abs(poles) < 1))
 
     def select(
-        self, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+        self,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
     ) -> LinearModel:
-        """Keep these states (rows and columns of the others are deleted), inputs and outputs, in this order."""
+        """Keep these states (rows and columns of the others are deleted), inputs and outputs, in
+        this order.
+        """
         ix = indices(self.states if states is None else states, self.states, "state")
         iu = indices(self.inputs if inputs is None else inputs, self.inputs, "input")
         if outputs is None:
-            outputs = [y for y in self.outputs if y not in self.states or self.states.index(y) in ix]
+            outputs = [
+                y for y in self.outputs if y not in self.states or self.states.index(y) in ix
+            ]
         iy = indices(outputs, self.outputs, "output")
         return replace(
             self,
-            A=self.A[np.ix_(ix, ix)], B=self.B[np.ix_(ix, iu)], C=self.C[np.ix_(iy, ix)], D=self.D[np.ix_(iy, iu)],
-            states=tuple(self.states[i] for i in ix), inputs=tuple(self.inputs[i] for i in iu),
+            A=self.A[np.ix_(ix, ix)],
+            B=self.B[np.ix_(ix, iu)],
+            C=self.C[np.ix_(iy, ix)],
+            D=self.D[np.ix_(iy, iu)],
+            states=tuple(self.states[i] for i in ix),
+            inputs=tuple(self.inputs[i] for i in iu),
             outputs=tuple(self.outputs[i] for i in iy),
-        )  # fmt: skip
+        )
 
     def discretize(self, dt: float) -> LinearModel:
         """Zero-order-hold equivalent at sample period `dt` (s); exact at the samples."""
@@ -78,7 +90,8 @@ class LinearModel:
         return replace(self, A=A, B=B, C=C, D=D, dt=dt)
 
     def driven_by(self, actuators: Mapping[str, LinearModel]) -> LinearModel:
-        """This model behind single-input single-output `actuators` {input: model}; the inputs keep their names, C and D their rows.
+        """This model behind single-input single-output `actuators` {input: model}; the inputs keep
+        their names, C and D their rows.
 
         Both must be continuous, or discrete with one sample period; `InputError` otherwise.
         """
@@ -90,7 +103,9 @@ class LinearModel:
                     f"got {len(part.inputs)}, {len(part.outputs)} and {part.dt}"
                 )
         parts = list(actuators.values())
-        A, B, C, D = (np.asarray(block_diag(*(getattr(part, matrix) for part in parts))) for matrix in "ABCD")
+        A, B, C, D = (
+            np.asarray(block_diag(*(getattr(part, matrix) for part in parts))) for matrix in "ABCD"
+        )
         direct = np.eye(len(self.inputs))
         direct[np.ix_(at, at)] = D
         into = np.zeros((len(A), len(self.inputs)))
@@ -98,74 +113,126 @@ class LinearModel:
         return replace(
             self,
             A=np.block([[self.A, self.B[:, at] @ C], [np.zeros((len(A), len(self.A))), A]]),
-            B=np.vstack([self.B @ direct, into]), C=np.hstack([self.C, self.D[:, at] @ C]), D=self.D @ direct,
-            states=(*self.states, *(s for part in parts for s in part.states)), point=None,
-        )  # fmt: skip
+            B=np.vstack([self.B @ direct, into]),
+            C=np.hstack([self.C, self.D[:, at] @ C]),
+            D=self.D @ direct,
+            states=(*self.states, *(s for part in parts for s in part.states)),
+            point=None,
+        )
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LinearModel:
-        """Close u_i = gain y_j + (new u_i) for each {(input, output): gain}; raises `InputError` where I - K D is singular."""
+        """Close u_i = gain y_j + (new u_i) for each {(input, output): gain}; raises `InputError`
+        where I - K D is singular.
+        """
         K = feedback_matrix(gains, self.inputs, self.outputs)
         N = loop_inverse(K @ self.D)
         NKC = N @ K @ self.C
-        return replace(self, A=self.A + self.B @ NKC, B=self.B @ N, C=self.C + self.D @ NKC, D=self.D @ N)
+        return replace(
+            self, A=self.A + self.B @ NKC, B=self.B @ N, C=self.C + self.D @ NKC, D=self.D @ N
+        )
 
     def frequency_response(self, omega: object) -> np.ndarray:
         """G(j omega) (n, ny, nu), complex, at `omega` (n,) in rad/s."""
         omega = frozen(omega, "omega", (None,))
         s = 1j * omega if self.dt is None else np.exp(1j * omega * self.dt)
         pencil = s[:, None, None] * np.eye(len(self.states)) - self.A
-        return self.C @ np.linalg.solve(pencil, np.broadcast_to(self.B, (len(omega), *self.B.shape))) + self.D
+        return (
+            self.C @ np.linalg.solve(pencil, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
+            + self.D
+        )
 
     def to_control(self) -> Any:
         """A python-control `StateSpace` with the same names (dt = 0 where continuous)."""
         import control
 
         return control.ss(
-            self.A, self.B, self.C, self.D, self.dt or 0, states=[str(s) for s in self.states],
-            inputs=[str(s) for s in self.inputs], outputs=[str(s) for s in self.outputs],
-        )  # fmt: skip
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            self.dt or 0,
+            states=[str(s) for s in self.states],
+            inputs=[str(s) for s in self.inputs],
+            outputs=[str(s) for s in self.outputs],
+        )
 
     @classmethod
     def gain(cls, matrix: Any, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
         """y = matrix u without states; `matrix` (ny, nu)."""
         nu, ny = len(inputs), len(outputs)
-        return cls(np.zeros((0, 0)), np.zeros((0, nu)), np.zeros((ny, 0)), matrix, (), signals(inputs), signals(outputs))
+        return cls(
+            np.zeros((0, 0)),
+            np.zeros((0, nu)),
+            np.zeros((ny, 0)),
+            matrix,
+            (),
+            signals(inputs),
+            signals(outputs),
+        )
 
     @classmethod
     def from_control(
-        cls, system: Any, *, units: Mapping[str, str] | None = None, states: Sequence[str] | None = None,
-        inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
-    ) -> LinearModel:  # fmt: skip
-        """From a python-control `StateSpace` (a `TransferFunction` is realised first); nothing is converted.
+        cls,
+        system: Any,
+        *,
+        units: Mapping[str, str] | None = None,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> LinearModel:
+        """From a python-control `StateSpace` (a `TransferFunction` is realised first); nothing is
+        converted.
 
-        Its labels become the names where `states`, `inputs` or `outputs` give none. `units` {name: unit} says what the signals are
-        in; for the others the unit of a well-known name, "1" else. Raises `InputError` for another type, a sample period of unknown
-        length (dt = True) and wrong numbers of names, `UnknownNameError` for the unit of a signal that is not there.
+        Its labels become the names where `states`, `inputs` or `outputs` give none. `units` {name:
+        unit} says what the signals are in; for the others the unit of a well-known name, "1" else.
+        Raises `InputError` for another type, a sample period of unknown length (dt = True) and
+        wrong numbers of names, `UnknownNameError` for the unit of a signal that is not there.
         """
         if not is_control_system(system):
-            raise InputError(f"expected a StateSpace or a TransferFunction of python-control, got {type(system).__name__}")
+            raise InputError(
+                "expected a StateSpace or a TransferFunction of python-control, got"
+                f" {type(system).__name__}"
+            )
         if not hasattr(system, "A"):
             import control
 
             system = control.ss(system)
         if system.dt is True:
-            raise InputError("the system is discrete with a sample period of unknown length (dt = True); set .dt to seconds")
+            raise InputError(
+                "the system is discrete with a sample period of unknown length (dt = True); set .dt"
+                " to seconds"
+            )
         groups = [
             list(given or labels)
-            for given, labels in ((states, system.state_labels), (inputs, system.input_labels), (outputs, system.output_labels))
+            for given, labels in (
+                (states, system.state_labels),
+                (inputs, system.input_labels),
+                (outputs, system.output_labels),
+            )
         ]
         indices(units or {}, [name for group in groups for name in group], "signal")
         return cls(
-            system.A, system.B, system.C, system.D, *(signals(group, units) for group in groups), dt=float(system.dt) if system.dt else None
+            system.A,
+            system.B,
+            system.C,
+            system.D,
+            *(signals(group, units) for group in groups),
+            dt=float(system.dt) if system.dt else None,
         )
 
 
 def is_control_system(system: object) -> bool:
-    """Whether this is a system of python-control, which need not be installed or loaded for the answer."""
-    return type(system).__module__.partition(".")[0] == "control" and hasattr(system, "input_labels")
+    """Whether this is a system of python-control, which need not be installed or loaded for the
+    answer.
+    """
+    return type(system).__module__.partition(".")[0] == "control" and hasattr(
+        system, "input_labels"
+    )
 
 
-def feedback_matrix(gains: Mapping[tuple[str, str], float], inputs: Sequence[str], outputs: Sequence[str]) -> np.ndarray:
+def feedback_matrix(
+    gains: Mapping[tuple[str, str], float], inputs: Sequence[str], outputs: Sequence[str]
+) -> np.ndarray:
     """K (nu, ny) of u = K y from {(input, output): gain}; raises `UnknownNameError`."""
     K = np.zeros((len(inputs), len(outputs)))
     for (u, y), gain in gains.items():

@@ -15,14 +15,18 @@ from symheli.lpv.signal import Signal, signals
 
 @dataclass(frozen=True, eq=False)
 class NamedVector(Mapping[str, float]):
-    """Values (n,) with a `Signal` each: `x["theta"]` is a float, `x.array` (or `np.asarray(x)`) the vector, `x.signals` names and units."""
+    """Values (n,) with a `Signal` each: `x["theta"]` is a float, `x.array` (or `np.asarray(x)`) the
+    vector, `x.signals` names and units.
+    """
 
     signals: tuple[Signal, ...]
     array: Array
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", signals(self.signals))
-        object.__setattr__(self, "array", frozen(self.array, "values", (len(self.signals),), finite=False))
+        object.__setattr__(
+            self, "array", frozen(self.array, "values", (len(self.signals),), finite=False)
+        )
 
     def __getitem__(self, name: str) -> float:
         if name not in self.signals:
@@ -42,4 +46,10 @@ class NamedVector(Mapping[str, float]):
         return np.array(self.array, dtype=dtype) if copy or dtype is not None else self.array
 
     def __repr__(self) -> str:
-        return "(" + ", ".join(f"{n}={v:.5g} {n.unit}" for n, v in zip(self.signals, self.array, strict=True)) + ")"
+        return (
+            "("
+            + ", ".join(
+                f"{n}={v:.5g} {n.unit}" for n, v in zip(self.signals, self.array, strict=True)
+            )
+            + ")"
+        )

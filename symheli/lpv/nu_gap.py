@@ -10,25 +10,44 @@ from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.sample_period import same_period
 
 ON_THE_CIRCLE = 1e3 * np.finfo(float).eps
-"""A pole this close to the unit circle may be on it: what rounding moves the eigenvalues of a small matrix by."""
+"""A pole this close to the unit circle may be on it: what rounding moves the eigenvalues of a small
+matrix by.
+"""
 
 REFINEMENTS = 30
-"""How often an interval of frequency is halved, at most, until the determinant turns little in it."""
+"""How often an interval of frequency is halved, at most, until the determinant turns little in
+it.
+"""
 
 
-def nu_gap(first: LinearModel, second: LinearModel, *, input_scale: object = 1.0, output_scale: object = 1.0, points: int = 2000) -> float:
-    """The nu-gap metric in [0, 1] of two discrete models with equal sample period, inputs and outputs.
+def nu_gap(
+    first: LinearModel,
+    second: LinearModel,
+    *,
+    input_scale: object = 1.0,
+    output_scale: object = 1.0,
+    points: int = 2000,
+) -> float:
+    """The nu-gap metric in [0, 1] of two discrete models with equal sample period, inputs and
+    outputs.
 
-    Inputs are divided by `input_scale` and outputs by `output_scale` (one a channel, in their units): the gap depends on them. 1
-    where the winding-number condition fails: no controller is known to suit both. Evaluated on `points` frequencies up to Nyquist,
-    logarithmic, from a thousandth of the slowest pole, at the poles and around them, and between them where the response turns by
-    more than an eighth of a circle. Models with poles on the unit circle, as far as rounding can tell, are refused with
-    `InputError`. Source: G. Vinnicombe, Uncertainty and Feedback (2001), chapter 3.
+    Inputs are divided by `input_scale` and outputs by `output_scale` (one a channel, in their
+    units): the gap depends on them. 1 where the winding-number condition fails: no controller is
+    known to suit both. Evaluated on `points` frequencies up to Nyquist, logarithmic, from a
+    thousandth of the slowest pole, at the poles and around them, and between them where the
+    response turns by more than an eighth of a circle. Models with poles on the unit circle, as far
+    as rounding can tell, are refused with `InputError`. Source: G. Vinnicombe, Uncertainty and
+    Feedback (2001), chapter 3.
     """
     if first.dt is None or not same_period(first.dt, second.dt):
-        raise InputError(f"nu_gap compares discrete models with one sample period, got {first.dt} and {second.dt} s; discretize them")
+        raise InputError(
+            f"nu_gap compares discrete models with one sample period, got {first.dt} and"
+            f" {second.dt} s; discretize them"
+        )
     if first.inputs != second.inputs or first.outputs != second.outputs:
-        raise InputError("nu_gap compares models with the same inputs and outputs in the same order")
+        raise InputError(
+            "nu_gap compares models with the same inputs and outputs in the same order"
+        )
     su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
     sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
     unstable, poles = [], []
@@ -41,7 +60,10 @@ def nu_gap(first: LinearModel, second: LinearModel, *, input_scale: object = 1.0
     angle = angles(np.concatenate(poles), points)
 
     def responses(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        one, two = (m.frequency_response(angle / m.dt) * su[None, None, :] / sy[None, :, None] for m in (first, second))  # type: ignore[operator]
+        one, two = (
+            m.frequency_response(angle / m.dt) * su[None, None, :] / sy[None, :, None]
+            for m in (first, second)
+        )  # type: ignore[operator]
         return one, two
 
     P1, P2 = responses(angle)
@@ -53,32 +75,51 @@ def nu_gap(first: LinearModel, second: LinearModel, *, input_scale: object = 1.0
         angle = np.concatenate([angle, between])
         order = np.argsort(angle)
         angle = angle[order]
-        P1, P2 = (np.concatenate(pair)[order] for pair in zip((P1, P2), responses(between), strict=True))
+        P1, P2 = (
+            np.concatenate(pair)[order] for pair in zip((P1, P2), responses(between), strict=True)
+        )
     if _winding(P1, P2) + unstable[0] - unstable[1] != 0:
         return 1.0
     return float(_chordal(P1, P2).max())
 
 
 def chordal_distance(
-    first: LinearModel, second: LinearModel, omega: object, *, input_scale: object = 1.0, output_scale: object = 1.0
+    first: LinearModel,
+    second: LinearModel,
+    omega: object,
+    *,
+    input_scale: object = 1.0,
+    output_scale: object = 1.0,
 ) -> np.ndarray:
-    """Pointwise chordal distance (n,) in [0, 1] of two models with the same signals at `omega` (n,) rad/s, scaled as in `nu_gap`.
+    """Pointwise chordal distance (n,) in [0, 1] of two models with the same signals at `omega` (n,)
+    rad/s, scaled as in `nu_gap`.
 
-    Its largest value over all frequencies is the nu-gap where the winding-number condition holds; over a band it says how far
-    apart the models are there, whatever their slow modes.
+    Its largest value over all frequencies is the nu-gap where the winding-number condition holds;
+    over a band it says how far apart the models are there, whatever their slow modes.
     """
     su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
     sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
-    return _chordal(*(m.frequency_response(omega) * su[None, None, :] / sy[None, :, None] for m in (first, second)))
+    return _chordal(
+        *(
+            m.frequency_response(omega) * su[None, None, :] / sy[None, :, None]
+            for m in (first, second)
+        )
+    )
 
 
 def angles(poles: np.ndarray, points: int) -> np.ndarray:
-    """Angles of z from 0 to pi: logarithmic, and around every pole as dense as it is close to the circle."""
+    """Angles of z from 0 to pi: logarithmic, and around every pole as dense as it is close to the
+    circle.
+    """
     speed = np.abs(np.log(poles[poles != 0].astype(complex)))  # in units of 1/dt
     slowest = min(1.0, float(speed.min(initial=1.0)))
     around = np.sinh(np.linspace(-8.0, 8.0, 41))
     near = (np.abs(np.angle(poles))[:, None] + np.abs(np.abs(poles) - 1)[:, None] * around).ravel()
-    return np.unique(np.concatenate([[0.0], np.geomspace(1e-3 * slowest, np.pi, points), near[(near > 0) & (near < np.pi)]]))
+    return np.unique(
+        np.concatenate(
+            [[0.0], np.geomspace(1e-3 * slowest, np.pi, points), near[(near > 0) & (near < np.pi)]]
+        )
+    )
 
 
 def _turns(P1: np.ndarray, P2: np.ndarray) -> np.ndarray:
@@ -88,7 +129,9 @@ def _turns(P1: np.ndarray, P2: np.ndarray) -> np.ndarray:
 
 
 def _winding(P1: np.ndarray, P2: np.ndarray) -> int:
-    """Clockwise turns about 0 of det(I + P2* P1) along the unit circle (upper half, doubled by symmetry): zeros less poles outside it."""
+    """Clockwise turns about 0 of det(I + P2* P1) along the unit circle (upper half, doubled by
+    symmetry): zeros less poles outside it.
+    """
     return -round(float(np.sum(_turns(P1, P2)) / np.pi))  # both half circles: 2 x sum / (2 pi)
 
 

@@ -9,7 +9,8 @@ from symheli.lpv.named_vector import NamedVector
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """States `x`, inputs `u` and state derivatives `xdot` (zero at an equilibrium) at a scheduling value.
+    """States `x`, inputs `u` and state derivatives `xdot` (zero at an equilibrium) at a scheduling
+    value.
 
     `x` and `u` are named vectors with units; `airspeed` in m/s.
     """

@@ -26,11 +26,14 @@ PANELS = 6
 def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Figure:
     """A matplotlib figure of the signals `names` (default: all) against time (s), with their units.
 
-    Shaded: gaps, and where a sample of that signal is missing; no line crosses them. A sample between two missing ones is a dot. The
-    figure belongs to no window: `figure.savefig("record.png")`, or its display in a notebook. Raises `InputError`
-    for no signals, `UnknownNameError` for those the record lacks.
+    Shaded: gaps, and where a sample of that signal is missing; no line crosses them. A sample
+    between two missing ones is a dot. The figure belongs to no window:
+    `figure.savefig("record.png")`, or its display in a notebook. Raises `InputError` for no
+    signals, `UnknownNameError` for those the record lacks.
     """
-    shown = record.select(record.signals if names is None else [names] if isinstance(names, str) else list(names))
+    shown = record.select(
+        record.signals if names is None else [names] if isinstance(names, str) else list(names)
+    )
     if not shown.signals:
         raise InputError("name at least one signal to plot")
     wide = 2 if len(shown.signals) > PANELS else 1
@@ -64,9 +67,14 @@ def label(signal: Signal) -> str:
 
 
 def draw(ax: Axes, record: FlightRecord, column: Array, **style: object) -> None:
-    """`column` (n,) against the time of `record`: broken at gaps and where it is not finite, a dot where a sample stands alone."""
+    """`column` (n,) against the time of `record`: broken at gaps and where it is not finite, a dot
+    where a sample stands alone.
+    """
     ends = [part.stop for part in record.segments()[:-1]]
-    time, values = np.insert(record.time, ends, np.nan), np.insert(np.where(np.isfinite(column), column, np.nan), ends, np.nan)
+    time, values = (
+        np.insert(record.time, ends, np.nan),
+        np.insert(np.where(np.isfinite(column), column, np.nan), ends, np.nan),
+    )
     (line,) = ax.plot(time, values, **style)  # type: ignore[arg-type]
     known = np.concatenate([[False], np.isfinite(values), [False]])
     alone = known[1:-1] & ~known[:-2] & ~known[2:]
@@ -79,7 +87,9 @@ def draw(ax: Axes, record: FlightRecord, column: Array, **style: object) -> None
 def shade_missing(ax: Axes, record: FlightRecord, column: Array) -> None:
     """Grey from the last sample before a gap, or a missing one, to the next."""
     known = np.flatnonzero(np.isfinite(column))
-    part_of = np.repeat(np.arange(len(record.segments())), [part.stop - part.start for part in record.segments()])
+    part_of = np.repeat(
+        np.arange(len(record.segments())), [part.stop - part.start for part in record.segments()]
+    )
     for a, b in pairwise(known.tolist()):
         if b > a + 1 or part_of[a] != part_of[b]:
             ax.axvspan(record.time[a], record.time[b], color=SHADE, linewidth=0)

@@ -1,4 +1,6 @@
-"""Fewer states: truncation balanced over the whole range of the scheduling, for stable and unstable models alike."""
+"""Fewer states: truncation balanced over the whole range of the scheduling, for stable and unstable
+models alike.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +20,20 @@ from symheli.lpv.signal import Signal
 Model = TypeVar("Model", LPVStateSpace, LinearModel)
 
 NEGLIGIBLE = 1e-7
-"""A state with a singular value below this fraction of the largest is not there: the roots of what Riccati solutions lose to rounding."""
+"""A state with a singular value below this fraction of the largest is not there: the roots of what
+Riccati solutions lose to rounding.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Reduction(Generic[Model]):
-    """The reduced `model`, and what it costs with p held at each of `p` (K,), between the points that were balanced.
+    """The reduced `model`, and what it costs with p held at each of `p` (K,), between the points
+    that were balanced.
 
-    `singular_values` (nx,): importance of each balanced state, those beyond the order were left out. `nu_gap` (K,) in [0, 1] between
-    reduced and full model. `error` (K,): largest gain of their difference over frequency by that of the full model, NaN where one of
-    them is unstable. Both with scaled channels, on a frequency grid. Nothing is promised for p that moves.
+    `singular_values` (nx,): importance of each balanced state, those beyond the order were left
+    out. `nu_gap` (K,) in [0, 1] between reduced and full model. `error` (K,): largest gain of their
+    difference over frequency by that of the full model, NaN where one of them is unstable. Both
+    with scaled channels, on a frequency grid. Nothing is promised for p that moves.
     """
 
     model: Model
@@ -37,21 +43,35 @@ class Reduction(Generic[Model]):
     error: Array
 
 
-def reduce(model: Model, order: int, *, nodes: int = 21, input_scale: object = 1.0, output_scale: object = 1.0) -> Reduction[Model]:
-    """Keep `order` states of a model by one constant projection, balanced for the means over p of its frozen Gramians.
+def reduce(
+    model: Model,
+    order: int,
+    *,
+    nodes: int = 21,
+    input_scale: object = 1.0,
+    output_scale: object = 1.0,
+) -> Reduction[Model]:
+    """Keep `order` states of a model by one constant projection, balanced for the means over p of
+    its frozen Gramians.
 
-    The Gramians are those of the normalised coprime factors, solutions of the Riccati equations of u'u + y'y: they exist for
-    unstable models and belong to the nu-gap. One projection for all p keeps the dependence on p in its basis and adds no
-    terms where p moves. Inputs are divided by `input_scale`, outputs by `output_scale` (one a channel, in their units); what counts as
-    important depends on them. Poles on the stability boundary (a heading) are refused by the nu-gap: leave such states out first.
+    The Gramians are those of the normalised coprime factors, solutions of the Riccati equations of
+    u'u + y'y: they exist for unstable models and belong to the nu-gap. One projection for all p
+    keeps the dependence on p in its basis and adds no terms where p moves. Inputs are divided by
+    `input_scale`, outputs by `output_scale` (one a channel, in their units); what counts as
+    important depends on them. Poles on the stability boundary (a heading) are refused by the
+    nu-gap: leave such states out first.
 
-    Raises `InputError` for an order that is not below the number of states that matter, or a frozen model that is not
-    stabilisable and detectable. Source: Jonckheere and Silverman (1983), IEEE Trans. Automatic Control 28; Meyer (1990), 35;
-    means of frozen Gramians after Wood, Goddard and Glover (1996), CDC.
+    Raises `InputError` for an order that is not below the number of states that matter, or a frozen
+    model that is not stabilisable and detectable. Source: Jonckheere and Silverman (1983), IEEE
+    Trans. Automatic Control 28; Meyer (1990), 35; means of frozen Gramians after Wood, Goddard and
+    Glover (1996), CDC.
     """
     nx = len(model.states)
     if not isinstance(order, int) or isinstance(order, bool) or not 0 < order < nx:
-        raise InputError(f"order: expected an integer from 1 to {nx - 1} (the model has {nx} states), got {order!r}")
+        raise InputError(
+            f"order: expected an integer from 1 to {nx - 1} (the model has {nx} states), got"
+            f" {order!r}"
+        )
     su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(model.inputs),))
     sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(model.outputs),))
     balanced = _nodes(model, nodes)
@@ -61,7 +81,10 @@ def reduce(model: Model, order: int, *, nodes: int = 21, input_scale: object = 1
     U, values, V = np.linalg.svd(Lx.T @ Ly)
     if values[order - 1] <= NEGLIGIBLE * values[0]:
         count = int(np.sum(values > NEGLIGIBLE * values[0]))
-        raise InputError(f"order: only {count} of the {nx} states can be excited and seen; reduce to {count} or fewer")
+        raise InputError(
+            f"order: only {count} of the {nx} states can be excited and seen; reduce to {count} or"
+            " fewer"
+        )
     size = np.sqrt(values[:order])
     left, right = Lx @ U[:, :order] / size, Ly @ V[:order].T / size
     small = _projected(model, left, right)
@@ -70,13 +93,18 @@ def reduce(model: Model, order: int, *, nodes: int = 21, input_scale: object = 1
     compared = [_comparable(full, reduced) for (_, full), (_, reduced) in pairs]
     gaps = [nu_gap(*pair, input_scale=su, output_scale=sy) for pair in compared]
     errors = [_relative_error(*pair, su, sy) for pair in compared]
-    return Reduction(small, values, np.array([p for (p, _), _ in pairs]), np.array(gaps), np.array(errors))
+    return Reduction(
+        small, values, np.array([p for (p, _), _ in pairs]), np.array(gaps), np.array(errors)
+    )
 
 
 def _nodes(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[float, LinearModel]]:
     if isinstance(model, LinearModel):
         return [(np.nan, model)]
-    return [(float(p), model.at(float(p))) for p in np.linspace(model.scheduling.low, model.scheduling.high, count)]
+    return [
+        (float(p), model.at(float(p)))
+        for p in np.linspace(model.scheduling.low, model.scheduling.high, count)
+    ]
 
 
 def _gramians(model: LinearModel, su: Array, sy: Array, p: float) -> tuple[Array, Array]:
@@ -88,7 +116,10 @@ def _gramians(model: LinearModel, su: Array, sy: Array, p: float) -> tuple[Array
         Y = solve(A.T, C.T, B @ B.T, np.eye(C.shape[0]) + D @ D.T, s=B @ D.T)
     except (np.linalg.LinAlgError, ValueError) as error:
         where = "" if np.isnan(p) else f" at p = {p:.4g}"
-        raise InputError(f"the frozen model{where} is not stabilisable and detectable, it cannot be balanced ({error})") from error
+        raise InputError(
+            f"the frozen model{where} is not stabilisable and detectable, it cannot be balanced"
+            f" ({error})"
+        ) from error
     return X, Y
 
 
@@ -107,7 +138,9 @@ def _projected(model: Model, left: Array, right: Array) -> Model:
 
 
 def _comparable(full: LinearModel, small: LinearModel) -> tuple[LinearModel, LinearModel]:
-    """Both discrete: continuous models by one bilinear transformation, which keeps gains and the nu-gap."""
+    """Both discrete: continuous models by one bilinear transformation, which keeps gains and the
+    nu-gap.
+    """
     if full.dt is not None:
         return full, small
     fastest = float(np.abs(full.poles()).max(initial=0.0))

@@ -24,9 +24,13 @@ class Scheduling:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
-            raise InputError(f"scheduling {self.name}: expected finite low < high, got [{self.low}, {self.high}]")
+            raise InputError(
+                f"scheduling {self.name}: expected finite low < high, got [{self.low}, {self.high}]"
+            )
         if not self.rate >= 0:
-            raise InputError(f"scheduling {self.name}: rate must be >= 0 {self.unit}/s, got {self.rate}")
+            raise InputError(
+                f"scheduling {self.name}: rate must be >= 0 {self.unit}/s, got {self.rate}"
+            )
 
     @property
     def middle(self) -> float:
@@ -47,12 +51,15 @@ class Scheduling:
         return replace(self, rate=rate)
 
     def check(self, p: object) -> Array:
-        """`p` as an array; raises `InputError` where it leaves [low, high] by more than rounding."""
+        """`p` as an array; raises `InputError` where it leaves [low, high] by more than
+        rounding.
+        """
         p = frozen(p, self.name)
         slack = 1e-9 * (self.high - self.low)
         if p.size and (p.min() < self.low - slack or p.max() > self.high + slack):
             raise InputError(
-                f"{self.name} spans [{p.min():.4g}, {p.max():.4g}] {self.unit} but the model holds on "
-                f"[{self.low:.4g}, {self.high:.4g}]; clip the data or identify and sweep over a wider range"
+                f"{self.name} spans [{p.min():.4g}, {p.max():.4g}] {self.unit} but the model holds"
+                f" on [{self.low:.4g}, {self.high:.4g}]; clip the data or identify and sweep over a"
+                " wider range"
             )
         return p

@@ -38,7 +38,9 @@ class Signal(str):
 
 
 def signals(names: Iterable[str], units: Mapping[str, str] | None = None) -> tuple[Signal, ...]:
-    """A tuple of `Signal`s; `units` overrides the known unit by name. Repeated names raise `InputError`."""
+    """A tuple of `Signal`s; `units` overrides the known unit by name. Repeated names raise
+    `InputError`.
+    """
     if units is None and type(names) is tuple and all(type(n) is Signal for n in names):
         out = names  # made already: signals never change
     else:

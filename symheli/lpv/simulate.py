@@ -11,13 +11,21 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 
 
 def simulate(
-    lpv: LPVStateSpace, p: object, u: object, x0: object | None = None, *, dt: float | None = None, drift: object | None = None
+    lpv: LPVStateSpace,
+    p: object,
+    u: object,
+    x0: object | None = None,
+    *,
+    dt: float | None = None,
+    drift: object | None = None,
 ) -> tuple[Array, Array]:
-    """States (n, nx) and outputs (n, ny) for scheduling p (n,) and inputs u (n, nu) held between samples.
+    """States (n, nx) and outputs (n, ny) for scheduling p (n,) and inputs u (n, nu) held between
+    samples.
 
-    Continuous models are advanced by the exact exponential of each sample's A(p(k)), B(p(k)) over `dt` (s), p held;
-    discrete ones by their own matrices. `drift` (n, nx) is added to dx/dt (continuous) or to x(k+1) (discrete):
-    a moving trim x0(p) contributes -x0'(p) dp/dt. Deviations in, deviations out.
+    Continuous models are advanced by the exact exponential of each sample's A(p(k)), B(p(k)) over
+    `dt` (s), p held; discrete ones by their own matrices. `drift` (n, nx) is added to dx/dt
+    (continuous) or to x(k+1) (discrete): a moving trim x0(p) contributes -x0'(p) dp/dt. Deviations
+    in, deviations out.
     """
     p = lpv.scheduling.check(p)
     n, nx, nu = len(p), len(lpv.states), len(lpv.inputs)
@@ -29,7 +37,11 @@ def simulate(
         if dt is None or not dt > 0:
             raise InputError("a continuous model needs the sample period dt (s)")
         stacked = np.zeros((n, 2 * nx + nu, 2 * nx + nu))
-        stacked[:, :nx, :nx], stacked[:, :nx, nx : nx + nu], stacked[:, :nx, nx + nu :] = A, B, np.eye(nx)
+        stacked[:, :nx, :nx], stacked[:, :nx, nx : nx + nu], stacked[:, :nx, nx + nu :] = (
+            A,
+            B,
+            np.eye(nx),
+        )
         step = expm(stacked * dt)
         A, B, E = step[:, :nx, :nx], step[:, :nx, nx : nx + nu], step[:, :nx, nx + nu :]
         w = np.einsum("kij,kj->ki", E, w)

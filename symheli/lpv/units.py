@@ -10,38 +10,80 @@ from collections.abc import Mapping
 from symheli.errors import InputError, UnknownNameError
 
 _TO_SI: dict[str, tuple[float, str]] = {
-    "1": (1.0, "1"), "%": (0.01, "1"), "s": (1.0, "s"), "ms": (1e-3, "s"), "us": (1e-6, "s"), "ns": (1e-9, "s"), "min": (60.0, "s"),
-    "m": (1.0, "m"), "cm": (0.01, "m"), "mm": (1e-3, "m"), "km": (1e3, "m"), "ft": (0.3048, "m"), "in": (0.0254, "m"),
-    "m/s": (1.0, "m/s"), "km/h": (1 / 3.6, "m/s"), "kt": (1852 / 3600, "m/s"), "mph": (0.44704, "m/s"),
-    "ft/s": (0.3048, "m/s"), "ft/min": (0.3048 / 60, "m/s"),
-    "m/s^2": (1.0, "m/s^2"), "ft/s^2": (0.3048, "m/s^2"), "g": (9.80665, "m/s^2"),
-    "rad": (1.0, "rad"), "deg": (math.pi / 180, "rad"), "mrad": (1e-3, "rad"),
-    "rad/s": (1.0, "rad/s"), "deg/s": (math.pi / 180, "rad/s"), "rpm": (2 * math.pi / 60, "rad/s"),
-    "kg": (1.0, "kg"), "lb": (0.45359237, "kg"), "slug": (14.593902937, "kg"),
-    "kg m^2": (1.0, "kg m^2"), "slug ft^2": (14.593902937 * 0.3048**2, "kg m^2"),
-    "m^2": (1.0, "m^2"), "ft^2": (0.3048**2, "m^2"),
-    "N": (1.0, "N"), "N m": (1.0, "N m"), "N m/rad": (1.0, "N m/rad"), "W": (1.0, "W"), "hp": (745.6998715822702, "W"),
-    "Pa": (1.0, "Pa"), "kg/m^3": (1.0, "kg/m^3"), "1/rad": (1.0, "1/rad"), "rad/rad": (1.0, "rad/rad"),
-    "s/rad": (1.0, "s/rad"), "1/s": (1.0, "1/s"), "V": (1.0, "V"),
-}  # fmt: skip
+    "1": (1.0, "1"),
+    "%": (0.01, "1"),
+    "s": (1.0, "s"),
+    "ms": (1e-3, "s"),
+    "us": (1e-6, "s"),
+    "ns": (1e-9, "s"),
+    "min": (60.0, "s"),
+    "m": (1.0, "m"),
+    "cm": (0.01, "m"),
+    "mm": (1e-3, "m"),
+    "km": (1e3, "m"),
+    "ft": (0.3048, "m"),
+    "in": (0.0254, "m"),
+    "m/s": (1.0, "m/s"),
+    "km/h": (1 / 3.6, "m/s"),
+    "kt": (1852 / 3600, "m/s"),
+    "mph": (0.44704, "m/s"),
+    "ft/s": (0.3048, "m/s"),
+    "ft/min": (0.3048 / 60, "m/s"),
+    "m/s^2": (1.0, "m/s^2"),
+    "ft/s^2": (0.3048, "m/s^2"),
+    "g": (9.80665, "m/s^2"),
+    "rad": (1.0, "rad"),
+    "deg": (math.pi / 180, "rad"),
+    "mrad": (1e-3, "rad"),
+    "rad/s": (1.0, "rad/s"),
+    "deg/s": (math.pi / 180, "rad/s"),
+    "rpm": (2 * math.pi / 60, "rad/s"),
+    "kg": (1.0, "kg"),
+    "lb": (0.45359237, "kg"),
+    "slug": (14.593902937, "kg"),
+    "kg m^2": (1.0, "kg m^2"),
+    "slug ft^2": (14.593902937 * 0.3048**2, "kg m^2"),
+    "m^2": (1.0, "m^2"),
+    "ft^2": (0.3048**2, "m^2"),
+    "N": (1.0, "N"),
+    "N m": (1.0, "N m"),
+    "N m/rad": (1.0, "N m/rad"),
+    "W": (1.0, "W"),
+    "hp": (745.6998715822702, "W"),
+    "Pa": (1.0, "Pa"),
+    "kg/m^3": (1.0, "kg/m^3"),
+    "1/rad": (1.0, "1/rad"),
+    "rad/rad": (1.0, "rad/rad"),
+    "s/rad": (1.0, "s/rad"),
+    "1/s": (1.0, "1/s"),
+    "V": (1.0, "V"),
+}
 
 _BASE = ("kg", "m", "rad", "s", "V")
 _ATOMS: dict[str, dict[str, int]] = {
-    "1": {}, **{base: {base: 1} for base in _BASE},
-    "N": {"kg": 1, "m": 1, "s": -2}, "W": {"kg": 1, "m": 2, "s": -3}, "Pa": {"kg": 1, "m": -1, "s": -2},
-}  # fmt: skip
+    "1": {},
+    **{base: {base: 1} for base in _BASE},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+}
 
 Dimension = Mapping[str, int]
-"""Exponents of kg, m, rad, s, V; those that are zero are left out. The radian counts as a unit: it tells N m from N m/rad."""
+"""Exponents of kg, m, rad, s, V; those that are zero are left out. The radian counts as a unit: it
+tells N m from N m/rad.
+"""
 
 
 def to_si(unit: str) -> tuple[float, str]:
     """(factor, SI unit) such that value_SI = factor * value. Raises `UnknownNameError`.
 
-    Products, powers and quotients of known units are units too: "slug ft^2", "ft/s^2/rad", "1/(ft s)".
+    Products, powers and quotients of known units are units too: "slug ft^2", "ft/s^2/rad", "1/(ft
+    s)".
     """
     if not isinstance(unit, str):
-        raise InputError(f"unit: expected a text such as 'deg/s' ('1' where there is none), got {unit!r}")
+        raise InputError(
+            f"unit: expected a text such as 'deg/s' ('1' where there is none), got {unit!r}"
+        )
     if unit in _TO_SI:
         return _TO_SI[unit]
     factor, powers = _parse(unit)
@@ -54,7 +96,9 @@ def dimension(unit: str) -> Dimension:
 
 
 def quotient(unit: str, by: str) -> str:
-    """The SI unit of a quantity in `unit` divided by one in `by`: "m/s^2" by "rad" is "m/s^2/rad"."""
+    """The SI unit of a quantity in `unit` divided by one in `by`: "m/s^2" by "rad" is
+    "m/s^2/rad".
+    """
     return text(_combined(dimension(unit), dimension(by), -1))
 
 
@@ -76,7 +120,9 @@ def units_of(wanted: Dimension) -> list[str]:
 
 @functools.cache
 def _parse(unit: str) -> tuple[float, Dimension]:
-    """Factor to SI and dimension. After a / stands one unit or a product in brackets: m/(s rad), m/s/rad, never m/s rad."""
+    """Factor to SI and dimension. After a / stands one unit or a product in brackets: m/(s rad),
+    m/s/rad, never m/s rad.
+    """
     if unit in _TO_SI and _TO_SI[unit][1] != unit:  # km/h, rpm: known as a whole
         factor, si = _TO_SI[unit]
         return factor, _parse(si)[1]
@@ -85,7 +131,10 @@ def _parse(unit: str) -> tuple[float, Dimension]:
     for below, rest in zip(parts[1::2], parts[2::2], strict=True):
         inner = below.strip().removeprefix("(").removesuffix(")")
         if rest.strip() or (" " in below.strip() and inner == below.strip()):
-            raise InputError(f"unit {unit!r}: put what follows a / in brackets, as in 1/(m s), or use a second /, as in 1/m/s")
+            raise InputError(
+                f"unit {unit!r}: put what follows a / in brackets, as in 1/(m s), or use a second"
+                " /, as in 1/m/s"
+            )
         other, minus = _product(inner, unit)
         factor, powers = factor / other, _combined(powers, minus, -1)
     return factor, powers

@@ -17,9 +17,11 @@ def write_text(path: str | os.PathLike[str], content: str) -> Path:
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
-    """Replace `path` by `content` at once, folders made as needed: a reader sees the old file or the new one, never half of it.
+    """Replace `path` by `content` at once, folders made as needed: a reader sees the old file or
+    the new one, never half of it.
 
-    Raises `SymheliError` where the disk is full or the folder cannot be written; the old file is then still there.
+    Raises `SymheliError` where the disk is full or the folder cannot be written; the old file is
+    then still there.
     """
     target = Path(path)
     temporary = ""
@@ -43,7 +45,10 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
 
 def _reason(target: Path, error: OSError, size: int) -> str:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return f"{target}: the disk is full, {size / 1024:.0f} KiB are needed; free some space and try again"
+        return (
+            f"{target}: the disk is full, {size / 1024:.0f} KiB are needed; free some space and try"
+            " again"
+        )
     return f"{target}: cannot be written ({error.strerror or error}); choose another place"
 
 

@@ -1,4 +1,6 @@
-"""What no gain of an LFT can undercut: frozen models all over the box, and trajectories along straight lines through it."""
+"""What no gain of an LFT can undercut: frozen models all over the box, and trajectories along
+straight lines through it.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ Array = np.ndarray
 
 
 class BoxGain(NamedTuple):
-    """The largest frozen gain `gamma`, the `p` (m,) and frequency `omega` (rad/s) where it occurs; inf where unstable."""
+    """The largest frozen gain `gamma`, the `p` (m,) and frequency `omega` (rad/s) where it occurs;
+    inf where unstable.
+    """
 
     gamma: float
     p: tuple[float, ...]
@@ -29,7 +33,8 @@ class BoxGain(NamedTuple):
 
 
 def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
-    """max over the box of the H-infinity norm of the frozen models: a grid, and a local search from its best points.
+    """max over the box of the H-infinity norm of the frozen models: a grid, and a local search from
+    its best points.
 
     Without channels: 0 where every model of the grid is stable.
     """
@@ -52,17 +57,29 @@ def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
         return best
     step = 1.0 / (points - 1)
     for k in _peaks(values, grid, 2 * step)[:3]:
-        simplex = np.vstack([grid[k], *(grid[k] + step * np.where(grid[k] > 0, -1.0, 1.0) * e for e in np.eye(m))])
+        simplex = np.vstack(
+            [grid[k], *(grid[k] + step * np.where(grid[k] > 0, -1.0, 1.0) * e for e in np.eye(m))]
+        )
         result: Any = minimize(
-            lambda delta: -min(at(delta).gamma, 1e300), grid[k], method="Nelder-Mead", bounds=[(-1.0, 1.0)] * m,
-            options={"initial_simplex": simplex, "maxfev": 30 * m, "xatol": 1e-6, "fatol": 1e-9 * best.gamma},
-        )  # fmt: skip
+            lambda delta: -min(at(delta).gamma, 1e300),
+            grid[k],
+            method="Nelder-Mead",
+            bounds=[(-1.0, 1.0)] * m,
+            options={
+                "initial_simplex": simplex,
+                "maxfev": 30 * m,
+                "xatol": 1e-6,
+                "fatol": 1e-9 * best.gamma,
+            },
+        )
         best = max(best, at(result.x), key=lambda f: f.gamma)
     return best
 
 
 def _at_poles(lft: LFT, grid: Array) -> Array:
-    """For each delta (K, m) the largest gain at the frequencies of the model's own poles, at rest and of D; inf where unstable."""
+    """For each delta (K, m) the largest gain at the frequencies of the model's own poles, at rest
+    and of D; inf where unstable.
+    """
     M, x = lft.matrix(grid), len(lft.states)
     A, B, C, D = M[:, :x, :x], M[:, :x, x:], M[:, x:, :x], M[:, x:, x:]
     poles = np.linalg.eigvals(A)
@@ -72,33 +89,61 @@ def _at_poles(lft: LFT, grid: Array) -> Array:
     if min(B.shape[2], C.shape[1]) == 0:
         return np.zeros(len(grid))
     if lft.dt is None:
-        s = 1j * np.concatenate([np.zeros((len(grid), 1)), np.abs(poles), np.abs(poles.imag)], axis=1)
+        s = 1j * np.concatenate(
+            [np.zeros((len(grid), 1)), np.abs(poles), np.abs(poles.imag)], axis=1
+        )
     else:
-        s = np.exp(1j * np.concatenate([np.zeros((len(grid), 1)), np.abs(np.angle(poles)), np.full((len(grid), 1), math.pi)], axis=1))
+        s = np.exp(
+            1j
+            * np.concatenate(
+                [
+                    np.zeros((len(grid), 1)),
+                    np.abs(np.angle(poles)),
+                    np.full((len(grid), 1), math.pi),
+                ],
+                axis=1,
+            )
+        )
     pencil = s[:, :, None, None] * np.eye(x) - A[:, None]
-    response = C[:, None] @ np.linalg.solve(pencil, np.broadcast_to(B[:, None], (*s.shape, *B.shape[1:]))) + D[:, None]
+    response = (
+        C[:, None] @ np.linalg.solve(pencil, np.broadcast_to(B[:, None], (*s.shape, *B.shape[1:])))
+        + D[:, None]
+    )
     gains = np.linalg.svd(response, compute_uv=False)[..., 0].max(axis=1)
     return np.maximum(gains, np.linalg.svd(D, compute_uv=False)[..., 0])
 
 
 def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBound:
-    """The best lower bound over p that moves along a line through the box, its diagonals and its axes: jumping, and at rate limits.
+    """The best lower bound over p that moves along a line through the box, its diagonals and its
+    axes: jumping, and at rate limits.
 
-    One parameter: its whole range. A search over jumps alone misses slower waves that are worse, so the limits of the
-    parameters, where they have some, give a second try. `search` None: the frozen gain.
+    One parameter: its whole range. A search over jumps alone misses slower waves that are worse, so
+    the limits of the parameters, where they have some, give a second try. `search` None: the frozen
+    gain.
     """
     best = LowerBound(frozen.gamma, None)
     limits = [s.rate / s.radius for s in lft.parameters if math.isfinite(s.rate) and s.rate > 0]
-    tries = [(*line, rate) for rate in (math.inf, *limits[:1]) for line in _lines(len(lft.blocks))] if search else []
+    tries = (
+        [(*line, rate) for rate in (math.inf, *limits[:1]) for line in _lines(len(lft.blocks))]
+        if search
+        else []
+    )
     budget = Budget(search.seconds if search else math.inf)
     for k, (start, end, rate) in enumerate(tries):
         if search is None or budget.over:
             break
         budget.tell("line %d of %d, gain %.6g so far", k + 1, len(tries), best.gamma)
         search = replace(search, seconds=budget.left / (len(tries) - k))
-        found = lower_bound(along(lft, start, end), rate, frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega), search=search)
+        found = lower_bound(
+            along(lft, start, end),
+            rate,
+            frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega),
+            search=search,
+        )
         if found.gamma > best.gamma:
-            best = found._replace(trajectory=found.trajectory and _in_box(lft, found.trajectory, start, end))
+            best = found._replace(
+                trajectory=found.trajectory and _in_box(lft, found.trajectory, start, end)
+            )
         if math.isinf(best.gamma):
             break
     return best
@@ -121,14 +166,29 @@ def box_growing_trajectory(lft: LFT, search: Search | None) -> Trajectory | None
 
 
 def along(lft: LFT, start: Array, end: Array) -> LFT:
-    """One parameter s in [-1, 1] that moves all the normalised parameters on a straight line from `start` to `end`."""
-    middle, half = np.repeat(0.5 * (start + end), lft.sizes), np.repeat(0.5 * (end - start), lft.sizes)
+    """One parameter s in [-1, 1] that moves all the normalised parameters on a straight line from
+    `start` to `end`.
+    """
+    middle, half = (
+        np.repeat(0.5 * (start + end), lft.sizes),
+        np.repeat(0.5 * (end - start), lft.sizes),
+    )
     # w = (middle + half s) z
     loop = np.eye(lft.order) - lft.M11 * middle
     M11, M12 = np.linalg.solve(loop, lft.M11 * half), np.linalg.solve(loop, lft.M12)
     M21 = lft.M21 * half + (lft.M21 * middle) @ M11
     blocks = (Block(Scheduling("line", "1", -1.0, 1.0), lft.order),)
-    return LFT(M11, M12, M21, lft.M22 + (lft.M21 * middle) @ M12, blocks, lft.states, lft.inputs, lft.outputs, lft.dt)
+    return LFT(
+        M11,
+        M12,
+        M21,
+        lft.M22 + (lft.M21 * middle) @ M12,
+        blocks,
+        lft.states,
+        lft.inputs,
+        lft.outputs,
+        lft.dt,
+    )
 
 
 def _lines(m: int) -> list[tuple[Array, Array]]:

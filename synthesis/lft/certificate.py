@@ -15,7 +15,9 @@ Array = np.ndarray
 
 
 class Trial(NamedTuple):
-    """One cone program: what was asked ("gain" or "margin"), its margin, the solver's word, and the gain verified (inf: none)."""
+    """One cone program: what was asked ("gain" or "margin"), its margin, the solver's word, and the
+    gain verified (inf: none).
+    """
 
     program: str
     margin: float
@@ -28,7 +30,8 @@ class Trial(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LFTCertificate(Verdict):
-    """A bound on an LFT, "l2 gain" or "stability", for every p(t) in its box, as fast as it likes, with its proof.
+    """A bound on an LFT, "l2 gain" or "stability", for every p(t) in its box, as fast as it likes,
+    with its proof.
 
     scaling     the class of multipliers, one of `SCALINGS`
     proof       P (nx, nx) of V = x'P x and the multiplier, None where there is none
@@ -50,11 +53,16 @@ class LFTCertificate(Verdict):
         found = super().fault
         if found or self.proof is None or self.proof.multiplier.scaling == self.scaling:
             return found
-        return f"the multiplier is of the class {self.proof.multiplier.scaling!r}, the claim of {self.scaling!r:.60}"
+        return (
+            f"the multiplier is of the class {self.proof.multiplier.scaling!r}, the claim of"
+            f" {self.scaling!r:.60}"
+        )
 
     @property
     def lyapunov(self) -> Array | None:
-        """P of V = x'P x, in units of the squared output times seconds (samples) per squared state."""
+        """P of V = x'P x, in units of the squared output times seconds (samples) per squared
+        state.
+        """
         return None if self.proof is None else self.proof.P
 
     @property

@@ -15,7 +15,9 @@ Array = np.ndarray
 
 
 class Loop(NamedTuple):
-    """dx/dt (or x(k+1)) = A x + Bw w + Bu u, z = Cz x + Dzw w + Dzu u, y = Cy x + Dyw w + Dyu u, w = Delta z."""
+    """dx/dt (or x(k+1)) = A x + Bw w + Bu u, z = Cz x + Dzw w + Dzu u, y = Cy x + Dyw w + Dyu u, w
+    = Delta z.
+    """
 
     A: Array
     Bw: Array
@@ -29,7 +31,9 @@ class Loop(NamedTuple):
 
 
 class Coordinates(NamedTuple):
-    """`units` of state, output and time; z = right z', w = right w' with left = right^-1 and both commuting with Delta."""
+    """`units` of state, output and time; z = right z', w = right w' with left = right^-1 and both
+    commuting with Delta.
+    """
 
     units: Scaling
     left: Array
@@ -40,40 +44,66 @@ def split(lft: LFT) -> Loop:
     """The nine matrices of the LFT as it is."""
     x = len(lft.states)
     return Loop(
-        lft.M22[:x, :x], lft.M21[:x], lft.M22[:x, x:], lft.M12[:, :x], lft.M11, lft.M12[:, x:],
-        lft.M22[x:, :x], lft.M21[x:], lft.M22[x:, x:],
-    )  # fmt: skip
+        lft.M22[:x, :x],
+        lft.M21[:x],
+        lft.M22[:x, x:],
+        lft.M12[:, :x],
+        lft.M11,
+        lft.M12[:, x:],
+        lft.M22[x:, :x],
+        lft.M21[x:],
+        lft.M22[x:, x:],
+    )
 
 
 def scaled(lft: LFT, coordinates: Coordinates) -> Loop:
-    """The LFT in these coordinates: outputs divided by the channel, time in its unit, energies keep their ratios."""
+    """The LFT in these coordinates: outputs divided by the channel, time in its unit, energies keep
+    their ratios.
+    """
     (left, right, channel, time, _), L, R = coordinates.units, coordinates.left, coordinates.right
     loop, root = split(lft), np.sqrt(time)
     return Loop(
-        time * left @ loop.A @ right, root * left @ loop.Bw @ R, root * left @ loop.Bu,
-        root * L @ loop.Cz @ right, L @ loop.Dzw @ R, L @ loop.Dzu,
-        root * loop.Cy @ right / channel, loop.Dyw @ R / channel, loop.Dyu / channel,
-    )  # fmt: skip
+        time * left @ loop.A @ right,
+        root * left @ loop.Bw @ R,
+        root * left @ loop.Bu,
+        root * L @ loop.Cz @ right,
+        L @ loop.Dzw @ R,
+        L @ loop.Dzu,
+        root * loop.Cy @ right / channel,
+        loop.Dyw @ R / channel,
+        loop.Dyu / channel,
+    )
 
 
 def coordinates(lft: LFT, gain: float, *, one: bool = False) -> Coordinates:
-    """From the model at the middle of the box and an expected `gain`: states by a Lyapunov solution, the copies of a parameter
-    by balancing what state noise and inputs make of z against what w makes of state and outputs (`one`: by one number)."""
+    """From the model at the middle of the box and an expected `gain`: states by a Lyapunov
+    solution, the copies of a parameter by balancing what state noise and inputs make of z against
+    what w makes of state and outputs (`one`: by one number).
+    """
     middle = lft.at(*(s.middle for s in lft.parameters))
-    every = [lft.at(*(s.middle + delta * s.radius for s in lft.parameters)) for delta in np.linspace(-1.0, 1.0, 9)]
+    every = [
+        lft.at(*(s.middle + delta * s.radius for s in lft.parameters))
+        for delta in np.linspace(-1.0, 1.0, 9)
+    ]
     elsewhere = Matrices(*(np.stack([getattr(model, name) for model in every]) for name in "ABCD"))
-    plain = Coordinates(model_scaling(middle, gain, elsewhere), np.eye(lft.order), np.eye(lft.order))
+    plain = Coordinates(
+        model_scaling(middle, gain, elsewhere), np.eye(lft.order), np.eye(lft.order)
+    )
     loop, n, x = scaled(lft, plain), lft.order, len(lft.states)
     s = _frequencies(loop.A, lft.dt is None)
     pencil = s[:, None, None] * np.eye(x) - loop.A
     noise = linalg.inv(plain.units.weight)
     B, C = np.hstack([loop.Bw, noise, loop.Bu]), np.vstack([loop.Cz, noise, loop.Cy])
-    # the pseudo-inverse: only sizes matter, and next to a pole that is singular to rounding there is one too
+    # the pseudo-inverse: only sizes matter, and next to a pole that is singular to rounding there
+    # is one too
     G = C @ np.linalg.pinv(pencil) @ B
     G[:, :n, :n] += loop.Dzw
     G[:, :n, n + x :] += loop.Dzu
     G[:, n + x :, :n] += loop.Dyw
-    reach, seen = _spread(G[:, :n, n:], G[:, :n, :n]), _spread(_adjoint(G[:, n:, :n]), _adjoint(G[:, :n, :n]))
+    reach, seen = (
+        _spread(G[:, :n, n:], G[:, :n, :n]),
+        _spread(_adjoint(G[:, n:, :n]), _adjoint(G[:, :n, :n])),
+    )
     right = np.zeros((n, n))
     if one and np.trace(reach) > 0 and np.trace(seen) > 0:
         right = float(np.trace(reach) / np.trace(seen)) ** 0.25 * np.eye(n)
@@ -84,23 +114,31 @@ def coordinates(lft: LFT, gain: float, *, one: bool = False) -> Coordinates:
 
 
 def _frequencies(A: Array, continuous: bool) -> Array:
-    """Points where the loop is looked at, just outside the stability region so that a pole on its border does no harm."""
+    """Points where the loop is looked at, just outside the stability region so that a pole on its
+    border does no harm.
+    """
     if not continuous:
         return 1.005 * np.exp(1j * np.concatenate([[0.0], np.geomspace(1e-3, np.pi, 40)]))
     size = np.abs(np.linalg.eigvals(A)) if len(A) else np.ones(1)
     slowest = max(float(size.min()), 1e-12 * float(size.max()), 1e-300)
-    omega = np.concatenate([[0.0], np.geomspace(0.3 * slowest, 3 * max(float(size.max()), slowest), 40), size])
+    omega = np.concatenate(
+        [[0.0], np.geomspace(0.3 * slowest, 3 * max(float(size.max()), slowest), 40), size]
+    )
     return 1j * omega + 0.005 * np.maximum(omega, slowest)
 
 
 def _spread(direct: Array, around: Array) -> Array:
-    """Sum over frequencies of H H*, H the direct response and what of it comes around the loop once."""
+    """Sum over frequencies of H H*, H the direct response and what of it comes around the loop
+    once.
+    """
     once = direct @ _adjoint(direct)
     return np.real(once + around @ once @ _adjoint(around)).sum(axis=0)
 
 
 def _balancing(reach: Array, seen: Array) -> Array:
-    """T with T^-1 reach T^-T = T' seen T, diagonal; directions that hardly matter are treated as if they did."""
+    """T with T^-1 reach T^-T = T' seen T, diagonal; directions that hardly matter are treated as if
+    they did.
+    """
     if not len(reach):
         return reach
     # each copy in a unit of its own first: those it came with may differ by any number
@@ -108,7 +146,9 @@ def _balancing(reach: Array, seen: Array) -> Array:
     both = (a > 0) & (b > 0)
     unit = np.where(both, a / np.where(both, b, 1.0), 1.0) ** 0.25
     reach, seen = reach / np.outer(unit, unit), seen * np.outer(unit, unit)
-    reach, seen = (M + 1e-6 * max(float(np.trace(M)) / len(M), 1e-300) * np.eye(len(M)) for M in (reach, seen))
+    reach, seen = (
+        M + 1e-6 * max(float(np.trace(M)) / len(M), 1e-300) * np.eye(len(M)) for M in (reach, seen)
+    )
     root = linalg.cholesky(reach, lower=True)
     values, V = linalg.eigh(root.T @ seen @ root)
     return unit[:, None] * root @ V / np.maximum(values, 1e-300) ** 0.25

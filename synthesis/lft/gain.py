@@ -16,7 +16,13 @@ from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_boun
 from synthesis.lft.certificate import LFTCertificate, Trial
 from synthesis.lft.coordinates import coordinates, scaled
 from synthesis.lft.multipliers import Class, Multiplier, check_scaling, multiplier_class
-from synthesis.lft.program import gain_program, inequality, margin_program, unpack, with_state_channels
+from synthesis.lft.program import (
+    gain_program,
+    inequality,
+    margin_program,
+    unpack,
+    with_state_channels,
+)
 from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.lower_bound import THOROUGH, LowerBound, Search
 from synthesis.proof_search import NOTHING, inflated
@@ -27,27 +33,46 @@ from synthesis.verdict import Seconds, Status, Trajectory
 Array = np.ndarray
 
 MARGINS = (1e-7, 1e-6, 1e-5, 1e-3)
-"""The (x, w) block is held below -margin I in scaled coordinates, tried in turn until the answer is verified."""
+"""The (x, w) block is held below -margin I in scaled coordinates, tried in turn until the answer is
+verified.
+"""
 
 
 def lft_gain(
-    lft: LFT, scaling: str = "DG", *, solver: Solver | str = "CLARABEL", search: Search | None = THOROUGH
-) -> LFTCertificate:  # fmt: skip
-    """Certified upper bound of the L2 gain of `lft` over every p(t) in its box, as fast as it likes.
+    lft: LFT,
+    scaling: str = "DG",
+    *,
+    solver: Solver | str = "CLARABEL",
+    search: Search | None = THOROUGH,
+) -> LFTCertificate:
+    """Certified upper bound of the L2 gain of `lft` over every p(t) in its box, as fast as it
+    likes.
 
-    `scaling`: "small gain", "D", "DG" or "full block", from the most conservative to the least (see `multipliers`). The gain
-    is recomputed from P and the multiplier alone and verified. `search` looks for the worst trajectory (None: the frozen gain
-    is the lower bound). Raises `InputError`, `SolverError`; a failed solve is a certificate with gamma = inf and its reason in
-    `status`. Reduce the LFT first: superfluous copies of a parameter cost time.
+    `scaling`: "small gain", "D", "DG" or "full block", from the most conservative to the least (see
+    `multipliers`). The gain is recomputed from P and the multiplier alone and verified. `search`
+    looks for the worst trajectory (None: the frozen gain is the lower bound). Raises `InputError`,
+    `SolverError`; a failed solve is a certificate with gamma = inf and its reason in `status`.
+    Reduce the LFT first: superfluous copies of a parameter cost time.
     """
     solver = _checked(lft, scaling, solver)
     if not (lft.inputs and lft.outputs):
-        raise InputError(f"a gain needs inputs and outputs, got {len(lft.inputs)} and {len(lft.outputs)}; see lft_stability")
+        raise InputError(
+            f"a gain needs inputs and outputs, got {len(lft.inputs)} and {len(lft.outputs)}; see"
+            " lft_stability"
+        )
     start = time.perf_counter()
     frozen = frozen_box_gain(lft)
     if math.isinf(frozen.gamma):
         if surely_unstable(lft.at(*frozen.p).A, lft.dt):
-            return _certificate(lft, scaling, solver, None, LowerBound(math.inf, _at_rest(frozen)), math.inf, time.perf_counter() - start)
+            return _certificate(
+                lft,
+                scaling,
+                solver,
+                None,
+                LowerBound(math.inf, _at_rest(frozen)),
+                math.inf,
+                time.perf_counter() - start,
+            )
         # stable or not to rounding: nothing is known from below
         frozen, search = BoxGain(0.0, frozen.p, math.nan), None
     below = box_lower_bound(lft, frozen, search)
@@ -62,29 +87,48 @@ def lft_gain(
     for other in tries:
         if other is not best:
             best.add(other)
-    return _certificate(lft, scaling, solver, best, below, frozen.gamma, bounds).resting_on(said(search and search.seconds, bounds))
+    return _certificate(lft, scaling, solver, best, below, frozen.gamma, bounds).resting_on(
+        said(search and search.seconds, bounds)
+    )
 
 
 def lft_stability(
-    lft: LFT, scaling: str = "DG", *, solver: Solver | str = "CLARABEL", search: Search | None = THOROUGH
-) -> LFTCertificate:  # fmt: skip
-    """Proof that the state decays for every p(t) in the box, as fast as it likes; channels play no part.
+    lft: LFT,
+    scaling: str = "DG",
+    *,
+    solver: Solver | str = "CLARABEL",
+    search: Search | None = THOROUGH,
+) -> LFTCertificate:
+    """Proof that the state decays for every p(t) in the box, as fast as it likes; channels play no
+    part.
 
-    As `lft_gain`: `.verified` is the answer, `.gamma`, `.lower` and `.frozen` are NaN. Where no proof is found, `search` looks
-    for a trajectory along which the state grows.
+    As `lft_gain`: `.verified` is the answer, `.gamma`, `.lower` and `.frozen` are NaN. Where no
+    proof is found, `search` looks for a trajectory along which the state grows.
     """
     solver = _checked(lft, scaling, solver)
     frozen = frozen_box_gain(lft.select(inputs=(), outputs=()))
     if math.isinf(frozen.gamma) and surely_unstable(lft.at(*frozen.p).A, lft.dt):
-        return _certificate(lft, scaling, solver, None, LowerBound(math.nan, _at_rest(frozen)), math.nan, 0.0)
+        return _certificate(
+            lft, scaling, solver, None, LowerBound(math.nan, _at_rest(frozen)), math.nan, 0.0
+        )
     found = _Attempt(lft.select(inputs=(), outputs=()), scaling, solver, 1.0).run()
     start = time.perf_counter()
     worst = None if found.proof is not None else box_growing_trajectory(lft, search)
-    return _certificate(lft, scaling, solver, found, LowerBound(math.nan, worst), math.nan, time.perf_counter() - start)
+    return _certificate(
+        lft,
+        scaling,
+        solver,
+        found,
+        LowerBound(math.nan, worst),
+        math.nan,
+        time.perf_counter() - start,
+    )
 
 
 class _Attempt:
-    """The cone programs of one LFT and one class of multipliers; what was found and what was tried."""
+    """The cone programs of one LFT and one class of multipliers; what was found and what was
+    tried.
+    """
 
     def __init__(self, lft: LFT, scaling: str, solver: Solver, gain: float):
         self.begin = time.perf_counter()
@@ -97,7 +141,9 @@ class _Attempt:
         if not lft.inputs:
             loop = with_state_channels(loop)
         self.inputs = loop.Bu.shape[1]
-        self.linear = inequality(loop, self.multipliers, lft.dt is None).congruent(self.evidence.coordinates.units.weight)
+        self.linear = inequality(loop, self.multipliers, lft.dt is None).congruent(
+            self.evidence.coordinates.units.weight
+        )
         self.proof: Quadratic | None = None
         self.gamma, self.conditioning, self.answer = math.inf, math.inf, Answer.FAILED
         self.trials: list[Trial] = []
@@ -109,10 +155,14 @@ class _Attempt:
         return self.ended - self.begin - self.solving - self.verifying, self.solving, self.verifying
 
     def run(self) -> _Attempt:
-        """Minimise the gain; where no answer can be verified, ask for the largest margin of stability."""
+        """Minimise the gain; where no answer can be verified, ask for the largest margin of
+        stability.
+        """
         x = len(self.lft.states)
         for margin in MARGINS:
-            candidate = self._solve(gain_program(self.linear, self.multipliers, x, self.inputs, margin))
+            candidate = self._solve(
+                gain_program(self.linear, self.multipliers, x, self.inputs, margin)
+            )
             self._judge("gain", margin, candidate, (1.0,))
             self.answer = candidate.answer
             if self.proof is not None or candidate.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
@@ -129,7 +179,10 @@ class _Attempt:
     def add(self, other: _Attempt) -> None:
         """The programs and the time of another attempt at the same gain."""
         self.trials = other.trials + self.trials
-        self.solving, self.verifying = self.solving + other.solving, self.verifying + other.verifying
+        self.solving, self.verifying = (
+            self.solving + other.solving,
+            self.verifying + other.verifying,
+        )
         self.begin -= other.ended - other.begin
 
     def _solve(self, program: ConeProgram) -> Candidate:
@@ -137,8 +190,12 @@ class _Attempt:
         self.solving += candidate.seconds
         return candidate
 
-    def _judge(self, program: str, margin: float, candidate: Candidate, weights: Array | tuple[float, ...]) -> None:
-        """Keep the best multiple of the candidate that can be verified, whatever the solver said of it."""
+    def _judge(
+        self, program: str, margin: float, candidate: Candidate, weights: Array | tuple[float, ...]
+    ) -> None:
+        """Keep the best multiple of the candidate that can be verified, whatever the solver said of
+        it.
+        """
         start = time.perf_counter()
         best = math.inf
         for weight in weights if candidate.x is not None else ():
@@ -163,10 +220,15 @@ class _Attempt:
 
 def _checked(lft: LFT, scaling: str, solver: Solver | str) -> Solver:
     if not isinstance(lft, LFT):
-        raise InputError(f"expected an LFT, got {type(lft).__name__}; a polynomial LPVStateSpace becomes one with .to_lft().reduce()")
+        raise InputError(
+            f"expected an LFT, got {type(lft).__name__}; a polynomial LPVStateSpace becomes one"
+            " with .to_lft().reduce()"
+        )
     check_scaling(scaling, lft.sizes)
     if not lft.states:
-        raise InputError("the LFT has no states; its gain is the largest norm of its matrix over the box")
+        raise InputError(
+            "the LFT has no states; its gain is the largest norm of its matrix over the box"
+        )
     return solver if isinstance(solver, Solver) else Solver(solver)
 
 
@@ -176,9 +238,17 @@ def _at_rest(frozen: BoxGain) -> Trajectory:
 
 
 def _certificate(
-    lft: LFT, scaling: str, solver: Solver, found: _Attempt | None, below: LowerBound, frozen: float, bounds: float
-) -> LFTCertificate:  # fmt: skip
-    """The certificate of what was `found`; None: a frozen model is unstable and nothing was tried."""
+    lft: LFT,
+    scaling: str,
+    solver: Solver,
+    found: _Attempt | None,
+    below: LowerBound,
+    frozen: float,
+    bounds: float,
+) -> LFTCertificate:
+    """The certificate of what was `found`; None: a frozen model is unstable and nothing was
+    tried.
+    """
     kind = "stability" if math.isnan(below.gamma) else "l2 gain"
     proof = found.proof if found else None
     growing = math.isinf(below.gamma) if kind == "l2 gain" else below.trajectory is not None
@@ -193,26 +263,60 @@ def _certificate(
     gamma = math.nan if kind == "stability" else found.gamma if found else math.inf
     seconds = Seconds(*(found.seconds if found else (0.0, 0.0, 0.0)), bounds)
     return LFTCertificate(
-        kind=kind, scaling=scaling, gamma=gamma, lower=below.gamma, frozen=frozen, status=status, verified=proof is not None,
-        proof=proof, rates=(math.inf,) * len(lft.parameters), hypotheses=_hypotheses(lft, scaling, proof, kind), solver=str(solver),
-        seconds=seconds, conditioning=found.conditioning if found else math.inf, attempts=tuple(found.trials) if found else (),
-        worst=below.trajectory, evidence=found.evidence if found else None,
-    )  # fmt: skip
+        kind=kind,
+        scaling=scaling,
+        gamma=gamma,
+        lower=below.gamma,
+        frozen=frozen,
+        status=status,
+        verified=proof is not None,
+        proof=proof,
+        rates=(math.inf,) * len(lft.parameters),
+        hypotheses=_hypotheses(lft, scaling, proof, kind),
+        solver=str(solver),
+        seconds=seconds,
+        conditioning=found.conditioning if found else math.inf,
+        attempts=tuple(found.trials) if found else (),
+        worst=below.trajectory,
+        evidence=found.evidence if found else None,
+    )
 
 
 _CLASS = {
-    "small gain": "the parameters together as one full block of norm one, complex and dynamic ones included, in the LFT's own coordinates",
-    "D": "scalings D that commute with the parameters: these may be complex, or operators of norm one",
+    "small gain": (
+        "the parameters together as one full block of norm one, complex and dynamic ones included,"
+        " in the LFT's own coordinates"
+    ),
+    "D": (
+        "scalings D that commute with the parameters: these may be complex, or operators of"
+        " norm one"
+    ),
     "DG": "scalings D and G: the parameters are real and may jump",
-    "full block": "a full block multiplier, concave in each parameter, positive at the corners of the box",
+    "full block": (
+        "a full block multiplier, concave in each parameter, positive at the corners of the box"
+    ),
 }
 
 
 def _hypotheses(lft: LFT, scaling: str, proof: Quadratic | None, kind: str) -> tuple[str, ...]:
-    ranges = ", ".join(f"{s.name} in [{s.low:g}, {s.high:g}]{'' if s.unit == '1' else ' ' + s.unit}" for s in lft.parameters)
-    out = [f"{ranges or 'no parameter'}: exogenous, as fast as it likes; a limit on its rate is not used", f"constant P; {_CLASS[scaling]}"]
+    ranges = ", ".join(
+        f"{s.name} in [{s.low:g}, {s.high:g}]{'' if s.unit == '1' else ' ' + s.unit}"
+        for s in lft.parameters
+    )
+    out = [
+        (
+            f"{ranges or 'no parameter'}: exogenous, as fast as it likes; a limit on its rate is"
+            " not used"
+        ),
+        f"constant P; {_CLASS[scaling]}",
+    ]
     if proof is not None:
-        out.append(VERIFIED.format(what="finitely many matrices", shared="only the matrices of the LFT"))
+        out.append(
+            VERIFIED.format(what="finitely many matrices", shared="only the matrices of the LFT")
+        )
     if kind == "l2 gain":
-        out.append("the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs together")
+        out.append(
+            "the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs"
+            " together"
+        )
     return tuple(out)

@@ -1,16 +1,20 @@
-"""Multipliers for w = Delta z, Delta = diag(delta_i I), |delta_i| <= 1: what is known of (w, z) at every instant.
+"""Multipliers for w = Delta z, Delta = diag(delta_i I), |delta_i| <= 1: what is known of (w, z) at
+every instant.
 
-A multiplier [Q S; S' R] claims [w; z]'[Q S; S' R][w; z] >= 0 for every Delta of the box. Four nested classes:
+A multiplier [Q S; S' R] claims [w; z]'[Q S; S' R][w; z] >= 0 for every Delta of the box. Four
+nested classes:
 
-small gain   t (|z|^2 - |w|^2) with one number t > 0, in the coordinates the LFT has
-D            R = -Q = diag(D_i) > 0, S = 0                                     (scalings that commute with Delta)
-DG           as D, and S = diag(G_i), G_i' = -G_i                               (the parameters are real)
-full block   any Q, S, R with Q_ii < 0 and Delta'Q Delta + Delta'S + S'Delta + R > 0 at the corners of the box
+small gain   t (|z|^2 - |w|^2) with one number t > 0, in the coordinates the LFT has D            R
+= -Q = diag(D_i) > 0, S = 0                                     (scalings that commute with Delta)
+DG           as D, and S = diag(G_i), G_i' = -G_i                               (the parameters are
+real) full block   any Q, S, R with Q_ii < 0 and Delta'Q Delta + Delta'S + S'Delta + R > 0 at the
+corners of the box
 
-With Q_ii < 0 the last expression is concave in each parameter alone, so its minimum over the box is at a corner. For one
-parameter DG loses nothing against the full block: a quadratic matrix polynomial that is positive on an interval is a sum of
-squares. Sources: Fan, Tits and Doyle, IEEE TAC 36 (1991), D and G; Scherer, "LPV control and full block multipliers",
-Automatica 37 (2001); Meinsma, Shrivastava and Fu, IEEE TAC 42 (1997), why DG is exact for one repeated scalar.
+With Q_ii < 0 the last expression is concave in each parameter alone, so its minimum over the box is
+at a corner. For one parameter DG loses nothing against the full block: a quadratic matrix
+polynomial that is positive on an interval is a sum of squares. Sources: Fan, Tits and Doyle, IEEE
+TAC 36 (1991), D and G; Scherer, "LPV control and full block multipliers", Automatica 37 (2001);
+Meinsma, Shrivastava and Fu, IEEE TAC 42 (1997), why DG is exact for one repeated scalar.
 """
 
 from __future__ import annotations
@@ -38,7 +42,9 @@ MOST_CORNERS = 64
 
 @dataclass(frozen=True, eq=False)
 class Multiplier:
-    """[Q S; S' R] (2n, 2n) of the class `scaling` for parameter blocks of `sizes`; Q and R symmetric, exactly."""
+    """[Q S; S' R] (2n, 2n) of the class `scaling` for parameter blocks of `sizes`; Q and R
+    symmetric, exactly.
+    """
 
     scaling: str
     sizes: tuple[int, ...]
@@ -47,7 +53,9 @@ class Multiplier:
     R: Array
 
     def __post_init__(self) -> None:
-        if not isinstance(self.sizes, tuple) or any(structure.whole(size, 0, "size") for size in self.sizes):
+        if not isinstance(self.sizes, tuple) or any(
+            structure.whole(size, 0, "size") for size in self.sizes
+        ):
             raise InputError(f"expected a tuple of block sizes, got {self.sizes!r:.60}")
         for name in ("Q", "S", "R"):
             object.__setattr__(self, name, structure.numbers(getattr(self, name), name))
@@ -61,8 +69,16 @@ class Multiplier:
             return f"expected one of the scalings {', '.join(SCALINGS)}, got {self.scaling!r:.60}"
         n = sum(self.sizes)
         if self.S.shape != (n, n) or not np.all(np.isfinite(self.S)):
-            return f"S of a multiplier: expected finite numbers of shape {(n, n)}, got shape {self.S.shape}"
-        return structure.first(*(structure.symmetric(M, (n, n), f"{name} of a multiplier") for name, M in (("Q", self.Q), ("R", self.R))))
+            return (
+                f"S of a multiplier: expected finite numbers of shape {(n, n)}, got shape"
+                f" {self.S.shape}"
+            )
+        return structure.first(
+            *(
+                structure.symmetric(M, (n, n), f"{name} of a multiplier")
+                for name, M in (("Q", self.Q), ("R", self.R))
+            )
+        )
 
     @property
     def matrix(self) -> Array:
@@ -70,7 +86,9 @@ class Multiplier:
         return np.block([[self.Q, self.S], [self.S.T, self.R]])
 
     def transformed(self, left: Array, weight: float) -> Multiplier:
-        """weight times the multiplier for w = left^-1 w', z = left^-1 z' (left commutes with Delta), its class kept exactly."""
+        """weight times the multiplier for w = left^-1 w', z = left^-1 z' (left commutes with
+        Delta), its class kept exactly.
+        """
 
         def back(M: Array) -> Array:
             return weight * left.T @ M @ left
@@ -93,7 +111,9 @@ class Condition(NamedTuple):
 
 
 class Class(NamedTuple):
-    """A class of multipliers: its basis Q, S, R (unknowns, n, n) each, and the conditions on the unknowns."""
+    """A class of multipliers: its basis Q, S, R (unknowns, n, n) each, and the conditions on the
+    unknowns.
+    """
 
     Q: Array
     S: Array
@@ -106,7 +126,10 @@ def check_scaling(scaling: str, sizes: Sequence[int]) -> str:
     if scaling not in SCALINGS:
         raise UnknownNameError("scaling", scaling, SCALINGS)
     if scaling == "full block" and 2 ** len(sizes) > MOST_CORNERS:
-        raise InputError(f"full block multipliers need 2^{len(sizes)} corners; take scaling='DG' for so many parameters")
+        raise InputError(
+            f"full block multipliers need 2^{len(sizes)} corners; take scaling='DG' for so many"
+            " parameters"
+        )
     return scaling
 
 
@@ -123,7 +146,11 @@ def multiplier_class(scaling: str, sizes: Sequence[int]) -> Class:
     if scaling == "full block":
         return _full(n, blocks, sizes)
     D = np.concatenate([_embedded(basis(b.stop - b.start), n, b) for b in blocks])
-    G = np.concatenate([_embedded(_skew(b.stop - b.start), n, b) for b in blocks]) if scaling == "DG" else np.zeros((0, n, n))
+    G = (
+        np.concatenate([_embedded(_skew(b.stop - b.start), n, b) for b in blocks])
+        if scaling == "DG"
+        else np.zeros((0, n, n))
+    )
     R, S = np.concatenate([D, 0 * G]), np.concatenate([0 * D, G])
     return Class(-R, S, R, tuple(Condition(R[:, b, b]) for b in blocks))
 
@@ -133,7 +160,10 @@ def _full(n: int, blocks: list[slice], sizes: Sequence[int]) -> Class:
     general = np.eye(n * n).reshape(n * n, n, n)
     k, g = len(symmetric), len(general)
     zero = np.zeros((k, n, n))
-    Q, R = np.concatenate([symmetric, zero, np.zeros((g, n, n))]), np.concatenate([zero, symmetric, np.zeros((g, n, n))])
+    Q, R = (
+        np.concatenate([symmetric, zero, np.zeros((g, n, n))]),
+        np.concatenate([zero, symmetric, np.zeros((g, n, n))]),
+    )
     S = np.concatenate([zero, zero, general])
     concave = [Condition(-Q[:, b, b]) for b in blocks]
     return Class(Q, S, R, (*concave, *(Condition(_at(Q, S, R, delta)) for delta in corners(sizes))))

@@ -4,8 +4,8 @@ Continuous time, with w = Delta z and a multiplier [Q S; S' R]: for all (x, w, u
 
     2 x'P (A x + Bw w + Bu u) + [w; z]'[Q S; S' R][w; z] + y'y - gamma^2 u'u < 0,   P > 0,
 
-so that V = x'P x falls by more than y'y - gamma^2 u'u along every trajectory; discrete time: x(k+1)'P x(k+1) - x'P x.
-For w alone it says that the parameter loop is well posed.
+so that V = x'P x falls by more than y'y - gamma^2 u'u along every trajectory; discrete time:
+x(k+1)'P x(k+1) - x'P x. For w alone it says that the parameter loop is well posed.
 """
 
 from __future__ import annotations
@@ -23,11 +23,15 @@ from synthesis.symmetric import basis, extended, smat, svec
 Array = np.ndarray
 
 FLOOR = 0.1
-"""P and the conditions of the multiplier are held above this part of the margin (scaled coordinates), so that they are strict."""
+"""P and the conditions of the multiplier are held above this part of the margin (scaled
+coordinates), so that they are strict.
+"""
 
 
 class Linear(NamedTuple):
-    """constant + sum_k x_k matrices[k] on (x, w, u) must be negative; `first` of the unknowns are those of P."""
+    """constant + sum_k x_k matrices[k] on (x, w, u) must be negative; `first` of the unknowns are
+    those of P.
+    """
 
     constant: Array
     matrices: Array
@@ -52,29 +56,41 @@ def inequality(loop: Loop, multipliers: Class, continuous: bool) -> Linear:
     else:
         lyapunov = move.T @ P @ move - here.T @ P @ here
     side = own.T @ multipliers.S @ z
-    static = own.T @ multipliers.Q @ own + side + np.swapaxes(side, -1, -2) + z.T @ multipliers.R @ z
+    static = (
+        own.T @ multipliers.Q @ own + side + np.swapaxes(side, -1, -2) + z.T @ multipliers.R @ z
+    )
     return Linear(y.T @ y, np.concatenate([lyapunov, static]), len(P))
 
 
 def with_state_channels(loop: Loop) -> Loop:
-    """Noise on every state as the input, the state as the output: a gain from one to the other exists where the loop is stable."""
+    """Noise on every state as the input, the state as the output: a gain from one to the other
+    exists where the loop is stable.
+    """
     x, w = len(loop.A), loop.Bw.shape[1]
-    return loop._replace(Bu=np.eye(x), Dzu=np.zeros((w, x)), Cy=np.eye(x), Dyw=np.zeros((x, w)), Dyu=np.zeros((x, x)))
+    return loop._replace(
+        Bu=np.eye(x), Dzu=np.zeros((w, x)), Cy=np.eye(x), Dyw=np.zeros((x, w)), Dyu=np.zeros((x, x))
+    )
 
 
-def gain_program(linear: Linear, multipliers: Class, states: int, inputs: int, margin: float) -> ConeProgram:
+def gain_program(
+    linear: Linear, multipliers: Class, states: int, inputs: int, margin: float
+) -> ConeProgram:
     """Minimise gamma^2 with the (x, w) block below -margin I. Unknowns: P, multiplier, gamma^2."""
     size = len(linear.constant)
     inner = np.zeros((size, size))
     inner[: size - inputs, : size - inputs] = np.eye(size - inputs)
     gain = np.eye(size) - inner
     rows = [(linear.constant + margin * inner, np.concatenate([linear.matrices, -gain[None]]))]
-    rows += [(FLOOR * margin * np.eye(len(M[0])), -M) for M in _positive(linear, multipliers, states, extra=1)]
+    rows += [
+        (FLOOR * margin * np.eye(len(M[0])), -M)
+        for M in _positive(linear, multipliers, states, extra=1)
+    ]
     return _assembled(rows, _last(len(linear.matrices) + 1, 1.0))
 
 
 def margin_program(linear: Linear, multipliers: Class, states: int, inputs: int) -> ConeProgram:
-    """Maximise t with the (x, w) block below -t I, without channels, P and the multiplier's conditions between 0 and I.
+    """Maximise t with the (x, w) block below -t I, without channels, P and the multiplier's
+    conditions between 0 and I.
 
     Nothing can hold strictly where the largest t is zero. Unknowns: P, multiplier, t.
     """
@@ -90,7 +106,9 @@ def unpack(x: Array, multipliers: Class, states: int) -> tuple[Array, Array, Arr
     """P, Q, S, R (scaled coordinates) from the unknowns."""
     first = states * (states + 1) // 2
     P = smat(x[:first], states)
-    Q, S, R = (np.tensordot(x[first:-1], M, axes=1) for M in (multipliers.Q, multipliers.S, multipliers.R))
+    Q, S, R = (
+        np.tensordot(x[first:-1], M, axes=1) for M in (multipliers.Q, multipliers.S, multipliers.R)
+    )
     return P, Q, S, R
 
 

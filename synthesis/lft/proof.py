@@ -1,4 +1,5 @@
-"""Is this P and multiplier a proof? Recomputed from the LFT alone, in floating point or in exact rational arithmetic.
+"""Is this P and multiplier a proof? Recomputed from the LFT alone, in floating point or in exact
+rational arithmetic.
 
 Nothing here is shared with the assembly of the cone program: an error there cannot pass here.
 """
@@ -27,7 +28,9 @@ CORNERS = 6
 
 
 class Quadratic(NamedTuple):
-    """V = x'P x and a multiplier, in physical units and in the copies of the parameters the LFT has."""
+    """V = x'P x and a multiplier, in physical units and in the copies of the parameters the LFT
+    has.
+    """
 
     P: Array
     multiplier: Multiplier
@@ -40,7 +43,9 @@ class Evidence(NamedTuple):
     coordinates: Coordinates
 
     def fault(self, proof: Quadratic, kind: str, rates: tuple[float, ...]) -> str | None:
-        """What keeps the proof from being about this LFT and this claim, before any inequality; None where nothing does."""
+        """What keeps the proof from being about this LFT and this claim, before any inequality;
+        None where nothing does.
+        """
         if not isinstance(proof, Quadratic) or not isinstance(proof.multiplier, Multiplier):
             return "expected P and a Multiplier"
         if kind != ("l2 gain" if self.lft.inputs else "stability"):
@@ -51,18 +56,26 @@ class Evidence(NamedTuple):
         units, left, right = self.coordinates
         return structure.first(
             structure.symmetric(np.asarray(proof.P), (x, x), "P"),
-            M.fault or (None if _structure_holds(M, self.lft) else f"the multiplier is not of the class {M.scaling!r} for this LFT"),
+            M.fault
+            or (
+                None
+                if _structure_holds(M, self.lft)
+                else f"the multiplier is not of the class {M.scaling!r} for this LFT"
+            ),
             structure.coordinates(left, right, (), self.lft.order),
             units.fault(x),
         )
 
     def least_gain(self, proof: Quadratic) -> tuple[float, float]:
-        """(gain that the proof admits, condition number of P); inf where it proves nothing, NaN without channels."""
+        """(gain that the proof admits, condition number of P); inf where it proves nothing, NaN
+        without channels.
+        """
         lft, (units, _, right) = self.lft, self.coordinates
         E = np.zeros((lft.order + len(lft.states) + len(lft.inputs),) * 2)
         n, x = lft.order, len(lft.states)
         root = math.sqrt(units.time)
-        # columns of (w, x, u); energies divided by the channel squared and counted in the unit of time
+        # columns of (w, x, u); energies divided by the channel squared and counted in the unit of
+        # time
         E[:n, :n], E[n : n + x, n : n + x] = right, root * units.right @ units.weight
         E[n + x :, n + x :] = np.eye(len(lft.inputs))
         F = E.T @ _left_side(lft, proof, float) @ E / units.channel**2
@@ -83,7 +96,9 @@ class Evidence(NamedTuple):
         return math.isnan(least) if math.isnan(gamma) else least < gamma
 
     def exact(self, proof: Quadratic, gamma: float) -> bool:
-        """LDL' in rationals; the doubles of the LFT, of the proof and of gamma are taken as the rationals they are."""
+        """LDL' in rationals; the doubles of the LFT, of the proof and of gamma are taken as the
+        rationals they are.
+        """
         number, n, x = rational(), self.lft.order, len(self.lft.states)
         if not _structure_holds(proof.multiplier, self.lft):
             return False
@@ -93,17 +108,24 @@ class Evidence(NamedTuple):
         else:
             for i in range(n + x, len(F)):
                 F[i, i] = F[i, i] + number(gamma) * number(gamma)
-        exactly = all(positive_definite(M) for M in (_exact(proof.P, number), *_conditions(proof.multiplier, number), F))
+        exactly = all(
+            positive_definite(M)
+            for M in (_exact(proof.P, number), *_conditions(proof.multiplier, number), F)
+        )
         return exactly and self.witnessed(proof, gamma, number)
 
     def witnessed(self, proof: Quadratic, gamma: float, number: Number) -> bool:
-        """V = x'Px does at the corners of the box and inside it what is claimed, through the closed model's own matrices."""
+        """V = x'Px does at the corners of the box and inside it what is claimed, through the closed
+        model's own matrices.
+        """
         g = None if math.isnan(gamma) else number(gamma) * number(gamma)
         P, m = _exact(proof.P, number), len(self.lft.parameters)
         corners = product((-1.0, 1.0), repeat=m) if m <= CORNERS else ()
         diagonals = (np.where(np.arange(m) % 2, -t, t) for t in np.linspace(-0.9, 0.9, 7))
         for delta in (*corners, *diagonals):
-            model = self.lft.at(*(s.middle + d * s.radius for s, d in zip(self.lft.parameters, delta, strict=True)))
+            model = self.lft.at(
+                *(s.middle + d * s.radius for s, d in zip(self.lft.parameters, delta, strict=True))
+            )
             own = Matrices(*(_exact(M, number) for M in (model.A, model.B, model.C, model.D)))
             F = pointwise.dissipation(own, P, None, None if self.lft.dt is None else P, g)
             if not positive_definite(-F):
@@ -124,14 +146,18 @@ class Evidence(NamedTuple):
 
 
 def _left_side(lft: LFT, proof: Quadratic, number: Number) -> Array:
-    """The quadratic form on (w, x, u) with gamma = 0: rows of the LFT are (z, dx/dt or x(k+1), y)."""
+    """The quadratic form on (w, x, u) with gamma = 0: rows of the LFT are (z, dx/dt or x(k+1),
+    y).
+    """
     M11, M12, M21, M22 = (_exact(M, number) for M in (lft.M11, lft.M12, lft.M21, lft.M22))
     n, x = lft.order, len(lft.states)
     z = np.concatenate([M11, M12], axis=1)
     below = np.concatenate([M21, M22], axis=1)
     move, y = below[:x], below[x:]
     P = _exact(proof.P, number)
-    Q, S, R = (_exact(M, number) for M in (proof.multiplier.Q, proof.multiplier.S, proof.multiplier.R))
+    Q, S, R = (
+        _exact(M, number) for M in (proof.multiplier.Q, proof.multiplier.S, proof.multiplier.R)
+    )
     F = z.T @ R @ z + y.T @ y
     cross = S @ z
     F[:n] = F[:n] + cross
@@ -149,7 +175,9 @@ def _left_side(lft: LFT, proof: Quadratic, number: Number) -> Array:
 
 
 def _structure_holds(multiplier: Multiplier, lft: LFT) -> bool:
-    """Exactly: the blocks are those of the LFT, and the multiplier has the form its class promises."""
+    """Exactly: the blocks are those of the LFT, and the multiplier has the form its class
+    promises.
+    """
     Q, S, R = multiplier.Q, multiplier.S, multiplier.R
     if multiplier.sizes != lft.sizes or np.any(Q != Q.T) or np.any(R != R.T):
         return False
@@ -158,8 +186,18 @@ def _structure_holds(multiplier: Multiplier, lft: LFT) -> bool:
     owner = np.repeat(np.arange(len(multiplier.sizes)), multiplier.sizes)
     outside = owner[:, None] != owner[None, :]
     allowed = np.all(S == -S.T) if multiplier.scaling == "DG" else not np.any(S)
-    scalar = multiplier.scaling != "small gain" or not len(R) or np.array_equal(R, R[0, 0] * np.eye(len(R)))
-    return bool(allowed and scalar and np.array_equal(Q, -R) and not np.any(R[outside]) and not np.any(S[outside]))
+    scalar = (
+        multiplier.scaling != "small gain"
+        or not len(R)
+        or np.array_equal(R, R[0, 0] * np.eye(len(R)))
+    )
+    return bool(
+        allowed
+        and scalar
+        and np.array_equal(Q, -R)
+        and not np.any(R[outside])
+        and not np.any(S[outside])
+    )
 
 
 def _conditions(multiplier: Multiplier, number: Number) -> Iterator[Array]:

@@ -1,4 +1,6 @@
-"""Several scheduling parameters, and other relaxations than Bernstein coefficients: polynomial matrices over a box."""
+"""Several scheduling parameters, and other relaxations than Bernstein coefficients: polynomial
+matrices over a box.
+"""
 
 from synthesis.polynomial.certificate import BoxCertificate
 from synthesis.polynomial.lyapunov import BoxLyapunov

@@ -1,4 +1,6 @@
-"""What no certificate over a box can beat: frozen models all over it, and trajectories along straight lines through it."""
+"""What no certificate over a box can beat: frozen models all over it, and trajectories along
+straight lines through it.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ Array = np.ndarray
 Measure = Callable[[Array, Array, Array, Array], float]
 
 WAVES = 30
-"""Waves looked at along each line for peaks and slow decay, those of the fastest growth first; for peaks, those of many periods too."""
+"""Waves looked at along each line for peaks and slow decay, those of the fastest growth first; for
+peaks, those of many periods too.
+"""
 
 
 class Worst(NamedTuple):
@@ -42,7 +46,9 @@ class Worst(NamedTuple):
 
 
 def measure(demand: Demand, dt: float | None) -> Measure:
-    """What a frozen model is measured by, larger is worse: its gain, or minus its decay rate (1/s) for stability too."""
+    """What a frozen model is measured by, larger is worse: its gain, or minus its decay rate (1/s)
+    for stability too.
+    """
     if demand.kind == "l2 gain":
         return lambda A, B, C, D: norm(A, B, C, D, dt)[0]
     if demand.kind == "energy-to-peak gain":
@@ -53,11 +59,16 @@ def measure(demand: Demand, dt: float | None) -> Measure:
 def frozen_decay(A: Array, dt: float | None) -> float:
     """Decay rate of the slowest mode, 1/s; negative where it grows."""
     poles = np.linalg.eigvals(A)
-    return float(-poles.real.max()) if dt is None else -math.log(max(float(np.abs(poles).max()), 1e-300)) / dt
+    return (
+        float(-poles.real.max())
+        if dt is None
+        else -math.log(max(float(np.abs(poles).max()), 1e-300)) / dt
+    )
 
 
 def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> float:
-    """max |y(t)| over inputs of unit energy: sqrt of the largest eigenvalue of C X C' (+ D D'), X the controllability Gramian.
+    """max |y(t)| over inputs of unit energy: sqrt of the largest eigenvalue of C X C' (+ D D'), X
+    the controllability Gramian.
 
     inf where the model is not stable. Source: Rotea (1993); discrete time by the same argument.
     """
@@ -88,11 +99,24 @@ def worst_frozen(model: Pieces, size: Measure) -> Worst:
         return worst
     for k in np.argsort(-values)[:2]:
         step = (high - low) / (count - 1)
-        simplex = np.vstack([grid[k], *(grid[k] + d * np.where(grid[k] + d > high, -1.0, 1.0) for d in np.diag(step))])
+        simplex = np.vstack(
+            [
+                grid[k],
+                *(grid[k] + d * np.where(grid[k] + d > high, -1.0, 1.0) for d in np.diag(step)),
+            ]
+        )
         found: Any = minimize(
-            lambda p: -min(at(p), 1e300), grid[k], method="Nelder-Mead", bounds=list(zip(low, high, strict=True)),
-            options={"initial_simplex": simplex, "maxfev": 40 * m, "xatol": 1e-7 * float((high - low).min()), "fatol": 1e-12},
-        )  # fmt: skip
+            lambda p: -min(at(p), 1e300),
+            grid[k],
+            method="Nelder-Mead",
+            bounds=list(zip(low, high, strict=True)),
+            options={
+                "initial_simplex": simplex,
+                "maxfev": 40 * m,
+                "xatol": 1e-7 * float((high - low).min()),
+                "fatol": 1e-12,
+            },
+        )
         value = at(found.x)
         if value > worst.value:
             worst = Worst(value, tuple(map(float, np.clip(found.x, low, high))))
@@ -100,9 +124,18 @@ def worst_frozen(model: Pieces, size: Measure) -> Worst:
 
 
 def unstable_at(model: Pieces, suspect: tuple[float, ...]) -> tuple[float, ...] | None:
-    """A p, the suspect one first, at which the frozen model is unstable beyond rounding; None where there is none on the grid."""
+    """A p, the suspect one first, at which the frozen model is unstable beyond rounding; None where
+    there is none on the grid.
+    """
     points = np.vstack([suspect, _grid(model)])
-    return next((tuple(map(float, p)) for p, A in zip(points, model.at(points).A, strict=True) if surely_unstable(A, model.dt)), None)
+    return next(
+        (
+            tuple(map(float, p))
+            for p, A in zip(points, model.at(points).A, strict=True)
+            if surely_unstable(A, model.dt)
+        ),
+        None,
+    )
 
 
 def _count(model: Pieces) -> int:
@@ -110,26 +143,41 @@ def _count(model: Pieces) -> int:
 
 
 def _grid(model: Pieces) -> Array:
-    axes = [np.unique(np.r_[np.linspace(s.low, s.high, _count(model)), b]) for s, b in zip(model.parameters, model.breaks, strict=True)]
+    axes = [
+        np.unique(np.r_[np.linspace(s.low, s.high, _count(model)), b])
+        for s, b in zip(model.parameters, model.breaks, strict=True)
+    ]
     return np.array(list(product(*axes)))
 
 
-def worst_moving(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, frozen: Worst, search: Search | None) -> Worst:
-    """The worst found along p that moves on lines through the box within its rates; `frozen` where nothing is worse.
+def worst_moving(
+    model: LPVStateSpace | PolynomialStateSpace,
+    demand: Demand,
+    frozen: Worst,
+    search: Search | None,
+) -> Worst:
+    """The worst found along p that moves on lines through the box within its rates; `frozen` where
+    nothing is worse.
 
-    Gains and minus decay rates: inf (gain) or a value >= 0 (decay) means a trajectory along which the state grows.
+    Gains and minus decay rates: inf (gain) or a value >= 0 (decay) means a trajectory along which
+    the state grows.
     """
     best = frozen
     if search is None or all(rate == 0 for rate in demand.rates):
         return best
-    budget, lines = Budget(search.seconds), [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.rate > 0]
+    budget, lines = (
+        Budget(search.seconds),
+        [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.rate > 0],
+    )
     for k, (line, back) in enumerate(lines):
         if budget.over:
             break
         budget.tell("line %d of %d, %.6g so far", k + 1, len(lines), abs(best.value))
         rate, search = line.scheduling.rate, replace(search, seconds=budget.left / (len(lines) - k))
         if demand.kind == "l2 gain":
-            found = lower_bound(line, rate, frozen=FrozenGain(frozen.value, 0.0, 0.0), search=search)
+            found = lower_bound(
+                line, rate, frozen=FrozenGain(frozen.value, 0.0, 0.0), search=search
+            )
             value, trajectory = found.gamma, found.trajectory
         elif demand.kind == "energy-to-peak gain":
             value, trajectory = _peaks(line, rate, search)
@@ -142,7 +190,9 @@ def worst_moving(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, fr
     return best
 
 
-def growing(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, search: Search | None) -> Trajectory | None:
+def growing(
+    model: LPVStateSpace | PolynomialStateSpace, demand: Demand, search: Search | None
+) -> Trajectory | None:
     """A p(t) on such a line along which the state grows, None where none was found."""
     if search is None:
         return None
@@ -159,7 +209,9 @@ def growing(model: LPVStateSpace | PolynomialStateSpace, demand: Demand, search:
 
 
 def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:
-    """Energy to peak along waves: the Gramian of inputs held over each step, from rest over some cycles."""
+    """Energy to peak along waves: the Gramian of inputs held over each step, from rest over some
+    cycles.
+    """
     family = WaveFamily(line, rate, search)
     best: tuple[float, Trajectory | None] = (0.0, None)
     # where A does not depend on p, growth ranks nothing
@@ -188,7 +240,9 @@ def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Tra
 
 
 def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:
-    """Minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers; the error of the time steps taken off."""
+    """Minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers; the error
+    of the time steps taken off.
+    """
     family = WaveFamily(line, rate, search)
     best: tuple[float, Trajectory | None] = (-math.inf, None)
     budget = Budget(search.seconds)
@@ -198,9 +252,10 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
         cycle = Trajectory(*wave.vertices())
         longest = max(family.longest, wave.period / search.steps)
         rates = [
-            math.log(max(multiplier(steps(line, cycle.time, cycle.p, longest / finer)), 1e-300)) / wave.period
+            math.log(max(multiplier(steps(line, cycle.time, cycle.p, longest / finer)), 1e-300))
+            / wave.period
             for finer in ((2, 4) if line.dt is None else (1, 1))
-        ]  # fmt: skip
+        ]
         value = rates[1] - abs(rates[1] - rates[0])
         if value > best[0]:
             best = value, cycle if line.dt is None else samples(cycle, line.dt)
@@ -209,16 +264,25 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
 
 def _lines(
     model: LPVStateSpace | PolynomialStateSpace, rates: Sequence[float]
-) -> Iterator[tuple[LPVStateSpace, Callable[[Array], Array]]]:  # fmt: skip
-    """Diagonals and axes of the box as models of one parameter within the rates, and the way back to p."""
+) -> Iterator[tuple[LPVStateSpace, Callable[[Array], Array]]]:
+    """Diagonals and axes of the box as models of one parameter within the rates, and the way back
+    to p.
+    """
     if isinstance(model, LPVStateSpace):
         yield model.with_rate(rates[0]), lambda p: p
         return
     low, high = np.array(model.box).T
     m = len(low)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    directions = [np.array((1.0, *signs)) for signs in product((1.0, -1.0), repeat=m - 1)] + (list(np.eye(m)) if m > 1 else [])
+    directions = [np.array((1.0, *signs)) for signs in product((1.0, -1.0), repeat=m - 1)] + (
+        list(np.eye(m)) if m > 1 else []
+    )
     for d in directions:
         line = model.along(middle - d * half, middle + d * half)
         rate = min(r / h for r, h, used in zip(rates, half, d, strict=True) if used)
-        yield line.with_rate(rate), lambda s, d=d: middle + np.multiply.outer(s, d * half) if m > 1 else middle[0] + s * half[0]
+        yield (
+            line.with_rate(rate),
+            lambda s, d=d: (
+                middle + np.multiply.outer(s, d * half) if m > 1 else middle[0] + s * half[0]
+            ),
+        )

@@ -1,4 +1,6 @@
-"""What was proven over a box of parameters, or by another relaxation than plain Bernstein coefficients."""
+"""What was proven over a box of parameters, or by another relaxation than plain Bernstein
+coefficients.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,12 @@ from synthesis.verdict import Verdict
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BoxCertificate(Verdict):
-    """A bound for every p(t) in a box within its rates, of any kind, with its proof and its hypotheses.
+    """A bound for every p(t) in a box within its rates, of any kind, with its proof and its
+    hypotheses.
 
-    relaxation  how the inequalities were imposed; a "grid" proves nothing
-    lyapunov    V = x' P(p) x, None where there is none
-    indicative  the bound that holds at the points of a grid, where that was asked for: no proof; else NaN
-    evidence    the model and units that `verify` uses
+    relaxation  how the inequalities were imposed; a "grid" proves nothing lyapunov    V = x' P(p)
+    x, None where there is none indicative  the bound that holds at the points of a grid, where that
+    was asked for: no proof; else NaN evidence    the model and units that `verify` uses
     """
 
     relaxation: str
@@ -29,7 +31,9 @@ class BoxCertificate(Verdict):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.verified and self.relaxation == "grid":
-            raise CertificateError("a certificate on a grid cannot be verified: between its points nothing is known")
+            raise CertificateError(
+                "a certificate on a grid cannot be verified: between its points nothing is known"
+            )
 
     @property
     def _proof(self) -> tuple[BoxLyapunov | None, Evidence | None]:

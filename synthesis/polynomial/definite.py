@@ -1,4 +1,6 @@
-"""Is a given polynomial matrix negative definite on its whole box? Bernstein coefficients, halving the box where they do not tell."""
+"""Is a given polynomial matrix negative definite on its whole box? Bernstein coefficients, halving
+the box where they do not tell.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ CELLS = 4000
 
 
 def negative_definite(F: PolynomialMatrix, cells: int = CELLS) -> bool:
-    """Floating point, all boxes of a generation at once; False too where `cells` boxes did not suffice."""
+    """Floating point, all boxes of a generation at once; False too where `cells` boxes did not
+    suffice.
+    """
     m, spent = len(F.box), 0
     waiting = F.coefficients[None]
     while len(waiting):
@@ -25,7 +29,11 @@ def negative_definite(F: PolynomialMatrix, cells: int = CELLS) -> bool:
         values = np.linalg.eigvalsh(flat)
         limit = -20 * F.shape[0] * np.finfo(float).eps * np.abs(values).max(axis=2)
         below = values[..., -1] < limit
-        if not np.all(below.reshape(len(waiting), *waiting.shape[1 : m + 1])[_corners(waiting.shape[1 : m + 1])]):
+        if not np.all(
+            below.reshape(len(waiting), *waiting.shape[1 : m + 1])[
+                _corners(waiting.shape[1 : m + 1])
+            ]
+        ):
             return False
         waiting = waiting[~below.all(axis=1)]
         if len(waiting):
@@ -34,7 +42,9 @@ def negative_definite(F: PolynomialMatrix, cells: int = CELLS) -> bool:
 
 
 def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
-    """The same in the exact arithmetic of the coefficients: an LDL' factorisation of each decides."""
+    """The same in the exact arithmetic of the coefficients: an LDL' factorisation of each
+    decides.
+    """
     waiting, spent = [F], 0
     while waiting:
         spent += 1
@@ -47,7 +57,9 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
         promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[:, -1] < 0))
         if promising and all(positive_definite(-M) for M in matrices):
             continue
-        corners = G.coefficients[tuple(slice(None, None, max(d, 1)) for d in G.degrees)].reshape(-1, *G.shape)
+        corners = G.coefficients[tuple(slice(None, None, max(d, 1)) for d in G.degrees)].reshape(
+            -1, *G.shape
+        )
         if not all(positive_definite(-M) for M in corners):
             return False
         curvature = _curvature(numbers.reshape(1, *G.coefficients.shape), len(G.box))[0]
@@ -58,7 +70,9 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
 
 
 def _normalised(F: Array) -> Array:
-    """Matrices (..., n, n) with a diagonal of -1 where it is negative: rounding then means the same in all units."""
+    """Matrices (..., n, n) with a diagonal of -1 where it is negative: rounding then means the same
+    in all units.
+    """
     size = np.sqrt(np.abs(np.diagonal(F, axis1=-2, axis2=-1)))
     size = np.where(size > 0, size, 1.0)
     return F / size[..., :, None] / size[..., None, :]
@@ -69,7 +83,9 @@ def _corners(shape: tuple[int, ...]) -> tuple[slice, ...]:
 
 
 def _curvature(c: Array, m: int) -> Array:
-    """(boxes, m): how far the coefficients are from affine along each parameter, which is what halving improves."""
+    """(boxes, m): how far the coefficients are from affine along each parameter, which is what
+    halving improves.
+    """
     out = np.zeros((len(c), m))
     for i in range(m):
         if c.shape[i + 1] > 2:

@@ -1,9 +1,9 @@
-"""What must be negative definite over the box, as polynomial matrices in p for a given P; linear in P.
+"""What must be negative definite over the box, as polynomial matrices in p, linear in P.
 
 Continuous time, V = x' P(p) x, at every corner nu of the box of rates, Pdot = sum_i nu_i dP/dp_i:
 
-    L2 gain          [A'P + PA + Pdot + C'C   PB + C'D; .   D'D - g I] < 0                        gain^2 = g
-    energy to peak   [A'P + PA + Pdot   PB; .   -I] < 0  and  [P   C'; .   g I] > 0, D = 0         gain^2 = g
+    L2 gain          [A'P + PA + Pdot + C'C   PB + C'D; .   D'D - g I] < 0
+    energy to peak   [A'P + PA + Pdot   PB; .   -I] < 0  and  [P   C'; .   g I] > 0, D = 0
     decay rate       A'P + PA + Pdot + 2 alpha P < 0
 
 discrete time, P+ = P(p(k+1)):
@@ -12,9 +12,10 @@ discrete time, P+ = P(p(k+1)):
     energy to peak   [A'P+A - P   A'P+B; .   B'P+B - I] < 0  and  [P 0 C'; 0 I D'; C D g I] > 0
     decay rate       A'P+A exp(2 alpha dt) - P < 0
 
-and P > 0. Sources: Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996), theorem 3.1; Rotea, "The
-generalized H2 control problem", Automatica 29 (1993); Boyd, El Ghaoui, Feron and Balakrishnan, "Linear Matrix
-Inequalities in System and Control Theory" (1994), sections 5.1 and 6.
+and P > 0; gain^2 = g. Sources: Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996),
+theorem 3.1; Rotea, "The generalized H2 control problem", Automatica 29 (1993); Boyd, El Ghaoui,
+Feron and Balakrishnan, "Linear Matrix Inequalities in System and Control Theory" (1994), sections
+5.1 and 6.
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ Array = np.ndarray
 
 
 class Demand(NamedTuple):
-    """What is asked: `kind`; `rates` of the parameters in their units per second; `shift`: alpha of a decay rate, 1/s, else 0."""
+    """What is asked: `kind`; `rates` of the parameters in their units per second; `shift`: alpha of
+    a decay rate, 1/s, else 0.
+    """
 
     kind: Kind
     rates: tuple[float, ...]
@@ -42,11 +45,17 @@ class Demand(NamedTuple):
 
     def steps(self, dt: float | None, degrees: Sequence[int]) -> tuple[float, ...]:
         """Largest change of each parameter in a sample that matters to P; 0 in continuous time."""
-        return tuple(rate * dt if dt and d else 0.0 for rate, d in zip(self.rates, degrees, strict=True))
+        return tuple(
+            rate * dt if dt and d else 0.0 for rate, d in zip(self.rates, degrees, strict=True)
+        )
 
     def meaningful(self, dt: float | None, degrees: Sequence[int]) -> bool:
-        """False where P varies with a p that may jump in continuous time: dV/dt has no bound then."""
-        return dt is not None or all(math.isfinite(r) or d == 0 for r, d in zip(self.rates, degrees, strict=True))
+        """False where P varies with a p that may jump in continuous time: dV/dt has no bound
+        then.
+        """
+        return dt is not None or all(
+            math.isfinite(r) or d == 0 for r, d in zip(self.rates, degrees, strict=True)
+        )
 
 
 class Pair(NamedTuple):
@@ -61,8 +70,12 @@ def positivity(P: PolynomialMatrix) -> PolynomialMatrix:
     return -P
 
 
-def decrease(model: Pieces, region: Region, P: Pair, demand: Demand, number: Number) -> Iterator[PolynomialMatrix]:
-    """The dissipation inequalities on a region, without the term in g; one a corner of the box of rates."""
+def decrease(
+    model: Pieces, region: Region, P: Pair, demand: Demand, number: Number
+) -> Iterator[PolynomialMatrix]:
+    """The dissipation inequalities on a region, without the term in g; one a corner of the box of
+    rates.
+    """
     m = len(model.parameters)
     A, B, C, D = model_on(model, region, number)
     here = now(P.here, region, number)
@@ -83,8 +96,17 @@ def decrease(model: Pieces, region: Region, P: Pair, demand: Demand, number: Num
         side, corner = here @ B, B.T @ B * 0
         varying = [(i, rate) for i, rate in enumerate(demand.rates) if here.degrees[i] and rate > 0]
         slopes = [here.derivative(i) * number(rate) for i, rate in varying]
-        drifts = [sum((s * sign for s, sign in zip(slopes[1:], signs[1:], strict=True)), slopes[0] * signs[0]) if slopes else None
-                  for signs in product((-1, 1), repeat=len(slopes))]  # fmt: skip
+        drifts = [
+            (
+                sum(
+                    (s * sign for s, sign in zip(slopes[1:], signs[1:], strict=True)),
+                    slopes[0] * signs[0],
+                )
+                if slopes
+                else None
+            )
+            for signs in product((-1, 1), repeat=len(slopes))
+        ]
     if gain:
         top, side, corner = top + C.T @ C, side + C.T @ D, corner + D.T @ D
     for drift in drifts:

@@ -1,4 +1,6 @@
-"""Lyapunov functions V(x, p) = x' P(p) x with P a polynomial, or a continuous spline, in several parameters."""
+"""Lyapunov functions V(x, p) = x' P(p) x with P a polynomial, or a continuous spline, in several
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +20,9 @@ Array = np.ndarray
 class BoxLyapunov:
     """P of degree d_i in parameter i on each of the K_i segments between `knots[i]`, continuous.
 
-    `coefficients` (K_1 d_1 + 1, ..., K_m d_m + 1, n, n): segment j of parameter i has the Bernstein coefficients
-    j d_i .. (j + 1) d_i along axis i. Physical units of the states. Raises `InputError` for other shapes.
+    `coefficients` (K_1 d_1 + 1, ..., K_m d_m + 1, n, n): segment j of parameter i has the Bernstein
+    coefficients j d_i .. (j + 1) d_i along axis i. Physical units of the states. Raises
+    `InputError` for other shapes.
     """
 
     knots: tuple[Array, ...]
@@ -28,9 +31,14 @@ class BoxLyapunov:
 
     def __post_init__(self) -> None:
         if not isinstance(self.knots, tuple) or not isinstance(self.degrees, tuple):
-            raise InputError(f"expected a tuple of knots and one of degrees, got {self.knots!r:.60} and {self.degrees!r:.60}")
+            raise InputError(
+                f"expected a tuple of knots and one of degrees, got {self.knots!r:.60} and"
+                f" {self.degrees!r:.60}"
+            )
         object.__setattr__(self, "knots", tuple(structure.numbers(k, "knots") for k in self.knots))
-        object.__setattr__(self, "coefficients", structure.numbers(self.coefficients, "coefficients"))
+        object.__setattr__(
+            self, "coefficients", structure.numbers(self.coefficients, "coefficients")
+        )
         if self.fault:
             raise InputError(self.fault)
 
@@ -39,7 +47,10 @@ class BoxLyapunov:
         """What is wrong with the form, None where nothing is."""
         if len(self.knots) != len(self.degrees):
             return f"expected a degree for each of {len(self.knots)} parameters, got {self.degrees}"
-        found = structure.first(*map(structure.ascending, self.knots), *(structure.whole(d, 0, "degree") for d in self.degrees))
+        found = structure.first(
+            *map(structure.ascending, self.knots),
+            *(structure.whole(d, 0, "degree") for d in self.degrees),
+        )
         if found:
             return found
         n = self.coefficients.shape[-1] if self.coefficients.ndim else 0
@@ -54,7 +65,9 @@ class BoxLyapunov:
             return f"P is of {len(self.knots)} parameters, the model has {len(box)}"
         if self.coefficients.shape[-1] != states:
             return f"P is of {self.coefficients.shape[-1]} variables, the model has {states}"
-        return structure.first(*(structure.covering(k, *ends) for k, ends in zip(self.knots, box, strict=True)))
+        return structure.first(
+            *(structure.covering(k, *ends) for k, ends in zip(self.knots, box, strict=True))
+        )
 
     @property
     def segments(self) -> tuple[int, ...]:
@@ -86,8 +99,13 @@ class BoxLyapunov:
         for i, knots in enumerate(self.knots):
             value, slack = points[:, i], 1e-9 * (knots[-1] - knots[0])
             if len(value) and (value.min() < knots[0] - slack or value.max() > knots[-1] + slack):
-                raise InputError(f"p spans [{value.min():.4g}, {value.max():.4g}], P is known on [{knots[0]:.4g}, {knots[-1]:.4g}]")
-            index[:, i] = np.clip(np.searchsorted(knots, value, side="right") - 1, 0, len(knots) - 2)
+                raise InputError(
+                    f"p spans [{value.min():.4g}, {value.max():.4g}], P is known on"
+                    f" [{knots[0]:.4g}, {knots[-1]:.4g}]"
+                )
+            index[:, i] = np.clip(
+                np.searchsorted(knots, value, side="right") - 1, 0, len(knots) - 2
+            )
         out = np.empty((len(points), *self.coefficients.shape[-2:]))
         for place in np.unique(index, axis=0):
             P, here = self.segment(place), np.all(index == place, axis=1)

@@ -1,4 +1,6 @@
-"""Matrices whose entries are polynomials in the parameters of a box, in tensor-product Bernstein form."""
+"""Matrices whose entries are polynomials in the parameters of a box, in tensor-product Bernstein
+form.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +23,11 @@ Box = tuple[tuple[Any, Any], ...]
 class PolynomialMatrix:
     """F(p) for p in `box`, one (low, high) a parameter, by its Bernstein coefficients.
 
-    `coefficients` (d_1 + 1, ..., d_m + 1, ..., rows, columns) of degree d_i in parameter i; axes between the m first and the
-    two last are a stack of matrices, which broadcast. Floats, or exact rationals in object arrays (the box in the same
-    arithmetic). On the whole box F(p) lies in the convex hull of its coefficients; those at the corners are its values
-    there. Operands must share the box. Raises `InputError` otherwise, and for coefficients of fewer than m + 2 axes.
+    `coefficients` (d_1 + 1, ..., d_m + 1, ..., rows, columns) of degree d_i in parameter i; axes
+    between the m first and the two last are a stack of matrices, which broadcast. Floats, or exact
+    rationals in object arrays (the box in the same arithmetic). On the whole box F(p) lies in the
+    convex hull of its coefficients; those at the corners are its values there. Operands must share
+    the box. Raises `InputError` otherwise, and for coefficients of fewer than m + 2 axes.
     """
 
     box: Box
@@ -32,8 +35,14 @@ class PolynomialMatrix:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "box", tuple((low, high) for low, high in self.box))
-        if self.coefficients.ndim < len(self.box) + 2 or 0 in self.coefficients.shape[: len(self.box)]:
-            raise InputError(f"expected {len(self.box)} axes of coefficients and a matrix, got shape {self.coefficients.shape}")
+        if (
+            self.coefficients.ndim < len(self.box) + 2
+            or 0 in self.coefficients.shape[: len(self.box)]
+        ):
+            raise InputError(
+                f"expected {len(self.box)} axes of coefficients and a matrix, got shape"
+                f" {self.coefficients.shape}"
+            )
         if not all(low < high for low, high in self.box):
             raise InputError(f"expected low < high for every parameter, got {self.box}")
 
@@ -56,12 +65,16 @@ class PolynomialMatrix:
         power = [_power_to_bernstein(d, *bounds) for d, bounds in zip(degrees, box, strict=True)]
         out: Any = 0
         for exponents, M in terms.items():
-            weights = reduce(np.multiply.outer, [power[i][:, e] for i, e in enumerate(exponents)], np.ones(()))
+            weights = reduce(
+                np.multiply.outer, [power[i][:, e] for i, e in enumerate(exponents)], np.ones(())
+            )
             out = out + np.multiply.outer(weights, np.asarray(M, dtype=float))
         return cls(box, out)
 
     def to_monomials(self) -> dict[tuple[int, ...], Array]:
-        """{exponents: matrix}, every exponent up to the degrees; ill-conditioned for high degrees on a box far from 0."""
+        """{exponents: matrix}, every exponent up to the degrees; ill-conditioned for high degrees
+        on a box far from 0.
+        """
         c = self.coefficients
         for i, (d, bounds) in enumerate(zip(self.degrees, self.box, strict=True)):
             c = _along(np.linalg.inv(_power_to_bernstein(d, *bounds)), c, i)
@@ -86,18 +99,27 @@ class PolynomialMatrix:
         """F at p (..., m), shape (..., rows, columns); floats."""
         p = np.asarray(p, dtype=float)
         if p.shape[-1:] != (len(self.box),):
-            raise InputError(f"expected {len(self.box)} parameter(s) along the last axis, got shape {p.shape}")
+            raise InputError(
+                f"expected {len(self.box)} parameter(s) along the last axis, got shape {p.shape}"
+            )
         points = p.reshape(-1, len(self.box))
         value = np.broadcast_to(self.coefficients, (len(points), *self.coefficients.shape))
         for i, (d, (low, high)) in enumerate(zip(self.degrees, self.box, strict=True)):
-            weights = np.stack([w * np.ones(len(points)) for w in blossom([(points[:, i] - low) / (high - low)] * d)])
+            weights = np.stack(
+                [
+                    w * np.ones(len(points))
+                    for w in blossom([(points[:, i] - low) / (high - low)] * d)
+                ]
+            )
             value = np.einsum("jk,kj...->k...", weights, value)
         return value.reshape(*p.shape[:-1], *value.shape[1:])
 
     def __add__(self, other: PolynomialMatrix) -> PolynomialMatrix:
         """Sum; the lower degrees are raised."""
         degrees = self._common(other)
-        F, G = _stacked(self.elevate(degrees).coefficients, other.elevate(degrees).coefficients, len(self.box))
+        F, G = _stacked(
+            self.elevate(degrees).coefficients, other.elevate(degrees).coefficients, len(self.box)
+        )
         return replace(self, coefficients=F + G)
 
     def __neg__(self) -> PolynomialMatrix:
@@ -149,7 +171,9 @@ class PolynomialMatrix:
         out = np.zeros((*(d + 1 for d in degrees), *F.shape[m:]), dtype=F.dtype)
         for index in np.ndindex(*(e + 1 for e in extra)):
             factor = prod(comb(e, i) for e, i in zip(extra, index, strict=True))
-            out[tuple(slice(i, i + n) for i, n in zip(index, F.shape[:m], strict=True))] += factor * F
+            out[tuple(slice(i, i + n) for i, n in zip(index, F.shape[:m], strict=True))] += (
+                factor * F
+            )
         return _unweighted(self.box, out)
 
     def restrict(self, box: Box) -> PolynomialMatrix:
@@ -157,14 +181,23 @@ class PolynomialMatrix:
         c = self.coefficients
         for i, ((low, high), (a, b)) in enumerate(zip(self.box, box, strict=True)):
             if (low, high) != (a, b):
-                c = _along(restriction(self.degrees[i], (a - low) / (high - low), (b - low) / (high - low)), c, i)
+                c = _along(
+                    restriction(
+                        self.degrees[i], (a - low) / (high - low), (b - low) / (high - low)
+                    ),
+                    c,
+                    i,
+                )
         return replace(self, box=box, coefficients=c)
 
     def split(self, axis: int) -> tuple[PolynomialMatrix, PolynomialMatrix]:
         """The two halves of the box along a parameter."""
         low, high = self.box[axis]
         middle = (low + high) / 2
-        return tuple(self.restrict((*self.box[:axis], part, *self.box[axis + 1 :])) for part in ((low, middle), (middle, high)))  # type: ignore[return-value]
+        return tuple(
+            self.restrict((*self.box[:axis], part, *self.box[axis + 1 :]))
+            for part in ((low, middle), (middle, high))
+        )  # type: ignore[return-value]
 
     def extend(self, box: Box) -> PolynomialMatrix:
         """The same with further parameters, those of `box`, on which it does not depend."""
@@ -192,7 +225,10 @@ def block(rows: Sequence[Sequence[PolynomialMatrix]]) -> PolynomialMatrix:
         c = _padded(F.elevate(degrees).coefficients, m, m + len(stack) + 2)
         return np.broadcast_to(c, (*c.shape[:m], *stack, *c.shape[-2:]))
 
-    return PolynomialMatrix(box, np.concatenate([np.concatenate([full(F) for F in row], axis=-1) for row in rows], axis=-2))
+    return PolynomialMatrix(
+        box,
+        np.concatenate([np.concatenate([full(F) for F in row], axis=-1) for row in rows], axis=-2),
+    )
 
 
 def _padded(c: Array, m: int, ndim: int) -> Array:
@@ -200,7 +236,9 @@ def _padded(c: Array, m: int, ndim: int) -> Array:
 
 
 def _stacked(F: Array, G: Array, m: int) -> tuple[Array, Array]:
-    """Both with as many stack axes, so that these broadcast and not the axes of the coefficients."""
+    """Both with as many stack axes, so that these broadcast and not the axes of the
+    coefficients.
+    """
     ndim = max(F.ndim, G.ndim)
     return _padded(F, m, ndim), _padded(G, m, ndim)
 
@@ -211,21 +249,33 @@ def _along(T: Array, coefficients: Array, axis: int) -> Array:
 
 
 def _binomials(c: Array, m: int) -> Array:
-    weights = reduce(np.multiply.outer, [np.array([comb(n - 1, i) for i in range(n)], dtype=object) for n in c.shape[:m]], np.array(1))
-    return np.asarray(weights if c.dtype == object else weights.astype(float)).reshape(*c.shape[:m], *(1,) * (c.ndim - m))
+    weights = reduce(
+        np.multiply.outer,
+        [np.array([comb(n - 1, i) for i in range(n)], dtype=object) for n in c.shape[:m]],
+        np.array(1),
+    )
+    return np.asarray(weights if c.dtype == object else weights.astype(float)).reshape(
+        *c.shape[:m], *(1,) * (c.ndim - m)
+    )
 
 
 # the integer 0 of an empty sum must not become the float 0.0
-_exact_quotient = np.frompyfunc(lambda numerator, weight: numerator if numerator == 0 else numerator / weight, 2, 1)
+_exact_quotient = np.frompyfunc(
+    lambda numerator, weight: numerator if numerator == 0 else numerator / weight, 2, 1
+)
 
 
 def _unweighted(box: Box, c: Array) -> PolynomialMatrix:
     weights = _binomials(c, len(box))
-    return PolynomialMatrix(box, np.asarray(_exact_quotient(c, weights)) if c.dtype == object else c / weights)
+    return PolynomialMatrix(
+        box, np.asarray(_exact_quotient(c, weights)) if c.dtype == object else c / weights
+    )
 
 
 def _power_to_bernstein(degree: int, low: float, high: float) -> Array:
-    """Matrix (d + 1, d + 1): Bernstein coefficients over [low, high] of p^e in column e (the blossom of p^e)."""
+    """Matrix (d + 1, d + 1): Bernstein coefficients over [low, high] of p^e in column e (the
+    blossom of p^e).
+    """
     out = np.zeros((degree + 1, degree + 1))
     for e in range(degree + 1):
         # p^e = (low + width t)^e; the blossom at e arguments, (degree of) which k are `high`

@@ -13,7 +13,13 @@ from scipy import sparse
 from symheli.errors import InputError
 from synthesis.cone_program import ConeProgram
 from synthesis.forms import Relaxation
-from synthesis.polynomial.imposed import Conditions, coefficient_conditions, grid_conditions, sums_of_squares, vertex_conditions
+from synthesis.polynomial.imposed import (
+    Conditions,
+    coefficient_conditions,
+    grid_conditions,
+    sums_of_squares,
+    vertex_conditions,
+)
 from synthesis.polynomial.inequalities import Demand, Pair, decrease, peak, positivity
 from synthesis.polynomial.lyapunov import segment_slices
 from synthesis.polynomial.matrix import PolynomialMatrix
@@ -24,7 +30,9 @@ Array = np.ndarray
 
 
 class Shape(NamedTuple):
-    """The form of P: knots and degree in each parameter, and the total degree where that is limited (one segment only)."""
+    """The form of P: knots and degree in each parameter, and the total degree where that is limited
+    (one segment only).
+    """
 
     knots: tuple[Array, ...]
     degrees: tuple[int, ...]
@@ -37,7 +45,9 @@ class Shape(NamedTuple):
 
     @property
     def free(self) -> Array:
-        """Matrix (coefficients, free ones): the identity, or orthonormal polynomials of limited total degree."""
+        """Matrix (coefficients, free ones): the identity, or orthonormal polynomials of limited
+        total degree.
+        """
         if self.total is None:
             return np.eye(prod(self.counts))
         if any(len(k) > 2 for k in self.knots):
@@ -49,9 +59,11 @@ class Shape(NamedTuple):
 
 
 class Affine(NamedTuple):
-    """F = sum_v x_v linear[., v] + constant + g `level`, which must stay below -`back_off`; svec'd matrices (N, N).
+    """F = sum_v x_v linear[., v] + constant + g `level`, which must stay below -`back_off`; svec'd
+    matrices (N, N).
 
-    `linear` (K, V, L) and `constant` (K, L) are the Bernstein coefficients of `degrees`; `columns` (V,) of P.
+    `linear` (K, V, L) and `constant` (K, L) are the Bernstein coefficients of `degrees`; `columns`
+    (V,) of P.
     """
 
     degrees: tuple[int, ...]
@@ -63,8 +75,12 @@ class Affine(NamedTuple):
     N: int
 
 
-def affine_inequalities(model: Pieces, demand: Demand, shape: Shape, margin: float, floor: float, weight: Array) -> list[Affine]:
-    """Every inequality of the problem, scaled data; the state blocks of the decrease in coordinates changed by `weight`."""
+def affine_inequalities(
+    model: Pieces, demand: Demand, shape: Shape, margin: float, floor: float, weight: Array
+) -> list[Affine]:
+    """Every inequality of the problem, scaled data; the state blocks of the decrease in coordinates
+    changed by `weight`.
+    """
     nx, nu, ny = model.sizes
     eye, gains = np.eye(nx), demand.kind in ("l2 gain", "energy-to-peak gain")
     nothing = svec(np.zeros((nx, nx)))
@@ -72,12 +88,18 @@ def affine_inequalities(model: Pieces, demand: Demand, shape: Shape, margin: flo
     # every P on its own segments
     for index in np.ndindex(*(len(k) - 1 for k in shape.knots)):
         columns, P = _unknown(shape, index, np.unique(_ids(shape, index)), nx)
-        out.append(_affine(positivity(P), columns, nothing, floor * svec(eye) if gains else nothing, 0 * eye))
+        out.append(
+            _affine(
+                positivity(P), columns, nothing, floor * svec(eye) if gains else nothing, 0 * eye
+            )
+        )
         if not gains:
             out.append(_affine(P, columns, nothing, nothing, -eye))
     if gains:
         inputs = np.diag(np.r_[np.zeros(nx), np.ones(nu)])
-        level, fixed = (-svec(inputs), 0 * inputs) if demand.kind == "l2 gain" else (0 * svec(inputs), -inputs)
+        level, fixed = (
+            (-svec(inputs), 0 * inputs) if demand.kind == "l2 gain" else (0 * svec(inputs), -inputs)
+        )
         back_off = margin * svec(np.diag(np.r_[np.ones(nx), np.zeros(nu)]))
     else:
         level, fixed, back_off = svec(eye), 0 * eye, nothing
@@ -85,7 +107,15 @@ def affine_inequalities(model: Pieces, demand: Demand, shape: Shape, margin: flo
         columns, pair = _pair(shape, region, nx)
         for F in decrease(model, region, pair, demand, float):
             W = extended(weight, F.shape[0] - nx)
-            out.append(_affine(PolynomialMatrix(F.box, W.T @ F.coefficients @ W), columns, level, back_off, fixed))
+            out.append(
+                _affine(
+                    PolynomialMatrix(F.box, W.T @ F.coefficients @ W),
+                    columns,
+                    level,
+                    back_off,
+                    fixed,
+                )
+            )
         if demand.kind == "energy-to-peak gain" and region.next_segment == region.segment:
             columns, P = _unknown(shape, region.segment, np.unique(_ids(shape, region.segment)), nx)
             F = peak(model, region, P, float)
@@ -95,8 +125,17 @@ def affine_inequalities(model: Pieces, demand: Demand, shape: Shape, margin: flo
     return out
 
 
-def assemble(inequalities: Sequence[Affine], shape: Shape, states: int, relaxation: Relaxation, *, maximise: bool) -> ConeProgram:
-    """minimise g (or maximise it) subject to all of them; the unknowns are P's free coefficients, g, Gram matrices."""
+def assemble(
+    inequalities: Sequence[Affine],
+    shape: Shape,
+    states: int,
+    relaxation: Relaxation,
+    *,
+    maximise: bool,
+) -> ConeProgram:
+    """minimise g (or maximise it) subject to all of them; the unknowns are P's free coefficients,
+    g, Gram matrices.
+    """
     nv = length(states)
     free = shape.free
     tensor = len(free) * nv
@@ -108,15 +147,34 @@ def assemble(inequalities: Sequence[Affine], shape: Shape, states: int, relaxati
             F, P = _raised(F, relaxation.elevation, tensor)
             terms = list(sums_of_squares(F.degrees, F.N))
             level = np.tile(F.level, len(F.constant))
-            zero.append((P, level, (-F.constant - F.back_off).ravel(), sparse.hstack([t.map for t in terms], format="csc")))
+            zero.append(
+                (
+                    P,
+                    level,
+                    (-F.constant - F.back_off).ravel(),
+                    sparse.hstack([t.map for t in terms], format="csc"),
+                )
+            )
             squares += [t.size for t in terms]
             continue
         conditions = _conditions(relaxation, F.degrees)
-        lift = sparse.kron(sparse.csr_matrix(conditions.negative), sparse.identity(length(F.N)), format="csr")
+        lift = sparse.kron(
+            sparse.csr_matrix(conditions.negative), sparse.identity(length(F.N)), format="csr"
+        )
         rows = len(conditions.negative)
-        cone.append((lift @ P, np.tile(F.level, rows), (-conditions.negative @ F.constant - F.back_off).ravel()))
-        bend: Any = sparse.kron(sparse.csr_matrix(conditions.positive), sparse.identity(length(F.N)), format="csr")
-        cone.append((-bend @ P, np.zeros(bend.shape[0]), (conditions.positive @ F.constant).ravel()))
+        cone.append(
+            (
+                lift @ P,
+                np.tile(F.level, rows),
+                (-conditions.negative @ F.constant - F.back_off).ravel(),
+            )
+        )
+        bend: Any = sparse.kron(
+            sparse.csr_matrix(conditions.positive), sparse.identity(length(F.N)), format="csr"
+        )
+        cone.append(
+            (-bend @ P, np.zeros(bend.shape[0]), (conditions.positive @ F.constant).ravel())
+        )
         sizes += [F.N] * (rows + len(conditions.positive))
     parts = [*((P, level, b) for P, level, b, _ in zero), *cone]
     left: Any = sparse.vstack([P for P, _, _ in parts]) @ reduce_P
@@ -154,15 +212,23 @@ def _raised(F: Affine, elevation: int, tensor: int) -> tuple[Affine, sparse.csr_
     if elevation:
         T = coefficient_conditions(F.degrees, elevation, 0).negative
         degrees = tuple(d + elevation if d else 0 for d in F.degrees)
-        F = F._replace(degrees=degrees, linear=np.tensordot(T, F.linear, axes=1), constant=T @ F.constant)
+        F = F._replace(
+            degrees=degrees, linear=np.tensordot(T, F.linear, axes=1), constant=T @ F.constant
+        )
     return F, _columns(F, tensor)
 
 
-def _affine(F: PolynomialMatrix, columns: Array, level: Array, back_off: Array, fixed: Array) -> Affine:
-    """From the polynomial of a stack of unit P and, last in the stack, P = 0; `fixed` is a constant to add."""
+def _affine(
+    F: PolynomialMatrix, columns: Array, level: Array, back_off: Array, fixed: Array
+) -> Affine:
+    """From the polynomial of a stack of unit P and, last in the stack, P = 0; `fixed` is a constant
+    to add.
+    """
     m, N = len(F.box), F.shape[0]
     c = svec(F.coefficients).reshape(-1, F.coefficients.shape[m], length(N))
-    return Affine(F.degrees, columns, c[:, :-1] - c[:, -1:], c[:, -1] + svec(fixed), level, back_off, N)
+    return Affine(
+        F.degrees, columns, c[:, :-1] - c[:, -1:], c[:, -1] + svec(fixed), level, back_off, N
+    )
 
 
 def _ids(shape: Shape, index: Sequence[int]) -> Array:
@@ -176,8 +242,12 @@ def _pair(shape: Shape, region: Region, states: int) -> tuple[Array, Pair]:
     return columns, Pair(P, _unknown(shape, there, involved, states)[1])
 
 
-def _unknown(shape: Shape, index: Sequence[int], involved: Array, states: int) -> tuple[Array, PolynomialMatrix]:
-    """Columns (V,) of the `involved` coefficients, and P on a segment for a unit of each; then for none."""
+def _unknown(
+    shape: Shape, index: Sequence[int], involved: Array, states: int
+) -> tuple[Array, PolynomialMatrix]:
+    """Columns (V,) of the `involved` coefficients, and P on a segment for a unit of each; then for
+    none.
+    """
     ids, E = _ids(shape, index), basis(states)
     nv = len(E)
     unit = (ids[..., None] == involved).astype(float)
@@ -188,8 +258,12 @@ def _unknown(shape: Shape, index: Sequence[int], involved: Array, states: int) -
 
 
 def _legendre(degree: int) -> Array:
-    """Bernstein coefficients (degree + 1, degree + 1) on [0, 1], a column a Legendre polynomial, orthonormal."""
+    """Bernstein coefficients (degree + 1, degree + 1) on [0, 1], a column a Legendre polynomial,
+    orthonormal.
+    """
     nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    values = np.polynomial.legendre.legvander(2 * nodes - 1, degree) * np.sqrt(2 * np.arange(degree + 1) + 1)
+    values = np.polynomial.legendre.legvander(2 * nodes - 1, degree) * np.sqrt(
+        2 * np.arange(degree + 1) + 1
+    )
     identity = PolynomialMatrix(((0.0, 1.0),), np.eye(degree + 1)[:, None, :])
     return np.linalg.solve(identity(nodes[:, None])[:, 0, :], values)

@@ -1,4 +1,6 @@
-"""The boxes on which an inequality is one polynomial, and the model and P there, in any arithmetic."""
+"""The boxes on which an inequality is one polynomial, and the model and P there, in any
+arithmetic.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ Number = Callable[[float], Any]
 
 
 class Pieces(NamedTuple):
-    """A model of one or several parameters, polynomial between the `breaks` of each (most have none inside their range).
+    """A model of one or several parameters, polynomial between the `breaks` of each (most have none
+    inside their range).
 
     `source` is the model as it was given.
     """
@@ -37,14 +40,21 @@ class Pieces(NamedTuple):
 
     @property
     def passes_peaks(self) -> bool:
-        """Whether an input of any height passes at once to the outputs: feedthrough in continuous time."""
+        """Whether an input of any height passes at once to the outputs: feedthrough in continuous
+        time.
+        """
         return self.dt is None and any(np.any(D.coefficients) for *_, D in self.models.values())
 
     @property
     def original(self) -> bool:
         """Whether these are the pieces of the `source`, to the last bit."""
         own = pieces(self.source)
-        same = (self.parameters, self.breaks, self.dt, self.models.keys()) == (own.parameters, own.breaks, own.dt, own.models.keys())
+        same = (self.parameters, self.breaks, self.dt, self.models.keys()) == (
+            own.parameters,
+            own.breaks,
+            own.dt,
+            own.models.keys(),
+        )
         return same and all(
             M.box == N.box and np.array_equal(M.coefficients, N.coefficients)
             for key in own.models
@@ -57,7 +67,9 @@ class Pieces(NamedTuple):
         A, B, C, _ = next(iter(self.models.values()))
         return A.shape[0], B.shape[1], C.shape[0]
 
-    def scaled(self, left: Array, right: Array, inputs: float, outputs: float, time: float) -> Pieces:
+    def scaled(
+        self, left: Array, right: Array, inputs: float, outputs: float, time: float
+    ) -> Pieces:
         """x = right z, dt = time dtau, u and y in the units `inputs` and `outputs`."""
 
         def change(M: PolynomialMatrix, L: Any, R: Any, factor: float) -> PolynomialMatrix:
@@ -67,29 +79,42 @@ class Pieces(NamedTuple):
         one, two = np.eye(ny), np.eye(nu)
         models = {
             key: (
-                change(A, left, right, time), change(B, left, two, time * inputs),
-                change(C, one, right, 1 / outputs), change(D, one, two, inputs / outputs),
+                change(A, left, right, time),
+                change(B, left, two, time * inputs),
+                change(C, one, right, 1 / outputs),
+                change(D, one, two, inputs / outputs),
             )
             for key, (A, B, C, D) in self.models.items()
-        }  # fmt: skip
+        }
         return self._replace(models=models)
 
 
 def pieces(model: LPVStateSpace | PolynomialStateSpace) -> Pieces:
     """The model in polynomial pieces over its box."""
     if isinstance(model, PolynomialStateSpace):
-        return Pieces(model, model.parameters, model.box, {(0,) * len(model.box): (model.A, model.B, model.C, model.D)}, model.dt)
+        return Pieces(
+            model,
+            model.parameters,
+            model.box,
+            {(0,) * len(model.box): (model.A, model.B, model.C, model.D)},
+            model.dt,
+        )
     parts = model_pieces(model)
     models = {
-        (k,): tuple(PolynomialMatrix(((piece.low, piece.high),), M) for M in (piece.A, piece.B, piece.C, piece.D))
+        (k,): tuple(
+            PolynomialMatrix(((piece.low, piece.high),), M)
+            for M in (piece.A, piece.B, piece.C, piece.D)
+        )
         for k, piece in enumerate(parts)
-    }  # fmt: skip
+    }
     breaks = (parts[0].low, *(piece.high for piece in parts))
     return Pieces(model, (model.scheduling,), (breaks,), models, model.dt)
 
 
 class Region(NamedTuple):
-    """One strip a parameter: p in a box, inside one piece of the model and one segment of P, and where p(k+1) may be."""
+    """One strip a parameter: p in a box, inside one piece of the model and one segment of P, and
+    where p(k+1) may be.
+    """
 
     strips: tuple[Strip, ...]
     piece: tuple[int, ...]
@@ -111,21 +136,32 @@ class Region(NamedTuple):
 
 
 def regions(model: Pieces, knots: Sequence[Array], steps: Sequence[float]) -> Iterator[Region]:
-    """All of them: the ranges cut at knots and breaks, and where p moves by at most `steps` a sample, where that leads to."""
+    """All of them: the ranges cut at knots and breaks, and where p moves by at most `steps` a
+    sample, where that leads to.
+    """
     nothing = np.zeros((1, 0, 0))
     every = []
     for breaks, k, step in zip(model.breaks, knots, steps, strict=True):
         # only the ends of the pieces matter here
-        stretches = [ModelPiece(a, b, nothing, nothing, nothing, nothing) for a, b in pairwise(breaks)]
+        stretches = [
+            ModelPiece(a, b, nothing, nothing, nothing, nothing) for a, b in pairwise(breaks)
+        ]
         every.append(strips(stretches, k, step))
     for choice in product(*every):
-        index = [int(np.searchsorted(b, 0.5 * (s.cell.low + s.cell.high)) - 1) for b, s in zip(model.breaks, choice, strict=True)]
+        index = [
+            int(np.searchsorted(b, 0.5 * (s.cell.low + s.cell.high)) - 1)
+            for b, s in zip(model.breaks, choice, strict=True)
+        ]
         yield Region(choice, tuple(index))
 
 
 def exact(values: Array, number: Number) -> Array:
     """The doubles as numbers of the arithmetic."""
-    return np.asarray(values, dtype=float) if number is float else np.asarray(np.frompyfunc(number, 1, 1)(values), dtype=object)
+    return (
+        np.asarray(values, dtype=float)
+        if number is float
+        else np.asarray(np.frompyfunc(number, 1, 1)(values), dtype=object)
+    )
 
 
 def convert(F: PolynomialMatrix, number: Number) -> PolynomialMatrix:
@@ -145,8 +181,12 @@ def now(P: PolynomialMatrix, region: Region, number: Number) -> PolynomialMatrix
     return P.restrict(_box(region, number))
 
 
-def successor(P: PolynomialMatrix, region: Region, number: Number, moving: Sequence[bool]) -> PolynomialMatrix:
-    """P(p(k+1)) over the box of p and one [0, 1] a parameter, which runs from the lower to the upper limit of p(k+1)."""
+def successor(
+    P: PolynomialMatrix, region: Region, number: Number, moving: Sequence[bool]
+) -> PolynomialMatrix:
+    """P(p(k+1)) over the box of p and one [0, 1] a parameter, which runs from the lower to the
+    upper limit of p(k+1).
+    """
     m = len(P.box)
     box, c = _box(region, number), P.coefficients
     for i, strip in enumerate(region.strips):
@@ -158,7 +198,8 @@ def successor(P: PolynomialMatrix, region: Region, number: Number, moving: Seque
         if not moving[i]:
             T = T[:, :1]
         elif corners[0] == corners[1]:
-            # where p(k+1) may be does not depend on p: a step as wide as the range, or a strip between two knots
+            # where p(k+1) may be does not depend on p: a step as wide as the range, or a strip
+            # between two knots
             T = T[:1]
         # axis i becomes x_i; s_i goes behind the parameters
         c = np.tensordot(T, c, axes=(2, i))

@@ -21,7 +21,12 @@ def pilot():
 
 @pytest.fixture(scope="module")
 def short(pilot):
-    return fly(symheli.Helicopter.load("xcell60", governor="ideal"), SHORT, excitation=SMALL, autopilot=pilot)
+    return fly(
+        symheli.Helicopter.load("xcell60", governor="ideal"),
+        SHORT,
+        excitation=SMALL,
+        autopilot=pilot,
+    )
 
 
 def test_a_transition_reaches_its_airspeed_and_returns_to_hover(ideal, pilot):
@@ -49,8 +54,17 @@ def test_both_governors_fly(pi):
 
 def test_runge_kutta_is_of_order_four(ideal):
     point = symheli.trim(ideal, 6.0)  # no wake edge nearby: the equations are smooth there
-    cp, sp, ct, st = (f(v / 2) for v in (point.x["phi"], point.x["theta"]) for f in (np.cos, np.sin))
-    start = np.concatenate([point.x.array[:6] + 0.1, [cp * ct, sp * ct, cp * st, -sp * st], np.zeros(3), point.x.array[8:]])
+    cp, sp, ct, st = (
+        f(v / 2) for v in (point.x["phi"], point.x["theta"]) for f in (np.cos, np.sin)
+    )
+    start = np.concatenate(
+        [
+            point.x.array[:6] + 0.1,
+            [cp * ct, sp * ct, cp * st, -sp * st],
+            np.zeros(3),
+            point.x.array[8:],
+        ]
+    )
     controls = point.u.array + 0.01
 
     def end(steps):
@@ -73,20 +87,32 @@ def test_integration_error_of_a_flight_stays_below_its_promise(ideal, pilot, sho
 
 
 def test_noise_has_the_asked_size_and_follows_its_seed(ideal, pilot, short):
-    first, again, other = (fly(ideal, SHORT, excitation=SMALL, autopilot=pilot, noise_db=30.0, seed=s) for s in (1, 1, 2))
+    first, again, other = (
+        fly(ideal, SHORT, excitation=SMALL, autopilot=pilot, noise_db=30.0, seed=s)
+        for s in (1, 1, 2)
+    )
     np.testing.assert_array_equal(first.values, again.values)
     assert not np.array_equal(first.values, other.values)
-    # white noise seen through second differences: a smooth flight adds little to them where it moves slowly against 50 Hz
+    # white noise seen through second differences: a smooth flight adds little to them where it
+    # moves slowly against 50 Hz
     clean = short.columns(("u", "v", "w", "phi", "theta"))
     noisy = first.columns(("u", "v", "w", "phi", "theta"))
     noise = (np.diff(noisy, n=3, axis=0) - np.diff(clean, n=3, axis=0)).std(axis=0) / np.sqrt(20)
     level = 20 * np.log10(clean.std(axis=0) / noise)
-    np.testing.assert_allclose(level, 30.0, atol=1.0)  # the autopilot answers the noise, and 500 samples scatter by 0.3 dB
+    np.testing.assert_allclose(
+        level, 30.0, atol=1.0
+    )  # the autopilot answers the noise, and 500 samples scatter by 0.3 dB
     assert "30 dB" in first.note
 
 
 def test_the_record_holds_what_its_documentation_says(ideal, short):
-    wanted = {*map(str, ideal.states), *map(str, ideal.inputs), *(f"e_{i}" for i in ideal.inputs), "airspeed", "airspeed_command"}
+    wanted = {
+        *map(str, ideal.states),
+        *map(str, ideal.inputs),
+        *(f"e_{i}" for i in ideal.inputs),
+        "airspeed",
+        "airspeed_command",
+    }
     assert set(short.signals) == wanted
     assert set(MEASURED) <= wanted
     assert short.dt == pytest.approx(0.02)
@@ -96,14 +122,21 @@ def test_the_record_holds_what_its_documentation_says(ideal, short):
 
 
 def test_airspeed_is_that_of_the_air(ideal, pilot):
-    windy = fly(ideal, AirspeedSchedule((4.0,), (2.0,), (2.0,), start=4.0), autopilot=pilot, wind=(-2.0, 0.0, 0.0))
+    windy = fly(
+        ideal,
+        AirspeedSchedule((4.0,), (2.0,), (2.0,), start=4.0),
+        autopilot=pilot,
+        wind=(-2.0, 0.0, 0.0),
+    )
     np.testing.assert_allclose(windy["airspeed"], 4.0, atol=0.1)
     np.testing.assert_allclose(windy["u"], 2.0, atol=0.1)  # against 2 m/s of headwind
 
 
 def test_a_lost_flight_says_when_and_what_to_change(ideal, pilot):
     wild = Excitation({"d_lon": 0.5, "d_lat": 0.5}, band=(0.1, 0.5))
-    with pytest.raises(SymheliError, match=r"the flight was lost at .* s near .* m/s: less excitation"):
+    with pytest.raises(
+        SymheliError, match=r"the flight was lost at .* s near .* m/s: less excitation"
+    ):
         fly(ideal, AirspeedSchedule.transition(0.0, 6.0, 2.0), excitation=wild, autopilot=pilot)
 
 

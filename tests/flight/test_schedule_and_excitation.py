@@ -13,7 +13,9 @@ def test_each_ramp_peaks_at_its_acceleration_and_reaches_its_target():
     schedule = AirspeedSchedule((13.0, 4.0), (3.0, 1.5), (2.0, 2.0))
     t = np.linspace(0, schedule.duration, 40001)
     speed, rate = schedule(t)
-    assert rate.max() == pytest.approx(3.0, rel=1e-6)  # a node lies within 1e-3 of the middle of the ramp
+    assert rate.max() == pytest.approx(
+        3.0, rel=1e-6
+    )  # a node lies within 1e-3 of the middle of the ramp
     assert rate.min() == pytest.approx(-1.5, rel=1e-6)
     assert speed.max() == pytest.approx(13.0)
     assert speed[-1] == pytest.approx(4.0)
@@ -29,7 +31,9 @@ def test_transition_returns_to_where_it_began():
 
 
 def test_varied_schedules_follow_their_seed_and_cover_the_range():
-    one, again = (AirspeedSchedule.varied(0.0, 13.0, (1.5, 3.0, 4.0, 2.0), 1.0, seed=3) for _ in range(2))
+    one, again = (
+        AirspeedSchedule.varied(0.0, 13.0, (1.5, 3.0, 4.0, 2.0), 1.0, seed=3) for _ in range(2)
+    )
     assert one == again
     assert one != AirspeedSchedule.varied(0.0, 13.0, (1.5, 3.0, 4.0, 2.0), 1.0, seed=4)
     assert {0.0, 13.0} <= set(one.targets)

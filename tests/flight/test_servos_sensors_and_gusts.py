@@ -18,7 +18,9 @@ TRAVEL = np.array([0.096, 0.096, 0.183, 0.38])
 
 @pytest.fixture(scope="module")
 def behind_servos():
-    return gain_scheduled_lqr(symheli.Helicopter.load("xcell60", governor="ideal"), 0.0, 8.0, 0.02, servos=XCELL_SERVOS)
+    return gain_scheduled_lqr(
+        symheli.Helicopter.load("xcell60", governor="ideal"), 0.0, 8.0, 0.02, servos=XCELL_SERVOS
+    )
 
 
 @pytest.mark.parametrize("servo", [CYCLIC, TAIL])
@@ -28,12 +30,21 @@ def test_a_servo_has_the_printed_transfer_function(servo):
     H = wn**2 / (s**2 + 2 * z * wn * s + wn**2)
     if servo.zero:
         H = H * (s / servo.zero + 1) / (s / servo.pole + 1)
-    np.testing.assert_allclose(servo.linear("d_lat").frequency_response(s.imag)[:, 0, 0], H, rtol=1e-12)
+    np.testing.assert_allclose(
+        servo.linear("d_lat").frequency_response(s.imag)[:, 0, 0], H, rtol=1e-12
+    )
 
 
 def test_small_steps_follow_the_linear_servo():
-    fine = {name: Servo(s.natural_frequency, s.damping, s.zero, s.pole) for name, s in XCELL_SERVOS.items()}
-    bank, dt, command = ServoBank(fine, INPUTS, TRAVEL, 0.005), 0.005, np.array([0.01, -0.02, 0.03, 0.05])
+    fine = {
+        name: Servo(s.natural_frequency, s.damping, s.zero, s.pole)
+        for name, s in XCELL_SERVOS.items()
+    }
+    bank, dt, command = (
+        ServoBank(fine, INPUTS, TRAVEL, 0.005),
+        0.005,
+        np.array([0.01, -0.02, 0.03, 0.05]),
+    )
     state, out = bank.init(np.zeros(4)), []
     for _ in range(60):
         state, reached = bank.step(state, command)
@@ -53,9 +64,13 @@ def test_a_servo_keeps_its_travel_its_rate_and_its_steps():
         state, reached = bank.step(state, np.full(4, 10.0))
         deflections.append(reached)
     deflections = np.array(deflections)
-    assert np.all(np.abs(np.diff(deflections, axis=0)) <= 0.5 * 0.005 * (1 + 1e-9))  # critically damped: no faster than its command
+    assert np.all(
+        np.abs(np.diff(deflections, axis=0)) <= 0.5 * 0.005 * (1 + 1e-9)
+    )  # critically damped: no faster than its command
     np.testing.assert_allclose(deflections[-1], TRAVEL, atol=1e-9)
-    state, _ = bank.step(bank.init(np.zeros(4)), 0.13 * TRAVEL)  # the nearest of the positions 0, 0.2, .. of the travel is 0.2
+    state, _ = bank.step(
+        bank.init(np.zeros(4)), 0.13 * TRAVEL
+    )  # the nearest of the positions 0, 0.2, .. of the travel is 0.2
     while not np.allclose(state.followed, 0.2 * TRAVEL):
         before = state.followed
         state, _ = bank.step(state, 0.13 * TRAVEL)
@@ -70,7 +85,9 @@ def test_a_bank_starts_at_rest():
 
 def test_a_sensor_delays_holds_biases_and_rounds():
     truth = np.arange(20.0)[:, None]
-    bank = SensorBank({"q": Sensor(bias=0.4, period=0.06, delay=0.03, quantum=0.5)}, ("q",), 20, 0.02, seed=0)
+    bank = SensorBank(
+        {"q": Sensor(bias=0.4, period=0.06, delay=0.03, quantum=0.5)}, ("q",), 20, 0.02, seed=0
+    )
     read = [bank.read(k, truth)[0] for k in range(20)]
     # two samples late, a new value every third sample, 0.4 rounded to 0.5 on top
     assert read == [(max(k - 2, 0) // 3) * 3 + 0.5 for k in range(20)]
@@ -84,17 +101,27 @@ def test_sensor_noise_has_its_size_and_is_held_with_the_reading():
 
 
 def test_a_flight_behind_servos_stays_in_trim_and_records_both_sides(ideal, behind_servos):
-    record = fly(ideal, AirspeedSchedule((4.0,), (1.0,), (2.0,), start=4.0), servos=XCELL_SERVOS, autopilot=behind_servos)
+    record = fly(
+        ideal,
+        AirspeedSchedule((4.0,), (1.0,), (2.0,), start=4.0),
+        servos=XCELL_SERVOS,
+        autopilot=behind_servos,
+    )
     point = symheli.trim(ideal, 4.0)
     for name in INPUTS:
         step = 2 * ideal.travel[INPUTS.index(name)] / XCELL_SERVOS[name].steps
-        assert np.abs(record[name] - point.u[name]).max() < 2 * step  # a limit cycle over a step or two of the servo
+        assert (
+            np.abs(record[name] - point.u[name]).max() < 2 * step
+        )  # a limit cycle over a step or two of the servo
         assert f"{name}_command" in record.signals
     assert np.abs(record["airspeed"] - 4.0).max() < 0.3
 
 
 def test_without_limits_the_deflection_is_the_command_through_the_servo(ideal, behind_servos):
-    fine = {name: Servo(s.natural_frequency, s.damping, s.zero, s.pole) for name, s in XCELL_SERVOS.items()}
+    fine = {
+        name: Servo(s.natural_frequency, s.damping, s.zero, s.pole)
+        for name, s in XCELL_SERVOS.items()
+    }
     record = fly(ideal, HOVER, servos=fine, autopilot=behind_servos)
     model = fine["d_lon"].linear("d_lon").discretize(0.02)
     x = record["d_lon"][0] * np.linalg.solve(np.eye(3) - model.A, model.B[:, 0])
@@ -107,7 +134,10 @@ def test_gusts_move_the_helicopter_and_stand_in_the_record(ideal, behind_servos)
     wind = Wind((2.0, 0.0, 0.0), (Gust((0.0, 3.0, 0.0), 1.5, 1.0),), Dryden(5.0, 15.0), seed=2)
     record = fly(ideal, HOVER, wind=wind, autopilot=None)
     calm = fly(ideal, HOVER, wind=(2.0, 0.0, 0.0))
-    np.testing.assert_allclose(record.columns(("wind_n", "wind_e", "wind_d")), wind.history(record.time, record["airspeed_command"]))
+    np.testing.assert_allclose(
+        record.columns(("wind_n", "wind_e", "wind_d")),
+        wind.history(record.time, record["airspeed_command"]),
+    )
     assert np.abs(record["v"] - calm["v"]).max() > 0.3
     assert "wind_n" not in calm.signals
 
@@ -121,7 +151,9 @@ def test_sensors_reach_the_autopilot_and_the_record(ideal, behind_servos):
 
 def test_the_gains_are_softened_until_slow_servos_allow_them(ideal, behind_servos):
     stiff = gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02)
-    np.testing.assert_array_equal(behind_servos.gains, stiff.gains)  # those of the X-Cell are fast enough
+    np.testing.assert_array_equal(
+        behind_servos.gains, stiff.gains
+    )  # those of the X-Cell are fast enough
     slow = gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02, servos=dict.fromkeys(INPUTS, Servo(3.0, 0.5)))
     assert slow.radius < 1
     assert np.linalg.norm(slow.gains) < 0.8 * np.linalg.norm(stiff.gains)

@@ -1,4 +1,6 @@
-"""The least-squares problems that recursions solve, row by row or in fifty digits, with no recursion of a factor."""
+"""The least-squares problems that recursions solve, row by row or in fifty digits, with no
+recursion of a factor.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +14,41 @@ PRIOR = 32 * EPS
 
 
 class Rows:
-    """Every row ever given, weighted: data, and what keeps the coefficients awake. For constant and variable forgetting."""
+    """Every row ever given, weighted: data, and what keeps the coefficients awake. For constant and
+    variable forgetting.
+    """
 
     def __init__(self, n, m, forgetting, largest):
         self.n, self.largest = n, largest
-        fastest = forgetting.factor if isinstance(forgetting, Constant) else 1 - 1 / forgetting.shortest
-        self.samples = max(PRIOR, 2 * forgetting.floor / max(fastest**n, 1e-12)) if fastest < 1 else PRIOR
-        self.A, self.b, self.w, self.data = np.zeros((0, n)), np.zeros((0, m)), np.zeros(0), np.zeros(0, bool)
+        fastest = (
+            forgetting.factor if isinstance(forgetting, Constant) else 1 - 1 / forgetting.shortest
+        )
+        self.samples = (
+            max(PRIOR, 2 * forgetting.floor / max(fastest**n, 1e-12)) if fastest < 1 else PRIOR
+        )
+        self.A, self.b, self.w, self.data = (
+            np.zeros((0, n)),
+            np.zeros((0, m)),
+            np.zeros(0),
+            np.zeros(0, bool),
+        )
         self.peak, self.fed, self.turn = np.zeros(n), np.zeros(n), 0
 
     def absorb(self, phi, y, factor):
         """`factor` is what the recursion forgets with: variable forgetting chooses it by itself."""
         j, target = self.turn, self.samples * self.peak[self.turn] ** 2
         if 2 * self.fed[j] < target:
-            self._add(np.eye(self.n)[j], self._now[j] if self.samples > PRIOR else 0 * y, target - self.fed[j])
+            self._add(
+                np.eye(self.n)[j],
+                self._now[j] if self.samples > PRIOR else 0 * y,
+                target - self.fed[j],
+            )
             self.fed[j] = target
         peak = peaks(self.peak, phi, self.largest)
-        for i in np.flatnonzero((peak > self.peak) & (self.samples * peak**2 > (100 if self.samples > PRIOR else 4) * self.fed)):
+        for i in np.flatnonzero(
+            (peak > self.peak)
+            & (self.samples * peak**2 > (100 if self.samples > PRIOR else 4) * self.fed)
+        ):
             self._add(np.eye(self.n)[i], 0 * y, self.samples * peak[i] ** 2 - self.fed[i])
             self.fed[i] = self.samples * peak[i] ** 2
         self.peak, self.w, self.fed = peak, self.w * factor, self.fed * factor
@@ -49,7 +69,10 @@ class Rows:
         """By Householder's reflections, in extended precision where the machine has it."""
         A, b, scale = self._weighted
         seen, out = np.any(A != 0, axis=0), np.zeros((self.n, b.shape[1]))
-        out[seen] = triangular_solution(A[:, seen].astype(np.longdouble), b.astype(np.longdouble)) / scale[seen, None]
+        out[seen] = (
+            triangular_solution(A[:, seen].astype(np.longdouble), b.astype(np.longdouble))
+            / scale[seen, None]
+        )
         return out
 
     @property
@@ -66,7 +89,9 @@ class Rows:
 
     @property
     def spectrum(self):
-        """Scale (n,) of the columns, singular values, right singular vectors of the scaled columns."""
+        """Scale (n,) of the columns, singular values, right singular vectors of the scaled
+        columns.
+        """
         A, _, scale = self._weighted
         _, values, V = np.linalg.svd(A, full_matrices=False)
         return scale, values, V
@@ -81,7 +106,9 @@ class Rows:
 
 
 class Information:
-    """The information of directional forgetting, in fifty digits. Cao and Schwartz (2000), with what `Directional` says."""
+    """The information of directional forgetting, in fifty digits. Cao and Schwartz (2000), with
+    what `Directional` says.
+    """
 
     def __init__(self, n, m, forgetting, largest):
         self.n, self.forgetting, self.largest = n, forgetting, largest
@@ -100,13 +127,18 @@ class Information:
                 self.L[i, i] += mpmath.mpf(PRIOR * peak[i] ** 2 - self.fed[i])
                 self.fed[i] = PRIOR * peak[i] ** 2
             self.peak = peak
-            exact, outputs = (np.array([mpmath.mpf(float(v)) for v in part], object) for part in (phi, y))
+            exact, outputs = (
+                np.array([mpmath.mpf(float(v)) for v in part], object) for part in (phi, y)
+            )
             if (np.abs(phi[peak > 0]) >= self.forgetting.quiet * peak[peak > 0]).any():
                 v, c = self.L @ exact, exact @ self.b
                 length = exact @ v
                 if length > mpmath.mpf("1e-290"):
                     share = (1 - mpmath.mpf(self.forgetting.factor)) / length
-                    self.L, self.b = self.L - share * np.outer(v, v), self.b - share * np.outer(v, c)
+                    self.L, self.b = (
+                        self.L - share * np.outer(v, v),
+                        self.b - share * np.outer(v, c),
+                    )
             self.L, self.b = self.L + np.outer(exact, exact), self.b + np.outer(exact, outputs)
         self.A, self.turn = np.vstack([self.A, phi]), (self.turn + 1) % self.n
 
@@ -120,15 +152,25 @@ class Information:
             seen = [i for i in range(self.n) if self.L[i, i] != 0]
             out, A = np.zeros(self.b.shape), mpmath.matrix(self.L[np.ix_(seen, seen)].tolist())
             for j in range(self.b.shape[1] if seen else 0):
-                out[seen, j] = [float(v) for v in mpmath.lu_solve(A, mpmath.matrix(self.b[seen, j].tolist()))]
+                out[seen, j] = [
+                    float(v) for v in mpmath.lu_solve(A, mpmath.matrix(self.b[seen, j].tolist()))
+                ]
             return out
 
     @property
     def spectrum(self):
         with mpmath.workdps(50):
-            scale = np.array([mpmath.sqrt(v) if v > 0 else mpmath.mpf(1) for v in np.diagonal(self.L)], object)
-            values, vectors = mpmath.eigsy(mpmath.matrix((self.L / np.outer(scale, scale)).tolist()))
-        return scale.astype(float), np.sqrt([max(float(v), 0.0) for v in values]), np.array(vectors.T.tolist(), float)
+            scale = np.array(
+                [mpmath.sqrt(v) if v > 0 else mpmath.mpf(1) for v in np.diagonal(self.L)], object
+            )
+            values, vectors = mpmath.eigsy(
+                mpmath.matrix((self.L / np.outer(scale, scale)).tolist())
+            )
+        return (
+            scale.astype(float),
+            np.sqrt([max(float(v), 0.0) for v in values]),
+            np.array(vectors.T.tolist(), float),
+        )
 
 
 def triangular_solution(A, b):

@@ -1,4 +1,6 @@
-"""Bands of short records with coloured residuals hold the truth about as often as they say: repeated experiments, counted."""
+"""Bands of short records with coloured residuals hold the truth about as often as they say:
+repeated experiments, counted.
+"""
 
 import numpy as np
 import pytest
@@ -15,15 +17,22 @@ EXPERIMENTS = 200
 def experiment(samples, noise, slow, seed):
     """y = (1 + 0.1 p) u(k-1) + 0.3 + 0.02 p + e, e and u of first order with these poles."""
     rng = np.random.default_rng(seed)
-    u, e = (lfilter([1.0], [1.0, -pole], rng.standard_normal(samples + 200))[200:] for pole in (slow, noise))
+    u, e = (
+        lfilter([1.0], [1.0, -pole], rng.standard_normal(samples + 200))[200:]
+        for pole in (slow, noise)
+    )
     p = 6.5 + 6 * np.sin(6 * np.pi * np.arange(samples) / samples)
     y = 0.5 * np.sqrt(1 - noise**2) * e
     y[1:] += (1 + 0.1 * p[:-1]) * u[:-1] / u.std() + 0.3 + 0.02 * p[:-1]
-    return FlightRecord.from_arrays(0.05 * np.arange(samples), dict.fromkeys("yup", "1"), y=y, u=u / u.std(), p=p)
+    return FlightRecord.from_arrays(
+        0.05 * np.arange(samples), dict.fromkeys("yup", "1"), y=y, u=u / u.std(), p=p
+    )
 
 
 def coverage(samples, noise, slow, experiments=EXPERIMENTS):
-    """How often 95 % bands hold the input's coefficient and the offset, over experiments and three p."""
+    """How often 95 % bands hold the input's coefficient and the offset, over experiments and three
+    p.
+    """
     held = []
     for seed in range(experiments):
         record = experiment(samples, noise, slow, seed)
@@ -43,13 +52,26 @@ def test_a_short_coloured_record_is_not_too_sure_of_itself():
 @pytest.mark.parametrize(
     ("samples", "noise", "slow", "least"),
     [
-        (150, 0.0, 0.0, 0.93), (150, 0.8, 0.8, 0.90), (150, 0.9, 0.95, 0.84), (150, 0.95, 0.5, 0.78),
-        (300, 0.8, 0.8, 0.92), (300, 0.9, 0.95, 0.90), (300, 0.95, 0.5, 0.89),
-        (1000, 0.0, 0.0, 0.93), (1000, 0.8, 0.8, 0.93), (1000, 0.9, 0.95, 0.93), (1000, 0.95, 0.5, 0.92),
+        (150, 0.0, 0.0, 0.93),
+        (150, 0.8, 0.8, 0.90),
+        (150, 0.9, 0.95, 0.84),
+        (150, 0.95, 0.5, 0.78),
+        (300, 0.8, 0.8, 0.92),
+        (300, 0.9, 0.95, 0.90),
+        (300, 0.95, 0.5, 0.89),
+        (1000, 0.0, 0.0, 0.93),
+        (1000, 0.8, 0.8, 0.93),
+        (1000, 0.9, 0.95, 0.93),
+        (1000, 0.95, 0.5, 0.92),
     ],
-)  # fmt: skip
+)
 def test_bands_hold_the_truth_as_often_as_the_guide_says(samples, noise, slow, least):
-    """The table of docs/identification.md: `pytest -m slow -s` on this file prints it. Each share is known to about 2 %."""
+    """The table of docs/identification.md: `pytest -m slow -s` on this file prints it. Each share
+    is known to about 2 %.
+    """
     held = coverage(samples, noise, slow)
-    print(f"\n{samples:5d} samples, noise {noise:4.2f}, input {slow:4.2f}: coefficient {100 * held[0]:.0f} %, offset {100 * held[1]:.0f} %")
+    print(
+        f"\n{samples:5d} samples, noise {noise:4.2f}, input {slow:4.2f}: coefficient"
+        f" {100 * held[0]:.0f} %, offset {100 * held[1]:.0f} %"
+    )
     assert held.min() > least

@@ -1,4 +1,6 @@
-"""The C kernel and its NumPy twin: one algorithm, one memory, the same numbers; and both what batch formulas say."""
+"""The C kernel and its NumPy twin: one algorithm, one memory, the same numbers; and both what batch
+formulas say.
+"""
 
 import numpy as np
 import pytest
@@ -20,21 +22,31 @@ WAYS = (
     idn.Directional(0.97, quiet=0.05),
 )
 STRUCTURES = {
-    "two outputs, offset, rate": structure(outputs=("a", "b"), inputs=("u", "v"), offset=True, offset_rate=True),
+    "two outputs, offset, rate": structure(
+        outputs=("a", "b"), inputs=("u", "v"), offset=True, offset_rate=True
+    ),
     "no inputs, one lag": structure(inputs=(), na=1, nb=0, basis=idn.Polynomial(0, 0.0, 13.0)),
-    "spline, current p": structure(basis=Spline((0.0, 2.0, 6.0, 10.0, 13.0)), scheduling_at="now", delay=0, nb=3),
-    "nine outputs": structure(outputs=tuple("abcdefghi"), na=1, nb=1, basis=idn.Polynomial(1, 0.0, 13.0)),
+    "spline, current p": structure(
+        basis=Spline((0.0, 2.0, 6.0, 10.0, 13.0)), scheduling_at="now", delay=0, nb=3
+    ),
+    "nine outputs": structure(
+        outputs=tuple("abcdefghi"), na=1, nb=1, basis=idn.Polynomial(1, 0.0, 13.0)
+    ),
 }
 
 
 def both(rls):
     if kernel.compiled_kernel(rls.precision) is None:
         pytest.skip("no compiled kernel is installed")
-    return Online(rls.configuration, rls._kernel, rls.init()), Online(rls.configuration, twin.Kernel(rls.configuration), rls.init())
+    return Online(rls.configuration, rls._kernel, rls.init()), Online(
+        rls.configuration, twin.Kernel(rls.configuration), rls.init()
+    )
 
 
 def awkward(arx, n=160):
-    """Rows [y, u, p] with a silence, a missing sample, a jump, sizes far apart, and p that rests and creeps before it moves."""
+    """Rows [y, u, p] with a silence, a missing sample, a jump, sizes far apart, and p that rests
+    and creeps before it moves.
+    """
     rng = np.random.default_rng(3)
     rows = np.column_stack([rng.normal(size=(n, arx.ny + arx.nu)), moving(n)])
     rows[:5, :-1] *= 1e-6
@@ -50,9 +62,13 @@ def awkward(arx, n=160):
 @pytest.mark.parametrize("way", WAYS, ids=str)
 @pytest.mark.parametrize("name", STRUCTURES)
 def test_c_and_numpy_agree_to_the_last_bit(name, way, precision):
-    """The same IEEE operations in the same order, no contraction: there is nothing to differ by, so no tolerance either."""
+    """The same IEEE operations in the same order, no contraction: there is nothing to differ by, so
+    no tolerance either.
+    """
     compiled, numpy = both(idn.RecursiveLeastSquares(STRUCTURES[name], way, precision=precision))
-    for a, b in zip(compiled.run(awkward(STRUCTURES[name])), numpy.run(awkward(STRUCTURES[name])), strict=True):
+    for a, b in zip(
+        compiled.run(awkward(STRUCTURES[name])), numpy.run(awkward(STRUCTURES[name])), strict=True
+    ):
         np.testing.assert_array_equal(a, b)
     np.testing.assert_array_equal(compiled.state.memory, numpy.state.memory)
     np.testing.assert_array_equal(compiled.gain, numpy.gain)
@@ -91,7 +107,9 @@ def test_block_diagonal_estimates_are_those_of_least_squares_output_by_output():
 
 SQUARES = (np.ones_like, np.square)
 BESIDE = {
-    "two parameters": idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0))), None),
+    "two parameters": idn.Product(
+        (idn.Polynomial(1, 0.0, 13.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0))), None
+    ),
     "total degree": idn.Product((idn.Polynomial(2, 0.0, 13.0), idn.Polynomial(2, -1.0, 1.0)), 2),
     "one's own functions": idn.UserFunctions(SQUARES, 0.0, 13.0),
 }
@@ -105,7 +123,12 @@ def test_other_bases_give_what_batch_least_squares_gives(name, precision):
     arx = structure(scheduling=p, basis=basis, offset=True, offset_rate=True, na=1)
     rng = np.random.default_rng(1)
     k = np.arange(400)
-    columns = {"y": rng.normal(size=400), "u": rng.normal(size=400), "v": moving(400), "s": np.sin(0.53 * k)}
+    columns = {
+        "y": rng.normal(size=400),
+        "u": rng.normal(size=400),
+        "v": moving(400),
+        "s": np.sin(0.53 * k),
+    }
     record = FlightRecord.from_arrays(0.1 * k, dict.fromkeys(columns, "1"), **columns)
     rls = idn.RecursiveLeastSquares(arx, precision=precision)
     history = rls.run(record)
@@ -113,7 +136,9 @@ def test_other_bases_give_what_batch_least_squares_gives(name, precision):
     best = np.linalg.lstsq(data.phi, data.y, rcond=None)[0]
     # predictions of size 1; condition below 1e3, twice the rounding errors of 400 samples
     tolerance = 1e-10 if precision == "double" else 1e-2
-    np.testing.assert_allclose(data.phi @ history.state.theta, data.phi @ best, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(
+        data.phi @ history.state.theta, data.phi @ best, rtol=0, atol=tolerance
+    )
     single = rls.online()
     for row in np.column_stack([columns[c] for c in ("y", "u", *p)]):
         single.update(row[:1], row[1:2], row[2] if len(p) == 1 else row[2:])
@@ -134,8 +159,14 @@ def test_basis_in_the_kernel_is_the_basis_of_the_structure():
 
 
 def test_directional_forgetting_is_its_formula():
-    """Cao and Schwartz: R <- R - (1 - l) R phi phi' R / (phi' R phi) + phi phi', R the information."""
-    arx, rng, factor = structure(inputs=(), na=2, nb=0, basis=idn.Polynomial(1, 0.0, 13.0)), np.random.default_rng(0), 0.9
+    """Cao and Schwartz: R <- R - (1 - l) R phi phi' R / (phi' R phi) + phi phi', R the
+    information.
+    """
+    arx, rng, factor = (
+        structure(inputs=(), na=2, nb=0, basis=idn.Polynomial(1, 0.0, 13.0)),
+        np.random.default_rng(0),
+        0.9,
+    )
     rls = idn.RecursiveLeastSquares(arx, idn.Directional(factor, quiet=0.0))
     online, n = rls.online(), arx.n_regressors
     information = np.zeros((n, n))
@@ -146,7 +177,9 @@ def test_directional_forgetting_is_its_formula():
             information = online.state.factor[:n, :n].T @ online.state.factor[:n, :n]
         elif k > 9:
             v = information @ phi
-            information = information - (1 - factor) * np.outer(v, v) / (phi @ v) + np.outer(phi, phi)
+            information = (
+                information - (1 - factor) * np.outer(v, v) / (phi @ v) + np.outer(phi, phi)
+            )
     R = online.state.factor[:n, :n]
     np.testing.assert_allclose(R.T @ R, information, rtol=1e-10)
     np.testing.assert_allclose(online.state.solve(), online.state.theta, rtol=0, atol=1e-12)
@@ -183,7 +216,11 @@ def test_online_run_and_single_updates_agree():
     truth = Truth(structure())
     record = truth.record(moving(100), noise=0.1)
     rls = idn.RecursiveLeastSquares(truth.arx, 0.99)
-    a, b, rows = rls.online(), rls.online(), np.column_stack([record["y"], record["u"], record["p"]])
+    a, b, rows = (
+        rls.online(),
+        rls.online(),
+        np.column_stack([record["y"], record["u"], record["p"]]),
+    )
     a.run(rows, history=False)
     for y, u, p in rows:
         b.update([y], u, p)
@@ -192,7 +229,9 @@ def test_online_run_and_single_updates_agree():
     assert a.determined == b.determined == b.state.determined
 
 
-@pytest.mark.skipif(kernel.compiled_kernel("single") is None, reason="ten million samples want the compiled kernel")
+@pytest.mark.skipif(
+    kernel.compiled_kernel("single") is None, reason="ten million samples want the compiled kernel"
+)
 @pytest.mark.slow
 def test_single_precision_that_never_forgets_says_when_it_is_full():
     arx = structure(na=1, nb=1, basis=idn.Polynomial(0, 0.0, 13.0))
@@ -202,7 +241,9 @@ def test_single_precision_that_never_forgets_says_when_it_is_full():
     for _ in range(83):
         online.run(rows, history=False)
     assert not online.saturated
-    online.run(rows, history=False)  # 8.4e6 > 1 / eps = 8388608 - the weight has counted every sample
+    online.run(
+        rows, history=False
+    )  # 8.4e6 > 1 / eps = 8388608 - the weight has counted every sample
     assert online.saturated
     assert online.state.count == 8_400_000 - 1
     assert np.isfinite(online.coefficients).all()
@@ -215,7 +256,9 @@ def test_the_twin_takes_over_with_one_warning(monkeypatch):
     kernel.compiled_kernel.cache_clear()
     kernel._without.cache_clear()
     try:
-        with pytest.warns(CompilerWarning, match="SYMHELI_COMPILE=0: recursive estimates run in NumPy") as caught:
+        with pytest.warns(
+            CompilerWarning, match="SYMHELI_COMPILE=0: recursive estimates run in NumPy"
+        ) as caught:
             states = [idn.RecursiveLeastSquares(structure()).init() for _ in range(3)]
         assert len(caught) == 1
         assert isinstance(idn.RecursiveLeastSquares(structure())._kernel, twin.Kernel)

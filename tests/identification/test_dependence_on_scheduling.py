@@ -9,11 +9,17 @@ from known_systems import flown, structure
 import identification as idn
 from symheli.lpv import FlightRecord
 
-A1, A2, B1 = np.array([-0.9, 0.35, 0.15]), np.array([0.45, -0.2, 0.1]), np.array([0.8, -0.5, 0.3])  # of 1, p, p^2 on [-1, 1]
+A1, A2, B1 = (
+    np.array([-0.9, 0.35, 0.15]),
+    np.array([0.45, -0.2, 0.1]),
+    np.array([0.8, -0.5, 0.3]),
+)  # of 1, p, p^2 on [-1, 1]
 
 
 def dynamic(n=900, noise=0.0):
-    """y(k) + a1(p(k-1)) y(k-1) + a2(p(k-2)) y(k-2) = b1(p(k-1)) u(k-1): nine coefficients, p fast."""
+    """y(k) + a1(p(k-1)) y(k-1) + a2(p(k-2)) y(k-2) = b1(p(k-1)) u(k-1): nine coefficients, p
+    fast.
+    """
     rng = np.random.default_rng(7)
     arx = structure(na=2, nb=1, basis=idn.Polynomial(2, -1.0, 1.0))
     p = 0.6 * np.sin(0.35 * np.pi * np.arange(n)) + 0.3 * rng.uniform(-1, 1, n)
@@ -49,18 +55,26 @@ def test_a_static_model_of_it_leaves_a_residual_and_the_report_says_why(noise):
 
 
 def two_states(n=900, coupling=0.0):
-    """x1+ = -a1(p) x1 + (1 + coupling p) x2 + b1(p) u, x2+ = -a2(p) x1, y = x1: every matrix at p(k), stepped as it stands.
+    """x1+ = -a1(p) x1 + (1 + coupling p) x2 + b1(p) u, x2+ = -a2(p) x1, y = x1: every matrix at
+    p(k), stepped as it stands.
 
-    Without coupling, eliminating x2 gives the system of `dynamic`: y(k) depends on p(k-1) and p(k-2) though no matrix knows the past.
-    Source of the remark: Toth, Abbas and Werner (2012), On the state-space realization of LPV input-output models, IEEE Trans. CST 20.
+    Without coupling, eliminating x2 gives the system of `dynamic`: y(k) depends on p(k-1) and
+    p(k-2) though no matrix knows the past. Source of the remark: Toth, Abbas and Werner (2012), On
+    the state-space realization of LPV input-output models, IEEE Trans. CST 20.
     """
     rng = np.random.default_rng(11)
-    p, u = 0.6 * np.sin(0.35 * np.pi * np.arange(n)) + 0.3 * rng.uniform(-1, 1, n), rng.uniform(-1, 1, n)
+    p, u = (
+        0.6 * np.sin(0.35 * np.pi * np.arange(n)) + 0.3 * rng.uniform(-1, 1, n),
+        rng.uniform(-1, 1, n),
+    )
     a1, a2, b1 = (np.polynomial.polynomial.polyval(p, c) for c in (A1, A2, B1))
     x, y = np.zeros(2), np.zeros(n)
     for k in range(n):
         y[k] = x[0]
-        x = np.array([[-a1[k], 1.0 + coupling * p[k]], [-a2[k], 0.0]]) @ x + np.array([b1[k], 0.0]) * u[k]
+        x = (
+            np.array([[-a1[k], 1.0 + coupling * p[k]], [-a2[k], 0.0]]) @ x
+            + np.array([b1[k], 0.0]) * u[k]
+        )
     return FlightRecord.from_arrays(0.1 * np.arange(n), dict.fromkeys("yup", "1"), y=y, u=u, p=p)
 
 
@@ -76,7 +90,9 @@ def test_a_static_state_space_model_has_dynamic_dependence_as_input_output_model
 
 
 def test_where_the_state_is_hidden_behind_moving_coefficients_both_models_leave_a_residual():
-    """With coupling a_2 depends on p(k-1) and p(k-2) together: no structure of one instant a coefficient is exact, and none pretends."""
+    """With coupling a_2 depends on p(k-1) and p(k-2) together: no structure of one instant a
+    coefficient is exact, and none pretends.
+    """
     record = two_states(coupling=0.6)
     for at in ("lag", "now"):
         arx = structure(na=2, nb=1, basis=idn.Polynomial(2, -1.0, 1.0), scheduling_at=at)
@@ -89,7 +105,8 @@ def test_where_the_state_is_hidden_behind_moving_coefficients_both_models_leave_
 def test_the_right_model_of_noisy_data_is_not_suspected():
     arx, record = dynamic(noise=0.1)
     report = idn.dependence_report(idn.fit(arx, record), record)
-    # 1 % of the rows are explained by 9 more regressors by chance; significant in one of a thousand records
+    # 1 % of the rows are explained by 9 more regressors by chance; significant in one of a thousand
+    # records
     assert report.dynamic == (False,)
     assert "no sign of another dependence" in str(report)
     assert report.probability[0] > 1e-3

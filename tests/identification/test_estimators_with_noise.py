@@ -1,4 +1,6 @@
-"""Output noise: least squares is biased by it, instruments, their refinement and output error are not; all are exact without it."""
+"""Output noise: least squares is biased by it, instruments, their refinement and output error are
+not; all are exact without it.
+"""
 
 import numpy as np
 import pytest
@@ -14,12 +16,16 @@ from identification.stretches import contracted, filtered, stretches
 from symheli.errors import ConvergenceWarning, InputError
 from symheli.lpv import FlightRecord
 
-TRUE = np.array([[-1.2, 0.4], [0.6, -0.2], [0.5, 0.3]])  # monomial coefficients of a_1, a_2, b_1 on p in [0, 1]
+TRUE = np.array(
+    [[-1.2, 0.4], [0.6, -0.2], [0.5, 0.3]]
+)  # monomial coefficients of a_1, a_2, b_1 on p in [0, 1]
 ARX = idn.LPVARX("y", "u", "p", 2, 1, 1, idn.Polynomial(1, 0.0, 1.0), scheduling_at="now")
 
 
 def oscillator(n, seed, *, decibel=10.0, pole=0.0):
-    """An open-loop record of TRUE with output noise so many dB below the signal, coloured by 1/(1 - pole/q)."""
+    """An open-loop record of TRUE with output noise so many dB below the signal, coloured by 1/(1 -
+    pole/q).
+    """
     rng = np.random.default_rng(seed)
     k = np.arange(n)
     p, u, x, v = 0.5 + 0.5 * np.sin(0.05 * k), rng.normal(size=n), np.zeros(n), rng.normal(size=n)
@@ -35,7 +41,9 @@ def oscillator(n, seed, *, decibel=10.0, pole=0.0):
 def errors(method, seeds=(0, 1, 2), pole=0.0, **options):
     out = []
     for seed in seeds:
-        found = idn.fit(ARX, oscillator(1500, seed, pole=pole), method=method, **options).coefficients.monomial()
+        found = idn.fit(
+            ARX, oscillator(1500, seed, pole=pole), method=method, **options
+        ).coefficients.monomial()
         out.append(np.vstack([found.A[:, :, 0, 0], found.B[:, :, 0, 0]]) - TRUE)
     return np.array(out)
 
@@ -48,9 +56,12 @@ def test_noise_at_10_db_biases_least_squares_with_or_without_a_penalty(method):
     assert np.abs(biased.mean(axis=0)).max() > 10 * biased.std(axis=0).max()
 
 
-@pytest.mark.parametrize(("method", "options"), [("iv", {"instruments": ("u",)}), ("riv", {}), ("oe", {})])
+@pytest.mark.parametrize(
+    ("method", "options"), [("iv", {"instruments": ("u",)}), ("riv", {}), ("oe", {})]
+)
 def test_noise_at_10_db_does_not_bias_instruments_nor_output_error(method, options):
-    # what is left is scatter: up to 0.02 a realization (iv), so the mean of three stays within 0.04; the bias of "ls" is 0.3
+    # what is left is scatter: up to 0.02 a realization (iv), so the mean of three stays within
+    # 0.04; the bias of "ls" is 0.3
     assert np.abs(errors(method, **options).mean(axis=0)).max() < 0.04
 
 
@@ -60,26 +71,50 @@ def test_refined_instruments_with_white_noise_are_the_output_error_estimate():
     closest = idn.fit(ARX, record, method="oe", options=idn.OutputError(initial="measured"))
     assert refined.details["converged"]
     assert closest.details["converged"]
-    # both solve (d response / d theta)' (y - response) = 0; they differ in the filter at the first samples only
+    # both solve (d response / d theta)' (y - response) = 0; they differ in the filter at the first
+    # samples only
     np.testing.assert_allclose(refined.theta, closest.theta, atol=2e-3)
 
 
 def test_a_noise_model_finds_the_colour_and_narrows_the_scatter():
-    white, coloured = errors("riv", (0, 1, 2), 0.9), errors("riv", (0, 1, 2), 0.9, options=idn.Refined(noise_order=1))
-    model = idn.fit(ARX, oscillator(1500, 0, pole=0.9), method="riv", options=idn.Refined(noise_order=1))
-    assert model.details["noise"][0][0] == pytest.approx(-0.9, abs=0.03)  # scatter of sqrt((1 - 0.81) / 1500) = 0.011
-    assert np.linalg.norm(coloured) < 0.9 * np.linalg.norm(white)  # measured 0.77 on these three records, 0.64 on eight
+    white, coloured = (
+        errors("riv", (0, 1, 2), 0.9),
+        errors("riv", (0, 1, 2), 0.9, options=idn.Refined(noise_order=1)),
+    )
+    model = idn.fit(
+        ARX, oscillator(1500, 0, pole=0.9), method="riv", options=idn.Refined(noise_order=1)
+    )
+    assert model.details["noise"][0][0] == pytest.approx(
+        -0.9, abs=0.03
+    )  # scatter of sqrt((1 - 0.81) / 1500) = 0.011
+    assert np.linalg.norm(coloured) < 0.9 * np.linalg.norm(
+        white
+    )  # measured 0.77 on these three records, 0.64 on eight
 
 
 def test_closed_loop_noise_is_kept_out_of_the_refinement_by_the_external_excitation():
-    arx, nodes, a = structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0)), np.array([2.0, 6.5, 11.0]), (1.5, 0.7)
+    arx, nodes, a = (
+        structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0)),
+        np.array([2.0, 6.5, 11.0]),
+        (1.5, 0.7),
+    )
     true = np.stack([-(a[0] + 0.01 * nodes), a[1] + 0.004 * nodes], axis=1)
     record = closed_loop(2500, noise=0.5, seed=2, a=a)
     worst = {
-        method: np.abs(idn.fit(arx, record, method=method, **options).coefficients.at(nodes).A[:, :, 0, 0] - true).max()
-        for method, options in (("ls", {}), ("iv", {"instruments": ("r",)}), ("riv", {"instruments": ("r",)}))
+        method: (
+            np.abs(
+                idn.fit(arx, record, method=method, **options).coefficients.at(nodes).A[:, :, 0, 0]
+                - true
+            ).max()
+        )
+        for method, options in (
+            ("ls", {}),
+            ("iv", {"instruments": ("r",)}),
+            ("riv", {"instruments": ("r",)}),
+        )
     }
-    # measured 0.39, 0.028 and 0.005 on this record; over three records iv 0.007 to 0.028, riv 0.001 to 0.006
+    # measured 0.39, 0.028 and 0.005 on this record; over three records iv 0.007 to 0.028, riv 0.001
+    # to 0.006
     assert worst["ls"] > 0.2
     assert worst["riv"] < 0.015
     assert worst["riv"] < worst["iv"]
@@ -87,8 +122,13 @@ def test_closed_loop_noise_is_kept_out_of_the_refinement_by_the_external_excitat
 
 @pytest.mark.parametrize("at", ["lag", "now"])
 def test_refined_instruments_identify_a_plant_that_is_unstable_in_open_loop(at):
-    """Unstable at high p, so that no free run is bounded: an observer driven by what the excitation explains stands in for it."""
-    arx, nodes = structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0), scheduling_at=at), np.array([2.0, 6.5, 11.0])
+    """Unstable at high p, so that no free run is bounded: an observer driven by what the excitation
+    explains stands in for it.
+    """
+    arx, nodes = (
+        structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0), scheduling_at=at),
+        np.array([2.0, 6.5, 11.0]),
+    )
     true = np.stack([-(1.75 + 0.01 * nodes), 0.80 + 0.004 * nodes], axis=1)
     assert np.abs(np.roots([1.0, -(1.75 + 0.01 * 12.5), 0.80 + 0.004 * 12.5])).max() > 1.01
     found = {"iv": [], "riv": []}
@@ -98,18 +138,23 @@ def test_refined_instruments_identify_a_plant_that_is_unstable_in_open_loop(at):
             model = idn.fit(arx, record, method=method, instruments=("r",))
             errors.append(np.abs(model.coefficients.at(nodes).A[:, :, 0, 0] - true).max())
             assert model.details.get("converged", True)
-    # measured over eight records: iv 0.005 to 0.018, riv 0.0006 to 0.0036; least squares is off by 0.28
+    # measured over eight records: iv 0.005 to 0.018, riv 0.0006 to 0.0036; least squares is off by
+    # 0.28
     assert np.max(found["riv"]) < 0.008
     assert np.median(found["riv"]) < 0.5 * np.median(found["iv"])
 
 
 def test_the_poles_of_the_observer_are_those_of_the_plant_mirrored_at_the_unit_circle():
-    """Closed form for a constant plant: poles 1.25 and 0.5 become 0.8 and 0.5, white noise of size 2 white innovations of size 2 * 1.25."""
+    """Closed form for a constant plant: poles 1.25 and 0.5 become 0.8 and 0.5, white noise of size
+    2 white innovations of size 2 * 1.25.
+    """
     a1, a2 = np.poly([1.25, 0.5])[1:]
     A = np.tile([[a1, a2]], (4000, 1, 1))
     observer = Observer.of(A, np.array([2.0]))
     poles = np.linalg.eigvals(np.array([[-a1, -a2], [1.0, 0.0]]) - observer.gain[-1] @ -A[-1])
-    np.testing.assert_allclose(np.sort(poles), [0.5, 0.8], atol=1e-3)  # DOUBT is a share of 1e-4 of the noise
+    np.testing.assert_allclose(
+        np.sort(poles), [0.5, 0.8], atol=1e-3
+    )  # DOUBT is a share of 1e-4 of the noise
     v = 2.0 * np.random.default_rng(0).normal(size=4002)
     error = observer.innovations((v[2:] + a1 * v[1:-1] + a2 * v[:-2])[:, None, None])[100:, 0, 0]
     assert error.std() == pytest.approx(2.5, rel=0.03)  # scatter of 1 / sqrt(2 * 3900) = 0.011
@@ -121,8 +166,12 @@ def test_while_the_plant_is_stable_the_observer_is_the_simulation():
     run = stretches(ARX, [oscillator(400, 0)], outputs=True)[0]
     A = run.lag_coefficients(idn.fit(ARX, oscillator(400, 0), method="riv").theta)
     w = rng.normal(size=(len(A), 1, 1))
-    observed, simulated = Observer.of(A, np.ones(1)).innovations(w), filtered(A, w, np.zeros((2, 1)))
-    # the past is taken as measured with noise, which is over after a few periods; then the gain is that of a doubt of 1e-4
+    observed, simulated = (
+        Observer.of(A, np.ones(1)).innovations(w),
+        filtered(A, w, np.zeros((2, 1))),
+    )
+    # the past is taken as measured with noise, which is over after a few periods; then the gain is
+    # that of a doubt of 1e-4
     np.testing.assert_allclose(observed[100:], simulated[100:], atol=0.02 * np.abs(simulated).max())
 
 
@@ -140,9 +189,14 @@ def test_without_noise_refined_instruments_in_closed_loop_are_exact():
 
 
 MIMO = dict(
-    outputs=("a", "b"), inputs=("u", "v"), na={"a": {"a": 2, "b": 1}, "b": {"a": 0, "b": 2}}, nb=((1, 2), (2, 1)), delay=((1, 0), (2, 1)),
-    offset=True, offset_rate=True,
-)  # fmt: skip
+    outputs=("a", "b"),
+    inputs=("u", "v"),
+    na={"a": {"a": 2, "b": 1}, "b": {"a": 0, "b": 2}},
+    nb=((1, 2), (2, 1)),
+    delay=((1, 0), (2, 1)),
+    offset=True,
+    offset_rate=True,
+)
 
 
 @pytest.mark.parametrize("at", ["lag", "now"])
@@ -152,7 +206,9 @@ def test_without_noise_every_method_gives_the_coefficients_of_a_coupled_structur
     records = [truth.record(moving(350), seed=1), truth.record(moving(250)[::-1].copy(), seed=2)]
     options = {"instruments": truth.arx.inputs} if method == "iv" else {}
     # 1e-8: instruments and trust regions lose a few digits of a condition of 1e3 to 1e4
-    np.testing.assert_allclose(idn.fit(truth.arx, records, method=method, **options).theta, truth.theta, atol=1e-8)
+    np.testing.assert_allclose(
+        idn.fit(truth.arx, records, method=method, **options).theta, truth.theta, atol=1e-8
+    )
 
 
 def test_refinement_comes_back_from_a_start_that_diverges():
@@ -173,15 +229,27 @@ def test_sensitivities_are_the_derivatives_of_the_simulation_error(estimated):
     truth = Truth(structure(**MIMO))
     record = truth.record(moving(90), noise=0.1, noise_seed=50)
     values, t = record.values.copy(), record.time.copy()
-    values[30, 0] = values[60, 4] = np.nan  # a measurement, and a scheduling value: the run breaks there
+    values[30, 0] = values[60, 4] = (
+        np.nan
+    )  # a measurement, and a scheduling value: the run breaks there
     t[45:] += 9.0
     record = FlightRecord(t, values, record.signals)
-    problem = SimulationError(truth.arx, stretches(truth.arx, [record], outputs=False), estimated=estimated)
+    problem = SimulationError(
+        truth.arx, stretches(truth.arx, [record], outputs=False), estimated=estimated
+    )
     x = problem.start(0.9 * truth.theta)
     exact = problem.jacobian(x)
     h = 1e-6
-    differences = np.stack([(problem.residuals(x + h * e) - problem.residuals(x - h * e)) / (2 * h) for e in np.eye(len(x))], axis=1)
-    np.testing.assert_allclose(exact, differences, atol=1e-7 * np.abs(exact).max())  # central differences: h^2 and 1e-16 / h
+    differences = np.stack(
+        [
+            (problem.residuals(x + h * e) - problem.residuals(x - h * e)) / (2 * h)
+            for e in np.eye(len(x))
+        ],
+        axis=1,
+    )
+    np.testing.assert_allclose(
+        exact, differences, atol=1e-7 * np.abs(exact).max()
+    )  # central differences: h^2 and 1e-16 / h
 
 
 def test_output_error_bridges_missing_outputs_and_finds_where_each_stretch_starts():
@@ -199,9 +267,15 @@ def test_output_error_bridges_missing_outputs_and_finds_where_each_stretch_start
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (dict(method="ls", options=idn.Ridge()), "options of method 'ls': expected none, got Ridge"),
+        (
+            dict(method="ls", options=idn.Ridge()),
+            "options of method 'ls': expected none, got Ridge",
+        ),
         (dict(method="ridge", options=idn.Lasso()), r"expected Ridge\(...\), got Lasso"),
-        (dict(method="ridge", instruments=("u",)), 'instruments are for method="iv", "riv" and "oe"'),
+        (
+            dict(method="ridge", instruments=("u",)),
+            'instruments are for method="iv", "riv" and "oe"',
+        ),
         (dict(method="oe", forgetting=0.9), "forgetting is for"),
     ],
 )
@@ -228,5 +302,7 @@ def test_options_out_of_range_are_refused_when_made(make):
 
 def test_rows_that_the_methods_share_are_counted_alike():
     record = oscillator(300, 0)
-    used = {m: idn.fit(ARX, record, method=m).rows_used for m in ("ls", "ridge", "lasso", "riv", "oe")}
+    used = {
+        m: idn.fit(ARX, record, method=m).rows_used for m in ("ls", "ridge", "lasso", "riv", "oe")
+    }
     assert set(used.values()) == {len(stacked(ARX, [record]).phi)}

@@ -7,7 +7,8 @@ from known_systems import Truth, flown, moving, moving_box, structure
 import identification as idn
 from symheli.errors import ExcitationError, InputError
 
-# 1e-9: the condition of these regressors stays below 1e4, and rounding enters at 1e-16 of signals of size 1-10
+# 1e-9: the condition of these regressors stays below 1e4, and rounding enters at 1e-16 of signals
+# of size 1-10
 EXACT = dict(rtol=0, atol=1e-9)
 
 SHAPES = {
@@ -18,9 +19,19 @@ SHAPES = {
     "offsets": dict(outputs=("theta", "u"), inputs=("d_lon",), offset=True, offset_rate=True),
     "one output of the past only": dict(inputs=(), nb=0, offset=True, na=1),
     "miso": dict(outputs=("theta",), inputs=("d_lon", "d_col"), delay=0),
-    "orders by equation": dict(outputs=("theta", "u"), inputs=("d_lon",), na={"theta": 3, "u": 1}, nb={"theta": 1, "u": 2}, offset=True),
+    "orders by equation": dict(
+        outputs=("theta", "u"),
+        inputs=("d_lon",),
+        na={"theta": 3, "u": 1},
+        nb={"theta": 1, "u": 2},
+        offset=True,
+    ),
     "orders by input": dict(
-        outputs=("v", "r"), inputs=("d_lat", "d_ped"), na=1, nb={"d_lat": 1, "d_ped": 2}, delay={"d_lat": 0, "d_ped": 2}
+        outputs=("v", "r"),
+        inputs=("d_lat", "d_ped"),
+        na=1,
+        nb={"d_lat": 1, "d_ped": 2},
+        delay={"d_lat": 0, "d_ped": 2},
     ),
     "orders by signal": dict(
         outputs=("v", "r"),
@@ -39,10 +50,22 @@ BASES = {
     "cubic b-spline": (idn.BSpline(3, (0.0, 4.0, 9.0, 13.0)), ONE),
     "hats": (idn.PiecewiseLinear((0.0, 5.0, 13.0)), ONE),
     "spline": (idn.Spline((0.0, 4.0, 9.0, 13.0)), ONE),
-    "brought along": (idn.UserFunctions((np.ones_like, np.cos, lambda p: 1 / (1 + p)), 0.0, 13.0), ONE),
-    "tensor product": (idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3))), SEVERAL),
-    "total degree": (idn.Product((idn.Polynomial(2, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3)), total_degree=2), SEVERAL),
-    "mixed product": (idn.Product((idn.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3))), SEVERAL),
+    "brought along": (
+        idn.UserFunctions((np.ones_like, np.cos, lambda p: 1 / (1 + p)), 0.0, 13.0),
+        ONE,
+    ),
+    "tensor product": (
+        idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3))),
+        SEVERAL,
+    ),
+    "total degree": (
+        idn.Product((idn.Polynomial(2, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3)), total_degree=2),
+        SEVERAL,
+    ),
+    "mixed product": (
+        idn.Product((idn.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3))),
+        SEVERAL,
+    ),
 }
 
 
@@ -58,16 +81,27 @@ def test_noise_free_record_gives_the_coefficients_back(shape, at, method):
 @pytest.mark.parametrize(("at", "method"), [("lag", "rls"), ("now", "ls")])
 @pytest.mark.parametrize("basis", BASES)
 @pytest.mark.parametrize("shape", ["offsets", "orders by signal"])
-def test_whatever_the_basis_the_coefficients_the_predictions_and_the_free_run_come_back(shape, basis, at, method):
+def test_whatever_the_basis_the_coefficients_the_predictions_and_the_free_run_come_back(
+    shape, basis, at, method
+):
     functions, p = BASES[basis]
-    truth = Truth(structure(**SHAPES[shape], basis=functions, scheduling=("p", "q")[: functions.dimension], scheduling_at=at))
+    truth = Truth(
+        structure(
+            **SHAPES[shape],
+            basis=functions,
+            scheduling=("p", "q")[: functions.dimension],
+            scheduling_at=at,
+        )
+    )
     record = truth.record(p)
     model = idn.fit(truth.arx, record, method=method)
     np.testing.assert_allclose(model.theta, truth.theta, **EXACT)
     # 1e-8: a free run gathers errors of the coefficients of 1e-9 over a few time constants
     measured, m = record.columns(truth.arx.outputs), truth.arx.memory
     np.testing.assert_allclose(model.simulate(record)[m:], measured[m:], atol=1e-8)
-    np.testing.assert_allclose(model.predict(record, horizon=7)[m + 6 :], measured[m + 6 :], atol=1e-8)
+    np.testing.assert_allclose(
+        model.predict(record, horizon=7)[m + 6 :], measured[m + 6 :], atol=1e-8
+    )
 
 
 def test_a_model_of_several_parameters_freezes_and_refuses_a_state_space_of_one():
@@ -77,7 +111,9 @@ def test_a_model_of_several_parameters_freezes_and_refuses_a_state_space_of_one(
     values, z, omega = truth.coefficients.at([4.0, 1.2]), np.exp(0.1j * 3.0), np.array([3.0])
     left = np.eye(2) + sum(values.A[i] * z ** -(i + 1.0) for i in range(2))
     right = sum(values.B[j] * z ** -float(j) for j in range(2))
-    np.testing.assert_allclose(model.at([4.0, 1.2]).frequency_response(omega)[0], np.linalg.solve(left, right), **EXACT)
+    np.testing.assert_allclose(
+        model.at([4.0, 1.2]).frequency_response(omega)[0], np.linalg.solve(left, right), **EXACT
+    )
     with pytest.raises(InputError, match="has one scheduling parameter, this one has 2"):
         model.to_state_space()
     with pytest.raises(InputError, match="expected 2 along the last axis"):
@@ -96,8 +132,12 @@ def test_several_parameters_that_move_together_are_refused():
 
 @pytest.mark.parametrize("method", ["ls", "rls"])
 def test_the_papers_structure_is_recovered_from_the_papers_parameter_trajectory(method):
-    """na=3, one input coefficient at lag 2, quadratic in p, p from sin(pi k/3): Budiyono and Sutarto, eqs 13-15."""
-    arx = structure(outputs=("theta", "w", "u"), inputs=("d_lon",), na=3, nb=1, delay=2, scheduling_at="now")
+    """na=3, one input coefficient at lag 2, quadratic in p, p from sin(pi k/3): Budiyono and
+    Sutarto, eqs 13-15.
+    """
+    arx = structure(
+        outputs=("theta", "w", "u"), inputs=("d_lon",), na=3, nb=1, delay=2, scheduling_at="now"
+    )
     truth = Truth(arx)
     p = 6.5 * (1 + np.sin(np.pi * np.arange(500) / 3))
     model = idn.fit(arx, truth.record(p), method=method)
@@ -106,7 +146,9 @@ def test_the_papers_structure_is_recovered_from_the_papers_parameter_trajectory(
 
 
 def test_a_discrete_polynomial_system_with_its_state_as_output_comes_back_exactly():
-    """x(k+1) = A(p(k)) x(k) + B(p(k)) u(k) is the order-1 structure with coefficients at the lag."""
+    """x(k+1) = A(p(k)) x(k) + B(p(k)) u(k) is the order-1 structure with coefficients at the
+    lag.
+    """
     rng = np.random.default_rng(3)
     A0, A1, A2 = 0.4 * rng.uniform(-1, 1, (3, 4, 4)) / [[[1.0]], [[13.0]], [[169.0]]]
     B0, B1 = rng.uniform(-1, 1, (2, 4, 2)) / [[[1.0]], [[13.0]]]
@@ -117,7 +159,9 @@ def test_a_discrete_polynomial_system_with_its_state_as_output_comes_back_exactl
     def B(p):
         return B0 + p * B1
 
-    arx = structure(outputs=("u", "w", "q", "theta"), inputs=("d_lon", "d_col"), na=1, nb=1, delay=1)
+    arx = structure(
+        outputs=("u", "w", "q", "theta"), inputs=("d_lon", "d_col"), na=1, nb=1, delay=1
+    )
     p = moving(600)
     record = flown(arx, [lambda q: -A(q)], [B], p, rng.normal(size=(600, 2)))
     lpv = idn.fit(arx, record).to_state_space()
@@ -130,7 +174,11 @@ def test_a_discrete_polynomial_system_with_its_state_as_output_comes_back_exactl
 def test_coefficients_read_as_monomials_in_physical_units():
     arx = structure(na=1, nb=1)
     record = flown(
-        arx, [lambda p: np.array([[-0.5 - 0.03 * p + 0.002 * p**2]])], [lambda p: np.array([[1 - 0.05 * p]])], moving(), _noise(700)
+        arx,
+        [lambda p: np.array([[-0.5 - 0.03 * p + 0.002 * p**2]])],
+        [lambda p: np.array([[1 - 0.05 * p]])],
+        moving(),
+        _noise(700),
     )
     found = idn.fit(arx, record).coefficients.monomial()
     np.testing.assert_allclose(found.A[0, :, 0, 0], [-0.5, -0.03, 0.002], **EXACT)
@@ -139,7 +187,9 @@ def test_coefficients_read_as_monomials_in_physical_units():
 
 def test_two_records_are_fitted_together_without_reaching_from_one_to_the_other():
     truth = Truth(structure())
-    model = idn.fit(truth.arx, [truth.record(moving(80), seed=1), truth.record(moving(90)[::-1].copy(), seed=2)])
+    model = idn.fit(
+        truth.arx, [truth.record(moving(80), seed=1), truth.record(moving(90)[::-1].copy(), seed=2)]
+    )
     assert model.rows_used == 80 + 90 - 2 * truth.arx.memory
     np.testing.assert_allclose(model.theta, truth.theta, **EXACT)
 
@@ -154,7 +204,8 @@ def test_missing_samples_and_gaps_cost_rows_but_not_exactness():
     holed = type(record)(time, values, record.signals)
     for method in ("ls", "rls"):
         model = idn.fit(truth.arx, holed, method=method)
-        # y missing: itself and two lags; u: two lags (delay 1); p: all terms at lags 1, 2; two starts of two samples
+        # y missing: itself and two lags; u: two lags (delay 1); p: all terms at lags 1, 2; two
+        # starts of two samples
         assert model.rows_dropped == 3 + 2 + 2 + 4
         np.testing.assert_allclose(model.theta, truth.theta, **EXACT)
 

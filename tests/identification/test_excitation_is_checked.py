@@ -14,7 +14,9 @@ P_OF_THE_PAPER = 6.5 * (1 + np.sin(np.pi * np.arange(400) / 3))
 def test_three_scheduling_values_never_determine_a_cubic(method):
     arx = structure(basis=idn.Polynomial(3, 0.0, 13.0))
     record = Truth(arx).record(P_OF_THE_PAPER)
-    with pytest.raises(ExcitationError, match=r"p takes 3 distinct values and .* needs 4.*degree 2 at most") as caught:
+    with pytest.raises(
+        ExcitationError, match=r"p takes 3 distinct values and .* needs 4.*degree 2 at most"
+    ) as caught:
         idn.fit(arx, record, method=method, **({"instruments": ("u",)} if method == "iv" else {}))
     assert caught.value.report.distinct == 3
     assert caught.value.report.needed == 4

@@ -5,7 +5,14 @@ import pytest
 from known_systems import moving, structure
 from scipy.signal import lfilter
 
-from identification import FrequencyResponse, choose_experiments, compare_experiments, fit, frequency_response, uncertainty
+from identification import (
+    FrequencyResponse,
+    choose_experiments,
+    compare_experiments,
+    fit,
+    frequency_response,
+    uncertainty,
+)
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FlightRecord, LinearModel
 
@@ -29,7 +36,14 @@ def flown(n=12_000, noise=0.0, coupling=0.3, seed=0):
         y[k] = model.C @ x
         x = model.A @ x + model.B @ u[k]
     y += noise * y.std(axis=0) * rng.standard_normal(y.shape)
-    return FlightRecord.from_arrays(DT * np.arange(n), dict.fromkeys(("a", "b", "y", "z"), "1"), a=u[:, 0], b=u[:, 1], y=y[:, 0], z=y[:, 1])
+    return FlightRecord.from_arrays(
+        DT * np.arange(n),
+        dict.fromkeys(("a", "b", "y", "z"), "1"),
+        a=u[:, 0],
+        b=u[:, 1],
+        y=y[:, 0],
+        z=y[:, 1],
+    )
 
 
 def test_the_response_of_a_known_plant_comes_back_though_its_inputs_move_together():
@@ -42,7 +56,9 @@ def test_the_response_of_a_known_plant_comes_back_though_its_inputs_move_togethe
     assert np.all(response.multiple[:, 0] > 0.9)
     assert np.all(response.mismatch(plant().discretize(DT))[[0, 1], [0, 1]] < 50)
     wrong = plant().discretize(DT)
-    wrong = LinearModel(wrong.A, 3 * wrong.B, wrong.C, wrong.D, wrong.states, wrong.inputs, wrong.outputs, wrong.dt)
+    wrong = LinearModel(
+        wrong.A, 3 * wrong.B, wrong.C, wrong.D, wrong.states, wrong.inputs, wrong.outputs, wrong.dt
+    )
     assert np.all(response.mismatch(wrong)[[0, 1], [0, 1]] > 100)
 
 
@@ -51,13 +67,19 @@ def static(noise, seed=0, n=6000):
     rng = np.random.default_rng(seed)
     a, b, e = rng.standard_normal((3, n))
     b += 0.5 * a
-    return FlightRecord.from_arrays(DT * np.arange(n), dict.fromkeys("aby", "1"), a=a, b=b, y=2 * a + b + noise * e)
+    return FlightRecord.from_arrays(
+        DT * np.arange(n), dict.fromkeys("aby", "1"), a=a, b=b, y=2 * a + b + noise * e
+    )
 
 
 def test_coherence_falls_and_the_random_error_grows_with_noise_as_they_say():
-    r = [frequency_response(static(2.0, seed), ("y",), ("a", "b"), window=5.0) for seed in range(20)]
+    r = [
+        frequency_response(static(2.0, seed), ("y",), ("a", "b"), window=5.0) for seed in range(20)
+    ]
     errors = np.array([(np.abs(one.G[:, 0, 0]) / 2 - 1) / one.random_error[:, 0, 0] for one in r])
-    assert np.sqrt(np.mean(errors**2)) == pytest.approx(1.0, rel=0.25)  # asymptotic in the number of windows
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(
+        1.0, rel=0.25
+    )  # asymptotic in the number of windows
     # a with b taken off has the variance 1/(1 + 0.25): 4 x 0.8 against noise of 4
     assert np.mean([one.coherence[:, 0, 0] for one in r]) == pytest.approx(3.2 / 7.2, abs=0.05)
     quiet = frequency_response(static(0.1), ("y",), ("a", "b"), window=5.0)
@@ -65,15 +87,29 @@ def test_coherence_falls_and_the_random_error_grows_with_noise_as_they_say():
     assert quiet.multiple.min() > 0.98
 
 
-@pytest.mark.parametrize(("coherence", "weight"), [(0.6, 0.51), (0.8, 0.76), (0.9, 0.88), (1.0, 1.0)])
+@pytest.mark.parametrize(
+    ("coherence", "weight"), [(0.6, 0.51), (0.8, 0.76), (0.9, 0.88), (1.0, 1.0)]
+)
 def test_the_mismatch_weighs_by_the_coherence_as_published(coherence, weight):
-    """W = (1.58 (1 - exp(-gamma^2)))^2 is 0.51 at gamma^2 = 0.6 and 1 at 1; half the gain at every frequency costs 20 W 6.02^2."""
+    """W = (1.58 (1 - exp(-gamma^2)))^2 is 0.51 at gamma^2 = 0.6 and 1 at 1; half the gain at every
+    frequency costs 20 W 6.02^2.
+    """
     shape = (5, 1, 1)
     measured = FrequencyResponse(
-        np.arange(1.0, 6.0), np.full(shape, 0.5 + 0j), np.full(shape, coherence), np.ones((5, 1)), np.zeros(shape), ("y",), ("u",)
-    )  # fmt: skip
-    model = LinearModel(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], (), ("u",), ("y",), DT)
-    assert measured.mismatch(model, 0.5)[0, 0] == pytest.approx(20 * weight * (20 * np.log10(2)) ** 2, rel=0.01)  # two digits
+        np.arange(1.0, 6.0),
+        np.full(shape, 0.5 + 0j),
+        np.full(shape, coherence),
+        np.ones((5, 1)),
+        np.zeros(shape),
+        ("y",),
+        ("u",),
+    )
+    model = LinearModel(
+        np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], (), ("u",), ("y",), DT
+    )
+    assert measured.mismatch(model, 0.5)[0, 0] == pytest.approx(
+        20 * weight * (20 * np.log10(2)) ** 2, rel=0.01
+    )  # two digits
 
 
 def test_gaps_are_not_bridged_and_inputs_that_move_together_are_refused():
@@ -116,7 +152,9 @@ def test_the_experiment_that_moves_everything_tells_most_and_limits_are_kept():
     assert [e.name for e in found if not e.allowed] == ["switching, too large"]
     plan = choose_experiments(found, 2)
     assert plan.experiments[0].name == "switching, moving p"
-    assert np.all(plan.bounds <= plan.experiments[0].bounds * (1 + 1e-9))  # more data never know less
+    assert np.all(
+        plan.bounds <= plan.experiments[0].bounds * (1 + 1e-9)
+    )  # more data never know less
     sine = next(e for e in found if e.name == "one sine")
     assert np.median(sine.bounds) > 5 * np.median(plan.experiments[0].bounds)
 
@@ -126,15 +164,23 @@ def test_bounds_are_the_standard_errors_a_fit_reports():
     (one,) = compare_experiments(structure(), {"x": records["switching, moving p"]}, {})
     record = records["switching, moving p"]
     rng = np.random.default_rng(1)
-    noisy = FlightRecord(record.time, record.values + np.array([0.1, 0, 0]) * rng.standard_normal(record.values.shape), record.signals)
+    noisy = FlightRecord(
+        record.time,
+        record.values + np.array([0.1, 0, 0]) * rng.standard_normal(record.values.shape),
+        record.signals,
+    )
     model = fit(structure(), noisy)
     white = np.sqrt(np.diagonal(uncertainty(model, noisy).white[0]))
     scale = np.sqrt(model.residual_covariance[0, 0])
-    np.testing.assert_allclose(one.bounds * scale, white, rtol=0.15)  # the noise moves the regressors a little
+    np.testing.assert_allclose(
+        one.bounds * scale, white, rtol=0.15
+    )  # the noise moves the regressors a little
 
 
 def test_an_experiment_that_leaves_coefficients_open_says_so_and_none_allowed_is_refused():
-    still = {"constant p": candidate(np.random.default_rng(0).standard_normal(300), np.full(300, 5.0))}
+    still = {
+        "constant p": candidate(np.random.default_rng(0).standard_normal(300), np.full(300, 5.0))
+    }
     (one,) = compare_experiments(structure(), still, {})
     assert np.all(np.isinf(one.bounds))
     with pytest.raises(ExcitationError, match="no candidate keeps its limits"):

@@ -15,7 +15,9 @@ GAIN = 0.35
 
 
 def closed_loop(n, *, noise, seed, at="lag", a=(1.75, 0.80)):
-    """A plant held by u = r - GAIN y_measured; the noise is on the measurement and so goes round the loop. Unstable at high p."""
+    """A plant held by u = r - GAIN y_measured; the noise is on the measurement and so goes round
+    the loop. Unstable at high p.
+    """
     rng = np.random.default_rng(seed)
     k = np.arange(n)
     p = 6.5 + 6.0 * np.sin(0.021 * k)
@@ -26,7 +28,11 @@ def closed_loop(n, *, noise, seed, at="lag", a=(1.75, 0.80)):
         if j >= 2:
             q = p[j - 1] if at == "lag" else p[j]
             q2 = p[j - 2] if at == "lag" else p[j]
-            true[j] = (a[0] + 0.01 * q) * true[j - 1] - (a[1] + 0.004 * q2) * true[j - 2] + (0.5 + 0.02 * q) * u[j - 1]
+            true[j] = (
+                (a[0] + 0.01 * q) * true[j - 1]
+                - (a[1] + 0.004 * q2) * true[j - 2]
+                + (0.5 + 0.02 * q) * u[j - 1]
+            )
         y[j] = true[j] + e[j]
         u[j] = r[j] - GAIN * y[j]
     return FlightRecord.from_arrays(0.05 * k, dict.fromkeys("yurp", "1"), y=y, u=u, r=r, p=p)
@@ -38,7 +44,9 @@ def errors(method, *, at, seeds=(1, 2, 3), **options):
     true = np.stack([-(1.75 + 0.01 * nodes), 0.80 + 0.004 * nodes], axis=1)
     out = []
     for seed in seeds:
-        found = idn.fit(arx, closed_loop(6000, noise=0.5, seed=seed, at=at), method=method, **options).coefficients.at(nodes)
+        found = idn.fit(
+            arx, closed_loop(6000, noise=0.5, seed=seed, at=at), method=method, **options
+        ).coefficients.at(nodes)
         out.append(found.A[:, :, 0, 0] - true)
     return np.array(out)
 
@@ -46,10 +54,12 @@ def errors(method, *, at, seeds=(1, 2, 3), **options):
 @pytest.mark.parametrize("at", ["lag", "now"])
 def test_least_squares_is_badly_biased_by_closed_loop_noise_and_instruments_are_not(at):
     biased, unbiased = errors("ls", at=at), errors("iv", at=at, instruments=("r",))
-    # the same sign and size in every realization: a bias, not scatter. Measured 0.28 with a scatter of 0.008; A_1 is about 1.8
+    # the same sign and size in every realization: a bias, not scatter. Measured 0.28 with a scatter
+    # of 0.008; A_1 is about 1.8
     assert np.abs(biased.mean(axis=0)).max() > 0.2
     assert np.abs(biased.mean(axis=0)).max() > 10 * biased.std(axis=0).max()
-    # what is left is scatter: 0.003 a realization at 6000 samples, so the mean of three stays within 0.01
+    # what is left is scatter: 0.003 a realization at 6000 samples, so the mean of three stays
+    # within 0.01
     assert np.abs(unbiased.mean(axis=0)).max() < 0.01
 
 
@@ -74,7 +84,9 @@ def test_too_few_or_blind_instruments_are_refused():
 
 
 def test_what_instruments_leave_of_the_bias_is_foreseen_by_their_strength():
-    """The louder the noise, the less of the output the excitation explains: F falls, and below 10 the bias of least squares is back."""
+    """The louder the noise, the less of the output the excitation explains: F falls, and below 10
+    the bias of least squares is back.
+    """
     arx, true = structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0)), np.array([-1.815, 0.826])
     left, F = [], []
     for noise in (0.5, 2.0, 5.0, 20.0):
@@ -83,11 +95,16 @@ def test_what_instruments_leave_of_the_bias_is_foreseen_by_their_strength():
             warnings.simplefilter("always")
             model = idn.fit(arx, record, method="iv", instruments=("r",))
         biased = idn.fit(arx, record).coefficients.at(6.5).A.ravel() - true
-        left.append(float((model.coefficients.at(6.5).A.ravel() - true) @ biased / (biased @ biased)))
+        left.append(
+            float((model.coefficients.at(6.5).A.ravel() - true) @ biased / (biased @ biased))
+        )
         F.append(model.details["first_stage_F"])
         weak = [str(w.message) for w in said if w.category is DataWarning]
         assert len(weak) == (F[-1] < 10)
-        assert all("the instruments are weak (first-stage F" in text and model.details["weakest"] in text for text in weak)
+        assert all(
+            "the instruments are weak (first-stage F" in text and model.details["weakest"] in text
+            for text in weak
+        )
     assert F == sorted(F, reverse=True)
     assert F[0] > 100
     assert F[-1] < 2  # 1 is what chance explains
@@ -96,15 +113,20 @@ def test_what_instruments_leave_of_the_bias_is_foreseen_by_their_strength():
     assert left[3] > 0.4  # hardly any: 0.5
 
 
-def test_the_first_stage_is_the_f_statistic_of_one_regressor_and_that_of_the_worst_combination_of_several():
+def test_the_first_stage_is_the_f_statistic_of_one_regressor_and_of_the_worst_combination():
     rng = np.random.default_rng(3)
     Z, own = rng.standard_normal((300, 4)), np.ones((300, 1))
-    x = np.column_stack([Z @ rng.standard_normal(4), Z @ rng.standard_normal(4)]) + rng.standard_normal((300, 2))
+    x = np.column_stack(
+        [Z @ rng.standard_normal(4), Z @ rng.standard_normal(4)]
+    ) + rng.standard_normal((300, 2))
     Q = np.linalg.qr(np.hstack([Z, own]))[0]
 
     def F(column):
         """The textbook's: restricted against unrestricted sum of squares."""
-        full, bare = (np.sum((column - A @ np.linalg.lstsq(A, column, rcond=None)[0]) ** 2) for A in (np.hstack([Z, own]), own))
+        full, bare = (
+            np.sum((column - A @ np.linalg.lstsq(A, column, rcond=None)[0]) ** 2)
+            for A in (np.hstack([Z, own]), own)
+        )
         return (bare - full) / 4 / (full / 295)
 
     one = first_stage(np.hstack([x[:, :1], own]), Q, ("x", "1"), np.array([False, True]))
@@ -112,5 +134,12 @@ def test_the_first_stage_is_the_f_statistic_of_one_regressor_and_that_of_the_wor
     both = first_stage(np.hstack([x, own]), Q, ("x", "z", "1"), np.array([False, False, True]))
     angles = np.linspace(0, np.pi, 2001)
     # the best of 2000 directions is within 1e-5 of the least
-    assert both.F == pytest.approx(min(F(np.cos(a) * x[:, 0] + np.sin(a) * x[:, 1]) for a in angles), rel=1e-4)
-    assert first_stage(np.hstack([Z[:, :2], own]), Q, ("x", "z", "1"), np.array([False, False, True])).F > 1e9
+    assert both.F == pytest.approx(
+        min(F(np.cos(a) * x[:, 0] + np.sin(a) * x[:, 1]) for a in angles), rel=1e-4
+    )
+    assert (
+        first_stage(
+            np.hstack([Z[:, :2], own]), Q, ("x", "z", "1"), np.array([False, False, True])
+        ).F
+        > 1e9
+    )

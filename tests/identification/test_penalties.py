@@ -18,13 +18,18 @@ def noisy(n=300, **over):
 
 def test_ridge_without_weight_is_least_squares_and_with_all_weight_the_lti_fit():
     truth, record = noisy(outputs=("a", "b"), na={"a": 2, "b": 1})
-    free, none = idn.fit(truth.arx, record), idn.fit(truth.arx, record, method="ridge", options=idn.Ridge(weight=0.0))
+    free, none = (
+        idn.fit(truth.arx, record),
+        idn.fit(truth.arx, record, method="ridge", options=idn.Ridge(weight=0.0)),
+    )
     np.testing.assert_allclose(none.theta, free.theta, atol=1e-10)
     lti = idn.fit(truth.arx.lti(), record).coefficients.at(4.0)
     flat = idn.fit(truth.arx, record, method="ridge", options=idn.Ridge(weight=1e8)).coefficients
     for p in (0.0, 13.0):
         for found, constant in zip(flat.at(p), lti, strict=True):
-            np.testing.assert_allclose(found, constant, atol=1e-6)  # 1e-8 of the data left against the penalty, times a few
+            np.testing.assert_allclose(
+                found, constant, atol=1e-6
+            )  # 1e-8 of the data left against the penalty, times a few
     zero = idn.fit(truth.arx, record, method="ridge", options=idn.Ridge(weight=1e8, towards="zero"))
     assert np.abs(zero.theta).max() < 1e-6
 
@@ -33,12 +38,20 @@ def test_ridge_without_weight_is_least_squares_and_with_all_weight_the_lti_fit()
 def test_ridge_does_not_care_how_the_functions_are_written_nor_about_units(towards):
     truth, record = noisy(basis=idn.Polynomial(1, 0.0, 13.0))
     options = idn.Ridge(weight=0.1, towards=towards)
-    hats, own = idn.PiecewiseLinear((0.0, 13.0)), idn.UserFunctions((np.ones_like, lambda p: 1e3 * p), 0.0, 13.0)
-    fits = [idn.fit(structure(basis=b), record, method="ridge", options=options).predict(record, 1) for b in (truth.arx.basis, hats, own)]
+    hats, own = (
+        idn.PiecewiseLinear((0.0, 13.0)),
+        idn.UserFunctions((np.ones_like, lambda p: 1e3 * p), 0.0, 13.0),
+    )
+    fits = [
+        idn.fit(structure(basis=b), record, method="ridge", options=options).predict(record, 1)
+        for b in (truth.arx.basis, hats, own)
+    ]
     np.testing.assert_allclose(fits[1], fits[0], atol=1e-9)
     np.testing.assert_allclose(fits[2], fits[0], atol=1e-9)
     units = dict.fromkeys(("y", "u", "p"), "1")
-    scaled = type(record).from_arrays(record.time, units, y=1e3 * record["y"], u=1e-3 * record["u"], p=record["p"])
+    scaled = type(record).from_arrays(
+        record.time, units, y=1e3 * record["y"], u=1e-3 * record["u"], p=record["p"]
+    )
     other = idn.fit(truth.arx, scaled, method="ridge", options=options).predict(scaled, 1)
     np.testing.assert_allclose(1e-3 * other, fits[0], atol=1e-9)
 
@@ -47,11 +60,16 @@ def test_cross_validated_weight_is_the_best_of_a_brute_force_search():
     truth, record = noisy(60)
     model = idn.fit(truth.arx, record, method="ridge")
     data = regression(truth.arx, record)
-    # the penalty from its definition: for orthonormal polynomials the variance over p is the sum of squares but for the constant one
+    # the penalty from its definition: for orthonormal polynomials the variance over p is the sum of
+    # squares but for the constant one
     m, size = len(data.phi), truth.arx.basis.size
     P = np.zeros((data.phi.shape[1],) * 2)
     for j in range(0, len(P), size):
-        P[j : j + size, j : j + size] = np.diag([0.0] + [1.0] * (size - 1)) * np.sum(data.phi[:, j : j + size] ** 2) / (size * m)
+        P[j : j + size, j : j + size] = (
+            np.diag([0.0] + [1.0] * (size - 1))
+            * np.sum(data.phi[:, j : j + size] ** 2)
+            / (size * m)
+        )
 
     def score(weight):
         H = data.phi @ np.linalg.solve(data.phi.T @ data.phi + m * weight * P, data.phi.T)
@@ -60,10 +78,12 @@ def test_cross_validated_weight_is_the_best_of_a_brute_force_search():
 
     (chosen,) = model.details["weight"]
     # within the tolerance of the search (0.01 decades) the score is flat
-    assert score(chosen) <= min(score(w) for w in 10.0 ** np.linspace(GRID[0], GRID[-1], 400)) * (1 + 1e-6)
+    assert score(chosen) <= min(score(w) for w in 10.0 ** np.linspace(GRID[0], GRID[-1], 400)) * (
+        1 + 1e-6
+    )
 
 
-def test_ridge_predicts_better_than_least_squares_where_there_are_more_coefficients_than_the_data_bear():
+def test_ridge_predicts_better_than_least_squares_where_the_data_bear_fewer_coefficients():
     gains = []
     for seed in range(6):
         truth = Truth(structure(na=1, nb=1, basis=idn.Polynomial(1, 0.0, 13.0)), seed=seed)
@@ -89,7 +109,9 @@ def test_ridge_fits_where_least_squares_must_refuse_and_says_what_the_data_lack(
 
 def test_every_corner_of_the_lasso_path_meets_the_optimality_conditions():
     rng = np.random.default_rng(0)
-    X = rng.normal(size=(80, 12)) @ rng.normal(size=(12, 12))  # correlated: coefficients leave again on the way
+    X = rng.normal(size=(80, 12)) @ rng.normal(
+        size=(12, 12)
+    )  # correlated: coefficients leave again on the way
     X /= np.sqrt(np.mean(X**2, axis=0))
     y = X[:, [1, 4]] @ [2.0, -1.0] + 0.5 * rng.normal(size=80)
     prices, path = lasso_path(X, y)
@@ -105,7 +127,9 @@ def test_every_corner_of_the_lasso_path_meets_the_optimality_conditions():
 
 
 def test_lasso_keeps_what_is_there_and_drops_what_is_not():
-    """Order 1 and degree 1, looked for among order 3 and degree 3; one true coefficient is 190 times smaller than another."""
+    """Order 1 and degree 1, looked for among order 3 and degree 3; one true coefficient is 190
+    times smaller than another.
+    """
     truth = Truth(structure(na=1, nb=1, basis=idn.Polynomial(1, 0.0, 13.0)), seed=4)
     rich = structure(na=3, nb=3, basis=idn.Polynomial(3, 0.0, 13.0))
     p = moving(600)
@@ -116,7 +140,9 @@ def test_lasso_keeps_what_is_there_and_drops_what_is_not():
         true = truth.coefficients
         np.testing.assert_allclose(found.A[0, :2], true.A[0], atol=tolerance)
         np.testing.assert_allclose(found.B[0, :2], true.B[0], atol=tolerance)
-        assert model.details["kept"][0] <= 4  # the true ones; with noise the small one may be missed
+        assert (
+            model.details["kept"][0] <= 4
+        )  # the true ones; with noise the small one may be missed
         assert np.count_nonzero(model.theta) == model.details["kept"][0]
 
 

@@ -11,8 +11,12 @@ from identification.regressors import regression
 from symheli.errors import InputError
 
 STRUCTURES = {
-    "lag": dict(outputs=("a", "b"), inputs=("u",), na=3, nb=2, delay=1, offset=True, offset_rate=True),
-    "now": dict(outputs=("a", "b"), inputs=("u",), na=3, nb=1, delay=2, offset=True, scheduling_at="now"),
+    "lag": dict(
+        outputs=("a", "b"), inputs=("u",), na=3, nb=2, delay=1, offset=True, offset_rate=True
+    ),
+    "now": dict(
+        outputs=("a", "b"), inputs=("u",), na=3, nb=1, delay=2, offset=True, scheduling_at="now"
+    ),
 }
 
 
@@ -27,7 +31,9 @@ def test_one_step_prediction_is_the_regressor_times_the_coefficients(name):
     model, record = fitted(name)
     data = regression(model.structure, record)
     # rounding only: the same sums in another order
-    np.testing.assert_allclose(model.predict(record, horizon=1)[data.rows], data.phi @ model.theta, atol=1e-12)
+    np.testing.assert_allclose(
+        model.predict(record, horizon=1)[data.rows], data.phi @ model.theta, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", STRUCTURES)
@@ -46,7 +52,9 @@ def test_prediction_is_a_free_run_started_horizon_samples_before(name, horizon):
 def test_longer_horizons_reach_the_free_run():
     model, record = fitted("lag")
     last = len(record) - model.structure.memory
-    np.testing.assert_allclose(model.predict(record, horizon=last)[-1], model.simulate(record)[-1], atol=1e-11)
+    np.testing.assert_allclose(
+        model.predict(record, horizon=last)[-1], model.simulate(record)[-1], atol=1e-11
+    )
 
 
 def test_nothing_is_predicted_across_a_gap_or_a_missing_sample():
@@ -58,7 +66,8 @@ def test_nothing_is_predicted_across_a_gap_or_a_missing_sample():
     ahead, free = model.predict(holed, horizon=4), model.simulate(holed)
     assert np.isnan(ahead[100 : 100 + 3 + 3]).all()
     assert np.isfinite(ahead[106:150]).all()
-    # the input at 150 enters y(151) and y(152) directly, predictions of up to 4 steps start behind it
+    # the input at 150 enters y(151) and y(152) directly, predictions of up to 4 steps start behind
+    # it
     assert np.isnan(ahead[151:156]).all()
     assert np.isfinite(ahead[156:]).all()
     assert np.isnan(free[100:103]).all()
@@ -70,7 +79,9 @@ def test_a_missing_output_does_not_stop_a_free_run():
     model, record = fitted("now")
     values = record.values.copy()
     values[50:60, 0] = np.nan
-    np.testing.assert_array_equal(model.simulate(type(record)(record.time, values, record.signals)), model.simulate(record))
+    np.testing.assert_array_equal(
+        model.simulate(type(record)(record.time, values, record.signals)), model.simulate(record)
+    )
 
 
 def test_divergence_is_flagged_as_infinite_without_warnings():
@@ -78,7 +89,9 @@ def test_divergence_is_flagged_as_infinite_without_warnings():
     p, u = moving(3000), np.random.default_rng(0).normal(size=(3000, 1))
     stable = flown(arx, [lambda q: np.array([[-0.5]])], [lambda q: np.array([[1.0]])], p, u)
     model = idn.fit(arx, stable)
-    explosive = type(model)(arx, 4.0 * model.theta, model.dt, model.outputs, model.inputs, model.scheduling, [[1.0]], 1)
+    explosive = type(model)(
+        arx, 4.0 * model.theta, model.dt, model.outputs, model.inputs, model.scheduling, [[1.0]], 1
+    )
     free = explosive.simulate(stable)
     assert np.isnan(free[0])
     assert np.isinf(free[-1])

@@ -1,4 +1,6 @@
-"""One kernel for every processor of a kind: compiled once a level of vector instructions, the same bits from each."""
+"""One kernel for every processor of a kind: compiled once a level of vector instructions, the same
+bits from each.
+"""
 
 import platform
 import re
@@ -13,20 +15,26 @@ import identification as idn
 from identification import kernel
 from identification.online import Online
 
-compiled_only = pytest.mark.skipif(not kernel.compiled_kernels("double"), reason="no compiled kernel is installed")
+compiled_only = pytest.mark.skipif(
+    not kernel.compiled_kernels("double"), reason="no compiled kernel is installed"
+)
 
 
 @compiled_only
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("name", STRUCTURES)
 def test_every_level_gives_the_same_bits(name, precision):
-    """No contraction and sums in a fixed order: there is nothing to differ by, so no tolerance either."""
+    """No contraction and sums in a fixed order: there is nothing to differ by, so no tolerance
+    either.
+    """
     rows = awkward(STRUCTURES[name])
     for way in WAYS:
         rls = idn.RecursiveLeastSquares(STRUCTURES[name], way, precision=precision)
         memories = {}
         for level, module in kernel.compiled_kernels(precision).items():
-            online = Online(rls.configuration, module.Kernel(*rls.configuration.arguments), rls.init())
+            online = Online(
+                rls.configuration, module.Kernel(*rls.configuration.arguments), rls.init()
+            )
             online.run(rows, history=False)
             memories[level] = online.state.memory
         for memory in memories.values():
@@ -54,11 +62,22 @@ def test_the_fastest_level_is_taken_and_the_baseline_is_always_there():
 
 
 @compiled_only
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64") or not shutil.which("objdump"), reason="wants objdump on an x86-64")
+@pytest.mark.skipif(
+    platform.machine() not in ("x86_64", "AMD64") or not shutil.which("objdump"),
+    reason="wants objdump on an x86-64",
+)
 @pytest.mark.parametrize("ending", ["double", "single"])
 def test_what_runs_everywhere_holds_no_instruction_of_a_level_above(ending):
     """Registers ymm and zmm, and mnemonics with a leading v, came with AVX."""
-    for module in (kernel.compiled_kernels(ending)["baseline"], kernel.importlib.import_module("identification.kernel._processor")):
-        code = subprocess.run(["objdump", "-d", "--no-show-raw-insn", module.__file__], capture_output=True, text=True, check=True).stdout
+    for module in (
+        kernel.compiled_kernels(ending)["baseline"],
+        kernel.importlib.import_module("identification.kernel._processor"),
+    ):
+        code = subprocess.run(
+            ["objdump", "-d", "--no-show-raw-insn", module.__file__],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
         assert len(code) > 1000
         assert not re.search(r"\t(v[a-z]+\s|.*%[yz]mm)", code)

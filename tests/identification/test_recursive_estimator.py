@@ -12,36 +12,62 @@ from symheli.errors import InputError
 def test_recursive_and_batch_estimates_agree_on_noisy_data():
     truth = Truth(structure(outputs=("a", "b"), inputs=("u", "v"), offset=True))
     record = truth.record(moving(500), noise=0.3)
-    batch, recursive = idn.fit(truth.arx, record, method="ls"), idn.fit(truth.arx, record, method="rls")
+    batch, recursive = (
+        idn.fit(truth.arx, record, method="ls"),
+        idn.fit(truth.arx, record, method="rls"),
+    )
     data = regression(truth.arx, record)
-    # both are backward stable orthogonal methods: they differ by rounding times the condition (below 1e3), not by its square
-    np.testing.assert_allclose(data.phi @ recursive.theta, data.phi @ batch.theta, rtol=0, atol=1e-10 * np.abs(data.y).max())
+    # both are backward stable orthogonal methods: they differ by rounding times the condition
+    # (below 1e3), not by its square
+    np.testing.assert_allclose(
+        data.phi @ recursive.theta,
+        data.phi @ batch.theta,
+        rtol=0,
+        atol=1e-10 * np.abs(data.y).max(),
+    )
     residual = data.phi.T @ (data.y - data.phi @ recursive.theta)
     assert np.abs(residual).max() < 1e-10 * np.abs(data.phi.T @ data.y).max()
     np.testing.assert_allclose(recursive.residual_covariance, batch.residual_covariance, rtol=1e-9)
 
 
-@pytest.mark.parametrize("over", [dict(), dict(outputs=("a", "b"), inputs=("u", "v"), na={"a": 3, "b": 1}, offset=True, delay=0)])
-@pytest.mark.parametrize("basis", [idn.Polynomial(5, 0.0, 13.0), idn.BSpline(3, (0.0, 4.0, 9.0, 13.0))])
+@pytest.mark.parametrize(
+    "over",
+    [
+        dict(),
+        dict(outputs=("a", "b"), inputs=("u", "v"), na={"a": 3, "b": 1}, offset=True, delay=0),
+    ],
+)
+@pytest.mark.parametrize(
+    "basis", [idn.Polynomial(5, 0.0, 13.0), idn.BSpline(3, (0.0, 4.0, 9.0, 13.0))]
+)
 def test_recursive_coefficients_differ_from_batch_by_rounding_times_condition(basis, over):
     truth = Truth(structure(basis=basis, **over))
     record = truth.record(moving(900), noise=0.3, noise_seed=50)
     batch, recursive = (idn.fit(truth.arx, record, method=m) for m in ("ls", "rls"))
     data = regression(truth.arx, record)
     size = np.abs(data.y).max()
-    np.testing.assert_allclose(data.phi @ recursive.theta, data.phi @ batch.theta, rtol=0, atol=1e-10 * size)
+    np.testing.assert_allclose(
+        data.phi @ recursive.theta, data.phi @ batch.theta, rtol=0, atol=1e-10 * size
+    )
     left = np.where(truth.arx.free, data.phi.T @ (data.y - data.phi @ recursive.theta), 0.0)
     assert np.abs(left).max() < 1e-10 * np.abs(data.phi.T @ data.y).max()
     scale = np.linalg.norm(data.phi, axis=0)[:, None]
-    relative = np.linalg.norm((recursive.theta - batch.theta) * scale) / np.linalg.norm(batch.theta * scale)
+    relative = np.linalg.norm((recursive.theta - batch.theta) * scale) / np.linalg.norm(
+        batch.theta * scale
+    )
     condition = batch.excitation.condition
     multiple = relative / (np.finfo(float).eps * condition)
-    print(f"coefficients differ by {relative:.2e} = {multiple:.2f} x eps x condition ({condition:.3g})")
+    print(
+        f"coefficients differ by {relative:.2e} = {multiple:.2f} x eps x condition"
+        f" ({condition:.3g})"
+    )
     assert multiple < 20  # measured 0.3 to 1.8
 
 
 def slow_and_cold():
-    """Degree 5 on 0-13 m/s, p through its range once in 3000 samples and nothing known before; noise 0.1, output 2.8 (rms)."""
+    """Degree 5 on 0-13 m/s, p through its range once in 3000 samples and nothing known before;
+    noise 0.1, output 2.8 (rms).
+    """
     truth = Truth(structure(basis=idn.Polynomial(5, 0.0, 13.0)))
     p = 6.5 - 6.4 * np.cos(2 * np.pi * np.arange(3000) / 3000)
     return truth, truth.record(p, noise=0.1, noise_seed=50)
@@ -56,8 +82,11 @@ def test_degree_five_with_forgetting_and_slow_airspeed_predicts_as_weighted_batc
     weights = np.sqrt(0.99 ** np.arange(len(data.phi))[::-1])[:, None]
     batch = np.linalg.lstsq(weights * data.phi, weights * data.y, rcond=None)[0]
     window = slice(-300, None)  # older samples have no weight left to agree about
-    np.testing.assert_allclose(data.phi[window] @ history.state.solve(), data.phi[window] @ batch, rtol=0, atol=1e-8)
-    # 100 samples of a slow p fix the model where p is, not elsewhere: single coefficients reach 7e6, predictions stay at the noise
+    np.testing.assert_allclose(
+        data.phi[window] @ history.state.solve(), data.phi[window] @ batch, rtol=0, atol=1e-8
+    )
+    # 100 samples of a slow p fix the model where p is, not elsewhere: single coefficients reach
+    # 7e6, predictions stay at the noise
     assert np.sqrt(np.mean(history.innovations[200:] ** 2)) < 0.15
 
 
@@ -69,7 +98,9 @@ def test_the_default_floor_does_no_harm_on_a_slow_cold_start():
 
 def test_coefficients_along_the_gain_equal_those_of_the_factor():
     truth = Truth(structure())
-    history = idn.RecursiveLeastSquares(truth.arx, forgetting=0.995).run(truth.record(moving(700), noise=0.1))
+    history = idn.RecursiveLeastSquares(truth.arx, forgetting=0.995).run(
+        truth.record(moving(700), noise=0.1)
+    )
     # the gain accumulates 700 roundings, each damped by later data
     np.testing.assert_allclose(history.state.theta, history.state.solve(), rtol=0, atol=1e-9)
     np.testing.assert_array_equal(history.coefficients[-1], history.state.theta)
@@ -118,14 +149,20 @@ def test_a_missing_sample_teaches_nothing_and_empties_the_lags():
 
 @pytest.mark.parametrize("forgetting", [0.9, 0.99])
 def test_slow_scheduling_and_a_long_silence_wind_nothing_up(forgetting):
-    """Constant forgetting without a floor reaches coefficients of 1e35 in other packages once excitation stops."""
+    """Constant forgetting without a floor reaches coefficients of 1e35 in other packages once
+    excitation stops.
+    """
     truth = Truth(structure())
     n, silence = 400, 4000
     p = np.concatenate([moving(n), np.full(silence, 6.0)])
     record = truth.record(p, noise=0.01)
     values = record.values.copy()
-    values[n:, :2] = 1e-3 * np.random.default_rng(0).normal(size=(silence, 2))  # noise only, far below what excited the filter
-    history = idn.RecursiveLeastSquares(truth.arx, forgetting=forgetting).run(type(record)(record.time, values, record.signals))
+    values[n:, :2] = 1e-3 * np.random.default_rng(0).normal(
+        size=(silence, 2)
+    )  # noise only, far below what excited the filter
+    history = idn.RecursiveLeastSquares(truth.arx, forgetting=forgetting).run(
+        type(record)(record.time, values, record.signals)
+    )
     state, size = history.state, np.abs(truth.theta).max()
     assert np.isfinite(history.coefficients).all()
     assert np.abs(history.coefficients[n:]).max() < 10 * size
@@ -134,7 +171,8 @@ def test_slow_scheduling_and_a_long_silence_wind_nothing_up(forgetting):
     assert diagonal.min() > 1e-3 * np.sqrt(1e-3) * state.peak.min()
     rich = truth.record(moving(300), seed=5)
     again = idn.RecursiveLeastSquares(truth.arx, forgetting=forgetting).run(rich, state)
-    # the filter still learns: 300 excited samples leave less than forgetting ** 300 of the silence, and of 1/floor
+    # the filter still learns: 300 excited samples leave less than forgetting ** 300 of the silence,
+    # and of 1/floor
     np.testing.assert_allclose(again.state.theta, truth.theta, atol=0.05 * size)
 
 

@@ -14,13 +14,23 @@ from symheli.errors import InputError, SymheliError
 OWN = idn.UserFunctions((np.ones_like, np.cos), 0.0, 13.0, ("1", "cos p"))
 CASES = {
     "one output": dict(),
-    "orders by signal": dict(outputs=("a", "b"), inputs=("u", "v"), na={"a": {"a": 1, "b": 0}, "b": 2}, nb={"u": 1, "v": 2}, offset=True),
-    "b-spline": dict(basis=idn.BSpline(2, (0.0, 5.0, 13.0)), offset=True, offset_rate=True, scheduling_at="now"),
+    "orders by signal": dict(
+        outputs=("a", "b"),
+        inputs=("u", "v"),
+        na={"a": {"a": 1, "b": 0}, "b": 2},
+        nb={"u": 1, "v": 2},
+        offset=True,
+    ),
+    "b-spline": dict(
+        basis=idn.BSpline(2, (0.0, 5.0, 13.0)), offset=True, offset_rate=True, scheduling_at="now"
+    ),
     "spline": dict(basis=idn.Spline((0.0, 3.0, 8.0, 13.0))),
     "hats": dict(basis=idn.PiecewiseLinear((0.0, 8.0, 13.0)), inputs=(), nb=0, offset=True),
     "brought along": dict(basis=OWN),
     "two parameters": dict(
-        scheduling=("p", "q"), basis=idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(1, 0.9, 1.3)), 1), offset_rate=True
+        scheduling=("p", "q"),
+        basis=idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(1, 0.9, 1.3)), 1),
+        offset_rate=True,
     ),
 }
 
@@ -38,10 +48,19 @@ def test_a_model_comes_back_to_the_last_bit(case, tmp_path):
     path = model.save(tmp_path / "folder" / "model.json")
     back = idn.LPVARXModel.load(path, basis=OWN if case == "brought along" else None)
     assert back.structure == model.structure
-    assert (back.outputs, back.inputs, back.parameters) == (model.outputs, model.inputs, model.parameters)
+    assert (back.outputs, back.inputs, back.parameters) == (
+        model.outputs,
+        model.inputs,
+        model.parameters,
+    )
     for name in ("theta", "residual_covariance"):
         np.testing.assert_array_equal(getattr(back, name), getattr(model, name))
-    assert (back.dt, back.method, back.rows_used, back.rows_dropped) == (model.dt, model.method, model.rows_used, model.rows_dropped)
+    assert (back.dt, back.method, back.rows_used, back.rows_dropped) == (
+        model.dt,
+        model.method,
+        model.rows_used,
+        model.rows_dropped,
+    )
     np.testing.assert_array_equal(back.simulate(record), model.simulate(record))
 
 
@@ -52,7 +71,9 @@ def test_units_details_and_covariance_travel_along(tmp_path):
     back = idn.LPVARXModel.load(carried.save(tmp_path / "b.json"))
     np.testing.assert_array_equal(back.covariance, carried.covariance)
     assert back.details == model.details
-    in_knots = type(record).from_arrays(record.time, {"y": "deg", "u": "1", "p": "kt"}, y=record["y"], u=record["u"], p=record["p"])
+    in_knots = type(record).from_arrays(
+        record.time, {"y": "deg", "u": "1", "p": "kt"}, y=record["y"], u=record["u"], p=record["p"]
+    )
     with_units = idn.fit(structure(basis=idn.Polynomial(1, 0.0, 7.0)), in_knots)
     back = idn.LPVARXModel.load(with_units.save(tmp_path / "c.json"))
     assert (back.outputs[0].unit, back.parameters[0].unit) == ("rad", "m/s")
@@ -71,14 +92,18 @@ def test_damaged_foreign_and_newer_files_are_refused_in_words(tmp_path):
     refused(whole[: len(whole) // 2], "not a whole file.*take an older copy")
     content = json.loads(whole)
     refused(json.dumps({**content, "dt": 0.2}), "does not match its digest")
-    refused(json.dumps({**content, "version": 99}), "version 99 of the format, this program reads 1")
+    refused(
+        json.dumps({**content, "version": 99}), "version 99 of the format, this program reads 1"
+    )
     refused(json.dumps({"theta": [1.0]}), "expected a file of 'symheli LPV-ARX model', got None")
     refused("[1, 2]", "got 'list'")
     refused(whole, "belongs to another basis", basis=idn.Polynomial(1, 0.0, 13.0))
     with pytest.raises(InputError, match="No such file"):
         idn.LPVARXModel.load(tmp_path / "nothing.json")
     own, _ = fitted("brought along")
-    with pytest.raises(InputError, match="the functions 1, cos p are not in the file; give the basis"):
+    with pytest.raises(
+        InputError, match="the functions 1, cos p are not in the file; give the basis"
+    ):
         idn.LPVARXModel.load(own.save(tmp_path / "own.json"))
 
 
@@ -106,8 +131,12 @@ def test_the_matlab_file_predicts_what_the_model_predicts(tmp_path):
     def at(M, lag):
         return M @ np.power(p[k - lag], file["powers"])
 
-    expected = -sum(at(file["A"][:, :, :, i - 1], i) @ y[k - i] for i in file["output_lags"]) + at(file["c"], 1)
-    expected = expected + sum(at(file["B"][:, :, :, j], lag) @ u[k - lag] for j, lag in enumerate(file["input_lags"]))
+    expected = -sum(at(file["A"][:, :, :, i - 1], i) @ y[k - i] for i in file["output_lags"]) + at(
+        file["c"], 1
+    )
+    expected = expected + sum(
+        at(file["B"][:, :, :, j], lag) @ u[k - lag] for j, lag in enumerate(file["input_lags"])
+    )
     np.testing.assert_allclose(model.predict(record, 1)[k], expected, atol=1e-11)
 
 

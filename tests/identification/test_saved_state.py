@@ -40,10 +40,19 @@ def saved(tmp_path):
     ("other", "words"),
     [
         (idn.RecursiveLeastSquares(structure(na=3), 0.99), "structure, na is 2, expected 3"),
-        (idn.RecursiveLeastSquares(structure(basis=idn.Polynomial(2, 0.0, 14.0)), 0.99), "basis is Polynomial"),
-        (idn.RecursiveLeastSquares(structure(offset=True), 0.99), "offset is the default, expected True"),
+        (
+            idn.RecursiveLeastSquares(structure(basis=idn.Polynomial(2, 0.0, 14.0)), 0.99),
+            "basis is Polynomial",
+        ),
+        (
+            idn.RecursiveLeastSquares(structure(offset=True), 0.99),
+            "offset is the default, expected True",
+        ),
         (idn.RecursiveLeastSquares(structure(), 0.98), "forgetting is Constant"),
-        (idn.RecursiveLeastSquares(structure(), 0.99, precision="single"), "precision is float64, expected float32"),
+        (
+            idn.RecursiveLeastSquares(structure(), 0.99, precision="single"),
+            "precision is float64, expected float32",
+        ),
     ],
 )
 def test_a_state_of_another_estimator_is_refused(saved, other, words):
@@ -60,7 +69,10 @@ def test_damaged_files_are_refused(saved):
         ("[]", "not a file of"),
         (json.dumps({**content, "schema": "x"}), "expected a file of"),
         (json.dumps({**content, "version": 99}), "version 99"),
-        (json.dumps({**content, "memory": [*content["memory"][:-1], "0x1.8p+1"]}), "do not match their digest"),
+        (
+            json.dumps({**content, "memory": [*content["memory"][:-1], "0x1.8p+1"]}),
+            "do not match their digest",
+        ),
         (json.dumps({**content, "memory": None}), "do not match their digest"),
     ):
         path.write_text(broken)

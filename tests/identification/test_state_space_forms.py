@@ -9,13 +9,22 @@ from symheli.errors import InputError
 from symheli.lpv import Spline, simulate
 
 CASES = {
-    "shifted, three lags": ("shifted", dict(outputs=("a", "b"), inputs=("u", "v"), na=3, nb=1, delay=2)),
+    "shifted, three lags": (
+        "shifted",
+        dict(outputs=("a", "b"), inputs=("u", "v"), na=3, nb=1, delay=2),
+    ),
     "shifted, order one": ("shifted", dict(outputs=("a", "b"), inputs=("u",), na=1, nb=1, delay=1)),
     "shifted, inputs reach further": ("shifted", dict(na=1, nb=3, delay=1)),
-    "shifted, feedthrough": ("shifted", dict(outputs=("a", "b"), inputs=("u", "v"), na=2, nb=2, delay=0)),
+    "shifted, feedthrough": (
+        "shifted",
+        dict(outputs=("a", "b"), inputs=("u", "v"), na=2, nb=2, delay=0),
+    ),
     "shifted, spline": ("shifted", dict(basis=Spline((0.0, 3.0, 8.0, 13.0)))),
     "shifted, inputs only": ("shifted", dict(na=0, nb=2, delay=0)),
-    "direct, three lags": ("direct", dict(outputs=("a", "b"), inputs=("u", "v"), na=3, nb=1, delay=2, scheduling_at="now")),
+    "direct, three lags": (
+        "direct",
+        dict(outputs=("a", "b"), inputs=("u", "v"), na=3, nb=1, delay=2, scheduling_at="now"),
+    ),
     "direct, feedthrough": ("direct", dict(na=2, nb=3, delay=0, scheduling_at="now")),
     "direct, static": ("direct", dict(na=0, nb=1, delay=0, scheduling_at="now")),
 }
@@ -32,16 +41,22 @@ def test_realization_responds_as_the_difference_equation_however_p_moves(case):
     p, u, m = record["p"], record.columns(truth.arx.inputs), truth.arx.memory
     x0 = _state_at(lpv, record, m, p, u) if lpv.states else np.zeros(0)
     _, y = simulate(lpv, p[m:], u[m:], x0)
-    # 1e-10: rounding through a stable recursion of 200 steps and, with feedthrough, an exact interpolation at 5 nodes
+    # 1e-10: rounding through a stable recursion of 200 steps and, with feedthrough, an exact
+    # interpolation at 5 nodes
     np.testing.assert_allclose(y, free[m:], atol=1e-10)
 
 
 def _state_at(lpv, record, m, p, u):
-    """The state at sample m that explains the measured past: found by running the realization from an unknown state at 0."""
+    """The state at sample m that explains the measured past: found by running the realization from
+    an unknown state at 0.
+    """
     measured = record.columns(lpv.outputs)
     if lpv.states[0].endswith("_lag1") or any("_lag" in s for s in lpv.states):
-        return np.array([record[s.rsplit("_lag", 1)[0]][m - int(s.rsplit("_lag", 1)[1])] for s in lpv.states])
-    # observer form x(k+1) = F x(k) + G u(k) + correction: with y measured, x_i(k+1) = x_{i+1}(k) - A_i y + B_i u, all but x_1 shift out
+        return np.array(
+            [record[s.rsplit("_lag", 1)[0]][m - int(s.rsplit("_lag", 1)[1])] for s in lpv.states]
+        )
+    # observer form x(k+1) = F x(k) + G u(k) + correction: with y measured, x_i(k+1) = x_{i+1}(k) -
+    # A_i y + B_i u, all but x_1 shift out
     ny, order = len(lpv.outputs), len(lpv.states) // len(lpv.outputs)
     x = np.zeros(len(lpv.states))
     for k in range(m):
@@ -54,7 +69,9 @@ def _state_at(lpv, record, m, p, u):
 @pytest.mark.parametrize("at", ["lag", "now"])
 @pytest.mark.parametrize("delay", [0, 1])
 def test_the_frozen_model_has_the_frequency_response_of_the_frozen_coefficients(at, delay):
-    truth = Truth(structure(outputs=("a", "b"), inputs=("u",), na=2, nb=2, delay=delay, scheduling_at=at))
+    truth = Truth(
+        structure(outputs=("a", "b"), inputs=("u",), na=2, nb=2, delay=delay, scheduling_at=at)
+    )
     model = idn.fit(truth.arx, truth.record(moving(200)))
     omega = np.array([0.3, 4.0, 20.0])
     z, values = np.exp(1j * omega * model.dt), truth.coefficients.at(4.0)

@@ -1,4 +1,6 @@
-"""Orders and delays by signal, groups of equations, several scheduling parameters: what a structure says about itself."""
+"""Orders and delays by signal, groups of equations, several scheduling parameters: what a structure
+says about itself.
+"""
 
 import numpy as np
 import pytest
@@ -13,7 +15,12 @@ BOX = idn.Product((idn.Polynomial(1, 0.0, 13.0), idn.Polynomial(2, 0.9, 1.3)))
 
 def test_the_same_orders_written_three_ways_are_the_same_structure():
     by_output = structure(**TWO, na={"a": 2, "b": 2}, nb={"u": 1, "v": 3}, delay={"u": 0, "v": 1})
-    nested = structure(**TWO, na=2, nb={"a": {"u": 1, "v": 3}, "b": {"u": 1, "v": 3}}, delay={"a": {"u": 0, "v": 1}, "b": {"u": 0, "v": 1}})
+    nested = structure(
+        **TWO,
+        na=2,
+        nb={"a": {"u": 1, "v": 3}, "b": {"u": 1, "v": 3}},
+        delay={"a": {"u": 0, "v": 1}, "b": {"u": 0, "v": 1}},
+    )
     rows = structure(**TWO, na=((2, 2), (2, 2)), nb=((1, 3), (1, 3)), delay=((0, 1), (0, 1)))
     assert by_output == nested == rows
     assert by_output.na == 2
@@ -23,14 +30,23 @@ def test_the_same_orders_written_three_ways_are_the_same_structure():
 def test_outputs_with_the_same_regressors_form_one_group():
     arx = structure(outputs=("a", "b", "c"), inputs=("u",), na={"a": 2, "b": 1, "c": 2}, nb=1)
     assert [g.outputs for g in arx.groups] == [(0, 2), (1,)]
-    names = [[arx.regressor_names[i].split(" ")[0] for i in arx.regressors(g)[:: arx.basis.size]] for g in arx.groups]
-    assert names == [["a(k-1)", "b(k-1)", "c(k-1)", "a(k-2)", "b(k-2)", "c(k-2)", "u(k-1)"], ["a(k-1)", "b(k-1)", "c(k-1)", "u(k-1)"]]
+    names = [
+        [arx.regressor_names[i].split(" ")[0] for i in arx.regressors(g)[:: arx.basis.size]]
+        for g in arx.groups
+    ]
+    assert names == [
+        ["a(k-1)", "b(k-1)", "c(k-1)", "a(k-2)", "b(k-2)", "c(k-2)", "u(k-1)"],
+        ["a(k-1)", "b(k-1)", "c(k-1)", "u(k-1)"],
+    ]
     assert len(structure(**TWO).groups) == 1
 
 
 def test_free_coefficients_are_those_of_the_groups():
-    arx = structure(**TWO, na={"a": {"a": 2, "b": 0}, "b": {"a": 1, "b": 3}}, nb={"a": 0, "b": 2}, delay=0)
-    # the equation of a has 2 lags of a; that of b has 1 of a, 3 of b and 2 of each input; 3 functions each
+    arx = structure(
+        **TWO, na={"a": {"a": 2, "b": 0}, "b": {"a": 1, "b": 3}}, nb={"a": 0, "b": 2}, delay=0
+    )
+    # the equation of a has 2 lags of a; that of b has 1 of a, 3 of b and 2 of each input; 3
+    # functions each
     assert arx.free.sum(axis=0).tolist() == [3 * 2, 3 * (1 + 3 + 4)]
     assert arx.memory == 3
 

@@ -1,4 +1,6 @@
-"""At every sample a recursion's coefficients are those of batch least squares on the same weighted rows, whatever p has done so far."""
+"""At every sample a recursion's coefficients are those of batch least squares on the same weighted
+rows, whatever p has done so far.
+"""
 
 import numpy as np
 import pytest
@@ -26,9 +28,20 @@ LOW, HIGH = 0.0, 13.0
 
 @st.composite
 def scheduling(draw, samples):
-    """p (samples,) in [0, 1]: creeping away from rest, stepping, resting, returning, jumping a little or far, or always moving."""
-    k, kind = np.arange(samples), draw(st.sampled_from(["creeping", "stepping", "resting", "returning", "jumping", "moving"]))
-    start, step, at_sample = draw(st.floats(0, 1)), 10.0 ** draw(st.floats(-12, 0)), draw(st.integers(5, samples // 2))
+    """p (samples,) in [0, 1]: creeping away from rest, stepping, resting, returning, jumping a
+    little or far, or always moving.
+    """
+    k, kind = (
+        np.arange(samples),
+        draw(
+            st.sampled_from(["creeping", "stepping", "resting", "returning", "jumping", "moving"])
+        ),
+    )
+    start, step, at_sample = (
+        draw(st.floats(0, 1)),
+        10.0 ** draw(st.floats(-12, 0)),
+        draw(st.integers(5, samples // 2)),
+    )
     match kind:
         case "creeping":
             p = start + step * np.maximum(k - at_sample, 0)
@@ -43,12 +56,16 @@ def scheduling(draw, samples):
             p = start + step * (k >= at_sample)
         case _:
             p = 0.5 + 0.5 * np.sin(draw(st.floats(0.01, 0.5)) * k)
-    return np.where(p < 1e-60, 0.0, np.clip(p, 0.0, 1.0))  # regressors whose squares underflow are not there
+    return np.where(
+        p < 1e-60, 0.0, np.clip(p, 0.0, 1.0)
+    )  # regressors whose squares underflow are not there
 
 
 @st.composite
 def experiments(draw, small=False):
-    """A structure and a record of it: degree or knots, orders, one output or two (with a regressor each or shared), gaps, noise."""
+    """A structure and a record of it: degree or knots, orders, one output or two (with a regressor
+    each or shared), gaps, noise.
+    """
     two = draw(st.booleans()) and not small
     n = draw(st.integers(40, 60 if small else 120))
     knots = (LOW, LOW + 0.3 * (HIGH - LOW), HIGH)
@@ -59,14 +76,22 @@ def experiments(draw, small=False):
     elif draw(st.booleans()):
         basis = idn.BSpline(draw(st.integers(1, 3)), knots)
     else:
-        basis = idn.Product((idn.Polynomial(draw(st.integers(0, 2)), LOW, HIGH), idn.Polynomial(1, LOW, HIGH)), None)
+        basis = idn.Product(
+            (idn.Polynomial(draw(st.integers(0, 2)), LOW, HIGH), idn.Polynomial(1, LOW, HIGH)), None
+        )
     names = ("p",) if basis.dimension == 1 else ("p", "q")
     na = draw(st.integers(1, 2 if small else 4))
     arx = structure(
-        outputs=("a", "b") if two else ("a",), scheduling=names if len(names) > 1 else "p", basis=basis, delay=draw(st.integers(0, 1)),
-        na={"a": na, "b": 1} if two and draw(st.booleans()) else na, nb=draw(st.integers(1, 2)),
-        offset=draw(st.booleans()), offset_rate=draw(st.booleans()), scheduling_at=draw(st.sampled_from(["lag", "now"])),
-    )  # fmt: skip
+        outputs=("a", "b") if two else ("a",),
+        scheduling=names if len(names) > 1 else "p",
+        basis=basis,
+        delay=draw(st.integers(0, 1)),
+        na={"a": na, "b": 1} if two and draw(st.booleans()) else na,
+        nb=draw(st.integers(1, 2)),
+        offset=draw(st.booleans()),
+        offset_rate=draw(st.booleans()),
+        scheduling_at=draw(st.sampled_from(["lag", "now"])),
+    )
     p = np.column_stack([LOW + (HIGH - LOW) * draw(scheduling(n)) for _ in names])
     noise = draw(st.sampled_from([0.0, 1e-6, 0.03, 0.3]))
     seed = draw(st.integers(0, 10**6))
@@ -83,8 +108,12 @@ def compare(arx, data, forgetting, checks):
     rls = idn.RecursiveLeastSquares(arx, forgetting)
     online, size = rls.online(), largest(arx.basis)
     groups = [(arx.regressors(g), list(g.outputs)) for g in arx.groups]
-    problems = [problem(len(columns), len(outputs), forgetting, size) for columns, outputs in groups]
-    when = set(np.linspace(2, len(data.phi) - 2, checks).astype(int)) if len(data.phi) > 4 else set()
+    problems = [
+        problem(len(columns), len(outputs), forgetting, size) for columns, outputs in groups
+    ]
+    when = (
+        set(np.linspace(2, len(data.phi) - 2, checks).astype(int)) if len(data.phi) > 4 else set()
+    )
     for k, (phi, y) in enumerate(zip(data.phi, data.y, strict=True)):
         online.absorb(phi, y)
         state = online.state
@@ -94,17 +123,24 @@ def compare(arx, data, forgetting, checks):
                 at_one_instant(one, state, columns, outputs, data, k)
                 if isinstance(one, Rows):
                     left = state.factors[g][len(columns) :, len(columns) :]
-                    np.testing.assert_allclose(left.T @ left, one.residual, rtol=1e-6, atol=1e-8 * np.sum(data.y**2))
+                    np.testing.assert_allclose(
+                        left.T @ left, one.residual, rtol=1e-6, atol=1e-8 * np.sum(data.y**2)
+                    )
 
 
 def at_one_instant(one, state, columns, outputs, data, k):
-    best, theta, solved = one.theta, state.theta[np.ix_(columns, outputs)], state.solve()[np.ix_(columns, outputs)]
+    best, theta, solved = (
+        one.theta,
+        state.theta[np.ix_(columns, outputs)],
+        state.solve()[np.ix_(columns, outputs)],
+    )
     assert np.isfinite(state.memory).all()
     spread = data.y[:, outputs].std(axis=0)
     rows, root = one.rows
     for found in (theta, solved):
         assert (root[:, None] * np.abs(rows @ (found - best)) <= 1e-8 * spread).all()
-    # the next row, over all directions where all are called determined, else over those that stand well out of what is pretended
+    # the next row, over all directions where all are called determined, else over those that stand
+    # well out of what is pretended
     scale, values, V = one.spectrum
     known = np.ones(len(values), bool) if state.determined else values > 1e-5
     if known.any():
@@ -113,8 +149,9 @@ def at_one_instant(one, state, columns, outputs, data, k):
         y = data.y[: k + 1, outputs]
         residual = np.linalg.norm(root[-len(y) :, None] * (y - rows @ best), axis=0)
         coefficients = np.linalg.norm(scale[:, None] * best, axis=0)
-        # perturbation of least squares (Higham, Accuracy and Stability, theorem 20.1): 100 roundings times the condition, and where the
-        # next row leaves the span of those seen, times its square and the residual
+        # perturbation of least squares (Higham, Accuracy and Stability, theorem 20.1): 100
+        # roundings times the condition, and where the next row leaves the span of those seen, times
+        # its square and the residual
         allowed = 1e-8 * spread + 100 * EPS * np.linalg.norm(data.phi[k + 1][columns] / scale) * (
             condition * coefficients + condition**2 * residual
         )
@@ -155,16 +192,25 @@ def test_batch_and_recursion_call_the_same_records_determined(experiment):
     online = idn.RecursiveLeastSquares(arx).online()
     for phi, y in zip(data.phi, data.y, strict=True):
         online.absorb(phi, y)
-    batch = all(determined_columns(data.phi[:, arx.regressors(g)], arx.basis).all() for g in arx.groups)
+    batch = all(
+        determined_columns(data.phi[:, arx.regressors(g)], arx.basis).all() for g in arx.groups
+    )
     assert online.determined == batch
 
 
 @pytest.mark.parametrize("outputs", [1, 5, 9])
 def test_a_plant_at_rest_that_starts_to_move_leaves_nothing_that_is_no_number(outputs):
-    """Once, rounding that was left of a sample explained whole taught further rows, each 1e-16 of the last, down to where 1/f overflows."""
+    """Once, rounding that was left of a sample explained whole taught further rows, each 1e-16 of
+    the last, down to where 1/f overflows.
+    """
     names, rng = tuple("abcdefghi"[:outputs]), np.random.default_rng(2)
-    arx = structure(outputs=names, inputs=("u", "v"), na=1, nb=1, basis=idn.Polynomial(3, 0.0, 13.0))
-    A, B = 0.5 * np.eye(outputs) + 0.1 * rng.standard_normal((outputs, outputs)) / outputs, 0.02 * rng.standard_normal((outputs, 2))
+    arx = structure(
+        outputs=names, inputs=("u", "v"), na=1, nb=1, basis=idn.Polynomial(3, 0.0, 13.0)
+    )
+    A, B = (
+        0.5 * np.eye(outputs) + 0.1 * rng.standard_normal((outputs, outputs)) / outputs,
+        0.02 * rng.standard_normal((outputs, 2)),
+    )
     y, online = np.zeros(outputs), idn.RecursiveLeastSquares(arx).online()
     for p in rng.uniform(0, 13, 200):
         u = rng.standard_normal(2)
@@ -176,7 +222,9 @@ def test_a_plant_at_rest_that_starts_to_move_leaves_nothing_that_is_no_number(ou
 
 
 def creeping(arx, samples=400, rate=1e-4, noise=0.0):
-    """At rest for a quarter, then away at `rate` m/s a sample: columns become known one after another."""
+    """At rest for a quarter, then away at `rate` m/s a sample: columns become known one after
+    another.
+    """
     p = 3.0 + rate * np.maximum(np.arange(samples) - samples // 4, 0) ** 1.5
     return Truth(arx).record(np.minimum(p, 13.0), noise=noise)
 
@@ -184,20 +232,31 @@ def creeping(arx, samples=400, rate=1e-4, noise=0.0):
 @pytest.mark.parametrize("noise", [0.0, 0.03])
 @pytest.mark.parametrize("degree", [2, 4])
 def test_an_airspeed_that_creeps_away_from_rest_does_not_run_away(degree, noise):
-    """Coefficients once moved along the gain from a point that did not solve the factor: predictions off by 1e24, called determined."""
+    """Coefficients once moved along the gain from a point that did not solve the factor:
+    predictions off by 1e24, called determined.
+    """
     arx = structure(basis=idn.Polynomial(degree, 0.0, 13.0), na=3)
     record = creeping(arx, rate=3e-3, noise=noise)
     batch, recursive = (idn.fit(arx, record, method=method) for method in ("ls", "rls"))
     data = regression(arx, record)
-    np.testing.assert_allclose(data.phi @ recursive.theta, data.phi @ batch.theta, rtol=0, atol=1e-8 * data.y.std())
+    np.testing.assert_allclose(
+        data.phi @ recursive.theta, data.phi @ batch.theta, rtol=0, atol=1e-8 * data.y.std()
+    )
     history = idn.RecursiveLeastSquares(arx).run(record)
     assert history.state.determined
-    np.testing.assert_allclose(data.phi @ history.state.theta, data.phi @ batch.theta, rtol=0, atol=1e-8 * data.y.std())
+    np.testing.assert_allclose(
+        data.phi @ history.state.theta, data.phi @ batch.theta, rtol=0, atol=1e-8 * data.y.std()
+    )
 
 
-@pytest.mark.skipif(kernel.compiled_kernel("double") is None, reason="twenty thousand samples want the compiled kernel")
+@pytest.mark.skipif(
+    kernel.compiled_kernel("double") is None,
+    reason="twenty thousand samples want the compiled kernel",
+)
 def test_rounding_along_the_gain_does_not_add_up():
-    """p hardly moves for 20000 samples: 5e-9 of the output unless the coefficients are solved anew in time, 8e-11 as it is."""
+    """p hardly moves for 20000 samples: 5e-9 of the output unless the coefficients are solved anew
+    in time, 8e-11 as it is.
+    """
     arx = structure(basis=idn.Polynomial(4, 0.0, 13.0), na=3)
     record = Truth(arx).record(3.0 + 1.3e-4 * np.sin(0.2 * np.arange(20000)), noise=0.3)
     state, data = idn.RecursiveLeastSquares(arx).run(record).state, regression(arx, record)
@@ -210,6 +269,8 @@ def test_a_corrupted_estimate_is_not_returned(monkeypatch):
     arx = structure()
     record = creeping(arx, rate=3e-3, noise=0.03)
     least_squares = idn.estimate.least_squares_by_group
-    monkeypatch.setattr(idn.estimate, "least_squares_by_group", lambda *args: least_squares(*args) * (1 + 1e-8))
+    monkeypatch.setattr(
+        idn.estimate, "least_squares_by_group", lambda *args: least_squares(*args) * (1 + 1e-8)
+    )
     with pytest.raises(AccuracyError, match=r"not orthogonal to .*not the least-squares ones"):
         idn.fit(arx, record)

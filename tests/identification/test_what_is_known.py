@@ -1,25 +1,50 @@
-"""After a fit: how certain the coefficients are, what the residuals say, which orders the data support."""
+"""After a fit: how certain the coefficients are, what the residuals say, which orders the data
+support.
+"""
 
 import numpy as np
 import pytest
 from known_systems import Truth, flown, moving, structure
 from scipy.signal import lfilter
 
-from identification import LPVARX, Polynomial, fit, order_scan, residual_analysis, theil, uncertainty
+from identification import (
+    LPVARX,
+    Polynomial,
+    fit,
+    order_scan,
+    residual_analysis,
+    theil,
+    uncertainty,
+)
 from symheli.errors import InputError
 from symheli.lpv import FlightRecord
 
-FIR = LPVARX(outputs=("y",), inputs=("u",), scheduling="p", na=0, nb=1, delay=1, basis=Polynomial(1, 0.0, 13.0))
+FIR = LPVARX(
+    outputs=("y",),
+    inputs=("u",),
+    scheduling="p",
+    na=0,
+    nb=1,
+    delay=1,
+    basis=Polynomial(1, 0.0, 13.0),
+)
 
 
 def fir_record(seed, colour, n=1500):
-    """y = (1 + p/13) u(k-1) + coloured noise, with an input as slow as the noise and p slower than both."""
+    """y = (1 + p/13) u(k-1) + coloured noise, with an input as slow as the noise and p slower than
+    both.
+    """
     rng = np.random.default_rng(seed)
-    p, u = 6.5 + 6 * np.sin(2 * np.pi * np.arange(n) / 500), lfilter([1.0], [1.0, -0.9], rng.standard_normal(n))
+    p, u = (
+        6.5 + 6 * np.sin(2 * np.pi * np.arange(n) / 500),
+        lfilter([1.0], [1.0, -0.9], rng.standard_normal(n)),
+    )
     e = lfilter([1.0], [1.0, -colour], rng.standard_normal(n)) * np.sqrt(1 - colour**2)
     y = 0.3 * e
     y[1:] += (1 + p[:-1] / 13) * u[:-1]
-    return FlightRecord.from_arrays(0.1 * np.arange(n), {"y": "1", "u": "1", "p": "1"}, y=y, u=u, p=p)
+    return FlightRecord.from_arrays(
+        0.1 * np.arange(n), {"y": "1", "u": "1", "p": "1"}, y=y, u=u, p=p
+    )
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.9])
@@ -36,7 +61,9 @@ def test_standard_errors_are_the_scatter_of_repeated_experiments(colour):
     # the scatter of 150 fits is known to 6 %; the taper takes a few percent off
     np.testing.assert_allclose(np.mean(errors, axis=0), scatter, rtol=0.25)
     if colour:
-        assert np.all(np.mean(white, axis=0) < 0.6 * scatter)  # the usual formula is too sure of itself
+        assert np.all(
+            np.mean(white, axis=0) < 0.6 * scatter
+        )  # the usual formula is too sure of itself
 
 
 def test_bands_hold_the_true_coefficient_functions_as_often_as_they_say():
@@ -53,14 +80,26 @@ def test_bands_hold_the_true_coefficient_functions_as_often_as_they_say():
 
 
 def test_an_equation_without_a_coefficient_has_no_band_for_it():
-    arx = LPVARX(("a", "b"), ("u",), "p", na={"a": {"a": 1, "b": 0}, "b": {"a": 1, "b": 1}}, nb=1, delay=1, basis=Polynomial(1, 0.0, 13.0))
+    arx = LPVARX(
+        ("a", "b"),
+        ("u",),
+        "p",
+        na={"a": {"a": 1, "b": 0}, "b": {"a": 1, "b": 1}},
+        nb=1,
+        delay=1,
+        basis=Polynomial(1, 0.0, 13.0),
+    )
     rng = np.random.default_rng(0)
     columns = dict(zip("abu", rng.standard_normal((3, 400)), strict=True)) | {"p": moving(400)}
     record = FlightRecord.from_arrays(0.1 * np.arange(400), dict.fromkeys(columns, "1"), **columns)
     u = uncertainty(fit(arx, record), record)
     assert {(b.output, b.regressor) for b in u.bands([3.0])} == {
-        ("a", "a(k-1)"), ("a", "u(k-1)"), ("b", "a(k-1)"), ("b", "b(k-1)"), ("b", "u(k-1)"),
-    }  # fmt: skip
+        ("a", "a(k-1)"),
+        ("a", "u(k-1)"),
+        ("b", "a(k-1)"),
+        ("b", "b(k-1)"),
+        ("b", "u(k-1)"),
+    }
     assert np.all(np.isfinite(u.colour))
 
 
@@ -94,17 +133,25 @@ def test_static_dependence_fitted_to_a_system_with_dynamic_dependence_leaves_col
     y = np.zeros(2000)
     for k in range(1, 2000):
         y[k] = (0.5 + 0.02 * p[k - 1] + 0.15 * (p[k] - p[k - 1])) * y[k - 1] + u[k - 1]
-    record = FlightRecord.from_arrays(0.1 * np.arange(2000), dict.fromkeys("yup", "1"), y=y, u=u, p=p)
+    record = FlightRecord.from_arrays(
+        0.1 * np.arange(2000), dict.fromkeys("yup", "1"), y=y, u=u, p=p
+    )
     model = fit(arx, record)
     assert model.score(record, horizon=1)["y"] < 90
-    exact = flown(arx, [lambda q: np.array([[-0.5 - 0.02 * q]])], [lambda q: np.array([[1.0]])], p, u[:, None])
+    exact = flown(
+        arx, [lambda q: np.array([[-0.5 - 0.02 * q]])], [lambda q: np.array([[1.0]])], p, u[:, None]
+    )
     assert fit(arx, exact).score(exact, horizon=1)["y"] == pytest.approx(100.0)
 
 
 def test_theils_shares_add_up_and_name_the_cause():
     rng = np.random.default_rng(2)
     y = rng.standard_normal(4000)
-    for guess, cause in ((y + 1.0, "bias"), (0.5 * y, "variance"), (y + 0.3 * rng.standard_normal(4000), "covariance")):
+    for guess, cause in (
+        (y + 1.0, "bias"),
+        (0.5 * y, "variance"),
+        (y + 0.3 * rng.standard_normal(4000), "covariance"),
+    ):
         t = theil(y, guess)
         assert t.bias + t.variance + t.covariance == pytest.approx(1.0)
         assert getattr(t, cause) > 0.9
@@ -116,7 +163,10 @@ def test_theils_shares_add_up_and_name_the_cause():
 def test_an_order_scan_finds_the_order_and_degree_that_made_the_data():
     arx = structure(na=2, nb=2, basis=Polynomial(1, 0.0, 13.0))
     truth = Truth(arx, seed=5, size=1.6)
-    train, test = truth.record(moving(1500), noise=0.1), truth.record(moving(1200)[200:], noise=0.1, seed=7)
+    train, test = (
+        truth.record(moving(1500), noise=0.1),
+        truth.record(moving(1200)[200:], noise=0.1, seed=7),
+    )
     scan = order_scan(arx, train, test, orders=(1, 2, 3), degrees=(0, 1, 2), horizon=5)
     best = scan.best("bic")
     assert (best.na, best.degree) == (2, 1)
@@ -129,7 +179,13 @@ def test_an_order_scan_finds_the_order_and_degree_that_made_the_data():
 def test_structures_the_data_cannot_determine_are_listed_with_the_reason():
     k = np.arange(400)
     arx, u = structure(), np.random.default_rng(0).standard_normal((400, 1))
-    record = flown(arx, [lambda q: np.array([[0.1]])] * 2, [lambda q: np.array([[1.0]])] * 2, 6.5 + 6 * np.sin(np.pi * k / 3), u)
+    record = flown(
+        arx,
+        [lambda q: np.array([[0.1]])] * 2,
+        [lambda q: np.array([[1.0]])] * 2,
+        6.5 + 6 * np.sin(np.pi * k / 3),
+        u,
+    )
     scan = order_scan(arx, record, record, orders=(2,), degrees=(2, 3), horizon=5)
     assert not scan.trials[0].refused
     assert "3 distinct values" in scan.trials[1].refused

@@ -12,7 +12,9 @@ def manoeuvre(heli, airspeed=6.0, n=20, size=0.01, dt=0.02):
     """A trim point as start, and smooth motion of all four inputs about its own (n, 4)."""
     point = symheli.trim(heli, airspeed)
     time = dt * np.arange(n)[:, None]
-    return flight_state(point.x.array), point.u.array + size * np.sin(time * np.array([5.0, 6.0, 7.0, 8.0]) + [0.0, 1.0, 2.0, 3.0])
+    return flight_state(point.x.array), point.u.array + size * np.sin(
+        time * np.array([5.0, 6.0, 7.0, 8.0]) + [0.0, 1.0, 2.0, 3.0]
+    )
 
 
 def without_compiler(monkeypatch, heli):

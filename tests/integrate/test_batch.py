@@ -16,18 +16,29 @@ from symheli.numeric import Numeric
 
 
 def many(heli, count, n=5, seed=0):
-    """Starts (count, nx), inputs (count, n, 4), wind (count, n, 3) and masses (count,) that all differ."""
+    """Starts (count, nx), inputs (count, n, 4), wind (count, n, 3) and masses (count,) that all
+    differ.
+    """
     rng = np.random.default_rng(seed)
     x0, u = manoeuvre(heli, n=n)
     starts = np.tile(x0, (count, 1))
     starts[:, :6] += 0.3 * rng.normal(size=(count, 6))
-    return starts, u + 0.01 * rng.normal(size=(count, n, 4)), rng.normal(size=(count, n, 3)), rng.uniform(7.0, 9.0, count)
+    return (
+        starts,
+        u + 0.01 * rng.normal(size=(count, n, 4)),
+        rng.normal(size=(count, n, 3)),
+        rng.uniform(7.0, 9.0, count),
+    )
 
 
 def feedback(heli, n, seed=0):
     rng = np.random.default_rng(seed)
     x0, _ = manoeuvre(heli, n=1)
-    return Feedback(0.02 * rng.normal(size=(n, 4, len(heli.states))), np.tile(euler_state(x0), (n, 1)), heli.travel)
+    return Feedback(
+        0.02 * rng.normal(size=(n, 4, len(heli.states))),
+        np.tile(euler_state(x0), (n, 1)),
+        heli.travel,
+    )
 
 
 def test_each_flight_is_the_single_flight_to_the_bit(heli):
@@ -35,13 +46,17 @@ def test_each_flight_is_the_single_flight_to_the_bit(heli):
     batch = simulate_batch(heli, x0, u, wind, dt=0.02, parameters={"body.mass": mass}, keep=1)
     assert batch.states.shape == (37, 6, len(heli.flight_states))
     for i in (0, 15, 16, 36):
-        alone = simulate(heli.with_parameters({"body.mass": mass[i]}), x0[i], u[i], wind[i], dt=0.02)
+        alone = simulate(
+            heli.with_parameters({"body.mass": mass[i]}), x0[i], u[i], wind[i], dt=0.02
+        )
         np.testing.assert_array_equal(batch.states[i], alone.states)
 
 
 def test_workers_and_neighbours_change_no_bit(ideal):
     x0, u, wind, _ = many(ideal, 200)
-    one, two, seven = (simulate_batch(ideal, x0, u, wind, dt=0.02, workers=w).final for w in (1, 2, 7))
+    one, two, seven = (
+        simulate_batch(ideal, x0, u, wind, dt=0.02, workers=w).final for w in (1, 2, 7)
+    )
     np.testing.assert_array_equal(one, two)
     np.testing.assert_array_equal(one, seven)
     turned = simulate_batch(ideal, x0[::-1], u[::-1], wind[::-1], dt=0.02).final
@@ -50,7 +65,12 @@ def test_workers_and_neighbours_change_no_bit(ideal):
 
 def test_numpy_gives_the_bits_of_machine_code(heli, monkeypatch):
     x0, u, wind, mass = many(heli, 20, n=3)
-    options = {"dt": 0.02, "parameters": {"body.mass": mass, "density": 1.1}, "feedback": feedback(heli, 3), "keep": 1}
+    options = {
+        "dt": 0.02,
+        "parameters": {"body.mass": mass, "density": 1.1},
+        "feedback": feedback(heli, 3),
+        "keep": 1,
+    }
     compiled = simulate_batch(heli, x0, u, wind, **options)
     plain = simulate_batch(without_compiler(monkeypatch, heli), x0, u, wind, **options)
     np.testing.assert_array_equal(plain.states, compiled.states)
@@ -60,10 +80,18 @@ def test_numpy_gives_the_bits_of_machine_code(heli, monkeypatch):
 def test_shared_histories_are_the_same_as_repeated_ones(ideal):
     x0, u, wind, _ = many(ideal, 6)
     shared = simulate_batch(ideal, x0, u[0], wind[0], dt=0.02).final
-    np.testing.assert_array_equal(shared, simulate_batch(ideal, x0, np.tile(u[0], (6, 1, 1)), np.tile(wind[0], (6, 1, 1)), dt=0.02).final)
+    np.testing.assert_array_equal(
+        shared,
+        simulate_batch(
+            ideal, x0, np.tile(u[0], (6, 1, 1)), np.tile(wind[0], (6, 1, 1)), dt=0.02
+        ).final,
+    )
     steady = simulate_batch(ideal, x0[0], u, np.array([1.0, 2.0, 0.0]), dt=0.02).final
     np.testing.assert_array_equal(
-        steady, simulate_batch(ideal, np.tile(x0[0], (6, 1)), u, np.tile([1.0, 2.0, 0.0], (6, 1, 1)), dt=0.02).final
+        steady,
+        simulate_batch(
+            ideal, np.tile(x0[0], (6, 1)), u, np.tile([1.0, 2.0, 0.0], (6, 1, 1)), dt=0.02
+        ).final,
     )
 
 
@@ -85,7 +113,11 @@ def test_feedback_is_that_of_a_loop_over_samples(heli):
     batch = simulate_batch(heli, x0, u, wind, dt=0.02, feedback=loop, keep=1)
     step, x = Numeric(runge_kutta(heli, 0.02, 4)), x0[1]
     for k in range(8):
-        command = np.clip(u[1, k] - loop.gains[k] @ (euler_state(x) - loop.reference[k]), -heli.travel, heli.travel)
+        command = np.clip(
+            u[1, k] - loop.gains[k] @ (euler_state(x) - loop.reference[k]),
+            -heli.travel,
+            heli.travel,
+        )
         np.testing.assert_allclose(batch.inputs[1, k], command, atol=1e-12)
         x = step(x, command, wind[1, k])[0]
     np.testing.assert_allclose(batch.final[1], x, atol=1e-11)
@@ -111,13 +143,18 @@ def test_ctrl_c_ends_a_long_batch_at_once(ideal):
     begin = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         simulate_batch(ideal, x0, long, dt=0.02)
-    assert time.perf_counter() - begin < 5.0  # a sample takes microseconds; the rest is what a busy machine may add
+    assert (
+        time.perf_counter() - begin < 5.0
+    )  # a sample takes microseconds; the rest is what a busy machine may add
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"x0": np.zeros((4, 10)), "u": np.zeros((5, 3, 4))}, r"must say one number of flights N, got \[4, 5\]"),
+        (
+            {"x0": np.zeros((4, 10)), "u": np.zeros((5, 3, 4))},
+            r"must say one number of flights N, got \[4, 5\]",
+        ),
         ({"x0": np.zeros(10), "u": np.zeros((3, 4))}, "must say one number of flights N, got none"),
         ({"parameters": {"body.mass": np.ones(3)}}, "must say one number of flights"),
         ({"parameters": {"body.mass": [1.0, np.nan, 1.0, 1.0]}}, "body.mass: entry"),
@@ -133,4 +170,10 @@ def test_ctrl_c_ends_a_long_batch_at_once(ideal):
 def test_what_does_not_fit_is_refused_with_a_reason(ideal, change, message):
     arguments = {"x0": np.zeros((4, 10)), "u": np.zeros((4, 3, 4)), "dt": 0.02} | change
     with pytest.raises(InputError, match=message):
-        simulate_batch(ideal, arguments.pop("x0"), arguments.pop("u"), arguments.pop("wind", (0, 0, 0)), **arguments)
+        simulate_batch(
+            ideal,
+            arguments.pop("x0"),
+            arguments.pop("u"),
+            arguments.pop("wind", (0, 0, 0)),
+            **arguments,
+        )

@@ -1,4 +1,6 @@
-"""Programs: the same bits from NumPy, CasADi's virtual machine and C, whatever lies side by side."""
+"""Programs: the same bits from NumPy, CasADi's virtual machine and C, whatever lies side by
+side.
+"""
 
 import ctypes
 
@@ -31,22 +33,30 @@ def test_a_program_is_its_casadi_function_to_rounding(heli):
     x, u, wind = points(heli, 2000)
     ours = np.array(evaluate(program(heli.flight_rhs), x, u, wind)[0])
     theirs = np.array(heli.flight_rhs.map(2000)(x, u, wind))
-    # quotients by constants are products by reciprocals: a few units of 1e-16 in each of a few hundred operations
+    # quotients by constants are products by reciprocals: a few units of 1e-16 in each of a few
+    # hundred operations
     np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-11)
 
 
 def test_the_virtual_machine_gives_the_bits_of_numpy(heli):
     x, u, wind = points(heli, 500)
     made = program(heli.flight_rhs)
-    np.testing.assert_array_equal(np.array(as_casadi(made).map(500)(x, u, wind)), np.array(evaluate(made, x, u, wind)[0]))
+    np.testing.assert_array_equal(
+        np.array(as_casadi(made).map(500)(x, u, wind)), np.array(evaluate(made, x, u, wind)[0])
+    )
 
 
 @needs_compiler
 @pytest.mark.parametrize("layout", [Layout(), Layout(8), Layout(8, 2)])
 def test_machine_code_gives_the_bits_of_numpy_in_every_layout(ideal, layout):
     made, lanes = program(ideal.flight_rhs), layout.lanes
-    call = "void call(const lane *x, const lane *u, const lane *wind, lane *xdot) { rhs(x, u, wind, xdot); }\n"
-    code = ctypes.CDLL(str(library(layout.prelude + c_function(made, layout, "rhs") + call, f"test-{lanes}")))
+    call = (
+        "void call(const lane *x, const lane *u, const lane *wind, lane *xdot) { rhs(x, u, wind,"
+        " xdot); }\n"
+    )
+    code = ctypes.CDLL(
+        str(library(layout.prelude + c_function(made, layout, "rhs") + call, f"test-{lanes}"))
+    )
     everywhere = points(ideal, 640)
     expected = np.array(evaluate(made, *everywhere)[0])
     for first in range(0, 640, lanes):
@@ -57,7 +67,9 @@ def test_machine_code_gives_the_bits_of_numpy_in_every_layout(ideal, layout):
 
 
 def test_a_side_holds_what_it_alone_needs(ideal):
-    """Every user of an operation on a side is on that side, or is the selection itself: nothing is used that was not computed."""
+    """Every user of an operation on a side is on that side, or is the selection itself: nothing is
+    used that was not computed.
+    """
     made = program(ideal.flight_rhs)
     homes = branches(made)
 
@@ -72,7 +84,9 @@ def test_a_side_holds_what_it_alone_needs(ideal):
             assert inside(user, homes[a]) or made.operations[a].name == "constant"
     assert all(homes[a] is None for output in made.outputs for a in output)
     roots = [homes[k] for k, o in enumerate(made.operations) if o.name == "sqrt"]
-    assert sum(home is not None for home in roots) >= 4  # two Halley steps of each rotor that are rarely taken
+    assert (
+        sum(home is not None for home in roots) >= 4
+    )  # two Halley steps of each rotor that are rarely taken
 
 
 def test_held_work_done_once_changes_no_bit(heli):
@@ -80,7 +94,9 @@ def test_held_work_done_once_changes_no_bit(heli):
     made = program(heli.flight_rhs)
     held, rest = made.split([0])
     kept = evaluate(held, u, wind)[0]
-    np.testing.assert_array_equal(np.array(evaluate(rest, x, kept)[0]), np.array(evaluate(made, x, u, wind)[0]))
+    np.testing.assert_array_equal(
+        np.array(evaluate(rest, x, kept)[0]), np.array(evaluate(made, x, u, wind)[0])
+    )
     assert len(rest.operations) < len(made.operations)
 
 
@@ -112,7 +128,9 @@ def test_a_function_of_the_mathematical_library_is_refused():
 
 
 def test_the_right_hand_side_stays_cheap(ideal):
-    """Roots and quotients set the pace of machine code: 18 and 46 of them once, in 1060 operations."""
+    """Roots and quotients set the pace of machine code: 18 and 46 of them once, in 1060
+    operations.
+    """
     names = [o.name for o in program(ideal.flight_rhs).operations]
     assert names.count("sqrt") <= 12
     assert names.count("div") <= 12

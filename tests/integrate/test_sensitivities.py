@@ -1,4 +1,6 @@
-"""Derivatives of flights: forward against adjoint, against differences of flights, against the matrix exponential."""
+"""Derivatives of flights: forward against adjoint, against differences of flights, against the
+matrix exponential.
+"""
 
 import numpy as np
 import pytest
@@ -11,10 +13,14 @@ from symheli.attitude import euler_state, flight_state
 from symheli.integrate import DormandPrince, Radau, RungeKutta4, gradient, tangent
 
 METHODS = [RungeKutta4(), DormandPrince(1e3, largest=0.01), Radau()]
-"""The adaptive one with equal steps: derivatives are those at the steps taken, and differences must not change them."""
+"""The adaptive one with equal steps: derivatives are those at the steps taken, and differences must
+not change them.
+"""
 
 
-@pytest.fixture(params=["ideal", pytest.param("pi", marks=pytest.mark.slow)])  # each governor's derivatives take seconds to compile
+@pytest.fixture(
+    params=["ideal", pytest.param("pi", marks=pytest.mark.slow)]
+)  # each governor's derivatives take seconds to compile
 def either(request):
     return request.getfixturevalue(request.param)
 
@@ -23,19 +29,33 @@ def case(heli, method, m=3, n=6):
     rng = np.random.default_rng(1)
     x0, u = manoeuvre(heli, n=n)
     flown = simulate(heli, x0, u, rng.normal(size=(n, 3)), dt=0.02, method=method)
-    directions = rng.normal(size=(len(x0), m)), 0.1 * rng.normal(size=(n, 4, m)), rng.normal(size=(n, 3, m))
+    directions = (
+        rng.normal(size=(len(x0), m)),
+        0.1 * rng.normal(size=(n, 4, m)),
+        rng.normal(size=(n, 3, m)),
+    )
     return flown, directions, rng.normal(size=(*flown.states.shape, 2))
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_adjoint_and_tangent_agree_to_rounding(either, method):
-    """<weights, tangent(d)> = <gradient(weights), d>: two routes through two separately differentiated programs."""
+    """<weights, tangent(d)> = <gradient(weights), d>: two routes through two separately
+    differentiated programs.
+    """
     flown, (dx0, du, dwind), weights = case(either, method)
     change, bar = tangent(either, flown, dx0, du, dwind), gradient(either, flown, weights)
     forward = np.einsum("knm,knj->mj", change, weights)
-    backward = np.einsum("nm,nj->mj", dx0, bar.x0) + np.einsum("knm,knj->mj", du, bar.u) + np.einsum("knm,knj->mj", dwind, bar.wind)
-    tolerance = 1e-9 if isinstance(method, Radau) else 1e-13  # the implicit solutions are good to 1e-12; else sums of 1e3 rounded terms
-    np.testing.assert_allclose(forward, backward, rtol=tolerance, atol=tolerance * np.abs(forward).max())
+    backward = (
+        np.einsum("nm,nj->mj", dx0, bar.x0)
+        + np.einsum("knm,knj->mj", du, bar.u)
+        + np.einsum("knm,knj->mj", dwind, bar.wind)
+    )
+    tolerance = (
+        1e-9 if isinstance(method, Radau) else 1e-13
+    )  # the implicit solutions are good to 1e-12; else sums of 1e3 rounded terms
+    np.testing.assert_allclose(
+        forward, backward, rtol=tolerance, atol=tolerance * np.abs(forward).max()
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -50,7 +70,7 @@ def test_tangents_are_the_limit_of_differences_of_flights(either, method):
         x0[6:10] /= np.linalg.norm(x0[6:10])
         return simulate(
             either, x0, flown.inputs + step * du, flown.wind + step * dwind, dt=0.02, method=method
-        ).states  # fmt: skip
+        ).states
 
     def central(step):
         return (states(step) - states(-step)) / (2 * step)
@@ -63,19 +83,41 @@ def test_tangents_are_the_limit_of_differences_of_flights(either, method):
 def test_about_a_trim_point_the_transition_matrix_is_the_matrix_exponential(either):
     point, n, dt = symheli.trim(either, 6.0), 25, 0.02
     model = symheli.linearize(either, point)
-    flown = simulate(either, point, np.tile(point.u.array, (n, 1)), dt=dt, method=RungeKutta4(0.001))
+    flown = simulate(
+        either, point, np.tile(point.u.array, (n, 1)), dt=dt, method=RungeKutta4(0.001)
+    )
     h = 1e-6  # of the Euler angles: differences of closed forms, exact to 1e-10
     basis = np.eye(len(either.states))
-    start = np.stack([(flight_state(point.x.array + h * e) - flight_state(point.x.array - h * e)) / (2 * h) for e in basis], axis=1)
+    start = np.stack(
+        [
+            (flight_state(point.x.array + h * e) - flight_state(point.x.array - h * e)) / (2 * h)
+            for e in basis
+        ],
+        axis=1,
+    )
     end, du = tangent(either, flown, start)[-1], np.zeros((n, 4, 4))
     du[:] = np.eye(4)
 
     def in_euler_form(change):
-        return np.stack([(euler_state(flown.final + h * d) - euler_state(flown.final - h * d)) / (2 * h) for d in change.T], axis=1)
+        return np.stack(
+            [
+                (euler_state(flown.final + h * d) - euler_state(flown.final - h * d)) / (2 * h)
+                for d in change.T
+            ],
+            axis=1,
+        )
 
-    block = expm(np.block([[model.A, model.B], [np.zeros((4, len(basis) + 4))]]) * n * dt)[: len(basis)]
-    np.testing.assert_allclose(in_euler_form(end), block[:, : len(basis)], atol=2e-8 * np.abs(block).max())
-    np.testing.assert_allclose(in_euler_form(tangent(either, flown, du=du)[-1]), block[:, len(basis) :], atol=2e-8 * np.abs(block).max())
+    block = expm(np.block([[model.A, model.B], [np.zeros((4, len(basis) + 4))]]) * n * dt)[
+        : len(basis)
+    ]
+    np.testing.assert_allclose(
+        in_euler_form(end), block[:, : len(basis)], atol=2e-8 * np.abs(block).max()
+    )
+    np.testing.assert_allclose(
+        in_euler_form(tangent(either, flown, du=du)[-1]),
+        block[:, len(basis) :],
+        atol=2e-8 * np.abs(block).max(),
+    )
 
 
 def test_without_a_compiler_derivatives_agree(either, monkeypatch):
@@ -83,7 +125,9 @@ def test_without_a_compiler_derivatives_agree(either, monkeypatch):
     change, bar = tangent(either, flown, *directions), gradient(either, flown, weights)
     plain = without_compiler(monkeypatch, either)
     np.testing.assert_allclose(tangent(plain, flown, *directions), change, rtol=1e-12, atol=1e-12)
-    for ours, theirs in zip(vars(gradient(plain, flown, weights)).values(), vars(bar).values(), strict=True):
+    for ours, theirs in zip(
+        vars(gradient(plain, flown, weights)).values(), vars(bar).values(), strict=True
+    ):
         np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-11)
 
 
@@ -91,7 +135,9 @@ def test_a_change_along_the_quaternion_vanishes(ideal):
     x0, u = manoeuvre(ideal, n=3)
     flown = simulate(ideal, x0, u, dt=0.02)
     change = tangent(ideal, flown, du=np.random.default_rng(0).normal(size=(3, 4)))
-    np.testing.assert_allclose(np.einsum("ki,ki->k", flown.states[:, 6:10], change[:, 6:10]), 0.0, atol=1e-15)
+    np.testing.assert_allclose(
+        np.einsum("ki,ki->k", flown.states[:, 6:10], change[:, 6:10]), 0.0, atol=1e-15
+    )
 
 
 def test_one_functional_and_many_are_the_same(ideal):

@@ -17,7 +17,10 @@ from symheli.numeric import Numeric
     ("methods", "order"),
     [
         ([RungeKutta4(0.02 / k) for k in (1, 2, 4)], 4),
-        ([DormandPrince(relative=1e3, largest=0.02 / k) for k in (1, 2, 4)], 5),  # any error is tolerated: equal steps
+        (
+            [DormandPrince(relative=1e3, largest=0.02 / k) for k in (1, 2, 4)],
+            5,
+        ),  # any error is tolerated: equal steps
         ([Radau(0.04 / k, stages=2) for k in (1, 2, 4)], 3),
         ([Radau(0.04 / k, stages=3) for k in (1, 2, 4)], 5),
     ],
@@ -26,9 +29,13 @@ def test_the_error_falls_with_the_order_of_the_method(ideal, methods, order):
     x0, u = manoeuvre(ideal, n=2)  # 6 m/s: no wake edge nearby, the equations are smooth there
     x0[:6] += 0.1
     exact = simulate(ideal, x0, u, dt=0.32, method=DormandPrince(1e-13, 1e-13)).final
-    errors = [np.abs(simulate(ideal, x0, u, dt=0.32, method=m).final - exact).max() for m in methods]
+    errors = [
+        np.abs(simulate(ideal, x0, u, dt=0.32, method=m).final - exact).max() for m in methods
+    ]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all(np.abs(orders[-1] - order) < 0.5), orders  # the next term of the error is still a tenth of the first
+    assert np.all(np.abs(orders[-1] - order) < 0.5), (
+        orders
+    )  # the next term of the error is still a tenth of the first
 
 
 def test_three_methods_fly_the_same_flight(heli):
@@ -48,19 +55,26 @@ def test_the_fixed_step_is_that_of_the_closed_loop_flights(heli):
     step, x = Numeric(runge_kutta(heli, 0.02, 4)), x0
     for row in u:
         x = step(x, row, np.array([1.0, -1.0, 0.2]))[0]
-    np.testing.assert_allclose(simulate(heli, x0, u, (1.0, -1.0, 0.2), dt=0.02).final, x, atol=1e-11)  # two programs, rounded apart
+    np.testing.assert_allclose(
+        simulate(heli, x0, u, (1.0, -1.0, 0.2), dt=0.02).final, x, atol=1e-11
+    )  # two programs, rounded apart
 
 
 def test_a_tighter_tolerance_means_a_smaller_error(ideal):
     x0, u = manoeuvre(ideal, n=10)
     exact = simulate(ideal, x0, u, dt=0.1, method=DormandPrince(1e-13, 1e-13)).final
-    errors = [np.abs(simulate(ideal, x0, u, dt=0.1, method=DormandPrince(t, t)).final - exact).max() for t in (1e-5, 1e-7, 1e-9)]
+    errors = [
+        np.abs(simulate(ideal, x0, u, dt=0.1, method=DormandPrince(t, t)).final - exact).max()
+        for t in (1e-5, 1e-7, 1e-9)
+    ]
     assert errors[0] < 1e-3
     assert all(after < before / 10 for before, after in pairwise(errors))
 
 
 def test_flapping_too_fast_for_explicit_steps_is_flown_by_the_implicit_method(ideal):
-    """A light bar follows the swash plate in a tenth of a millisecond: nothing else changes, 5 ms steps of order 4 explode."""
+    """A light bar follows the swash plate in a tenth of a millisecond: nothing else changes, 5 ms
+    steps of order 4 explode.
+    """
     x0, u = manoeuvre(ideal, n=10)
     stiff = ideal.with_parameters({"main_rotor.bar_lock_number": 800.0})
     with pytest.raises(SymheliError, match="left the range of numbers"):
@@ -78,7 +92,9 @@ def test_without_a_compiler_every_bit_is_the_same(heli, monkeypatch):
     for method in ("rk4", "dopri"):
         compiled = simulate(changed, x0, u, (1.0, 0.0, 0.5), dt=0.02, method=method)
         with monkeypatch.context() as patch:
-            plain = simulate(without_compiler(patch, changed), x0, u, (1.0, 0.0, 0.5), dt=0.02, method=method)
+            plain = simulate(
+                without_compiler(patch, changed), x0, u, (1.0, 0.0, 0.5), dt=0.02, method=method
+            )
         np.testing.assert_array_equal(plain.states, compiled.states)
         np.testing.assert_array_equal(plain.steps, compiled.steps)
 
@@ -87,7 +103,9 @@ def test_a_trimmed_flight_goes_straight_on(heli):
     point = symheli.trim(heli, 5.0)
     flown = simulate(heli, point, np.tile(point.u.array, (50, 1)), dt=0.02)
     # the residual of the trim, 1e-9, grows with the unstable modes for one second
-    np.testing.assert_allclose(euler_state(flown.states), np.tile(point.x.array, (51, 1)), atol=1e-7)
+    np.testing.assert_allclose(
+        euler_state(flown.states), np.tile(point.x.array, (51, 1)), atol=1e-7
+    )
     np.testing.assert_allclose(flown["x_n"], 5.0 * flown.times, atol=1e-6)
     record = flown.to_record()
     assert record["d_col"][0] == point.u["d_col"]
@@ -97,7 +115,9 @@ def test_a_trimmed_flight_goes_straight_on(heli):
 def test_another_airframe_of_the_same_parts_needs_no_new_code(ideal, monkeypatch):
     x0, u = manoeuvre(ideal, n=10)
     simulate(ideal, x0, u, dt=0.02)
-    monkeypatch.setattr("symheli.integrate.equations.library", lambda source, name: pytest.fail("compiled anew"))
+    monkeypatch.setattr(
+        "symheli.integrate.equations.library", lambda source, name: pytest.fail("compiled anew")
+    )
     thin = simulate(ideal.with_parameters({"density": 1.0}), x0, u, dt=0.02)
     monkeypatch.undo()
     loaded = symheli.Helicopter.load("xcell60", governor="ideal", density=1.0)
@@ -112,8 +132,12 @@ def test_attitude_forms_are_inverse():
     flight = flight_state(x, heading=2.0, position=(1.0, 2.0, 3.0))
     np.testing.assert_allclose(euler_state(flight), x, atol=1e-14)
     angles = np.column_stack([np.full(20, 2.0), x[:, 7], x[:, 6]])
-    np.testing.assert_allclose(flight[:, 6:10], Rotation.from_euler("ZYX", angles).as_quat(canonical=True, scalar_first=True) *
-                               np.sign(flight[:, 6:7]), atol=1e-14)  # fmt: skip
+    np.testing.assert_allclose(
+        flight[:, 6:10],
+        Rotation.from_euler("ZYX", angles).as_quat(canonical=True, scalar_first=True)
+        * np.sign(flight[:, 6:7]),
+        atol=1e-14,
+    )
 
 
 @pytest.mark.parametrize(
@@ -128,20 +152,39 @@ def test_attitude_forms_are_inverse():
         ({"x0": np.zeros(9)}, "expected 15 states in quaternion form or 10 in Euler form"),
         ({"dt": 0.0}, "dt must be a positive"),
         ({"method": "euler"}, "unknown method 'euler'"),
-        ({"feedback": Feedback(np.zeros((3, 4, 9)), np.zeros((3, 9)), np.ones(4))}, r"expected gains \(3, 4, 10\)"),
-        ({"feedback": Feedback(np.zeros((3, 4, 10)), np.zeros((3, 10)), np.ones(4)), "method": "dopri"}, 'flown by "rk4" only'),
+        (
+            {"feedback": Feedback(np.zeros((3, 4, 9)), np.zeros((3, 9)), np.ones(4))},
+            r"expected gains \(3, 4, 10\)",
+        ),
+        (
+            {
+                "feedback": Feedback(np.zeros((3, 4, 10)), np.zeros((3, 10)), np.ones(4)),
+                "method": "dopri",
+            },
+            'flown by "rk4" only',
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused_with_a_reason(ideal, change, message):
     arguments = {"x0": flight_state(np.zeros(10)), "u": np.zeros((3, 4)), "dt": 0.02} | change
     with pytest.raises(InputError, match=message):
-        simulate(ideal, arguments.pop("x0"), arguments.pop("u"), arguments.pop("wind", (0, 0, 0)), **arguments)
+        simulate(
+            ideal,
+            arguments.pop("x0"),
+            arguments.pop("u"),
+            arguments.pop("wind", (0, 0, 0)),
+            **arguments,
+        )
 
 
 def test_a_flight_that_cannot_be_continued_says_where(ideal):
     x0, u = manoeuvre(ideal, n=3)
     with pytest.raises(SymheliError, match="steps became too small or too many"):
         simulate(ideal, x0, u, dt=1.0, method=DormandPrince(1e-12, 1e-12, most=20))
-    for bad in (lambda: RungeKutta4(0.0), lambda: DormandPrince(relative=-1.0), lambda: Radau(stages=0)):
+    for bad in (
+        lambda: RungeKutta4(0.0),
+        lambda: DormandPrince(relative=-1.0),
+        lambda: Radau(stages=0),
+    ):
         with pytest.raises(InputError, match="must be"):
             bad()

@@ -15,7 +15,10 @@ from symheli.logs.xplane import body_velocity
 from symheli.lpv import FlightRecord
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
-HEADER = "   Vtrue,_ktas |   ____Q,rad/s |   pitch,__deg |   _roll,__deg |   hding,_true |   ___vX,__m/s |   ___vY,__m/s |   ___vZ,__m/s | "
+HEADER = (
+    "   Vtrue,_ktas |   ____Q,rad/s |   pitch,__deg |   _roll,__deg |   hding,_true |   ___vX,__m/s"
+    " |   ___vY,__m/s |   ___vZ,__m/s | "
+)
 
 
 def real(name):
@@ -36,7 +39,7 @@ def row(*values):
     return " | ".join(f"{v:12.5f}" for v in values) + " | "
 
 
-# --- X-Plane ---------------------------------------------------------------------------------------------------------------
+# --- X-Plane -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "lengths"), [("Forward.txt", [4, 935]), ("Data.txt", [602])])
@@ -44,7 +47,9 @@ def test_a_real_xplane_log_splits_at_its_headers_and_comes_out_in_si(name, lengt
     path = real(f"xplane/{name}")
     record = FlightRecord.from_xplane(path, dt=0.1)
     assert [s.stop - s.start for s in record.segments()] == lengths
-    assert {"u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "airspeed", "stick_lon"} <= set(record.signals)
+    assert {"u", "v", "w", "p", "q", "r", "phi", "theta", "psi", "airspeed", "stick_lon"} <= set(
+        record.signals
+    )
     # attitudes in rad and speeds in m/s of a flying helicopter
     assert np.abs(record["theta"]).max() < 1.6
     assert 10 < record["airspeed"].max() < 40
@@ -56,7 +61,9 @@ def test_pitch_rate_and_pitch_of_a_real_log_agree_on_the_sample_period():
     record = FlightRecord.from_xplane(real("xplane/Forward.txt"), dt=0.1)
     inside = record.segments()[1]
     slope = np.polyfit(record.derivative("theta")[inside], record["q"][inside], 1)[0]
-    assert slope == pytest.approx(1.0, abs=0.05)  # wings level on this flight; the step jitters by 10 % about 0.1 s
+    assert slope == pytest.approx(
+        1.0, abs=0.05
+    )  # wings level on this flight; the step jitters by 10 % about 0.1 s
 
 
 def test_body_velocity_is_the_published_rotation():
@@ -78,7 +85,15 @@ def test_nose_east_and_flying_east_is_forward_speed_in_metres_per_second(tmp_pat
 def test_sessions_with_other_columns_keep_their_own_and_the_cut_row_goes(tmp_path):
     other = "   ____Q,rad/s |   thro1,_part |   thro1,_part | "
     path = write(
-        tmp_path, HEADER, *[row(10, 0.1, 0, 0, 90, 5, 0, 0)] * 4, "", HEADER, "", other, *[row(0.2, 0.5, 0.6)] * 5, row(0.2, 0.5)[:-3]
+        tmp_path,
+        HEADER,
+        *[row(10, 0.1, 0, 0, 90, 5, 0, 0)] * 4,
+        "",
+        HEADER,
+        "",
+        other,
+        *[row(0.2, 0.5, 0.6)] * 5,
+        row(0.2, 0.5)[:-3],
     )
     record = FlightRecord.from_xplane(path, dt=0.1)
     assert [s.stop - s.start for s in record.segments()] == [4, 5]
@@ -93,7 +108,9 @@ def test_the_clock_of_a_log_is_used_where_it_has_one_and_degrees_a_second_are_co
     header = "   _totl,_time |   ____Q,deg/s | "
     path = write(tmp_path, header, *[row(t, 180.0) for t in (7.0, 7.1, 7.2, 7.2, 7.3)])
     record = FlightRecord.from_xplane(path)
-    np.testing.assert_allclose(record.time, [0, 0.1, 0.2, 0.3], atol=1e-9)  # the repeated instant is dropped
+    np.testing.assert_allclose(
+        record.time, [0, 0.1, 0.2, 0.3], atol=1e-9
+    )  # the repeated instant is dropped
     np.testing.assert_allclose(record["q"], np.pi)
 
 
@@ -106,7 +123,10 @@ def test_the_clock_of_a_log_is_used_where_it_has_one_and_degrees_a_second_are_co
         (row(1, 2).encode(), "not an X-Plane log"),
         (HEADER.encode(), "no whole row"),
         ((HEADER + "\n" + row(1, 2) + "\n" + row(*range(8))).encode(), "line 2: expected 8 fields"),
-        ((HEADER + "\n" + row(*range(8)).replace("3.0", "x.0")).encode(), "line 2: expected numbers"),
+        (
+            (HEADER + "\n" + row(*range(8)).replace("3.0", "x.0")).encode(),
+            "line 2: expected numbers",
+        ),
     ],
 )
 def test_a_spoilt_xplane_log_says_what_is_wrong(tmp_path, content, message):
@@ -116,7 +136,7 @@ def test_a_spoilt_xplane_log_says_what_is_wrong(tmp_path, content, message):
         FlightRecord.from_xplane(path, dt=0.1)
 
 
-# --- CSV -------------------------------------------------------------------------------------------------------------------
+# --- CSV -----------------------------------------------------------------------------------------
 
 
 def test_csv_columns_come_in_their_units_and_empty_cells_are_missing(tmp_path):
@@ -128,7 +148,9 @@ def test_csv_columns_come_in_their_units_and_empty_cells_are_missing(tmp_path):
 
 def test_the_real_trex_flight_is_read_without_a_time_column():
     path = real("trex550/trex550_flight_clean.csv")
-    record = FlightRecord.from_csv(path, time=None, units={"q_radps": "rad/s", "theta_rad": "rad", "u_mps": "m/s"}, dt=0.0084)
+    record = FlightRecord.from_csv(
+        path, time=None, units={"q_radps": "rad/s", "theta_rad": "rad", "u_mps": "m/s"}, dt=0.0084
+    )
     assert len(record) == 13622
     assert record.dt == pytest.approx(0.0084)
     assert np.isfinite(record.values).all()
@@ -142,7 +164,15 @@ SAME = {
     "tabs": ["t\tq\tnote", "0\t1.5\ta", "0.1\t\tb", "0.2\t-2e-1\tc"],
     "tabs, decimal commas": ["t\tq\tnote", "0\t1,5\ta", "0,1\tNaN\tb", "0,2\t-0,2\tc"],
     "blanks": ["  t   q  note", "  0  1.5  a", "0.1  nan b", "0.2 -0.2 c"],
-    "comments": ["# logger 3.1, serial 7", "", "t,q,note", "# armed", "0,1.5,a", "0.1,null,b", "0.2,-0.2,c"],
+    "comments": [
+        "# logger 3.1, serial 7",
+        "",
+        "t,q,note",
+        "# armed",
+        "0,1.5,a",
+        "0.1,null,b",
+        "0.2,-0.2,c",
+    ],
     "header in a comment": ["# logger 3.1", "# t q", "0 1.5", "0.1 nan", "0.2 -0.2"],
     "separator behind the last": ["t;q;", "0;1.5;", "0.1;;", "0.2;-0.2;"],
     "quotes": ['"t","q","note, by hand"', '0,1.5,"a, b"', "0.1,,b", "0.2,-2e-1,c"],
@@ -162,18 +192,34 @@ def test_a_table_is_read_however_it_is_written_and_without_pandas(tmp_path, monk
 
 
 @pytest.mark.parametrize("numbers", [[0.0, -1.5, 3e-12], [1e300, -2.5e-300, 123456.789]])
-@pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", ".")])
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", ".")]
+)
 def test_what_pandas_writes_is_read_to_the_last_bit(tmp_path, numbers, separator, decimal):
     frame = pd.DataFrame({"t": [0.0, 0.1, 0.2], "q": numbers})
     frame.to_csv(tmp_path / "log.csv", sep=separator, decimal=decimal, index=False)
-    np.testing.assert_array_equal(FlightRecord.from_csv(tmp_path / "log.csv", "t", {"q": "1"})["q"], numbers)
+    np.testing.assert_array_equal(
+        FlightRecord.from_csv(tmp_path / "log.csv", "t", {"q": "1"})["q"], numbers
+    )
 
 
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (["t,q", "0,02,1,5", "0,04,1,6"], "row 1 has 4 cells, the header 2 names .*a comma cannot be both separator and decimal sign"),
-        (["t;q", "0;1,5", "0.1;2"], "column 't', row 2: expected a number, got '0.1'; the decimal sign is a comma elsewhere"),
+        (
+            ["t,q", "0,02,1,5", "0,04,1,6"],
+            (
+                "row 1 has 4 cells, the header 2 names .*a comma cannot be both separator and"
+                " decimal sign"
+            ),
+        ),
+        (
+            ["t;q", "0;1,5", "0.1;2"],
+            (
+                "column 't', row 2: expected a number, got '0.1'; the decimal sign is a comma"
+                " elsewhere"
+            ),
+        ),
         (["0.0,1", "0.1,2"], "the first line holds numbers"),
         (["# only", "# words"], "nothing but comments"),
         (["t,q", "0,1_000"], "got '1_000'"),
@@ -181,7 +227,9 @@ def test_what_pandas_writes_is_read_to_the_last_bit(tmp_path, numbers, separator
 )
 def test_a_table_that_can_be_read_in_two_ways_is_not_guessed_at(tmp_path, lines, message):
     with pytest.raises(InputError, match=message):
-        FlightRecord.from_csv(write(tmp_path, *lines, name="log.csv"), time="t", units={"q": "rad/s"})
+        FlightRecord.from_csv(
+            write(tmp_path, *lines, name="log.csv"), time="t", units={"q": "rad/s"}
+        )
 
 
 @pytest.mark.parametrize("unit", ["ms", "us", "ns"])
@@ -192,7 +240,9 @@ def test_a_clock_that_counts_in_another_unit_is_read_by_its_name_in_every_format
     for record in (
         FlightRecord.from_csv(tmp_path / "log.csv", "t", {"q": "1"}, time_unit=unit),
         FlightRecord.from_mat(tmp_path / "log.mat", "t", {"q": "1"}, time_unit=unit),
-        FlightRecord.from_frame(pd.DataFrame({"t": ticks, "q": 1.0}), "t", {"q": "1"}, time_unit=unit),
+        FlightRecord.from_frame(
+            pd.DataFrame({"t": ticks, "q": 1.0}), "t", {"q": "1"}, time_unit=unit
+        ),
     ):
         assert record.dt == 0.02
     with pytest.warns(DataWarning, match="s apart; if the time is in"):
@@ -222,13 +272,22 @@ def test_a_spoilt_csv_says_what_is_wrong(tmp_path, lines, options, message):
 
 def test_a_frame_of_dates_or_words_is_refused_in_words():
     """Dates as numbers are nano- or microseconds, by the version of pandas."""
-    frame = pd.DataFrame({"t": [0.0, 0.1, 0.2], "when": pd.date_range("2024-05-01", periods=3, freq="100ms"), "s": list("abc"), "q": 1.0})
+    frame = pd.DataFrame(
+        {
+            "t": [0.0, 0.1, 0.2],
+            "when": pd.date_range("2024-05-01", periods=3, freq="100ms"),
+            "s": list("abc"),
+            "q": 1.0,
+        }
+    )
     with pytest.raises(InputError, match="'when' holds dates; give numbers"):
         FlightRecord.from_frame(frame, "when", {"q": "rad/s"})
     with pytest.raises(InputError, match="column 's': expected numbers"):
         FlightRecord.from_frame(frame, "t", {"s": "1"})
     seconds = frame.assign(t=(frame["when"] - frame["when"].iloc[0]).dt.total_seconds())
-    np.testing.assert_allclose(FlightRecord.from_frame(seconds, "t", {"q": "rad/s"}).time, [0.0, 0.1, 0.2], atol=1e-12)
+    np.testing.assert_allclose(
+        FlightRecord.from_frame(seconds, "t", {"q": "rad/s"}).time, [0.0, 0.1, 0.2], atol=1e-12
+    )
 
 
 def test_a_missing_file_is_an_input_error(tmp_path):
@@ -236,7 +295,7 @@ def test_a_missing_file_is_an_input_error(tmp_path):
         FlightRecord.from_csv(tmp_path / "nowhere.csv", time="t", units={"q": "rad/s"})
 
 
-# --- MATLAB and ULog -------------------------------------------------------------------------------------------------------
+# --- MATLAB and ULog -----------------------------------------------------------------------------
 
 
 def test_mat_vectors_of_either_orientation_and_inside_structs(tmp_path):
@@ -261,13 +320,17 @@ def test_a_spoilt_mat_file_says_what_is_wrong(tmp_path):
 
 
 def test_ulog_topics_of_different_rates_meet_on_one_grid(tmp_path, monkeypatch):
-    slow = np.delete(np.arange(0, 3_000_000, 100_000), slice(12, 20)) + 40_000  # us; silent from 1.14 to 2.04 s
+    slow = (
+        np.delete(np.arange(0, 3_000_000, 100_000), slice(12, 20)) + 40_000
+    )  # us; silent from 1.14 to 2.04 s
 
     class FakeULog:
         def __init__(self, path):
             fast = np.arange(0, 3_000_000, 4_000)
             self.data_list = [
-                types.SimpleNamespace(name="rates", data={"timestamp": fast, "xyz[1]": 1e-6 * fast}),
+                types.SimpleNamespace(
+                    name="rates", data={"timestamp": fast, "xyz[1]": 1e-6 * fast}
+                ),
                 types.SimpleNamespace(name="air", data={"timestamp": slow, "speed": 2e-6 * slow}),
             ]
 
@@ -289,4 +352,6 @@ def test_ulog_topics_of_different_rates_meet_on_one_grid(tmp_path, monkeypatch):
 def test_without_pyulog_the_message_names_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyulog", None)
     with pytest.raises(InputError, match=r"symheli\[logs\]"):
-        FlightRecord.from_ulog(write(tmp_path, "x", name="log.ulg"), {"q": ("rates", "xyz[1]", "rad/s")}, dt=0.02)
+        FlightRecord.from_ulog(
+            write(tmp_path, "x", name="log.ulg"), {"q": ("rates", "xyz[1]", "rad/s")}, dt=0.02
+        )

@@ -34,14 +34,18 @@ def test_signals_come_in_si_by_the_names_of_the_map(tmp_path):
 def test_dt_resamples_and_a_table_without_time_takes_it_as_its_step(tmp_path):
     log, _ = files(tmp_path)
     for head, n in (('time = "stamp"\ntime_unit = "ms"\ndt = 0.1\n', 10), ("dt = 0.1\n", 50)):
-        (tmp_path / "m.toml").write_text(head + '[signals]\nq = { column = "gyro y", unit = "deg/s" }\n')
+        (tmp_path / "m.toml").write_text(
+            head + '[signals]\nq = { column = "gyro y", unit = "deg/s" }\n'
+        )
         record = FlightRecord.from_map(log, tmp_path / "m.toml")
         assert (len(record), record.dt) == (n, pytest.approx(0.1))
 
 
 def test_matlab_structs_are_reached_into(tmp_path):
     savemat(tmp_path / "flight.mat", {"log": {"t": np.arange(5.0), "th": np.arange(5.0)}})
-    (tmp_path / "m.toml").write_text('time = "log.t"\n[signals]\ntheta = { column = "log.th", unit = "deg" }\n')
+    (tmp_path / "m.toml").write_text(
+        'time = "log.t"\n[signals]\ntheta = { column = "log.th", unit = "deg" }\n'
+    )
     record = FlightRecord.from_map(tmp_path / "flight.mat", tmp_path / "m.toml")
     np.testing.assert_allclose(record["theta"], np.radians(np.arange(5.0)))
 
@@ -57,7 +61,11 @@ def test_matlab_structs_are_reached_into(tmp_path):
         ("time = 'stamp'\n", InputError, r"a \[signals\] table is needed"),
         ("= 3", InputError, "not valid TOML"),
         ('dt = -1\n[signals]\nq = { column = "a" }\n', InputError, "dt must be a positive"),
-        ('time = "stamp"\n[signals]\nq = { column = "gyro_y", unit = "1" }\n', UnknownNameError, "gyro y"),
+        (
+            'time = "stamp"\n[signals]\nq = { column = "gyro_y", unit = "1" }\n',
+            UnknownNameError,
+            "gyro y",
+        ),
     ],
 )
 def test_a_wrong_map_is_refused_with_the_reason(tmp_path, mapping, error, message):
@@ -71,6 +79,8 @@ def test_a_ulog_needs_a_step_and_topics(tmp_path):
     (tmp_path / "m.toml").write_text('[signals]\nq = { column = "rates", unit = "rad/s" }\n')
     with pytest.raises(InputError, match="give dt"):
         FlightRecord.from_map(tmp_path / "flight.ulg", tmp_path / "m.toml")
-    (tmp_path / "m.toml").write_text('dt = 0.02\n[signals]\nq = { column = "rates", unit = "rad/s" }\n')
+    (tmp_path / "m.toml").write_text(
+        'dt = 0.02\n[signals]\nq = { column = "rates", unit = "rad/s" }\n'
+    )
     with pytest.raises(InputError, match=r"topic\.field"):
         FlightRecord.from_map(tmp_path / "flight.ulg", tmp_path / "m.toml")

@@ -7,11 +7,25 @@ import pytest
 from scipy.interpolate import BPoly, CubicSpline
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Scheduling, Spline, UserFunctions
+from symheli.lpv import (
+    BSpline,
+    PiecewiseLinear,
+    Polynomial,
+    Product,
+    Scheduling,
+    Spline,
+    UserFunctions,
+)
 from symheli.lpv.units import to_si
 
 NODES = (0.0, 1.0, 3.0, 7.0, 13.0)
-BASES = [Polynomial(4, 0.0, 13.0), Spline(NODES), PiecewiseLinear(NODES), BSpline(3, NODES), BSpline(2, NODES)]
+BASES = [
+    Polynomial(4, 0.0, 13.0),
+    Spline(NODES),
+    PiecewiseLinear(NODES),
+    BSpline(3, NODES),
+    BSpline(2, NODES),
+]
 
 
 BOX = Product((Polynomial(2, 0.0, 13.0), Polynomial(3, 0.9, 1.3)))
@@ -25,11 +39,16 @@ def test_polynomials_are_orthonormal_over_the_range():
 
 
 def test_monomial_coefficients_go_back_and_forth():
-    basis, given = Polynomial(3, 2.0, 9.0), np.array([[1.0, -2.0], [0.5, 0.0], [0.0, 3.0], [0.1, 0.2]])
+    basis, given = (
+        Polynomial(3, 2.0, 9.0),
+        np.array([[1.0, -2.0], [0.5, 0.0], [0.0, 3.0], [0.1, 0.2]]),
+    )
     inside = basis.from_monomial(given)
     np.testing.assert_allclose(basis.to_monomial(inside), given, atol=1e-12)
     p = np.linspace(2, 9, 7)
-    np.testing.assert_allclose(basis(p) @ inside, np.polynomial.polynomial.polyval(p, given).T, atol=1e-11)
+    np.testing.assert_allclose(
+        basis(p) @ inside, np.polynomial.polynomial.polyval(p, given).T, atol=1e-11
+    )
 
 
 FORMS = {
@@ -47,7 +66,9 @@ def test_each_form_of_a_polynomial_is_the_same_polynomial(name):
     coefficients = np.random.default_rng(1).normal(size=5)
     written = basis.form(name).T @ coefficients
     # 1e-10: monomials on 2-9 m/s cancel by up to 1e5
-    np.testing.assert_allclose(sum(written[j] * FORMS[name](p, j) for j in range(5)), basis(p) @ coefficients, atol=1e-10)
+    np.testing.assert_allclose(
+        sum(written[j] * FORMS[name](p, j) for j in range(5)), basis(p) @ coefficients, atol=1e-10
+    )
 
 
 @pytest.mark.parametrize("total", [None, 2])
@@ -57,12 +78,17 @@ def test_products_are_products_and_their_forms_are_products_of_forms(total):
     p = np.random.default_rng(2).uniform([0, 0.9], [13, 1.3], (5, 2))
     coefficients = np.random.default_rng(3).normal(size=basis.size)
     by_hand = sum(
-        c * basis.factors[0](p[:, 0])[:, i] * basis.factors[1](p[:, 1])[:, j] for c, (i, j) in zip(coefficients, basis.indices, strict=True)
+        c * basis.factors[0](p[:, 0])[:, i] * basis.factors[1](p[:, 1])[:, j]
+        for c, (i, j) in zip(coefficients, basis.indices, strict=True)
     )
     np.testing.assert_allclose(basis(p) @ coefficients, by_hand, atol=1e-12)
     monomial = basis.form("monomial").T @ coefficients
-    powers = sum(c * p[:, 0] ** i * p[:, 1] ** j for c, (i, j) in zip(monomial, basis.indices, strict=True))
-    np.testing.assert_allclose(powers, by_hand, atol=1e-9)  # monomials on 0.9-1.3 cancel by up to 1e4
+    powers = sum(
+        c * p[:, 0] ** i * p[:, 1] ** j for c, (i, j) in zip(monomial, basis.indices, strict=True)
+    )
+    np.testing.assert_allclose(
+        powers, by_hand, atol=1e-9
+    )  # monomials on 0.9-1.3 cancel by up to 1e4
 
 
 def test_products_of_orthonormal_polynomials_are_orthonormal_over_the_box():
@@ -81,7 +107,9 @@ def test_b_splines_add_up_to_one_are_local_and_of_degree_one_are_hats():
 
 
 def test_functions_brought_along_are_taken_as_they_are():
-    basis = UserFunctions((np.ones_like, np.sqrt, lambda p: np.exp(-p)), 0.0, 13.0, ("1", "root", "decay"))
+    basis = UserFunctions(
+        (np.ones_like, np.sqrt, lambda p: np.exp(-p)), 0.0, 13.0, ("1", "root", "decay")
+    )
     np.testing.assert_allclose(basis([4.0, 9.0]), [[1, 2, math.exp(-4)], [1, 3, math.exp(-9)]])
 
 
@@ -96,21 +124,29 @@ def test_bernstein_pieces_are_the_functions(basis):
     for piece in basis.pieces():
         p = np.linspace(piece.low, piece.high, 6)
         for j in range(basis.size):
-            np.testing.assert_allclose(BPoly(piece.bernstein[j][:, None], [piece.low, piece.high])(p), basis(p)[:, j], atol=1e-11)
+            np.testing.assert_allclose(
+                BPoly(piece.bernstein[j][:, None], [piece.low, piece.high])(p),
+                basis(p)[:, j],
+                atol=1e-11,
+            )
 
 
 def test_spline_is_the_cubic_spline_through_values():
     values = np.sin(NODES)
     p = np.linspace(0, 13, 40)
     np.testing.assert_allclose(Spline(NODES)(p) @ values, CubicSpline(NODES, values)(p), atol=1e-12)
-    np.testing.assert_allclose(PiecewiseLinear(NODES)(p) @ values, np.interp(p, NODES, values), atol=1e-12)
+    np.testing.assert_allclose(
+        PiecewiseLinear(NODES)(p) @ values, np.interp(p, NODES, values), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("basis", BASES, ids=lambda b: type(b).__name__)
 def test_fit_recovers_coefficients_and_counts_its_nodes(basis):
     rng = np.random.default_rng(0)
     coefficients, p = rng.standard_normal((basis.size, 2, 3)), np.linspace(0, 13, 30)
-    np.testing.assert_allclose(basis.fit(p, np.tensordot(basis(p), coefficients, 1)), coefficients, atol=1e-10)
+    np.testing.assert_allclose(
+        basis.fit(p, np.tensordot(basis(p), coefficients, 1)), coefficients, atol=1e-10
+    )
     with pytest.raises(InputError, match=rf"needs {basis.size} distinct nodes, got 2"):
         basis.fit([1.0, 2.0, 2.0], np.zeros(3))
 
@@ -120,17 +156,29 @@ def test_fit_recovers_coefficients_and_counts_its_nodes(basis):
     [
         (lambda: BSpline(0, NODES), "degree must be an integer >= 1"),
         (lambda: BSpline(2, (1.0, 1.0)), "strictly increasing breakpoints"),
-        (lambda: UserFunctions((np.log,), 0.0, 1.0), "function f0: expected finite numbers.*not finite"),
+        (
+            lambda: UserFunctions((np.log,), 0.0, 1.0),
+            "function f0: expected finite numbers.*not finite",
+        ),
         (lambda: UserFunctions((), 0.0, 1.0), "at least one callable"),
-        (lambda: UserFunctions((np.cos,), 0.0, 1.0).pieces(), "not known to be piecewise polynomial"),
+        (
+            lambda: UserFunctions((np.cos,), 0.0, 1.0).pieces(),
+            "not known to be piecewise polynomial",
+        ),
         (lambda: UserFunctions((np.cos,), 0.0, 1.0)(0.5, 1), "no known derivative"),
         (lambda: UserFunctions((np.cos,), 0.0, 1.0).form("monomial"), "has no 'monomial' form"),
         (lambda: Product((Polynomial(1, 0, 1),)), "at least two"),
-        (lambda: Product((Polynomial(1, 0, 1), BSpline(1, NODES)), total_degree=1), "total_degree is for polynomial"),
+        (
+            lambda: Product((Polynomial(1, 0, 1), BSpline(1, NODES)), total_degree=1),
+            "total_degree is for polynomial",
+        ),
         (lambda: BOX([0.5, 1.0, 2.0]), "expected 2 along the last axis"),
         (lambda: BOX([0.5, 7.0]), r"scheduling parameter 2 of 2 spans \[7, 7\]"),
         (lambda: Polynomial(1, 0, 1).form("monomail"), "did you mean 'monomial'"),
-        (lambda: Product((Polynomial(1, 0, 1),) * 2, total_degree=1).form("bernstein"), "mixes degrees"),
+        (
+            lambda: Product((Polynomial(1, 0, 1),) * 2, total_degree=1).form("bernstein"),
+            "mixes degrees",
+        ),
         (lambda: Polynomial(-1, 0, 1), "degree must be an integer"),
         (lambda: Polynomial(2, 5.0, 5.0), "low < high"),
         (lambda: Spline((0.0, 1.0, 2.0)), "at least 4 strictly increasing"),
@@ -151,12 +199,20 @@ def test_scheduling_knows_middle_radius_and_rate():
     p = Scheduling("airspeed", "m/s", 2.0, 12.0)
     assert (p.middle, p.radius, p.rate) == (7.0, 5.0, math.inf)
     assert p.with_rate(3.0).rate == 3.0
-    np.testing.assert_array_equal(p.check([2.0, 12.0 + 1e-9]), [2.0, 12.0 + 1e-9])  # rounding passes
+    np.testing.assert_array_equal(
+        p.check([2.0, 12.0 + 1e-9]), [2.0, 12.0 + 1e-9]
+    )  # rounding passes
 
 
 @pytest.mark.parametrize(
     ("unit", "factor", "si"),
-    [("deg", math.pi / 180, "rad"), ("kt", 1852 / 3600, "m/s"), ("ft", 0.3048, "m"), ("rpm", math.pi / 30, "rad/s"), ("ms", 1e-3, "s")],
+    [
+        ("deg", math.pi / 180, "rad"),
+        ("kt", 1852 / 3600, "m/s"),
+        ("ft", 0.3048, "m"),
+        ("rpm", math.pi / 30, "rad/s"),
+        ("ms", 1e-3, "s"),
+    ],
 )
 def test_units_convert_to_si(unit, factor, si):
     assert to_si(unit) == (pytest.approx(factor, rel=1e-15), si)

@@ -16,7 +16,9 @@ def record(n=2000, noise=0.0):
     rng = np.random.default_rng(0)
     u = rng.standard_normal(n)
     y = lfilter([0.0, 0.5], [1.0, -1.5, 0.7], u) + noise * rng.standard_normal(n)
-    return FlightRecord.from_arrays(DT * np.arange(n), {"y": "rad", "u": "1", "p": "m/s"}, y=y, u=u, p=np.full(n, 5.0))
+    return FlightRecord.from_arrays(
+        DT * np.arange(n), {"y": "rad", "u": "1", "p": "m/s"}, y=y, u=u, p=np.full(n, 5.0)
+    )
 
 
 ARX = LPVARX(("y",), ("u",), "p", na=2, nb=1, delay=1, basis=Polynomial(0, 0.0, 13.0))
@@ -29,13 +31,17 @@ def test_one_filter_on_all_signals_keeps_a_linear_relation(zero_phase):
     theta = fit(ARX, filtered.between(2.0, 38.0)).theta[:, 0]
     # away from the ends the filter has forgotten how it started
     np.testing.assert_allclose(theta, [-1.5, 0.7, 0.5], atol=1e-6)
-    assert filtered["u"].std() < 0.9 * clean["u"].std()  # white noise loses what is above the corner
+    assert (
+        filtered["u"].std() < 0.9 * clean["u"].std()
+    )  # white noise loses what is above the corner
     np.testing.assert_array_equal(filtered["p"], clean["p"])
 
 
 def test_a_filter_starts_settled_and_passes_what_is_below_its_corner():
     t = DT * np.arange(1000)
-    rec = FlightRecord.from_arrays(t, {"a": "1", "b": "1"}, a=np.full(1000, 3.0), b=np.sin(2 * np.pi * 0.2 * t))
+    rec = FlightRecord.from_arrays(
+        t, {"a": "1", "b": "1"}, a=np.full(1000, 3.0), b=np.sin(2 * np.pi * 0.2 * t)
+    )
     out = low_pass(rec, 5.0, zero_phase=True)
     np.testing.assert_allclose(out["a"], 3.0, rtol=1e-9)
     np.testing.assert_allclose(out["b"][50:-50], rec["b"][50:-50], atol=1e-3)
@@ -51,7 +57,9 @@ def test_nothing_crosses_a_gap_or_a_missing_sample():
     out = low_pass(holed, 5.0)
     assert np.isnan(out["y"]).sum() == 1
     alone = low_pass(FlightRecord(time[200:], values[200:], rec.signals), 5.0)
-    np.testing.assert_allclose(out["y"][200:], alone["y"], rtol=1e-9)  # the median step rounds differently
+    np.testing.assert_allclose(
+        out["y"][200:], alone["y"], rtol=1e-9
+    )  # the median step rounds differently
     changed = values.copy()
     changed[50, 0] += 1.0
     again = low_pass(FlightRecord(time, changed, rec.signals), 5.0)

@@ -15,8 +15,13 @@ def test_a_delay_passes_every_amplitude_and_lags_by_omega_t(order):
     omega = np.linspace(0.1, 0.5 * order, 20) / T
     response = pade_delay("d_lat", T, order).frequency_response(omega)[:, 0, 0]
     np.testing.assert_allclose(np.abs(response), 1.0, rtol=1e-9)  # all-pass
-    # the first neglected term of the phase: (n!)^2 (omega T)^(2n+1) / ((2n)! (2n+1)!) (Baker and Graves-Morris, Pade Approximants)
-    bound = factorial(order) ** 2 * (omega * T) ** (2 * order + 1) / (factorial(2 * order) * factorial(2 * order + 1))
+    # the first neglected term of the phase: (n!)^2 (omega T)^(2n+1) / ((2n)! (2n+1)!) (Baker and
+    # Graves-Morris, Pade Approximants)
+    bound = (
+        factorial(order) ** 2
+        * (omega * T) ** (2 * order + 1)
+        / (factorial(2 * order) * factorial(2 * order + 1))
+    )
     assert np.all(np.abs(np.angle(response * np.exp(1j * omega * T))) < 1.5 * bound + 1e-10)
 
 

@@ -18,8 +18,17 @@ def record(time=None, **columns):
 
 
 def test_units_are_converted_at_the_door_and_kept_in_the_signal():
-    frame = pd.DataFrame({"t": [0.0, 10.0, 20.0], "speed": [10.0, 20.0, 30.0], "theta": [0.0, 90.0, 180.0], "junk": ["a", "b", "c"]})
-    got = FlightRecord.from_frame(frame, time="t", units={"speed": "kt", "theta": "deg"}, time_unit="ms")
+    frame = pd.DataFrame(
+        {
+            "t": [0.0, 10.0, 20.0],
+            "speed": [10.0, 20.0, 30.0],
+            "theta": [0.0, 90.0, 180.0],
+            "junk": ["a", "b", "c"],
+        }
+    )
+    got = FlightRecord.from_frame(
+        frame, time="t", units={"speed": "kt", "theta": "deg"}, time_unit="ms"
+    )
     np.testing.assert_allclose(got["theta"], [0, np.pi / 2, np.pi])
     np.testing.assert_allclose(got["speed"][0], 10 * 1852 / 3600)
     assert got.dt == pytest.approx(0.01)
@@ -34,10 +43,16 @@ def test_units_are_converted_at_the_door_and_kept_in_the_signal():
         (lambda: record([0.0, 0.2, 0.1]), "time must increase"),
         (lambda: record([0.0]), "at least two samples"),
         (lambda: record([0.0, np.nan]), r"time: entry \(1,\) is nan"),
-        (lambda: record(q=[0.0] * 9 + [np.inf]), "q is infinite at 0.9 s; mark missing samples as NaN"),
+        (
+            lambda: record(q=[0.0] * 9 + [np.inf]),
+            "q is infinite at 0.9 s; mark missing samples as NaN",
+        ),
         (lambda: record(q=np.zeros(4)), r"q: expected shape \(10\), got \(4,\)"),
         (lambda: FlightRecord.from_arrays([0, 1], {}, q=[0, 1]), "declare the unit of 'q'"),
-        (lambda: FlightRecord.from_arrays([0, 1], {"q": "rad/sec"}, q=[0, 1]), "did you mean 'rad/s'"),
+        (
+            lambda: FlightRecord.from_arrays([0, 1], {"q": "rad/sec"}, q=[0, 1]),
+            "did you mean 'rad/s'",
+        ),
         (lambda: record([0, 0.1, 0.23, 0.31]).dt, "sampling is irregular"),
         (lambda: record().resample(0), "positive number"),
         (lambda: record()["p"], "unknown signal 'p'"),
@@ -50,7 +65,9 @@ def test_a_record_that_cannot_be_used_says_why(make, message):
 
 def test_a_misspelt_column_gets_the_nearest():
     with pytest.raises(UnknownNameError, match="did you mean 'theta'"):
-        FlightRecord.from_frame(pd.DataFrame({"t": [0, 1], "theta": [0, 1]}), time="t", units={"tetha": "rad"})
+        FlightRecord.from_frame(
+            pd.DataFrame({"t": [0, 1], "theta": [0, 1]}), time="t", units={"tetha": "rad"}
+        )
 
 
 def test_gaps_split_the_record_and_nothing_is_invented_across_them():
@@ -111,12 +128,25 @@ def test_a_plot_has_units_and_no_line_across_gaps_and_missing_samples():
     got = holed()
     figure = got.plot()
     q, n = figure.axes
-    assert (q.get_title(loc="left"), n.get_title(loc="left"), n.get_xlabel()) == ("q (rad/s)", "n", "time (s)")
+    assert (q.get_title(loc="left"), n.get_title(loc="left"), n.get_xlabel()) == (
+        "q (rad/s)",
+        "n",
+        "time (s)",
+    )
     time, values = q.lines[0].get_data()
-    drawn = np.isfinite(time[:-1]) & np.isfinite(time[1:]) & np.isfinite(values[:-1]) & np.isfinite(values[1:])
-    steps = [(round(a, 6), round(b, 6)) for a, b in zip(time[:-1][drawn], time[1:][drawn], strict=True)]
+    drawn = (
+        np.isfinite(time[:-1])
+        & np.isfinite(time[1:])
+        & np.isfinite(values[:-1])
+        & np.isfinite(values[1:])
+    )
+    steps = [
+        (round(a, 6), round(b, 6)) for a, b in zip(time[:-1][drawn], time[1:][drawn], strict=True)
+    ]
     assert steps == [(0.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 0.4), (2.4, 2.5)]
-    np.testing.assert_allclose(q.lines[1].get_xdata(), [2.0, 2.2])  # alone between what is missing: dots
+    np.testing.assert_allclose(
+        q.lines[1].get_xdata(), [2.0, 2.2]
+    )  # alone between what is missing: dots
     assert len(q.patches) == 3  # shaded: the gap, and two missing samples
     assert len(n.patches) == 1
     figure.savefig(io.BytesIO(), format="svg")
@@ -124,10 +154,15 @@ def test_a_plot_has_units_and_no_line_across_gaps_and_missing_samples():
 
 def test_a_plot_of_many_signals_stands_in_two_columns_and_of_named_ones_shows_those():
     many = FlightRecord.from_arrays(
-        np.arange(4.0), {f"s{i}": "m" for i in range(9)}, note="log", **{f"s{i}": np.zeros(4) for i in range(9)}
+        np.arange(4.0),
+        {f"s{i}": "m" for i in range(9)},
+        note="log",
+        **{f"s{i}": np.zeros(4) for i in range(9)},
     )
     figure = many.plot()
-    assert sorted(ax.get_title(loc="left") for ax in figure.axes if ax.get_visible()) == [f"s{i} (m)" for i in range(9)]
+    assert sorted(ax.get_title(loc="left") for ax in figure.axes if ax.get_visible()) == [
+        f"s{i} (m)" for i in range(9)
+    ]
     assert figure.get_suptitle() == "log"
     assert [ax.get_title(loc="left") for ax in many.plot(["s3", "s1"]).axes] == ["s3 (m)", "s1 (m)"]
     with pytest.raises(UnknownNameError, match="unknown signal 'q'"):
@@ -136,15 +171,31 @@ def test_a_plot_of_many_signals_stands_in_two_columns_and_of_named_ones_shows_th
 
 def test_without_pandas_a_data_frame_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(InputError, match=r"a data frame needs pandas: pip install 'symheli\[logs\]'"):
+    with pytest.raises(
+        InputError, match=r"a data frame needs pandas: pip install 'symheli\[logs\]'"
+    ):
         record().to_frame()
 
 
 def test_no_method_changes_the_record_it_is_called_on():
     got = holed().rows(slice(5, None)).select(["n"]).with_signals({"a": "1"}, a=np.arange(6.0))
     before = got.time.copy(), got.values.copy(), got.signals
-    got.plot(), got.resample(0.05), got.low_pass(2.0), got.decimate(2), got.split(0.5), got.between(2.0, 2.3), got.rows([0, 2])
-    got.select(["a"]), got.with_signals({"a": "m"}, a=np.zeros(6)), got.derivative("a"), got.columns(["a"]), got.to_frame()
+    (
+        got.plot(),
+        got.resample(0.05),
+        got.low_pass(2.0),
+        got.decimate(2),
+        got.split(0.5),
+        got.between(2.0, 2.3),
+        got.rows([0, 2]),
+    )
+    (
+        got.select(["a"]),
+        got.with_signals({"a": "m"}, a=np.zeros(6)),
+        got.derivative("a"),
+        got.columns(["a"]),
+        got.to_frame(),
+    )
     for new, old in zip((got.time, got.values), before[:2], strict=True):
         np.testing.assert_array_equal(new, old)
     assert got.signals == before[2]
@@ -153,7 +204,10 @@ def test_no_method_changes_the_record_it_is_called_on():
 def test_the_methods_are_the_functions_of_that_name():
     got = record(np.arange(200) * 0.1)
     for method, function in (
-        (got.low_pass(2.0, 2, zero_phase=True, leave=["q"]), low_pass(got, 2.0, 2, zero_phase=True, leave=["q"])),
+        (
+            got.low_pass(2.0, 2, zero_phase=True, leave=["q"]),
+            low_pass(got, 2.0, 2, zero_phase=True, leave=["q"]),
+        ),
         (got.decimate(4), decimate(got, 4)),
         *zip(got.split(0.7), split(got, 0.7), strict=True),
     ):

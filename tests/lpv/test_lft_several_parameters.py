@@ -1,4 +1,6 @@
-"""LFTs in several parameters: what they were made from, reduced, truncated, over other ranges, sampled and back."""
+"""LFTs in several parameters: what they were made from, reduced, truncated, over other ranges,
+sampled and back.
+"""
 
 import numpy as np
 import pytest
@@ -7,7 +9,10 @@ from families import random_lpv, stacked
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LFT, LinearModel, Polynomial, Scheduling, connect
 
-SPEED, MASS = Scheduling("airspeed", "m/s", 0.0, 13.0, 3.0), Scheduling("mass", "kg", 6.0, 10.0, 0.0)
+SPEED, MASS = (
+    Scheduling("airspeed", "m/s", 0.0, 13.0, 3.0),
+    Scheduling("mass", "kg", 6.0, 10.0, 0.0),
+)
 CORNERS = [(0.0, 6.0), (0.0, 10.0), (13.0, 6.0), (13.0, 10.0), (4.4, 9.1)]
 
 
@@ -18,7 +23,12 @@ def polynomial(seed=0, rank=1):
     def power(rows, columns, size):
         return size * rng.standard_normal((rows, rank)) @ rng.standard_normal((rank, columns))
 
-    A = {(0, 0): rng.standard_normal((3, 3)), (1, 0): power(3, 3, 0.1), (2, 0): power(3, 3, 0.01), (1, 1): power(3, 3, 0.02)}
+    A = {
+        (0, 0): rng.standard_normal((3, 3)),
+        (1, 0): power(3, 3, 0.1),
+        (2, 0): power(3, 3, 0.01),
+        (1, 1): power(3, 3, 0.02),
+    }
     B = {(0, 0): rng.standard_normal((3, 2)), (0, 1): power(3, 2, 0.1)}
     C = {(0, 0): rng.standard_normal((2, 3)), (0, 2): power(2, 3, 0.01)}
     D = {(0, 0): rng.standard_normal((2, 2))}
@@ -48,11 +58,21 @@ def test_a_polynomial_in_two_parameters_is_itself_before_and_after_reduction(p):
 def test_the_order_of_a_sum_of_products_is_what_its_factors_need():
     # v' (p + q) u needs one copy of each; p q of rank one needs one more of one of them
     rank_one = np.outer([1.0, 2.0, 0.5], [1.0, -1.0, 3.0])
-    made = LFT.polynomial({(0, 0): -np.eye(3), (1, 0): rank_one, (0, 1): rank_one}, {(0, 0): np.eye(3)[:, :1]}, {(0, 0): np.eye(3)[:1]},
-                          {(0, 0): [[0.0]]}, [SPEED, MASS])  # fmt: skip
+    made = LFT.polynomial(
+        {(0, 0): -np.eye(3), (1, 0): rank_one, (0, 1): rank_one},
+        {(0, 0): np.eye(3)[:, :1]},
+        {(0, 0): np.eye(3)[:1]},
+        {(0, 0): [[0.0]]},
+        [SPEED, MASS],
+    )
     assert made.reduce().sizes == (1, 1)
-    product = LFT.polynomial({(0, 0): -np.eye(3), (1, 1): rank_one}, {(0, 0): np.eye(3)[:, :1]}, {(0, 0): np.eye(3)[:1]},
-                             {(0, 0): [[0.0]]}, [SPEED, MASS])  # fmt: skip
+    product = LFT.polynomial(
+        {(0, 0): -np.eye(3), (1, 1): rank_one},
+        {(0, 0): np.eye(3)[:, :1]},
+        {(0, 0): np.eye(3)[:1]},
+        {(0, 0): [[0.0]]},
+        [SPEED, MASS],
+    )
     # in normalised parameters p q = (a + b d)(c + e f): d, f and d f, all with one factor
     assert product.reduce().order == 2
 
@@ -62,9 +82,13 @@ def test_one_parameter_as_a_special_case_of_several_has_the_same_minimal_order()
     nx = 4
     parts = {
         name: {(i, 0): M[rows, columns] for i, M in enumerate(whole)}
-        for name, rows, columns in (("A", slice(nx), slice(nx)), ("B", slice(nx), slice(nx, None)),
-                                    ("C", slice(nx, None), slice(nx)), ("D", slice(nx, None), slice(nx, None)))
-    }  # fmt: skip
+        for name, rows, columns in (
+            ("A", slice(nx), slice(nx)),
+            ("B", slice(nx), slice(nx, None)),
+            ("C", slice(nx, None), slice(nx)),
+            ("D", slice(nx, None), slice(nx, None)),
+        )
+    }
     several = LFT.polynomial(**parts, parameters=[lpv.scheduling, MASS]).reduce()
     assert several.sizes == (lpv.to_lft().reduce().order, 0)
 
@@ -88,8 +112,11 @@ def test_truncation_keeps_its_promises(seed):
 def test_truncation_of_one_parameter_is_measured_against_the_model_itself():
     lpv, _ = random_lpv(3)
     cut = lpv.to_lft().truncate(order=6)
-    worst = max(np.abs(stacked(cut.lft.at(p)) - stacked(lpv.at(p))).max() for p in np.linspace(0, 13, 7))
-    # entries here are scaled to about one before the norm is taken: the plain difference is of the same size
+    worst = max(
+        np.abs(stacked(cut.lft.at(p)) - stacked(lpv.at(p))).max() for p in np.linspace(0, 13, 7)
+    )
+    # entries here are scaled to about one before the norm is taken: the plain difference is of the
+    # same size
     assert 0.01 * cut.error < worst < 100 * cut.error
     assert cut.error <= cut.bound
 
@@ -110,7 +137,11 @@ def test_another_range_of_one_parameter_keeps_the_model():
 def reciprocal(scheduling):
     """y = u/p: y = e, e = u + y - p y."""
     return connect(
-        LFT.parameter(scheduling, "y", "v"), scalar(1.0), inputs=["u"], outputs=["y"], sums={"e": {"u": 1.0, "y": 1.0, "v": -1.0}}
+        LFT.parameter(scheduling, "y", "v"),
+        scalar(1.0),
+        inputs=["u"],
+        outputs=["y"],
+        sums={"e": {"u": 1.0, "y": 1.0, "v": -1.0}},
     )
 
 
@@ -125,19 +156,25 @@ def test_rational_dependence_comes_out_of_a_loop_and_is_well_posed_where_it_is_f
 
 
 def test_a_loop_that_is_singular_only_inside_a_box_of_two_parameters_is_found():
-    # 1/(p - q) with p in [1, 3], q in [0, 2]: the corners differ in sign; with q in [-3, -1] it is proven
+    # 1/(p - q) with p in [1, 3], q in [0, 2]: the corners differ in sign; with q in [-3, -1] it is
+    # proven
     def difference(low, high):
         q = Scheduling("q", "1", low, high)
         return connect(
-            LFT.parameter(Scheduling("p", "1", 1.0, 3.0), "y", "v"), LFT.parameter(q, "y", "w"), scalar(1.0),
-            inputs=["u"], outputs=["y"], sums={"e": {"u": 1.0, "y": 1.0, "v": -1.0, "w": 1.0}},
-        )  # fmt: skip
+            LFT.parameter(Scheduling("p", "1", 1.0, 3.0), "y", "v"),
+            LFT.parameter(q, "y", "w"),
+            scalar(1.0),
+            inputs=["u"],
+            outputs=["y"],
+            sums={"e": {"u": 1.0, "y": 1.0, "v": -1.0, "w": 1.0}},
+        )
 
     found = difference(0.0, 2.0).well_posed()
     assert found.holds is False
     assert found.where["p"] == pytest.approx(found.where["q"], abs=1e-9)
     assert difference(-3.0, -1.0).well_posed().holds is True
-    # the determinant touches zero in one corner only: no change of sign can show it, nor can the cells exclude it
+    # the determinant touches zero in one corner only: no change of sign can show it, nor can the
+    # cells exclude it
     assert difference(-1.0, 1.0).well_posed(boxes=50).holds is not True
 
 
@@ -151,10 +188,14 @@ def test_polynomials_come_back_from_their_lft():
 
 
 def test_kinematic_rows_of_the_helicopter_do_not_count_as_dependence(ideal):
-    """Their rounding in the cubic fit, 1e-16 where the entry is one, was once scaled up to a dependence of size one."""
+    """Their rounding in the cubic fit, 1e-16 where the entry is one, was once scaled up to a
+    dependence of size one.
+    """
     import symheli
 
-    family = symheli.sweep(ideal, np.linspace(0, 13, 14)).select(["v", "p", "r", "phi", "b1"], ["d_lat", "d_ped"])
+    family = symheli.sweep(ideal, np.linspace(0, 13, 14)).select(
+        ["v", "p", "r", "phi", "b1"], ["d_lat", "d_ped"]
+    )
     lft = family.interpolate("polynomial", 3).to_lft()
     assert lft.truncate(order=lft.reduce().order).error < 1e-10
     assert lft.reduce().to_lpv().basis == Polynomial(3, 0.0, 13.0)
@@ -186,8 +227,14 @@ def test_tustin_is_the_bilinear_transform_of_every_frozen_model():
     s = 2 / 0.05 * (z - 1) / (z + 1)
     for p in CORNERS:
         m = lft.at(*p)
-        expected = m.C @ np.linalg.solve(s[:, None, None] * np.eye(3) - m.A, np.broadcast_to(m.B, (3, 3, 2))) + m.D
-        np.testing.assert_allclose(sampled.at(*p).frequency_response(np.array([0.1, 1.0, 20.0])), expected, atol=1e-10)
+        expected = (
+            m.C
+            @ np.linalg.solve(s[:, None, None] * np.eye(3) - m.A, np.broadcast_to(m.B, (3, 3, 2)))
+            + m.D
+        )
+        np.testing.assert_allclose(
+            sampled.at(*p).frequency_response(np.array([0.1, 1.0, 20.0])), expected, atol=1e-10
+        )
     with pytest.raises(InputError, match="already discrete"):
         sampled.discretize(0.05)
 
@@ -216,6 +263,15 @@ def test_wrong_use_is_explained():
     with pytest.raises(InputError, match="has 2 parameters"):
         lft.to_lpv()
     with pytest.raises(InputError, match="one block a parameter"):
-        LFT(np.zeros((2, 2)), np.zeros((2, 1)), np.zeros((1, 2)), np.zeros((1, 1)), ((SPEED, 1), (SPEED, 1)), ("x",), (), ())
+        LFT(
+            np.zeros((2, 2)),
+            np.zeros((2, 1)),
+            np.zeros((1, 2)),
+            np.zeros((1, 1)),
+            ((SPEED, 1), (SPEED, 1)),
+            ("x",),
+            (),
+            (),
+        )
     with pytest.raises(InputError, match="either the error"):
         lft.truncate()

@@ -13,7 +13,13 @@ def random_model(nx=4, nu=2, ny=2, seed=0):
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((nx, nx)) - 3 * np.eye(nx)
     names = [signals(f"{c}{i}" for i in range(n)) for c, n in (("x", nx), ("u", nu), ("y", ny))]
-    return LinearModel(A, rng.standard_normal((nx, nu)), rng.standard_normal((ny, nx)), rng.standard_normal((ny, nu)), *names)
+    return LinearModel(
+        A,
+        rng.standard_normal((nx, nu)),
+        rng.standard_normal((ny, nx)),
+        rng.standard_normal((ny, nu)),
+        *names,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -61,12 +67,20 @@ def test_residualized_states_settle_at_once_the_slow_response_is_kept(family):
     for k in range(len(family)):
         model, i = family[k], [family.states.index(s) for s in ("a1", "b1")]
         kept = [s for s in range(10) if s not in i]
-        schur = model.A[np.ix_(kept, kept)] - model.A[np.ix_(kept, i)] @ np.linalg.inv(model.A[np.ix_(i, i)]) @ model.A[np.ix_(i, kept)]
+        schur = (
+            model.A[np.ix_(kept, kept)]
+            - model.A[np.ix_(kept, i)]
+            @ np.linalg.inv(model.A[np.ix_(i, i)])
+            @ model.A[np.ix_(i, kept)]
+        )
         np.testing.assert_allclose(slow.A[k], schur, atol=1e-10)
-        # equal steady gain: the transfer function at s = 0 does not know which derivatives were set to zero
+        # equal steady gain: the transfer function at s = 0 does not know which derivatives were set
+        # to zero
         full, reduced = model.frequency_response([0.0]), slow[k].frequency_response([0.0])
         keep = [model.outputs.index(y) for y in slow.outputs]
-        np.testing.assert_allclose(reduced[0], full[0][keep], rtol=1e-8, atol=1e-8 * np.abs(full).max())
+        np.testing.assert_allclose(
+            reduced[0], full[0][keep], rtol=1e-8, atol=1e-8 * np.abs(full).max()
+        )
 
 
 def test_residualizing_states_that_do_not_settle_is_refused(family):
@@ -100,17 +114,35 @@ def test_interpolation_names_what_it_cannot_do(family):
 
 
 def test_models_and_families_cannot_be_changed_and_check_their_shapes(family):
-    for array in (family.A, family[0].B, family.airspeeds, family.interpolate().A, family.trims[0].x.array):
+    for array in (
+        family.A,
+        family[0].B,
+        family.airspeeds,
+        family.interpolate().A,
+        family.trims[0].x.array,
+    ):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0
     mine = np.eye(2)
-    model = LinearModel(mine, np.ones((2, 1)), mine, np.zeros((2, 1)), signals("ab"), signals("u"), signals("ab"))
+    model = LinearModel(
+        mine, np.ones((2, 1)), mine, np.zeros((2, 1)), signals("ab"), signals("u"), signals("ab")
+    )
     mine[:] = 7
     np.testing.assert_array_equal(model.A, np.eye(2))
     with pytest.raises(InputError, match=r"B: expected shape \(2, 1\), got \(1, 2\)"):
-        LinearModel(np.eye(2), np.ones((1, 2)), np.eye(2), np.zeros((2, 1)), signals("ab"), signals("u"), signals("ab"))
+        LinearModel(
+            np.eye(2),
+            np.ones((1, 2)),
+            np.eye(2),
+            np.zeros((2, 1)),
+            signals("ab"),
+            signals("u"),
+            signals("ab"),
+        )
     with pytest.raises(InputError, match=r"entry \(0, 0\) is nan"):
-        LinearModel(np.full((1, 1), np.nan), [[1]], [[1]], [[0]], signals("a"), signals("u"), signals("y"))
+        LinearModel(
+            np.full((1, 1), np.nan), [[1]], [[1]], [[0]], signals("a"), signals("u"), signals("y")
+        )
 
 
 def test_a_signal_is_its_name_and_knows_its_unit():

@@ -13,13 +13,17 @@ from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, simulate
 
 def stable(dt=None):
     A0, A1 = np.array([[0.0, 1.0], [-4.0, -1.0]]), np.array([[0.0, 0.0], [-0.5, -0.1]])
-    return LPVStateSpace.polynomial(A=[A0, A1], B=[[[0.0], [1.0]]], C=[np.eye(2)], D=[np.zeros((2, 1))], scheduling=SPEED, dt=dt)
+    return LPVStateSpace.polynomial(
+        A=[A0, A1], B=[[[0.0], [1.0]]], C=[np.eye(2)], D=[np.zeros((2, 1))], scheduling=SPEED, dt=dt
+    )
 
 
 def test_powers_of_p_are_in_physical_units():
     lpv, whole = random_lpv(3)
     p = 9.3
-    np.testing.assert_allclose(stacked(lpv.at(p)), sum(M * p**i for i, M in enumerate(whole)), atol=1e-12)
+    np.testing.assert_allclose(
+        stacked(lpv.at(p)), sum(M * p**i for i, M in enumerate(whole)), atol=1e-12
+    )
 
 
 def test_many_p_at_once_are_the_frozen_models_one_by_one():
@@ -48,7 +52,11 @@ def test_a_rational_loop_is_closed_by_the_lft_that_the_message_names():
     with pytest.raises(InputError, match=r"lpv\.to_lft\(\)\.feedback\(\.\.\.\) closes it exactly"):
         lpv.feedback(gains)
     for p in (0.0, 5.0, 13.0):
-        np.testing.assert_allclose(stacked(lpv.to_lft().feedback(gains).at(p)), stacked(lpv.at(p).feedback(gains)), atol=1e-12)
+        np.testing.assert_allclose(
+            stacked(lpv.to_lft().feedback(gains).at(p)),
+            stacked(lpv.at(p).feedback(gains)),
+            atol=1e-12,
+        )
 
 
 def test_a_spline_is_closed_where_its_products_stay_splines():
@@ -56,10 +64,14 @@ def test_a_spline_is_closed_where_its_products_stay_splines():
     rng = np.random.default_rng(0)
     A, C = rng.standard_normal((4, 2, 2)), rng.standard_normal((4, 1, 2))
     B = np.broadcast_to(rng.standard_normal((2, 1)), (4, 2, 1))
-    lpv = LPVStateSpace(PiecewiseLinear(nodes), A, B, C, np.zeros((4, 1, 1)), SPEED, ("x1", "x2"), ("u1",), ("y1",))
+    lpv = LPVStateSpace(
+        PiecewiseLinear(nodes), A, B, C, np.zeros((4, 1, 1)), SPEED, ("x1", "x2"), ("u1",), ("y1",)
+    )
     closed = lpv.feedback({("u1", "y1"): 2.0})
     for p in (0.0, 4.1, 13.0):
-        np.testing.assert_allclose(stacked(closed.at(p)), stacked(lpv.at(p).feedback({("u1", "y1"): 2.0})), atol=1e-14)
+        np.testing.assert_allclose(
+            stacked(closed.at(p)), stacked(lpv.at(p).feedback({("u1", "y1"): 2.0})), atol=1e-14
+        )
     moving = replace(lpv, B=rng.standard_normal((4, 2, 1)))
     with pytest.raises(InputError, match="leaves this basis"):
         moving.feedback({("u1", "y1"): 2.0})
@@ -93,7 +105,9 @@ def test_simulation_agrees_with_an_ode_solver_and_converges_with_the_step():
     errors = []
     for n in (400, 800):
         t = np.arange(n + 1) * end / n
-        middle = np.minimum(t + 0.5 * end / n, end)  # p and u are held: their values at the middle of the step are second order
+        middle = np.minimum(
+            t + 0.5 * end / n, end
+        )  # p and u are held: their values at the middle of the step are second order
         x, _ = simulate(lpv, speed(middle), drive(middle)[:, None], [1.0, 0.0], dt=end / n)
         errors.append(np.abs(x[-1] - exact).max())
     assert errors[1] < 1e-4
@@ -109,7 +123,9 @@ def test_simulation_with_constant_p_is_exact_and_a_drift_is_added_as_a_rate():
         np.testing.assert_allclose(x[k], state, atol=1e-12)
         state = model.A @ state + model.B @ u[k]
     np.testing.assert_allclose(y, x)
-    pushed, _ = simulate(lpv, np.full(n, 4.0), np.zeros((n, 1)), dt=dt, drift=np.tile([0.0, 1.0], (n, 1)))
+    pushed, _ = simulate(
+        lpv, np.full(n, 4.0), np.zeros((n, 1)), dt=dt, drift=np.tile([0.0, 1.0], (n, 1))
+    )
     forced, _ = simulate(lpv, np.full(n, 4.0), np.ones((n, 1)), dt=dt)  # B = [0, 1]
     np.testing.assert_allclose(pushed, forced, atol=1e-12)
     with pytest.raises(InputError, match="sample period dt"):
@@ -118,8 +134,16 @@ def test_simulation_with_constant_p_is_exact_and_a_drift_is_added_as_a_rate():
 
 def test_matrices_of_unequal_shape_are_refused():
     with pytest.raises(InputError, match="differ in shape"):
-        LPVStateSpace.polynomial(A=[np.eye(2), np.eye(3)], B=[np.ones((2, 1))], C=[np.eye(2)], D=[np.zeros((2, 1))], scheduling=SPEED)
+        LPVStateSpace.polynomial(
+            A=[np.eye(2), np.eye(3)],
+            B=[np.ones((2, 1))],
+            C=[np.eye(2)],
+            D=[np.zeros((2, 1))],
+            scheduling=SPEED,
+        )
     with pytest.raises(InputError, match="at least one coefficient"):
-        LPVStateSpace.polynomial(A=[], B=[np.ones((2, 1))], C=[np.eye(2)], D=[np.zeros((2, 1))], scheduling=SPEED)
+        LPVStateSpace.polynomial(
+            A=[], B=[np.ones((2, 1))], C=[np.eye(2)], D=[np.zeros((2, 1))], scheduling=SPEED
+        )
     with pytest.raises(InputError, match="positive number of seconds"):
         stable(dt=-0.1)

@@ -10,7 +10,9 @@ from symheli.lpv import chordal_distance, nu_gap, signals
 
 
 def model(A, B, C, D, dt=0.1):
-    return LinearModel(A, B, C, D, signals([f"x{i}" for i in range(len(A))]), signals(["u"]), signals(["y"]), dt=dt)
+    return LinearModel(
+        A, B, C, D, signals([f"x{i}" for i in range(len(A))]), signals(["u"]), signals(["y"]), dt=dt
+    )
 
 
 def gain(k):
@@ -23,7 +25,9 @@ def pole(a, b=1.0):
 
 def test_two_gains_are_as_far_apart_as_their_points_on_the_sphere():
     a, b = 0.5, 3.0
-    assert nu_gap(gain(a), gain(b)) == pytest.approx(abs(a - b) / np.sqrt((1 + a**2) * (1 + b**2)), rel=1e-12)
+    assert nu_gap(gain(a), gain(b)) == pytest.approx(
+        abs(a - b) / np.sqrt((1 + a**2) * (1 + b**2)), rel=1e-12
+    )
 
 
 def test_distance_is_zero_to_itself_and_symmetric():
@@ -33,7 +37,9 @@ def test_distance_is_zero_to_itself_and_symmetric():
 
 
 def test_a_slightly_stable_and_a_slightly_unstable_pole_are_close_for_feedback():
-    """High gain at low frequency: both look like an integrator; the open-loop difference would be unbounded."""
+    """High gain at low frequency: both look like an integrator; the open-loop difference would be
+    unbounded.
+    """
     assert nu_gap(pole(0.999), pole(1.001)) < 0.05
 
 
@@ -42,9 +48,9 @@ def test_a_stable_and_a_far_unstable_plant_of_small_gain_are_as_far_as_can_be():
 
 
 def test_scaling_channels_is_the_same_as_scaling_the_models():
-    assert nu_gap(pole(0.9, 3.0), pole(0.8, 5.0), input_scale=0.1, output_scale=2.0) == pytest.approx(
-        nu_gap(pole(0.9, 3.0 * 0.1 / 2.0), pole(0.8, 5.0 * 0.1 / 2.0)), rel=1e-12
-    )
+    assert nu_gap(
+        pole(0.9, 3.0), pole(0.8, 5.0), input_scale=0.1, output_scale=2.0
+    ) == pytest.approx(nu_gap(pole(0.9, 3.0 * 0.1 / 2.0), pole(0.8, 5.0 * 0.1 / 2.0)), rel=1e-12)
 
 
 def test_chordal_distance_never_exceeds_the_gap():
@@ -55,18 +61,29 @@ def test_chordal_distance_never_exceeds_the_gap():
 
 def test_models_that_cannot_be_compared_are_refused():
     with pytest.raises(InputError, match="sample period"):
-        nu_gap(pole(0.9), model(np.array([[0.9]]), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)), dt=0.2))
+        nu_gap(
+            pole(0.9),
+            model(np.array([[0.9]]), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)), dt=0.2),
+        )
     with pytest.raises(InputError, match="unit circle"):
         nu_gap(pole(1.0), pole(0.5))
 
 
 def lag(dt, slow=0.01):
     """1/(s + slow), sampled with a hold."""
-    return model(np.array([[np.exp(-slow * dt)]]), np.array([[-np.expm1(-slow * dt) / slow]]), np.eye(1), np.zeros((1, 1)), dt)
+    return model(
+        np.array([[np.exp(-slow * dt)]]),
+        np.array([[-np.expm1(-slow * dt) / slow]]),
+        np.eye(1),
+        np.zeros((1, 1)),
+        dt,
+    )
 
 
 def test_the_gap_does_not_depend_on_how_finely_a_slow_pole_is_sampled():
-    """A pole 1e-10 inside the circle was once taken to lie on it, and frequencies below 1e-3 rad/s were never looked at."""
+    """A pole 1e-10 inside the circle was once taken to lie on it, and frequencies below 1e-3 rad/s
+    were never looked at.
+    """
     expected = nu_gap(lag(1e-2), lag(1e-2, 0.03))
     for dt in (1e-4, 1e-8):
         # a hold of 1e-2 s differs from none by half a sample's phase at the crossover of 1 rad/s
@@ -74,14 +91,18 @@ def test_the_gap_does_not_depend_on_how_finely_a_slow_pole_is_sampled():
 
 
 def test_turns_at_the_sharpest_resonance_are_counted():
-    """k/(s^2 + 2 z s + 1) with z = 1e-7 and -1e-7: both are at infinity on the sphere where they differ, so they are close."""
+    """k/(s^2 + 2 z s + 1) with z = 1e-7 and -1e-7: both are at infinity on the sphere where they
+    differ, so they are close.
+    """
 
     def resonance(damping, dt=0.1):
         A = np.array([[0.0, 1.0], [-1.0, -2 * damping]])
         inverse = np.linalg.inv(np.eye(2) - 0.5 * dt * A)
         B = inverse @ np.array([[0.0], [dt]])
         C = np.array([[1.0, 0.0]]) @ inverse
-        return model(inverse @ (np.eye(2) + 0.5 * dt * A), B, C, 0.5 * np.array([[1.0, 0.0]]) @ B, dt)
+        return model(
+            inverse @ (np.eye(2) + 0.5 * dt * A), B, C, 0.5 * np.array([[1.0, 0.0]]) @ B, dt
+        )
 
     assert nu_gap(resonance(1e-7), resonance(-1e-7)) < 1e-5
 

@@ -10,20 +10,33 @@ P = Scheduling("p", "1", 0.0, 1.0)
 
 
 def lti(n=6, seed=0, dt=None, shift=0.0):
-    """A random model with poles of real part about -1 (or inside a disk of radius 0.85), moved by `shift`."""
+    """A random model with poles of real part about -1 (or inside a disk of radius 0.85), moved by
+    `shift`.
+    """
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(n, n))
     radius = np.abs(np.linalg.eigvals(A)).max()
     A = A / radius * 0.85 if dt else A - (np.linalg.eigvals(A).real.max() + 0.3) * np.eye(n)
     A = A + shift * np.eye(n)
     B, C = rng.normal(size=(n, 2)), rng.normal(size=(2, n))
-    return LinearModel(A, B, C, 0.1 * rng.normal(size=(2, 2)), tuple(f"x{i}" for i in range(n)), ("u", "v"), ("y", "z"), dt=dt)  # type: ignore[arg-type]
+    return LinearModel(
+        A,
+        B,
+        C,
+        0.1 * rng.normal(size=(2, 2)),
+        tuple(f"x{i}" for i in range(n)),
+        ("u", "v"),
+        ("y", "z"),
+        dt=dt,
+    )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.9])
 @pytest.mark.parametrize("order", [2, 4])
 def test_nu_gap_stays_below_twice_the_tail_of_the_coprime_factors(order, shift):
-    """With s^2 = v^2 / (1 + v^2) the Hankel singular values of the normalised coprime factors: Meyer (1990), continuous time."""
+    """With s^2 = v^2 / (1 + v^2) the Hankel singular values of the normalised coprime factors:
+    Meyer (1990), continuous time.
+    """
     full = lti(shift=shift)
     assert full.is_stable() == (shift == 0.0)
     found = reduce(full, order)
@@ -44,7 +57,9 @@ def test_the_reported_gap_is_that_of_the_frozen_models():
 
 
 def lpv(dt, unseen=2):
-    """Three states that depend on p and `unseen` ones that no input reaches, mixed by a constant transformation."""
+    """Three states that depend on p and `unseen` ones that no input reaches, mixed by a constant
+    transformation.
+    """
     rng = np.random.default_rng(3)
     n = 3 + unseen
     A0, A1 = np.zeros((n, n)), np.zeros((n, n))
@@ -68,14 +83,30 @@ def test_states_that_no_input_reaches_cost_nothing(dt):
     assert found.model.basis == full.basis
     for p in (0.0, 0.33, 1.0):
         omega = np.array([0.1, 1.0, 10.0])
-        np.testing.assert_allclose(found.model.at(p).frequency_response(omega), full.at(p).frequency_response(omega), rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(
+            found.model.at(p).frequency_response(omega),
+            full.at(p).frequency_response(omega),
+            rtol=1e-6,
+            atol=1e-8,
+        )
     with pytest.raises(InputError, match="only 3 of the 5 states can be excited and seen"):
         full.reduce(4)
 
 
 def test_reduction_does_not_depend_on_units_once_channels_are_scaled():
     full = lpv(0.05)
-    other = LPVStateSpace(full.basis, full.A, 1e-3 * full.B, 50 * full.C, 0.05 * full.D, P, full.states, full.inputs, full.outputs, 0.05)
+    other = LPVStateSpace(
+        full.basis,
+        full.A,
+        1e-3 * full.B,
+        50 * full.C,
+        0.05 * full.D,
+        P,
+        full.states,
+        full.inputs,
+        full.outputs,
+        0.05,
+    )
     first, second = full.reduce(2), other.reduce(2, input_scale=1e3, output_scale=50.0)
     np.testing.assert_allclose(second.nu_gap, first.nu_gap, atol=1e-7)
     assert first.nu_gap.max() > 1e-3
@@ -86,6 +117,15 @@ def test_what_cannot_be_reduced_is_refused_in_words():
     for order in (0, 5, 2.0):
         with pytest.raises(InputError, match="order: expected an integer from 1 to 4"):
             full.reduce(order)  # type: ignore[arg-type]
-    hidden = LinearModel(np.diag([0.5, 1.5, 0.3]), [[1.0], [0.0], [1.0]], [[1.0, 1.0, 0.0]], [[0.0]], "abc", ("u",), ("y",), dt=0.1)  # type: ignore[arg-type]
+    hidden = LinearModel(
+        np.diag([0.5, 1.5, 0.3]),
+        [[1.0], [0.0], [1.0]],
+        [[1.0, 1.0, 0.0]],
+        [[0.0]],
+        "abc",
+        ("u",),
+        ("y",),
+        dt=0.1,
+    )  # type: ignore[arg-type]
     with pytest.raises(InputError, match="not stabilisable and detectable"):
         reduce(hidden, 1)

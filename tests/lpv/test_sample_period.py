@@ -1,4 +1,6 @@
-"""A record of 50 Hz says 0.02 s, whatever subtraction makes of its stamps, and goes with whatever else runs at 0.02 s."""
+"""A record of 50 Hz says 0.02 s, whatever subtraction makes of its stamps, and goes with whatever
+else runs at 0.02 s.
+"""
 
 import re
 
@@ -17,7 +19,9 @@ def record(time):
     return FlightRecord(time, np.zeros((len(time), 1)), ("q",))
 
 
-@pytest.mark.parametrize("dt", [0.02, 0.01, 0.0084, 0.05, 1 / 30, 1 / 400, 0.1, 1.0, 2.5, 60.0, 1 / 3])
+@pytest.mark.parametrize(
+    "dt", [0.02, 0.01, 0.0084, 0.05, 1 / 30, 1 / 400, 0.1, 1.0, 2.5, 60.0, 1 / 3]
+)
 @pytest.mark.parametrize("start", [0.0, 12.34, 1e5])
 def test_the_period_of_a_clean_clock_is_the_number_that_was_meant(dt, start):
     for n in (2, 100, 5000):
@@ -59,11 +63,18 @@ def test_models_go_together_where_their_periods_differ_by_rounding_and_not_other
 
 @pytest.mark.parametrize(("step", "unit"), [(20.0, "ms"), (20000.0, "us"), (2e7, "ns")])
 def test_a_time_in_another_unit_is_asked_for(step, unit):
-    with pytest.warns(DataWarning, match=rf"{re.escape(f'{step:.6g}')} s apart; if the time is in {unit}.*--time-unit {unit}"):
+    with pytest.warns(
+        DataWarning,
+        match=rf"{re.escape(f'{step:.6g}')} s apart; if the time is in {unit}.*--time-unit {unit}",
+    ):
         FlightRecord.from_arrays(step * np.arange(9), {"q": "rad/s"}, q=np.zeros(9))
 
 
 def test_a_step_no_flight_recorder_has_is_asked_about_once():
-    with pytest.warns(DataWarning, match="2e-05 s apart; the time is taken in seconds: check its unit"):
+    with pytest.warns(
+        DataWarning, match="2e-05 s apart; the time is taken in seconds: check its unit"
+    ):
         got = FlightRecord.from_arrays(2e-5 * np.arange(9), {"q": "rad/s"}, q=np.zeros(9))
-    assert "p" in got.with_signals({"p": "1"}, p=np.zeros(9)).signals  # warnings are errors here: nothing is said again
+    assert (
+        "p" in got.with_signals({"p": "1"}, p=np.zeros(9)).signals
+    )  # warnings are errors here: nothing is said again

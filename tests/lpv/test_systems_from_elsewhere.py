@@ -1,4 +1,6 @@
-"""Matrices, gains and python-control systems from elsewhere go in by the same doors as the models of this package."""
+"""Matrices, gains and python-control systems from elsewhere go in by the same doors as the models
+of this package.
+"""
 
 import control
 import numpy as np
@@ -6,7 +8,17 @@ import pytest
 from families import SPEED, random_lpv, stacked
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LinearFamily, LinearModel, LPVStateSpace, PiecewiseLinear, append, connect, feedback, parallel, series
+from symheli.lpv import (
+    LinearFamily,
+    LinearModel,
+    LPVStateSpace,
+    PiecewiseLinear,
+    append,
+    connect,
+    feedback,
+    parallel,
+    series,
+)
 from symheli.stitched_model import StitchedModel
 
 PLANT = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ("v",), ("d_col",), ("q",))
@@ -17,8 +29,18 @@ def compensator(**names):
 
 
 def test_units_and_names_come_with_a_system_of_python_control():
-    model = LinearModel.from_control(compensator(), states=["lag"], inputs=["q"], outputs=["command"], units={"lag": "m", "command": "V"})
-    assert [(str(s), s.unit) for s in (*model.states, *model.inputs, *model.outputs)] == [("lag", "m"), ("q", "rad/s"), ("command", "V")]
+    model = LinearModel.from_control(
+        compensator(),
+        states=["lag"],
+        inputs=["q"],
+        outputs=["command"],
+        units={"lag": "m", "command": "V"},
+    )
+    assert [(str(s), s.unit) for s in (*model.states, *model.inputs, *model.outputs)] == [
+        ("lag", "m"),
+        ("q", "rad/s"),
+        ("command", "V"),
+    ]
     with pytest.raises(UnknownNameError, match="did you mean 'lag'"):
         LinearModel.from_control(compensator(), states=["lag"], units={"lg": "m"})
     transfer = LinearModel.from_control(control.tf([2.0], [1.0, 3.0]))
@@ -32,9 +54,17 @@ def test_units_and_names_come_with_a_system_of_python_control():
 def test_a_python_control_system_connects_by_its_names():
     # "e" carries no unit, as python-control's signals do
     plant = LinearModel(PLANT.A, PLANT.B, PLANT.C, PLANT.D, ("v",), ("u",), ("y",))
-    loop = connect(plant, compensator(inputs="y", outputs="e"), inputs=["r"], outputs=["y"], sums={"u": {"r": 1.0, "e": -1.0}})
+    loop = connect(
+        plant,
+        compensator(inputs="y", outputs="e"),
+        inputs=["r"],
+        outputs=["y"],
+        sums={"u": {"r": 1.0, "e": -1.0}},
+    )
     expected = control.feedback(plant.to_control(), compensator())
-    assert loop.at().frequency_response([0.7])[0, 0, 0] == pytest.approx(complex(expected(0.7j)), rel=1e-12)
+    assert loop.at().frequency_response([0.7])[0, 0, 0] == pytest.approx(
+        complex(expected(0.7j)), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("join", [feedback, series, parallel, append])
@@ -43,18 +73,26 @@ def test_gains_lpv_models_and_python_control_systems_are_joined_in_their_order(j
     theirs = compensator()
     ours = LinearModel.from_control(theirs)
     for p in (0.0, 7.0):
-        np.testing.assert_array_equal(stacked(join(lpv, theirs).at(p)), stacked(join(lpv.to_lft(), ours).at(p)))
+        np.testing.assert_array_equal(
+            stacked(join(lpv, theirs).at(p)), stacked(join(lpv.to_lft(), ours).at(p))
+        )
         for gain in (2.0, [[2.0]], np.array([[2.0]])):
             named = LinearModel.gain([[2.0]], ["a"], ["b"])
-            np.testing.assert_array_equal(stacked(join(lpv, gain).at(p)), stacked(join(lpv.to_lft(), named).at(p)))
+            np.testing.assert_array_equal(
+                stacked(join(lpv, gain).at(p)), stacked(join(lpv.to_lft(), named).at(p))
+            )
 
 
 def test_what_has_no_states_goes_with_any_sample_period():
     sampled = PLANT.discretize(0.1)
     for gain in (LinearModel.gain([[3.0]], ["q"], ["e"]), 3.0, control.ss([], [], [], [[3.0]])):
         assert series(sampled, gain).dt == 0.1
-        assert series(sampled, gain).at().frequency_response([1.0]) == pytest.approx(3 * sampled.frequency_response([1.0]), rel=1e-14)
-    with pytest.raises(InputError, match=r"one sample period, got 0.1 s, continuous; discretize the continuous"):
+        assert series(sampled, gain).at().frequency_response([1.0]) == pytest.approx(
+            3 * sampled.frequency_response([1.0]), rel=1e-14
+        )
+    with pytest.raises(
+        InputError, match=r"one sample period, got 0.1 s, continuous; discretize the continuous"
+    ):
         series(sampled, PLANT)
 
 
@@ -64,15 +102,25 @@ def test_what_cannot_be_connected_is_told_what_can():
     with pytest.raises(InputError, match="or a system of python-control to connect, got dict"):
         append(PLANT, {})
     spline = LPVStateSpace(
-        PiecewiseLinear((0.0, 13.0)), np.zeros((2, 1, 1)), np.zeros((2, 1, 1)), np.zeros((2, 1, 1)), np.zeros((2, 1, 1)), SPEED,
-        ("x",), ("u",), ("y",),
-    )  # fmt: skip
+        PiecewiseLinear((0.0, 13.0)),
+        np.zeros((2, 1, 1)),
+        np.zeros((2, 1, 1)),
+        np.zeros((2, 1, 1)),
+        np.zeros((2, 1, 1)),
+        SPEED,
+        ("x",),
+        ("u",),
+        ("y",),
+    )
     with pytest.raises(InputError, match="interpolate with kind='polynomial'"):
         append(spline)
 
 
 def test_a_family_of_matrices_from_elsewhere_has_no_trims_and_interpolates_all_the_same():
-    models = [LinearModel([[-1.0 - v]], [[1.0]], [[1.0]], [[0.0]], ("u",), ("d_col",), ("u",)) for v in (0.0, 5.0, 13.0)]
+    models = [
+        LinearModel([[-1.0 - v]], [[1.0]], [[1.0]], [[0.0]], ("u",), ("d_col",), ("u",))
+        for v in (0.0, 5.0, 13.0)
+    ]
     family = LinearFamily.from_models([0.0, 5.0, 13.0], models)
     assert family[1].point is None
     lpv = family.select(["u"]).interpolate("polynomial", 1)
@@ -90,7 +138,16 @@ def test_a_stitched_model_says_that_it_needs_trims(ideal):
     import symheli
 
     family = symheli.sweep(ideal, [0.0, 5.0])
-    bare = LinearFamily(family.airspeeds, family.A, family.B, family.C, family.D, family.states, family.inputs, family.outputs)
+    bare = LinearFamily(
+        family.airspeeds,
+        family.A,
+        family.B,
+        family.C,
+        family.D,
+        family.states,
+        family.inputs,
+        family.outputs,
+    )
     with pytest.raises(InputError, match="a stitched model needs the trim at each airspeed"):
         StitchedModel.from_family(bare)
 
@@ -99,6 +156,8 @@ def test_loops_through_feedthrough_are_solved():
     model = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.5]], ("x",), ("u",), ("y",))
     closed = model.feedback({("u", "y"): -1.0})
     expected = control.feedback(model.to_control(), control.ss([], [], [], [[1.0]]))
-    assert closed.frequency_response([0.3])[0, 0, 0] == pytest.approx(complex(expected(0.3j)), rel=1e-12)
+    assert closed.frequency_response([0.3])[0, 0, 0] == pytest.approx(
+        complex(expected(0.3j)), rel=1e-12
+    )
     with pytest.raises(InputError, match="not well posed"):
         model.feedback({("u", "y"): 2.0})

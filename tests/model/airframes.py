@@ -1,4 +1,6 @@
-"""Vehicle files for tests: the packaged X-Cell with something changed, written where a user would."""
+"""Vehicle files for tests: the packaged X-Cell with something changed, written where a user
+would.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ XCELL = (resources.files("symheli.vehicles") / "xcell60.toml").read_text(encodin
 
 
 def write(folder, *sections, name="mine.toml", **changes):
-    """The X-Cell's file with `sections` appended and {entry line: other text} replaced; its path."""
+    """The X-Cell's file with `sections` appended and {entry line: other text} replaced; its
+    path.
+    """
     text = XCELL
     for old, new in changes.get("replace", {}).items():
         assert len(re.findall(re.escape(old), text)) >= 1, f"{old!r} is not in the file"
@@ -21,7 +25,9 @@ def write(folder, *sections, name="mine.toml", **changes):
 
 
 DOCS = (Path(__file__).resolve().parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
-WING_COMPONENT, WING = (re.findall(rf"```{language}\n(.*?)```", DOCS, re.DOTALL)[0] for language in ("python", "toml"))
+WING_COMPONENT, WING = (
+    re.findall(rf"```{language}\n(.*?)```", DOCS, re.DOTALL)[0] for language in ("python", "toml")
+)
 """The wing of the documentation, so that it is known to work."""
 
 AFT_ROTOR = """

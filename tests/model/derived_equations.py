@@ -1,4 +1,5 @@
-"""Equations of motion derived by Kane's method in SymPy: a rigid body with a rotor that spins about its z axis.
+"""Equations of motion derived by Kane's method in SymPy: a rigid body with a rotor that spins about
+its z axis.
 
 Nothing here comes from the model: frames, velocities and the principle of virtual power only.
 """
@@ -9,22 +10,33 @@ from functools import cache
 
 import numpy as np
 import sympy
-from sympy.physics.mechanics import KanesMethod, Point, ReferenceFrame, RigidBody, dynamicsymbols, inertia
+from sympy.physics.mechanics import (
+    KanesMethod,
+    Point,
+    ReferenceFrame,
+    RigidBody,
+    dynamicsymbols,
+    inertia,
+)
 
 SPEEDS = "u v w p q r Om"
-"""Velocity of the c.g. and angular velocity in body axes; speed of the rotor relative to the body."""
+"""Velocity of the c.g. and angular velocity in body axes; speed of the rotor relative to the
+body.
+"""
 
 GIVEN = "X Y Z L M N Q_e Q_a g m Ixx Iyy Izz I_rot"
-"""Force and moment on the body, torque of the engine on the rotor (its reaction on the body) and of the air against the rotor,
-gravity, mass, moments of inertia."""
+"""Force and moment on the body, torque of the engine on the rotor (its reaction on the body) and of
+the air against the rotor, gravity, mass, moments of inertia.
+"""
 
 
 @cache
 def derived(attitude):
     """(accelerations, kinematics): functions of (coordinates, speeds, given).
 
-    attitude: "euler" (psi theta phi, yaw pitch roll) or "quaternion" (scalar first). Coordinates: position north east down,
-    attitude, rotor angle. `accelerations` gives u' v' w' p' q' r' Om'; `kinematics` the derivatives of position and attitude.
+    attitude: "euler" (psi theta phi, yaw pitch roll) or "quaternion" (scalar first). Coordinates:
+    position north east down, attitude, rotor angle. `accelerations` gives u' v' w' p' q' r' Om';
+    `kinematics` the derivatives of position and attitude.
     """
     given = sympy.symbols(GIVEN)
     X, Y, Z, L, M, N, Q_e, Q_a, g, m, Ixx, Iyy, Izz, I_rot = given
@@ -43,8 +55,12 @@ def derived(attitude):
     if attitude == "quaternion":
         turning.append(sum(a * a.diff() for a in turns))  # unit length
     velocity = u * body.x + v * body.y + w * body.z
-    moving = [velocity.dot(axis) - coordinate.diff() for axis, coordinate in zip(earth, position, strict=True)]
-    # the angular velocities are given by the speeds themselves, so that no attitude rate is left in the dynamics
+    moving = [
+        velocity.dot(axis) - coordinate.diff()
+        for axis, coordinate in zip(earth, position, strict=True)
+    ]
+    # the angular velocities are given by the speeds themselves, so that no attitude rate is left in
+    # the dynamics
     body.set_ang_vel(earth, p * body.x + q * body.y + r * body.z)
     rotor.orient_axis(body, body.z, angle)
     rotor.set_ang_vel(body, Om * body.z)
@@ -58,10 +74,14 @@ def derived(attitude):
         (rotor, (Q_e - Q_a) * body.z),
     ]
     coordinates = [*position, *turns, angle]
-    kane = KanesMethod(earth, q_ind=coordinates, u_ind=speeds, kd_eqs=[*moving, *turning, angle.diff() - Om])
+    kane = KanesMethod(
+        earth, q_ind=coordinates, u_ind=speeds, kd_eqs=[*moving, *turning, angle.diff() - Om]
+    )
     kane.kanes_equations([whole, spinning], loads)
     rates = kane.kindiffdict()
     arguments = [coordinates, speeds, given]
     balance = sympy.lambdify(arguments, [kane.mass_matrix, kane.forcing], cse=True)
     kinematics = sympy.lambdify(arguments, [rates[c.diff()] for c in (*position, *turns)], cse=True)
-    return lambda *values: np.linalg.solve(*balance(*values)).ravel(), lambda *values: np.array(kinematics(*values))
+    return lambda *values: np.linalg.solve(*balance(*values)).ravel(), lambda *values: np.array(
+        kinematics(*values)
+    )

@@ -28,7 +28,10 @@ def test_a_used_helicopter_is_copied_and_flies_as_before(used, travel):
     other = travel(used)
     assert other == used
     point = symheli.trim(used, 5.0)
-    np.testing.assert_array_equal(other.numeric("rhs")(point.x.array, point.u.array, 0.0)[0], used.numeric("rhs")(point.x, point.u, 0.0)[0])
+    np.testing.assert_array_equal(
+        other.numeric("rhs")(point.x.array, point.u.array, 0.0)[0],
+        used.numeric("rhs")(point.x, point.u, 0.0)[0],
+    )
     stitched = symheli.StitchedModel.from_family(symheli.sweep(other, [0.0, 5.0]))
     assert len(pickle.loads(pickle.dumps(stitched)).states) == len(other.states)
 

@@ -1,4 +1,6 @@
-"""The packaged airframes: converted from their sources, scaled exactly, and a linear model from the literature."""
+"""The packaged airframes: converted from their sources, scaled exactly, and a linear model from the
+literature.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ R50 = (resources.files("symheli.vehicles") / "r50_hover.linear.toml").read_text(
 @pytest.mark.parametrize("governor", ["ideal", "pi"])
 @pytest.mark.parametrize("name", vehicles())
 def test_every_packaged_airframe_trims_along_the_transition(name, governor):
-    family = symheli.sweep(symheli.Helicopter.load(name, governor=governor), [0.0, 3.0, 6.0, 10.0, 15.0])
+    family = symheli.sweep(
+        symheli.Helicopter.load(name, governor=governor), [0.0, 3.0, 6.0, 10.0, 15.0]
+    )
     assert all(point.attainable for point in family.trims)
 
 
@@ -33,50 +37,83 @@ def test_kahn_hudson_values_are_the_source_values_converted():
             assert quantity.value == pytest.approx(factor * float(stated[1]), rel=5e-6), name
             checked += 1
     assert checked == 27
-    assert set(vehicle.assumed) == {n for n, q in vehicle.quantities.items() if not q.source.startswith("KH")}
+    assert set(vehicle.assumed) == {
+        n for n, q in vehicle.quantities.items() if not q.source.startswith("KH")
+    }
     blade, offset = 0.0847 * to_si("slug ft^2")[0], 0.0225 / 2.25  # I_b, e/R
-    stiffness = 0.75 * vehicle.values("main_rotor")["blades"] * blade * vehicle.values("drivetrain")["nominal_speed"] ** 2 * offset
+    stiffness = (
+        0.75
+        * vehicle.values("main_rotor")["blades"]
+        * blade
+        * vehicle.values("drivetrain")["nominal_speed"] ** 2
+        * offset
+    )
     assert vehicle.values("vertical_fin")["lift_slope"] == pytest.approx(1.4339 / 0.275, rel=1e-5)
     assert vehicle.values("main_rotor")["hub_stiffness"] == pytest.approx(stiffness, rel=1e-5)
 
 
 def test_more_blades_of_less_chord_are_the_same_rotor(ideal):
-    """Blades enter by the solidity b c/(pi R) alone; one blade more of the same chord is another rotor."""
+    """Blades enter by the solidity b c/(pi R) alone; one blade more of the same chord is another
+    rotor.
+    """
     chord = ideal.vehicle.values("main_rotor")["chord"]
     for other, same in (({"blades": 4, "chord": chord / 2}, True), ({"blades": 3}, False)):
-        changed = ideal.with_parameters({f"main_rotor.{entry}": value for entry, value in other.items()})
+        changed = ideal.with_parameters(
+            {f"main_rotor.{entry}": value for entry, value in other.items()}
+        )
         one, two = (symheli.trim(heli, 8.0) for heli in (ideal, changed))
-        assert np.allclose(two.u.array, one.u.array, rtol=0, atol=1e-13) == same  # rounding of the solidity through Newton's method
+        assert (
+            np.allclose(two.u.array, one.u.array, rtol=0, atol=1e-13) == same
+        )  # rounding of the solidity through Newton's method
 
 
 @pytest.mark.parametrize("factor", [0.3, 5.0])
 @pytest.mark.parametrize("name", vehicles())
 def test_froude_scaling_is_exact_similarity(name, factor):
-    """At sqrt(N) times the speed the same angles hold the scaled helicopter; its eigenvalues are N^-0.5 times, forces N^3."""
+    """At sqrt(N) times the speed the same angles hold the scaled helicopter; its eigenvalues are
+    N^-0.5 times, forces N^3.
+    """
     heli = symheli.Helicopter.load(name, governor="pi")
     copy = heli.scaled(factor)
     for speed in (0.0, 4.0, 11.0):
         one, other = symheli.trim(heli, speed), symheli.trim(copy, speed * factor**0.5)
-        np.testing.assert_allclose(other.u.array, one.u.array, atol=1e-12)  # rounding through Newton's method
+        np.testing.assert_allclose(
+            other.u.array, one.u.array, atol=1e-12
+        )  # rounding through Newton's method
         angles = [heli.states.index(s) for s in ("phi", "theta", "a1", "b1")]
         np.testing.assert_allclose(other.x.array[angles], one.x.array[angles], atol=1e-12)
         assert other.x["Om"] == pytest.approx(one.x["Om"] * factor**-0.5, rel=1e-14)
-        poles, copies = (np.sort_complex(symheli.linearize(h, p).poles()) for h, p in ((heli, one), (copy, other)))
-        np.testing.assert_allclose(copies * factor**0.5, poles, atol=1e-11)  # entries up to 300, rounding 1e-14 of them
-        thrust = [h.compiled("diagnostics")(x=p.x.array, u=p.u.array, wind=0)["T_mr"] for h, p in ((heli, one), (copy, other))]
+        poles, copies = (
+            np.sort_complex(symheli.linearize(h, p).poles())
+            for h, p in ((heli, one), (copy, other))
+        )
+        np.testing.assert_allclose(
+            copies * factor**0.5, poles, atol=1e-11
+        )  # entries up to 300, rounding 1e-14 of them
+        thrust = [
+            h.compiled("diagnostics")(x=p.x.array, u=p.u.array, wind=0)["T_mr"]
+            for h, p in ((heli, one), (copy, other))
+        ]
         assert float(thrust[1]) == pytest.approx(float(thrust[0]) * factor**3, rel=1e-12)
 
 
 def test_scaling_follows_the_units_of_the_entries(ideal):
     copy = ideal.scaled(4.0).vehicle
-    ratio = {name: q.value / ideal.vehicle.quantities[name].value for name, q in copy.quantities.items()}
+    ratio = {
+        name: q.value / ideal.vehicle.quantities[name].value for name, q in copy.quantities.items()
+    }
     assert ratio["body.mass"] == pytest.approx(4.0**3)
     assert ratio["body.Izz"] == pytest.approx(4.0**5)
     assert ratio["main_rotor.hub_stiffness"] == pytest.approx(4.0**4)
     assert ratio["drivetrain.max_power"] == pytest.approx(4.0**3.5)
     assert ratio["drivetrain.nominal_speed"] == pytest.approx(0.5)
     assert ratio["drivetrain.governor_kp"] == pytest.approx(2.0)
-    assert ratio["drivetrain.governor_ki"] == ratio["controls.d_lon"] == ratio["main_rotor.lift_slope"] == 1.0
+    assert (
+        ratio["drivetrain.governor_ki"]
+        == ratio["controls.d_lon"]
+        == ratio["main_rotor.lift_slope"]
+        == 1.0
+    )
     assert "Froude-scaled by 4" in copy.title
     assert copy.values("tail_wake")["rotor_radius"] == copy.values("main_rotor")["radius"]
     for wrong in (0.0, -1.0, np.inf):
@@ -85,7 +122,9 @@ def test_scaling_follows_the_units_of_the_entries(ideal):
 
 
 def test_r50_in_hover_keeps_the_constraints_of_its_identification():
-    """X_a = -g, Y_b = g, N_rfb = -N_ped and K_rfb = 2 N_r were held; the roll mode follows sqrt(L_b) where flapping is slow."""
+    """X_a = -g, Y_b = g, N_rfb = -N_ped and K_rfb = 2 N_r were held; the roll mode follows
+    sqrt(L_b) where flapping is slow.
+    """
     model = symheli.identified_model("r50_hover")
     par = {name: quantity.value for name, quantity in model.parameters.items()}
     assert par["X_a"] == -par["g"]
@@ -95,9 +134,17 @@ def test_r50_in_hover_keeps_the_constraints_of_its_identification():
     assert {"N_v", "N_w"} <= set(model.assumed)
     assert "disputed" in model.parameters["N_v"].source
     # p' = L_b b, b' = -p - b/tau_f: s^2 + s/tau_f + L_b
-    np.testing.assert_allclose(np.sort(model.select(["p", "b"]).poles()), np.sort(np.roots([1, 1 / 0.0463, 166.1])), rtol=1e-12)
-    yaw = np.sort_complex(model.select(["r", "r_fb"]).poles())  # s^2 + 12.39 s + N_r K_rfb - N_rfb K_r
-    np.testing.assert_allclose(yaw, np.sort_complex(np.roots([1, 12.39, 4.13 * 8.26 + 33.1 * 2.16])), rtol=1e-12)
+    np.testing.assert_allclose(
+        np.sort(model.select(["p", "b"]).poles()),
+        np.sort(np.roots([1, 1 / 0.0463, 166.1])),
+        rtol=1e-12,
+    )
+    yaw = np.sort_complex(
+        model.select(["r", "r_fb"]).poles()
+    )  # s^2 + 12.39 s + N_r K_rfb - N_rfb K_r
+    np.testing.assert_allclose(
+        yaw, np.sort_complex(np.roots([1, 12.39, 4.13 * 8.26 + 33.1 * 2.16])), rtol=1e-12
+    )
     assert not model.is_stable()  # a hovering helicopter without autopilot
 
 
@@ -110,7 +157,9 @@ def test_r50_in_feet_and_in_si_have_the_same_poles(tmp_path):
     A = model.A * feet[:, None] / feet
     assert A[0, 0] == pytest.approx(-0.0505)
     assert A[8, 7] == pytest.approx(-131.2)  # Z_b in ft/s^2
-    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(model.poles()), atol=1e-9)
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(model.poles()), atol=1e-9
+    )
     assert [s.unit for s in model.states[:3]] == ["m/s", "m/s", "rad/s"]
     assert model.select(["r", "r_fb"], ["ped"]).title == model.title
 
@@ -129,7 +178,11 @@ def test_r50_in_feet_and_in_si_have_the_same_poles(tmp_path):
         ("X_u*u", "abs(u)", "expected names, numbers and"),
         ("X_u*u", "X_u*(u", "cannot be evaluated"),
         ('phi = "p"\n', "", "one equation a state"),
-        ('X_u = { value = -0.0505, unit = "1/s"', 'X_u = { value = -0.0505, unit = "1/sec"', "unknown unit '1/sec'"),
+        (
+            'X_u = { value = -0.0505, unit = "1/s"',
+            'X_u = { value = -0.0505, unit = "1/sec"',
+            "unknown unit '1/sec'",
+        ),
         ("[inputs]", "[input]", r"section \[inputs\] is missing"),
     ],
 )

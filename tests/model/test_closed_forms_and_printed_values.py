@@ -24,10 +24,17 @@ def hover_with_thrust_equal_to_weight(heli):
         x[heli.states.index("Om")] = OM
 
     def excess(d_col):
-        return float(heli.compiled("diagnostics")(x=x, u=[0, 0, d_col, 0.25], wind=0)["T_mr"]) - M * GRAVITY
+        return (
+            float(heli.compiled("diagnostics")(x=x, u=[0, 0, d_col, 0.25], wind=0)["T_mr"])
+            - M * GRAVITY
+        )
 
     d_col = brentq(excess, 0.02, 0.17, xtol=1e-14)
-    return x, np.array([0, 0, d_col, 0.25]), heli.compiled("diagnostics")(x=x, u=[0, 0, d_col, 0.25], wind=0)
+    return (
+        x,
+        np.array([0, 0, d_col, 0.25]),
+        heli.compiled("diagnostics")(x=x, u=[0, 0, d_col, 0.25], wind=0),
+    )
 
 
 def test_hover_inflow_thrust_and_collective(ideal):
@@ -49,7 +56,9 @@ def test_ideal_inflow_gives_the_printed_induced_velocity_and_torque():
 
 
 def test_hover_derivatives_meet_their_closed_forms(ideal):
-    """Z_w and Z_col of the rotor alone; the fuselage in the downwash adds to both and is removed by its drag areas."""
+    """Z_w and Z_col of the rotor alone; the fuselage in the downwash adds to both and is removed by
+    its drag areas.
+    """
     x, u, d = hover_with_thrust_equal_to_weight(ideal)
     lam = float(d["lam0"])
     A, B, _ = (np.array(m) for m in ideal.compiled("jacobian")(x, u, np.zeros(3)))
@@ -58,8 +67,8 @@ def test_hover_derivatives_meet_their_closed_forms(ideal):
     z_col = -(SCALE / M) * (8 / 3) * SLOPE * SIGMA * ETA * lam / denominator
     assert z_w == pytest.approx(-0.778, abs=5e-4)
     assert z_col == pytest.approx(-134.3, abs=0.05)
-    # fuselage: Z = 0.5 rho S_z (V_i - w)^2, dZ/dV_i with V_i = lam Om R; dlam/dw and dlam/dcol follow from the thrust slope:
-    # C_T = 2 eta lam (lam - mu_z)
+    # fuselage: Z = 0.5 rho S_z (V_i - w)^2, dZ/dV_i with V_i = lam Om R; dlam/dw and dlam/dcol
+    # follow from the thrust slope: C_T = 2 eta lam (lam - mu_z)
     tip, area = OM * R, 0.15
     dct_dw, dct_dcol = -z_w * M / SCALE, -z_col * M / SCALE
     dlam_dw = (dct_dw + 2 * ETA * lam / tip) / (4 * ETA * lam)
@@ -88,7 +97,9 @@ def test_tail_rotor_derivatives_in_hover_are_inside_the_reading_error(ideal):
 
 
 def test_yaw_response_to_collective_depends_on_the_governor(ideal, pi):
-    """Frozen engine torque gives about 0, the ideal governor -117 1/s^2 per rad; pedal 136 against 91."""
+    """Frozen engine torque gives about 0, the ideal governor -117 1/s^2 per rad; pedal 136 against
+    91.
+    """
     rows = {}
     for heli in (ideal, pi):
         lin = symheli.linearize(heli, symheli.trim(heli, 0.0))
@@ -100,7 +111,9 @@ def test_yaw_response_to_collective_depends_on_the_governor(ideal, pi):
 
 
 def test_governor_poles_match_the_linearised_rotor_equation(pi):
-    """a11 = -(3 Q0 + P_max K_p)/(Om I_rot), a12 = P_max K_i/(Om I_rot), a21 = -1 with the body held."""
+    """a11 = -(3 Q0 + P_max K_p)/(Om I_rot), a12 = P_max K_i/(Om I_rot), a21 = -1 with the body
+    held.
+    """
     hover = symheli.trim(pi, 0.0)
     lin = symheli.linearize(pi, hover)
     Om, om_i, r = (lin.states.index(s) for s in ("Om", "om_i", "r"))

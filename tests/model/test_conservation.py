@@ -1,4 +1,6 @@
-"""What must not change: energy, momentum, angular momentum; and what the two attitude forms must share."""
+"""What must not change: energy, momentum, angular momentum; and what the two attitude forms must
+share.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ import symheli
 from symheli.rigid_body import GRAVITY
 
 NO_AIR = {"density": 1e-30, "main_rotor.hub_stiffness": 0.0}
-"""Without air there is no thrust, and without stiffness the hub passes on no flapping: gravity and the engine are left."""
+"""Without air there is no thrust, and without stiffness the hub passes on no flapping: gravity and
+the engine are left.
+"""
 
 U = np.array([0.0, 0.0, 0.1, 0.2])
 
@@ -47,33 +51,49 @@ def invariants(heli, x):
     body = heli.vehicle.values("body")
     inertia = np.array([body["Ixx"], body["Iyy"], body["Izz"]])
     turned = Rotation.from_quat(np.roll(x[6:10], -1))
-    energy = 0.5 * body["mass"] * x[:3] @ x[:3] + 0.5 * inertia @ x[3:6] ** 2 - body["mass"] * GRAVITY * x[12]
+    energy = (
+        0.5 * body["mass"] * x[:3] @ x[:3]
+        + 0.5 * inertia @ x[3:6] ** 2
+        - body["mass"] * GRAVITY * x[12]
+    )
     return energy, turned.apply(inertia * x[3:6]), x[10:13]
 
 
-def test_tumbling_body_keeps_energy_and_angular_momentum_and_falls_along_a_parabola_to_integrator_order(pi):
-    """Throttle shut and no air: 2 s of tumbling; every error falls by 2^4 when the step is halved."""
+def test_tumbling_body_keeps_energy_and_angular_momentum_to_integrator_order(pi):
+    """Throttle shut and no air: 2 s of tumbling; every error falls by 2^4 when the step is
+    halved.
+    """
     heli = pi.with_parameters(NO_AIR)
-    start = in_flight(heli, u=6.0, v=-2.0, w=1.0, p=3.0, q=-2.0, r=1.0, Om=250.0)  # above its command: the governor asks for nothing
+    start = in_flight(
+        heli, u=6.0, v=-2.0, w=1.0, p=3.0, q=-2.0, r=1.0, Om=250.0
+    )  # above its command: the governor asks for nothing
     energy, momentum, _ = invariants(heli, start)
     parabola = start[:3] * 2.0 + np.array([0.0, 0.0, 0.5 * GRAVITY * 2.0**2])
 
     def errors(steps):
         e, h, position = invariants(heli, flight(heli, start, 2.0, steps))
         return np.array(
-            [abs(e - energy) / energy, np.abs(h - momentum).max() / np.linalg.norm(momentum), np.abs(position - parabola).max()]
+            [
+                abs(e - energy) / energy,
+                np.abs(h - momentum).max() / np.linalg.norm(momentum),
+                np.abs(position - parabola).max(),
+            ]
         )
 
     coarse, fine = errors(50), errors(100)
     assert np.all(coarse < 1e-2)
     assert np.all(fine > 1e-10)  # above rounding, or there is no order to see
     orders = np.log2(coarse / fine)
-    assert np.all((orders > 3.5) & (orders < 5.6)), orders  # energy of a free rigid body gains an order, 5
+    assert np.all((orders > 3.5) & (orders < 5.6)), (
+        orders
+    )  # energy of a free rigid body gains an order, 5
 
 
 def test_engine_cannot_change_the_angular_momentum_about_the_shaft(pi):
-    """Izz r + I_rot (Om + r) without air, while the engine runs the rotor up: to rounding, as Runge-Kutta keeps what is linear.
-    The printed sign of r' in the rotor equation gains what it should not."""
+    """Izz r + I_rot (Om + r) without air, while the engine runs the rotor up: to rounding, as
+    Runge-Kutta keeps what is linear. The printed sign of r' in the rotor equation gains what it
+    should not.
+    """
     body, drive = pi.vehicle.values("body"), pi.vehicle.values("drivetrain")
     drift = {}
     for option in ((), ("rotor_reaction",)):
@@ -81,7 +101,10 @@ def test_engine_cannot_change_the_angular_momentum_about_the_shaft(pi):
         start = in_flight(heli, Om=140.0, om_i=10.0)
         end = flight(heli, start, 3.0, 300)
         rates = heli.flight_states.index("r"), heli.flight_states.index("Om")
-        momentum = [body["Izz"] * x[rates[0]] + drive["inertia"] * (x[rates[1]] + x[rates[0]]) for x in (start, end)]
+        momentum = [
+            body["Izz"] * x[rates[0]] + drive["inertia"] * (x[rates[1]] + x[rates[0]])
+            for x in (start, end)
+        ]
         assert abs(end[rates[1]] - 140.0) > 10  # the rotor did speed up
         drift[option] = abs(momentum[1] - momentum[0]) / momentum[0]
     assert drift[()] < 1e-13
@@ -104,7 +127,9 @@ def test_engine_torque_is_internal_in_air_too(pi):
 
 
 def test_ideal_governor_is_the_limit_of_constant_rotor_speed(ideal, pi):
-    """With the engine torque that makes Om' = 0 the 12-state model has the yaw acceleration of the 10-state one."""
+    """With the engine torque that makes Om' = 0 the 12-state model has the yaw acceleration of the
+    10-state one.
+    """
     from scipy.optimize import brentq
 
     point = symheli.trim(ideal, 4.0)
@@ -123,16 +148,22 @@ def test_free_fall_in_thin_air(ideal):
     x = np.zeros(10)
     x[6], x[7] = 0.3, -0.2
     a = ideal.with_parameters({"density": 1e-12}).numeric("rhs")(x, U, 0.0)[0][:3]
-    expected = GRAVITY * np.array([math.sin(0.2), math.sin(0.3) * math.cos(0.2), math.cos(0.3) * math.cos(0.2)])
+    expected = GRAVITY * np.array(
+        [math.sin(0.2), math.sin(0.3) * math.cos(0.2), math.cos(0.3) * math.cos(0.2)]
+    )
     np.testing.assert_allclose(a, expected, rtol=1e-9)
 
 
 def test_quaternion_and_euler_forms_fly_the_same_flight_to_integrator_order(heli):
-    """1.5 s with a pedal and cyclic step from 6 m/s, between the wake's corners; the gap falls by 2^4 when the step is halved."""
+    """1.5 s with a pedal and cyclic step from 6 m/s, between the wake's corners; the gap falls by
+    2^4 when the step is halved.
+    """
     point = symheli.trim(heli, 6.0)
     u = point.u.array + np.array([0.004, -0.003, 0.002, 0.01])
     turned = Rotation.from_euler("ZYX", [0.0, point.x["theta"], point.x["phi"]])
-    start = np.concatenate([point.x.array[:6], np.roll(turned.as_quat(), 1), [0.0, 0.0, -20.0], point.x.array[8:]])
+    start = np.concatenate(
+        [point.x.array[:6], np.roll(turned.as_quat(), 1), [0.0, 0.0, -20.0], point.x.array[8:]]
+    )
 
     def gap(steps):
         quaternion = flight(heli, start, 1.5, steps, u)

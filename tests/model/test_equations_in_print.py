@@ -25,7 +25,11 @@ def test_every_equation_and_symbol_can_be_set_and_fits_a_page():
     from matplotlib.mathtext import MathTextParser
 
     sections = [section for options in MODELS for section in listing(model(options))]
-    every = {e for section in sections for e in (*section.equations, *(p.symbol for p in section.parameters))}
+    every = {
+        e
+        for section in sections
+        for e in (*section.equations, *(p.symbol for p in section.parameters))
+    }
     parser = MathTextParser("path")
     for equation in every:
         width = parser.parse(f"${equation}$", dpi=72)[0]
@@ -36,7 +40,9 @@ def test_every_component_every_parameter_and_every_state_derivative_is_there(hel
     sections = {section.title: section for section in listing(heli)}
     for name, part in heli.vehicle.components.items():
         section = sections[name.replace("_", " ").capitalize()]
-        assert {p.entry for p in section.parameters} == {f"{name}.{entry}" for entry in heli.vehicle.sections[name]}
+        assert {p.entry for p in section.parameters} == {
+            f"{name}.{entry}" for entry in heli.vehicle.sections[name]
+        }
         assert all(p.unit and p.source for p in section.parameters)
         for state in part.states:
             assert any(e.startswith(dot(symbol_of(str(state)))) for e in section.equations)
@@ -54,7 +60,9 @@ def test_every_parameter_a_component_uses_occurs_in_its_equations(pi):
 
 
 def test_printed_forms_change_what_is_printed():
-    """Each option that changes an equation changes its line; the relaxed iteration has the same root and the same line."""
+    """Each option that changes an equation changes its line; the relaxed iteration has the same
+    root and the same line.
+    """
     plain = model({}).latex()
     for option in PRINTED:
         changed = model({"printed": [option]}).latex()
@@ -71,7 +79,9 @@ def test_document_is_balanced_and_every_section_has_equations(heli):
     without_escapes = re.sub(r"\\[{}]", "", whole)
     assert without_escapes.count("{") == without_escapes.count("}")
     text = re.sub(r"\\\[.*?\\\]|\$.*?\$", "", whole)
-    assert not re.search(r"(?<!\\)[_#%^]", text.split(r"\maketitle")[1])  # outside mathematics these need a backslash
+    assert not re.search(
+        r"(?<!\\)[_#%^]", text.split(r"\maketitle")[1]
+    )  # outside mathematics these need a backslash
 
 
 def test_printed_numbers_are_the_fractions_the_code_means():
@@ -94,10 +104,15 @@ def test_printed_numbers_are_the_fractions_the_code_means():
 def test_the_documentation_is_what_the_command_writes(tmp_path):
     from studies.cli import main
 
-    assert main(["export", "markdown", "--governor", "pi", "--out", str(tmp_path / "equations.md")]) == 0
+    assert (
+        main(["export", "markdown", "--governor", "pi", "--out", str(tmp_path / "equations.md")])
+        == 0
+    )
     committed = Path(__file__).resolve().parents[2] / "docs" / "equations.md"
     fresh = (tmp_path / "equations.md").read_text(encoding="utf-8")
-    assert fresh == committed.read_text(encoding="utf-8"), "run: symheli export markdown --governor pi --out docs/equations.md"
+    assert fresh == committed.read_text(encoding="utf-8"), (
+        "run: symheli export markdown --governor pi --out docs/equations.md"
+    )
 
 
 def test_latex_is_written_by_the_command(tmp_path):
@@ -113,9 +128,15 @@ def test_a_second_rotor_and_a_part_of_ones_own_are_printed_under_their_names(tmp
     (tmp_path / "wing.py").write_text(WING_COMPONENT)
     heli = symheli.Helicopter.load(write(tmp_path, WING, AFT_ROTOR))
     sections = {section.title: section for section in listing(heli)}
-    assert r"Z_{\mathrm{wing}} = - \frac{\mathrm{area} \mathrm{lift\_slope} \rho u_{a} w_{a}}{2}" in sections["Wing"].equations
+    assert (
+        r"Z_{\mathrm{wing}} = - \frac{\mathrm{area} \mathrm{lift\_slope} \rho u_{a} w_{a}}{2}"
+        in sections["Wing"].equations
+    )
     assert sections["Wing"].text == "wing.py: lift along z, in linear attached flow."
-    assert any(e.startswith(r"\dot{a}_{1,\mathrm{aft},\mathrm{rotor}} = ") for e in sections["Aft rotor"].equations)
+    assert any(
+        e.startswith(r"\dot{a}_{1,\mathrm{aft},\mathrm{rotor}} = ")
+        for e in sections["Aft rotor"].equations
+    )
     total = next(e for e in sections["Rigid body"].equations if e.startswith("Z = "))
     assert r"Z_{\mathrm{mr},\mathrm{aft},\mathrm{rotor}}" in total
     assert r"Z_{\mathrm{wing}}" in total

@@ -1,4 +1,6 @@
-"""Over the whole envelope: finite values and derivatives, and trims that either hold or say why not."""
+"""Over the whole envelope: finite values and derivatives, and trims that either hold or say why
+not.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from hypothesis import strategies as st
 import symheli
 from symheli.equilibrium import TOLERANCE
 
-HELICOPTERS = {governor: symheli.Helicopter.load("xcell60", governor=governor) for governor in ("ideal", "pi")}
+HELICOPTERS = {
+    governor: symheli.Helicopter.load("xcell60", governor=governor) for governor in ("ideal", "pi")
+}
 
 
 def around(size):
@@ -33,12 +37,27 @@ STATES = st.tuples(
 
 
 @settings(max_examples=200, deadline=None)
-@given(STATES, st.tuples(*[around(1.0)] * 4), st.tuples(*[around(12.0)] * 3), st.sampled_from(["ideal", "pi"]))
-@example((0.0,) * 10 + (167.0, 0.0), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "pi")  # no flow anywhere
-@example((0.0, 0.0, 20.0) + (0.0,) * 7 + (167.0, 9.0), (0.0, 0.0, -0.4, 0.2), (0.0, 0.0, 0.0), "pi")  # falling, thrust saturated downwards
-@example((0.0, 0.0, -20.0) + (0.0,) * 7 + (60.0, 9.0), (0.0, 0.0, 1.0, -1.0), (0.0, 0.0, 0.0), "pi")  # thrust saturated upwards, slow rotor
-@example((-15.0,) + (0.0,) * 9 + (167.0, 9.0), (0.0, 0.0, 0.1, 0.25), (0.0, 0.0, 0.0), "ideal")  # rearwards
-def test_right_hand_side_and_jacobian_are_finite_everywhere_short_of_gimbal_lock(x, u, wind, governor):
+@given(
+    STATES,
+    st.tuples(*[around(1.0)] * 4),
+    st.tuples(*[around(12.0)] * 3),
+    st.sampled_from(["ideal", "pi"]),
+)
+@example(
+    (0.0,) * 10 + (167.0, 0.0), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "pi"
+)  # no flow anywhere
+@example(
+    (0.0, 0.0, 20.0) + (0.0,) * 7 + (167.0, 9.0), (0.0, 0.0, -0.4, 0.2), (0.0, 0.0, 0.0), "pi"
+)  # falling, thrust saturated downwards
+@example(
+    (0.0, 0.0, -20.0) + (0.0,) * 7 + (60.0, 9.0), (0.0, 0.0, 1.0, -1.0), (0.0, 0.0, 0.0), "pi"
+)  # thrust saturated upwards, slow rotor
+@example(
+    (-15.0,) + (0.0,) * 9 + (167.0, 9.0), (0.0, 0.0, 0.1, 0.25), (0.0, 0.0, 0.0), "ideal"
+)  # rearwards
+def test_right_hand_side_and_jacobian_are_finite_everywhere_short_of_gimbal_lock(
+    x, u, wind, governor
+):
     heli = HELICOPTERS[governor]
     at = np.array(x[: len(heli.states)]), np.array(u), np.array(wind)
     assert np.all(np.isfinite(heli.numeric("rhs")(*at)[0]))
@@ -48,15 +67,21 @@ def test_right_hand_side_and_jacobian_are_finite_everywhere_short_of_gimbal_lock
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.floats(0.0, 20.0), st.floats(-1.0, 1.0), st.one_of(st.just(0.0), st.floats(-math.pi, math.pi)),
-    st.one_of(st.just(0.0), st.floats(-0.6, 0.6)), st.floats(0.0, 3000.0), st.sampled_from(["ideal", "pi"]),
-)  # fmt: skip
+    st.floats(0.0, 20.0),
+    st.floats(-1.0, 1.0),
+    st.one_of(st.just(0.0), st.floats(-math.pi, math.pi)),
+    st.one_of(st.just(0.0), st.floats(-0.6, 0.6)),
+    st.floats(0.0, 3000.0),
+    st.sampled_from(["ideal", "pi"]),
+)
 @example(0.0, 0.0, 0.0, 0.0, 0.0, "pi")  # hover
 @example(8.0, 0.0, math.pi, 0.0, 0.0, "ideal")  # rearwards
 @example(8.0, 0.0, -math.pi / 2, 0.0, 0.0, "ideal")  # sidewards
 @example(6.0, -1.0, 0.0, 0.0, 0.0, "ideal")  # straight down, into the own wake
 @example(20.0, 1.0, 0.0, 0.0, 0.0, "pi")  # straight up: more than the rotor has
-def test_a_trim_holds_or_says_what_is_missing(airspeed, steepness, sideslip, turn_rate, altitude, governor):
+def test_a_trim_holds_or_says_what_is_missing(
+    airspeed, steepness, sideslip, turn_rate, altitude, governor
+):
     heli = HELICOPTERS[governor]
     climb_rate = steepness * airspeed
     asked = dict(climb_rate=climb_rate, sideslip=sideslip, turn_rate=turn_rate, altitude=altitude)
@@ -64,18 +89,27 @@ def test_a_trim_holds_or_says_what_is_missing(airspeed, steepness, sideslip, tur
     assert np.all(np.isfinite(point.x.array))
     assert np.all(np.isfinite(point.residual.array))
     if not point.success:
-        with pytest.raises(symheli.TrimError, match=r"no trim at .* the best point leaves d\w+/dt = .* (m|rad)/s") as caught:
+        with pytest.raises(
+            symheli.TrimError, match=r"no trim at .* the best point leaves d\w+/dt = .* (m|rad)/s"
+        ) as caught:
             symheli.trim(heli, airspeed, **asked)
         assert str(caught.value).count("/dt = ") == len(heli.states)
         return
-    xdot = heli.at_altitude(altitude).numeric("rhs")(point.x.array, point.u.array, point.wind.array)[0]
+    xdot = heli.at_altitude(altitude).numeric("rhs")(
+        point.x.array, point.u.array, point.wind.array
+    )[0]
     assert np.abs(xdot).max() < TOLERANCE
     u, v, w = point.x.array[:3]
     assert math.hypot(u, v, w) == pytest.approx(airspeed, abs=1e-9)
     phi, theta = point.x["phi"], point.x["theta"]
-    # upward velocity and turn about the vertical, through the rotation to earth axes; rounding of speeds up to 20 m/s
-    assert u * math.sin(theta) - (v * math.sin(phi) + w * math.cos(phi)) * math.cos(theta) == pytest.approx(climb_rate, abs=1e-9)
-    assert (point.x["q"] * math.sin(phi) + point.x["r"] * math.cos(phi)) / math.cos(theta) == pytest.approx(turn_rate, abs=1e-9)
+    # upward velocity and turn about the vertical, through the rotation to earth axes; rounding of
+    # speeds up to 20 m/s
+    assert u * math.sin(theta) - (v * math.sin(phi) + w * math.cos(phi)) * math.cos(
+        theta
+    ) == pytest.approx(climb_rate, abs=1e-9)
+    assert (point.x["q"] * math.sin(phi) + point.x["r"] * math.cos(phi)) / math.cos(
+        theta
+    ) == pytest.approx(turn_rate, abs=1e-9)
     if point.attainable:
         assert np.all(np.abs(point.u.array) < heli.travel)
     model = symheli.linearize(heli, point)
@@ -83,7 +117,9 @@ def test_a_trim_holds_or_says_what_is_missing(airspeed, steepness, sideslip, tur
 
 
 def test_a_control_beyond_its_travel_is_said_not_hidden(ideal):
-    """28 m/s holds in the equations with more collective than the servo has: a success that cannot be attained."""
+    """28 m/s holds in the equations with more collective than the servo has: a success that cannot
+    be attained.
+    """
     point = symheli.trim(ideal, 28.0)
     assert point.success
     assert not point.attainable
@@ -92,7 +128,10 @@ def test_a_control_beyond_its_travel_is_said_not_hidden(ideal):
 
 
 def test_where_nothing_holds_the_best_point_stays_within_the_travel(ideal):
-    with pytest.raises(symheli.TrimError, match=r"no trim at 60 m/s: .* du/dt = -\d.*m/s\^2.* at or beyond the stop: d_col") as caught:
+    with pytest.raises(
+        symheli.TrimError,
+        match=r"no trim at 60 m/s: .* du/dt = -\d.*m/s\^2.* at or beyond the stop: d_col",
+    ) as caught:
         symheli.trim(ideal, 60.0)
     assert np.all(np.abs(caught.value.result.u.array) <= ideal.travel)
 
@@ -107,12 +146,21 @@ def test_altitude_is_density_and_models_are_taken_in_the_air_of_their_point(idea
 
 
 def test_wind_shifts_velocity_over_ground_and_nothing_else(ideal):
-    """Any steady wind, from any side: attitude and controls of the trim through the air are those of still air."""
+    """Any steady wind, from any side: attitude and controls of the trim through the air are those
+    of still air.
+    """
     still = symheli.trim(ideal, 7.0, sideslip=0.2)
     for heading in (0.0, 90.0, 270.0):
-        blown = symheli.trim(ideal, 7.0, sideslip=0.2, wind=(5 * math.cos(math.radians(heading)), 5 * math.sin(math.radians(heading)), 0.5))
+        blown = symheli.trim(
+            ideal,
+            7.0,
+            sideslip=0.2,
+            wind=(5 * math.cos(math.radians(heading)), 5 * math.sin(math.radians(heading)), 0.5),
+        )
         np.testing.assert_allclose(blown.u.array, still.u.array, atol=1e-9)
-        np.testing.assert_allclose(blown.x.array[:3] - blown.wind.array, still.x.array[:3], atol=1e-9)
+        np.testing.assert_allclose(
+            blown.x.array[:3] - blown.wind.array, still.x.array[:3], atol=1e-9
+        )
 
 
 @pytest.mark.parametrize(
@@ -132,18 +180,26 @@ def test_conditions_that_cannot_be_are_refused(ideal, bad):
 
 
 def test_autorotation_and_lack_of_power_are_named(pi):
-    """A closed throttle cannot hold the rotor back in a steep descent; an engine of 300 W cannot hover."""
+    """A closed throttle cannot hold the rotor back in a steep descent; an engine of 300 W cannot
+    hover.
+    """
     with pytest.raises(symheli.TrimError, match="throttle closed: the air drives the rotor"):
         symheli.trim(pi, 18.0, climb_rate=-16.2)
     with pytest.raises(symheli.TrimError, match="full throttle: the engine lacks power"):
         symheli.trim(pi.with_parameters({"drivetrain.max_power": 300.0}), 0.0)
-    assert symheli.trim(symheli.Helicopter(pi.vehicle, "ideal"), 18.0, climb_rate=-16.2).success  # that governor may brake
+    assert symheli.trim(
+        symheli.Helicopter(pi.vehicle, "ideal"), 18.0, climb_rate=-16.2
+    ).success  # that governor may brake
 
 
 def test_where_the_equations_jump_a_failure_says_so(ideal):
-    """At 20 m/s between 6.9 and 7.05 m/s down the wake factor falls from 1.5 to 0: equilibria on both sides, none between."""
+    """At 20 m/s between 6.9 and 7.05 m/s down the wake factor falls from 1.5 to 0: equilibria on
+    both sides, none between.
+    """
     above, below = (symheli.trim(ideal, 20.0, climb_rate=rate) for rate in (-6.9, -7.05))
     assert above.success
     assert below.success
-    with pytest.raises(symheli.TrimError, match="equations jump here, as the flow turns at the disc"):
+    with pytest.raises(
+        symheli.TrimError, match="equations jump here, as the flow turns at the disc"
+    ):
         symheli.trim(ideal, 20.0, climb_rate=-7.0)

@@ -25,8 +25,14 @@ def envelope(ideal):
 
 
 def test_a_trim_map_holds_the_trims_of_its_points(ideal, envelope):
-    """Reached from neighbours or from hover, the same equilibrium; impossible pairs are empty, not wrong."""
-    assert envelope.possible.tolist() == [[False, False, True, False, False], [False, True, True, True, False], [True] * 5]
+    """Reached from neighbours or from hover, the same equilibrium; impossible pairs are empty, not
+    wrong.
+    """
+    assert envelope.possible.tolist() == [
+        [False, False, True, False, False],
+        [False, True, True, True, False],
+        [True] * 5,
+    ]
     assert envelope.success[envelope.possible].all()
     for i, speed in enumerate(envelope.airspeeds):
         for j, rate in enumerate(envelope.climb_rates):
@@ -39,10 +45,14 @@ def test_a_trim_map_holds_the_trims_of_its_points(ideal, envelope):
 
 
 def test_climbing_takes_power_and_descending_gives_it(ideal, envelope):
-    """dP/d climb rate is about the weight (8.2 kg g = 80 N) at 10 m/s: energy, less what the flow through the disc changes."""
+    """dP/d climb rate is about the weight (8.2 kg g = 80 N) at 10 m/s: energy, less what the flow
+    through the disc changes.
+    """
     slope = (envelope["power"][2, 3] - envelope["power"][2, 1]) / 8.0
     assert slope == pytest.approx(80.4, rel=0.15)
-    values = ideal.compiled("diagnostics")(x=envelope.at(2, 2).x.array, u=envelope.at(2, 2).u.array, wind=0)
+    values = ideal.compiled("diagnostics")(
+        x=envelope.at(2, 2).x.array, u=envelope.at(2, 2).u.array, wind=0
+    )
     assert envelope["power"][2, 2] == pytest.approx(167.0 * float(values["Q_e"]), rel=1e-12)
 
 
@@ -56,10 +66,14 @@ def test_a_trim_map_as_csv_reads_back(envelope):
     assert rows[0]["d_col"] == "rad"  # the second line has the units
     assert rows[0]["airspeed"] == "m/s"
     assert len(rows) - 1 == envelope.possible.sum()
-    np.testing.assert_array_equal([float(r["theta"]) for r in rows[1:]], envelope["theta"][envelope.possible])
+    np.testing.assert_array_equal(
+        [float(r["theta"]) for r in rows[1:]], envelope["theta"][envelope.possible]
+    )
 
 
-@pytest.mark.parametrize(("speeds", "rates"), [([], [0.0]), ([2.0, 1.0], [0.0]), ([1.0], [0.0, np.nan]), ([1.0], [5.0])])
+@pytest.mark.parametrize(
+    ("speeds", "rates"), [([], [0.0]), ([2.0, 1.0], [0.0]), ([1.0], [0.0, np.nan]), ([1.0], [5.0])]
+)
 def test_grids_that_cannot_be_are_refused(ideal, speeds, rates):
     with pytest.raises(symheli.InputError):
         symheli.trim_map(ideal, speeds, rates)
@@ -75,7 +89,8 @@ def test_failures_are_kept_in_the_map(ideal):
 
 @pytest.mark.parametrize("governor", ["ideal", "pi"])
 def test_derivatives_are_those_of_force_and_moment(ideal, governor):
-    """Central differences of X .. N by mass and inertia of the body alone, which know no gravity and no kinematic term.
+    """Central differences of X .. N by mass and inertia of the body alone, which know no gravity
+    and no kinematic term.
 
     Under "ideal" the rotor is turned with the body: N contains its reaction.
     """
@@ -84,12 +99,21 @@ def test_derivatives_are_those_of_force_and_moment(ideal, governor):
     table = symheli.derivatives(family)
     names = heli.diagnostics.name_out()
     body = heli.vehicle.values("body")
-    inertia = {"X": body["mass"], "Y": body["mass"], "Z": body["mass"], "L": body["Ixx"], "M": body["Iyy"], "N": body["Izz"]}
+    inertia = {
+        "X": body["mass"],
+        "Y": body["mass"],
+        "Z": body["mass"],
+        "L": body["Ixx"],
+        "M": body["Iyy"],
+        "N": body["Izz"],
+    }
     for k, point in enumerate(family.trims):
         z = np.concatenate([point.x.array, point.u.array])
 
         def wrench(z):
-            values = heli.numeric("diagnostics")(z[: len(heli.states)], z[len(heli.states) :], np.zeros(3))
+            values = heli.numeric("diagnostics")(
+                z[: len(heli.states)], z[len(heli.states) :], np.zeros(3)
+            )
             return {s: float(values[names.index(s)][0]) / inertia[s] for s in "XYZLMN"}
 
         for column in ("u", "w", "q", "r", "b1", "d_col", "d_ped"):
@@ -99,7 +123,9 @@ def test_derivatives_are_those_of_force_and_moment(ideal, governor):
             for row in ROW.values():
                 difference = (plus[row] - minus[row]) / 2e-5
                 # rounding 1e-13/1e-5 of forces up to 10 m/s^2, truncation far less
-                assert table[f"{row}_{column.removeprefix('d_')}"][k] == pytest.approx(difference, abs=2e-6, rel=1e-6)
+                assert table[f"{row}_{column.removeprefix('d_')}"][k] == pytest.approx(
+                    difference, abs=2e-6, rel=1e-6
+                )
 
 
 def test_derivatives_know_their_units_and_nomenclature(level):
@@ -128,7 +154,11 @@ def test_derivatives_know_their_units_and_nomenclature(level):
     ("name", "values", "variant"),
     [
         ("mass", [7.0, 9.0], lambda h, v: h.with_parameters({"body.mass": v})),
-        ("rotor_speed", [150.0, 175.0], lambda h, v: h.with_parameters({"drivetrain.nominal_speed": v})),
+        (
+            "rotor_speed",
+            [150.0, 175.0],
+            lambda h, v: h.with_parameters({"drivetrain.nominal_speed": v}),
+        ),
         ("density", [1.0, 1.2], lambda h, v: symheli.Helicopter(h.vehicle, "ideal", density=v)),
         ("altitude", [0.0, 2500.0], lambda h, v: h.at_altitude(v)),
         ("climb_rate", [-1.0, 2.0], lambda h, v: h),
@@ -141,8 +171,12 @@ def test_a_grid_is_the_family_at_each_value(ideal, name, values, variant):
     assert grid.axis == name
     assert grid.B.shape == (2, 2, 10, 4)
     for j, value in enumerate(values):
-        family = symheli.sweep(variant(ideal, value), speeds, climb_rate=value if name == "climb_rate" else 0.0)
-        np.testing.assert_allclose(grid.A[:, j], family.A, atol=1e-9)  # two Newton iterations from other starts
+        family = symheli.sweep(
+            variant(ideal, value), speeds, climb_rate=value if name == "climb_rate" else 0.0
+        )
+        np.testing.assert_allclose(
+            grid.A[:, j], family.A, atol=1e-9
+        )  # two Newton iterations from other starts
         np.testing.assert_array_equal(grid.family(**{name: value}).A, grid.A[:, j])
         np.testing.assert_array_equal(grid.at(1, j).A, grid.A[1, j])
         assert grid.trims[1][j].airspeed == 8.0
@@ -165,6 +199,8 @@ def test_a_grid_refuses_what_it_does_not_hold(ideal):
 def test_a_grid_compiles_nothing_anew(ideal, monkeypatch):
     for name in ("rhs", "jacobian", "diagnostics"):
         ideal.numeric(name)
-    monkeypatch.setattr("symheli.helicopter.compiled", lambda function: pytest.fail("compiled anew"))
+    monkeypatch.setattr(
+        "symheli.helicopter.compiled", lambda function: pytest.fail("compiled anew")
+    )
     symheli.sweep_grid(ideal, [3.0], mass=[8.0, 9.0])
     symheli.sweep_grid(ideal, [3.0], altitude=[0.0, 1000.0])

@@ -1,4 +1,6 @@
-"""A part is a file and a section: a wing of one's own, a second rotor, a rotor off the centre of gravity."""
+"""A part is a file and a section: a wing of one's own, a second rotor, a rotor off the centre of
+gravity.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ import symheli
 
 @pytest.fixture(autouse=True)
 def interpreted(monkeypatch):
-    """These airframes are looked at once: compiling them would cost more than it saves. The numbers are the same."""
+    """These airframes are looked at once: compiling them would cost more than it saves. The numbers
+    are the same.
+    """
     monkeypatch.setattr("symheli.helicopter.compiled", lambda function: function)
 
 
@@ -29,7 +33,9 @@ def load(path, governor="ideal"):
 
 
 def test_a_wing_of_ones_own_changes_z_w_as_its_closed_form_says(tmp_path, ideal):
-    """Z_w of the wing is -0.5 rho S C_La u0/m, Z_u the same with w0; nothing else of the model changes at the same state."""
+    """Z_w of the wing is -0.5 rho S C_La u0/m, Z_u the same with w0; nothing else of the model
+    changes at the same state.
+    """
     (tmp_path / "wing.py").write_text(WING_COMPONENT)
     winged = load(write(tmp_path, WING))
     point = symheli.trim(ideal, 9.0)
@@ -45,11 +51,15 @@ def test_a_wing_of_ones_own_changes_z_w_as_its_closed_form_says(tmp_path, ideal)
 
 @pytest.mark.parametrize("governor", ["ideal", "pi"])
 def test_a_second_rotor_trims_and_linearizes_under_names_of_its_own(tmp_path, governor):
-    """Two rotors fore and aft, collectives mixed for pitch: the names of the first stay, the second adds its section."""
+    """Two rotors fore and aft, collectives mixed for pitch: the names of the first stay, the second
+    adds its section.
+    """
     heli = load(write(tmp_path, AFT_ROTOR, replace={"[main_rotor]": FORWARD}), governor)
     assert heli.states[8:12] == ("a1", "b1", "a1_aft_rotor", "b1_aft_rotor")
     assert heli.states[10].unit == "rad"
-    assert {"V_imr", "V_imr_aft_rotor", "switch_aft_rotor_vortex_ring"} <= set(heli.diagnostics.name_out())
+    assert {"V_imr", "V_imr_aft_rotor", "switch_aft_rotor_vortex_ring"} <= set(
+        heli.diagnostics.name_out()
+    )
     for speed in (0.0, 6.0):
         lin = symheli.linearize(heli, symheli.trim(heli, speed))
         assert np.all(np.isfinite(lin.A))
@@ -57,9 +67,18 @@ def test_a_second_rotor_trims_and_linearizes_under_names_of_its_own(tmp_path, go
 
 
 def test_a_rotor_off_the_centre_of_gravity_adds_its_arm_to_pitch(tmp_path, ideal):
-    """In hover, for a rotor at x: M gains x T, the flow at the hub -q x, so M_q gains m x^2 Z_w (Z_w of the rotor alone)."""
+    """In hover, for a rotor at x: M gains x T, the flow at the hub -q x, so M_q gains m x^2 Z_w
+    (Z_w of the rotor alone).
+    """
     x = 0.1
-    moved = load(write(tmp_path, replace={"[main_rotor]": f'[main_rotor]\nx = {{ value = {x}, unit = "m", source = "test" }}'}))
+    moved = load(
+        write(
+            tmp_path,
+            replace={
+                "[main_rotor]": f'[main_rotor]\nx = {{ value = {x}, unit = "m", source = "test" }}'
+            },
+        )
+    )
     point = symheli.trim(ideal, 0.0)
     at = (point.x.array, point.u.array, 0.0)
     w, q = ideal.states.index("w"), ideal.states.index("q")
@@ -71,30 +90,47 @@ def test_a_rotor_off_the_centre_of_gravity_adds_its_arm_to_pitch(tmp_path, ideal
         {f"fuselage.area_{axis}": 0.0 for axis in "xyz"} | {"horizontal_tail.area": 0.0}
     )
     z_w = bare.numeric("jacobian")(*at)[0][w, w] * 8.2  # N s/m, rotor alone
-    # fuselage and tail in the changed downwash take part in Am - A by under 1 % of the rotor's own effect; flapping not at all
+    # fuselage and tail in the changed downwash take part in Am - A by under 1 % of the rotor's own
+    # effect; flapping not at all
     assert (Am - A)[q, q] == pytest.approx(x**2 * z_w / 0.34, rel=0.02)
 
 
 def test_a_second_rotor_far_away_in_still_air_doubles_the_hover_force(tmp_path, ideal):
-    """At the same pitch two equal rotors at the same place give twice the thrust and twice the torque of one."""
-    twin = AFT_ROTOR.replace("controls = { d_col = { d_col = 1.0, d_lon = -0.5 } }\n", "").replace("value = -0.4", "value = 0.0")
+    """At the same pitch two equal rotors at the same place give twice the thrust and twice the
+    torque of one.
+    """
+    twin = AFT_ROTOR.replace("controls = { d_col = { d_col = 1.0, d_lon = -0.5 } }\n", "").replace(
+        "value = -0.4", "value = 0.0"
+    )
     heli = load(write(tmp_path, twin))
     point = symheli.trim(ideal, 0.0)
     x = np.concatenate([point.x.array, point.x.array[8:]])
-    values = dict(zip(heli.diagnostics.name_out(), heli.numeric("diagnostics")(x, point.u.array, 0.0), strict=True))
+    values = dict(
+        zip(
+            heli.diagnostics.name_out(),
+            heli.numeric("diagnostics")(x, point.u.array, 0.0),
+            strict=True,
+        )
+    )
     for name in ("T_mr", "Q_mr", "V_imr"):
         assert values[f"{name}_aft_rotor"] == pytest.approx(values[name], rel=1e-14)
 
 
 def test_flow_may_be_taken_from_the_rotor_that_is_named(tmp_path):
-    """The fuselage under the second rotor: without flight speed its drag follows that rotor's downwash."""
+    """The fuselage under the second rotor: without flight speed its drag follows that rotor's
+    downwash.
+    """
     fuselage = '[fuselage]\nflow = { V_imr = "V_imr_aft_rotor" }'
     aft = AFT_ROTOR.replace("d_lon = -0.5", "d_lon = 0.0, d_lat = 1.0")
     first, second = (
-        load(write(tmp_path, aft, name=f"{k}.toml", replace={"[fuselage]": text})) for k, text in enumerate(("[fuselage]", fuselage))
+        load(write(tmp_path, aft, name=f"{k}.toml", replace={"[fuselage]": text}))
+        for k, text in enumerate(("[fuselage]", fuselage))
     )
     x = np.zeros(len(first.states))
-    gain = [h.rhs(x, [0, 0.02, 0.09, 0.2], [0, 0, 0]) - h.rhs(x, [0, 0.0, 0.09, 0.2], [0, 0, 0]) for h in (first, second)]
+    gain = [
+        h.rhs(x, [0, 0.02, 0.09, 0.2], [0, 0, 0]) - h.rhs(x, [0, 0.0, 0.09, 0.2], [0, 0, 0])
+        for h in (first, second)
+    ]
     w = first.states.index("w")
     assert float(gain[1][w]) > float(gain[0][w])  # more downwash on the fuselage pushes it down
     assert float(gain[1][0]) == float(gain[0][0])
@@ -117,10 +153,19 @@ def test_the_printed_names_stay_for_one_rotor(heli):
     ("section", "message"),
     [
         (WING, "no component file at .*wing.py"),
-        (WING.replace("./wing.py", "wings"), r"line \d+, wing.component: unknown component 'wings'"),
-        (AFT_ROTOR.replace("d_lon = -0.5", "d_lno = -0.5"), "aft_rotor.controls: unknown control 'd_lno'; did you mean 'd_lon'"),
+        (
+            WING.replace("./wing.py", "wings"),
+            r"line \d+, wing.component: unknown component 'wings'",
+        ),
+        (
+            AFT_ROTOR.replace("d_lon = -0.5", "d_lno = -0.5"),
+            "aft_rotor.controls: unknown control 'd_lno'; did you mean 'd_lon'",
+        ),
         (AFT_ROTOR.replace("-0.5", "nan"), "gain must be a finite number"),
-        ("[wake]\ncomponent = 'tail_wake'\nflow = { V_mr = 'V_imr' }", "wake.flow: unknown flow 'V_mr'"),
+        (
+            "[wake]\ncomponent = 'tail_wake'\nflow = { V_mr = 'V_imr' }",
+            "wake.flow: unknown flow 'V_mr'",
+        ),
     ],
 )
 def test_a_section_that_cannot_be_says_where_and_why(tmp_path, section, message):
@@ -141,18 +186,26 @@ def test_a_component_file_that_fails_is_named(tmp_path):
 
 def test_flow_that_nobody_makes_is_named(tmp_path):
     with pytest.raises(symheli.InputError, match="V_imr_front"):
-        _ = load(write(tmp_path, replace={"[fuselage]": "[fuselage]\nflow = { V_imr = 'V_imr_front' }"})).states
+        _ = load(
+            write(tmp_path, replace={"[fuselage]": "[fuselage]\nflow = { V_imr = 'V_imr_front' }"})
+        ).states
 
 
 def test_other_numbers_share_the_compiled_equations(ideal):
-    """with_parameters gives what a file with these numbers gives, follows references, and compiles nothing."""
+    """with_parameters gives what a file with these numbers gives, follows references, and compiles
+    nothing.
+    """
     heavy = ideal.with_parameters({"body.mass": 9.0, "density": 1.1, "main_rotor.radius": 0.8})
     assert heavy._functions is ideal._functions
     assert heavy.vehicle.values("tail_wake")["rotor_radius"] == 0.8
     assert heavy.parameters["density"] == heavy.density == 1.1
     point = symheli.trim(heavy, 4.0)
-    rhs = np.array(heavy.rhs(point.x.array, point.u.array, [0, 0, 0])).ravel()  # numbers written in, not passed
-    np.testing.assert_allclose(rhs, heavy.numeric("rhs")(point.x.array, point.u.array, 0.0)[0], atol=1e-12)
+    rhs = np.array(
+        heavy.rhs(point.x.array, point.u.array, [0, 0, 0])
+    ).ravel()  # numbers written in, not passed
+    np.testing.assert_allclose(
+        rhs, heavy.numeric("rhs")(point.x.array, point.u.array, 0.0)[0], atol=1e-12
+    )
     assert point.u["d_col"] > symheli.trim(ideal, 4.0).u["d_col"]
     with pytest.raises(symheli.UnknownNameError, match=r"body\.mass"):
         ideal.with_parameters({"body.mas": 1.0})

@@ -22,12 +22,21 @@ def test_trimmed_velocity_is_what_was_asked(ideal):
     x = point.x
     assert math.hypot(x["u"], x["v"], x["w"]) == pytest.approx(8.0, rel=1e-12)
     phi, theta = x["phi"], x["theta"]
-    climb = x["u"] * math.sin(theta) - (x["v"] * math.sin(phi) + x["w"] * math.cos(phi)) * math.cos(theta)
+    climb = x["u"] * math.sin(theta) - (x["v"] * math.sin(phi) + x["w"] * math.cos(phi)) * math.cos(
+        theta
+    )
     assert climb == pytest.approx(1.5, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    "asked", [{"turn_rate": 0.3}, {"climb_rate": -1.5}, {"sideslip": math.pi / 2}, {"sideslip": math.pi}, {"wind": (3, 2, 0)}]
+    "asked",
+    [
+        {"turn_rate": 0.3},
+        {"climb_rate": -1.5},
+        {"sideslip": math.pi / 2},
+        {"sideslip": math.pi},
+        {"wind": (3, 2, 0)},
+    ],
 )
 def test_turn_descent_sideways_rearward_and_wind_trim(heli, asked):
     assert symheli.trim(heli, 5.0, **asked).success
@@ -40,7 +49,9 @@ def test_an_impossible_trim_says_why_and_keeps_the_best_point(ideal):
     assert not symheli.trim(ideal, 60.0, throw=False).success
 
 
-@pytest.mark.parametrize("bad", [{"airspeed": -1.0}, {"airspeed": math.nan}, {"airspeed": 2.0, "climb_rate": 3.0}])
+@pytest.mark.parametrize(
+    "bad", [{"airspeed": -1.0}, {"airspeed": math.nan}, {"airspeed": 2.0, "climb_rate": 3.0}]
+)
 def test_bad_conditions_are_refused(ideal, bad):
     with pytest.raises(symheli.InputError):
         symheli.trim(ideal, **bad)
@@ -50,12 +61,16 @@ def one_sided(f, z, i, h):
     """Second-order one-sided differences of f at z in direction i, forwards and backwards."""
     e = np.zeros(len(z))
     e[i] = h
-    return (-3 * f(z) + 4 * f(z + e) - f(z + 2 * e)) / (2 * h), (3 * f(z) - 4 * f(z - e) + f(z - 2 * e)) / (2 * h)
+    return (-3 * f(z) + 4 * f(z + e) - f(z + 2 * e)) / (2 * h), (
+        3 * f(z) - 4 * f(z - e) + f(z - 2 * e)
+    ) / (2 * h)
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.15, 0.6, 2.0, 5.0, 9.5, 12.0, 19.0])
 def test_jacobian_agrees_with_differences_on_each_side_of_a_kink(heli, speed):
-    """At a kink the algorithmic derivative must equal one side; elsewhere both. Hover (0) is a kink of several limits."""
+    """At a kink the algorithmic derivative must equal one side; elsewhere both. Hover (0) is a kink
+    of several limits.
+    """
     point = symheli.trim(heli, speed)
     z0 = np.concatenate([point.x.array, point.u.array])
     n, rhs = len(heli.states), heli.compiled("rhs")
@@ -63,13 +78,18 @@ def test_jacobian_agrees_with_differences_on_each_side_of_a_kink(heli, speed):
     def f(z):
         return np.array(rhs(z[:n], z[n:], np.zeros(3))).ravel()
 
-    A, B, _ = (np.array(m) for m in heli.compiled("jacobian")(point.x.array, point.u.array, np.zeros(3)))
+    A, B, _ = (
+        np.array(m) for m in heli.compiled("jacobian")(point.x.array, point.u.array, np.zeros(3))
+    )
     J = np.hstack([A, B])
     for i in range(len(z0)):
         forward, backward = one_sided(f, z0, i, 1e-5)
-        # rounding 1e-14/h = 1e-9 and truncation h^2 times third derivatives up to 1e4: 1e-5 relative to the column
+        # rounding 1e-14/h = 1e-9 and truncation h^2 times third derivatives up to 1e4: 1e-5
+        # relative to the column
         tolerance = 2e-5 * (1 + np.abs(J[:, i]))
-        np.testing.assert_array_less(np.minimum(np.abs(J[:, i] - forward), np.abs(J[:, i] - backward)), tolerance)
+        np.testing.assert_array_less(
+            np.minimum(np.abs(J[:, i] - forward), np.abs(J[:, i] - backward)), tolerance
+        )
 
 
 def test_jacobian_is_finite_in_awkward_corners(heli):
@@ -99,7 +119,15 @@ def test_quaternion_and_euler_forms_agree(heli):
     """The same accelerations from both forms at a random state, heading 270 deg."""
     rng = np.random.default_rng(3)
     n = len(heli.states)
-    x = np.concatenate([rng.normal(size=3) * 4, rng.normal(size=3) * 0.5, [0.2, -0.15], rng.normal(size=2) * 0.02, [165.0, 12.0][: n - 10]])
+    x = np.concatenate(
+        [
+            rng.normal(size=3) * 4,
+            rng.normal(size=3) * 0.5,
+            [0.2, -0.15],
+            rng.normal(size=2) * 0.02,
+            [165.0, 12.0][: n - 10],
+        ]
+    )
     u = np.array([0.01, -0.02, 0.09, 0.2])
     phi, theta, psi = x[6], x[7], math.radians(270)
     from scipy.spatial.transform import Rotation

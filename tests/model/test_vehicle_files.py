@@ -24,23 +24,71 @@ def line_of(entry):
 @pytest.mark.parametrize(
     ("entry", "instead", "message"),
     [
-        (MASS, 'mass = { value = 8.2, unit = "kilo", source = "x" }', "unknown unit 'kilo'; expected kg"),
-        (MASS, 'mass = { value = 18, unit = "lbs", source = "x" }', "did you mean 'lb', 18 lb = 8.16466 kg?"),
-        (MASS, 'mass = { value = 8.2, unit = "m", source = "x" }', "expected kg (or lb, slug), got 8.2 m, which is another kind"),
+        (
+            MASS,
+            'mass = { value = 8.2, unit = "kilo", source = "x" }',
+            "unknown unit 'kilo'; expected kg",
+        ),
+        (
+            MASS,
+            'mass = { value = 18, unit = "lbs", source = "x" }',
+            "did you mean 'lb', 18 lb = 8.16466 kg?",
+        ),
+        (
+            MASS,
+            'mass = { value = 8.2, unit = "m", source = "x" }',
+            "expected kg (or lb, slug), got 8.2 m, which is another kind",
+        ),
         (MASS, "mass = 8.2", "a bare number has no unit: write { value = 8.2, unit = 'kg'"),
         (MASS, 'mass = { value = 8.2, source = "x" }', "the unit is missing: expected unit = 'kg'"),
-        (MASS, 'mass = { value = nan, unit = "kg", source = "x" }', "expected a finite number as value, got nan"),
-        (MASS, 'mass = { value = "8", unit = "kg", source = "x" }', "expected a finite number as value, got '8'"),
+        (
+            MASS,
+            'mass = { value = nan, unit = "kg", source = "x" }',
+            "expected a finite number as value, got nan",
+        ),
+        (
+            MASS,
+            'mass = { value = "8", unit = "kg", source = "x" }',
+            "expected a finite number as value, got '8'",
+        ),
         (MASS, 'mass = { value = 8.2, unit = "kg" }', "every number needs a source"),
-        (MASS, 'mass = { value = 8.2, unit = "kg", source = "x", asumed = true }', "unknown key 'asumed'; did you mean 'assumed'"),
-        (MASS, 'mass = { value = 8.2, unit = "kg", source = "x", assumed = 1 }', "assumed must be true or false"),
-        (MASS, 'mass = { value = -8.2, unit = "kg", source = "x" }', "body.mass: must be > 0 kg, got -8.2"),
-        (RADIUS, 'radius = { value = 0.0, unit = "m", source = "x" }', "main_rotor.radius: must be > 0 m, got 0"),
-        (RADIUS, 'radius = { value = 0.775, unit = "rad", source = "x" }', "expected m (or cm, mm, km, ft, in), got 0.775 rad"),
+        (
+            MASS,
+            'mass = { value = 8.2, unit = "kg", source = "x", asumed = true }',
+            "unknown key 'asumed'; did you mean 'assumed'",
+        ),
+        (
+            MASS,
+            'mass = { value = 8.2, unit = "kg", source = "x", assumed = 1 }',
+            "assumed must be true or false",
+        ),
+        (
+            MASS,
+            'mass = { value = -8.2, unit = "kg", source = "x" }',
+            "body.mass: must be > 0 kg, got -8.2",
+        ),
+        (
+            RADIUS,
+            'radius = { value = 0.0, unit = "m", source = "x" }',
+            "main_rotor.radius: must be > 0 m, got 0",
+        ),
+        (
+            RADIUS,
+            'radius = { value = 0.775, unit = "rad", source = "x" }',
+            "expected m (or cm, mm, km, ft, in), got 0.775 rad",
+        ),
         (RADIUS, 'radius = { ref = "body.radius" }', "must name an entry with a value"),
-        (RADIUS, 'radius = { ref = "body.mass" }', "expected m (or cm, mm, km, ft, in), got 8.2 kg"),
+        (
+            RADIUS,
+            'radius = { ref = "body.mass" }',
+            "expected m (or cm, mm, km, ft, in), got 8.2 kg",
+        ),
         *(
-            (BLADES, BLADES.replace("value = 2", f"value = {n}"), f"main_rotor.blades: must be a whole number >= 2, got {n}")
+            (
+                BLADES,
+                BLADES.replace("value = 2", f"value = {n}"),
+                f"main_rotor.blades: must be a whole number >= 2, got {n}",
+            )
             for n in (1, 0, -2, 2.5)
         ),
         (
@@ -51,7 +99,10 @@ def line_of(entry):
         (
             'd_lon = { value = 0.096, unit = "rad", source = "G15 text, servo travel, symmetric" }',
             'd_lon = { value = 5.5, unit = "degrees", source = "x" }',
-            "unknown unit 'degrees'; expected rad (or deg, mrad); did you mean 'deg', 5.5 deg = 0.0959931 rad?",
+            (
+                "unknown unit 'degrees'; expected rad (or deg, mrad); did you mean 'deg', 5.5 deg ="
+                " 0.0959931 rad?"
+            ),
         ),
         (
             'area_x = { value = 0.1, unit = "m^2", source = "G15 Table 15.1" }',
@@ -60,7 +111,9 @@ def line_of(entry):
         ),
     ],
 )
-def test_a_wrong_entry_is_named_with_its_line_and_what_was_expected(tmp_path, entry, instead, message):
+def test_a_wrong_entry_is_named_with_its_line_and_what_was_expected(
+    tmp_path, entry, instead, message
+):
     path = write(tmp_path, replace={entry: instead})
     with pytest.raises(symheli.InputError, match=re.escape(message)) as caught:
         load_vehicle(path)
@@ -70,14 +123,23 @@ def test_a_wrong_entry_is_named_with_its_line_and_what_was_expected(tmp_path, en
 def test_a_missing_entry_is_named_with_its_section_and_the_unknown_one_beside_it(tmp_path):
     path = write(tmp_path, replace={RADIUS: RADIUS.replace("radius", "radios")})
     with pytest.raises(
-        symheli.InputError, match=f"line {line_of(RADIUS)}, main_rotor.radios: unknown entry 'radios'; did you mean 'radius'"
+        symheli.InputError,
+        match=(
+            f"line {line_of(RADIUS)}, main_rotor.radios: unknown entry 'radios'; did you mean"
+            " 'radius'"
+        ),
     ):
         load_vehicle(path)
     path = write(tmp_path, replace={RADIUS: ""})
-    with pytest.raises(symheli.InputError, match=rf"line {line_of('[main_rotor]')}, main_rotor.radius: missing; add radius = .*'m'"):
+    with pytest.raises(
+        symheli.InputError,
+        match=rf"line {line_of('[main_rotor]')}, main_rotor.radius: missing; add radius = .*'m'",
+    ):
         load_vehicle(path)
     path = write(tmp_path, replace={"[body]": "[boddy]"})
-    with pytest.raises(symheli.InputError, match=r"section \[body\] is missing|unknown component 'boddy'"):
+    with pytest.raises(
+        symheli.InputError, match=r"section \[body\] is missing|unknown component 'boddy'"
+    ):
         load_vehicle(path)
 
 
@@ -91,12 +153,16 @@ def test_lines_are_found_in_every_way_toml_writes_an_entry(tmp_path):
     """A header with a comment, a dotted key, a table of its own."""
     for instead in ("[ body ]  # of the airframe", '[fuselage.more]\nx = 1\n["body"]'):
         path = write(tmp_path, replace={"[body]": instead, MASS: MASS.replace("8.2", "-1")})
-        with pytest.raises(symheli.InputError, match=r"line \d+, (body\.mass: must be|fuselage\.more)"):
+        with pytest.raises(
+            symheli.InputError, match=r"line \d+, (body\.mass: must be|fuselage\.more)"
+        ):
             load_vehicle(path)
     own = XCELL.replace(MASS, "") + '\n[body.mass]\nvalue = -3.0\nunit = "kg"\nsource = "x"\n'
     path = tmp_path / "own.toml"
     path.write_text(own)
-    with pytest.raises(symheli.InputError, match=rf"line {1 + own.splitlines().index('[body.mass]')}, body\.mass"):
+    with pytest.raises(
+        symheli.InputError, match=rf"line {1 + own.splitlines().index('[body.mass]')}, body\.mass"
+    ):
         load_vehicle(path)
 
 
@@ -115,7 +181,11 @@ def test_values_in_other_units_arrive_in_si(tmp_path):
     )
     assert values.values("body")["mass"] == pytest.approx(19.5 * 0.45359237, rel=1e-15)
     assert values.values("body")["Iyy"] == pytest.approx(8 * 0.45359237 * 0.3048**2, rel=1e-15)
-    assert values.values("main_rotor")["radius"] == values.values("tail_wake")["rotor_radius"] == pytest.approx(0.6858)
+    assert (
+        values.values("main_rotor")["radius"]
+        == values.values("tail_wake")["rotor_radius"]
+        == pytest.approx(0.6858)
+    )
     assert values.values("main_rotor")["nominal_speed"] == pytest.approx(50 * math.pi)
 
 

@@ -54,7 +54,10 @@ def test_vehicles_are_listed_with_title_and_source(run, answer):
 def test_trim_prints_the_numbers_of_the_library_with_units(run, answer):
     got = answer("trim", "--airspeed", "5", "--climb-rate", "-1", "--governor", "pi")
     point = symheli.trim(symheli.Helicopter.load("xcell60"), 5.0, climb_rate=-1.0)
-    assert got["inputs"]["d_col"] == {"value": pytest.approx(point.u["d_col"], rel=1e-9), "unit": "rad"}
+    assert got["inputs"]["d_col"] == {
+        "value": pytest.approx(point.u["d_col"], rel=1e-9),
+        "unit": "rad",
+    }
     status, out, _ = run("trim", "--sideslip-deg", "10", "--airspeed", "4")
     assert status == 0
     assert "theta" in out
@@ -121,7 +124,7 @@ def test_certify_with_an_lft_test_lets_the_airspeed_jump(answer, run):
     assert "did you mean 'DG'" in err
 
 
-# --- identify --------------------------------------------------------------------------------------------------------------
+# --- identify ------------------------------------------------------------------------------------
 
 
 def scheduled_csv(path, n=900, noise=0.0):
@@ -129,13 +132,31 @@ def scheduled_csv(path, n=900, noise=0.0):
     rng = np.random.default_rng(0)
     p, u, y = 5 + 4 * np.sin(2 * np.pi * np.arange(n) / 300), rng.standard_normal(n), np.zeros(n)
     for k in range(1, n):
-        y[k] = (0.9 - 0.05 * p[k - 1]) * y[k - 1] + (0.2 + 0.02 * p[k - 1]) * u[k - 1] + noise * rng.standard_normal()
+        y[k] = (
+            (0.9 - 0.05 * p[k - 1]) * y[k - 1]
+            + (0.2 + 0.02 * p[k - 1]) * u[k - 1]
+            + noise * rng.standard_normal()
+        )
     rows = [f"{0.05 * k:.3f},{np.degrees(y[k]):.12g},{u[k]:.12g},{p[k]:.12g}" for k in range(n)]
     path.write_text("\n".join(["t,y,u,p", *rows]))
     return path
 
 
-STRUCTURE = ("--na", 1, "--nb", 1, "--degree", 1, "--no-offset", "--outputs", "y", "--inputs", "u", "--scheduling", "p")
+STRUCTURE = (
+    "--na",
+    1,
+    "--nb",
+    1,
+    "--degree",
+    1,
+    "--no-offset",
+    "--outputs",
+    "y",
+    "--inputs",
+    "u",
+    "--scheduling",
+    "p",
+)
 UNITS = ("--units", "y=deg", "u=1", "p=m/s")
 MAPPED = (("theta", "y", "deg"), ("stick", "u", "1"), ("speed", "p", "m/s"))
 
@@ -156,12 +177,32 @@ def test_identify_recovers_a_scheduled_model_from_a_table(run, answer, tmp_path)
 
 def test_identify_reads_by_a_map_and_compares_orders(answer, run, tmp_path):
     log, signal_map = scheduled_csv(tmp_path / "log.csv"), tmp_path / "aircraft.toml"
-    signal_map.write_text('time = "t"\n[signals]\n' + "".join(f'{n} = {{ column = "{c}", unit = "{u}" }}\n' for n, c, u in MAPPED))
-    got = answer("identify", log, *STRUCTURE[:-6], "--outputs", "theta", "--inputs", "stick", "--scheduling", "speed", "--map", signal_map)
-    np.testing.assert_allclose(np.ravel(got["models"]["LPV, degree 1"]["coefficients"]["A"]), [-0.9, 0.05], atol=1e-8)
+    signal_map.write_text(
+        'time = "t"\n[signals]\n'
+        + "".join(f'{n} = {{ column = "{c}", unit = "{u}" }}\n' for n, c, u in MAPPED)
+    )
+    got = answer(
+        "identify",
+        log,
+        *STRUCTURE[:-6],
+        "--outputs",
+        "theta",
+        "--inputs",
+        "stick",
+        "--scheduling",
+        "speed",
+        "--map",
+        signal_map,
+    )
+    np.testing.assert_allclose(
+        np.ravel(got["models"]["LPV, degree 1"]["coefficients"]["A"]), [-0.9, 0.05], atol=1e-8
+    )
     assert np.shape(got["standard_errors"]) == (4, 1)
     scan = answer("identify", log, *STRUCTURE, *UNITS, "--orders")
-    best = max((t for t in scan["trials"] if not t["refused"]), key=lambda t: t["fit_percent"]["free run"][0])
+    best = max(
+        (t for t in scan["trials"] if not t["refused"]),
+        key=lambda t: t["fit_percent"]["free run"][0],
+    )
     assert best["degree"] >= 1
     status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--orders", "--train", 1)
     assert status == 1
@@ -173,7 +214,9 @@ def test_identify_draws_what_was_measured_and_predicted(run, answer, tmp_path, e
     log, picture = scheduled_csv(tmp_path / "log.csv", noise=0.1), tmp_path / f"fits.{end}"
     got = answer("identify", log, *STRUCTURE, *UNITS, "--plot", picture)
     assert got["written"] == [str(picture)]
-    assert picture.read_bytes().startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[end])
+    assert picture.read_bytes().startswith(
+        {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[end]
+    )
     status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--plot", picture, "--orders")
     assert status == 1
     assert "--plot draws the fits of one model" in error
@@ -187,14 +230,22 @@ def test_identify_writes_the_model_and_the_bands_of_its_coefficients(answer, run
     assert got["written"] == [str(path) for path in paths]
     assert paths[0].read_bytes().startswith(b"<?xml")
     model = LPVARXModel.load(paths[1])
-    np.testing.assert_array_equal(model.coefficients.monomial().A, got["models"]["LPV, degree 1"]["coefficients"]["A"])
-    np.testing.assert_allclose(np.sqrt(np.einsum("yii->iy", model.covariance)), got["standard_errors"], rtol=1e-12)
+    np.testing.assert_array_equal(
+        model.coefficients.monomial().A, got["models"]["LPV, degree 1"]["coefficients"]["A"]
+    )
+    np.testing.assert_allclose(
+        np.sqrt(np.einsum("yii->iy", model.covariance)), got["standard_errors"], rtol=1e-12
+    )
     answer("identify", log, *STRUCTURE, *UNITS, "--save", tmp_path / "model.mat")
-    assert list(np.atleast_1d(loadmat(tmp_path / "model.mat", simplify_cells=True)["outputs"])) == ["y"]
+    assert list(np.atleast_1d(loadmat(tmp_path / "model.mat", simplify_cells=True)["outputs"])) == [
+        "y"
+    ]
     status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--save", paths[1], "--orders")
     assert status == 1
     assert "--save writes one model" in error
-    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--save", log / "model.json")  # a file is no folder
+    status, _, error = run(
+        "identify", log, *STRUCTURE, *UNITS, "--save", log / "model.json"
+    )  # a file is no folder
     assert status == 1
     assert "cannot be written" in error
 
@@ -205,7 +256,14 @@ def test_identify_says_where_scheduling_does_not_pay(run, tmp_path):
     u, y = rng.standard_normal(600), np.zeros(600)
     for k in range(1, 600):
         y[k] = 0.8 * y[k - 1] + u[k - 1] + 0.3 * rng.standard_normal()
-    log.write_text("\n".join(["y,u,p", *(f"{a},{b},{c}" for a, b, c in zip(y, u, rng.uniform(0, 5, 600), strict=True))]))
+    log.write_text(
+        "\n".join(
+            [
+                "y,u,p",
+                *(f"{a},{b},{c}" for a, b, c in zip(y, u, rng.uniform(0, 5, 600), strict=True)),
+            ]
+        )
+    )
     status, out, _ = run("identify", log, "--dt", 0.1, *STRUCTURE, *UNITS)
     assert status == 0
     assert "scheduling does NOT pay" in out
@@ -222,12 +280,23 @@ def test_a_step_beside_a_time_column_resamples_by_that_column(answer, run, tmp_p
     assert "0 usable samples" in error
 
 
-def test_identify_reads_a_clock_in_milliseconds_and_decimal_commas_and_asks_where_the_unit_is_not_said(answer, run, tmp_path):
+def test_identify_reads_milliseconds_and_decimal_commas_and_asks_where_the_unit_is_not_said(
+    answer, run, tmp_path
+):
     log, other = scheduled_csv(tmp_path / "log.csv"), tmp_path / "semicolons.csv"
     rows = [line.split(",") for line in log.read_text().splitlines()]
     ticks = [["t"], *([str(50 * k)] for k in range(len(rows) - 1))]
-    other.write_text("# logger\n" + "\n".join(" ;".join([t, *row[1:]]).replace(".", ",") for (t,), row in zip(ticks, rows, strict=True)))
-    expected, got = answer("identify", log, *STRUCTURE, *UNITS), answer("identify", other, *STRUCTURE, *UNITS, "--time-unit", "ms")
+    other.write_text(
+        "# logger\n"
+        + "\n".join(
+            " ;".join([t, *row[1:]]).replace(".", ",")
+            for (t,), row in zip(ticks, rows, strict=True)
+        )
+    )
+    expected, got = (
+        answer("identify", log, *STRUCTURE, *UNITS),
+        answer("identify", other, *STRUCTURE, *UNITS, "--time-unit", "ms"),
+    )
     assert got["models"] == expected["models"]
     assert got["read"]["dt"] == 0.05
     with warnings.catch_warnings():
@@ -238,18 +307,36 @@ def test_identify_reads_a_clock_in_milliseconds_and_decimal_commas_and_asks_wher
     other.write_text(other.read_text().replace("t ;", "clock ;", 1))
     status, _, error = run("identify", other, *STRUCTURE, *UNITS)
     assert status == 1
-    assert "no column is called t or time; name it with --time, or give the sample period with --dt; found 'clock', 'y', 'u', 'p'" in error
+    assert (
+        "no column is called t or time; name it with --time, or give the sample period with --dt;"
+        " found 'clock', 'y', 'u', 'p'" in error
+    )
 
 
 def test_identify_cuts_decimates_smooths_and_fits_lti_models(answer, tmp_path):
     log = scheduled_csv(tmp_path / "log.csv")
-    options = ("--start", 5, "--stop", 35, "--decimate", 2, "--smooth-scheduling", 0.5, "--train", 0.5, "--scheduling-at", "now")
+    options = (
+        "--start",
+        5,
+        "--stop",
+        35,
+        "--decimate",
+        2,
+        "--smooth-scheduling",
+        0.5,
+        "--train",
+        0.5,
+        "--scheduling-at",
+        "now",
+    )
     got = answer("identify", log, *STRUCTURE, *UNITS, *options)
     assert got["read"]["samples"] == 300
     assert got["read"]["rows_outside_start_stop"] == 300
     assert got["read"]["dt"] == pytest.approx(0.1)
     assert got["read"]["held_out_samples"] == 150
-    alone = answer("identify", log, "--outputs", "y", "--inputs", "u", "--degree", 0, "--train", 1, *UNITS[:3])
+    alone = answer(
+        "identify", log, "--outputs", "y", "--inputs", "u", "--degree", 0, "--train", 1, *UNITS[:3]
+    )
     assert list(alone["models"]) == ["LTI"]
     assert alone["models"]["LTI"]["fit_percent"]["held_out"] is None
 
@@ -279,8 +366,32 @@ def test_a_real_flight_is_identified_and_scheduling_does_not_pay(answer):
     log = DATA / "trex550" / "trex550_flight_clean.csv"
     if not log.exists():
         pytest.skip(f"{log} is not here")
-    structure = ("--na", 2, "--nb", 3, "--degree", 1, "--decimate", 4, "--start", 31, "--scheduling-from", "u_mps,v_mps")
-    got = answer("identify", log, "--dt", 0.0084, "--outputs", "q_radps,theta_rad", "--inputs", "lon", *structure, *TREX_UNITS)
+    structure = (
+        "--na",
+        2,
+        "--nb",
+        3,
+        "--degree",
+        1,
+        "--decimate",
+        4,
+        "--start",
+        31,
+        "--scheduling-from",
+        "u_mps,v_mps",
+    )
+    got = answer(
+        "identify",
+        log,
+        "--dt",
+        0.0084,
+        "--outputs",
+        "q_radps,theta_rad",
+        "--inputs",
+        "lon",
+        *structure,
+        *TREX_UNITS,
+    )
     assert got["scheduling_pays"] == {"q_radps": False, "theta_rad": False}
     assert got["read"]["scheduling_range"][1] < 8.2
     fit = got["models"]["LTI"]["fit_percent"]["held_out"]
@@ -288,7 +399,7 @@ def test_a_real_flight_is_identified_and_scheduling_does_not_pay(answer):
     assert fit["1 s"]["theta_rad"] < 60
 
 
-# --- failure ---------------------------------------------------------------------------------------------------------------
+# --- failure -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -315,7 +426,10 @@ def test_a_failure_is_one_sentence_and_status_1(run, arguments, sentence):
     [
         ([], "--outputs"),
         (["--outputs", "y", "--inputs", "u"], "name the scheduling signal"),
-        (["--outputs", "y", "--inputs", "u", "--scheduling", "p"], "the unit of 'y' is not known: --units y=UNIT"),
+        (
+            ["--outputs", "y", "--inputs", "u", "--scheduling", "p"],
+            "the unit of 'y' is not known: --units y=UNIT",
+        ),
         ([*STRUCTURE, *UNITS, "z=1"], "unknown signal in --units 'z'"),
         ([*STRUCTURE, "--units", "y=deg", "u=1", "p=knots"], "unknown unit 'knots'"),
         ([*STRUCTURE, *UNITS, "--scheduling-from", "u,y"], "not both"),
@@ -357,13 +471,22 @@ def test_help_and_version_succeed(run):
     ("arguments", "module", "function", "passed"),
     [
         (
-            ["study", "--quick", "--seed", "3", "--out", "o"], "study", "run_study",
+            ["study", "--quick", "--seed", "3", "--out", "o"],
+            "study",
+            "run_study",
             {"vehicle": "xcell60", "out": Path("o"), "quick": True, "seed": 3},
         ),
-        (["campaign", "--seeds", "4"], "campaign", "run_campaign", {"seeds": 4, "vehicle": "xcell60"}),
+        (
+            ["campaign", "--seeds", "4"],
+            "campaign",
+            "run_campaign",
+            {"seeds": 4, "vehicle": "xcell60"},
+        ),
     ],
-)  # fmt: skip
-def test_long_jobs_get_their_options_and_show_their_result(run, monkeypatch, arguments, module, function, passed):
+)
+def test_long_jobs_get_their_options_and_show_their_result(
+    run, monkeypatch, arguments, module, function, passed
+):
     given = {}
 
     class Result:
@@ -377,7 +500,9 @@ def test_long_jobs_get_their_options_and_show_their_result(run, monkeypatch, arg
         given.update(options)
         return Result()
 
-    monkeypatch.setitem(sys.modules, f"studies.transition.{module}", SimpleNamespace(**{function: job}))
+    monkeypatch.setitem(
+        sys.modules, f"studies.transition.{module}", SimpleNamespace(**{function: job})
+    )
     assert run(*arguments)[:2] == (0, "a table\n")
     assert given == passed
     assert json.loads(run(*arguments, "--json")[1]) == {"gain": 2.5}
@@ -413,12 +538,34 @@ def test_a_full_disk_is_a_sentence_and_leaves_the_old_file(tmp_path, monkeypatch
 
 def test_json_is_strict_and_keeps_what_is_not_finite():
     got = json.loads(
-        as_json({"a": np.array([1.0, np.inf]), "b": float("nan"), "c": 1 + 2j, "d": (np.int64(3), None, True), "e": Path("x")})
+        as_json(
+            {
+                "a": np.array([1.0, np.inf]),
+                "b": float("nan"),
+                "c": 1 + 2j,
+                "d": (np.int64(3), None, True),
+                "e": Path("x"),
+            }
+        )
     )
-    assert got == {"a": [1.0, "inf"], "b": "nan", "c": {"real": 1.0, "imag": 2.0}, "d": [3, None, True], "e": "x"}
+    assert got == {
+        "a": [1.0, "inf"],
+        "b": "nan",
+        "c": {"real": 1.0, "imag": 2.0},
+        "d": [3, None, True],
+        "e": "x",
+    }
 
 
 def test_the_command_line_starts_without_heavy_libraries():
     heavy = "('casadi', 'cvxpy', 'pandas', 'matplotlib')"
-    code = f"import sys; from studies import cli; cli.parser(); print([m for m in {heavy} if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    code = (
+        f"import sys; from studies import cli; cli.parser(); print([m for m in {heavy} if m in"
+        " sys.modules])"
+    )
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == "[]"
+    )

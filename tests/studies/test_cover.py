@@ -15,7 +15,9 @@ PLAIN = Relaxation(degree=0)
 
 def lag(pole=1.0):
     """dx/dt = -pole x + u, y = x, whatever p is."""
-    return LPVStateSpace.polynomial([[[-pole]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0))
+    return LPVStateSpace.polynomial(
+        [[[-pole]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
+    )
 
 
 def left_out(size):
@@ -36,7 +38,11 @@ def test_nothing_is_proven_where_the_remainder_may_make_the_plant_unstable():
 
 
 def test_every_measured_difference_is_within_the_remainder_with_the_promised_safety():
-    missed = np.random.default_rng(1).standard_normal((40, 3, 5)) * [[1.0], [1e-3], [30.0]] * [1, 1, 1e-4, 1, 7]
+    missed = (
+        np.random.default_rng(1).standard_normal((40, 3, 5))
+        * [[1.0], [1e-3], [30.0]]
+        * [1, 1, 1e-4, 1, 7]
+    )
     rest = Remainder.of(missed)
     norms = np.linalg.norm(missed / rest.rows[:, None] / rest.columns, 2, axis=(1, 2))
     assert norms.max() == pytest.approx(1 / SAFETY)
@@ -44,4 +50,6 @@ def test_every_measured_difference_is_within_the_remainder_with_the_promised_saf
 
 def test_without_a_remainder_the_covering_model_has_the_gain_of_the_model():
     rest = Remainder.of(left_out(1e-12))
-    assert synthesis.l2_gain(covering(lag(), rest, 2.0), 0.0, relaxation=PLAIN, search=None).gamma == pytest.approx(0.5, rel=1e-3)
+    assert synthesis.l2_gain(
+        covering(lag(), rest, 2.0), 0.0, relaxation=PLAIN, search=None
+    ).gamma == pytest.approx(0.5, rel=1e-3)

@@ -67,7 +67,10 @@ def test_vehicles_say_how_much_is_assumed(run):
     out = run("vehicles")[1]
     assert "12 assumed: drivetrain.inertia" in out
     data = json.loads(run("vehicles", "--json")[1])
-    assumed = {entry["name"]: len(entry["assumed"]) for entry in data["vehicles"] + data["identified_models"]}
+    assumed = {
+        entry["name"]: len(entry["assumed"])
+        for entry in data["vehicles"] + data["identified_models"]
+    }
     assert assumed["xcell60"] == 0
     assert assumed["xcell_kahn_hudson"] == 12
     assert assumed["r50_hover"] == 4
@@ -75,7 +78,9 @@ def test_vehicles_say_how_much_is_assumed(run):
 
 def test_trim_takes_an_altitude(run, ideal):
     data = json.loads(run("trim", "--airspeed", "6", "--altitude", "2000", "--json")[1])
-    assert data["inputs"]["d_col"]["value"] == pytest.approx(symheli.trim(ideal, 6.0, altitude=2000.0).u["d_col"], rel=1e-9)
+    assert data["inputs"]["d_col"]["value"] == pytest.approx(
+        symheli.trim(ideal, 6.0, altitude=2000.0).u["d_col"], rel=1e-9
+    )
     assert run("trim", "--altitude", "90000")[0] == 1
 
 
@@ -91,6 +96,13 @@ def test_figures_draw_on_the_axes_they_are_given(ideal):
     assert not found.attainable[2].all()
     figure, (left, right) = plt.subplots(1, 2)
     assert trim_map_figure.plot(found, left, "theta") is left
-    assert derivative_figure.plot(symheli.derivatives(symheli.sweep(ideal, [2.0, 5.0])), right, ["M_q"]) is right
-    assert "control at or beyond its stop" in [text.get_text() for text in left.get_legend().get_texts()]
+    assert (
+        derivative_figure.plot(
+            symheli.derivatives(symheli.sweep(ideal, [2.0, 5.0])), right, ["M_q"]
+        )
+        is right
+    )
+    assert "control at or beyond its stop" in [
+        text.get_text() for text in left.get_legend().get_texts()
+    ]
     plt.close(figure)

@@ -20,7 +20,8 @@ def test_patches_give_back_polynomials_that_jump():
     values = np.where(p < 1, 1 + p**2, 7 - p)
     np.testing.assert_allclose(basis(p) @ basis.fit(p, values), values, atol=1e-12)
     sides = [piece.bernstein.T @ basis.fit(p, values) for piece in basis.pieces()]
-    # Bernstein coefficients begin and end with the values at the ends: 2 on one side of the jump, 6 on the other
+    # Bernstein coefficients begin and end with the values at the ends: 2 on one side of the jump, 6
+    # on the other
     assert (sides[0][-1], sides[1][0]) == pytest.approx((2.0, 6.0))
 
 
@@ -41,6 +42,8 @@ def test_the_covered_gain_is_hardly_above_that_of_the_polynomials(ideal):
     models = ExactLateral.of(ideal, 5.0, 8.0)
     loop = models.loop()
     plain = synthesis.l2_gain(loop, 1.0, relaxation=Relaxation(segments=(2,)), search=None)
-    covered, certificate = covered_gain(loop, Remainder.of(models.missed(loop)), 1.0, Relaxation(segments=(2,)), plain.gamma)
+    covered, certificate = covered_gain(
+        loop, Remainder.of(models.missed(loop)), 1.0, Relaxation(segments=(2,)), plain.gamma
+    )
     assert plain.frozen < covered < 1.01 * plain.gamma
     assert certificate.verify(rigorous=True)

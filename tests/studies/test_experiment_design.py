@@ -16,7 +16,9 @@ def test_a_larger_excitation_teaches_in_proportion_until_it_exceeds_a_limit_or_i
     assert [e.name for e in found.plan.experiments] == [LARGE.name]
     assert "was lost" in found.lost[wild.name]
     small, large = (float(np.median(e.bounds)) for e in found.experiments)
-    assert 2.0 < small / large < 9.0  # three times the amplitude; products of two signals grow ninefold
+    assert (
+        2.0 < small / large < 9.0
+    )  # three times the amplitude; products of two signals grow ninefold
     assert SMALL.name in found.table()
     strict = design("xcell60", LONGITUDINAL, 1, {"q": 0.8 * peak(LARGE)}, [SMALL, LARGE])
     assert [e.name for e in strict.plan.experiments] == [SMALL.name]

@@ -1,4 +1,6 @@
-"""The exported estimator compiles without a warning, freestanding, and reproduces Python's numbers to the last bit."""
+"""The exported estimator compiles without a warning, freestanding, and reproduces Python's numbers
+to the last bit.
+"""
 
 import shutil
 import subprocess
@@ -11,17 +13,53 @@ from studies.export_estimator import write_estimator
 from symheli.errors import InputError
 
 CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
-STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off")
-LONGITUDINAL = idn.LPVARX(("theta", "w", "u"), ("d_lon",), "airspeed", 3, 1, 2, idn.Polynomial(2, 0.0, 13.0), scheduling_at="now")
-GROUPS = idn.LPVARX(("a", "b"), ("c", "d"), "p", {"a": 1, "b": {"a": 0, "b": 2}}, 2, 0, idn.Spline((0.0, 1.0, 4.0, 9.0)), offset_rate=True)
+STRICT = (
+    "-std=c99",
+    "-O2",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-pedantic",
+    "-Werror",
+    "-ffp-contract=off",
+)
+LONGITUDINAL = idn.LPVARX(
+    ("theta", "w", "u"),
+    ("d_lon",),
+    "airspeed",
+    3,
+    1,
+    2,
+    idn.Polynomial(2, 0.0, 13.0),
+    scheduling_at="now",
+)
+GROUPS = idn.LPVARX(
+    ("a", "b"),
+    ("c", "d"),
+    "p",
+    {"a": 1, "b": {"a": 0, "b": 2}},
+    2,
+    0,
+    idn.Spline((0.0, 1.0, 4.0, 9.0)),
+    offset_rate=True,
+)
 BESIDE = idn.LPVARX(
-    "y", (), ("v", "s"), 2, 0, 0, idn.Product((idn.Polynomial(1, 0.0, 9.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0)))), offset=True
+    "y",
+    (),
+    ("v", "s"),
+    2,
+    0,
+    0,
+    idn.Product((idn.Polynomial(1, 0.0, 9.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0)))),
+    offset=True,
 )
 CASES = {
     "longitudinal": idn.RecursiveLeastSquares(LONGITUDINAL),
     "longitudinal, single": idn.RecursiveLeastSquares(LONGITUDINAL, 0.99, precision="single"),
     "groups, variable": idn.RecursiveLeastSquares(GROUPS, idn.Variable(200, 20)),
-    "groups, directional, single": idn.RecursiveLeastSquares(GROUPS, idn.Directional(0.97), precision="single"),
+    "groups, directional, single": idn.RecursiveLeastSquares(
+        GROUPS, idn.Directional(0.97), precision="single"
+    ),
     "two parameters, no inputs": idn.RecursiveLeastSquares(BESIDE, 0.98),
 }
 
@@ -37,15 +75,28 @@ class Everything(dict):
 
 
 def built(folder, name, *more):
-    """Compile as an autopilot would, without a hosted library, and the check as a program; returns what it prints."""
+    """Compile as an autopilot would, without a hosted library, and the check as a program; returns
+    what it prints.
+    """
     for part in (f"{name}.c", "rls.c"):
-        subprocess.run([CC, *STRICT, *more, "-ffreestanding", "-c", part, "-o", f"{part}.o"], cwd=folder, check=True)
-    subprocess.run([CC, *STRICT, f"{name}_check.c", f"{name}.c.o", "rls.c.o", "-lm", "-o", "check"], cwd=folder, check=True)
+        subprocess.run(
+            [CC, *STRICT, *more, "-ffreestanding", "-c", part, "-o", f"{part}.o"],
+            cwd=folder,
+            check=True,
+        )
+    subprocess.run(
+        [CC, *STRICT, f"{name}_check.c", f"{name}.c.o", "rls.c.o", "-lm", "-o", "check"],
+        cwd=folder,
+        check=True,
+    )
     return subprocess.run([str(folder / "check")], capture_output=True, text=True)
 
 
 @pytest.mark.skipif(CC is None, reason="no C compiler")
-@pytest.mark.parametrize(("case", "flags"), [*((case, ()) for case in CASES), ("groups, variable", ("-DRLS_NO_VECTORS",))])
+@pytest.mark.parametrize(
+    ("case", "flags"),
+    [*((case, ()) for case in CASES), ("groups, variable", ("-DRLS_NO_VECTORS",))],
+)
 def test_the_exported_estimator_reproduces_python_to_the_last_bit(tmp_path, case, flags):
     """With vectors, where the compiler has them, and number by number."""
     write_estimator(CASES[case], Everything(), tmp_path)
@@ -60,7 +111,9 @@ def test_the_check_notices_another_number(tmp_path):
     source = tmp_path / "estimator.c"
     text = source.read_text()
     assert "RLS_CONSTANT, 0x1.0000000000000p+0" in text
-    source.write_text(text.replace("RLS_CONSTANT, 0x1.0000000000000p+0", "RLS_CONSTANT, 0x1.fff0000000000p-1"))
+    source.write_text(
+        text.replace("RLS_CONSTANT, 0x1.0000000000000p+0", "RLS_CONSTANT, 0x1.fff0000000000p-1")
+    )
     done = built(tmp_path, "estimator")
     assert done.returncode == 1
     assert "last bit" not in done.stdout
@@ -68,15 +121,29 @@ def test_the_check_notices_another_number(tmp_path):
 
 @pytest.mark.skipif(CC is None or shutil.which("nm") is None, reason="no C compiler, or no nm")
 def test_nothing_is_allocated_and_no_library_is_called(tmp_path):
-    """All the compiler may add on its own are the four memory functions every C environment must have."""
+    """All the compiler may add on its own are the four memory functions every C environment must
+    have.
+    """
     write_estimator(CASES["longitudinal"], Everything(), tmp_path)
     built(tmp_path, "estimator")
-    listing = subprocess.run(["nm", "-u", "rls.c.o"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    assert {line.split()[-1] for line in listing.splitlines() if line.strip()} <= {"memset", "memcpy", "memmove", "memcmp"}
+    listing = subprocess.run(
+        ["nm", "-u", "rls.c.o"], cwd=tmp_path, check=True, capture_output=True, text=True
+    ).stdout
+    assert {line.split()[-1] for line in listing.splitlines() if line.strip()} <= {
+        "memset",
+        "memcpy",
+        "memmove",
+        "memcmp",
+    }
 
 
 def test_the_header_says_what_every_number_is(tmp_path):
-    write_estimator(CASES["longitudinal"], {"theta": "rad", "w": "m/s", "u": "m/s", "d_lon": "rad", "airspeed": "m/s"}, tmp_path, "heli")
+    write_estimator(
+        CASES["longitudinal"],
+        {"theta": "rad", "w": "m/s", "u": "m/s", "d_lon": "rad", "airspeed": "m/s"},
+        tmp_path,
+        "heli",
+    )
     text = (tmp_path / "heli.h").read_text()
     assert "#define HELI_Y_w 1 /* m/s */" in text
     assert "#define HELI_P_airspeed 0 /* m/s, 0 to 13 */" in text
@@ -101,8 +168,25 @@ def test_what_cannot_be_written_is_refused(tmp_path):
 def test_the_command_writes_it(tmp_path, capsys):
     from studies.cli import main
 
-    assert main(["export", "estimator", "--outputs", "q,theta", "--inputs", "d_lon", "--single", "--out", str(tmp_path / "on board")]) == 0
+    assert (
+        main(
+            [
+                "export",
+                "estimator",
+                "--outputs",
+                "q,theta",
+                "--inputs",
+                "d_lon",
+                "--single",
+                "--out",
+                str(tmp_path / "on board"),
+            ]
+        )
+        == 0
+    )
     assert "estimator_check.c" in capsys.readouterr().out
-    assert "#define ESTIMATOR_Y_q 0 /* rad/s */" in (tmp_path / "on board" / "estimator.h").read_text()
+    assert (
+        "#define ESTIMATOR_Y_q 0 /* rad/s */" in (tmp_path / "on board" / "estimator.h").read_text()
+    )
     assert main(["export", "estimator", "--outputs", "thta", "--out", str(tmp_path)]) == 1
     assert "did you mean 'theta'" in capsys.readouterr().err

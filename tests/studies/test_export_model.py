@@ -1,4 +1,6 @@
-"""An identified model as C compiles without a warning, freestanding, and predicts and simulates what Python does."""
+"""An identified model as C compiles without a warning, freestanding, and predicts and simulates
+what Python does.
+"""
 
 import shutil
 import subprocess
@@ -15,12 +17,24 @@ from symheli.lpv import Signal
 CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 CUBIC = idn.Polynomial(3, 0.0, 13.0)
-BOX = idn.Product((idn.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3)), total_degree=None)
+BOX = idn.Product(
+    (idn.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3)), total_degree=None
+)
 STRUCTURES = {
     "lag": idn.LPVARX(("a", "b"), ("c", "d"), "p", 2, 2, 1, CUBIC, offset=True, offset_rate=True),
     "now, feedthrough": idn.LPVARX(("a", "b"), ("c",), "p", 3, 2, 0, CUBIC, scheduling_at="now"),
-    "orders by signal": idn.LPVARX(("a", "b"), ("c",), "p", {"a": 1, "b": {"a": 0, "b": 2}}, 1, 3, idn.Spline((0.0, 1.0, 4.0, 9.0))),
-    "no inputs": idn.LPVARX("a", (), "p", 2, 0, 0, idn.PiecewiseLinear((0.0, 3.0, 9.0)), offset=True),
+    "orders by signal": idn.LPVARX(
+        ("a", "b"),
+        ("c",),
+        "p",
+        {"a": 1, "b": {"a": 0, "b": 2}},
+        1,
+        3,
+        idn.Spline((0.0, 1.0, 4.0, 9.0)),
+    ),
+    "no inputs": idn.LPVARX(
+        "a", (), "p", 2, 0, 0, idn.PiecewiseLinear((0.0, 3.0, 9.0)), offset=True
+    ),
     "no past": idn.LPVARX("a", "c", "p", 0, 1, 0, CUBIC, scheduling_at="now"),
     "two parameters": idn.LPVARX("a", "c", ("p", "s"), 2, 1, 1, BOX, offset_rate=True),
 }
@@ -28,14 +42,25 @@ STRUCTURES = {
 
 def model_of(arx, seed=0):
     """Random coefficients, small enough to be stable at every p; a unit for every signal."""
-    theta = np.random.default_rng(seed).uniform(-0.3, 0.3, (arx.n_regressors, arx.ny)) / arx.basis.size * arx.free
-    own = [tuple(Signal(str(s), "rad") for s in group) for group in (arx.outputs, arx.inputs, arx.parameters)]
+    theta = (
+        np.random.default_rng(seed).uniform(-0.3, 0.3, (arx.n_regressors, arx.ny))
+        / arx.basis.size
+        * arx.free
+    )
+    own = [
+        tuple(Signal(str(s), "rad") for s in group)
+        for group in (arx.outputs, arx.inputs, arx.parameters)
+    ]
     return idn.LPVARXModel(arx, theta, 0.02, *own, np.eye(arx.ny), 100)
 
 
 def built(folder, name="model"):
-    subprocess.run([CC, *STRICT, "-ffreestanding", "-c", f"{name}.c", "-o", "m.o"], cwd=folder, check=True)
-    subprocess.run([CC, *STRICT, f"{name}_check.c", "m.o", "-lm", "-o", "check"], cwd=folder, check=True)
+    subprocess.run(
+        [CC, *STRICT, "-ffreestanding", "-c", f"{name}.c", "-o", "m.o"], cwd=folder, check=True
+    )
+    subprocess.run(
+        [CC, *STRICT, f"{name}_check.c", "m.o", "-lm", "-o", "check"], cwd=folder, check=True
+    )
     return subprocess.run([str(folder / "check")], capture_output=True, text=True)
 
 
@@ -46,7 +71,9 @@ def test_the_c_model_predicts_and_runs_free_as_python_does(tmp_path, case, preci
     write_model(model_of(STRUCTURES[case]), tmp_path, precision=precision)
     done = built(tmp_path)
     assert done.returncode == 0, done.stdout
-    assert float(done.stdout.split()[-1]) > 0  # the sums run in another order: numbers that all agree to the last bit were not compared
+    assert (
+        float(done.stdout.split()[-1]) > 0
+    )  # the sums run in another order: numbers that all agree to the last bit were not compared
 
 
 @pytest.mark.skipif(CC is None, reason="no C compiler")
@@ -76,7 +103,8 @@ static int step(model_state *s, double u, double p, double measured)
 }
 static int again(model_state *s)
 {
-    return step(s, 0, 5, 0) == MODEL_NO_PAST && step(s, 0, 13, 0) == MODEL_NO_PAST && step(s, 0, 5, 0) == MODEL_PREDICTED;
+    return step(s, 0, 5, 0) == MODEL_NO_PAST && step(s, 0, 13, 0) == MODEL_NO_PAST
+        && step(s, 0, 5, 0) == MODEL_PREDICTED;
 }
 int main(void)
 {
@@ -106,7 +134,20 @@ def test_what_cannot_be_written_is_refused(tmp_path):
 
 def test_the_command_writes_it_and_says_what_it_needs(tmp_path, capsys):
     model_of(STRUCTURES["lag"]).save(tmp_path / "m.json")
-    assert main(["export", "model", "--model", str(tmp_path / "m.json"), "--out", str(tmp_path / "c"), "--single"]) == 0
+    assert (
+        main(
+            [
+                "export",
+                "model",
+                "--model",
+                str(tmp_path / "m.json"),
+                "--out",
+                str(tmp_path / "c"),
+                "--single",
+            ]
+        )
+        == 0
+    )
     header = (tmp_path / "c" / "model.h").read_text()
     assert "typedef float model_real;" in header
     assert "#define MODEL_P_p 0 /* rad, 0 to 13 */" in header

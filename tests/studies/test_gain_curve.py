@@ -11,10 +11,21 @@ from synthesis import Search
 
 NOTHING = {"constant P": math.inf, "LFT D/G": math.inf}
 STEEP = GainCurve(
-    "steep", "1", 1.0, {0.0: 1.0, 1.0: 2.0, 3.0: 5.0, 7.0: math.inf, math.inf: math.inf},
-    {"P(p, lag)": {3.0: 6.0}, "P(p)": {0.0: 1.0, 1.0: 7.0, 3.0: 8.0, 7.0: math.inf}}, NOTHING,
-)  # fmt: skip
-FLAT = GainCurve("flat", "1", 1.0, {0.0: 1.0, math.inf: 1.0}, {"P(p)": {0.0: 1.0, 3.0: 1.0}}, {"LFT D/G": 1.0, "LFT D": 1.7})
+    "steep",
+    "1",
+    1.0,
+    {0.0: 1.0, 1.0: 2.0, 3.0: 5.0, 7.0: math.inf, math.inf: math.inf},
+    {"P(p, lag)": {3.0: 6.0}, "P(p)": {0.0: 1.0, 1.0: 7.0, 3.0: 8.0, 7.0: math.inf}},
+    NOTHING,
+)
+FLAT = GainCurve(
+    "flat",
+    "1",
+    1.0,
+    {0.0: 1.0, math.inf: 1.0},
+    {"P(p)": {0.0: 1.0, 3.0: 1.0}},
+    {"LFT D/G": 1.0, "LFT D": 1.7},
+)
 
 
 def test_a_proof_for_a_larger_acceleration_counts_for_a_smaller_one():
@@ -40,7 +51,9 @@ def test_the_open_region_is_shaded_only_where_no_test_proves_a_gain(tmp_path):
 
 
 def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
-    lpv = LPVStateSpace.polynomial([[[-2.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0))
+    lpv = LPVStateSpace.polynomial(
+        [[[-2.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
+    )
     quick = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
     found = [
         *guarantees.bounds("baseline", "gust", lpv, (0.0, 1.0, math.inf), (2,), quick),
@@ -48,7 +61,8 @@ def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
     ]
     table = gain_tables.guarantee(found, "gust")
     assert table.columns[5:] == ["P(p)", "constant P", *guarantees.LFT_TESTS]
-    # a first-order lag with pole -1 at the worst: gain 1 whatever p does, and every test finds it or more
+    # a first-order lag with pole -1 at the worst: gain 1 whatever p does, and every test finds it
+    # or more
     assert [row[5:7] for row in table.rows] == [["1", "1"], ["1", "1"], ["", "1"]]
     assert {row[2] for row in table.rows} == {"proven"}
     curve = guarantees.gain_curve(found, "baseline", "gust", "lag")
@@ -57,12 +71,32 @@ def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
 
 def test_a_proof_of_a_model_that_the_exact_one_exceeds_is_said_not_to_hold_for_the_helicopter():
     def lag(gain):
-        return LPVStateSpace.polynomial([[[-2.0]], [[1.0]]], [[[gain]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0))
+        return LPVStateSpace.polynomial(
+            [[[-2.0]], [[1.0]]], [[[gain]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
+        )
 
     def bounds(model, gain):
-        return list(guarantees.bounds(model, "gust", lag(gain), (1.0,), (2,), Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1)))
+        return list(
+            guarantees.bounds(
+                model,
+                "gust",
+                lag(gain),
+                (1.0,),
+                (2,),
+                Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1),
+            )
+        )
 
-    (sentence,) = gain_tables.not_about_the_helicopter([*bounds("baseline", 1.0), *bounds("exact", 2.0)])
-    assert sentence.startswith("Gust channel, 1 m/s^2: 1 is proven of the baseline model, and flown airspeeds of the exact models reach 2")
-    assert not gain_tables.not_about_the_helicopter([*bounds("baseline", 2.1), *bounds("exact", 2.0)])
-    assert not gain_tables.not_about_the_helicopter([*bounds("baseline", 2.0), *bounds("exact", 2.0001)])
+    (sentence,) = gain_tables.not_about_the_helicopter(
+        [*bounds("baseline", 1.0), *bounds("exact", 2.0)]
+    )
+    assert sentence.startswith(
+        "Gust channel, 1 m/s^2: 1 is proven of the baseline model, and flown airspeeds of the exact"
+        " models reach 2"
+    )
+    assert not gain_tables.not_about_the_helicopter(
+        [*bounds("baseline", 2.1), *bounds("exact", 2.0)]
+    )
+    assert not gain_tables.not_about_the_helicopter(
+        [*bounds("baseline", 2.0), *bounds("exact", 2.0001)]
+    )

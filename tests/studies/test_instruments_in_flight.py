@@ -19,8 +19,12 @@ def test_instruments_beat_least_squares_in_flight_once_the_command_is_among_them
     arx = LONGITUDINAL.structure(order=2)
     biased = fit(arx, training)
     with pytest.warns(DataWarning, match="the instruments are weak"):
-        added, commanded = (fit(arx, training, method="iv", instruments=names) for names in (ADDED, (*ADDED, "airspeed_command")))
-    # measured 1 s ahead: q 78 by least squares, 93 by instruments; free run of u 93, 89 and without the command -44.
+        added, commanded = (
+            fit(arx, training, method="iv", instruments=names)
+            for names in (ADDED, (*ADDED, "airspeed_command"))
+        )
+    # measured 1 s ahead: q 78 by least squares, 93 by instruments; free run of u 93, 89 and without
+    # the command -44.
     assert commanded.score(test, 50)["q"] > biased.score(test, 50)["q"] + 8
     assert commanded.score(test)["u"] > 75
     assert added.score(test)["u"] < 50

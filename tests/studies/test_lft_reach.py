@@ -19,11 +19,18 @@ def test_the_largest_range_is_found_by_bisection():
     assert found.high < 3.7 <= found.failed[1]
     assert found.failed[1] - found.high < 0.04
     assert len(asked) < 14
-    assert largest("a test", lambda v: (0.0, v), lambda low, high: True, 13.0) == ("a test", 0.0, 13.0, None)
+    assert largest("a test", lambda v: (0.0, v), lambda low, high: True, 13.0) == (
+        "a test",
+        0.0,
+        13.0,
+        None,
+    )
 
 
 def test_a_jumping_airspeed_costs_the_longitudinal_loop_almost_nothing(ideal):
-    """The negative result of the page: here a P that varies with the airspeed gains nothing over D and G."""
+    """The negative result of the page: here a P that varies with the airspeed gains nothing over D
+    and G.
+    """
     lft = longitudinal_loop(ideal, points=14).to_lft().reduce()
     certificate = synthesis.lft_gain(lft, "DG", search=None)
     assert certificate.verified
@@ -45,7 +52,10 @@ def test_the_reach_of_each_scaling_on_the_lateral_loop(ideal):
     loop = lateral_loop(ideal)
     upper = [from_hover(loop, test).high for test in ("small gain", "D", "DG")]
     assert 0.4 < upper[0] < upper[1] < upper[2] < 2.0
-    widths = [found.high - found.low for found in (about(loop, 6.5, test) for test in ("small gain", "D", "DG"))]
+    widths = [
+        found.high - found.low
+        for found in (about(loop, 6.5, test) for test in ("small gain", "D", "DG"))
+    ]
     assert 2.0 < widths[0] < widths[1] < widths[2] < 9.5
 
 
@@ -56,7 +66,12 @@ def test_the_tables_of_the_page_hold_every_range_and_say_what_failed():
         "gains on [0, 13] m/s": {"DG": "INFEASIBLE", "frozen": 0.984},
         "whole range, jumping airspeed": {"grows": True},
         "from the low end, DG": {"test": "DG", "low": 0.0, "high": 1.56, "failed": (0.0, 1.57)},
-        "from the low end, growth": {"test": "no growth found", "low": 0.0, "high": 3.99, "failed": (0.0, 4.0)},
+        "from the low end, growth": {
+            "test": "no growth found",
+            "low": 0.0,
+            "high": 3.99,
+            "failed": (0.0, 4.0),
+        },
         "about 2 m/s, DG": {"test": "DG", "low": 0.57, "high": 3.43, "failed": None},
     }
     assert tables("lateral", found).splitlines() == [

@@ -25,7 +25,9 @@ def test_the_picture_holds_the_predictions_that_were_scored():
     model = result.scheduled
     for horizon, n in (("one step", 1), ("1 s", 20), ("free run", None)):
         own = [line for line in lines[COLOURS[horizon]] if len(line) == len(test)]
-        np.testing.assert_array_equal(own[0], (model.simulate(test) if n is None else model.predict(test, n))[:, 0])
+        np.testing.assert_array_equal(
+            own[0], (model.simulate(test) if n is None else model.predict(test, n))[:, 0]
+        )
     assert drawn.get_title(loc="left").startswith("y (rad): LPV, degree 1 ")
     assert scheduling.get_title(loc="left") == "p (m/s)"
     assert close.get_xlim() == pytest.approx((test.time[0], test.time[-1]))

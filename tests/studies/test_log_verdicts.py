@@ -1,4 +1,6 @@
-"""What identify says rests on the numbers it prints, and on predictions that know no more of p than a pilot would."""
+"""What identify says rests on the numbers it prints, and on predictions that know no more of p than
+a pilot would.
+"""
 
 import json
 import re
@@ -20,27 +22,62 @@ def judged(lpv, lti, *rivals, **over):
     """A comparison of models of one output with these held-out fits (1 s, free run)."""
     rng = np.random.default_rng(0)
     u, p = rng.standard_normal((2, 200))
-    record = FlightRecord.from_arrays(0.1 * np.arange(200), dict.fromkeys("yup", "1"), y=np.cumsum(u) * 0.1, u=u, p=p)
+    record = FlightRecord.from_arrays(
+        0.1 * np.arange(200), dict.fromkeys("yup", "1"), y=np.cumsum(u) * 0.1, u=u, p=p
+    )
     model = fit(LPVARX("y", "u", "p", 1, 1, 1, Polynomial(1, p.min(), p.max())), record)
-    scores = [{h: {"y": v} for h, v in zip(NAMES, (99.0, *fits), strict=True)} for fits in (lpv, lti, *rivals)]
+    scores = [
+        {h: {"y": v} for h, v in zip(NAMES, (99.0, *fits), strict=True)}
+        for fits in (lpv, lti, *rivals)
+    ]
     labels = ("LPV", "LTI", "LPV, moving trim", "LTI, moving trim")
-    return Comparison(tuple(Scored(n, model, s, s) for n, s in zip(labels, scores, strict=False)), record, record, **over)
+    return Comparison(
+        tuple(Scored(n, model, s, s) for n, s in zip(labels, scores, strict=False)),
+        record,
+        record,
+        **over,
+    )
 
 
 @pytest.mark.parametrize(
     ("lpv", "lti", "pays", "words"),
     [
-        ((97.3, 97.0), (97.3, 85.6), True, "scheduling pays .*97.3 against 97.3 % .*no different., 97.0 against 85.6 % .*better."),
+        (
+            (97.3, 97.0),
+            (97.3, 85.6),
+            True,
+            "scheduling pays .*97.3 against 97.3 % .*no different., 97.0 against 85.6 % .*better.",
+        ),
         ((96.0, 80.0), (90.0, 79.5), True, r"scheduling pays .*\(better\), .*\(no different\)"),
-        ((90.5, 80.0), (90.0, 79.5), False, r"scheduling does NOT pay on held-out data: .*\(no different\), .*\(no different\)"),
-        ((91.04, 1.0), (90.05, 1.0), False, r"91.0 against 90.0 % 1 s ahead \(no different\)"),  # as printed: exactly one point
+        (
+            (90.5, 80.0),
+            (90.0, 79.5),
+            False,
+            r"scheduling does NOT pay on held-out data: .*\(no different\), .*\(no different\)",
+        ),
+        (
+            (91.04, 1.0),
+            (90.05, 1.0),
+            False,
+            r"91.0 against 90.0 % 1 s ahead \(no different\)",
+        ),  # as printed: exactly one point
         ((97.4, 1.0), (96.4, 1.0), False, "no different"),  # whose difference in binary exceeds one
-        ((96.0, 60.0), (90.0, 79.5), False, r"scheduling does NOT pay throughout .*\(better\), .*\(worse\)"),
-        ((80.0, -5.0), (70.0, -500.0), True, r"-5.0 against -500.0 % in free run \(neither better than the mean of the record\)"),
+        (
+            (96.0, 60.0),
+            (90.0, 79.5),
+            False,
+            r"scheduling does NOT pay throughout .*\(better\), .*\(worse\)",
+        ),
+        (
+            (80.0, -5.0),
+            (70.0, -500.0),
+            True,
+            r"-5.0 against -500.0 % in free run \(neither better than the mean of the record\)",
+        ),
         ((80.0, -np.inf), (70.0, 30.0), False, r"diverges against 30.0 % in free run \(worse\)"),
         ((-20.0, -5.0), (-90.0, -np.inf), False, "scheduling does NOT pay on held-out data"),
     ],
-)  # fmt: skip
+)
 def test_a_verdict_follows_from_the_numbers_beside_it(lpv, lti, pays, words):
     found = judged(lpv, lti)
     (sentence,) = found.verdict()
@@ -54,7 +91,8 @@ def test_the_other_treatment_of_the_trim_is_heard_where_it_says_otherwise():
     own, other = found.verdict()
     assert "does NOT pay" in own
     assert other.startswith(
-        "LPV, moving trim beside LTI, moving trim would say otherwise: y: scheduling pays on held-out data: 90.0 against 70.0"
+        "LPV, moving trim beside LTI, moving trim would say otherwise: y: scheduling pays on"
+        " held-out data: 90.0 against 70.0"
     )
     assert len(judged((80.0, 80.0), (80.0, 80.0), (80.0, 80.0), (80.0, 80.0)).verdict()) == 1
 
@@ -78,12 +116,36 @@ def about_a_trim(n=3000, seed=0, decimals=9):
     x0, u = 0.2 * p - 0.01 * p**2, np.repeat(rng.standard_normal(n // 4), 4)
     y = x0.copy()
     for j in range(1, n):
-        y[j] = x0[j] + (0.9 + 0.006 * (p[j - 1] - 6.5)) * (y[j - 1] - x0[j - 1]) + (0.02 + 0.004 * p[j - 1]) * u[j - 1]
+        y[j] = (
+            x0[j]
+            + (0.9 + 0.006 * (p[j - 1] - 6.5)) * (y[j - 1] - x0[j - 1])
+            + (0.02 + 0.004 * p[j - 1]) * u[j - 1]
+        )
     y += 0.01 * y.std() * rng.standard_normal(n)
-    return "\n".join(["t,y,u,p", *(f"{0.05 * i:.2f},{y[i]:.{decimals}g},{u[i]:.9g},{p[i]:.9g}" for i in range(n))])
+    return "\n".join(
+        [
+            "t,y,u,p",
+            *(f"{0.05 * i:.2f},{y[i]:.{decimals}g},{u[i]:.9g},{p[i]:.9g}" for i in range(n)),
+        ]
+    )
 
 
-OPTIONS = ("--outputs", "y", "--inputs", "u", "--scheduling", "p", "--na", "1", "--nb", "1", "--units", "y=rad", "u=1", "p=m/s")
+OPTIONS = (
+    "--outputs",
+    "y",
+    "--inputs",
+    "u",
+    "--scheduling",
+    "p",
+    "--na",
+    "1",
+    "--nb",
+    "1",
+    "--units",
+    "y=rad",
+    "u=1",
+    "p=m/s",
+)
 
 
 @pytest.fixture
@@ -94,7 +156,12 @@ def identify(tmp_path, capsys):
         (tmp_path / "log.csv").write_text(log)
         answers = []
         for form in (("--json",), ()):
-            assert cli.main(["identify", str(tmp_path / "log.csv"), *OPTIONS, *map(str, options), *form]) == 0
+            assert (
+                cli.main(
+                    ["identify", str(tmp_path / "log.csv"), *OPTIONS, *map(str, options), *form]
+                )
+                == 0
+            )
             answers.append(capsys.readouterr().out)
         return json.loads(answers[0]), answers[1]
 
@@ -104,7 +171,10 @@ def identify(tmp_path, capsys):
 def test_a_moving_trim_is_tried_and_kept_where_it_predicts_better(identify):
     data, text = identify(about_a_trim(), "--commanded")
     assert data["judged"] == ["LPV, degree 2, moving trim", "LTI, moving trim"]
-    held = {label: model["fit_percent"]["held_out"]["1 s"]["y"] for label, model in data["models"].items()}
+    held = {
+        label: model["fit_percent"]["held_out"]["1 s"]["y"]
+        for label, model in data["models"].items()
+    }
     assert held["LPV, degree 2, moving trim"] > held["LPV, degree 2"] + 5
     assert "offset_rate, the moving trim, in sample: " in text
     assert "judged is the model with" in text
@@ -117,7 +187,10 @@ def test_a_moving_trim_is_tried_and_kept_where_it_predicts_better(identify):
 def test_a_measured_p_is_held_from_the_start_of_each_prediction(identify):
     """The trim's motion within a second is news to whoever schedules on a measurement."""
     ahead = {c: identify(about_a_trim(), *c)[0] for c in ((), ("--commanded",))}
-    fits = [found["models"]["LPV, degree 2, moving trim"]["fit_percent"]["held_out"]["1 s"]["y"] for found in ahead.values()]
+    fits = [
+        found["models"]["LPV, degree 2, moving trim"]["fit_percent"]["held_out"]["1 s"]["y"]
+        for found in ahead.values()
+    ]
     assert fits[0] < fits[1] - 10
     assert [found["scheduling_held"] for found in ahead.values()] == [True, False]
 
@@ -131,7 +204,10 @@ def test_means_are_identified_with_feedthrough_unless_told_otherwise(identify):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DataWarning)
         late, _ = identify(log, "--commanded", "--decimate", 4, "--delay", 1)
-    one, two = (f["models"]["LPV, degree 2, moving trim"]["fit_percent"]["held_out"]["1 s"]["y"] for f in (auto, late))
+    one, two = (
+        f["models"]["LPV, degree 2, moving trim"]["fit_percent"]["held_out"]["1 s"]["y"]
+        for f in (auto, late)
+    )
     assert one > two + 5
 
 
@@ -140,10 +216,25 @@ def test_another_log_is_held_out_as_a_whole(identify, tmp_path):
     data, text = identify(about_a_trim(2000), "--commanded", "--test", tmp_path / "other.csv")
     assert (data["read"]["training_samples"], data["read"]["held_out_samples"]) == (2000, 1000)
     assert "held out: other.csv, all 1000 samples" in text
-    assert cli.main(["identify", str(tmp_path / "log.csv"), *OPTIONS, "--test", str(tmp_path / "other.csv"), "--train", "0.5"]) == 1
+    assert (
+        cli.main(
+            [
+                "identify",
+                str(tmp_path / "log.csv"),
+                *OPTIONS,
+                "--test",
+                str(tmp_path / "other.csv"),
+                "--train",
+                "0.5",
+            ]
+        )
+        == 1
+    )
 
 
-@pytest.mark.parametrize(("method", "options"), [("iv", ("--instruments", "u")), ("ridge", ()), ("rls", ())])
+@pytest.mark.parametrize(
+    ("method", "options"), [("iv", ("--instruments", "u")), ("ridge", ()), ("rls", ())]
+)
 def test_the_estimator_is_chosen_and_named(identify, method, options):
     data, text = identify(about_a_trim(), "--commanded", "--method", method, *options)
     assert data["method"] == method
@@ -158,7 +249,9 @@ def test_a_scheduling_signal_made_of_outputs_is_found_and_its_free_runs_are_not_
     for k in range(1, 3000):
         y[k] = 0.97 * y[k - 1] + 0.05 * u[k - 1] + 0.2 * rng.standard_normal()
         p[k] = p[k - 1] + 0.2 * (y[k] - p[k - 1])
-    log = "\n".join(["t,y,u,p", *(f"{0.05 * k:.2f},{y[k]:.9g},{u[k]:.9g},{p[k]:.9g}" for k in range(3000))])
+    log = "\n".join(
+        ["t,y,u,p", *(f"{0.05 * k:.2f},{y[k]:.9g},{u[k]:.9g},{p[k]:.9g}" for k in range(3000))]
+    )
     data, text = identify(log)
     assert data["scheduling_leak"] == pytest.approx(1.0, abs=1e-6)
     assert "offset_rate is not tried: 100 % of what is new in p is in the outputs" in text
@@ -171,7 +264,9 @@ def test_the_moving_trim_is_not_tried_where_the_data_cannot_tell_it():
     rng = np.random.default_rng(0)
     u, p = rng.standard_normal(300), np.repeat([1.0, 2.0, 3.0], 100)
     y = np.convolve(u, 0.8 ** np.arange(40))[:300] * p + p
-    record = FlightRecord.from_arrays(0.1 * np.arange(300), dict.fromkeys("yup", "1"), y=y, u=u, p=p)
+    record = FlightRecord.from_arrays(
+        0.1 * np.arange(300), dict.fromkeys("yup", "1"), y=y, u=u, p=p
+    )
     arx = LPVARX("y", "u", "p", 1, 1, 1, Polynomial(2, 1.0, 3.0), offset=True)
     found = compare(arx, record, None, trim="auto")
     assert found.trim_note.startswith("offset_rate is not tried: the regressors have rank")

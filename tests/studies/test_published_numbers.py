@@ -1,4 +1,6 @@
-"""The table of printed and computed numbers: what the equations determine is met, what is not met stays visible."""
+"""The table of printed and computed numbers: what the equations determine is met, what is not met
+stays visible.
+"""
 
 import math
 from pathlib import Path
@@ -20,9 +22,15 @@ def test_every_number_the_printed_equations_determine_is_met(rows):
 
 
 def test_what_is_missed_is_missed_by_what_is_stated(rows):
-    """Neither fitted nor widened: the documentation tells these stories, and must change when they do."""
+    """Neither fitted nor widened: the documentation tells these stories, and must change when they
+    do.
+    """
     missed = {name for name, row in rows.items() if not row.met}
-    assert {"settling of the stabiliser bar", "pitch in forward flight at 14.5 m/s", "rotor torque in hover, eta_w = 0.9"} <= missed
+    assert {
+        "settling of the stabiliser bar",
+        "pitch in forward flight at 14.5 m/s",
+        "rotor torque in hover, eta_w = 0.9",
+    } <= missed
     assert {f"Y_v of the tail rotor at {v} m/s" for v in (3, 5, 10, 15, 20, 25)} <= missed
     # errata of the source: what it states beside the table contradicts the table
     errata = {
@@ -35,17 +43,22 @@ def test_what_is_missed_is_missed_by_what_is_stated(rows):
     for name, computed in errata.items():
         assert name in missed
         assert rows[name].computed == pytest.approx(computed, rel=1e-3)
-    # the roll rate is the cyclic's whichever way up: the tail rotor takes as much on one side as it gives on the other
+    # the roll rate is the cyclic's whichever way up: the tail rotor takes as much on one side as it
+    # gives on the other
     assert abs(rows["loss of steady roll rate when inverted"].computed) < 0.1
-    # the text's -10 deg is what the printed sign of the tail gives, though the text calls the tail stabilising
+    # the text's -10 deg is what the printed sign of the tail gives, though the text calls the tail
+    # stabilising
     assert rows["pitch at 14.5 m/s, horizontal tail as printed"].met
-    # the bar's printed 0.144 s, like the printed tau_e of about 0.1 s, belongs to a Lock number of 1.0; the table says 0.8
+    # the bar's printed 0.144 s, like the printed tau_e of about 0.1 s, belongs to a Lock number of
+    # 1.0; the table says 0.8
     assert 24 / (1.0 * 167.0) == pytest.approx(0.144, abs=5e-4)
     assert rows["settling of the stabiliser bar"].computed == pytest.approx(0.1796, abs=5e-5)
 
 
 def test_side_slope_agrees_with_the_linear_model(ideal):
-    """B of v' with respect to d_ped holds the tail rotor alone in hover: fin and wash add little, by a known sign."""
+    """B of v' with respect to d_ped holds the tail rotor alone in hover: fin and wash add little,
+    by a known sign.
+    """
     import symheli
     from studies.published_numbers import _side_slope
 
@@ -62,10 +75,16 @@ def test_the_table_has_a_line_a_number(rows):
 def test_the_documentation_shows_these_numbers(rows):
     page = (Path(__file__).resolve().parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
     lines = {
-        cells[0]: cells for cells in ([c.strip() for c in line.strip("| ").split("|")] for line in page.splitlines()) if len(cells) == 8
+        cells[0]: cells
+        for cells in (
+            [c.strip() for c in line.strip("| ").split("|")] for line in page.splitlines()
+        )
+        if len(cells) == 8
     }
     for row in rows.values():
         _, unit, printed, error, computed, _, determined, met = lines[row.quantity]
         assert (unit, float(printed), float(error)) == (row.unit, row.printed, row.reading_error)
         assert float(computed) == pytest.approx(row.computed, rel=1e-3)  # four digits are shown
-        assert (determined, met) == tuple("yes" if answer else "no" for answer in (row.determined, row.met))
+        assert (determined, met) == tuple(
+            "yes" if answer else "no" for answer in (row.determined, row.met)
+        )

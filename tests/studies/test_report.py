@@ -20,7 +20,11 @@ from symheli import LPVStateSpace, Scheduling
 from synthesis import Search
 
 GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
-COLLECTIONS = [f.name for f in fields(Outcome) if f.name not in ("vehicle", "quick", "seed", "heli", "baseline", "complete")]
+COLLECTIONS = [
+    f.name
+    for f in fields(Outcome)
+    if f.name not in ("vehicle", "quick", "seed", "heli", "baseline", "complete")
+]
 DRAWN = ("experiments", "flights", "comparisons", "frozen", "bounds")
 """Those that a figure shows."""
 
@@ -29,7 +33,9 @@ DRAWN = ("experiments", "flights", "comparisons", "frozen", "bounds")
 def full():
     """Every stage, as short as it gets."""
     study = stages.Study("xcell60", True, 0)
-    effort = Effort(6, 4, (0.0, math.inf), (2,), (0.0,), (0.0,), False, (0.0, math.inf), (2,), GLIMPSE)
+    effort = Effort(
+        6, 4, (0.0, math.inf), (2,), (0.0,), (0.0,), False, (0.0, math.inf), (2,), GLIMPSE
+    )
     for title, stage in stages._stages(study, effort):
         with stages._shown(title, study.seconds):
             stage()
@@ -71,15 +77,25 @@ def test_any_collection_of_the_outcome_may_be_empty(full, tmp_path, unpainted, m
 
 def test_a_vehicle_whose_entries_are_all_fitted_gets_its_report(full, tmp_path, unpainted):
     baseline = full.baseline
-    smooth = replace(baseline, entries=tuple(e for e in baseline.entries if e not in baseline.unfit))
+    smooth = replace(
+        baseline, entries=tuple(e for e in baseline.entries if e not in baseline.unfit)
+    )
     assert "is fitted by a polynomial" in page(replace(full, baseline=smooth), tmp_path)
-    assert "is fitted by a polynomial" in page(replace(full, baseline=replace(baseline, entries=())), tmp_path)
+    assert "is fitted by a polynomial" in page(
+        replace(full, baseline=replace(baseline, entries=())), tmp_path
+    )
     kinkless = replace(smooth, between=replace(baseline.between, kinks={}))
     assert "Corners of the model" not in page(replace(full, baseline=kinkless), tmp_path)
 
 
 def test_a_loop_that_is_unstable_when_frozen_gets_its_report(full, tmp_path, unpainted):
-    growing = LPVStateSpace.polynomial([[[-1.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("airspeed", "m/s", 0.0, 2.0))
+    growing = LPVStateSpace.polynomial(
+        [[[-1.0]], [[1.0]]],
+        [[[1.0]]],
+        [[[1.0]]],
+        [[[0.0]]],
+        Scheduling("airspeed", "m/s", 0.0, 2.0),
+    )
     found = list(guarantees.bounds("baseline", "gust", growing, (0.0, math.inf), (2,), GLIMPSE))
     outcome = replace(full, bounds=found, exact_frozen={"gust": math.inf})
     assert "unstable" in page(outcome, tmp_path)
@@ -98,14 +114,30 @@ def test_numbers_are_on_the_disk_before_a_picture_fails(full, tmp_path, monkeypa
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not (shutil.which("chromium") and shutil.which("pdftotext")), reason="wants chromium and pdftotext")
+@pytest.mark.skipif(
+    not (shutil.which("chromium") and shutil.which("pdftotext")),
+    reason="wants chromium and pdftotext",
+)
 def test_on_paper_no_column_is_lost(full, tmp_path, unpainted):
     """A4, as a browser prints it: every column of the widest table."""
     page(full, tmp_path)
     sheet = tmp_path / "report.pdf"
-    options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'browser'}", f"--print-to-pdf={sheet}"]
-    subprocess.run(["chromium", *options, str(tmp_path / "report.html")], check=True, capture_output=True, timeout=60)
-    text = subprocess.run(["pdftotext", "-layout", str(sheet), "-"], check=True, capture_output=True, text=True).stdout
+    options = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        f"--user-data-dir={tmp_path / 'browser'}",
+        f"--print-to-pdf={sheet}",
+    ]
+    subprocess.run(
+        ["chromium", *options, str(tmp_path / "report.html")],
+        check=True,
+        capture_output=True,
+        timeout=60,
+    )
+    text = subprocess.run(
+        ["pdftotext", "-layout", str(sheet), "-"], check=True, capture_output=True, text=True
+    ).stdout
     (table,) = gain_tables.every([b for b in full.bounds if b.channel == "gust"])
     frozen = next(line for line in text.splitlines() if re.match(r"\s*baseline\s+frozen\s", line))
     assert frozen.split() == " ".join(table.rows[0]).split()

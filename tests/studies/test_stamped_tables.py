@@ -1,4 +1,6 @@
-"""Tables of the documentation come from the command that stands above them, measured on a quiet machine."""
+"""Tables of the documentation come from the command that stands above them, measured on a quiet
+machine.
+"""
 
 import argparse
 import math
@@ -18,9 +20,14 @@ def test_a_table_is_kept_between_its_marks_with_command_date_and_machine(tmp_pat
     page = tmp_path / "page.md"
     page.write_text(PAGE)
     for text in ("first", "second"):
-        stamped_tables.keep(page, "gains", text, "a machine, 2 cores", "python -m studies.bracket --write")
+        stamped_tables.keep(
+            page, "gains", text, "a machine, 2 cores", "python -m studies.bracket --write"
+        )
     kept = page.read_text()
-    assert re.search(r"`python -m studies.bracket --write`, \d\d \w+ \d{4}: a machine, 2 cores\.\n\nsecond\n", kept)
+    assert re.search(
+        r"`python -m studies.bracket --write`, \d\d \w+ \d{4}: a machine, 2 cores\.\n\nsecond\n",
+        kept,
+    )
     assert kept.startswith("before\n")
     assert kept.endswith("after\n")
     assert "old" not in kept
@@ -30,7 +37,9 @@ def test_a_table_is_kept_between_its_marks_with_command_date_and_machine(tmp_pat
 
 
 @pytest.mark.parametrize(("load", "refused"), [(0.0, False), (0.15, False), (1.3, True)])
-def test_keeping_is_refused_with_the_load_where_others_are_at_work(load, refused, monkeypatch, capsys):
+def test_keeping_is_refused_with_the_load_where_others_are_at_work(
+    load, refused, monkeypatch, capsys
+):
     monkeypatch.setattr(stamped_tables, "busy_processors", lambda seconds: load)
     monkeypatch.setattr(sys, "argv", ["bracket", "--write"])
     if not refused:
@@ -50,11 +59,24 @@ def test_the_load_is_that_of_processors():
 
 
 def test_the_bracket_as_a_table():
-    gain = {"rate": 3.0, "lower": 4.9454, "memory": 5.2749, "plain": math.inf, "exact": True, "covered": math.nan, "gap": 1.07}
+    gain = {
+        "rate": 3.0,
+        "lower": 4.9454,
+        "memory": 5.2749,
+        "plain": math.inf,
+        "exact": True,
+        "covered": math.nan,
+        "gap": 1.07,
+    }
     found = {
-        "gain, frozen": 0.984, "growth at 7.5 m/s^2": "none found", "growth at 7.54 m/s^2": 1.00081, "gain at 3 m/s^2": gain,
-        "stable at 3 m/s^2 by P(p)": True, "stable at 7.1 m/s^2 by P(p, lag)": True, "stable at 6 m/s^2 by V of degree four": True,
-    }  # fmt: skip
+        "gain, frozen": 0.984,
+        "growth at 7.5 m/s^2": "none found",
+        "growth at 7.54 m/s^2": 1.00081,
+        "gain at 3 m/s^2": gain,
+        "stable at 3 m/s^2 by P(p)": True,
+        "stable at 7.1 m/s^2 by P(p, lag)": True,
+        "stable at 6 m/s^2 by V of degree four": True,
+    }
     assert bracket_table(found).splitlines() == [
         "| acceleration, m/s² | flown | proven, P(p, lag) | proven, P(p) |",
         "|---|---|---|---|",
@@ -69,4 +91,8 @@ def test_the_bracket_as_a_table():
 def test_the_page_has_the_marks_of_every_table_that_is_written():
     page = (stamped_tables.DOCS / "bracket.md").read_text(encoding="utf-8")
     for model in ("interpolated", "exact", "identified"):
-        assert page.count(f"<!-- {model}: written by its command -->") == page.count(f"<!-- {model}: end -->") == 1
+        assert (
+            page.count(f"<!-- {model}: written by its command -->")
+            == page.count(f"<!-- {model}: end -->")
+            == 1
+        )

@@ -28,7 +28,10 @@ def flown(ideal):
     """{noise: (training, test)}"""
     autopilot = autopilot_for(ideal)
     plans = {"noise-free": FlightPlan(0), "30 dB": FlightPlan(0).noisy()}
-    return {name: (plan.training(ideal, autopilot), plan.test(ideal, autopilot)) for name, plan in plans.items()}
+    return {
+        name: (plan.training(ideal, autopilot), plan.test(ideal, autopilot))
+        for name, plan in plans.items()
+    }
 
 
 def test_the_lft_is_the_polynomial_family_and_reduction_keeps_it(baseline):
@@ -69,7 +72,9 @@ def test_the_papers_experiment_runs_and_a_cubic_is_refused_with_the_reason(basel
 
 @pytest.mark.parametrize("axis", [LONGITUDINAL, LATERAL], ids=lambda a: a.mode)
 @pytest.mark.parametrize("noise", ["noise-free", "30 dB"])
-def test_identified_models_meet_their_marks_on_a_transition_they_have_not_seen(ideal, flown, axis, noise):
+def test_identified_models_meet_their_marks_on_a_transition_they_have_not_seen(
+    ideal, flown, axis, noise
+):
     training, test = flown[noise]
     result = axes.scores(ideal, axis, axes.identify(axis, training, "ls"), test)
     for output, marks in axis.marks.items():
@@ -80,7 +85,12 @@ def test_identified_models_meet_their_marks_on_a_transition_they_have_not_seen(i
 
 def test_instruments_find_the_modes_that_noise_hides_from_least_squares(ideal, flown):
     training = flown["30 dB"][0]
-    ls, iv = (axes.mode_misses(ideal, axes.identify(LONGITUDINAL, training, m, order=2), LONGITUDINAL.mode) for m in ("ls", "iv"))
+    ls, iv = (
+        axes.mode_misses(
+            ideal, axes.identify(LONGITUDINAL, training, m, order=2), LONGITUDINAL.mode
+        )
+        for m in ("ls", "iv")
+    )
     assert min(ls.values()) > 5
     assert max(iv.values()) < 3
 
@@ -89,7 +99,9 @@ def test_recursion_and_batch_give_the_same_model(flown):
     training, test = flown["noise-free"]
     rls, ls = (axes.identify(LONGITUDINAL, training, m) for m in ("rls", "ls"))
     # condition number 1e5 of the regressors times rounding, on predictions
-    np.testing.assert_allclose(rls.predict(test, 1)[10:], ls.predict(test, 1)[10:], rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(
+        rls.predict(test, 1)[10:], ls.predict(test, 1)[10:], rtol=1e-8, atol=1e-9
+    )
 
 
 def test_a_moving_trim_needs_its_drift(baseline, flown):
@@ -103,10 +115,14 @@ def test_a_moving_trim_needs_its_drift(baseline, flown):
 
 def test_gust_loop_is_proven_for_slow_airspeed_and_grows_when_it_may_jump(baseline):
     loop = guarantees.gust_loop(baseline.nodes)
-    slow = synthesis.l2_gain(loop, rate=1.0, relaxation=synthesis.Relaxation(segments=(8,)), search=None)
+    slow = synthesis.l2_gain(
+        loop, rate=1.0, relaxation=synthesis.Relaxation(segments=(8,)), search=None
+    )
     assert slow.verified
     assert slow.verify(rigorous=True)
-    assert slow.frozen == pytest.approx(guarantees.exact_frozen_gain(baseline.nodes, sampled=False), rel=0.01)
+    assert slow.frozen == pytest.approx(
+        guarantees.exact_frozen_gain(baseline.nodes, sampled=False), rel=0.01
+    )
     assert slow.frozen < slow.gamma < 2.7
     jump = synthesis.l2_gain(loop, rate=math.inf)
     assert not jump.verified
@@ -117,7 +133,9 @@ def test_every_row_of_the_experiments_table_fills_its_columns(baseline):
     from studies.transition import tables
     from studies.transition.outcome import Outcome
 
-    table = tables.experiment(Outcome("xcell60", True, 0, experiments=[run_experiment(baseline.nodes, False)]))
+    table = tables.experiment(
+        Outcome("xcell60", True, 0, experiments=[run_experiment(baseline.nodes, False)])
+    )
     assert len(table.rows) == len(OUTPUTS)
     assert {len(row) for row in table.rows} == {len(table.columns)}
     assert table.text()

@@ -12,7 +12,9 @@ from studies.transition.flights import FlightPlan, autopilot_for
 def test_every_output_of_every_axis_is_judged_and_counted():
     short = {"short": FlightPlan(ramps=3)}
     lines = list(pays.where_scheduling_pays(0, "xcell60", short))
-    assert [line.output for line in lines] == [output for axis in pays.AXES for output in axis.outputs]
+    assert [line.output for line in lines] == [
+        output for axis in pays.AXES for output in axis.outputs
+    ]
     for line in lines:
         gain = line.lpv["1 s"] - line.lti["1 s"]
         assert line.pays in (0, 1)
@@ -20,13 +22,16 @@ def test_every_output_of_every_axis_is_judged_and_counted():
     text = pays.table(lines)
     assert text.count("longitudinal-vertical") == 2  # medians, then the worst
     assert len(pays.data(lines)) == len(lines)
-    # noise-free, degree 2 contains degree 0: in sample and one step ahead it cannot do visibly worse held out
+    # noise-free, degree 2 contains degree 0: in sample and one step ahead it cannot do visibly
+    # worse held out
     assert np.all([line.lpv[HORIZONS[0]][0] > line.lti[HORIZONS[0]][0] - 5 for line in lines])
 
 
 def test_the_table_gives_the_median_and_the_worst_of_the_seeds():
     fits = {h: np.array([90.0, -20.0, 70.0]) for h in HORIZONS}
-    text = pays.table([pays.Line("still", "pitch", "q", fits, {h: v + 1 for h, v in fits.items()}, 2)])
+    text = pays.table(
+        [pays.Line("still", "pitch", "q", fits, {h: v + 1 for h, v in fits.items()}, 2)]
+    )
     median, worst = (line.split() for line in text.splitlines() if line.startswith("  q"))
     assert median == ["q", *["70.0", "/", "71.0"] * 3, "2/3"]
     assert worst == ["q", *["-20.0", "/", "-19.0"] * 3]

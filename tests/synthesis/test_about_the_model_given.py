@@ -1,4 +1,6 @@
-"""A certificate is about the model that was given: not about the units of its states, the limit on its rate, or how hard one looked."""
+"""A certificate is about the model that was given: not about the units of its states, the limit on
+its rate, or how hard one looked.
+"""
 
 import math
 from dataclasses import replace
@@ -11,7 +13,16 @@ from hypothesis import strategies as st
 from models import lag, random_stable, spring
 
 from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Relaxation, Search, Status, decay_rate, generalized_h2, l2_gain, lft_gain, stability
+from synthesis import (
+    Relaxation,
+    Search,
+    Status,
+    decay_rate,
+    generalized_h2,
+    l2_gain,
+    lft_gain,
+    stability,
+)
 
 QUICK = Search(levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000)
 COARSE = Relaxation(segments=(2,), degree=2)
@@ -19,7 +30,9 @@ SOS = Relaxation(kind="sos", segments=(1,), degree=1)
 ROUTES = {
     "splines": lambda lpv, rate, search: l2_gain(lpv, rate, relaxation=COARSE, search=search),
     "box": lambda lpv, rate, search: l2_gain(lpv, rate, relaxation=SOS, search=search),
-    "energy to peak": lambda lpv, rate, search: generalized_h2(replace(lpv, D=0 * lpv.D), rate, relaxation=SOS, search=search),
+    "energy to peak": lambda lpv, rate, search: generalized_h2(
+        replace(lpv, D=0 * lpv.D), rate, relaxation=SOS, search=search
+    ),
     "decay": lambda lpv, rate, search: decay_rate(lpv, rate, relaxation=SOS, search=search),
     "lft": lambda lpv, rate, search: lft_gain(lpv.to_lft().reduce(), search=search),
 }
@@ -35,7 +48,13 @@ def stiff(slow, fast, coupling):
     """Poles near -slow and -fast, the gain about 2."""
     A0 = np.array([[-slow, coupling * slow], [coupling * fast, -fast]])
     A1 = np.diag([-0.5 * slow, -0.3 * fast])
-    return LPVStateSpace.polynomial([A0, A1], [[[slow], [fast]]], [[[1.0, 1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0, 0.1 * slow))
+    return LPVStateSpace.polynomial(
+        [A0, A1],
+        [[[slow], [fast]]],
+        [[[1.0, 1.0]]],
+        [[[0.0]]],
+        Scheduling("p", "1", 0.0, 1.0, 0.1 * slow),
+    )
 
 
 @pytest.mark.parametrize("route", ROUTES)
@@ -47,10 +66,14 @@ def stiff(slow, fast, coupling):
 )
 def test_a_stiff_model_has_the_same_bound_in_any_units(route, speeds, coupling, exponents):
     lpv = stiff(*speeds, coupling)
-    bounds = [ROUTES[route](model, None, None) for model in (lpv, in_units(lpv, 10.0 ** np.array(exponents)))]
+    bounds = [
+        ROUTES[route](model, None, None)
+        for model in (lpv, in_units(lpv, 10.0 ** np.array(exponents)))
+    ]
     assert all(cert.verified for cert in bounds), [str(cert) for cert in bounds]
     assert bounds[1].verify(rigorous=True)
-    # 3e-3: the decay rate is bisected to 2e-3 of its limit; a gain to the solver's gap, 1e-4 on the stiffest
+    # 3e-3: the decay rate is bisected to 2e-3 of its limit; a gain to the solver's gap, 1e-4 on the
+    # stiffest
     assert bounds[1].proven == pytest.approx(bounds[0].proven, rel=3e-3)
     if route in ("splines", "box", "lft"):
         assert bounds[0].proven == pytest.approx(bounds[0].frozen, rel=1e-3)
@@ -60,7 +83,10 @@ def test_a_stiff_model_has_the_same_bound_in_any_units(route, speeds, coupling, 
 @pytest.mark.parametrize("route", ["splines", "box", "energy to peak"])
 def test_random_models_have_the_same_gain_in_any_units(route, seed):
     lpv = random_stable(seed)
-    gains = [ROUTES[route](model, None, None).gamma for model in (lpv, in_units(lpv, 10.0 ** np.array([-5, 0, 4])))]
+    gains = [
+        ROUTES[route](model, None, None).gamma
+        for model in (lpv, in_units(lpv, 10.0 ** np.array([-5, 0, 4])))
+    ]
     # what the solver's gap leaves
     assert gains[1] == pytest.approx(gains[0], rel=1e-3)
 
@@ -70,10 +96,13 @@ def test_random_models_have_the_same_gain_in_any_units(route, seed):
 def test_no_limit_on_the_rate_is_worse_than_none(route, lpv):
     certs = [ROUTES[route](lpv, rate, None) for rate in (0.1, 1e3, 1e6, 1e9, math.inf)]
     assert all(cert.verified for cert in certs)
-    # 1e-3: where a bound is that close to the frozen one, jumps are not tried; bisection of the decay rate: 4e-3
+    # 1e-3: where a bound is that close to the frozen one, jumps are not tried; bisection of the
+    # decay rate: 4e-3
     slack = 5e-3 if route == "decay" else 2e-3
     sign = -1 if route == "decay" else 1
-    assert all(sign * (fast.proven - slow.proven) >= -slack * slow.proven for slow, fast in pairwise(certs))
+    assert all(
+        sign * (fast.proven - slow.proven) >= -slack * slow.proven for slow, fast in pairwise(certs)
+    )
 
 
 @pytest.mark.parametrize("rate", [1e3, 1e7, 1e12])
@@ -91,7 +120,9 @@ def silent(how):
     lpv = lag()
     if how == "unobservable":
         A = [np.diag([-1.0, -2.0]), np.diag([-1.0, 0.5])]
-        return LPVStateSpace.polynomial(A, [[[1.0], [0.0]]], [[[0.0, 1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0, 1.0))
+        return LPVStateSpace.polynomial(
+            A, [[[1.0], [0.0]]], [[[0.0, 1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0, 1.0)
+        )
     return replace(lpv, **{name: 0 * getattr(lpv, name) for name in how})
 
 
@@ -123,7 +154,9 @@ def test_frozen_gains_near_zero_set_no_scale():
 
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize(
-    "lpv", [spring(damping=0.4), pytest.param(random_stable(4, rate=1.0), marks=pytest.mark.slow)], ids=["spring", "random"]
+    "lpv",
+    [spring(damping=0.4), pytest.param(random_stable(4, rate=1.0), marks=pytest.mark.slow)],
+    ids=["spring", "random"],
 )
 def test_looking_harder_from_below_changes_nothing_above(route, lpv):
     harder = replace(QUICK, levels=6, dwells=7, nodes=40, evaluations=10, steps=80)

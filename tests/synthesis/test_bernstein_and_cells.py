@@ -1,4 +1,6 @@
-"""The algebra under the LMIs: identities of Bernstein forms, coverage of the band of p and its next value."""
+"""The algebra under the LMIs: identities of Bernstein forms, coverage of the band of p and its next
+value.
+"""
 
 from fractions import Fraction
 
@@ -43,7 +45,9 @@ def test_restriction_and_composition_are_the_same_polynomial_elsewhere():
 
 def test_rational_arithmetic_is_exact():
     third = Fraction(1, 3)
-    assert list(restriction(1, third, 2 * third) @ np.array([Fraction(0), Fraction(1)], dtype=object)) == [third, 2 * third]
+    assert list(
+        restriction(1, third, 2 * third) @ np.array([Fraction(0), Fraction(1)], dtype=object)
+    ) == [third, 2 * third]
 
 
 def test_vectors_keep_inner_products():
@@ -73,7 +77,9 @@ def test_strips_cover_every_p_and_next_p_inside_the_right_segment(step):
             cell = strip.cell
             if cell.low <= p <= cell.high:
                 x = (p - cell.low) / (cell.high - cell.low)
-                bottom, top = ((1 - x) * strip.corners[0][f] + x * strip.corners[1][f] for f in (0, 1))
+                bottom, top = (
+                    (1 - x) * strip.corners[0][f] + x * strip.corners[1][f] for f in (0, 1)
+                )
                 if bottom <= after <= top:
                     hit.append(strip)
         assert hit, (p, after)
@@ -86,7 +92,9 @@ def test_lmi_polynomials_are_the_lmi_at_every_point(dt):
     lpv = random_stable(5, dt=dt)
     rng = np.random.default_rng(4)
     coefficients = rng.standard_normal((5, 3, 3))
-    P = SplineLyapunov(np.array([0.0, 0.25, 1.0]), 2, coefficients + np.swapaxes(coefficients, 1, 2))
+    P = SplineLyapunov(
+        np.array([0.0, 0.25, 1.0]), 2, coefficients + np.swapaxes(coefficients, 1, 2)
+    )
     forms = [form.block for form in lmi_polynomials(Claim(model_pieces(lpv), P, 0.7, dt), float)]
     p = 0.6
     A, B, C, D = lpv.matrices(p)
@@ -106,7 +114,9 @@ def test_lmi_polynomials_are_the_lmi_at_every_point(dt):
         cell = regions[k].cell
         x, s = (p - cell.low) / (cell.high - cell.low), 0.8
         after = (1 - s) * (p - 0.07) + s * (p + 0.07)
-        assert np.allclose(value(forms[k], x, s), M.T @ P.at(after) @ M - corner + Y.T @ Y, atol=1e-9)
+        assert np.allclose(
+            value(forms[k], x, s), M.T @ P.at(after) @ M - corner + Y.T @ Y, atol=1e-9
+        )
 
 
 def test_graded_knots_move_onto_breaks_of_the_model_and_keep_their_distance():

@@ -9,15 +9,26 @@ from models import lateral, spring
 
 from symheli.errors import InputError
 from symheli.lpv import Scheduling
-from synthesis import PolynomialStateSpace, Relaxation, Search, generalized_h2, l2_gain, lft_gain, lower_bound
+from synthesis import (
+    PolynomialStateSpace,
+    Relaxation,
+    Search,
+    generalized_h2,
+    l2_gain,
+    lft_gain,
+    lower_bound,
+)
 
 
 def mass_spring():
     stiffness, damping = (Scheduling(name, "1", -1, 1, rate=0.3) for name in "kd")
     return PolynomialStateSpace.polynomial(
         A={(0, 0): [[0, 1], [-1, -0.6]], (1, 0): [[0, 0], [-0.3, 0]], (0, 1): [[0, 0], [0, -0.2]]},
-        B={(0, 0): [[0], [1]]}, C={(0, 0): [[1, 0]]}, D={(0, 0): [[0]]}, parameters=[stiffness, damping],
-    )  # fmt: skip
+        B={(0, 0): [[0], [1]]},
+        C={(0, 0): [[1, 0]]},
+        D={(0, 0): [[0]]},
+        parameters=[stiffness, damping],
+    )
 
 
 @pytest.mark.parametrize("seconds", [0.3, 1.0])
@@ -25,7 +36,8 @@ def test_a_search_over_a_box_keeps_to_its_budget_and_says_so(seconds):
     began = time.process_time()
     cert = l2_gain(mass_spring(), relaxation=Relaxation(degree=1), search=Search(seconds=seconds))
     spent = time.process_time() - began
-    # every line ends with what it has begun: the steps of one cycle, and the response to its explicit input
+    # every line ends with what it has begun: the steps of one cycle, and the response to its
+    # explicit input
     assert cert.seconds.bounds < 4 * seconds + 5, spent
     assert f"during at most {seconds:g} s" in str(cert)
     assert "which ended the search" in str(cert)
@@ -34,13 +46,21 @@ def test_a_search_over_a_box_keeps_to_its_budget_and_says_so(seconds):
 
 def test_a_search_that_was_not_made_is_not_claimed():
     assert "no trajectory was looked for" in str(l2_gain(spring(damping=0.4), 0.1, search=None))
-    quick = Search(levels=3, dwells=2, starts=1, nodes=10, evaluations=2, steps=20, samples=100, seconds=60.0)
-    for cert in (generalized_h2(spring(damping=0.4), 0.1, search=quick), lft_gain(spring(damping=0.4).to_lft().reduce(), search=quick)):
+    quick = Search(
+        levels=3, dwells=2, starts=1, nodes=10, evaluations=2, steps=20, samples=100, seconds=60.0
+    )
+    for cert in (
+        generalized_h2(spring(damping=0.4), 0.1, search=quick),
+        lft_gain(spring(damping=0.4).to_lft().reduce(), search=quick),
+    ):
         assert "at most 60 s: the bound" in str(cert)
 
 
 def test_more_time_is_never_worse_and_no_time_still_a_bound():
-    bounds = [lower_bound(lateral(), 0.3, search=Search(seconds=s, evaluations=10, starts=1)).gamma for s in (1e-9, math.inf)]
+    bounds = [
+        lower_bound(lateral(), 0.3, search=Search(seconds=s, evaluations=10, starts=1)).gamma
+        for s in (1e-9, math.inf)
+    ]
     assert l2_gain(lateral(), 0.0, search=None).frozen <= bounds[0] * (1 + 1e-9)
     assert bounds[0] <= bounds[1]
 

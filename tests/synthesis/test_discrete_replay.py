@@ -1,4 +1,6 @@
-"""In discrete time a worst trajectory is one p a sample: flown on the model as it is returned, it shows what was claimed."""
+"""In discrete time a worst trajectory is one p a sample: flown on the model as it is returned, it
+shows what was claimed.
+"""
 
 import math
 
@@ -13,9 +15,15 @@ from synthesis import Relaxation, Search, decay_rate, generalized_h2, l2_gain, l
 
 QUICK = Search(levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000)
 SOS = Relaxation(kind="sos", segments=(1,), degree=1)
-common = settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+common = settings(
+    max_examples=6, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+)
 # spring: p pumps; two_ends: input at one end of p, output at the other
-springs = st.builds(lambda damping, dt: spring(damping=damping).discretize(dt), st.floats(0.3, 0.6), st.sampled_from([0.2, 0.5, 1.1]))
+springs = st.builds(
+    lambda damping, dt: spring(damping=damping).discretize(dt),
+    st.floats(0.3, 0.6),
+    st.sampled_from([0.2, 0.5, 1.1]),
+)
 
 
 @st.composite
@@ -23,11 +31,20 @@ def two_ends(draw):
     a = draw(st.floats(0.2, 0.9))
     B, C = [[[2.0]], [[-1.0]]], [[[1.0]], [[1.0]]]
     return LPVStateSpace.polynomial(
-        [[[a]]], B, C, [[[0.0]]], Scheduling("p", "1", -1.0, 2.0, math.inf), dt=draw(st.sampled_from([0.1, 0.3, 1.0]))
+        [[[a]]],
+        B,
+        C,
+        [[[0.0]]],
+        Scheduling("p", "1", -1.0, 2.0, math.inf),
+        dt=draw(st.sampled_from([0.1, 0.3, 1.0])),
     )
 
 
-models = st.one_of(springs, two_ends(), st.builds(lambda seed: random_stable(seed, dt=0.2), st.sampled_from([1, 7, 8])))
+models = st.one_of(
+    springs,
+    two_ends(),
+    st.builds(lambda seed: random_stable(seed, dt=0.2), st.sampled_from([1, 7, 8])),
+)
 rates = st.sampled_from([0.3, 2.0, math.inf])
 
 
@@ -48,7 +65,9 @@ def test_the_input_along_the_worst_trajectory_shows_the_gain(lpv, rate):
     within(lpv, rate, found.trajectory)
     if math.isinf(found.gamma):
         A = lpv.matrices(found.trajectory.p).A
-        assert np.abs(np.linalg.eigvals(np.linalg.multi_dot([*A[::-1], np.eye(len(A[0]))]))).max() == pytest.approx(found.growth, rel=1e-6)
+        assert np.abs(
+            np.linalg.eigvals(np.linalg.multi_dot([*A[::-1], np.eye(len(A[0]))]))
+        ).max() == pytest.approx(found.growth, rel=1e-6)
         assert found.growth > 1
         return
     y = simulate(lpv, found.trajectory.p, found.input)[1]
@@ -56,13 +75,18 @@ def test_the_input_along_the_worst_trajectory_shows_the_gain(lpv, rate):
 
 
 @common
-@given(lpv=models, rate=rates, relaxation=st.sampled_from([SOS, Relaxation(segments=(1,), degree=1)]))
-def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(lpv, rate, relaxation):
+@given(
+    lpv=models, rate=rates, relaxation=st.sampled_from([SOS, Relaxation(segments=(1,), degree=1)])
+)
+def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(
+    lpv, rate, relaxation
+):
     cert = l2_gain(lpv, rate, relaxation=relaxation, search=QUICK)
     if cert.worst is None or math.isinf(cert.lower):
         return
     within(lpv, rate, cert.worst)
-    # the largest gain from rest over these samples, by forward and adjoint passes from a random input: it only rises
+    # the largest gain from rest over these samples, by forward and adjoint passes from a random
+    # input: it only rises
     A, B, C, D = lpv.matrices(cert.worst.p)
     u = np.random.default_rng(0).standard_normal((len(A), B.shape[2]))
     ratio = 0.0

@@ -1,4 +1,6 @@
-"""A certificate that was tampered with, in any field of any form, is refused: by the constructor in words, or by both verifications."""
+"""A certificate that was tampered with, in any field of any form, is refused: by the constructor in
+words, or by both verifications.
+"""
 
 import math
 from dataclasses import fields, is_dataclass, replace
@@ -12,7 +14,15 @@ from models import lag, random_stable, spring
 
 from symheli.errors import SymheliError
 from symheli.lpv import LPVStateSpace
-from synthesis import Relaxation, decay_rate, generalized_h2, l2_gain, lft_gain, lft_stability, stability
+from synthesis import (
+    Relaxation,
+    decay_rate,
+    generalized_h2,
+    l2_gain,
+    lft_gain,
+    lft_stability,
+    stability,
+)
 
 COARSE = Relaxation(segments=(2,), degree=2)
 BOX = Relaxation(kind="sos", segments=(2,), degree=1)
@@ -22,8 +32,12 @@ FORMS = {
     "constant": lambda: l2_gain(lag(), math.inf, search=None),
     "sampled": lambda: l2_gain(random_stable(2, dt=0.1), relaxation=COARSE, search=None),
     "stability": lambda: stability(damped, 0.1, relaxation=COARSE, search=None),
-    "degree four": lambda: stability(damped, 0.1, relaxation=Relaxation(order=2, segments=(2,)), search=None),
-    "memory": lambda: l2_gain(damped, 0.5, relaxation=Relaxation(memory=1.0, segments=(3,), degree=2), search=None),
+    "degree four": lambda: stability(
+        damped, 0.1, relaxation=Relaxation(order=2, segments=(2,)), search=None
+    ),
+    "memory": lambda: l2_gain(
+        damped, 0.5, relaxation=Relaxation(memory=1.0, segments=(3,), degree=2), search=None
+    ),
     "box": lambda: l2_gain(damped, 0.1, relaxation=BOX, search=None),
     "box stability": lambda: stability(damped, 0.1, relaxation=BOX, search=None),
     "energy to peak": lambda: generalized_h2(damped, 0.1, relaxation=BOX, search=None),
@@ -34,9 +48,35 @@ FORMS = {
     "lft, full block": lambda: lft_gain(damped.to_lft().reduce(), "full block", search=None),
     "lft stability": lambda: lft_stability(damped.to_lft().reduce(), search=None),
 }
-JUNK = (None, "P", math.nan, math.inf, -math.inf, -1.0, 1e300, 10**400, (), True, np.full((2, 2), np.nan), np.zeros((0, 0)))
-# what is printed, or says how the proof was found, and the model itself: a certificate of another model is another certificate
-SAID = {"hypotheses", "solver", "seconds", "conditioning", "attempts", "worst", "unit", "relaxation", "indicative", "frozen", "status"}
+JUNK = (
+    None,
+    "P",
+    math.nan,
+    math.inf,
+    -math.inf,
+    -1.0,
+    1e300,
+    10**400,
+    (),
+    True,
+    np.full((2, 2), np.nan),
+    np.zeros((0, 0)),
+)
+# what is printed, or says how the proof was found, and the model itself: a certificate of another
+# model is another certificate
+SAID = {
+    "hypotheses",
+    "solver",
+    "seconds",
+    "conditioning",
+    "attempts",
+    "worst",
+    "unit",
+    "relaxation",
+    "indicative",
+    "frozen",
+    "status",
+}
 SAID |= {"lower", "upper", "verified", "lft", "lpv", "source", "elevation", "slack"}
 
 
@@ -55,7 +95,9 @@ def parts(thing):
 def exchanged(thing, path, value):
     name, *rest = path
     inner = exchanged(getattr(thing, name), rest, value) if rest else value
-    return replace(thing, **{name: inner}) if is_dataclass(thing) else thing._replace(**{name: inner})
+    return (
+        replace(thing, **{name: inner}) if is_dataclass(thing) else thing._replace(**{name: inner})
+    )
 
 
 def leaves(thing, path=()):
@@ -93,7 +135,11 @@ def test_junk_in_any_field_is_refused(form, data):
     path, value = data.draw(st.sampled_from(list(leaves(cert))))
     junk = data.draw(st.sampled_from([j for j in JUNK if not same(j, value)]))
     # the coordinates only serve the eyes of the floating check: other ones are as good
-    if path[-1] in ("channel", "time", "inputs", "outputs", "storage") and isinstance(junk, float | bool) and 0 < junk < math.inf:
+    if (
+        path[-1] in ("channel", "time", "inputs", "outputs", "storage")
+        and isinstance(junk, float | bool)
+        and 0 < junk < math.inf
+    ):
         return
     # and a gain larger than what was proven is proven
     if path == ("gamma",) and cert.kind.endswith("gain") and same(junk, 1e300):
@@ -108,11 +154,18 @@ def test_numbers_of_the_proof_that_were_changed_are_refused(form, data):
     cert = genuine(form)
     arrays = [(path, v) for path, v in leaves(cert) if _numeric(v) and "evidence" not in path]
     path, value = data.draw(st.sampled_from(arrays))
-    change = data.draw(st.sampled_from(["skew", "nan", "minus", "reversed", "shorter", "longer", "one"]))
+    change = data.draw(
+        st.sampled_from(["skew", "nan", "minus", "reversed", "shorter", "longer", "one"])
+    )
     array = np.array(value, dtype=float)
     at = tuple(data.draw(st.integers(0, n - 1)) for n in array.shape)
     if change == "skew":
-        if array.ndim < 2 or array.shape[-1] != array.shape[-2] or array.shape[-1] < 2 or path[-1] == "S":
+        if (
+            array.ndim < 2
+            or array.shape[-1] != array.shape[-2]
+            or array.shape[-1] < 2
+            or path[-1] == "S"
+        ):
             return
         i, j = data.draw(st.sampled_from([(0, 1), (1, 0)]))
         array[..., i, j] += data.draw(st.floats(1e-12, 1e3))
@@ -144,14 +197,30 @@ def test_numbers_of_the_proof_that_were_changed_are_refused(form, data):
 def test_a_bound_beyond_the_proof_is_refused(form):
     cert = genuine(form)
     if cert.kind == "stability":
-        others = [{"gamma": 1.0}, {"kind": "l2 gain"}, {"kind": "l2 gain", "gamma": 1.0, "lower": 0.0, "frozen": 0.0}]
+        others = [
+            {"gamma": 1.0},
+            {"kind": "l2 gain"},
+            {"kind": "l2 gain", "gamma": 1.0, "lower": 0.0, "frozen": 0.0},
+        ]
     elif cert.kind == "decay rate":
         # 1e-2: a bound is found to 2e-3 and loosened by as much as 1e-2 of it, rarely more
-        others = [{"alpha": a, "upper": 1e9, "frozen": 1e9} for a in (-1.0, math.nan, math.inf, 2 * cert.upper)]
+        others = [
+            {"alpha": a, "upper": 1e9, "frozen": 1e9}
+            for a in (-1.0, math.nan, math.inf, 2 * cert.upper)
+        ]
     else:
-        others = [{"gamma": g, "lower": -1e9, "frozen": -1e9} for g in (-cert.gamma, math.nan, math.inf, 0.0, 0.9 * cert.lower)]
-        others += [{"kind": "stability"}, {"kind": "stability", "gamma": math.nan, "lower": math.nan, "frozen": math.nan}]
-    others += [{"rates": (2.0 * (r if math.isfinite(r) else 1.0) + 1.0,)} for r in cert.rates] + [{"rates": ()}, {"rates": (-1.0,)}]
+        others = [
+            {"gamma": g, "lower": -1e9, "frozen": -1e9}
+            for g in (-cert.gamma, math.nan, math.inf, 0.0, 0.9 * cert.lower)
+        ]
+        others += [
+            {"kind": "stability"},
+            {"kind": "stability", "gamma": math.nan, "lower": math.nan, "frozen": math.nan},
+        ]
+    others += [{"rates": (2.0 * (r if math.isfinite(r) else 1.0) + 1.0,)} for r in cert.rates] + [
+        {"rates": ()},
+        {"rates": (-1.0,)},
+    ]
     for change in others:
         assert refused(lambda c=change: replace(cert, **c)), change
 
@@ -172,7 +241,10 @@ def test_the_proof_of_another_model_is_refused(form, other):
 def test_the_reason_of_a_refusal_can_be_read():
     cert = genuine("spline")
     assert "rates (0.3,), the claim for (2.0,)" in replace(cert, rates=(2.0,)).fault
-    assert "not those of the model" in replace(cert, evidence=cert.evidence._replace(pieces=cert.evidence.pieces[:0])).fault
+    assert (
+        "not those of the model"
+        in replace(cert, evidence=cert.evidence._replace(pieces=cert.evidence.pieces[:0])).fault
+    )
     part = replace(cert.lyapunov, knots=0.5 * cert.lyapunov.knots)
     assert "P is known for p in [0, 0.5]" in replace(cert, lyapunov=part).fault
 

@@ -13,12 +13,21 @@ from synthesis.frozen import norm
 
 
 def lightly_damped(seed, decades=0.7, least=-3.5):
-    """Modes of nearly equal peaks, damping 10^least .. 0.1, mixed, in units that differ by up to 1e6."""
+    """Modes of nearly equal peaks, damping 10^least .. 0.1, mixed, in units that differ by up to
+    1e6.
+    """
     rng = np.random.default_rng(seed)
     m = rng.integers(1, 6)
     w, z = 10 ** rng.uniform(-decades, decades, m), 10 ** rng.uniform(least, -1, m)
-    A = block_diag(*(v * np.array([[-d, np.sqrt(1 - d**2)], [-np.sqrt(1 - d**2), -d]]) for v, d in zip(w, z, strict=True)))
-    T = (np.eye(2 * m) + 0.3 * rng.standard_normal((2 * m, 2 * m))) * 10 ** rng.uniform(-3, 3, 2 * m)
+    A = block_diag(
+        *(
+            v * np.array([[-d, np.sqrt(1 - d**2)], [-np.sqrt(1 - d**2), -d]])
+            for v, d in zip(w, z, strict=True)
+        )
+    )
+    T = (np.eye(2 * m) + 0.3 * rng.standard_normal((2 * m, 2 * m))) * 10 ** rng.uniform(
+        -3, 3, 2 * m
+    )
     nu, ny = rng.integers(1, 4, 2)
     size = np.repeat(np.sqrt(z * w), 2)
     B, C = rng.standard_normal((2 * m, nu)) * size[:, None], rng.standard_normal((ny, 2 * m)) * size
@@ -27,15 +36,25 @@ def lightly_damped(seed, decades=0.7, least=-3.5):
 
 
 def dense(A, B, C, D):
-    """The largest gain by a grid that is dense around every pole and refined around its five highest points."""
+    """The largest gain by a grid that is dense around every pole and refined around its five
+    highest points.
+    """
 
     def gains(omega):
         pencil = 1j * omega[:, None, None] * np.eye(len(A)) - A
-        return np.linalg.norm(C @ np.linalg.solve(pencil, np.broadcast_to(B, (len(omega), *B.shape))) + D, 2, axis=(1, 2))
+        return np.linalg.norm(
+            C @ np.linalg.solve(pencil, np.broadcast_to(B, (len(omega), *B.shape))) + D,
+            2,
+            axis=(1, 2),
+        )
 
     around = np.sinh(np.linspace(-10, 10, 301))
     poles = np.linalg.eigvals(A)
-    points = np.unique(np.abs(np.concatenate([[0.0], *(p.imag + abs(p.real) * around for p in poles if p.imag >= 0)])))
+    points = np.unique(
+        np.abs(
+            np.concatenate([[0.0], *(p.imag + abs(p.real) * around for p in poles if p.imag >= 0)])
+        )
+    )
     values = gains(points)
     best = max(float(values.max()), float(np.linalg.norm(D, 2)))
     tops = [k for k in range(1, len(points) - 1) if values[k - 1] <= values[k] >= values[k + 1]]
@@ -52,7 +71,8 @@ def dense(A, B, C, D):
 def agree(seeds):
     for seed in seeds:
         model = lightly_damped(seed)
-        # the grid's own responses are exact to 1e-9 at this damping; the norm may be higher where the grid missed the top
+        # the grid's own responses are exact to 1e-9 at this damping; the norm may be higher where
+        # the grid missed the top
         assert norm(*model)[0] == pytest.approx(dense(*model), rel=1.1e-8), seed
 
 
@@ -75,11 +95,16 @@ def exact_gain(model, omega):
 
 @pytest.mark.parametrize("seed", [5, 33, 89, 126])
 def test_stiff_models_of_the_lightest_damping_are_right_in_forty_digits(seed):
-    """Frequencies four decades apart, damping 1e-6: one response in doubles is off by 1e-7 of the peak, by rounding alone."""
+    """Frequencies four decades apart, damping 1e-6: one response in doubles is off by 1e-7 of the
+    peak, by rounding alone.
+    """
     model = lightly_damped(seed, decades=2, least=-6)
     gain, omega = norm(*model)
     width = float(np.abs(np.linalg.eigvals(model[0]) - 1j * omega).min())
-    around = max(exact_gain(model, mpmath.mpf(omega) + width * mpmath.mpf(x)) for x in np.linspace(-0.01, 0.01, 9))
+    around = max(
+        exact_gain(model, mpmath.mpf(omega) + width * mpmath.mpf(x))
+        for x in np.linspace(-0.01, 0.01, 9)
+    )
     assert gain == pytest.approx(float(around), rel=1e-8)
 
 
@@ -88,7 +113,12 @@ def test_a_sampled_model_has_the_norm_of_its_bilinear_twin(seed):
     A, B, C, D = lightly_damped(seed)
     h = 0.05  # z = (1 + h s)/(1 - h s)
     inverse = np.linalg.inv(np.eye(len(A)) - h * A)
-    sampled = inverse @ (np.eye(len(A)) + h * A), math.sqrt(2 * h) * inverse @ B, math.sqrt(2 * h) * C @ inverse, D + h * C @ inverse @ B
+    sampled = (
+        inverse @ (np.eye(len(A)) + h * A),
+        math.sqrt(2 * h) * inverse @ B,
+        math.sqrt(2 * h) * C @ inverse,
+        D + h * C @ inverse @ B,
+    )
     # what A lost when it was made discrete, by the damping of 1e-3 of a sample
     assert norm(*sampled, dt=0.1)[0] == pytest.approx(norm(A, B, C, D)[0], rel=1e-7)
 
@@ -96,18 +126,24 @@ def test_a_sampled_model_has_the_norm_of_its_bilinear_twin(seed):
 @pytest.mark.parametrize("dt", [1e-3, 1e-5, 1e-7])
 def test_the_frozen_gain_of_a_finely_sampled_model_is_that_of_the_continuous_one(dt):
     lpv = random_stable(3)
-    assert frozen_gain(lpv.discretize(dt)).gamma == pytest.approx(frozen_gain(lpv).gamma, rel=2 * dt + 1e-7)
+    assert frozen_gain(lpv.discretize(dt)).gamma == pytest.approx(
+        frozen_gain(lpv).gamma, rel=2 * dt + 1e-7
+    )
 
 
 def test_the_norm_does_not_depend_on_the_units_of_states():
     A, B, C, D = lightly_damped(5)
     T = 10.0 ** np.random.default_rng(0).integers(-12, 13, len(A))
-    assert norm(T[:, None] * A / T, T[:, None] * B, C / T, D)[0] == pytest.approx(norm(A, B, C, D)[0], rel=1e-8)
+    assert norm(T[:, None] * A / T, T[:, None] * B, C / T, D)[0] == pytest.approx(
+        norm(A, B, C, D)[0], rel=1e-8
+    )
 
 
 @pytest.mark.parametrize("box", [False, True])
 def test_a_gain_that_is_loose_for_its_sample_period_says_so(box):
-    """A gain of 1 is proven within a percent where a sample is 1e-3 s; at 1e-7 s the margins of the LMIs are larger than its decay."""
+    """A gain of 1 is proven within a percent where a sample is 1e-3 s; at 1e-7 s the margins of the
+    LMIs are larger than its decay.
+    """
     for dt in (0.1, 1e-3, 1e-7):
         sampled = lag().discretize(dt)
         proven = l2_gain(PolynomialStateSpace.from_lpv(sampled) if box else sampled, search=None)

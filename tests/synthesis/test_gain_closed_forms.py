@@ -34,10 +34,13 @@ def test_a_constant_model_has_its_h_infinity_norm(seed, dt):
 
 
 def test_frozen_gain_finds_a_peak_between_grid_points_and_its_frequency():
-    # x'' + 0.02 x' + (1 + (p - 0.5137)^2) x = u: peak 1/(2 z sqrt(1 - z^2)) with z = 0.01 at p = 0.5137
+    # x'' + 0.02 x' + (1 + (p - 0.5137)^2) x = u: peak 1/(2 z sqrt(1 - z^2)) with z = 0.01 at p =
+    # 0.5137
     k = 0.5137
     A = [[[0, 1], [-1 - k * k, -0.02]], [[0, 0], [2 * k, 0]], [[0, 0], [-1.0, 0]]]
-    lpv = LPVStateSpace.polynomial(A, [[[0.0], [1]]], [[[1.0, 0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0))
+    lpv = LPVStateSpace.polynomial(
+        A, [[[0.0], [1]]], [[[1.0, 0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
+    )
     found = frozen_gain(lpv, points=7)
     assert found.gamma == pytest.approx(1 / (0.02 * math.sqrt(1 - 1e-4)), rel=1e-6)
     # the norm is flat at its peak: p is found to the square root of the precision of the norm
@@ -47,7 +50,11 @@ def test_frozen_gain_finds_a_peak_between_grid_points_and_its_frequency():
 
 def test_feedthrough_alone_is_its_largest_singular_value():
     lpv = LPVStateSpace.polynomial(
-        [-np.eye(2)], [np.zeros((2, 2))], [np.zeros((2, 2))], [np.diag([1.0, 2.0]), np.diag([0.0, 1.0])], Scheduling("p", "1", 0.0, 1.0)
+        [-np.eye(2)],
+        [np.zeros((2, 2))],
+        [np.zeros((2, 2))],
+        [np.diag([1.0, 2.0]), np.diag([0.0, 1.0])],
+        Scheduling("p", "1", 0.0, 1.0),
     )
     cert = l2_gain(lpv, 1.0, relaxation=COARSE, search=None)
     assert cert.frozen == pytest.approx(3.0, rel=1e-9)
@@ -76,9 +83,7 @@ def test_the_gain_does_not_depend_on_the_unit_of_time():
     lpv = random_stable(5, rate=0.3)
     s = lpv.scheduling
     # milliseconds instead of seconds
-    other = replace(
-        lpv, A=lpv.A * 1e-3, B=lpv.B * 1e-3, scheduling=replace(s, rate=s.rate * 1e-3)
-    )  # fmt: skip
+    other = replace(lpv, A=lpv.A * 1e-3, B=lpv.B * 1e-3, scheduling=replace(s, rate=s.rate * 1e-3))
     a, b = (l2_gain(model, relaxation=COARSE, search=None).gamma for model in (lpv, other))
     assert b == pytest.approx(a, rel=1e-4)
 
@@ -87,7 +92,9 @@ def test_the_gain_does_not_depend_on_the_unit_of_time():
 def test_a_fast_sampled_model_has_the_gain_of_the_continuous_one(rate):
     lpv = random_stable(6, degree=1)
     continuous = l2_gain(lpv, rate, relaxation=COARSE, search=None)
-    sampled = l2_gain(lpv.discretize(0.01), rate, relaxation=Relaxation(degree=3, segments=(4,)), search=None)
+    sampled = l2_gain(
+        lpv.discretize(0.01), rate, relaxation=Relaxation(degree=3, segments=(4,)), search=None
+    )
     # hold and sampling shift the response by half a sample: O(dt |A|) of a gain difference
     assert sampled.verified
     assert sampled.gamma == pytest.approx(continuous.gamma, rel=0.03)
@@ -101,7 +108,10 @@ def test_a_spline_model_has_the_gain_of_the_polynomial_it_samples():
     basis = Spline(nodes)
     sampled = lpv.matrices(np.array(nodes))
     spline = replace(lpv, basis=basis, A=sampled.A, B=sampled.B, C=sampled.C, D=sampled.D)
-    a, b = (l2_gain(model, relaxation=Relaxation(segments=(5,), grading=1.0), search=None) for model in (lpv, spline))
+    a, b = (
+        l2_gain(model, relaxation=Relaxation(segments=(5,), grading=1.0), search=None)
+        for model in (lpv, spline)
+    )
     # a cubic spline reproduces quadratics; the LMIs sit on other intervals
     assert b.gamma == pytest.approx(a.gamma, rel=1e-4)
     assert b.verify(rigorous=True)
@@ -112,7 +122,12 @@ def test_a_piecewise_linear_model_is_certified_up_to_its_corners():
 
     basis = PiecewiseLinear((0.0, 0.3, 1.0))
     lpv = replace(
-        lag(), basis=basis, A=np.array([[[-2.0]], [[-1.0]], [[-3.0]]]), B=np.ones((3, 1, 1)), C=np.ones((3, 1, 1)), D=np.zeros((3, 1, 1))
+        lag(),
+        basis=basis,
+        A=np.array([[[-2.0]], [[-1.0]], [[-3.0]]]),
+        B=np.ones((3, 1, 1)),
+        C=np.ones((3, 1, 1)),
+        D=np.zeros((3, 1, 1)),
     )
     cert = l2_gain(lpv, 0.5, relaxation=COARSE, search=None)
     assert cert.frozen == pytest.approx(1.0, rel=1e-6)
@@ -130,7 +145,9 @@ def test_a_narrower_range_than_the_basis_is_certified_on_that_range_only():
 
 def test_stability_needs_no_channels():
     lpv = random_stable(8)
-    bare = replace(lpv, B=lpv.B[:, :, :0], C=lpv.C[:, :0], D=lpv.D[:, :0, :0], inputs=(), outputs=())
+    bare = replace(
+        lpv, B=lpv.B[:, :, :0], C=lpv.C[:, :0], D=lpv.D[:, :0, :0], inputs=(), outputs=()
+    )
     cert = stability(bare, 0.1, relaxation=COARSE)
     assert cert.verified
     assert math.isnan(cert.gamma)

@@ -22,8 +22,16 @@ def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, relaxati
     # the family had 2 % more in A at one node, and only that: A is -1 .. -2
     off = [np.zeros((3, *M.shape[1:])) for M in (lpv.A, lpv.B, lpv.C, lpv.D)]
     off[0][1, 0, 0] = 0.04
-    text = str(analysis(replace(lpv, residuals=Residuals(np.linspace(s.low, s.high, 3), *off)), relaxation=relaxation, search=None))
-    assert "differs from what it was fitted to by at most 2 % of its largest value, in A[1, 1]" in text
+    text = str(
+        analysis(
+            replace(lpv, residuals=Residuals(np.linspace(s.low, s.high, 3), *off)),
+            relaxation=relaxation,
+            search=None,
+        )
+    )
+    assert (
+        "differs from what it was fitted to by at most 2 % of its largest value, in A[1, 1]" in text
+    )
     assert "fitted to" not in str(analysis(lpv, relaxation=relaxation, search=None))
 
 
@@ -39,23 +47,40 @@ def test_the_misfit_of_a_sampled_model_is_measured_from_its_own_samples():
     assert f"at most {100 * worst:.2g} %" in text
 
 
-@pytest.mark.parametrize("change", [lambda m: m.feedback({("u1", "y1"): -0.5}), lambda m: m.discretize(0.2)], ids=["closed", "sampled"])
+@pytest.mark.parametrize(
+    "change",
+    [lambda m: m.feedback({("u1", "y1"): -0.5}), lambda m: m.discretize(0.2)],
+    ids=["closed", "sampled"],
+)
 def test_the_misfit_survives_closing_a_loop_and_sampling(change):
-    """What a closed or sampled fit is off by is what the same loop, or hold, makes of the family."""
+    """What a closed or sampled fit is off by is what the same loop, or hold, makes of the
+    family.
+    """
     lpv = lag()
     nodes = np.linspace(lpv.scheduling.low, lpv.scheduling.high, 3)
     exact = lpv.matrices(nodes)
     fitted = lpv.with_residuals(nodes, exact._replace(A=exact.A - 0.1 * nodes[:, None, None]))
     changed = change(fitted)
     for k, p in enumerate(nodes):
-        plain = LPVStateSpace.polynomial([exact.A[k] - 0.1 * p], [exact.B[k]], [exact.C[k]], [exact.D[k]], scheduling=lpv.scheduling)
+        plain = LPVStateSpace.polynomial(
+            [exact.A[k] - 0.1 * p],
+            [exact.B[k]],
+            [exact.C[k]],
+            [exact.D[k]],
+            scheduling=lpv.scheduling,
+        )
         off = changed.at(p).A - change(plain).at(p).A
         np.testing.assert_allclose(changed.residuals.A[k - len(nodes)], off, atol=1e-12)
     assert "fitted to by at most" in str(stability(changed, relaxation=COARSE, search=None))
 
 
 def test_what_is_trusted_is_said():
-    for cert in (l2_gain(lag(), relaxation=COARSE, search=None), decay_rate(lag(), relaxation=SOS, search=None)):
+    for cert in (
+        l2_gain(lag(), relaxation=COARSE, search=None),
+        decay_rate(lag(), relaxation=SOS, search=None),
+    ):
         assert "through the model's own matrices" in str(cert)
         assert "are shared by the search for P and the proof" in str(cert)
-    assert "only the matrices of the LFT are shared" in str(lft_gain(lag().to_lft().reduce(), search=None))
+    assert "only the matrices of the LFT are shared" in str(
+        lft_gain(lag().to_lft().reduce(), search=None)
+    )

@@ -1,4 +1,6 @@
-"""An interrupt from the keyboard ends a solve within two seconds, however long its iterations are."""
+"""An interrupt from the keyboard ends a solve within two seconds, however long its iterations
+are.
+"""
 
 import os
 import signal
@@ -45,7 +47,10 @@ def test_an_interrupted_solve_ends_within_two_seconds(name, n, m, after):
     if name == "SCS":
         pytest.importorskip("scs")
     process = subprocess.Popen(
-        [sys.executable, "-c", SOLVE, name, str(n), str(m)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", SOLVE, name, str(n), str(m)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     process.stdout.readline()
     time.sleep(after)
@@ -105,7 +110,9 @@ def test_what_scs_has_heard_from_the_keyboard_is_passed_on(monkeypatch):
 def test_both_ways_of_solving_give_the_same_point(monkeypatch):
     # the largest eigenvalue of a 2 x 2 matrix: x I - M >= 0
     M = np.array([2.0, 1.0 * np.sqrt(2), 3.0])
-    program = cone_program.ConeProgram(np.ones(1), sparse.csc_matrix([[-1.0], [0.0], [-1.0]]), -M, (2,))
+    program = cone_program.ConeProgram(
+        np.ones(1), sparse.csc_matrix([[-1.0], [0.0], [-1.0]]), -M, (2,)
+    )
     here = cone_program.solve(program, cone_program.Solver()).x
     monkeypatch.setattr(cone_program, "SHORT", 0.0)
     np.testing.assert_array_equal(cone_program.solve(program, cone_program.Solver()).x, here)

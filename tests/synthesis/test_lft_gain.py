@@ -1,4 +1,6 @@
-"""LFT tests: their order, closed forms, published cases, independent routes, and that they never prove what is false."""
+"""LFT tests: their order, closed forms, published cases, independent routes, and that they never
+prove what is false.
+"""
 
 import math
 from dataclasses import replace
@@ -40,21 +42,37 @@ def gains(lft, scalings=SCALINGS, **options):
 
 
 def oscillator(k):
-    """x'' + 0.21 x' + (1 - d) x = f, |d| <= 0.8 k: the system of iqc_tvscalar_test.m of the IQC toolbox."""
-    return LFT([[0.0]], [[0, 0.8 * k, 0]], [[1.0], [0], [0]], [[-0.21, -1, 1], [1, 0, 0], [0, 1, 0]],
-               ((Scheduling("d", "1", -0.8 * k, 0.8 * k), 1),), ("v", "x"), ("f",), ("x_out",))  # fmt: skip
+    """x'' + 0.21 x' + (1 - d) x = f, |d| <= 0.8 k: the system of iqc_tvscalar_test.m of the IQC
+    toolbox.
+    """
+    return LFT(
+        [[0.0]],
+        [[0, 0.8 * k, 0]],
+        [[1.0], [0], [0]],
+        [[-0.21, -1, 1], [1, 0, 0], [0, 1, 0]],
+        ((Scheduling("d", "1", -0.8 * k, 0.8 * k), 1),),
+        ("v", "x"),
+        ("f",),
+        ("x_out",),
+    )
 
 
 def two_parameters(a):
-    """Delta = diag(d1, d2) in [-a, a]: the plant of IQClab's Demo_004 (J. Veenman), option 1, performance L2."""
+    """Delta = diag(d1, d2) in [-a, a]: the plant of IQClab's Demo_004 (J. Veenman), option 1,
+    performance L2.
+    """
     M11, M21 = np.array([[1.0, -2], [1, -1]]), np.array([[1.0, 0], [0, 0], [0, 1]])
     blocks = tuple((Scheduling(name, "1", -a, a), 1) for name in ("d1", "d2"))
     M22 = [[-2.0, -3, 1], [1, 1, 0], [1, 0, 0]]
-    return LFT(a * M11, [[1.0, 0, 0], [0, 0, 1]], a * M21, M22, blocks, ("x1", "x2"), ("w",), ("z",))
+    return LFT(
+        a * M11, [[1.0, 0, 0], [0, 0, 1]], a * M21, M22, blocks, ("x1", "x2"), ("w",), ("z",)
+    )
 
 
 def gridded(lft, points):
-    """The gain that one constant P allows on a grid of the box, by cvxpy: a lower bound of every constant-P test."""
+    """The gain that one constant P allows on a grid of the box, by cvxpy: a lower bound of every
+    constant-P test.
+    """
     nx, nu = len(lft.states), len(lft.inputs)
     P, g = cp.Variable((nx, nx), symmetric=True), cp.Variable()
     grid = np.linspace(-1, 1, points)
@@ -62,29 +80,55 @@ def gridded(lft, points):
     for delta in np.stack(np.meshgrid(*[grid] * len(lft.blocks)), -1).reshape(-1, len(lft.blocks)):
         M = lft.matrix(delta)
         A, B, C, D = M[:nx, :nx], M[:nx, nx:], M[nx:, :nx], M[nx:, nx:]
-        F = cp.bmat([[A.T @ P + P @ A + C.T @ C, P @ B + C.T @ D], [B.T @ P + D.T @ C, D.T @ D - g * np.eye(nu)]])
+        F = cp.bmat(
+            [
+                [A.T @ P + P @ A + C.T @ C, P @ B + C.T @ D],
+                [B.T @ P + D.T @ C, D.T @ D - g * np.eye(nu)],
+            ]
+        )
         constraints.append(0.5 * (F + F.T) << 0)
     cp.Problem(cp.Minimize(g), constraints).solve(solver="CLARABEL")
     return math.sqrt(g.value)
 
 
 def heavier():
-    """m v' = -v - k x + f, x' = v with the mass in [1, 1.2] kg (rational) and the stiffness in [3.5, 4.5] N/m."""
+    """m v' = -v - k x + f, x' = v with the mass in [1, 1.2] kg (rational) and the stiffness in
+    [3.5, 4.5] N/m.
+    """
     mass, stiffness = Scheduling("mass", "kg", 1.0, 1.2), Scheduling("stiffness", "N/m", 3.5, 4.5)
     body = LinearModel(
-        np.array([[0.0, 0], [1, 0]]), [[1.0], [0]], [[1.0, 0], [0, 1]], np.zeros((2, 1)), ("vs", "xs"), ("acc",), ("v1", "x1")
+        np.array([[0.0, 0], [1, 0]]),
+        [[1.0], [0]],
+        [[1.0, 0], [0, 1]],
+        np.zeros((2, 1)),
+        ("vs", "xs"),
+        ("acc",),
+        ("v1", "x1"),
     )
-    one = LinearModel(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], (), ("e",), ("acc",))
+    one = LinearModel(
+        np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], (), ("e",), ("acc",)
+    )
     return connect(
-        body, one, LFT.parameter(mass, "acc", "inertia"), LFT.parameter(stiffness, "x1", "spring"), inputs=["f"], outputs=["x1"],
+        body,
+        one,
+        LFT.parameter(mass, "acc", "inertia"),
+        LFT.parameter(stiffness, "x1", "spring"),
+        inputs=["f"],
+        outputs=["x1"],
         sums={"e": {"f": 1.0, "v1": -1.0, "spring": -1.0, "acc": 1.0, "inertia": -1.0}},
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("scaling", SCALINGS)
 def test_a_lag_has_its_static_gain(scaling):
     # the search does not depend on the scaling, and finds nothing above the frozen gain
-    cert = lft_gain(reduced(lag()), scaling, search=Search(levels=3, dwells=3, starts=1, nodes=16, evaluations=4, steps=24, samples=1000))
+    cert = lft_gain(
+        reduced(lag()),
+        scaling,
+        search=Search(
+            levels=3, dwells=3, starts=1, nodes=16, evaluations=4, steps=24, samples=1000
+        ),
+    )
     assert cert.frozen <= cert.lower <= cert.gamma <= 1 + CLOSE
     assert cert.frozen == pytest.approx(1.0, abs=1e-7)
     assert cert.verify()
@@ -101,7 +145,13 @@ def test_without_parameters_every_test_gives_the_h_infinity_norm(dt):
 
 
 @pytest.mark.parametrize(
-    ("seed", "dt"), [(3, 0.1), (4, 0.1), pytest.param(3, None, marks=pytest.mark.slow), pytest.param(4, None, marks=pytest.mark.slow)]
+    ("seed", "dt"),
+    [
+        (3, 0.1),
+        (4, 0.1),
+        pytest.param(3, None, marks=pytest.mark.slow),
+        pytest.param(4, None, marks=pytest.mark.slow),
+    ],
 )
 def test_richer_multipliers_prove_smaller_gains(seed, dt):
     lft = reduced(random_stable(seed, dt=dt))
@@ -117,7 +167,8 @@ def test_for_one_parameter_d_and_g_lose_nothing_against_any_constant_p(seed):
     lpv = random_stable(seed)
     DG, full = gains(reduced(lpv), ("DG", "full block"))
     assert full == pytest.approx(DG, rel=CLOSE)
-    # the Bernstein form of the same constant P can only be more conservative, and is not with its degree raised
+    # the Bernstein form of the same constant P can only be more conservative, and is not with its
+    # degree raised
     bernstein = l2_gain(lpv, math.inf, relaxation=Relaxation(elevation=6), search=None).gamma
     assert DG <= bernstein * (1 + CLOSE)
     assert bernstein == pytest.approx(DG, rel=1e-3)
@@ -135,7 +186,8 @@ def test_the_oscillator_is_proven_exactly_up_to_the_circle_criterion():
 
 
 def test_the_gain_of_the_oscillator_in_closed_form():
-    # small gain on both channels: |G|_inf/(1 - k' |G|_inf) with the parameter's own channel equal to the performance's
+    # small gain on both channels: |G|_inf/(1 - k' |G|_inf) with the parameter's own channel equal
+    # to the performance's
     peak, k = 1 / (0.21 * math.sqrt(1 - 0.105**2)), 0.1
     assert gains(oscillator(k / 0.8), ("small gain",))[0] <= peak / (1 - k * peak) * (1 + CLOSE)
     # one scalar parameter of one copy: all the classes are the same
@@ -145,7 +197,8 @@ def test_the_gain_of_the_oscillator_in_closed_form():
 def test_two_parameters_in_the_order_of_the_theory_and_down_to_what_constant_p_allows():
     lft = two_parameters(0.2)
     small, D, DG, full = gains(lft)
-    # one copy of each: there is no G, and D is strictly better than one number, the full block strictly better than D
+    # one copy of each: there is no G, and D is strictly better than one number, the full block
+    # strictly better than D
     assert DG == pytest.approx(D, rel=CLOSE)
     assert D < small * 0.99
     assert full < DG * 0.995
@@ -162,7 +215,8 @@ def test_full_blocks_reach_the_gridded_gain_of_a_rational_model():
 
 
 def test_tustins_rule_keeps_every_gain():
-    # the multiplier is static and the nominal loop undergoes a bilinear transform: the frequency-domain inequality is the same
+    # the multiplier is static and the nominal loop undergoes a bilinear transform: the
+    # frequency-domain inequality is the same
     lft = reduced(random_stable(4))
     for a, b in zip(gains(lft), gains(lft.discretize(0.1)), strict=True):
         assert b == pytest.approx(a, rel=CLOSE)
@@ -171,14 +225,24 @@ def test_tustins_rule_keeps_every_gain():
 def test_units_of_states_channels_and_time_do_not_matter():
     lpv = random_stable(3)
     T = np.diag([1e3, 1.0, 1e-3])
-    other = replace(lpv, A=1e-3 * T @ lpv.A @ np.linalg.inv(T), B=1e-3 * T @ lpv.B, C=1e4 * lpv.C @ np.linalg.inv(T), D=1e4 * lpv.D)
-    for a, b in zip(*(gains(reduced(m), ("D", "DG", "full block")) for m in (lpv, other)), strict=True):
+    other = replace(
+        lpv,
+        A=1e-3 * T @ lpv.A @ np.linalg.inv(T),
+        B=1e-3 * T @ lpv.B,
+        C=1e4 * lpv.C @ np.linalg.inv(T),
+        D=1e4 * lpv.D,
+    )
+    for a, b in zip(
+        *(gains(reduced(m), ("D", "DG", "full block")) for m in (lpv, other)), strict=True
+    ):
         assert b == pytest.approx(1e4 * a, rel=CLOSE)
 
 
 def test_superfluous_copies_change_only_the_small_gain():
     lpv = random_stable(6, degree=1)
-    for a, b in zip(*(gains(lft, ("D", "DG")) for lft in (lpv.to_lft(), reduced(lpv))), strict=True):
+    for a, b in zip(
+        *(gains(lft, ("D", "DG")) for lft in (lpv.to_lft(), reduced(lpv))), strict=True
+    ):
         assert b == pytest.approx(a, rel=1e-4)
 
 
@@ -208,17 +272,25 @@ def test_growth_along_a_diagonal_of_two_parameters_is_found():
 
 
 def test_an_lft_and_its_polynomial_model_have_the_same_lower_bound():
-    quick, lpv = Search(levels=4, dwells=4, starts=1, nodes=16, evaluations=4, steps=40, samples=2000), spring(damping=0.3)
-    # the same search on the same matrices, computed by another route: rounding, amplified a little by the ascents
+    quick, lpv = (
+        Search(levels=4, dwells=4, starts=1, nodes=16, evaluations=4, steps=40, samples=2000),
+        spring(damping=0.3),
+    )
+    # the same search on the same matrices, computed by another route: rounding, amplified a little
+    # by the ascents
     found, expected = (lower_bound(model, 1.0, search=quick) for model in (reduced(lpv), lpv))
     assert found.gamma == pytest.approx(expected.gamma, rel=1e-6)
     assert expected.gamma > 1.001 * frozen_gain(lpv).gamma
 
 
-@pytest.mark.parametrize("search", [
-    Search(levels=4, dwells=5, starts=1, nodes=32, evaluations=6, steps=60, samples=20_000),
-    pytest.param(Search(levels=6, dwells=7, evaluations=12, steps=80), marks=pytest.mark.slow),
-], ids=["coarse", "fine"])  # fmt: skip
+@pytest.mark.parametrize(
+    "search",
+    [
+        Search(levels=4, dwells=5, starts=1, nodes=32, evaluations=6, steps=60, samples=20_000),
+        pytest.param(Search(levels=6, dwells=7, evaluations=12, steps=80), marks=pytest.mark.slow),
+    ],
+    ids=["coarse", "fine"],
+)
 def test_the_lower_bound_sees_waves_at_the_parameters_own_rate(search):
     """A search over jumps alone ends at the frozen gain here, which slower waves exceed."""
     lpv = lateral().with_scheduling(Scheduling("airspeed", "m/s", 3.0, 10.0, 3.0))
@@ -238,8 +310,13 @@ def test_an_unstable_frozen_model_ends_the_search():
 def test_the_frozen_gain_over_a_box_is_found_between_grid_points():
     # peak of x'' + 2 z x' + x with z = 0.1 + (a - 0.3137)^2 + (b + 0.77)^2
     def damping(power):
-        return {(0, 0): power(0.2 + 2 * (0.3137**2 + 0.77**2)), (1, 0): power(-4 * 0.3137), (2, 0): power(2.0), (0, 1): power(4 * 0.77),
-                (0, 2): power(2.0)}  # fmt: skip
+        return {
+            (0, 0): power(0.2 + 2 * (0.3137**2 + 0.77**2)),
+            (1, 0): power(-4 * 0.3137),
+            (2, 0): power(2.0),
+            (0, 1): power(4 * 0.77),
+            (0, 2): power(2.0),
+        }
 
     A = damping(lambda c: np.array([[0, 0], [0, -c]]))
     A[0, 0] = A[0, 0] + np.array([[0, 1], [-1, 0]])
@@ -274,7 +351,12 @@ def test_a_proof_that_was_touched_is_no_longer_one():
     m = proof.multiplier
     lopsided = np.array(m.S)
     lopsided[0, 1] += 1e-12
-    for changed in (replace(m, S=lopsided), replace(m, R=-m.R, Q=-m.Q), replace(m, R=1.0000001 * m.R), replace(m, scaling="D")):
+    for changed in (
+        replace(m, S=lopsided),
+        replace(m, R=-m.R, Q=-m.Q),
+        replace(m, R=1.0000001 * m.R),
+        replace(m, scaling="D"),
+    ):
         assert verdicts(proof._replace(multiplier=changed)) == [False, False]
 
 
@@ -303,7 +385,9 @@ def test_a_solver_that_stops_early_proves_nothing_and_says_so():
 def test_scs_agrees_with_clarabel():
     lft = two_parameters(0.1)
     # a first-order method: three digits
-    assert gains(lft, ("full block",), solver="SCS")[0] == pytest.approx(gains(lft, ("full block",))[0], rel=5e-3)
+    assert gains(lft, ("full block",), solver="SCS")[0] == pytest.approx(
+        gains(lft, ("full block",))[0], rel=5e-3
+    )
 
 
 def test_a_certificate_that_contradicts_its_bounds_cannot_be_made():
@@ -324,8 +408,13 @@ def test_wrong_use_is_explained():
         lft_gain(lft.select(inputs=()))
     with pytest.raises(InputError, match="no states"):
         lft_gain(LFT.parameter(Scheduling("p", "1", 0.0, 1.0), "u", "y"))
-    seven = {name: {(0,) * 7: [[value]]} for name, value in (("A", -1.0), ("B", 1.0), ("C", 1.0), ("D", 0.0))}
-    many = LFT.polynomial(**seven, parameters=[Scheduling(f"p{i}", "1", 0.0, 1.0) for i in range(7)])
+    seven = {
+        name: {(0,) * 7: [[value]]}
+        for name, value in (("A", -1.0), ("B", 1.0), ("C", 1.0), ("D", 0.0))
+    }
+    many = LFT.polynomial(
+        **seven, parameters=[Scheduling(f"p{i}", "1", 0.0, 1.0) for i in range(7)]
+    )
     with pytest.raises(InputError, match="corners"):
         lft_gain(many, "full block")
     with pytest.raises(InputError, match="Q of a multiplier"):

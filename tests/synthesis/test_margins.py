@@ -48,12 +48,16 @@ def test_an_unstable_plant_has_a_lower_gain_margin_and_an_integrator_none():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_margins_are_the_onset_of_instability(seed):
-    """Random loops: inside the gain margins every gain is stable, just outside it is not; python-control finds the same phase."""
+    """Random loops: inside the gain margins every gain is stable, just outside it is not;
+    python-control finds the same phase.
+    """
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 6))
     A = rng.standard_normal((n, n))
     A -= (np.linalg.eigvals(A).real.max() + 0.3) * np.eye(n)
-    L = LinearModel.from_control(control.ss(A, rng.standard_normal((n, 1)), rng.standard_normal((1, n)), [[0.0]]))
+    L = LinearModel.from_control(
+        control.ss(A, rng.standard_normal((n, 1)), rng.standard_normal((1, n)), [[0.0]])
+    )
     m = margins(L)
     if not m.stable:
         assert np.linalg.eigvals(closed(L)).real.max() >= 0
@@ -67,7 +71,9 @@ def test_margins_are_the_onset_of_instability(seed):
     if math.isfinite(m.phase):
         assert math.degrees(m.phase) == pytest.approx(abs(theirs), abs=0.01)
     peak = control.disk_margins(L.to_control(), np.geomspace(1e-3, 1e3, 2001))[0]
-    assert m.disk == pytest.approx(peak, rel=1e-2)  # a grid of frequencies 0.7 % apart never finds less than the least
+    assert m.disk == pytest.approx(
+        peak, rel=1e-2
+    )  # a grid of frequencies 0.7 % apart never finds less than the least
     assert m.disk <= peak * (1 + 1e-9)
 
 
@@ -102,16 +108,26 @@ def test_an_unstable_loop_has_no_margin():
 
 
 def test_loops_are_broken_one_at_a_time():
-    """The spinning satellite: each loop alone looks perfect, both at once do not (Doyle 1986; Zhou and Doyle, Essentials, sec. 8.6)."""
+    """The spinning satellite: each loop alone looks perfect, both at once do not (Doyle 1986; Zhou
+    and Doyle, Essentials, sec. 8.6).
+    """
     a = 10.0
     plant = LinearModel(
-        np.array([[0, a], [-a, 0]]), np.eye(2), np.array([[1, a], [-a, 1]]), np.zeros((2, 2)), ("x1", "x2"), ("u1", "u2"), ("y1", "y2")
-    )  # fmt: skip
+        np.array([[0, a], [-a, 0]]),
+        np.eye(2),
+        np.array([[1, a], [-a, 1]]),
+        np.zeros((2, 2)),
+        ("x1", "x2"),
+        ("u1", "u2"),
+        ("y1", "y2"),
+    )
     feedback = {("u1", "y1"): -1.0, ("u2", "y2"): -1.0}
     alone = margins(loop(plant, feedback, "u1"))
     assert alone.gain == (0.0, math.inf)
     assert alone.disk == pytest.approx(2.0, rel=1e-6)  # L = 1/s
-    both = LinearModel(plant.A, plant.B, plant.C, plant.D, plant.states, plant.inputs, plant.outputs)
+    both = LinearModel(
+        plant.A, plant.B, plant.C, plant.D, plant.states, plant.inputs, plant.outputs
+    )
     # |S - I/2| with S = s/(s+1) [..]: the multivariable disk is about a tenth of it
     assert disk_margin(both) < 0.25
     with pytest.raises(UnknownNameError):
@@ -143,13 +159,17 @@ def test_a_response_that_never_lags_180_degrees_has_no_such_frequency():
 
 def test_actuators_stand_in_series():
     plant = LinearModel.from_control(control.rss(3, 2, 2, strictly_proper=False))
-    lag = LinearModel([[-20.0]], [[20.0]], [[1.0]], [[0.0]], ("servo",), ("command",), ("deflection",))
+    lag = LinearModel(
+        [[-20.0]], [[20.0]], [[1.0]], [[0.0]], ("servo",), ("command",), ("deflection",)
+    )
     w = np.array([0.3, 4.0, 30.0])
     name = str(plant.inputs[1])
     whole = plant.driven_by({name: lag}).frequency_response(w)
     alone = plant.frequency_response(w)
     np.testing.assert_allclose(whole[:, :, 0], alone[:, :, 0], rtol=1e-12)
-    np.testing.assert_allclose(whole[:, :, 1], alone[:, :, 1] * (20 / (1j * w + 20))[:, None], rtol=1e-12)
+    np.testing.assert_allclose(
+        whole[:, :, 1], alone[:, :, 1] * (20 / (1j * w + 20))[:, None], rtol=1e-12
+    )
     with pytest.raises(InputError, match="dt = None"):
         plant.driven_by({name: lag.discretize(0.1)})
 

@@ -1,4 +1,6 @@
-"""No solver, scaling or option makes an unstable plant stable, and no certificate survives tampering."""
+"""No solver, scaling or option makes an unstable plant stable, and no certificate survives
+tampering.
+"""
 
 import math
 from dataclasses import replace
@@ -10,7 +12,15 @@ from models import lag, random_stable, spring
 import synthesis
 from symheli.errors import InputError, SolverError
 from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Relaxation, Solver, SplineLyapunov, Status, installed_solvers, l2_gain, stability
+from synthesis import (
+    Relaxation,
+    Solver,
+    SplineLyapunov,
+    Status,
+    installed_solvers,
+    l2_gain,
+    stability,
+)
 from synthesis.forms import scaled_problem
 from synthesis.proof_search import prove
 
@@ -18,7 +28,9 @@ COARSE = Relaxation(segments=(2,), degree=2)
 
 
 def unstable(excess, scale, dt=None):
-    """A pole at `excess` in the middle of the range only (p = 0.5), stable at its ends; states scaled."""
+    """A pole at `excess` in the middle of the range only (p = 0.5), stable at its ends; states
+    scaled.
+    """
     A0 = np.array([[excess - 0.25, 1.0], [0.0, -1.0]])
     A1, A2 = np.diag([1.0, 0.0]), np.diag([-1.0, 0.0])
     T = np.diag([scale, 1.0])
@@ -26,7 +38,9 @@ def unstable(excess, scale, dt=None):
     if dt is not None:
         A = [np.eye(2) + dt * A[0], dt * A[1], dt * A[2]]
     B, C = T @ np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]]) @ np.linalg.inv(T)
-    return LPVStateSpace.polynomial(A, [B], [C], [np.zeros((1, 1))], Scheduling("p", "1", 0.0, 1.0, 0.1), dt=dt)
+    return LPVStateSpace.polynomial(
+        A, [B], [C], [np.zeros((1, 1))], Scheduling("p", "1", 0.0, 1.0, 0.1), dt=dt
+    )
 
 
 @pytest.mark.parametrize("solver", installed_solvers())
@@ -36,7 +50,10 @@ def test_an_unstable_plant_is_never_called_stable(solver, scale, excess):
     quick = Solver(solver, iterations=100 if solver == "SCS" else None)
     for dt in (None, 0.1):
         lpv = unstable(excess, scale, dt)
-        for cert in (stability(lpv, relaxation=COARSE, solver=quick), l2_gain(lpv, relaxation=COARSE, solver=quick, search=None)):
+        for cert in (
+            stability(lpv, relaxation=COARSE, solver=quick),
+            l2_gain(lpv, relaxation=COARSE, solver=quick, search=None),
+        ):
             assert not cert.verified
             assert cert.status is Status.UNSTABLE
             assert not cert.verify()
@@ -44,7 +61,9 @@ def test_an_unstable_plant_is_never_called_stable(solver, scale, excess):
         # and without the look at the frozen poles, the solver and the verification alone
         for with_gain in (False, True):
             for rate in (0.0, 0.1):
-                found = prove(scaled_problem(lpv, rate, 1.0, with_gain=with_gain), COARSE, quick, math.inf)
+                found = prove(
+                    scaled_problem(lpv, rate, 1.0, with_gain=with_gain), COARSE, quick, math.inf
+                )
                 assert found.lyapunov is None
 
 
@@ -58,20 +77,28 @@ def test_a_stable_plant_is_called_stable_by_every_solver(solver):
 
 
 def test_solvers_agree_on_the_gain():
-    quick = [Solver(name, iterations=2000 if name == "SCS" else None) for name in installed_solvers()]
-    gains = [l2_gain(random_stable(1), relaxation=COARSE, solver=solver, search=None).gamma for solver in quick]
+    quick = [
+        Solver(name, iterations=2000 if name == "SCS" else None) for name in installed_solvers()
+    ]
+    gains = [
+        l2_gain(random_stable(1), relaxation=COARSE, solver=solver, search=None).gamma
+        for solver in quick
+    ]
     # SCS, a first-order method, stops early and comes close from above: gamma is what its P proves
     assert max(gains) <= min(gains) * (1 + 1e-2)
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])
 def test_exact_arithmetic_confirms_a_good_certificate_and_rejects_a_tampered_one(dt):
-    cert = l2_gain(random_stable(2, dt=dt), relaxation=Relaxation(segments=(3,), degree=2), search=None)
+    cert = l2_gain(
+        random_stable(2, dt=dt), relaxation=Relaxation(segments=(3,), degree=2), search=None
+    )
     assert cert.verify()
     assert cert.verify(rigorous=True)
     P = cert.lyapunov
     assert P is not None
-    # at the optimum half a percent is too much to ask; 0.999 of a coefficient breaks a block that binds
+    # at the optimum half a percent is too much to ask; 0.999 of a coefficient breaks a block that
+    # binds
     lower = replace(cert, gamma=0.995 * cert.gamma, frozen=0.0, lower=0.0)
     worse = replace(cert, lyapunov=SplineLyapunov(P.knots, P.degree, 0.5 * P.coefficients))
     negative = P.coefficients.copy()
@@ -103,7 +130,13 @@ def test_an_infeasible_problem_says_so_and_promises_nothing():
 def test_a_certificate_reads_like_a_statement():
     cert = l2_gain(spring(), 0.02, relaxation=COARSE, search=None)
     text = str(cert)
-    for part in ("proven on the whole interval", "exogenous", "CLARABEL", "degree 2 on 2 segment", "0.02 per second"):
+    for part in (
+        "proven on the whole interval",
+        "exogenous",
+        "CLARABEL",
+        "degree 2 on 2 segment",
+        "0.02 per second",
+    ):
         assert part in text
 
 
@@ -129,15 +162,25 @@ def test_importing_loads_no_solver_and_every_name_is_documented():
     import subprocess
     import sys
 
-    code = "import sys, synthesis; print([m for m in ('cvxpy', 'clarabel', 'scs', 'flint', 'casadi', 'matplotlib') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    code = (
+        "import sys, synthesis; print([m for m in ('cvxpy', 'clarabel', 'scs', 'flint', 'casadi',"
+        " 'matplotlib') if m in sys.modules])"
+    )
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == "[]"
+    )
     for name in synthesis.__all__:
         assert inspect.getdoc(getattr(synthesis, name)), name
 
 
 @pytest.mark.parametrize("dt", [None, 0.2])
 def test_a_varying_p_of_v_proves_nothing_when_p_may_jump(dt):
-    cert = l2_gain(spring() if dt is None else spring().discretize(dt), 0.02, relaxation=COARSE, search=None)
+    cert = l2_gain(
+        spring() if dt is None else spring().discretize(dt), 0.02, relaxation=COARSE, search=None
+    )
     assert cert.verify()
     evidence = cert.evidence
     assert evidence is not None

@@ -1,4 +1,6 @@
-"""frozen <= lower <= gain <= gamma, for any model and rate; more freedom for p never lowers the gain."""
+"""frozen <= lower <= gain <= gamma, for any model and rate; more freedom for p never lowers the
+gain.
+"""
 
 import math
 from itertools import pairwise
@@ -16,7 +18,9 @@ QUICK = Search(levels=6, dwells=7, starts=1, nodes=40, evaluations=12, steps=80,
 
 
 def response(lpv, time, p, u, x, step):
-    """State at the end and output energy along straight lines in p, by Runge and Kutta's fourth-order rule and Simpson's."""
+    """State at the end and output energy along straight lines in p, by Runge and Kutta's
+    fourth-order rule and Simpson's.
+    """
     energy = 0.0
     for k in range(len(time) - 1):
         width = time[k + 1] - time[k]
@@ -24,7 +28,11 @@ def response(lpv, time, p, u, x, step):
             continue
         n = math.ceil(width / step)
         h = width / n
-        at = np.clip(p[k] + (p[k + 1] - p[k]) * np.arange(2 * n + 1) / (2 * n), lpv.scheduling.low, lpv.scheduling.high)
+        at = np.clip(
+            p[k] + (p[k + 1] - p[k]) * np.arange(2 * n + 1) / (2 * n),
+            lpv.scheduling.low,
+            lpv.scheduling.high,
+        )
         A, B, C, _ = lpv.matrices(at)
         drive = B @ (u[k][:, None] if u is not None else np.zeros((B.shape[2], 1)))
         for i in range(0, 2 * n, 2):
@@ -33,7 +41,14 @@ def response(lpv, time, p, u, x, step):
             k3 = A[i + 1] @ (x + h / 2 * k2) + drive[i + 1]
             k4 = A[i + 2] @ (x + h * k3) + drive[i + 2]
             middle, end = x + h / 8 * (2 * k1 + k2 + k3), x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            energy += h / 6 * sum(w * np.sum((C[j] @ z) ** 2) for w, j, z in ((1, i, x), (4, i + 1, middle), (1, i + 2, end)))
+            energy += (
+                h
+                / 6
+                * sum(
+                    w * np.sum((C[j] @ z) ** 2)
+                    for w, j, z in ((1, i, x), (4, i + 1, middle), (1, i + 2, end))
+                )
+            )
             x = end
     return x, float(energy)
 
@@ -57,7 +72,12 @@ def test_the_gain_does_not_fall_when_p_may_move_faster(dt):
 
 
 def test_a_finer_spline_does_not_prove_less():
-    gains = [l2_gain(spring(), 0.03, relaxation=Relaxation(segments=(k,), grading=1.0), search=None).gamma for k in (2, 4, 8)]
+    gains = [
+        l2_gain(
+            spring(), 0.03, relaxation=Relaxation(segments=(k,), grading=1.0), search=None
+        ).gamma
+        for k in (2, 4, 8)
+    ]
     assert gains[2] <= gains[1] * (1 + 1e-4) <= gains[0] * (1 + 2e-4)
 
 
@@ -75,7 +95,14 @@ def test_a_growing_trajectory_does_grow_when_it_is_flown():
     assert found.trajectory is not None
     time, p = found.trajectory
     assert np.abs(np.diff(p)).max() <= 4.0 * np.diff(time)[np.abs(np.diff(p)).argmax()] * (1 + 1e-9)
-    ends = response(spring(), np.tile(time, 8) + np.repeat(np.arange(8) * time[-1], len(time)), np.tile(p, 8), None, np.eye(2), 0.01)[0]
+    ends = response(
+        spring(),
+        np.tile(time, 8) + np.repeat(np.arange(8) * time[-1], len(time)),
+        np.tile(p, 8),
+        None,
+        np.eye(2),
+        0.01,
+    )[0]
     growth = np.linalg.norm(ends, axis=0)
     assert growth.max() > 0.5 * found.growth**8 > 0.5
 
@@ -95,7 +122,8 @@ def test_the_lower_bound_is_the_ratio_of_an_input_that_can_be_flown(dt):
         ratio = np.linalg.norm(y) / np.linalg.norm(found.input)
     else:
         ratio = math.sqrt(
-            response(lpv, time, p, found.input, np.zeros((2, 1)), 0.02)[1] / float(np.sum(found.input[:-1, 0] ** 2 * np.diff(time)))
+            response(lpv, time, p, found.input, np.zeros((2, 1)), 0.02)[1]
+            / float(np.sum(found.input[:-1, 0] ** 2 * np.diff(time)))
         )
     # continuous: the last input sample is left out
     assert ratio == pytest.approx(found.gamma, rel=1e-3 if dt is None else 1e-6)
@@ -110,7 +138,9 @@ def test_the_search_for_bad_trajectories_is_deterministic():
 def test_a_rate_of_zero_leaves_the_frozen_gain():
     found = lower_bound(spring(), 0.0)
     assert found.trajectory is None
-    assert found.gamma == pytest.approx(l2_gain(spring(), 0.0, relaxation=Relaxation(segments=(8,)), search=None).gamma, rel=1e-3)
+    assert found.gamma == pytest.approx(
+        l2_gain(spring(), 0.0, relaxation=Relaxation(segments=(8,)), search=None).gamma, rel=1e-3
+    )
 
 
 def test_a_certificate_that_contradicts_its_lower_bound_cannot_be_made():

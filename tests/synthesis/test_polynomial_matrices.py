@@ -1,4 +1,6 @@
-"""Polynomial matrices over a box: an algebra that agrees with evaluation, in floats and in rationals."""
+"""Polynomial matrices over a box: an algebra that agrees with evaluation, in floats and in
+rationals.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +20,9 @@ POINTS = np.array([[-1.0, 0.5], [2.0, 3.0], [0.3, 1.7], [1.9, 0.6]])
 
 
 def random(degrees, rows, columns, seed=0):
-    return PolynomialMatrix(BOX, np.random.default_rng(seed).standard_normal((*(d + 1 for d in degrees), rows, columns)))
+    return PolynomialMatrix(
+        BOX, np.random.default_rng(seed).standard_normal((*(d + 1 for d in degrees), rows, columns))
+    )
 
 
 def test_algebra_is_pointwise():
@@ -29,10 +33,14 @@ def test_algebra_is_pointwise():
     np.testing.assert_allclose((F - 2.0 * H)(POINTS), at[F] - 2 * at[H], atol=1e-12)
     np.testing.assert_allclose((G.T @ F.T)(POINTS), np.swapaxes(at[F] @ at[G], 1, 2), atol=1e-12)
     np.testing.assert_allclose(
-        (F.T @ F).congruence(G)(POINTS), np.swapaxes(at[G], 1, 2) @ np.swapaxes(at[F], 1, 2) @ at[F] @ at[G], atol=1e-11
+        (F.T @ F).congruence(G)(POINTS),
+        np.swapaxes(at[G], 1, 2) @ np.swapaxes(at[F], 1, 2) @ at[F] @ at[G],
+        atol=1e-11,
     )
     np.testing.assert_allclose(F.elevate((4, 2))(POINTS), at[F], atol=1e-12)
-    np.testing.assert_allclose(block([[F, H], [H, F]])(POINTS), np.block([[at[F], at[H]], [at[H], at[F]]]), atol=1e-12)
+    np.testing.assert_allclose(
+        block([[F, H], [H, F]])(POINTS), np.block([[at[F], at[H]], [at[H], at[F]]]), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -41,7 +49,9 @@ def test_derivative_and_halves(axis):
     step = h * np.eye(2)[axis]
     inside = POINTS[2:]
     # central differences of a cubic: h^2 f'''/6 plus rounding 1e-16/h
-    np.testing.assert_allclose(F.derivative(axis)(inside), (F(inside + step) - F(inside - step)) / (2 * h), atol=1e-8)
+    np.testing.assert_allclose(
+        F.derivative(axis)(inside), (F(inside + step) - F(inside - step)) / (2 * h), atol=1e-8
+    )
     low, high = F.split(axis)
     middle = np.mean(BOX[axis])
     for p in POINTS:
@@ -64,8 +74,13 @@ def test_rationals_agree_with_floats_and_are_exact():
     number = rational()
     F, G = random((2, 1), 2, 2, 4), random((1, 2), 2, 2, 5)
     f, g = convert(F, number), convert(G, number)
-    np.testing.assert_allclose((f @ g + f.elevate((3, 3))).coefficients.astype(float), (F @ G + F.elevate((3, 3))).coefficients, atol=1e-13)
-    # an identity of polynomials holds to the last bit: (F + G)'(F + G) = F'F + F'G + G'F + G'G, also on a half of the box
+    np.testing.assert_allclose(
+        (f @ g + f.elevate((3, 3))).coefficients.astype(float),
+        (F @ G + F.elevate((3, 3))).coefficients,
+        atol=1e-13,
+    )
+    # an identity of polynomials holds to the last bit: (F + G)'(F + G) = F'F + F'G + G'F + G'G,
+    # also on a half of the box
     left = ((f + g).T @ (f + g)).split(0)[1]
     right = (f.T @ f + f.T @ g + g.T @ f + g.T @ g).split(0)[1]
     assert np.all(left.coefficients == right.coefficients)
@@ -78,7 +93,12 @@ def test_a_sum_of_squares_is_what_it_says():
     terms = list(sums_of_squares(degrees, N))
     # t1 or 1 - t1 with squares of degree 1; 1 or t2 (1 - t2) with squares of degrees 1 and 0
     assert [term.size for term in terms] == [8, 4, 8, 4]
-    weights = [t[:, 0], t[:, 0] * t[:, 1] * (1 - t[:, 1]), 1 - t[:, 0], (1 - t[:, 0]) * t[:, 1] * (1 - t[:, 1])]
+    weights = [
+        t[:, 0],
+        t[:, 0] * t[:, 1] * (1 - t[:, 1]),
+        1 - t[:, 0],
+        (1 - t[:, 0]) * t[:, 1] * (1 - t[:, 1]),
+    ]
     for term, weight in zip(terms, weights, strict=True):
         R = np.random.default_rng(term.size).standard_normal((term.size, term.size))
         Q = R @ R.T
@@ -94,16 +114,24 @@ def test_conditions_are_values_and_coefficients():
     F = random((3, 2), 1, 1)
     c = F.coefficients.reshape(12, -1)
     corners = (vertex_conditions(F.degrees).negative @ c).ravel()
-    np.testing.assert_allclose(corners, F(np.array([[a, b] for a in BOX[0] for b in BOX[1]])).ravel(), atol=1e-14)
+    np.testing.assert_allclose(
+        corners, F(np.array([[a, b] for a in BOX[0] for b in BOX[1]])).ravel(), atol=1e-14
+    )
     halves = (coefficient_conditions(F.degrees, 0, 1).negative @ c).ravel()
-    expected = np.concatenate([q.coefficients.ravel() for half in F.split(0) for q in half.split(1)])
+    expected = np.concatenate(
+        [q.coefficients.ravel() for half in F.split(0) for q in half.split(1)]
+    )
     np.testing.assert_allclose(halves, expected, atol=1e-14)
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, -1e-4, -1e-2])
 def test_definiteness_is_decided_between_the_coefficients(gap):
-    """-(p1 - p2/2)^2 - gap: its coefficients are positive where the values are not; touches along a line for gap = 0."""
-    F = PolynomialMatrix.from_monomials({(2, 0): [[-1.0]], (1, 1): [[1.0]], (0, 2): [[-0.25]], (0, 0): [[-gap]]}, BOX)
+    """-(p1 - p2/2)^2 - gap: its coefficients are positive where the values are not; touches along a
+    line for gap = 0.
+    """
+    F = PolynomialMatrix.from_monomials(
+        {(2, 0): [[-1.0]], (1, 1): [[1.0]], (0, 2): [[-0.25]], (0, 0): [[-gap]]}, BOX
+    )
     assert F.coefficients.max() > 0.1
     assert negative_definite(F) == (gap > 0)
     assert negative_definite_exactly(convert(F, rational())) == (gap > 0)
@@ -128,18 +156,28 @@ def test_a_model_from_an_lft_is_the_same_model():
 
 def test_a_rational_lft_is_refused():
     s = Scheduling("p", "1", 1.0, 3.0)
-    rational_loop = LFT.polynomial({(0,): [[-1.0]], (1,): [[-0.2]]}, {(0,): [[1.0]]}, {(0,): [[1.0]]}, {(0,): [[0.0]], (1,): [[0.3]]}, [s])
+    rational_loop = LFT.polynomial(
+        {(0,): [[-1.0]], (1,): [[-0.2]]},
+        {(0,): [[1.0]]},
+        {(0,): [[1.0]]},
+        {(0,): [[0.0]], (1,): [[0.3]]},
+        [s],
+    )
     with pytest.raises(InputError, match="rational function"):
         PolynomialStateSpace.from_lft(rational_loop.feedback({("u1", "y1"): 0.5}))
 
 
 def test_wrong_input_gets_a_sentence():
     with pytest.raises(InputError, match="the boxes differ"):
-        _ = random((1, 1), 2, 2) + PolynomialMatrix(((0.0, 1.0), (0.0, 1.0)), np.zeros((1, 1, 2, 2)))
+        _ = random((1, 1), 2, 2) + PolynomialMatrix(
+            ((0.0, 1.0), (0.0, 1.0)), np.zeros((1, 1, 2, 2))
+        )
     with pytest.raises(InputError, match="exponents >= 0"):
         PolynomialMatrix.from_monomials({(1,): np.eye(2)}, BOX)
     with pytest.raises(InputError, match="axes of coefficients"):
         PolynomialMatrix(BOX, np.zeros((2, 2)))
     parameters = [Scheduling("p", "1", 0.0, 1.0)]
     with pytest.raises(InputError, match="B: expected polynomial matrices of shape"):
-        PolynomialStateSpace.polynomial({(0,): -np.eye(2)}, {(0,): [[1.0]]}, {(0,): [[1.0, 0]]}, {(0,): [[0.0]]}, parameters)
+        PolynomialStateSpace.polynomial(
+            {(0,): -np.eye(2)}, {(0,): [[1.0]]}, {(0,): [[1.0, 0]]}, {(0,): [[0.0]]}, parameters
+        )

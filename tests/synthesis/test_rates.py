@@ -10,7 +10,10 @@ from symheli.lpv import Scheduling
 from synthesis import l2_gain, lower_bound, stability
 from synthesis.rates import rates
 
-SPEED, MASS = Scheduling("airspeed", "m/s", 0.0, 13.0, 3.0), Scheduling("mass", "kg", 6.0, 10.0, 0.0)
+SPEED, MASS = (
+    Scheduling("airspeed", "m/s", 0.0, 13.0, 3.0),
+    Scheduling("mass", "kg", 6.0, 10.0, 0.0),
+)
 
 
 def test_one_for_all_one_for_each_or_by_name():
@@ -19,7 +22,9 @@ def test_one_for_all_one_for_each_or_by_name():
     assert rates((SPEED, MASS), [1.0, math.inf]) == (1.0, math.inf)
     assert rates((SPEED, MASS), {"airspeed": 1.0}) == (1.0, 0.0)
     for wrong in (-1.0, math.nan, [1.0], "1 m/s", {"mass": -1.0}, {"mass": None}):
-        with pytest.raises(InputError, match=r"rate must be >= 0 .* airspeed \(m/s/s\), mass \(kg/s\)"):
+        with pytest.raises(
+            InputError, match=r"rate must be >= 0 .* airspeed \(m/s/s\), mass \(kg/s\)"
+        ):
             rates((SPEED, MASS), wrong)
 
 
@@ -27,6 +32,8 @@ def test_the_rate_of_the_one_parameter_may_be_given_by_name():
     for question in (l2_gain, stability):
         named, plain = question(lag(), {"p": 0.3}, search=None), question(lag(), 0.3, search=None)
         assert named.rates == plain.rates == (0.3,)
-        with pytest.raises(UnknownNameError, match="unknown scheduling parameter 'airspeed'; known: p"):
+        with pytest.raises(
+            UnknownNameError, match="unknown scheduling parameter 'airspeed'; known: p"
+        ):
             question(lag(), {"airspeed": 0.3})
     assert lower_bound(lag(), {"p": 0.0}).gamma == lower_bound(lag(), 0.0).gamma

@@ -1,9 +1,10 @@
 """A published gain that is the value of a six-point grid, and a trajectory that exceeds it.
 
-Documentation of LPVTools (lpvnorm), after Tan, Hang and Chai, "Gain scheduling: from conventional to neuro-fuzzy", Automatica 33
-(1997): x_G' = (v - x_G)/tau, y = 1.1 K x_G, tau = sqrt(133.6 - 16.8 p), K = sqrt(4.8 p - 8.6), p in [2, 7], v the delay of 0.5 s
-(second-order Pade) of u = x_c + Kp e, x_c' = Ki e, e = d - y, Kp = (0.35 tau - 1)/K, Ki = 0.0625 tau/K; gain from d to e. Printed:
-20.1476 by a constant P, and 1.2968, later 1.2946, for |p'| <= 0.1 with P over 1, p, p^2, 1/p, sqrt p.
+Documentation of LPVTools (lpvnorm), after Tan, Hang and Chai, "Gain scheduling: from conventional
+to neuro-fuzzy", Automatica 33 (1997): x_G' = (v - x_G)/tau, y = 1.1 K x_G, tau = sqrt(133.6 - 16.8
+p), K = sqrt(4.8 p - 8.6), p in [2, 7], v the delay of 0.5 s (second-order Pade) of u = x_c + Kp e,
+x_c' = Ki e, e = d - y, Kp = (0.35 tau - 1)/K, Ki = 0.0625 tau/K; gain from d to e. Printed: 20.1476
+by a constant P, and 1.2968, later 1.2946, for |p'| <= 0.1 with P over 1, p, p^2, 1/p, sqrt p.
 """
 
 import numpy as np
@@ -16,11 +17,17 @@ DELAY, RATE = 0.5, 0.1
 
 
 def functions(p):
-    """1, p, p^2, 1/p, sqrt p and their derivatives (5, ...), in combinations orthonormal on [2, 7]: the span is what counts."""
+    """1, p, p^2, 1/p, sqrt p and their derivatives (5, ...), in combinations orthonormal on [2, 7]:
+    the span is what counts.
+    """
     p = np.asarray(p, dtype=float)
     grid = np.linspace(2, 7, 200)
-    change = np.linalg.inv(np.linalg.qr(np.stack([grid**e for e in (0, 1, 2, -1, 0.5)], -1))[1] / np.sqrt(len(grid)))
-    return change.T @ np.stack([p**e for e in (0, 1, 2, -1, 0.5)]), change.T @ np.stack([e * p ** (e - 1) for e in (0, 1, 2, -1, 0.5)])
+    change = np.linalg.inv(
+        np.linalg.qr(np.stack([grid**e for e in (0, 1, 2, -1, 0.5)], -1))[1] / np.sqrt(len(grid))
+    )
+    return change.T @ np.stack([p**e for e in (0, 1, 2, -1, 0.5)]), change.T @ np.stack(
+        [e * p ** (e - 1) for e in (0, 1, 2, -1, 0.5)]
+    )
 
 
 class Loop:
@@ -36,22 +43,36 @@ class Loop:
         p = np.asarray(p, dtype=float)
         tau, K = np.sqrt(133.6 - 16.8 * p), np.sqrt(4.8 * p - 8.6)
         Kp, Ki, one = (0.35 * tau - 1) / K, 0.0625 * tau / K, np.ones_like(p)
-        # (T^2 s^2/12 - T s/2 + 1)/(T^2 s^2/12 + T s/2 + 1) = 1 - 12 T s/(T^2 s^2 + 6 T s + 12), states in units of u
+        # (T^2 s^2/12 - T s/2 + 1)/(T^2 s^2/12 + T s/2 + 1) = 1 - 12 T s/(T^2 s^2 + 6 T s + 12),
+        # states in units of u
         a1, a0 = 6 / DELAY, 12 / DELAY**2
         A, B = np.zeros((*p.shape, 4, 4)), np.zeros((*p.shape, 4, 1))
         C, D = np.zeros((*p.shape, 1, 4)), np.ones((*p.shape, 1, 1))
         y = 1.1 * K
         # u = x_c + Kp (d - y x_G), v = u - 12/T d2, e = d - y x_G
-        A[..., 0, 0], A[..., 0, 3], A[..., 0, 2], B[..., 0, 0] = (-1 - Kp * y) / tau, 1 / tau, -2 * a1 / tau, Kp / tau
+        A[..., 0, 0], A[..., 0, 3], A[..., 0, 2], B[..., 0, 0] = (
+            (-1 - Kp * y) / tau,
+            1 / tau,
+            -2 * a1 / tau,
+            Kp / tau,
+        )
         A[..., 1, 2] = one
-        A[..., 2, 1], A[..., 2, 2], A[..., 2, 3], A[..., 2, 0], B[..., 2, 0] = -a0, -a1, 1, -Kp * y, Kp
+        A[..., 2, 1], A[..., 2, 2], A[..., 2, 3], A[..., 2, 0], B[..., 2, 0] = (
+            -a0,
+            -a1,
+            1,
+            -Kp * y,
+            Kp,
+        )
         A[..., 3, 0], B[..., 3, 0] = -Ki * y, Ki
         C[..., 0, 0] = -y
         return Matrices(A, B, C, D)
 
 
 def gridded(points, count):
-    """Least gain for which the LMI holds at these p with the first `count` functions, by cvxpy from the printed formulas."""
+    """Least gain for which the LMI holds at these p with the first `count` functions, by cvxpy from
+    the printed formulas.
+    """
     import cvxpy as cp
 
     model = Loop()
@@ -69,7 +90,10 @@ def gridded(points, count):
         constraints.append(here >> 0)
         for nu in (-RATE, RATE) if count > 1 else (0.0,):
             F = cp.bmat(
-                [[A.T @ here + here @ A + nu * slope + C.T @ C, here @ B + C.T @ D], [B.T @ here + D.T @ C, D.T @ D - g * np.eye(1)]]
+                [
+                    [A.T @ here + here @ A + nu * slope + C.T @ C, here @ B + C.T @ D],
+                    [B.T @ here + D.T @ C, D.T @ D - g * np.eye(1)],
+                ]
             )
             constraints.append(F << 0)
     cp.Problem(cp.Minimize(g), constraints).solve(solver="CLARABEL")
@@ -84,7 +108,8 @@ def test_the_frozen_gain_is_the_one_that_was_computed_before():
 
 
 def test_a_constant_p_gives_the_printed_gain_on_the_printed_grid():
-    # printed 20.1476, 20.1361 computed before by another route; 1e-3: the solver's gap on a gain of 20
+    # printed 20.1476, 20.1361 computed before by another route; 1e-3: the solver's gap on a gain of
+    # 20
     assert gridded(range(2, 8), 1) == pytest.approx(20.1361, rel=1e-3)
 
 
@@ -128,7 +153,12 @@ def output_energy(model, time, p, u):
             k4 = A[i + 2] @ (x + w * k3) + B[i + 2] @ d
             middle, end = x + w / 8 * (2 * k1 + k2 + k3), x + w / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             energy += (
-                w / 6 * sum(c * float(((C[j] @ z + D[j] @ d) ** 2).sum()) for c, j, z in ((1, i, x), (4, i + 1, middle), (1, i + 2, end)))
+                w
+                / 6
+                * sum(
+                    c * float(((C[j] @ z + D[j] @ d) ** 2).sum())
+                    for c, j, z in ((1, i, x), (4, i + 1, middle), (1, i + 2, end))
+                )
             )
             x = end
     return energy

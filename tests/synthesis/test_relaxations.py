@@ -1,4 +1,6 @@
-"""Whichever relaxation finds P: closed forms, their order, and never a proof of what is not true."""
+"""Whichever relaxation finds P: closed forms, their order, and never a proof of what is not
+true.
+"""
 
 import math
 from dataclasses import replace
@@ -10,7 +12,17 @@ from test_never_call_unstable_stable import unstable
 
 from symheli.errors import CertificateError, InputError, UnknownNameError
 from symheli.lpv import LFT, Scheduling
-from synthesis import PolynomialStateSpace, Relaxation, Solver, Status, decay_rate, generalized_h2, installed_solvers, l2_gain, stability
+from synthesis import (
+    PolynomialStateSpace,
+    Relaxation,
+    Solver,
+    Status,
+    decay_rate,
+    generalized_h2,
+    installed_solvers,
+    l2_gain,
+    stability,
+)
 from synthesis.polynomial.analysis import _Hunt
 from synthesis.polynomial.inequalities import Demand
 from synthesis.polynomial.regions import pieces
@@ -20,26 +32,41 @@ QUICK = Relaxation(degree=1)
 
 
 def two_lags(rate=(0.5, 2.0), dt=None):
-    """x' = -(1 + 0.3 a + 0.4 b) x + u, |a|, |b| <= 1: slowest at the corner (-1, -1), where it decays at 0.3."""
+    """x' = -(1 + 0.3 a + 0.4 b) x + u, |a|, |b| <= 1: slowest at the corner (-1, -1), where it
+    decays at 0.3.
+    """
     h = 1.0 if dt is None else dt
     A = {(0, 0): [[-1.0 * h + (dt is not None)]], (1, 0): [[-0.3 * h]], (0, 1): [[-0.4 * h]]}
-    parameters = [Scheduling("a", "1", -1.0, 1.0, rate[0]), Scheduling("b", "1", -1.0, 1.0, rate[1])]
-    return PolynomialStateSpace.polynomial(A, {(0, 0): [[h]]}, {(0, 0): [[1.0]]}, {(0, 0): [[0.0]]}, parameters, dt)
+    parameters = [
+        Scheduling("a", "1", -1.0, 1.0, rate[0]),
+        Scheduling("b", "1", -1.0, 1.0, rate[1]),
+    ]
+    return PolynomialStateSpace.polynomial(
+        A, {(0, 0): [[h]]}, {(0, 0): [[1.0]]}, {(0, 0): [[0.0]]}, parameters, dt
+    )
 
 
 def mass_spring(rate=0.1, dt=None, spring=0.3):
     """x'' + (0.6 + 0.2 d) x' + (1 + 0.3 k) x = u, |k|, |d| <= 1."""
-    A = {(0, 0): np.array([[0, 1.0], [-1, -0.6]]), (1, 0): np.array([[0, 0], [-spring, 0]]), (0, 1): np.array([[0, 0], [0, -0.2]])}
+    A = {
+        (0, 0): np.array([[0, 1.0], [-1, -0.6]]),
+        (1, 0): np.array([[0, 0], [-spring, 0]]),
+        (0, 1): np.array([[0, 0], [0, -0.2]]),
+    }
     if dt is not None:
         A = {e: dt * M + np.eye(2) * (e == (0, 0)) for e, M in A.items()}
     parameters = [Scheduling("k", "1", -1.0, 1.0, rate), Scheduling("d", "1", -1.0, 1.0, rate)]
-    return PolynomialStateSpace.polynomial(A, {(0, 0): [[0.0], [dt or 1.0]]}, {(0, 0): [[1.0, 0]]}, {(0, 0): [[0.0]]}, parameters, dt)
+    return PolynomialStateSpace.polynomial(
+        A, {(0, 0): [[0.0], [dt or 1.0]]}, {(0, 0): [[1.0, 0]]}, {(0, 0): [[0.0]]}, parameters, dt
+    )
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])
 @pytest.mark.parametrize("kind", PROOFS)
 def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
-    """Constant P = 1 proves what the slowest corner attains: gain 1/0.3, peak 1/sqrt(0.6), decay 0.3."""
+    """Constant P = 1 proves what the slowest corner attains: gain 1/0.3, peak 1/sqrt(0.6), decay
+    0.3.
+    """
     relaxation, model = Relaxation(kind=kind, degree=0), two_lags(dt=dt)
     slow = 0.3 if dt is None else (1 - 0.03)
     expected = {
@@ -58,10 +85,15 @@ def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
 
 
 def test_sums_of_squares_lie_between_grid_and_bernstein():
-    """The same P: every Bernstein proof is a sum of squares, and what holds in the box holds on the grid."""
+    """The same P: every Bernstein proof is a sum of squares, and what holds in the box holds on the
+    grid.
+    """
     model = mass_spring()
     for analysis in (l2_gain, generalized_h2):
-        found = {kind: analysis(model, relaxation=replace(QUICK, kind=kind), search=None) for kind in ("bernstein", "sos", "grid")}
+        found = {
+            kind: analysis(model, relaxation=replace(QUICK, kind=kind), search=None)
+            for kind in ("bernstein", "sos", "grid")
+        }
         # gamma is loosened by 1e-6 .. 1e-5 where it is proven; the grid is the solver's
         assert found["sos"].gamma <= found["bernstein"].gamma * (1 + 1e-4)
         assert found["grid"].indicative <= found["sos"].gamma * (1 + 1e-4)
@@ -91,7 +123,9 @@ def test_both_routes_to_one_parameter_agree(dt):
     old = l2_gain(model, relaxation=spline, search=None)
     # a total degree of 2 on one segment takes the other route with the same P
     one = l2_gain(model, relaxation=Relaxation(segments=(1,), degree=2), search=None)
-    new = l2_gain(model, relaxation=Relaxation(segments=(1,), degree=2, total_degree=2), search=None)
+    new = l2_gain(
+        model, relaxation=Relaxation(segments=(1,), degree=2, total_degree=2), search=None
+    )
     assert new.gamma == pytest.approx(one.gamma, rel=1e-3)
     if dt is not None:
         return  # p and p(k+1) make sums of squares in two variables: slow
@@ -102,31 +136,42 @@ def test_both_routes_to_one_parameter_agree(dt):
 
 def test_several_parameters_of_an_lft_or_one_polynomial_alike():
     A, B = {(0,): [[-1.0]], (1,): [[-1.0]]}, {(0,): [[1.0]]}
-    lft = LFT.polynomial(A, B, {(0,): [[1.0]]}, {(0,): [[0.0]]}, [Scheduling("p", "1", 0.0, 1.0, 1.0)])
+    lft = LFT.polynomial(
+        A, B, {(0,): [[1.0]]}, {(0,): [[0.0]]}, [Scheduling("p", "1", 0.0, 1.0, 1.0)]
+    )
     for model in (lft, PolynomialStateSpace.from_lpv(lag())):
         assert l2_gain(model, relaxation=QUICK, search=None).gamma == pytest.approx(1.0, rel=5e-6)
 
 
 @pytest.mark.slow
 def test_faster_parameters_cost_and_slower_ones_gain():
-    gains = [l2_gain(mass_spring(rate), relaxation=QUICK, search=None).gamma for rate in (0.0, 0.1, 0.4)]
+    gains = [
+        l2_gain(mass_spring(rate), relaxation=QUICK, search=None).gamma for rate in (0.0, 0.1, 0.4)
+    ]
     assert gains == sorted(gains)
-    assert l2_gain(mass_spring(), {"k": 0.4, "d": 0.0}, relaxation=QUICK, search=None).gamma <= gains[2] * (1 + 1e-4)
+    assert l2_gain(
+        mass_spring(), {"k": 0.4, "d": 0.0}, relaxation=QUICK, search=None
+    ).gamma <= gains[2] * (1 + 1e-4)
 
 
 def test_a_decay_rate_of_constant_coefficients_is_that_of_the_slowest_mode():
     model = mass_spring(spring=0.0)
     cert = decay_rate(model, 0.0, relaxation=replace(QUICK, kind="sos", degree=2), search=None)
-    # 0.2: damping 0.6 - 0.2 at d = -1, halved; exp(-alpha t) to the tolerance of the bisection and the degree of P
+    # 0.2: damping 0.6 - 0.2 at d = -1, halved; exp(-alpha t) to the tolerance of the bisection and
+    # the degree of P
     assert cert.frozen == pytest.approx(0.2, rel=1e-7)
     assert 0.97 * 0.2 <= cert.alpha <= 0.2
     assert cert.alpha <= cert.upper
 
 
 def test_the_energy_to_peak_gain_of_an_oscillator():
-    """x'' + 2 d x' + w^2 x = u: the peak of x is 1/sqrt(4 d w^2) for the energy of u (Lyapunov equation by hand)."""
+    """x'' + 2 d x' + w^2 x = u: the peak of x is 1/sqrt(4 d w^2) for the energy of u (Lyapunov
+    equation by hand).
+    """
     model = mass_spring(spring=0.0)
-    cert = generalized_h2(model, {"k": 0.0, "d": 0.0}, relaxation=replace(QUICK, degree=2), search=None)
+    cert = generalized_h2(
+        model, {"k": 0.0, "d": 0.0}, relaxation=replace(QUICK, degree=2), search=None
+    )
     assert cert.frozen == pytest.approx(1 / math.sqrt(2 * 0.4), rel=1e-7)
     assert cert.frozen <= cert.gamma <= 1.05 * cert.frozen
 
@@ -152,15 +197,24 @@ def never_proven(solver, scale, excess):
     for dt in (None, 0.1):
         model = unstable(excess, scale, dt)
         for kind in (*PROOFS, "grid"):
-            relaxation = Relaxation(kind=kind, degree=1, segments=(1,), points=4, margins=(1e-6,), subdivision=1)
+            relaxation = Relaxation(
+                kind=kind, degree=1, segments=(1,), points=4, margins=(1e-6,), subdivision=1
+            )
             for analysis in (l2_gain, generalized_h2, decay_rate, stability):
                 cert = analysis(model, relaxation=relaxation, solver=quick, search=None)
                 assert cert.status is Status.UNSTABLE
                 assert not cert.verified
             if kind == "grid":
                 continue
-            for demand in (Demand("stability", (0.0,)), Demand("l2 gain", (0.1,)), Demand("energy-to-peak gain", (0.1,))):
-                assert _Hunt(pieces(model), demand, relaxation, quick, 1.0).gain(math.inf).lyapunov is None
+            for demand in (
+                Demand("stability", (0.0,)),
+                Demand("l2 gain", (0.1,)),
+                Demand("energy-to-peak gain", (0.1,)),
+            ):
+                assert (
+                    _Hunt(pieces(model), demand, relaxation, quick, 1.0).gain(math.inf).lyapunov
+                    is None
+                )
 
 
 def test_a_grid_sees_no_instability_between_its_points_and_says_so():
@@ -183,7 +237,9 @@ def test_a_grid_is_never_a_proof(analysis):
     assert not cert.verify(rigorous=True)
     if analysis is not stability:
         assert math.isinf(cert.proven)
-        assert cert.indicative == pytest.approx({l2_gain: 1, generalized_h2: math.sqrt(0.5), decay_rate: 1}[analysis], rel=1e-3)
+        assert cert.indicative == pytest.approx(
+            {l2_gain: 1, generalized_h2: math.sqrt(0.5), decay_rate: 1}[analysis], rel=1e-3
+        )
     with pytest.raises(CertificateError):
         replace(cert, verified=True)
 
@@ -199,7 +255,9 @@ def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
         better = cert.proven * (1.02 if analysis is decay_rate else 0.98)
         # neither the bound nor P can be moved: negative P, or a bound better than P admits
         for bad in (
-            replace(cert, verified=False, **{"alpha" if analysis is decay_rate else "gamma": better}),
+            replace(
+                cert, verified=False, **{"alpha" if analysis is decay_rate else "gamma": better}
+            ),
             replace(cert, lyapunov=replace(P, coefficients=-P.coefficients)),
         ):
             assert not bad.verify()
@@ -249,15 +307,21 @@ def test_wrong_input_gets_a_sentence():
 
 
 def test_a_program_too_large_for_the_memory_is_left_alone_and_says_so():
-    """Sums of squares in p, q and their next values, of degree two: the process once was ended by the operating system."""
-    cert = l2_gain(mass_spring(0.5, dt=0.1), relaxation=Relaxation(kind="sos", degree=2), search=None)
+    """Sums of squares in p, q and their next values, of degree two: the process once was ended by
+    the operating system.
+    """
+    cert = l2_gain(
+        mass_spring(0.5, dt=0.1), relaxation=Relaxation(kind="sos", degree=2), search=None
+    )
     assert cert.status is Status.UNTRIED
     assert "would need several times" in str(cert)
     assert "a lower degree" in str(cert)
 
 
 def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
-    """P(p(k+1)) does not depend on p(k) where p jumps: its degree in p is that of A'A alone, two, and not two more."""
+    """P(p(k+1)) does not depend on p(k) where p jumps: its degree in p is that of A'A alone, two,
+    and not two more.
+    """
     from synthesis.polynomial.inequalities import decrease
     from synthesis.polynomial.program import Shape, _pair
     from synthesis.polynomial.regions import regions
@@ -267,5 +331,7 @@ def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
     for rate in (math.inf, 1.0):
         demand = Demand("stability", (rate, rate))
         region = next(iter(regions(model, shape.knots, demand.steps(model.dt, shape.degrees))))
-        degrees[rate] = [F.degrees for F in decrease(model, region, _pair(shape, region, 2)[1], demand, float)]
+        degrees[rate] = [
+            F.degrees for F in decrease(model, region, _pair(shape, region, 2)[1], demand, float)
+        ]
     assert degrees == {math.inf: [(2, 2, 2, 2)], 1.0: [(4, 4, 2, 2)]}

@@ -1,4 +1,6 @@
-"""No proof of a random plant near the limit is false: some in every run, ten thousand in all (docs/reliability.md)."""
+"""No proof of a random plant near the limit is false: some in every run, ten thousand in all
+(docs/reliability.md).
+"""
 
 import sys
 from pathlib import Path

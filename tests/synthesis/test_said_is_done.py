@@ -1,4 +1,6 @@
-"""A certificate says what was done: the solver's settings that were used, and no verdict that was not reached."""
+"""A certificate says what was done: the solver's settings that were used, and no verdict that was
+not reached.
+"""
 
 from dataclasses import replace
 
@@ -8,7 +10,18 @@ from models import constant, lag, spring
 
 from symheli.errors import CertificateError, InputError
 from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Relaxation, Solver, Status, cone_program, decay_rate, generalized_h2, l2_gain, lft_gain, lft_stability, stability
+from synthesis import (
+    Relaxation,
+    Solver,
+    Status,
+    cone_program,
+    decay_rate,
+    generalized_h2,
+    l2_gain,
+    lft_gain,
+    lft_stability,
+    stability,
+)
 
 COARSE = Relaxation(segments=(2,), degree=2)
 SOS = Relaxation(kind="sos", degree=1, segments=(1,))
@@ -28,7 +41,12 @@ def test_every_setting_reaches_the_solver_or_is_refused(name, monkeypatch):
             Solver(name, time_limit=3.0)
     else:
         assert 3.0 in Solver(name, time_limit=3.0).options.values()
-    for wrong in ({"tolerance": 0.0}, {"tolerance": 1.0}, {"iterations": 0}, {"tolerance": float("nan")}):
+    for wrong in (
+        {"tolerance": 0.0},
+        {"tolerance": 1.0},
+        {"iterations": 0},
+        {"tolerance": float("nan")},
+    ):
         with pytest.raises(InputError, match="expected 0 < tolerance < 1"):
             Solver(name, **wrong)
 
@@ -42,9 +60,20 @@ def test_what_is_printed_is_what_the_solver_was_given(monkeypatch):
         return genuine(data, cone, **options)
 
     monkeypatch.setattr(scs, "SCS", spy)
-    assert "tolerance 1e-05, at most 20000 iterations, 600 s" in l2_gain(lag(), relaxation=COARSE, solver="SCS", search=None).solver
-    assert given == {"verbose": False, "eps_abs": 1e-5, "eps_rel": 1e-5, "max_iters": 20000, "time_limit_secs": 600.0}
-    sharp = l2_gain(lag(), relaxation=COARSE, solver=Solver("SCS", tolerance=1e-7, iterations=300), search=None)
+    assert (
+        "tolerance 1e-05, at most 20000 iterations, 600 s"
+        in l2_gain(lag(), relaxation=COARSE, solver="SCS", search=None).solver
+    )
+    assert given == {
+        "verbose": False,
+        "eps_abs": 1e-5,
+        "eps_rel": 1e-5,
+        "max_iters": 20000,
+        "time_limit_secs": 600.0,
+    }
+    sharp = l2_gain(
+        lag(), relaxation=COARSE, solver=Solver("SCS", tolerance=1e-7, iterations=300), search=None
+    )
     assert "tolerance 1e-07, at most 300 iterations" in str(sharp)
     assert (given["eps_abs"], given["eps_rel"], given["max_iters"]) == (1e-7, 1e-7, 300)
 
@@ -83,9 +112,17 @@ def test_the_rounding_of_an_eigenvalue_makes_no_plant_unstable():
         l2_gain(lpv, relaxation=SOS, search=None),
         stability(lpv, relaxation=COARSE, search=None),
     ]
-    certs += [stability(lpv, relaxation=SOS, search=None), lft_gain(lpv.to_lft().reduce(), search=None)]
-    certs += [generalized_h2(lpv, relaxation=SOS, search=None), decay_rate(lpv, relaxation=SOS, search=None)]
-    assert all(cert.status is not Status.UNSTABLE for cert in certs), [cert.status for cert in certs]
+    certs += [
+        stability(lpv, relaxation=SOS, search=None),
+        lft_gain(lpv.to_lft().reduce(), search=None),
+    ]
+    certs += [
+        generalized_h2(lpv, relaxation=SOS, search=None),
+        decay_rate(lpv, relaxation=SOS, search=None),
+    ]
+    assert all(cert.status is not Status.UNSTABLE for cert in certs), [
+        cert.status for cert in certs
+    ]
     # and by more than rounding it is
     assert l2_gain(chain(0.1), relaxation=COARSE, search=None).status is Status.UNSTABLE
     assert stability(chain(0.1), relaxation=SOS, search=None).status is Status.UNSTABLE
@@ -94,7 +131,9 @@ def test_the_rounding_of_an_eigenvalue_makes_no_plant_unstable():
 def test_a_decay_that_is_growth_is_never_proven():
     # a frozen decay of 1e-3 and a rate at which x' = A(p) x grows
     A = [np.array([[-1e-3, 1.0], [-1.0, -1e-3]]), np.array([[0.0, 0.0], [-0.9, 0.0]])]
-    lpv = LPVStateSpace.polynomial(A, [np.eye(2)], [np.eye(2)], [np.zeros((2, 2))], Scheduling("p", "1", -1.0, 1.0, 5.0))
+    lpv = LPVStateSpace.polynomial(
+        A, [np.eye(2)], [np.eye(2)], [np.zeros((2, 2))], Scheduling("p", "1", -1.0, 1.0, 5.0)
+    )
     cert = decay_rate(lpv, relaxation=SOS, search=None)
     assert not cert.verified
     assert cert.alpha == -np.inf

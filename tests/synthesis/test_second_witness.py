@@ -1,4 +1,6 @@
-"""An error that the search for P and the proof of P share is found by the second witness: `verify` says no."""
+"""An error that the search for P and the proof of P share is found by the second witness: `verify`
+says no.
+"""
 
 from dataclasses import replace
 
@@ -8,7 +10,17 @@ from models import random_stable, spring
 
 from symheli.errors import CertificateError
 from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Relaxation, claim, decay_rate, forms, generalized_h2, l2_gain, pieces, stability, verify
+from synthesis import (
+    Relaxation,
+    claim,
+    decay_rate,
+    forms,
+    generalized_h2,
+    l2_gain,
+    pieces,
+    stability,
+    verify,
+)
 from synthesis.polynomial import program, proof, regions
 
 COARSE = Relaxation(segments=(4,), degree=2, grading=1.0)
@@ -16,10 +28,17 @@ BOX = Relaxation(kind="sos", segments=(4,), degree=2, grading=1.0)
 
 
 def two_ends(rate, dt=None):
-    """The input acts at one end of p and is seen at the other: P must vary, and pays for it where p moves."""
+    """The input acts at one end of p and is seen at the other: P must vary, and pays for it where p
+    moves.
+    """
     a = -1.0 if dt is None else 0.6
     return LPVStateSpace.polynomial(
-        [[[a]]], [[[2.0]], [[-1.0]]], [[[1.0]], [[1.0]]], [[[0.0]]], Scheduling("p", "1", -1.0, 2.0, rate), dt=dt
+        [[[a]]],
+        [[[2.0]], [[-1.0]]],
+        [[[1.0]], [[1.0]]],
+        [[[0.0]]],
+        Scheduling("p", "1", -1.0, 2.0, rate),
+        dt=dt,
     )
 
 
@@ -31,11 +50,19 @@ def everywhere(monkeypatch, name, mutant, *modules):
 def forget_the_rate(monkeypatch):
     """dP/dt left out of assembly and proof."""
     blocks, block, decrease = forms.continuous_blocks, claim._continuous, program.decrease
-    monkeypatch.setattr(forms, "continuous_blocks", lambda cells, knots, degree, rate, extra: blocks(cells, knots, degree, 0.0, extra))
-    monkeypatch.setattr(claim, "_continuous", lambda cell, P, rate, number: block(cell, P, 0.0, number))
+    monkeypatch.setattr(
+        forms,
+        "continuous_blocks",
+        lambda cells, knots, degree, rate, extra: blocks(cells, knots, degree, 0.0, extra),
+    )
+    monkeypatch.setattr(
+        claim, "_continuous", lambda cell, P, rate, number: block(cell, P, 0.0, number)
+    )
 
     def still(model, region, P, demand, number):
-        return decrease(model, region, P, demand._replace(rates=tuple(0.0 for _ in demand.rates)), number)
+        return decrease(
+            model, region, P, demand._replace(rates=tuple(0.0 for _ in demand.rates)), number
+        )
 
     everywhere(monkeypatch, "decrease", still, program, proof)
 
@@ -62,7 +89,9 @@ def drop_strips(monkeypatch):
 def drop_cells(monkeypatch):
     """The second half of the range is not looked at."""
     cells, strips = forms.cells, regions.strips
-    everywhere(monkeypatch, "cells", lambda *args: cells(*args)[: len(cells(*args)) // 2], forms, claim)
+    everywhere(
+        monkeypatch, "cells", lambda *args: cells(*args)[: len(cells(*args)) // 2], forms, claim
+    )
     monkeypatch.setattr(regions, "strips", lambda *args: strips(*args)[: len(strips(*args)) // 2])
 
 
@@ -71,7 +100,10 @@ def perturb_a_weight(monkeypatch):
     original = pieces.model_pieces
 
     def weaker(lpv):
-        return tuple(q._replace(**{name: _weakened(getattr(q, name)) for name in "ABCD"}) for q in original(lpv))
+        return tuple(
+            q._replace(**{name: _weakened(getattr(q, name)) for name in "ABCD"})
+            for q in original(lpv)
+        )
 
     everywhere(monkeypatch, "model_pieces", weaker, forms, verify, regions)
 
@@ -106,7 +138,8 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     mutate, model = CASES[case]
     assert ANALYSES[analysis](model()).verify(rigorous=True)
     mutate(monkeypatch)
-    # the witness in floating point is kept out, so that what the mutant believes becomes a certificate
+    # the witness in floating point is kept out, so that what the mutant believes becomes a
+    # certificate
     with monkeypatch.context() as blind:
         blind.setattr(verify, "holds_on_grid", lambda *args: True)
         blind.setattr(proof.Evidence, "on_grid", lambda *args: True)
@@ -121,7 +154,12 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     believed = (
         verify.proven(judge._claim(P), cert.gamma)
         if analysis == "splines"
-        else all(map(proof.negative_definite_exactly, proof.polynomials(judge.model, P, judge.demand, cert.gamma, number)))
+        else all(
+            map(
+                proof.negative_definite_exactly,
+                proof.polynomials(judge.model, P, judge.demand, cert.gamma, number),
+            )
+        )
     )
     assert believed, "the mutant does not believe itself: this tests nothing"
     assert not cert.verify(rigorous=True)
@@ -129,16 +167,29 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
 
 def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
     decay = decay_rate(spring(damping=0.4), 0.2, relaxation=BOX, search=None)
-    quartic = stability(spring(damping=0.4), 0.2, relaxation=Relaxation(order=2, segments=(2,)), search=None)
-    memory = l2_gain(spring(damping=0.4), 0.5, relaxation=Relaxation(memory=1.0, segments=(3,), degree=2), search=None)
+    quartic = stability(
+        spring(damping=0.4), 0.2, relaxation=Relaxation(order=2, segments=(2,)), search=None
+    )
+    memory = l2_gain(
+        spring(damping=0.4),
+        0.5,
+        relaxation=Relaxation(memory=1.0, segments=(3,), degree=2),
+        search=None,
+    )
     for cert in (decay, quartic, memory):
         assert cert.verify(rigorous=True)
         P, judge = cert._proof
         assert judge.witnessed(P, cert.proven, verify.rational())
         # the same P against a model that grows: without proof and pieces the witness must see it
         lpv = judge.model.source if cert is decay else judge.lpv
-        grows = replace(lpv, A=lpv.A + np.array([np.eye(2) * 0.5, *(np.zeros((2, 2)) for _ in lpv.A[1:])]))
+        grows = replace(
+            lpv, A=lpv.A + np.array([np.eye(2) * 0.5, *(np.zeros((2, 2)) for _ in lpv.A[1:])])
+        )
         with monkeypatch.context() as blind:
             blind.setattr(type(judge), "_reproduced", lambda *args: True)
-            other = judge._replace(model=judge.model._replace(source=grows)) if cert is decay else judge._replace(lpv=grows)
+            other = (
+                judge._replace(model=judge.model._replace(source=grows))
+                if cert is decay
+                else judge._replace(lpv=grows)
+            )
             assert not other.witnessed(P, cert.proven, verify.rational())

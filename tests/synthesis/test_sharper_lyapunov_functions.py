@@ -1,4 +1,6 @@
-"""Memory of p and forms of higher degree: their algebra, what they prove beyond x' P(p) x, and that they never prove too much."""
+"""Memory of p and forms of higher degree: their algebra, what they prove beyond x' P(p) x, and that
+they never prove too much.
+"""
 
 import math
 import sys
@@ -13,14 +15,32 @@ from scipy.optimize import brentq
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import MemoryLyapunov, Relaxation, Search, Solver, Status, decay_rate, generalized_h2, l2_gain, lower_bound, stability
+from synthesis import (
+    MemoryLyapunov,
+    Relaxation,
+    Search,
+    Solver,
+    Status,
+    decay_rate,
+    generalized_h2,
+    l2_gain,
+    lower_bound,
+    stability,
+)
 from synthesis.bernstein import blossom
 from synthesis.claim import Claim, lmi_polynomials
 from synthesis.forms import scaled_problem
 from synthesis.lag import LagRegion
 from synthesis.pieces import model_pieces
 from synthesis.proof_search import prove
-from synthesis.symmetric_power import generator, monomials, null_matrix, null_size, null_weights, power
+from synthesis.symmetric_power import (
+    generator,
+    monomials,
+    null_matrix,
+    null_size,
+    null_weights,
+    power,
+)
 
 MEMORY = Relaxation(segments=(8,), degree=2, grading=1.0, memory=1.5, memory_segments=2)
 QUARTIC = Relaxation(segments=(4,), order=2)
@@ -44,7 +64,9 @@ def test_monomials_follow_their_generator_and_their_power(n, m):
 @pytest.mark.parametrize(("n", "m"), [(2, 3), (3, 2), (5, 2)])
 def test_the_null_space_vanishes_exactly_and_is_all_there_is(n, m):
     rng = np.random.default_rng(n)
-    weights = np.array([Fraction(int(w)) for w in rng.integers(-9, 9, null_size(n, m))], dtype=object)
+    weights = np.array(
+        [Fraction(int(w)) for w in rng.integers(-9, 9, null_size(n, m))], dtype=object
+    )
     x = np.array([Fraction(int(v), 7) for v in rng.integers(-9, 9, n)], dtype=object)
     L = null_matrix(weights, n, m)
     assert z(x, m) @ L @ z(x, m) == 0
@@ -125,11 +147,18 @@ def test_higher_degrees_close_in_on_the_damping_that_a_jumping_spring_needs():
         low, high = truth, 3 * truth
         for _ in range(9):
             middle = 0.5 * (low + high)
-            proof = stability(spring(damping=middle, change=change), math.inf, relaxation=Relaxation(order=order), search=None)
+            proof = stability(
+                spring(damping=middle, change=change),
+                math.inf,
+                relaxation=Relaxation(order=order),
+                search=None,
+            )
             low, high = (low, middle) if proof.verified else (middle, high)
         needed.append(high)
         too_little = spring(damping=truth * (1 - 1e-3), change=change)
-        assert not stability(too_little, math.inf, relaxation=Relaxation(order=order), search=None).verified
+        assert not stability(
+            too_little, math.inf, relaxation=Relaxation(order=order), search=None
+        ).verified
     # one in 250 of the truth is the resolution of the bisection
     assert needed[0] > 1.2 * needed[1] > 1.2 * 1.05 * needed[2]
     assert needed[2] < 1.12 * truth
@@ -147,7 +176,10 @@ def test_they_prove_a_spring_at_a_rate_at_which_a_quadratic_does_not(relaxation)
 def test_memory_brings_the_gain_nearer_to_its_lower_bound():
     search = Search(levels=4, dwells=5, starts=1, nodes=40, evaluations=12, steps=80, samples=5000)
     below = lower_bound(spring(), 0.2, search=search).gamma
-    plain, memory = (l2_gain(spring(), 0.2, relaxation=form, search=None) for form in (Relaxation(segments=(8,), grading=1.0), MEMORY))
+    plain, memory = (
+        l2_gain(spring(), 0.2, relaxation=form, search=None)
+        for form in (Relaxation(segments=(8,), grading=1.0), MEMORY)
+    )
     assert memory.verify(rigorous=True)
     assert below <= memory.gamma < 0.9 * plain.gamma
 
@@ -156,7 +188,12 @@ def test_memory_brings_the_gain_nearer_to_its_lower_bound():
 def test_a_growing_spring_is_never_called_stable(relaxation):
     # the search finds growth here, whatever form is asked
     for rate in (1.0, 4.0, math.inf):
-        proof = stability(spring(), rate, relaxation=relaxation, search=Search(levels=4, dwells=7, starts=1, nodes=40, evaluations=12))
+        proof = stability(
+            spring(),
+            rate,
+            relaxation=relaxation,
+            search=Search(levels=4, dwells=7, starts=1, nodes=40, evaluations=12),
+        )
         assert proof.status is Status.GROWING
         assert not proof.verified
 
@@ -176,7 +213,9 @@ def test_an_unstable_plant_is_never_called_stable(relaxation, excess):
         )
         # without the look at the frozen poles: the solver and the verification alone
         for with_gain in (False,) if relaxation.order > 1 else (False, True):
-            found = prove(scaled_problem(lpv, 0.1, 1.0, with_gain=with_gain), relaxation, Solver(), math.inf)
+            found = prove(
+                scaled_problem(lpv, 0.1, 1.0, with_gain=with_gain), relaxation, Solver(), math.inf
+            )
             assert found.lyapunov is None
 
 
@@ -187,7 +226,9 @@ def test_a_lag_keeps_its_static_gain_with_a_memory():
 
 
 def test_tampered_proofs_fail_in_either_arithmetic():
-    remembered, quartic = (stability(spring(), 0.05, relaxation=form, search=None) for form in SHARPER)
+    remembered, quartic = (
+        stability(spring(), 0.05, relaxation=form, search=None) for form in SHARPER
+    )
     P, V = remembered.lyapunov, quartic.lyapunov
     assert isinstance(P, MemoryLyapunov)
     assert V is not None
@@ -214,14 +255,20 @@ def test_tampered_proofs_fail_in_either_arithmetic():
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.1, math.inf])
-@pytest.mark.parametrize(("form", "said"), [(MEMORY, "leave memory=1.5 out"), (QUARTIC, "leave order=2 out")])
-def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(form, said, rate, monkeypatch):
+@pytest.mark.parametrize(
+    ("form", "said"), [(MEMORY, "leave memory=1.5 out"), (QUARTIC, "leave order=2 out")]
+)
+def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(
+    form, said, rate, monkeypatch
+):
     # the function of that name hides the module
     for work in ("frozen_gain", "least_damped"):
         monkeypatch.setattr(sys.modules["synthesis.l2_gain"], work, None)
     sampled = spring().discretize(0.1)
     for analysis in (l2_gain, stability):
-        with pytest.raises(InputError, match=rf"continuous time; this model is sampled every 0\.1 s: {said}"):
+        with pytest.raises(
+            InputError, match=rf"continuous time; this model is sampled every 0\.1 s: {said}"
+        ):
             analysis(sampled, rate, relaxation=form)
     for analysis in (generalized_h2, decay_rate):
         with pytest.raises(InputError, match="order and memory of V are for l2_gain and stability"):
@@ -229,9 +276,13 @@ def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(form, 
 
 
 def test_one_state_has_a_form_of_higher_degree_too():
-    """Its one monomial leaves nothing to add to a block, which once was an array that could not be reshaped."""
+    """Its one monomial leaves nothing to add to a block, which once was an array that could not be
+    reshaped.
+    """
     assert stability(lag(), relaxation=QUARTIC).verify(rigorous=True)
-    assert not stability(replace(lag(), A=lag().A + np.array([[[1.0]], [[0.0]]])), relaxation=QUARTIC).verified
+    assert not stability(
+        replace(lag(), A=lag().A + np.array([[[1.0]], [[0.0]]])), relaxation=QUARTIC
+    ).verified
 
 
 def test_forms_that_do_not_suit_the_question_are_refused():

@@ -1,4 +1,6 @@
-"""Whichever analysis made it, a certificate answers the same questions, and contradicts itself nowhere."""
+"""Whichever analysis made it, a certificate answers the same questions, and contradicts itself
+nowhere.
+"""
 
 import math
 from dataclasses import replace
@@ -7,16 +9,33 @@ import pytest
 from models import lag
 
 from symheli.errors import CertificateError
-from synthesis import Relaxation, Verdict, decay_rate, generalized_h2, l2_gain, lft_gain, lft_stability, stability
+from synthesis import (
+    Relaxation,
+    Verdict,
+    decay_rate,
+    generalized_h2,
+    l2_gain,
+    lft_gain,
+    lft_stability,
+    stability,
+)
 
 ANALYSES = {
     "splines": lambda: l2_gain(lag(), relaxation=Relaxation(segments=(2,)), search=None),
     "box": lambda: l2_gain(lag(), relaxation=Relaxation(kind="sos", degree=1), search=None),
-    "energy to peak": lambda: generalized_h2(lag(), relaxation=Relaxation(degree=1, segments=(1,)), search=None),
-    "decay rate": lambda: decay_rate(lag(), relaxation=Relaxation(degree=1, segments=(1,)), search=None),
+    "energy to peak": lambda: generalized_h2(
+        lag(), relaxation=Relaxation(degree=1, segments=(1,)), search=None
+    ),
+    "decay rate": lambda: decay_rate(
+        lag(), relaxation=Relaxation(degree=1, segments=(1,)), search=None
+    ),
     "lft": lambda: lft_gain(lag().to_lft().reduce(), search=None),
-    "stability, splines": lambda: stability(lag(), relaxation=Relaxation(segments=(2,)), search=None),
-    "stability, box": lambda: stability(lag(), relaxation=Relaxation(kind="sos", degree=1), search=None),
+    "stability, splines": lambda: stability(
+        lag(), relaxation=Relaxation(segments=(2,)), search=None
+    ),
+    "stability, box": lambda: stability(
+        lag(), relaxation=Relaxation(kind="sos", degree=1), search=None
+    ),
     "stability, lft": lambda: lft_stability(lag().to_lft().reduce(), search=None),
 }
 
@@ -29,7 +48,9 @@ def test_every_certificate_answers_the_same_questions(analysis):
     assert cert.verify()
     assert cert.verify(rigorous=True)
     # dx/dt = -(1 + p) x + u, p in [0, 1]: gain 1, peak 1/sqrt 2, decay rate 1
-    exact = {"l2 gain": 1.0, "energy-to-peak gain": math.sqrt(0.5), "decay rate": 1.0}.get(cert.kind)
+    exact = {"l2 gain": 1.0, "energy-to-peak gain": math.sqrt(0.5), "decay rate": 1.0}.get(
+        cert.kind
+    )
     if exact is None:
         assert all(map(math.isnan, (cert.proven, cert.limit, cert.frozen, cert.gap)))
     else:
@@ -44,7 +65,16 @@ def test_every_certificate_answers_the_same_questions(analysis):
     assert cert.attempts
     assert sum(cert.seconds) > 0
     text = str(cert)
-    for part in (cert.kind, cert.status.value, cert.solver, "condition number 1", "tried: ", "exogenous", "CLARABEL", "tolerance"):
+    for part in (
+        cert.kind,
+        cert.status.value,
+        cert.solver,
+        "condition number 1",
+        "tried: ",
+        "exogenous",
+        "CLARABEL",
+        "tolerance",
+    ):
         assert part in text
     assert all(f"  - {sentence}" in text for sentence in cert.hypotheses)
 
@@ -52,8 +82,11 @@ def test_every_certificate_answers_the_same_questions(analysis):
 @pytest.mark.parametrize("analysis", [name for name in ANALYSES if "stability" not in name])
 def test_no_certificate_can_be_made_out_of_order(analysis):
     cert = ANALYSES[analysis]()
-    proven, limit, worse = ("alpha", "upper", 0.9) if cert.kind == "decay rate" else ("gamma", "lower", 1.1)
-    # beyond what a frozen model or a trajectory shows, and a trajectory better than the frozen model it began with
+    proven, limit, worse = (
+        ("alpha", "upper", 0.9) if cert.kind == "decay rate" else ("gamma", "lower", 1.1)
+    )
+    # beyond what a frozen model or a trajectory shows, and a trajectory better than the frozen
+    # model it began with
     for change, said in (
         ({"frozen": worse * cert.proven}, "the frozen"),
         ({limit: worse * cert.proven}, "bound"),

@@ -1,4 +1,6 @@
-"""The search for the worst p(t): exact sensitivities, limits kept to the last digit, and the worst case known in closed form."""
+"""The search for the worst p(t): exact sensitivities, limits kept to the last digit, and the worst
+case known in closed form.
+"""
 
 import math
 from dataclasses import replace
@@ -18,7 +20,10 @@ def bumpy(lpv, period=4.0, nodes=24):
     s = lpv.scheduling
     phase = 2 * np.pi * np.arange(nodes + 1) / nodes
     spacing = period / nodes if lpv.dt is None else lpv.dt * math.ceil(period / (nodes * lpv.dt))
-    return Trajectory(spacing * np.arange(nodes + 1), s.middle + s.radius * (0.5 * np.sin(phase) + 0.2 * np.cos(3 * phase)))
+    return Trajectory(
+        spacing * np.arange(nodes + 1),
+        s.middle + s.radius * (0.5 * np.sin(phase) + 0.2 * np.cos(3 * phase)),
+    )
 
 
 @pytest.mark.parametrize("dt", [None, 0.08])
@@ -36,7 +41,9 @@ def test_the_gradient_of_growth_is_its_difference_quotient(dt):
     found, slope = _gradient(lpv, cycle, GROWTH)
     assert found.value == pytest.approx(score(0.0) * period)
     # one-sided differences of 1e-6 inside, central ones of 1e-4 here: 1e-5 of the slope is left
-    assert slope[:-1] @ direction[:-1] == pytest.approx((score(1e-4) - score(-1e-4)) / 2e-4, rel=1e-4)
+    assert slope[:-1] @ direction[:-1] == pytest.approx(
+        (score(1e-4) - score(-1e-4)) / 2e-4, rel=1e-4
+    )
     if dt is None:
         assert slope[-1] == pytest.approx((score(0, 1e-4) - score(0, -1e-4)) / 2e-4, rel=1e-4)
 
@@ -70,7 +77,9 @@ def test_the_lifted_response_from_rest_is_the_step_by_step_one():
     for k, vk in enumerate(v.reshape(-1, 2)):
         z = system.step[k % len(system.step)] @ np.concatenate([x, vk])
         x, energy = z[:3], energy + z[3:] @ z[3:]
-    assert ratio_from_rest(Lifted.of(system), v, 1)[0] == pytest.approx(math.sqrt(energy) / np.linalg.norm(v), rel=1e-12)
+    assert ratio_from_rest(Lifted.of(system), v, 1)[0] == pytest.approx(
+        math.sqrt(energy) / np.linalg.norm(v), rel=1e-12
+    )
     assert gain(system).value == pytest.approx(math.log(worst_input(system)[0]), rel=1e-3)
 
 
@@ -79,7 +88,9 @@ def test_the_ascent_reaches_the_fastest_pumping_of_a_spring():
     # the pumping wave, a quarter and a tenth off
     wave = Wave(-1.0, 1.0, 3.1, 1.1, 0.0)
     lpv = spring(damping=0.05, change=0.6)
-    cycle, value = ascend(lpv, math.inf, on_nodes(Trajectory(*wave.vertices()), 60, None), GROWTH, 20.0, 40)
+    cycle, value = ascend(
+        lpv, math.inf, on_nodes(Trajectory(*wave.vertices()), 60, None), GROWTH, 20.0, 40
+    )
     # a jump of p takes one of sixty nodes
     assert 0.97 * best < value / cycle.time[-1] < best * (1 + 1e-3)
 
@@ -108,10 +119,16 @@ def test_the_search_finds_more_than_the_waves_it_starts_from():
     from synthesis import Search, lower_bound
     from synthesis.lower_bound import _Hunt
 
-    search = Search(levels=6, dwells=5, starts=1, nodes=40, evaluations=15, steps=80, samples=20_000)
+    search = Search(
+        levels=6, dwells=5, starts=1, nodes=40, evaluations=15, steps=80, samples=20_000
+    )
     lpv = replace(lateral(), scheduling=lateral().scheduling.with_rate(3.0))
     hunt = _Hunt(lpv, 3.0, search)
-    waves = max(gain for wave in hunt.family.coarse() if math.isfinite(gain := hunt.gain(Trajectory(*wave.vertices()))))
+    waves = max(
+        gain
+        for wave in hunt.family.coarse()
+        if math.isfinite(gain := hunt.gain(Trajectory(*wave.vertices())))
+    )
     assert lower_bound(lpv, search=search).gamma > 1.02 * waves
 
 
@@ -124,21 +141,32 @@ def test_the_gradient_by_corners_is_its_difference_quotient(rate, objective):
     levels, rests = rng.standard_normal((2, 4))
 
     def score(h):
-        return gradient(lpv, Corners(corners.levels + h * levels, corners.rests + h * rests), rate, objective, 0.1)[0]
+        return gradient(
+            lpv,
+            Corners(corners.levels + h * levels, corners.rests + h * rests),
+            rate,
+            objective,
+            0.1,
+        )[0]
 
     _, of_rests, of_levels = gradient(lpv, corners, rate, objective, 0.1)
-    # one-sided differences of 1e-6 inside; the frequency of the gain is held, which is exact to first order only at its peak
-    assert of_rests @ rests + of_levels @ levels == pytest.approx((score(1e-6) - score(-1e-6)) / 2e-6, rel=1e-4)
+    # one-sided differences of 1e-6 inside; the frequency of the gain is held, which is exact to
+    # first order only at its peak
+    assert of_rests @ rests + of_levels @ levels == pytest.approx(
+        (score(1e-6) - score(-1e-6)) / 2e-6, rel=1e-4
+    )
 
 
 def test_corners_reach_the_fastest_pumping_of_a_spring_exactly():
     best = fastest_growth(0.05, 0.6)
-    # a fifth off in every way; much further, the multipliers are a complex pair, whose modulus no corner changes
+    # a fifth off in every way; much further, the multipliers are a complex pair, whose modulus no
+    # corner changes
     start = Corners(np.array([-0.7, 0.8]), np.array([2.5, 1.2]))
     lpv = spring(damping=0.05, change=0.6)
     found = climb(lpv, math.inf, start, GROWTH, 0.2, 20.0, 30)
     assert found.levels == pytest.approx([-1.0, 1.0])
-    # the steps are exact, since p is constant between its corners; 1e-6: the quadrature behind `best` has 4000 points
+    # the steps are exact, since p is constant between its corners; 1e-6: the quadrature behind
+    # `best` has 4000 points
     assert gradient(lpv, found, math.inf, GROWTH, 0.2)[0] == pytest.approx(best, rel=1e-6)
 
 
@@ -148,17 +176,27 @@ def test_a_bound_by_jumps_is_flown_as_it_is_reported():
     from synthesis import Search, lower_bound
 
     lpv = spring(damping=0.4)
-    found = lower_bound(lpv, math.inf, search=Search(levels=4, dwells=7, starts=1, nodes=20, evaluations=8, steps=60, samples=3000))
+    found = lower_bound(
+        lpv,
+        math.inf,
+        search=Search(
+            levels=4, dwells=7, starts=1, nodes=20, evaluations=8, steps=60, samples=3000
+        ),
+    )
     time, p = found.trajectory
     assert np.any(np.diff(p)[np.diff(time) == 0] != 0)
     energy = response(lpv, time, p, found.input, np.zeros((2, 1)), 0.02)[1]
     # as in test_order_of_bounds: the last input sample is left out
-    assert math.sqrt(energy / np.sum(found.input[:-1, 0] ** 2 * np.diff(time))) == pytest.approx(found.gamma, rel=1e-3)
+    assert math.sqrt(energy / np.sum(found.input[:-1, 0] ** 2 * np.diff(time))) == pytest.approx(
+        found.gamma, rel=1e-3
+    )
     assert found.gamma > 1.1 * lower_bound(lpv, 0.0).gamma
 
 
 def test_a_slow_p_is_given_the_time_to_cross_its_range():
-    """x' = -x + (2 - p) u, y = (1 + p) x, rate 0.01: 2.25 frozen, 2.25441 in truth, by a cycle much longer than the model's own time."""
+    """x' = -x + (2 - p) u, y = (1 + p) x, rate 0.01: 2.25 frozen, 2.25441 in truth, by a cycle much
+    longer than the model's own time.
+    """
     from test_reference_cases import scalar
 
     from synthesis import Search, lower_bound
@@ -175,5 +213,7 @@ def test_a_p_that_may_jump_is_never_better_than_one_with_a_limit():
     from synthesis import Search, lower_bound
 
     quick = Search(levels=4, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=4000)
-    gains = [lower_bound(spring(damping=0.4), rate, search=quick).gamma for rate in (1.0, 3.0, math.inf)]
+    gains = [
+        lower_bound(spring(damping=0.4), rate, search=quick).gamma for rate in (1.0, 3.0, math.inf)
+    ]
     assert gains == sorted(gains)

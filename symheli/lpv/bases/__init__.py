@@ -8,4 +8,14 @@ from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.product import Product
 from symheli.lpv.bases.user_functions import UserFunctions
 
-__all__ = ["BSpline", "Basis", "FunctionSpace", "Piece", "PiecewiseLinear", "Polynomial", "Product", "Spline", "UserFunctions"]
+__all__ = [
+    "BSpline",
+    "Basis",
+    "FunctionSpace",
+    "Piece",
+    "PiecewiseLinear",
+    "Polynomial",
+    "Product",
+    "Spline",
+    "UserFunctions",
+]

@@ -13,7 +13,9 @@ from symheli.lpv.bases.function_space import FunctionSpace, Range
 
 
 class Piece(NamedTuple):
-    """One polynomial piece of a basis: on [low, high], f_j(p) = sum_i bernstein[j, i] B_i(x), x = (p-low)/(high-low)."""
+    """One polynomial piece of a basis: on [low, high], f_j(p) = sum_i bernstein[j, i] B_i(x), x =
+    (p-low)/(high-low).
+    """
 
     low: float
     high: float
@@ -21,7 +23,9 @@ class Piece(NamedTuple):
 
 
 class Basis(FunctionSpace):
-    """A family of functions f_1 .. f_n of one scheduling parameter p in [low, high]; M(p) = sum_j f_j(p) M_j."""
+    """A family of functions f_1 .. f_n of one scheduling parameter p in [low, high]; M(p) = sum_j
+    f_j(p) M_j.
+    """
 
     low: float
     high: float
@@ -33,10 +37,14 @@ class Basis(FunctionSpace):
 
     @abstractmethod
     def pieces(self) -> tuple[Piece, ...]:
-        """The polynomial pieces of the functions, in order of p; `InputError` where they are not piecewise polynomial."""
+        """The polynomial pieces of the functions, in order of p; `InputError` where they are not
+        piecewise polynomial.
+        """
 
     def __call__(self, p: object, derivative: int = 0) -> Array:
-        """Values (or derivatives, per unit of p) of the functions at p, shape p.shape + (n,). Raises `InputError` outside the range."""
+        """Values (or derivatives, per unit of p) of the functions at p, shape p.shape + (n,).
+        Raises `InputError` outside the range.
+        """
         return self._values(self._inside(p), derivative)
 
 

@@ -15,10 +15,12 @@ from symheli.lpv.bases.piecewise import PiecewisePolynomial
 
 @dataclass(frozen=True)
 class BSpline(PiecewisePolynomial):
-    """B-splines of `degree` between the `breakpoints`, degree - 1 times continuously differentiable; they add up to 1.
+    """B-splines of `degree` between the `breakpoints`, degree - 1 times continuously
+    differentiable; they add up to 1.
 
-    Each differs from zero over at most degree + 1 intervals: what the data say of one speed stays there. Degree 1 is
-    `PiecewiseLinear`; the end knots are repeated, so that the first and last coefficient are the values at the ends.
+    Each differs from zero over at most degree + 1 intervals: what the data say of one speed stays
+    there. Degree 1 is `PiecewiseLinear`; the end knots are repeated, so that the first and last
+    coefficient are the values at the ends.
     """
 
     degree: int
@@ -27,7 +29,9 @@ class BSpline(PiecewisePolynomial):
     def __post_init__(self) -> None:
         points = frozen(self.breakpoints, "breakpoints", (None,))
         if len(points) < 2 or np.any(np.diff(points) <= 0):
-            raise InputError(f"BSpline needs at least 2 strictly increasing breakpoints, got {self.breakpoints}")
+            raise InputError(
+                f"BSpline needs at least 2 strictly increasing breakpoints, got {self.breakpoints}"
+            )
         if not isinstance(self.degree, int) or self.degree < 1:
             raise InputError(f"degree must be an integer >= 1, got {self.degree!r}")
         object.__setattr__(self, "breakpoints", tuple(float(b) for b in points))
@@ -53,7 +57,14 @@ class BSpline(PiecewisePolynomial):
         return self.size
 
     def _piecewise(self) -> PPoly:
-        knots = np.concatenate([[self.low] * self.degree, self.breakpoints, [self.high] * self.degree])
-        inside = slice(self.degree, len(knots) - 1 - self.degree)  # without the empty intervals of the repeated ends
-        parts = [PPoly.from_spline(ScipyBSpline(knots, unit, self.degree)).c[:, inside] for unit in np.eye(self.size)]
+        knots = np.concatenate(
+            [[self.low] * self.degree, self.breakpoints, [self.high] * self.degree]
+        )
+        inside = slice(
+            self.degree, len(knots) - 1 - self.degree
+        )  # without the empty intervals of the repeated ends
+        parts = [
+            PPoly.from_spline(ScipyBSpline(knots, unit, self.degree)).c[:, inside]
+            for unit in np.eye(self.size)
+        ]
         return PPoly(np.stack(parts, axis=-1), np.array(self.breakpoints))

@@ -13,10 +13,11 @@ Range = tuple[float, float]
 
 
 class FunctionSpace(ABC):
-    """Functions f_1 .. f_n of the scheduling parameters p on a box; a coefficient is M(p) = sum_j f_j(p) M_j.
+    """Functions f_1 .. f_n of the scheduling parameters p on a box; a coefficient is M(p) = sum_j
+    f_j(p) M_j.
 
-    With one parameter p may have any shape and values have shape p.shape + (n,); with d > 1 parameters the last axis of p
-    holds them, p (..., d), and values have shape (..., n).
+    With one parameter p may have any shape and values have shape p.shape + (n,); with d > 1
+    parameters the last axis of p holds them, p (..., d), and values have shape (..., n).
     """
 
     @property
@@ -43,23 +44,34 @@ class FunctionSpace(ABC):
         return len(self.ranges)
 
     def form(self, name: str) -> Array:
-        """Matrix T (n, m) with f_j = sum_i T[j, i] g_i for the functions g of the named form; `InputError` where there is none.
+        """Matrix T (n, m) with f_j = sum_i T[j, i] g_i for the functions g of the named form;
+        `InputError` where there is none.
 
         Coefficients M_j of f become sum_j T[j, i] M_j of g.
         """
-        raise InputError(f"{type(self).__name__} has no {name!r} form; its coefficients are those of its own functions")
+        raise InputError(
+            f"{type(self).__name__} has no {name!r} form; its coefficients are those of its own"
+            " functions"
+        )
 
     def __call__(self, p: object) -> Array:
-        """Values of the functions at p; raises `InputError` outside the ranges and for a wrong number of parameters."""
+        """Values of the functions at p; raises `InputError` outside the ranges and for a wrong
+        number of parameters.
+        """
         return self._values(self._inside(p), 0)
 
     def fit(self, p: object, values: object) -> Array:
-        """Least-squares coefficients (n, ...) of `values` (K, ...) sampled at `p` (K,), or (K, d) with several parameters."""
+        """Least-squares coefficients (n, ...) of `values` (K, ...) sampled at `p` (K,), or (K, d)
+        with several parameters.
+        """
         p = frozen(p, "nodes", (None,) if self.dimension == 1 else (None, self.dimension))
         values = frozen(values, "values")
         distinct = len(np.unique(p, axis=0))
         if distinct < self.distinct_values:
-            raise InputError(f"{self} needs {self.distinct_values} distinct nodes, got {distinct}; add nodes or lower the degree")
+            raise InputError(
+                f"{self} needs {self.distinct_values} distinct nodes, got {distinct}; add nodes or"
+                " lower the degree"
+            )
         flat = values.reshape(len(p), -1)
         coefficients = np.linalg.lstsq(self(p), flat, rcond=None)[0]
         return coefficients.reshape(self.size, *values.shape[1:])
@@ -67,14 +79,22 @@ class FunctionSpace(ABC):
     def _inside(self, p: object) -> Array:
         p = frozen(p, "scheduling parameter")
         if self.dimension > 1 and p.shape[-1:] != (self.dimension,):
-            raise InputError(f"scheduling parameters: expected {self.dimension} along the last axis, got shape {p.shape}")
+            raise InputError(
+                f"scheduling parameters: expected {self.dimension} along the last axis, got shape"
+                f" {p.shape}"
+            )
         columns = p.reshape(-1, self.dimension).T
         for i, ((low, high), column) in enumerate(zip(self.ranges, columns, strict=True)):
             slack = 1e-9 * (high - low)
             if column.size and (column.min() < low - slack or column.max() > high + slack):
-                which = "the scheduling parameter" if self.dimension == 1 else f"scheduling parameter {i + 1} of {self.dimension}"
+                which = (
+                    "the scheduling parameter"
+                    if self.dimension == 1
+                    else f"scheduling parameter {i + 1} of {self.dimension}"
+                )
                 raise InputError(
-                    f"{which} spans [{column.min():.4g}, {column.max():.4g}] but the basis is declared on "
-                    f"[{low:.4g}, {high:.4g}]; declare the basis over the whole range of the data"
+                    f"{which} spans [{column.min():.4g}, {column.max():.4g}] but the basis is"
+                    f" declared on [{low:.4g}, {high:.4g}]; declare the basis over the whole range"
+                    " of the data"
                 )
         return p

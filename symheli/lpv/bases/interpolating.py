@@ -14,7 +14,9 @@ from symheli.lpv.bases.piecewise import PiecewisePolynomial
 
 @dataclass(frozen=True)
 class Cardinal(PiecewisePolynomial):
-    """Functions f_j with f_j(node_i) = 1 where i = j and 0 elsewhere; see `PiecewiseLinear` and `Spline`."""
+    """Functions f_j with f_j(node_i) = 1 where i = j and 0 elsewhere; see `PiecewiseLinear` and
+    `Spline`.
+    """
 
     nodes: tuple[float, ...]
 
@@ -23,7 +25,10 @@ class Cardinal(PiecewisePolynomial):
     def __post_init__(self) -> None:
         nodes = frozen(self.nodes, "nodes", (None,))
         if len(nodes) < self.minimum_nodes or np.any(np.diff(nodes) <= 0):
-            raise InputError(f"{type(self).__name__} needs at least {self.minimum_nodes} strictly increasing nodes, got {self.nodes}")
+            raise InputError(
+                f"{type(self).__name__} needs at least {self.minimum_nodes} strictly increasing"
+                f" nodes, got {self.nodes}"
+            )
         object.__setattr__(self, "nodes", tuple(float(n) for n in nodes))
 
     @property

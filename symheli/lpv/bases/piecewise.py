@@ -30,11 +30,18 @@ class PiecewisePolynomial(Basis):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One piece between every two breakpoints."""
-        power = self._functions.c[::-1]  # (degree + 1, segments, functions), ascending powers of p - breakpoint
+        power = self._functions.c[
+            ::-1
+        ]  # (degree + 1, segments, functions), ascending powers of p - breakpoint
         d = power.shape[0] - 1
         out = []
         for s, (low, high) in enumerate(pairwise(self._functions.x.tolist())):
             scaled = power[:, s, :] * ((high - low) ** np.arange(d + 1))[:, None]
-            bernstein = np.array([sum(comb(k, i) / comb(d, i) * scaled[i] for i in range(k + 1)) for k in range(d + 1)])
+            bernstein = np.array(
+                [
+                    sum(comb(k, i) / comb(d, i) * scaled[i] for i in range(k + 1))
+                    for k in range(d + 1)
+                ]
+            )
             out.append(Piece(low, high, bernstein.T))
         return tuple(out)

@@ -22,10 +22,11 @@ DIGITS = 8.0
 
 @dataclass(frozen=True)
 class Polynomial(Basis):
-    """Polynomials of degree 0 .. `degree` in p, as Legendre polynomials orthonormal over [low, high].
+    """Polynomials of degree 0 .. `degree` in p, as Legendre polynomials orthonormal over [low,
+    high].
 
-    f_j(p) = sqrt(2 j + 1) P_j(x), x = (2 p - low - high)/(high - low): condition number of the Gramian over
-    the range is 1, where raw monomials p^j on 0-13 m/s have 1e6 at degree 5.
+    f_j(p) = sqrt(2 j + 1) P_j(x), x = (2 p - low - high)/(high - low): condition number of the
+    Gramian over the range is 1, where raw monomials p^j on 0-13 m/s have 1e6 at degree 5.
     """
 
     degree: int
@@ -33,7 +34,9 @@ class Polynomial(Basis):
     high: float
 
     GRADED: ClassVar = ("orthonormal", "legendre", "chebyshev", "scaled", "monomial")
-    """Forms whose j-th function is of degree j: these polynomials, P_j(x), T_j(x), x^j with x in [-1, 1], and p^j in physical units."""
+    """Forms whose j-th function is of degree j: these polynomials, P_j(x), T_j(x), x^j with x in
+    [-1, 1], and p^j in physical units.
+    """
 
     def __post_init__(self) -> None:
         check_range(self.low, self.high)
@@ -55,7 +58,9 @@ class Polynomial(Basis):
         return np.sqrt(2.0 * np.arange(self.size) + 1.0)
 
     def _values(self, p: Array, derivative: int) -> Array:
-        x = ((p - self.low) - (self.high - p)) / (self.high - self.low)  # no digit of p is lost far from zero
+        x = ((p - self.low) - (self.high - p)) / (
+            self.high - self.low
+        )  # no digit of p is lost far from zero
         if derivative == 0:
             return (legendre.legvander(x, self.degree) * self._norms).reshape(*p.shape, self.size)
         scale = (2.0 / (self.high - self.low)) ** derivative
@@ -66,22 +71,40 @@ class Polynomial(Basis):
 
     @cached_property
     def monomial(self) -> Array:
-        """Matrix T (n, n): f_j(p) = sum_i T[j, i] p^i, p in physical units; each entry exact before it is rounded."""
+        """Matrix T (n, n): f_j(p) = sum_i T[j, i] p^i, p in physical units; each entry exact before
+        it is rounded.
+        """
         middle, radius = centre(self.low, self.high)
         power = {(i,): column for i, column in enumerate(self._powers.T)}
         physical = recentred(power, [(-middle / radius, 1 / radius)])
-        return frozen(np.stack([physical[i,] if (i,) in physical else np.zeros(self.size) for i in range(self.size)], axis=1), "monomial")
+        return frozen(
+            np.stack(
+                [
+                    physical[i,] if (i,) in physical else np.zeros(self.size)
+                    for i in range(self.size)
+                ],
+                axis=1,
+            ),
+            "monomial",
+        )
 
     @cached_property
     def _powers(self) -> Array:
         """Matrix T (n, n): f_j = sum_i T[j, i] x^i."""
-        return np.stack([np.pad(legendre.leg2poly(row), (0, self.size))[: self.size] for row in np.diag(self._norms)])
+        return np.stack(
+            [
+                np.pad(legendre.leg2poly(row), (0, self.size))[: self.size]
+                for row in np.diag(self._norms)
+            ]
+        )
 
     @cached_property
     def digits_lost(self) -> float:
-        """Decimal digits that rounding costs where a polynomial is written in powers of p in physical units and summed.
+        """Decimal digits that rounding costs where a polynomial is written in powers of p in
+        physical units and summed.
 
-        Few near zero, 16 (all of a double's) for degree 3 on [1e5, 1e5 + 1]; this basis itself loses none.
+        Few near zero, 16 (all of a double's) for degree 3 on [1e5, 1e5 + 1]; this basis itself
+        loses none.
         """
         reach = max(abs(self.low), abs(self.high))
         size = np.abs(self.monomial) @ reach ** np.arange(self.size) / self._norms
@@ -91,21 +114,29 @@ class Polynomial(Basis):
         """`monomial`, with a warning where it loses too much."""
         if self.digits_lost > DIGITS:
             warnings.warn(
-                f"powers of p lose about {self.digits_lost:.0f} of 16 digits on [{self.low:g}, {self.high:g}]; "
-                "keep the coefficients of the basis, or write the model in powers of p less the middle of its range",
-                PrecisionWarning, stacklevel=3,
-            )  # fmt: skip
+                f"powers of p lose about {self.digits_lost:.0f} of 16 digits on [{self.low:g},"
+                f" {self.high:g}]; keep the coefficients of the basis, or write the model in powers"
+                " of p less the middle of its range",
+                PrecisionWarning,
+                stacklevel=3,
+            )
         return self.monomial
 
     def form(self, name: str) -> Array:
-        """Matrix T (n, n): f_j = sum_i T[j, i] g_i for the forms in `GRADED` and "bernstein" (over [low, high])."""
+        """Matrix T (n, n): f_j = sum_i T[j, i] g_i for the forms in `GRADED` and "bernstein" (over
+        [low, high]).
+        """
         match name:
             case "orthonormal":
                 return np.eye(self.size)
             case "legendre":
                 return np.diag(self._norms)
             case "chebyshev" | "scaled":
-                rows = [chebyshev.poly2cheb(r) for r in self._powers] if name == "chebyshev" else self._powers
+                rows = (
+                    [chebyshev.poly2cheb(r) for r in self._powers]
+                    if name == "chebyshev"
+                    else self._powers
+                )
                 return np.stack([np.pad(r, (0, self.size - len(r))) for r in rows])
             case "monomial":
                 return self._physical()
@@ -114,13 +145,17 @@ class Polynomial(Basis):
         raise UnknownNameError("form", name, (*self.GRADED, "bernstein"))
 
     def from_monomial(self, coefficients: object) -> Array:
-        """Coefficients in this basis (n, ...) of sum_i p^i M_i with M = `coefficients` (at most n, ...), p in physical units.
+        """Coefficients in this basis (n, ...) of sum_i p^i M_i with M = `coefficients` (at most n,
+        ...), p in physical units.
 
-        Exact but for the last rounding: the powers are moved to the middle of the range as the rationals they are.
+        Exact but for the last rounding: the powers are moved to the middle of the range as the
+        rationals they are.
         """
         given = frozen(coefficients, "monomial coefficients")
         if given.shape[0] > self.size:
-            raise InputError(f"degree {given.shape[0] - 1} does not fit in a basis of degree {self.degree}")
+            raise InputError(
+                f"degree {given.shape[0] - 1} does not fit in a basis of degree {self.degree}"
+            )
         x = recentred({(i,): M for i, M in enumerate(given)}, [centre(self.low, self.high)])
         padded = np.zeros((self.size, *given.shape[1:]))
         for (i,), M in x.items():
@@ -128,9 +163,11 @@ class Polynomial(Basis):
         return np.linalg.solve(self._powers.T, padded.reshape(self.size, -1)).reshape(padded.shape)
 
     def to_monomial(self, coefficients: object) -> Array:
-        """Monomial coefficients M_i (n, ...) in physical units of p from coefficients in this basis (n, ...).
+        """Monomial coefficients M_i (n, ...) in physical units of p from coefficients in this basis
+        (n, ...).
 
-        Warns (`PrecisionWarning`) where powers of p lose more than half of the digits; see `digits_lost`.
+        Warns (`PrecisionWarning`) where powers of p lose more than half of the digits; see
+        `digits_lost`.
         """
         return np.tensordot(self._physical().T, frozen(coefficients, "coefficients"), axes=1)
 
@@ -141,5 +178,10 @@ class Polynomial(Basis):
         for i in range(d + 1):
             for k in range(i + 1):
                 shift[i, k] = comb(i, k) * 2.0**k * (-1.0) ** (i - k)
-        power_to_bernstein = np.array([[comb(i, k) / comb(d, k) if k <= i else 0.0 for i in range(d + 1)] for k in range(d + 1)])
+        power_to_bernstein = np.array(
+            [
+                [comb(i, k) / comb(d, k) if k <= i else 0.0 for i in range(d + 1)]
+                for k in range(d + 1)
+            ]
+        )
         return (Piece(self.low, self.high, self._powers @ shift @ power_to_bernstein),)

@@ -17,11 +17,12 @@ from symheli.lpv.bases.polynomial import Polynomial
 
 @dataclass(frozen=True)
 class Product(FunctionSpace):
-    """f_j(p) = f_{j1}(p_1) f_{j2}(p_2) ...: every product of functions of `factors`, the last factor running fastest.
+    """f_j(p) = f_{j1}(p_1) f_{j2}(p_2) ...: every product of functions of `factors`, the last
+    factor running fastest.
 
-    With `total_degree` (polynomial factors only) just the products whose degrees add up to that at most. Products of bases orthonormal
-    over their ranges are orthonormal over the box. Raises `InputError` for fewer than two factors or a total degree that
-    does not suit them.
+    With `total_degree` (polynomial factors only) just the products whose degrees add up to that at
+    most. Products of bases orthonormal over their ranges are orthonormal over the box. Raises
+    `InputError` for fewer than two factors or a total degree that does not suit them.
     """
 
     factors: tuple[Basis, ...]
@@ -30,11 +31,15 @@ class Product(FunctionSpace):
     def __post_init__(self) -> None:
         object.__setattr__(self, "factors", tuple(self.factors))
         if len(self.factors) < 2 or not all(isinstance(f, Basis) for f in self.factors):
-            raise InputError(f"a product needs at least two one-parameter bases, got {self.factors!r:.120}")
+            raise InputError(
+                f"a product needs at least two one-parameter bases, got {self.factors!r:.120}"
+            )
         if self.total_degree is None:
             return
         if not all(isinstance(f, Polynomial) for f in self.factors):
-            raise InputError("total_degree is for polynomial factors; leave it out for all products")
+            raise InputError(
+                "total_degree is for polynomial factors; leave it out for all products"
+            )
         if not isinstance(self.total_degree, int) or self.total_degree < 0:
             raise InputError(f"total_degree must be an integer >= 0, got {self.total_degree!r}")
 
@@ -47,7 +52,11 @@ class Product(FunctionSpace):
     def indices(self) -> tuple[tuple[int, ...], ...]:
         """Which function of each factor makes up each product."""
         limit = np.inf if self.total_degree is None else self.total_degree
-        return tuple(i for i in product(*(range(f.size) for f in self.factors)) if sum(i) <= limit or self.total_degree is None)
+        return tuple(
+            i
+            for i in product(*(range(f.size) for f in self.factors))
+            if sum(i) <= limit or self.total_degree is None
+        )
 
     @property
     def size(self) -> int:
@@ -61,18 +70,31 @@ class Product(FunctionSpace):
 
     def _values(self, p: Array, derivative: int) -> Array:
         if derivative:
-            raise InputError("products of bases have no derivative by one number; differentiate the factors")
+            raise InputError(
+                "products of bases have no derivative by one number; differentiate the factors"
+            )
         values = [f(p[..., i]) for i, f in enumerate(self.factors)]
-        return reduce(np.multiply, (v[..., list(column)] for v, column in zip(values, zip(*self.indices, strict=True), strict=True)))
+        return reduce(
+            np.multiply,
+            (
+                v[..., list(column)]
+                for v, column in zip(values, zip(*self.indices, strict=True), strict=True)
+            ),
+        )
 
     def form(self, name: str) -> Array:
-        """Products of the forms of the factors, in the same order; a total degree keeps the forms graded by degree."""
+        """Products of the forms of the factors, in the same order; a total degree keeps the forms
+        graded by degree.
+        """
         forms = [f.form(name) for f in self.factors]
         full = reduce(np.kron, forms)
         if self.total_degree is None:
             return full
         if name not in Polynomial.GRADED:
-            raise InputError(f"the {name!r} form mixes degrees: with a total degree choose from {', '.join(Polynomial.GRADED)}")
+            raise InputError(
+                f"the {name!r} form mixes degrees: with a total degree choose from"
+                f" {', '.join(Polynomial.GRADED)}"
+            )
         every = list(product(*(range(f.size) for f in self.factors)))
         kept = [every.index(i) for i in self.indices]
         return full[np.ix_(kept, kept)]

@@ -14,10 +14,12 @@ from symheli.lpv.bases.basis import Basis, Piece, check_range
 
 @dataclass(frozen=True)
 class UserFunctions(Basis):
-    """f_j(p) = functions[j](p) on [low, high]: callables that take an array of p and return one of the same shape.
+    """f_j(p) = functions[j](p) on [low, high]: callables that take an array of p and return one of
+    the same shape.
 
-    `names` label them (default f0, f1, ...). Columns are scaled where they are fitted, so the size of the functions does not
-    matter; their independence does. Raises `InputError` where a function does not return finite numbers over the range.
+    `names` label them (default f0, f1, ...). Columns are scaled where they are fitted, so the size
+    of the functions does not matter; their independence does. Raises `InputError` where a function
+    does not return finite numbers over the range.
     """
 
     functions: tuple[Callable[[Array], Array], ...]
@@ -27,12 +29,18 @@ class UserFunctions(Basis):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "functions", tuple(self.functions))
-        object.__setattr__(self, "names", tuple(self.names) or tuple(f"f{j}" for j in range(len(self.functions))))
+        object.__setattr__(
+            self, "names", tuple(self.names) or tuple(f"f{j}" for j in range(len(self.functions)))
+        )
         check_range(self.low, self.high)
         if not self.functions or not all(callable(f) for f in self.functions):
-            raise InputError(f"functions: expected at least one callable of p, got {self.functions!r:.120}")
+            raise InputError(
+                f"functions: expected at least one callable of p, got {self.functions!r:.120}"
+            )
         if len(self.names) != len(self.functions):
-            raise InputError(f"expected {len(self.functions)} names, one a function, got {len(self.names)}")
+            raise InputError(
+                f"expected {len(self.functions)} names, one a function, got {len(self.names)}"
+            )
         self(np.linspace(self.low, self.high, 33))
 
     @property
@@ -47,19 +55,25 @@ class UserFunctions(Basis):
 
     def _values(self, p: Array, derivative: int) -> Array:
         if derivative:
-            raise InputError("functions brought along have no known derivative; use a polynomial or spline basis")
+            raise InputError(
+                "functions brought along have no known derivative; use a polynomial or spline basis"
+            )
         out = np.empty((*p.shape, self.size))
         with np.errstate(all="ignore"):
             for j, (function, name) in enumerate(zip(self.functions, self.names, strict=True)):
                 values = np.asarray(function(p), dtype=float)
                 if values.shape not in (p.shape, ()) or not np.isfinite(values).all():
                     raise InputError(
-                        f"function {name}: expected finite numbers of shape {p.shape} on [{self.low:g}, {self.high:g}], got shape "
-                        f"{values.shape}" + ("" if np.isfinite(values).all() else " with entries that are not finite")
+                        f"function {name}: expected finite numbers of shape {p.shape} on"
+                        f" [{self.low:g}, {self.high:g}], got shape {values.shape}"
+                        + ("" if np.isfinite(values).all() else " with entries that are not finite")
                     )
                 out[..., j] = values
         return out
 
     def pieces(self) -> tuple[Piece, ...]:
         """Raises `InputError`: nothing says these functions are polynomials."""
-        raise InputError("functions brought along are not known to be piecewise polynomial; identify with a polynomial or spline basis")
+        raise InputError(
+            "functions brought along are not known to be piecewise polynomial; identify with a"
+            " polynomial or spline basis"
+        )

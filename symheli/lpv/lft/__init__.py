@@ -1,4 +1,6 @@
-"""Linear fractional transformations: the value, its algebra, reduction, sampling, and the way from and to polynomials."""
+"""Linear fractional transformations: the value, its algebra, reduction, sampling, and the way from
+and to polynomials.
+"""
 
 from symheli.lpv.lft.algebra import append, feedback, parallel, series
 from symheli.lpv.lft.interconnection import connect
@@ -8,4 +10,16 @@ from symheli.lpv.lft.sampling import HoldError
 from symheli.lpv.lft.truncation import Truncation
 from symheli.lpv.lft.well_posed import WellPosedness
 
-__all__ = ["LFT", "Block", "HoldError", "Truncation", "WellPosedness", "append", "connect", "expanded", "feedback", "parallel", "series"]
+__all__ = [
+    "LFT",
+    "Block",
+    "HoldError",
+    "Truncation",
+    "WellPosedness",
+    "append",
+    "connect",
+    "expanded",
+    "feedback",
+    "parallel",
+    "series",
+]

@@ -1,4 +1,6 @@
-"""Algebra of LFTs: side by side, in series, in parallel, in feedback, the star product. Everything is one constant closure."""
+"""Algebra of LFTs: side by side, in series, in parallel, in feedback, the star product. Everything
+is one constant closure.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ from symheli.lpv.signal import Signal
 
 
 def append(*systems: System) -> LFT:
-    """Side by side: states, inputs and outputs one after the other, a parameter of several systems in one block.
+    """Side by side: states, inputs and outputs one after the other, a parameter of several systems
+    in one block.
 
     A name that comes again gets the number of its system: phi, phi_2.
     """
@@ -28,7 +31,11 @@ def append(*systems: System) -> LFT:
         raise InputError("append needs at least one system")
     dt = _sample_period(lfts)
     parameters = _parameters(lfts)
-    rows: list[list[tuple[int, int]]] = [[], [], []]  # (system, row) of the parameter loop, the states, the outputs
+    rows: list[list[tuple[int, int]]] = [
+        [],
+        [],
+        [],
+    ]  # (system, row) of the parameter loop, the states, the outputs
     columns: list[list[tuple[int, int]]] = [[], [], []]
     for k, lft in enumerate(lfts):
         for axis, last in ((rows, lft.outputs), (columns, lft.inputs)):
@@ -47,32 +54,59 @@ def append(*systems: System) -> LFT:
         mine_rows = [i for i, (system, _) in enumerate(place_rows) if system == k]
         mine_columns = [j for j, (system, _) in enumerate(place_columns) if system == k]
         M[np.ix_(mine_rows, mine_columns)] = whole[
-            np.ix_([place_rows[i][1] for i in mine_rows], [place_columns[j][1] for j in mine_columns])
+            np.ix_(
+                [place_rows[i][1] for i in mine_rows], [place_columns[j][1] for j in mine_columns]
+            )
         ]
     blocks = tuple(Block(s, sum(len(_where(lft, s.name)) for lft in lfts)) for s in parameters)
     n = sum(block.size for block in blocks)
     return LFT(
-        M[:n, :n], M[:n, n:], M[n:, :n], M[n:, n:], blocks, _distinct([lft.states for lft in lfts]),
-        _distinct([lft.inputs for lft in lfts]), _distinct([lft.outputs for lft in lfts]), dt,
-    )  # fmt: skip
+        M[:n, :n],
+        M[:n, n:],
+        M[n:, :n],
+        M[n:, n:],
+        blocks,
+        _distinct([lft.states for lft in lfts]),
+        _distinct([lft.inputs for lft in lfts]),
+        _distinct([lft.outputs for lft in lfts]),
+        dt,
+    )
 
 
-def close(lft: LFT, K: Array, E: Array, F: Array, inputs: Sequence[Signal], outputs: Sequence[Signal]) -> LFT:
-    """The system with u = K y + E r and the outputs F y; r and F y are called `inputs` and `outputs`.
+def close(
+    lft: LFT, K: Array, E: Array, F: Array, inputs: Sequence[Signal], outputs: Sequence[Signal]
+) -> LFT:
+    """The system with u = K y + E r and the outputs F y; r and F y are called `inputs` and
+    `outputs`.
 
-    Loops through D and through the parameters are solved exactly. Raises `InputError` where the loop is singular at the
-    middle of the parameters.
+    Loops through D and through the parameters are solved exactly. Raises `InputError` where the
+    loop is singular at the middle of the parameters.
     """
     nx, n = len(lft.states), lft.order
     D = lft.M22[nx:, nx:]
     loop = np.eye(len(lft.inputs)) - K @ D
     if is_singular(loop):
-        raise InputError("the loop is not well posed: I - K D is singular at the middle of the parameter range")
+        raise InputError(
+            "the loop is not well posed: I - K D is singular at the middle of the parameter range"
+        )
     left = np.block([[lft.M11, lft.M12[:, :nx]], [lft.M21[:nx], lft.M22[:nx, :nx]]])
-    B, C = np.vstack([lft.M12[:, nx:], lft.M22[:nx, nx:]]), np.hstack([lft.M21[nx:], lft.M22[nx:, :nx]])
+    B, C = (
+        np.vstack([lft.M12[:, nx:], lft.M22[:nx, nx:]]),
+        np.hstack([lft.M21[nx:], lft.M22[nx:, :nx]]),
+    )
     KC, N = np.linalg.solve(loop, K @ C), np.linalg.solve(loop, E)
     whole = np.block([[left + B @ KC, B @ N], [F @ (C + D @ KC), F @ D @ N]])
-    return LFT(whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:], lft.blocks, lft.states, tuple(inputs), tuple(outputs), lft.dt)
+    return LFT(
+        whole[:n, :n],
+        whole[:n, n:],
+        whole[n:, :n],
+        whole[n:, n:],
+        lft.blocks,
+        lft.states,
+        tuple(inputs),
+        tuple(outputs),
+        lft.dt,
+    )
 
 
 def series(first: System, second: System) -> LFT:
@@ -80,7 +114,10 @@ def series(first: System, second: System) -> LFT:
     first, second = as_lft(first), as_lft(second)
     ny, nu = len(first.outputs), len(first.inputs)
     if len(second.inputs) != ny:
-        raise InputError(f"series connection needs as many inputs ({len(second.inputs)}) as outputs of the other ({ny})")
+        raise InputError(
+            f"series connection needs as many inputs ({len(second.inputs)}) as outputs of the other"
+            f" ({ny})"
+        )
     both = append(first, second)
     K, E = np.zeros((len(both.inputs), len(both.outputs))), np.zeros((len(both.inputs), nu))
     K[nu:, :ny], E[:nu] = np.eye(ny), np.eye(nu)
@@ -93,7 +130,8 @@ def parallel(first: System, second: System) -> LFT:
     nu, ny = len(first.inputs), len(first.outputs)
     if (len(second.inputs), len(second.outputs)) != (nu, ny):
         raise InputError(
-            f"parallel connection needs equal numbers of inputs and outputs, got {nu}, {ny} and {len(second.inputs)}, {len(second.outputs)}"
+            f"parallel connection needs equal numbers of inputs and outputs, got {nu}, {ny} and"
+            f" {len(second.inputs)}, {len(second.outputs)}"
         )
     both = append(first, second)
     E, F = np.vstack([np.eye(nu), np.eye(nu)]), np.hstack([np.eye(ny), np.eye(ny)])
@@ -106,12 +144,15 @@ def feedback(plant: System, controller: System, sign: float = -1.0) -> LFT:
     nu, ny = len(plant.inputs), len(plant.outputs)
     if (len(controller.inputs), len(controller.outputs)) != (ny, nu):
         raise InputError(
-            f"expected a controller with {ny} input(s) and {nu} output(s), got {len(controller.inputs)} and {len(controller.outputs)}"
+            f"expected a controller with {ny} input(s) and {nu} output(s), got"
+            f" {len(controller.inputs)} and {len(controller.outputs)}"
         )
     both = append(plant, controller)
     K = np.zeros((nu + ny, ny + nu))
     K[:nu, ny:], K[nu:, :ny] = sign * np.eye(nu), np.eye(ny)
-    return close(both, K, np.eye(nu + ny)[:, :nu], np.eye(ny + nu)[:ny], plant.inputs, plant.outputs)
+    return close(
+        both, K, np.eye(nu + ny)[:, :nu], np.eye(ny + nu)[:ny], plant.inputs, plant.outputs
+    )
 
 
 def star(upper: LFT, lower: System, outputs: int, inputs: int | None) -> LFT:
@@ -119,13 +160,18 @@ def star(upper: LFT, lower: System, outputs: int, inputs: int | None) -> LFT:
     lower = as_lft(lower)
     inputs = len(lower.outputs) if inputs is None else inputs
     nu, ny = len(upper.inputs), len(upper.outputs)
-    if not (0 <= outputs <= min(ny, len(lower.inputs)) and 0 <= inputs <= min(nu, len(lower.outputs))):
+    if not (
+        0 <= outputs <= min(ny, len(lower.inputs)) and 0 <= inputs <= min(nu, len(lower.outputs))
+    ):
         raise InputError(
-            f"star product: {outputs} of {ny} outputs cannot feed {len(lower.inputs)} inputs, or {inputs} of {len(lower.outputs)} outputs "
-            f"of the other cannot feed {nu} inputs; a series connection needs as many inputs as outputs of the other"
+            f"star product: {outputs} of {ny} outputs cannot feed {len(lower.inputs)} inputs, or"
+            f" {inputs} of {len(lower.outputs)} outputs of the other cannot feed {nu} inputs; a"
+            " series connection needs as many inputs as outputs of the other"
         )
     if outputs == 0 and inputs != nu:
-        raise InputError(f"series connection needs as many inputs ({nu}) as outputs of the other ({inputs})")
+        raise InputError(
+            f"series connection needs as many inputs ({nu}) as outputs of the other ({inputs})"
+        )
     both = append(upper, lower)
     K = np.zeros((len(both.inputs), len(both.outputs)))
     K[nu : nu + outputs, ny - outputs : ny] = np.eye(outputs)
@@ -151,12 +197,21 @@ def over_range(lft: LFT, scheduling: Scheduling) -> LFT:
     a[here], b[here] = (scheduling.middle - old.middle) / old.radius, scheduling.radius / old.radius
     loop = np.eye(lft.order) - lft.M11 * a
     if is_singular(loop):
-        raise InputError(f"the parameter loop is singular at the middle of the new range of {scheduling.name}; see .well_posed()")
+        raise InputError(
+            f"the parameter loop is singular at the middle of the new range of {scheduling.name};"
+            " see .well_posed()"
+        )
     M11, M12 = np.linalg.solve(loop, lft.M11), np.linalg.solve(loop, lft.M12)
-    blocks = tuple(Block(scheduling if block.scheduling is old else block.scheduling, block.size) for block in lft.blocks)
-    # w = (a + b delta') z: the outputs see M21 (a z + b w'), and z = M11 b w' + M12 v after the constant part is closed
+    blocks = tuple(
+        Block(scheduling if block.scheduling is old else block.scheduling, block.size)
+        for block in lft.blocks
+    )
+    # w = (a + b delta') z: the outputs see M21 (a z + b w'), and z = M11 b w' + M12 v after the
+    # constant part is closed
     M21 = lft.M21 * b + (lft.M21 * a) @ (M11 * b)
-    return replace(lft, M11=M11 * b, M12=M12, M21=M21, M22=lft.M22 + (lft.M21 * a) @ M12, blocks=blocks)
+    return replace(
+        lft, M11=M11 * b, M12=M12, M21=M21, M22=lft.M22 + (lft.M21 * a) @ M12, blocks=blocks
+    )
 
 
 def _sample_period(lfts: Sequence[LFT]) -> float | None:
@@ -164,8 +219,9 @@ def _sample_period(lfts: Sequence[LFT]) -> float | None:
     given = [lft.dt for lft in lfts if lft.states or lft.dt is not None]
     if not all(same_period(dt, given[0]) for dt in given):
         raise InputError(
-            f"systems must share one sample period, got {', '.join('continuous' if dt is None else f'{dt:g} s' for dt in given)}; "
-            "discretize the continuous ones first"
+            "systems must share one sample period, got"
+            f" {', '.join('continuous' if dt is None else f'{dt:g} s' for dt in given)}; discretize"
+            " the continuous ones first"
         )
     return given[0] if given else None
 
@@ -175,15 +231,20 @@ def _parameters(lfts: Sequence[LFT]) -> list[Scheduling]:
     for s in chain(*(lft.parameters for lft in lfts)):
         if found.setdefault(s.name, s) != s:
             raise InputError(
-                f"two systems schedule on {s.name} with different ranges, units or rates: {found[s.name]} and {s}; "
-                "bring both to one with with_scheduling, or rename one"
+                f"two systems schedule on {s.name} with different ranges, units or rates:"
+                f" {found[s.name]} and {s}; bring both to one with with_scheduling, or rename one"
             )
     return list(found.values())
 
 
 def _where(lft: LFT, name: str) -> list[int]:
     """Rows of the parameter loop that belong to the parameter of this name."""
-    return [i for block, part in zip(lft.blocks, parts(lft.sizes), strict=True) if block.scheduling.name == name for i in _range(part)]
+    return [
+        i
+        for block, part in zip(lft.blocks, parts(lft.sizes), strict=True)
+        if block.scheduling.name == name
+        for i in _range(part)
+    ]
 
 
 def _range(part: slice) -> range:

@@ -14,12 +14,18 @@ from symheli.lpv.lft.systems import System, as_lft
 from symheli.lpv.signal import Signal
 
 
-def connect(*systems: System, inputs: Sequence[str], outputs: Sequence[str], sums: Mapping[str, Mapping[str, float]] | None = None) -> LFT:
+def connect(
+    *systems: System,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    sums: Mapping[str, Mapping[str, float]] | None = None,
+) -> LFT:
     """One system of several: an input takes the output, or the external input, that has its name.
 
-    `sums` gives an input another source, {input: {signal: gain, ...}} with outputs and external `inputs` as signals.
-    `outputs` are outputs of the systems: LFTs, linear models, polynomial LPV models, systems of python-control. Units of connected
-    signals must agree. Raises `InputError` where an input is left open, an output name is used twice, or a loop is singular.
+    `sums` gives an input another source, {input: {signal: gain, ...}} with outputs and external
+    `inputs` as signals. `outputs` are outputs of the systems: LFTs, linear models, polynomial LPV
+    models, systems of python-control. Units of connected signals must agree. Raises `InputError`
+    where an input is left open, an output name is used twice, or a loop is singular.
     """
     lfts = [as_lft(s, by_name=True) for s in systems]
     whole = append(*lfts)
@@ -27,20 +33,31 @@ def connect(*systems: System, inputs: Sequence[str], outputs: Sequence[str], sum
     given_outputs = list(chain(*(s.outputs for s in lfts)))
     twice = sorted({str(y) for y in given_outputs if given_outputs.count(y) > 1})
     if twice:
-        raise InputError(f"several systems have an output called {', '.join(twice)}; rename all but one")
+        raise InputError(
+            f"several systems have an output called {', '.join(twice)}; rename all but one"
+        )
     sums = dict(sums or {})
     for name in sums:
         if name not in given_inputs:
             raise UnknownNameError("input", name, sorted(set(map(str, given_inputs))))
     external = [_external(name, given_inputs) for name in inputs]
     known = [*given_outputs, *external]
-    K, E = np.zeros((len(given_inputs), len(given_outputs))), np.zeros((len(given_inputs), len(external)))
+    K, E = (
+        np.zeros((len(given_inputs), len(given_outputs))),
+        np.zeros((len(given_inputs), len(external))),
+    )
     for i, u in enumerate(given_inputs):
         if u not in sums and u not in known:
-            raise InputError(f"nothing feeds the input {u!s}: no output or external input has that name, nor does sums mention it")
+            raise InputError(
+                f"nothing feeds the input {u!s}: no output or external input has that name, nor"
+                " does sums mention it"
+            )
         both = [name for name in (u,) if u not in sums and u in given_outputs and u in external]
         if both:
-            raise InputError(f"the input {u!s} could be fed by an output or by an external input of that name; say which in sums")
+            raise InputError(
+                f"the input {u!s} could be fed by an output or by an external input of that name;"
+                " say which in sums"
+            )
         for name, gain in sums.get(str(u), {str(u): 1.0}).items():
             if name not in known:
                 raise UnknownNameError("output or external input", name, sorted(map(str, known)))
@@ -56,7 +73,9 @@ def connect(*systems: System, inputs: Sequence[str], outputs: Sequence[str], sum
         if name not in given_outputs:
             raise UnknownNameError("output", name, sorted(map(str, given_outputs)))
         F[row, given_outputs.index(name)] = 1.0  # type: ignore[arg-type]
-    return close(whole, K, E, F, external, [given_outputs[given_outputs.index(name)] for name in outputs])  # type: ignore[arg-type]
+    return close(
+        whole, K, E, F, external, [given_outputs[given_outputs.index(name)] for name in outputs]
+    )  # type: ignore[arg-type]
 
 
 def _external(name: str, inputs: Sequence[Signal]) -> Signal:
@@ -69,4 +88,7 @@ def _external(name: str, inputs: Sequence[Signal]) -> Signal:
 
 def _same_unit(one: Signal, other: Signal) -> None:
     if one.unit != other.unit:
-        raise InputError(f"{one!s} is in {one.unit} on one side and in {other.unit} on the other; convert with a gain in sums")
+        raise InputError(
+            f"{one!s} is in {one.unit} on one side and in {other.unit} on the other; convert with a"
+            " gain in sums"
+        )

@@ -1,4 +1,6 @@
-"""Linear fractional transformations: a constant matrix closed by blocks of scheduling parameters."""
+"""Linear fractional transformations: a constant matrix closed by blocks of scheduling
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -36,11 +38,13 @@ def parts(sizes: Sequence[int]) -> list[slice]:
 
 @dataclass(frozen=True, eq=False)
 class LFT:
-    """M(delta) = M22 + M21 Delta (I - M11 Delta)^-1 M12 = [A B; C D], Delta = diag(delta_i I_ni), |delta_i| <= 1.
+    """M(delta) = M22 + M21 Delta (I - M11 Delta)^-1 M12 = [A B; C D], Delta = diag(delta_i I_ni),
+    |delta_i| <= 1.
 
-    The upper loop of a constant matrix with normalised scheduling parameters: `M11` (n, n), `M12` (n, nx + nu),
-    `M21` (nx + ny, n), `M22` (nx + ny, nx + nu) with n = `order` = sum of the block sizes, one block a parameter.
-    dx/dt = A x + B u, y = C x + D u (dt None), or x(k+1) = A x + B u (dt in s).
+    The upper loop of a constant matrix with normalised scheduling parameters: `M11` (n, n), `M12`
+    (n, nx + nu), `M21` (nx + ny, n), `M22` (nx + ny, nx + nu) with n = `order` = sum of the block
+    sizes, one block a parameter. dx/dt = A x + B u, y = C x + D u (dt None), or x(k+1) = A x + B u
+    (dt in s).
     """
 
     M11: Array
@@ -59,10 +63,18 @@ class LFT:
         object.__setattr__(self, "blocks", tuple(Block(*block) for block in self.blocks))
         names = [block.scheduling.name for block in self.blocks]
         if len(set(names)) != len(names):
-            raise InputError(f"one block a parameter, got {', '.join(names)}; order the rows so that a parameter has one block")
+            raise InputError(
+                f"one block a parameter, got {', '.join(names)}; order the rows so that a parameter"
+                " has one block"
+            )
         n = self.order
         rows, columns = len(self.states) + len(self.outputs), len(self.states) + len(self.inputs)
-        for name, shape in (("M11", (n, n)), ("M12", (n, columns)), ("M21", (rows, n)), ("M22", (rows, columns))):
+        for name, shape in (
+            ("M11", (n, n)),
+            ("M12", (n, columns)),
+            ("M21", (rows, n)),
+            ("M22", (rows, columns)),
+        ):
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
         if self.dt is not None and not self.dt > 0:
             raise InputError(f"dt must be a positive number of seconds or None, got {self.dt}")
@@ -78,11 +90,19 @@ class LFT:
 
     @classmethod
     def polynomial(
-        cls, A: Mapping[Any, Any], B: Mapping[Any, Any], C: Mapping[Any, Any], D: Mapping[Any, Any], parameters: Sequence[Scheduling],
-        dt: float | None = None, states: Sequence[str] | None = None, inputs: Sequence[str] | None = None,
+        cls,
+        A: Mapping[Any, Any],
+        B: Mapping[Any, Any],
+        C: Mapping[Any, Any],
+        D: Mapping[Any, Any],
+        parameters: Sequence[Scheduling],
+        dt: float | None = None,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
-    ) -> LFT:  # fmt: skip
-        """Polynomials in several parameters: {(0, 0): A00, (1, 0): A10, (0, 2): A02, ...}, exponents in the order of `parameters`.
+    ) -> LFT:
+        """Polynomials in several parameters: {(0, 0): A00, (1, 0): A10, (0, 2): A02, ...},
+        exponents in the order of `parameters`.
 
         The parameters are in physical units. Not yet reduced. Names default to x1.., u1.., y1...
         """
@@ -99,8 +119,12 @@ class LFT:
         return cls(none, M12, M21, M22, (), model.states, model.inputs, model.outputs, model.dt)
 
     @classmethod
-    def parameter(cls, scheduling: Scheduling, input: str, output: str, dt: float | None = None) -> LFT:
-        """y = p u without states, the brick of rational models: `connect` makes 1/p of it, p^2, and so on."""
+    def parameter(
+        cls, scheduling: Scheduling, input: str, output: str, dt: float | None = None
+    ) -> LFT:
+        """y = p u without states, the brick of rational models: `connect` makes 1/p of it, p^2, and
+        so on.
+        """
         one = np.array([[1.0]])
         blocks = (Block(scheduling, 1),)
         return cls(
@@ -136,7 +160,9 @@ class LFT:
     def scheduling(self) -> Scheduling:
         """The parameter, where there is one; raises `InputError` otherwise."""
         if len(self.blocks) != 1:
-            raise InputError(f"this LFT has {len(self.blocks)} parameters: {self._names()}; use .parameters")
+            raise InputError(
+                f"this LFT has {len(self.blocks)} parameters: {self._names()}; use .parameters"
+            )
         return self.blocks[0].scheduling
 
     def normalised(self, *p: float, **named: float) -> Array:
@@ -146,7 +172,10 @@ class LFT:
             if name not in names:
                 raise UnknownNameError("scheduling parameter", name, names)
         if len(p) + len(named) != len(names) or any(name in named for name in names[: len(p)]):
-            raise InputError(f"expected {len(names)} parameter value(s) ({self._names()}), got {len(p) + len(named)}")
+            raise InputError(
+                f"expected {len(names)} parameter value(s) ({self._names()}), got"
+                f" {len(p) + len(named)}"
+            )
         values = [*p, *(named[name] for name in names[len(p) :])]
         pairs = zip(self.parameters, values, strict=True)
         return np.array([s.normalised(s.check(value)) for s, value in pairs])
@@ -155,34 +184,58 @@ class LFT:
         """[A B; C D] at normalised parameters `delta` (..., m), shape (..., nx + ny, nx + nu)."""
         delta = np.atleast_1d(frozen(delta, "delta"))
         if delta.shape[-1] != len(self.blocks):
-            raise InputError(f"expected {len(self.blocks)} normalised parameter(s), got shape {delta.shape}")
+            raise InputError(
+                f"expected {len(self.blocks)} normalised parameter(s), got shape {delta.shape}"
+            )
         D = np.repeat(delta, self.sizes, axis=-1)
         try:
             inner = np.linalg.solve(
-                np.eye(self.order) - self.M11 * D[..., None, :], np.broadcast_to(self.M12, (*D.shape, self.M12.shape[1]))
+                np.eye(self.order) - self.M11 * D[..., None, :],
+                np.broadcast_to(self.M12, (*D.shape, self.M12.shape[1])),
             )
         except np.linalg.LinAlgError as error:
-            raise InputError("the parameter loop is not well posed there: I - M11 Delta is singular; see .well_posed()") from error
+            raise InputError(
+                "the parameter loop is not well posed there: I - M11 Delta is singular; see"
+                " .well_posed()"
+            ) from error
         return self.M22 + self.M21 @ (D[..., :, None] * inner)
 
     def matrices(self, p: object) -> Matrices:
-        """A, B, C, D at physical p: (...,) with one parameter, (..., m) with several; the axes of p come first."""
+        """A, B, C, D at physical p: (...,) with one parameter, (..., m) with several; the axes of p
+        come first.
+        """
         p = frozen(p, "scheduling parameters")
         if len(self.blocks) == 1:
             p = p[..., None]
         if not p.ndim or p.shape[-1] != len(self.blocks):
-            raise InputError(f"expected the {len(self.blocks)} parameters ({self._names()}) along the last axis, got shape {p.shape}")
+            raise InputError(
+                f"expected the {len(self.blocks)} parameters ({self._names()}) along the last axis,"
+                f" got shape {p.shape}"
+            )
         delta = [s.normalised(s.check(p[..., i])) for i, s in enumerate(self.parameters)]
         M, nx = self.matrix(np.stack(delta, axis=-1) if delta else p), len(self.states)
         return Matrices(M[..., :nx, :nx], M[..., :nx, nx:], M[..., nx:, :nx], M[..., nx:, nx:])
 
     def at(self, *p: float, **named: float) -> LinearModel:
-        """The model frozen at p (physical units), in the order of the blocks or by name: at(5.0, 8.0), at(airspeed=5, mass=8)."""
+        """The model frozen at p (physical units), in the order of the blocks or by name: at(5.0,
+        8.0), at(airspeed=5, mass=8).
+        """
         M, nx = self.matrix(self.normalised(*p, **named)), len(self.states)
-        return LinearModel(M[:nx, :nx], M[:nx, nx:], M[nx:, :nx], M[nx:, nx:], self.states, self.inputs, self.outputs, dt=self.dt)
+        return LinearModel(
+            M[:nx, :nx],
+            M[:nx, nx:],
+            M[nx:, :nx],
+            M[nx:, nx:],
+            self.states,
+            self.inputs,
+            self.outputs,
+            dt=self.dt,
+        )
 
     def well_posed(self, boxes: int = 4000) -> WellPosedness:
-        """Whether I - M11 Delta is invertible over the whole box; at most `boxes` cells are looked at."""
+        """Whether I - M11 Delta is invertible over the whole box; at most `boxes` cells are looked
+        at.
+        """
         from symheli.lpv.lft.well_posed import well_posed
 
         return well_posed(self, boxes)
@@ -190,50 +243,90 @@ class LFT:
     # -- the same model in other clothes
 
     def with_scheduling(self, scheduling: Scheduling) -> LFT:
-        """The same model with the parameter of that name over another range or with another rate; exact."""
+        """The same model with the parameter of that name over another range or with another rate;
+        exact.
+        """
         from symheli.lpv.lft.algebra import over_range
 
         return over_range(self, scheduling)
 
     def rename(self, names: Mapping[str, str]) -> LFT:
         """States, inputs, outputs and parameters under new names {old: new}; units stay."""
-        groups = {group: [str(s) for s in getattr(self, group)] for group in ("states", "inputs", "outputs")}
-        known = {name for group in groups.values() for name in group} | {s.name for s in self.parameters}
+        groups = {
+            group: [str(s) for s in getattr(self, group)]
+            for group in ("states", "inputs", "outputs")
+        }
+        known = {name for group in groups.values() for name in group} | {
+            s.name for s in self.parameters
+        }
         for name in names:
             if name not in known:
                 raise UnknownNameError("signal or parameter", name, sorted(known))
-        new = {group: tuple(Signal(names.get(s, s), s.unit) for s in getattr(self, group)) for group in groups}
-        blocks = tuple(Block(replace(b.scheduling, name=names.get(b.scheduling.name, b.scheduling.name)), b.size) for b in self.blocks)
+        new = {
+            group: tuple(Signal(names.get(s, s), s.unit) for s in getattr(self, group))
+            for group in groups
+        }
+        blocks = tuple(
+            Block(
+                replace(b.scheduling, name=names.get(b.scheduling.name, b.scheduling.name)), b.size
+            )
+            for b in self.blocks
+        )
         return replace(self, blocks=blocks, **new)
 
-    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LFT:
+    def select(
+        self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+    ) -> LFT:
         """Keep these inputs and outputs, in this order; every state stays."""
         nx = len(self.states)
-        columns = [*range(nx), *(nx + i for i in indices(self.inputs if inputs is None else inputs, self.inputs, "input"))]
-        rows = [*range(nx), *(nx + i for i in indices(self.outputs if outputs is None else outputs, self.outputs, "output"))]
+        columns = [
+            *range(nx),
+            *(
+                nx + i
+                for i in indices(self.inputs if inputs is None else inputs, self.inputs, "input")
+            ),
+        ]
+        rows = [
+            *range(nx),
+            *(
+                nx + i
+                for i in indices(
+                    self.outputs if outputs is None else outputs, self.outputs, "output"
+                )
+            ),
+        ]
         return replace(
-            self, M12=self.M12[:, columns], M21=self.M21[rows], M22=self.M22[np.ix_(rows, columns)],
-            inputs=tuple(self.inputs[i - nx] for i in columns[nx:]), outputs=tuple(self.outputs[i - nx] for i in rows[nx:]),
-        )  # fmt: skip
+            self,
+            M12=self.M12[:, columns],
+            M21=self.M21[rows],
+            M22=self.M22[np.ix_(rows, columns)],
+            inputs=tuple(self.inputs[i - nx] for i in columns[nx:]),
+            outputs=tuple(self.outputs[i - nx] for i in rows[nx:]),
+        )
 
     def reduce(self, tolerance: float = 1e-12) -> LFT:
-        """The same model with fewer copies of the parameters: minimal for one parameter, structured Kalman for several.
+        """The same model with fewer copies of the parameters: minimal for one parameter, structured
+        Kalman for several.
 
-        What is below `tolerance` of the size that its row and column give an entry counts as rounding.
+        What is below `tolerance` of the size that its row and column give an entry counts as
+        rounding.
         """
         from symheli.lpv.lft.reduction import reduce
 
         return reduce(self, tolerance)
 
     def truncate(self, error: float | None = None, *, order: int | None = None) -> Truncation:
-        """Fewer copies at the price of an error, which is measured and, where possible, bounded; see `Truncation`."""
+        """Fewer copies at the price of an error, which is measured and, where possible, bounded;
+        see `Truncation`.
+        """
         from symheli.lpv.lft.truncation import truncate
 
         return truncate(self, error, order)
 
     def star(self, other: Any, outputs: int = 0, inputs: int | None = None) -> LFT:
-        """Redheffer star product: the last `outputs` outputs feed the first inputs of `other`, whose first `inputs` outputs
-        feed the last inputs here. By default series connection, y = self(other(u)).
+        """Redheffer star product: the last `outputs` outputs feed the first inputs of `other`,
+        whose first `inputs` outputs feed the last inputs here. By default series connection, y =
+        self(other(u)).
 
         States are kept side by side, a parameter of both is one block.
         """
@@ -242,22 +335,32 @@ class LFT:
         return star(self, other, outputs, inputs)
 
     def feedback(self, gains: Mapping[tuple[str, str], float]) -> LFT:
-        """Close u_i = gain * y_j + (new u_i) for each {(input, output): gain}; for a dynamic controller see `connect`."""
+        """Close u_i = gain * y_j + (new u_i) for each {(input, output): gain}; for a dynamic
+        controller see `connect`.
+        """
         from symheli.lpv.lft.algebra import close
 
         K = np.zeros((len(self.inputs), len(self.outputs)))
         for (u, y), gain in gains.items():
-            K[indices([u], self.inputs, "input")[0], indices([y], self.outputs, "output")[0]] = float(gain)
-        return close(self, K, np.eye(len(self.inputs)), np.eye(len(self.outputs)), self.inputs, self.outputs)
+            K[indices([u], self.inputs, "input")[0], indices([y], self.outputs, "output")[0]] = (
+                float(gain)
+            )
+        return close(
+            self, K, np.eye(len(self.inputs)), np.eye(len(self.outputs)), self.inputs, self.outputs
+        )
 
     def discretize(self, dt: float) -> LFT:
-        """Tustin's rule, exact in the parameters: the trapezoidal rule of the time-varying model at samples `dt` s apart."""
+        """Tustin's rule, exact in the parameters: the trapezoidal rule of the time-varying model at
+        samples `dt` s apart.
+        """
         from symheli.lpv.lft.sampling import tustin
 
         return tustin(self, dt)
 
     def hold_error(self, dt: float, *, band: float = 0.25) -> HoldError:
-        """How far Tustin's rule is from the zero-order hold, for frozen p, up to `band` of the Nyquist frequency."""
+        """How far Tustin's rule is from the zero-order hold, for frozen p, up to `band` of the
+        Nyquist frequency.
+        """
         from symheli.lpv.lft.sampling import hold_error
 
         return hold_error(self, dt, band)

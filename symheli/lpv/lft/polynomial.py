@@ -23,11 +23,16 @@ ROUNDING = 16 * np.finfo(float).eps
 def from_lpv(lpv: LPVStateSpace) -> LFT:
     """M(delta) = M_0 + delta M_1 + ... + delta^d M_d by Horner's rule: order d (nx + nu), exact."""
     if not isinstance(lpv.basis, Polynomial):
-        raise InputError("an LFT needs polynomial (or rational) dependence; interpolate with kind='polynomial' first")
+        raise InputError(
+            "an LFT needs polynomial (or rational) dependence; interpolate with kind='polynomial'"
+            " first"
+        )
     stacked = np.block([[lpv.A, lpv.B], [lpv.C, lpv.D]])
     if (lpv.basis.low, lpv.basis.high) != (lpv.scheduling.low, lpv.scheduling.high):
         inner = Polynomial(lpv.basis.degree, lpv.scheduling.low, lpv.scheduling.high)
-        nodes = lpv.scheduling.middle + lpv.scheduling.radius * np.cos(np.pi * (np.arange(inner.size) + 0.5) / inner.size)
+        nodes = lpv.scheduling.middle + lpv.scheduling.radius * np.cos(
+            np.pi * (np.arange(inner.size) + 0.5) / inner.size
+        )
         stacked = inner.fit(nodes, np.tensordot(lpv.basis(nodes), stacked, axes=1))
     power = Polynomial(lpv.basis.degree, -1.0, 1.0).to_monomial(stacked)
     coefficients = {(i,): M for i, M in enumerate(power)}
@@ -35,12 +40,22 @@ def from_lpv(lpv: LPVStateSpace) -> LFT:
 
 
 def from_monomials(
-    A: Mapping[Any, Any], B: Mapping[Any, Any], C: Mapping[Any, Any], D: Mapping[Any, Any], parameters: Sequence[Scheduling],
-    dt: float | None, states: Sequence[str] | None, inputs: Sequence[str] | None, outputs: Sequence[str] | None,
-) -> LFT:  # fmt: skip
+    A: Mapping[Any, Any],
+    B: Mapping[Any, Any],
+    C: Mapping[Any, Any],
+    D: Mapping[Any, Any],
+    parameters: Sequence[Scheduling],
+    dt: float | None,
+    states: Sequence[str] | None,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+) -> LFT:
     """See `LFT.polynomial`."""
     parameters = tuple(parameters)
-    given = {name: _coefficients(name, M, len(parameters)) for name, M in (("A", A), ("B", B), ("C", C), ("D", D))}
+    given = {
+        name: _coefficients(name, M, len(parameters))
+        for name, M in (("A", A), ("B", B), ("C", C), ("D", D))
+    }
     (nx, _), (_, nu), (ny, _) = given["A"][0], given["B"][0], given["C"][0]
     for name, shape in (("A", (nx, nx)), ("B", (nx, nu)), ("C", (ny, nx)), ("D", (ny, nu))):
         if given[name][0] != shape:
@@ -51,23 +66,37 @@ def from_monomials(
         M = {name: matrices.get(exponents, zero[name]) for name, (_, matrices) in given.items()}
         whole[exponents] = np.block([[M["A"], M["B"]], [M["C"], M["D"]]])
     return _chains(
-        recentred(whole, [centre(s.low, s.high) for s in parameters]), parameters, signals(states or [f"x{i + 1}" for i in range(nx)]),
-        signals(inputs or [f"u{i + 1}" for i in range(nu)]), signals(outputs or [f"y{i + 1}" for i in range(ny)]), dt,
-    )  # fmt: skip
+        recentred(whole, [centre(s.low, s.high) for s in parameters]),
+        parameters,
+        signals(states or [f"x{i + 1}" for i in range(nx)]),
+        signals(inputs or [f"u{i + 1}" for i in range(nu)]),
+        signals(outputs or [f"y{i + 1}" for i in range(ny)]),
+        dt,
+    )
 
 
-def _coefficients(name: str, matrices: Mapping[Any, Any], count: int) -> tuple[tuple[int, int], dict[tuple[int, ...], Array]]:
+def _coefficients(
+    name: str, matrices: Mapping[Any, Any], count: int
+) -> tuple[tuple[int, int], dict[tuple[int, ...], Array]]:
     """(shape, {exponents: matrix}) after checking both."""
     if not isinstance(matrices, Mapping) or not matrices:
-        raise InputError(f"{name}: expected {{exponents: matrix}} with at least one entry, such as {{{(0,) * count}: {name}0}}")
+        raise InputError(
+            f"{name}: expected {{exponents: matrix}} with at least one entry, such as"
+            f" {{{(0,) * count}: {name}0}}"
+        )
     out = {}
     for key, M in matrices.items():
         exponents = tuple(key) if isinstance(key, tuple | list) else (key,)
         if len(exponents) != count or any(int(e) != e or e < 0 for e in exponents):
-            raise InputError(f"{name}: expected {count} exponent(s) >= 0, one a parameter, got {key!r}")
+            raise InputError(
+                f"{name}: expected {count} exponent(s) >= 0, one a parameter, got {key!r}"
+            )
         out[tuple(int(e) for e in exponents)] = frozen(M, f"{name}{exponents}", (None, None))
     if len({M.shape for M in out.values()}) > 1:
-        raise InputError(f"{name}: coefficient matrices differ in shape: {', '.join(str(M.shape) for M in out.values())}")
+        raise InputError(
+            f"{name}: coefficient matrices differ in shape:"
+            f" {', '.join(str(M.shape) for M in out.values())}"
+        )
     return next(iter(out.values())).shape, out  # type: ignore[return-value]
 
 
@@ -79,7 +108,9 @@ def _chains(
     outputs: Any,
     dt: float | None,
 ) -> LFT:
-    """One signal delta^a v a monomial a, made from that of the monomial before by one more factor; v is the input of M."""
+    """One signal delta^a v a monomial a, made from that of the monomial before by one more factor;
+    v is the input of M.
+    """
     m = len(parameters)
     zero: tuple[int, ...] = (0,) * m
     needed: set[tuple[int, ...]] = {zero}
@@ -101,8 +132,20 @@ def _chains(
             M11[here, j * width : (j + 1) * width] = np.eye(width)
         if exponents in coefficients:
             M21[:, here] = coefficients[exponents]
-    blocks = tuple(Block(s, width * sum(_before(e)[0] == i for e in chain)) for i, s in enumerate(parameters))
-    return LFT(M11, M12, M21, coefficients.get(zero, np.zeros((rows, width))), blocks, states, inputs, outputs, dt)
+    blocks = tuple(
+        Block(s, width * sum(_before(e)[0] == i for e in chain)) for i, s in enumerate(parameters)
+    )
+    return LFT(
+        M11,
+        M12,
+        M21,
+        coefficients.get(zero, np.zeros((rows, width))),
+        blocks,
+        states,
+        inputs,
+        outputs,
+        dt,
+    )
 
 
 def _before(exponents: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
@@ -114,9 +157,10 @@ def _before(exponents: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
 def expanded(lft: LFT) -> dict[tuple[int, ...], Array] | None:
     """{exponents: coefficient} of M in powers of delta, None where the dependence is rational.
 
-    A polynomial is one whose powers of L = M11 Delta end: exactly, as those of `LFT.polynomial` do, or, where the loop was
-    rotated (reduced, say), to rounding. Then what is left out is proven to stay below `_rounding` in the whole box, entry by entry;
-    so do the coefficients left out. Units of states, inputs, outputs and copies play no part.
+    A polynomial is one whose powers of L = M11 Delta end: exactly, as those of `LFT.polynomial` do,
+    or, where the loop was rotated (reduced, say), to rounding. Then what is left out is proven to
+    stay below `_rounding` in the whole box, entry by entry; so do the coefficients left out. Units
+    of states, inputs, outputs and copies play no part.
     """
     m, n = len(lft.blocks), lft.order
     zero: tuple[int, ...] = (0,) * m
@@ -130,14 +174,17 @@ def expanded(lft: LFT) -> dict[tuple[int, ...], Array] | None:
             out[exponents] = out.get(exponents, np.zeros_like(lft.M22)) + lft.M21 @ M @ lft.M12
         power = {e: lft.M11 @ M for e, M in fed.items()}
         bar = _rounding(lft, size)
-        if np.all(_rest(lft, size, sum((np.abs(M) for M in power.values()), np.zeros((n, n)))) <= bar):
+        if np.all(
+            _rest(lft, size, sum((np.abs(M) for M in power.values()), np.zeros((n, n)))) <= bar
+        ):
             kept = {e: np.where(np.abs(M) > bar, M, 0.0) for e, M in out.items() if e != zero}
             return {zero: lft.M22, **{e: M for e, M in kept.items() if np.any(M)}}
     return None if n else out
 
 
 def _rounding(lft: LFT, size: Array) -> Array:
-    """What M can change anywhere in the box, to first order, where every entry of M11 .. M22 changes by `ROUNDING` of itself.
+    """What M can change anywhere in the box, to first order, where every entry of M11 .. M22
+    changes by `ROUNDING` of itself.
 
     `size` bounds (I - M11 Delta)^-1 entry by entry.
     """
@@ -146,12 +193,16 @@ def _rounding(lft: LFT, size: Array) -> Array:
 
 
 def _rest(lft: LFT, size: Array, last: Array) -> Array:
-    """Bound of all that follows the k powers of L summed so far: |L^k| <= `last`, |(I - L)^-1| <= `size` (I - last)^-1."""
+    """Bound of all that follows the k powers of L summed so far: |L^k| <= `last`, |(I - L)^-1| <=
+    `size` (I - last)^-1.
+    """
     if not np.any(last):
         return np.zeros(lft.M22.shape)
     if not np.abs(np.linalg.eigvals(last)).max() < 0.5:
         return np.full(lft.M22.shape, np.inf)
-    return np.abs(lft.M21) @ size @ last @ np.linalg.solve(np.eye(lft.order) - last, np.abs(lft.M12))
+    return (
+        np.abs(lft.M21) @ size @ last @ np.linalg.solve(np.eye(lft.order) - last, np.abs(lft.M12))
+    )
 
 
 def _times_delta(word: Mapping[tuple[int, ...], Array], lft: LFT) -> dict[tuple[int, ...], Array]:
@@ -169,9 +220,16 @@ def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
     """See `LFT.to_lpv`."""
     s, nx = lft.scheduling, len(lft.states)
     terms = expanded(lft)
-    exact = None if terms is None else [terms.get((i,), np.zeros_like(lft.M22)) for i in range(max(terms)[0] + 1)]
+    exact = (
+        None
+        if terms is None
+        else [terms.get((i,), np.zeros_like(lft.M22)) for i in range(max(terms)[0] + 1)]
+    )
     if exact is None and degree is None:
-        raise InputError("this LFT depends on its parameter rationally; to_lpv(degree=...) fits polynomials and reports the misfit")
+        raise InputError(
+            "this LFT depends on its parameter rationally; to_lpv(degree=...) fits polynomials and"
+            " reports the misfit"
+        )
     if degree is not None and exact is not None and degree < len(exact) - 1:
         exact = None
     if exact is not None:
@@ -181,14 +239,27 @@ def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
     else:
         assert degree is not None  # noqa: S101 - refused above
         basis = Polynomial(degree, s.low, s.high)
-        nodes = s.middle + s.radius * np.cos(np.pi * (np.arange(8 * (degree + 1)) + 0.5) / (8 * (degree + 1)))
+        nodes = s.middle + s.radius * np.cos(
+            np.pi * (np.arange(8 * (degree + 1)) + 0.5) / (8 * (degree + 1))
+        )
         values = lft.matrix(s.normalised(nodes)[:, None])
         M = basis.fit(nodes, values)
         wrong = np.tensordot(basis(nodes), M, axes=1) - values
-        misfit = Residuals(nodes, wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:])
+        misfit = Residuals(
+            nodes, wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:]
+        )
     # the orthonormal polynomials over [-1, 1] in delta are those over [low, high] in p
     basis = Polynomial(degree, s.low, s.high)
     return LPVStateSpace(
-        basis, M[:, :nx, :nx], M[:, :nx, nx:], M[:, nx:, :nx], M[:, nx:, nx:], s, lft.states, lft.inputs, lft.outputs, dt=lft.dt,
+        basis,
+        M[:, :nx, :nx],
+        M[:, :nx, nx:],
+        M[:, nx:, :nx],
+        M[:, nx:, nx:],
+        s,
+        lft.states,
+        lft.inputs,
+        lft.outputs,
+        dt=lft.dt,
         residuals=misfit,
-    )  # fmt: skip
+    )

@@ -24,9 +24,10 @@ def reduce(lft: LFT, tolerance: float) -> LFT:
 def _one_parameter(lft: LFT, tolerance: float) -> LFT:
     """Minimal order, exactly.
 
-    M(delta) = M22 + sum_i delta^i M21 M11^(i-1) M12, so the order is the rank of the block Hankel matrix of
-    its Markov parameters, and the singular vectors realize it (Ho-Kalman). Singular values below `tolerance`
-    times the largest count as zero, as does dependence that is not `significant`.
+    M(delta) = M22 + sum_i delta^i M21 M11^(i-1) M12, so the order is the rank of the block Hankel
+    matrix of its Markov parameters, and the singular vectors realize it (Ho-Kalman). Singular
+    values below `tolerance` times the largest count as zero, as does dependence that is not
+    `significant`.
     """
     n = lft.order
     rows, columns = lft.M22.shape
@@ -40,13 +41,20 @@ def _one_parameter(lft: LFT, tolerance: float) -> LFT:
         return _projected(lft, [np.zeros((n, 0))], [np.zeros((n, 0))])
     depends = significant(np.abs(np.stack(markov)).max(axis=0), lft.M22, tolerance)
     markov = [np.where(depends, M, 0.0) for M in markov]
-    # states and channels of different size: balance rows and columns so that the rank is judged entry by entry
+    # states and channels of different size: balance rows and columns so that the rank is judged
+    # entry by entry
     size = np.abs(np.stack(markov)).max(axis=0)
     row_scale, column_scale = equilibrate(size)
     scaled = [row_scale[:, None] * M * column_scale for M in markov]
     hankel = np.block([[scaled[i + j] for j in range(depth)] for i in range(depth)])
     shifted = np.block(
-        [[scaled[i + j + 1] if i + j + 1 < len(scaled) else np.zeros((rows, columns)) for j in range(depth)] for i in range(depth)]
+        [
+            [
+                scaled[i + j + 1] if i + j + 1 < len(scaled) else np.zeros((rows, columns))
+                for j in range(depth)
+            ]
+            for i in range(depth)
+        ]
     )
     U, s, Vt = np.linalg.svd(hankel)
     r = int(np.sum(s > tolerance * s[0])) if s[0] > 0 else 0
@@ -55,14 +63,21 @@ def _one_parameter(lft: LFT, tolerance: float) -> LFT:
     M12 = root[:, None] * Vt[:r, :columns] / column_scale
     M21 = U[:rows, :r] * root / row_scale[:, None]
     # what does not depend on the parameter is cut off from it to the last bit
-    M12, M21 = np.where(np.any(depends, axis=0), M12, 0.0), np.where(np.any(depends, axis=1)[:, None], M21, 0.0)
-    return _as_much_reached_as_seen(replace(lft, M11=M11, M12=M12, M21=M21, blocks=(Block(lft.blocks[0].scheduling, r),)))
+    M12, M21 = (
+        np.where(np.any(depends, axis=0), M12, 0.0),
+        np.where(np.any(depends, axis=1)[:, None], M21, 0.0),
+    )
+    return _as_much_reached_as_seen(
+        replace(lft, M11=M11, M12=M12, M21=M21, blocks=(Block(lft.blocks[0].scheduling, r),))
+    )
 
 
 def _as_much_reached_as_seen(lft: LFT) -> LFT:
-    """Coordinates of the copies of one parameter in which its Hankel matrix is balanced, near the units the model came in.
+    """Coordinates of the copies of one parameter in which its Hankel matrix is balanced, near the
+    units the model came in.
 
-    What a small gain proves depends on coordinates, of which these are as good as any: the same however the LFT was made.
+    What a small gain proves depends on coordinates, of which these are as good as any: the same
+    however the LFT was made.
     """
     if not lft.order:
         return lft
@@ -85,14 +100,20 @@ def _as_much_reached_as_seen(lft: LFT) -> LFT:
 def _structured(lft: LFT, tolerance: float) -> LFT:
     """Remove what no input reaches and what no output sees, block by block, all blocks together.
 
-    The subspaces of each parameter's copies that words in the M11 blocks reach (and, transposed, see) are the smallest
-    realization for parameters that do not commute; parameters that do may allow fewer still. Source: Cockburn and
-    Morton, "Linear fractional representations of uncertain systems", Automatica 33 (1997). Ranks are judged in coordinates in which
-    rows, columns and copies are of one size, whatever the units.
+    The subspaces of each parameter's copies that words in the M11 blocks reach (and, transposed,
+    see) are the smallest realization for parameters that do not commute; parameters that do may
+    allow fewer still. Source: Cockburn and Morton, "Linear fractional representations of uncertain
+    systems", Automatica 33 (1997). Ranks are judged in coordinates in which rows, columns and
+    copies are of one size, whatever the units.
     """
     lft = _without_rounding(lft, tolerance)
     units = _units(lft)
-    lft = replace(lft, M11=units.copies[:, None] * lft.M11 / units.copies, M12=units.copies[:, None] * lft.M12, M21=lft.M21 / units.copies)
+    lft = replace(
+        lft,
+        M11=units.copies[:, None] * lft.M11 / units.copies,
+        M12=units.copies[:, None] * lft.M12,
+        M21=lft.M21 / units.copies,
+    )
     while True:
         seen = _reached(lft.M11.T, (units.rows[:, None] * lft.M21).T, lft.blocks, tolerance)
         smaller = _projected(lft, seen, seen)
@@ -104,7 +125,9 @@ def _structured(lft: LFT, tolerance: float) -> LFT:
 
 
 class _Units(NamedTuple):
-    """Factors that bring the rows (nx + ny,) and columns (nx + nu,) of M, and the copies (n,), to one size."""
+    """Factors that bring the rows (nx + ny,) and columns (nx + nu,) of M, and the copies (n,), to
+    one size.
+    """
 
     rows: Array
     columns: Array
@@ -112,7 +135,9 @@ class _Units(NamedTuple):
 
 
 def _samples(lft: LFT) -> Array:
-    """Points of the box (SAMPLES, m), the same every time; nearer to its middle where the loop is singular."""
+    """Points of the box (SAMPLES, m), the same every time; nearer to its middle where the loop is
+    singular.
+    """
     delta = np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, len(lft.blocks)))
     for shrink in (1.0, 0.7, 0.5, 0.2, 0.0):
         try:
@@ -124,18 +149,24 @@ def _samples(lft: LFT) -> Array:
 
 
 def _without_rounding(lft: LFT, tolerance: float) -> LFT:
-    """Rows and columns of M in which no entry depends on the parameters by more than rounding are cut off from them."""
+    """Rows and columns of M in which no entry depends on the parameters by more than rounding are
+    cut off from them.
+    """
     change = np.abs(lft.matrix(_samples(lft)) - lft.M22).max(axis=0)
     depends = significant(change, lft.M22, tolerance)
     rows, columns = np.any(depends, axis=1), np.any(depends, axis=0)
-    return replace(lft, M12=np.where(columns, lft.M12, 0.0), M21=np.where(rows[:, None], lft.M21, 0.0))
+    return replace(
+        lft, M12=np.where(columns, lft.M12, 0.0), M21=np.where(rows[:, None], lft.M21, 0.0)
+    )
 
 
 def _units(lft: LFT) -> _Units:
     delta = np.repeat(_samples(lft), lft.sizes, axis=-1)
     rows, columns = equilibrate(np.abs(lft.matrix(_samples(lft))).max(axis=0, initial=0.0))
     loop = np.eye(lft.order) - lft.M11 * delta[:, None, :]
-    reach = np.abs(np.linalg.solve(loop, np.broadcast_to(lft.M12 * columns, (len(delta), *lft.M12.shape)))).max(axis=(0, 2), initial=0.0)
+    reach = np.abs(
+        np.linalg.solve(loop, np.broadcast_to(lft.M12 * columns, (len(delta), *lft.M12.shape)))
+    ).max(axis=(0, 2), initial=0.0)
     back = np.swapaxes(np.eye(lft.order) - delta[:, :, None] * lft.M11, -1, -2)
     sight = np.broadcast_to((rows[:, None] * lft.M21).T, (len(delta), lft.order, len(rows)))
     see = np.abs(np.linalg.solve(back, sight)).max(axis=(0, 2), initial=0.0)
@@ -150,7 +181,10 @@ def _reached(M11: Array, M12: Array, blocks: tuple[Block, ...], tolerance: float
     """Orthonormal bases (n_i, r_i) of what the inputs reach in each block."""
     part = parts([block.size for block in blocks])
     scale = max(float(np.abs(M12).max(initial=0.0)), 1e-300)
-    bases = [_extended(np.zeros((block.size, 0)), M12[here], tolerance * scale) for block, here in zip(blocks, part, strict=True)]
+    bases = [
+        _extended(np.zeros((block.size, 0)), M12[here], tolerance * scale)
+        for block, here in zip(blocks, part, strict=True)
+    ]
     reach = max(float(np.abs(M11).max(initial=0.0)), 1e-300)
     while True:
         grown = []
@@ -176,7 +210,10 @@ def _extended(basis: Array, columns: Array, threshold: float) -> Array:
 def _projected(lft: LFT, left: list[Array], right: list[Array]) -> LFT:
     """The LFT with copies z_i = right_i z_i', left_i' right_i = I."""
     L, R = _diagonal(left), _diagonal(right)
-    blocks = tuple(Block(block.scheduling, basis.shape[1]) for block, basis in zip(lft.blocks, right, strict=True))
+    blocks = tuple(
+        Block(block.scheduling, basis.shape[1])
+        for block, basis in zip(lft.blocks, right, strict=True)
+    )
     return replace(lft, M11=L.T @ lft.M11 @ R, M12=L.T @ lft.M12, M21=lft.M21 @ R, blocks=blocks)
 
 

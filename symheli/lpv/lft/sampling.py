@@ -14,8 +14,10 @@ from symheli.lpv.lft.model import LFT
 
 
 class HoldError(NamedTuple):
-    """Largest difference of the frozen frequency responses, Tustin minus zero-order hold, channel by channel relative to the
-    largest response of that channel; at `p` {parameter: value} and `omega` (rad/s)."""
+    """Largest difference of the frozen frequency responses, Tustin minus zero-order hold, channel
+    by channel relative to the largest response of that channel; at `p` {parameter: value} and
+    `omega` (rad/s).
+    """
 
     relative: float
     p: dict[str, float]
@@ -23,10 +25,11 @@ class HoldError(NamedTuple):
 
 
 def tustin(lft: LFT, dt: float) -> LFT:
-    """The state becomes xi = x - dt/2 dx/dt, with xi(k+1) = xi + dt dx/dt and x = xi + dt/2 dx/dt: the trapezoidal rule.
+    """The state becomes xi = x - dt/2 dx/dt, with xi(k+1) = xi + dt dx/dt and x = xi + dt/2 dx/dt:
+    the trapezoidal rule.
 
-    The loop through the parameters stays as it is, so the order does too. Raises `InputError` where I - dt/2 A is
-    singular at the middle of the parameters.
+    The loop through the parameters stays as it is, so the order does too. Raises `InputError` where
+    I - dt/2 A is singular at the middle of the parameters.
     """
     if lft.dt is not None:
         raise InputError(f"the model is already discrete (dt = {lft.dt} s)")
@@ -42,7 +45,17 @@ def tustin(lft: LFT, dt: float) -> LFT:
     out = whole + 0.5 * dt * whole[:, state] @ slope
     out[state] = dt * slope
     out[state, state] += np.eye(nx)
-    return LFT(out[:n, :n], out[:n, n:], out[n:, :n], out[n:, n:], lft.blocks, lft.states, lft.inputs, lft.outputs, dt)
+    return LFT(
+        out[:n, :n],
+        out[:n, n:],
+        out[n:, :n],
+        out[n:, n:],
+        lft.blocks,
+        lft.states,
+        lft.inputs,
+        lft.outputs,
+        dt,
+    )
 
 
 def hold_error(lft: LFT, dt: float, band: float, points: int = 60) -> HoldError:
@@ -56,8 +69,14 @@ def hold_error(lft: LFT, dt: float, band: float, points: int = 60) -> HoldError:
     for p in product(*(np.linspace(s.low, s.high, count) for s in lft.parameters)):
         hold = lft.at(*p).discretize(dt).frequency_response(omega)
         size = np.abs(hold).max(axis=0)
-        wrong = np.abs(sampled.at(*p).frequency_response(omega) - hold) / np.where(size > 0, size, 1.0)
+        wrong = np.abs(sampled.at(*p).frequency_response(omega) - hold) / np.where(
+            size > 0, size, 1.0
+        )
         if wrong.max(initial=0.0) > worst.relative:
             k = int(np.unravel_index(wrong.argmax(), wrong.shape)[0])
-            worst = HoldError(float(wrong.max()), {s.name: float(v) for s, v in zip(lft.parameters, p, strict=True)}, float(omega[k]))
+            worst = HoldError(
+                float(wrong.max()),
+                {s.name: float(v) for s, v in zip(lft.parameters, p, strict=True)},
+                float(omega[k]),
+            )
     return worst

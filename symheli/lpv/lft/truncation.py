@@ -16,10 +16,11 @@ from symheli.lpv.lft.reduction import reduce
 
 
 class Truncation(NamedTuple):
-    """A smaller `lft`, the largest `error` found on a dense grid of the box, and a proven `bound` of it (inf: none known).
+    """A smaller `lft`, the largest `error` found on a dense grid of the box, and a proven `bound`
+    of it (inf: none known).
 
-    Both are spectral norms of the difference of [A B; C D] after rows and columns are scaled so that the largest
-    dependence in each is about one: relative errors, whatever the units.
+    Both are spectral norms of the difference of [A B; C D] after rows and columns are scaled so
+    that the largest dependence in each is about one: relative errors, whatever the units.
     """
 
     lft: LFT
@@ -30,12 +31,17 @@ class Truncation(NamedTuple):
 def truncate(lft: LFT, error: float | None, order: int | None) -> Truncation:
     """Structured balanced truncation: copies that little reaches and little sees go first.
 
-    Block-diagonal Gramians X >= M11 X M11' + M12 M12' and Y >= M11' Y M11 + M21' M21 make the error at most twice the sum
-    of the singular values cut off, for any Delta of norm one. Source: Beck, Doyle and Glover, "Model reduction of
-    multidimensional and uncertain systems", IEEE Trans. Automatic Control 41 (1996). Here they come from a linear fixed
-    point that pays a factor m for m parameters; where that diverges the factor is dropped and nothing is proven.
+    Block-diagonal Gramians X >= M11 X M11' + M12 M12' and Y >= M11' Y M11 + M21' M21 make the error
+    at most twice the sum of the singular values cut off, for any Delta of norm one. Source: Beck,
+    Doyle and Glover, "Model reduction of multidimensional and uncertain systems", IEEE Trans.
+    Automatic Control 41 (1996). Here they come from a linear fixed point that pays a factor m for m
+    parameters; where that diverges the factor is dropped and nothing is proven.
     """
-    if (error is None) == (order is None) or (error is not None and not error >= 0) or (order is not None and order < 0):
+    if (
+        (error is None) == (order is None)
+        or (error is not None and not error >= 0)
+        or (order is not None and order < 0)
+    ):
         raise InputError("give either the error allowed (>= 0) or the order wanted (>= 0)")
     whole = reduce(lft, 1e-12)
     if not whole.order:
@@ -74,21 +80,37 @@ def _balanced(lft: LFT, row: Array, column: Array) -> tuple[LFT, Array, bool]:
         proven = False
         grams = [_gramians(lft.M11, B, sizes, 1), _gramians(lft.M11.T, C.T, sizes, 1)]
     if any(g is None for g in grams):
-        raise InputError("no structured Gramians: the parameter loop is not contractive; narrow the ranges of the parameters")
-    left, right, sigma = np.zeros((lft.order, lft.order)), np.zeros((lft.order, lft.order)), np.zeros(lft.order)
+        raise InputError(
+            "no structured Gramians: the parameter loop is not contractive; narrow the ranges of"
+            " the parameters"
+        )
+    left, right, sigma = (
+        np.zeros((lft.order, lft.order)),
+        np.zeros((lft.order, lft.order)),
+        np.zeros(lft.order),
+    )
     for here, X, Y in zip(parts(sizes), *grams, strict=True):  # type: ignore[arg-type]
         root = _root(X)
         values, V = np.linalg.eigh(root.T @ Y @ root)
         s = np.sqrt(np.maximum(values, 1e-300))
         T = root @ V / np.sqrt(s)
-        right[here, here], left[here, here], sigma[here] = T, np.linalg.pinv(T), np.sqrt(np.maximum(values, 0.0))
-    return replace(lft, M11=left @ lft.M11 @ right, M12=left @ lft.M12, M21=lft.M21 @ right), sigma, proven
+        right[here, here], left[here, here], sigma[here] = (
+            T,
+            np.linalg.pinv(T),
+            np.sqrt(np.maximum(values, 0.0)),
+        )
+    return (
+        replace(lft, M11=left @ lft.M11 @ right, M12=left @ lft.M12, M21=lft.M21 @ right),
+        sigma,
+        proven,
+    )
 
 
 def _gramians(M11: Array, B: Array, sizes: tuple[int, ...], factor: int) -> list[Array] | None:
     """Fixed point of X_i = factor (sum_j M_ij X_j M_ij' + B_i B_i'), None where it diverges.
 
-    A positive semidefinite matrix of m block rows is at most m times its block diagonal: with factor m the inequality holds.
+    A positive semidefinite matrix of m block rows is at most m times its block diagonal: with
+    factor m the inequality holds.
     """
     mask = np.zeros(M11.shape)
     for part in parts(sizes):
@@ -113,7 +135,9 @@ def _root(X: Array) -> Array:
 def _kept(lft: LFT, kept: Array) -> LFT:
     sizes = [int(np.sum((kept >= part.start) & (kept < part.stop))) for part in parts(lft.sizes)]
     blocks = tuple(Block(s, size) for s, size in zip(lft.parameters, sizes, strict=True))
-    return replace(lft, M11=lft.M11[kept][:, kept], M12=lft.M12[kept], M21=lft.M21[:, kept], blocks=blocks)
+    return replace(
+        lft, M11=lft.M11[kept][:, kept], M12=lft.M12[kept], M21=lft.M21[:, kept], blocks=blocks
+    )
 
 
 def _dependence(lft: LFT) -> Array:

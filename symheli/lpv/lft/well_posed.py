@@ -12,17 +12,21 @@ from symheli.lpv.lft.model import LFT
 
 
 class WellPosedness(NamedTuple):
-    """`holds`: I - M11 Delta is invertible in the whole box (True: proven in floating point), False: it is singular at
-    `where` {parameter: physical value}, None: not decided within the cells allowed, nearest trouble at `where`."""
+    """`holds`: I - M11 Delta is invertible in the whole box (True: proven in floating point),
+    False: it is singular at `where` {parameter: physical value}, None: not decided within the cells
+    allowed, nearest trouble at `where`.
+    """
 
     holds: bool | None
     where: dict[str, float]
 
 
 def well_posed(lft: LFT, boxes: int) -> WellPosedness:
-    """Bisect the box until every cell is proven, or one is found where the determinant changes sign.
+    """Bisect the box until every cell is proven, or one is found where the determinant changes
+    sign.
 
-    About the middle c of a cell with half-widths r, I - M11 Delta is invertible where the Perron root of
+    About the middle c of a cell with half-widths r, I - M11 Delta is invertible where the Perron
+    root of
     |(I - M11 C)^-1 M11| R is below one.
     """
     m, sizes = len(lft.blocks), lft.sizes
@@ -32,7 +36,10 @@ def well_posed(lft: LFT, boxes: int) -> WellPosedness:
         if not cells:
             return WellPosedness(True, {})
         middle, half = cells.pop(0)
-        corners = [middle, *(middle + half * np.array(signs) for signs in product((-1.0, 1.0), repeat=m))]
+        corners = [
+            middle,
+            *(middle + half * np.array(signs) for signs in product((-1.0, 1.0), repeat=m)),
+        ]
         for delta in corners:
             here = np.linalg.slogdet(np.eye(lft.order) - lft.M11 * np.repeat(delta, sizes))[0]
             if here != sign:
@@ -62,10 +69,14 @@ def _crossing(lft: LFT, delta: Array, sizes: tuple[int, ...]) -> Array:
     low, high = 0.0, 1.0
     for _ in range(60):
         t = 0.5 * (low + high)
-        positive = np.linalg.slogdet(np.eye(lft.order) - lft.M11 * np.repeat(t * delta, sizes))[0] > 0
+        positive = (
+            np.linalg.slogdet(np.eye(lft.order) - lft.M11 * np.repeat(t * delta, sizes))[0] > 0
+        )
         low, high = (t, high) if positive else (low, t)
     return high * delta
 
 
 def _physical(lft: LFT, delta: Array) -> dict[str, float]:
-    return {s.name: float(s.middle + s.radius * d) for s, d in zip(lft.parameters, delta, strict=True)}
+    return {
+        s.name: float(s.middle + s.radius * d) for s, d in zip(lft.parameters, delta, strict=True)
+    }
