@@ -16,7 +16,7 @@ from pathlib import Path
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
-FOLDER = "identification/kernel"
+FOLDER = "identification/recursive/kernel"
 SOURCES = [f"{FOLDER}/{name}" for name in ("rls.h", "rls.c", "python.c")]
 DIGEST = hashlib.sha256(
     b"".join((Path(__file__).parent / source).read_bytes() for source in SOURCES)
@@ -33,7 +33,7 @@ def kernel(precision, level):
     """One precision (double, single) for one of `LEVELS`."""
     module = f"_{precision}{level}"
     return Extension(
-        f"identification.kernel.{module}",
+        f"identification.recursive.kernel.{module}",
         [f"{FOLDER}/{precision}_precision.c"],
         depends=SOURCES,
         define_macros=[("RLS_MODULE", module), ("RLS_SOURCE", f'"{DIGEST.hexdigest()}"')],
@@ -44,7 +44,7 @@ def kernel(precision, level):
 
 
 PROCESSOR = Extension(
-    "identification.kernel._processor",
+    "identification.recursive.kernel._processor",
     [f"{FOLDER}/processor.c"],
     py_limited_api=True,
     optional=True,

@@ -27,7 +27,7 @@ sys.path[0] = str(ROOT)  # this folder holds scripts named like the packages the
 import symheli  # noqa: E402
 from benchmarks.opponents import gridded_lmi  # noqa: E402
 from benchmarks.timing import arguments, keep  # noqa: E402
-from studies.lateral_loop import HOLD, OUTPUTS, STATES, lateral_loop  # noqa: E402
+from studies.loops.lateral import HOLD, OUTPUTS, STATES, lateral_loop  # noqa: E402
 from symheli.flight import XCELL_SERVOS  # noqa: E402
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, pade_delay  # noqa: E402
 from synthesis import Certificate, LFTCertificate, Relaxation, l2_gain, lft_gain  # noqa: E402

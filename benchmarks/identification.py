@@ -30,7 +30,7 @@ from benchmarks.opponents.covariance_rls import (  # noqa: E402
 )
 from benchmarks.timing import arguments, keep, lines, medians  # noqa: E402
 from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
-from identification.kernel import compiled_kernel  # noqa: E402
+from identification.recursive.kernel import compiled_kernel  # noqa: E402
 
 BASIS = Polynomial(2, 0.0, 13.0)
 CASES = {

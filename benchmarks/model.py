@@ -22,8 +22,8 @@ import symheli  # noqa: E402
 from benchmarks.opponents import scipy_flight  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
+from symheli.codegen.numeric import Numeric  # noqa: E402
 from symheli.integrate import RungeKutta4  # noqa: E402
-from symheli.numeric import Numeric  # noqa: E402
 
 DT, STEPS = 0.02, 4  # s; Runge-Kutta steps of 5 ms
 STILL = np.zeros(3)

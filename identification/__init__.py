@@ -10,35 +10,35 @@ input-output models with moving coefficients.
 Units are those of the record: SI and radians.
 """
 
-from identification.coefficients import Coefficients, CoefficientValues
-from identification.dependence import DependenceReport, dependence_report
-from identification.estimate import fit
-from identification.excitation import ExcitationReport, excitation_report
-from identification.experiment_design import (
+from identification.design.excitation import ExcitationReport, excitation_report
+from identification.design.experiment_design import (
     Experiment,
     Plan,
     choose_experiments,
     compare_experiments,
 )
-from identification.forgetting import Constant, Directional, Forgetting, Variable
-from identification.frequency_response import FrequencyResponse, frequency_response
-from identification.history import History
-from identification.instrumental_variables import Instruments
-from identification.lasso import Lasso
-from identification.model import LPVARXModel
-from identification.online import Online
-from identification.order_scan import OrderScan, Trial, order_scan
-from identification.output_error import OutputError
-from identification.prediction import fit_percent
-from identification.recursive_least_squares import RecursiveLeastSquares
-from identification.refined_instruments import Refined
-from identification.residuals import ResidualAnalysis, Theil, residual_analysis, theil
-from identification.response_band import ResponseBand
-from identification.ridge import Ridge
-from identification.rls_state import RLSInfo, RLSState
-from identification.slow_modes import SlowMode, SlowModes, slow_modes
-from identification.structure import LPVARX, Entry, Group, Term
-from identification.uncertainty import Band, Uncertainty, uncertainty
+from identification.estimators.estimate import fit
+from identification.estimators.instrumental_variables import Instruments
+from identification.estimators.lasso import Lasso
+from identification.estimators.output_error import OutputError
+from identification.estimators.refined_instruments import Refined
+from identification.estimators.ridge import Ridge
+from identification.judge.dependence import DependenceReport, dependence_report
+from identification.judge.frequency_response import FrequencyResponse, frequency_response
+from identification.judge.order_scan import OrderScan, Trial, order_scan
+from identification.judge.residuals import ResidualAnalysis, Theil, residual_analysis, theil
+from identification.judge.response_band import ResponseBand
+from identification.judge.slow_modes import SlowMode, SlowModes, slow_modes
+from identification.judge.uncertainty import Band, Uncertainty, uncertainty
+from identification.model.coefficients import Coefficients, CoefficientValues
+from identification.model.lpvarx_model import LPVARXModel
+from identification.model.prediction import fit_percent
+from identification.recursive.forgetting import Constant, Directional, Forgetting, Variable
+from identification.recursive.history import History
+from identification.recursive.online import Online
+from identification.recursive.recursive_least_squares import RecursiveLeastSquares
+from identification.recursive.rls_state import RLSInfo, RLSState
+from identification.structure.lpvarx import LPVARX, Entry, Group, Term
 from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
 
 __all__ = [

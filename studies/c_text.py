@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 
 def require_identifier(name: str) -> None:

@@ -12,7 +12,7 @@ from studies.export_c_check import check_program
 from studies.files import write_text
 from symheli import Helicopter, Signal
 from symheli.errors import InputError
-from symheli.lpv.signal import signals
+from symheli.values.signal import signals
 
 EARTH_WIND = signals(("w_n", "w_e", "w_d"), dict.fromkeys(("w_n", "w_e", "w_d"), "m/s"))
 _CMAKE_MARK = "# Written by symheli export c; rewritten by it while this line stays."

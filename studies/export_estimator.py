@@ -9,14 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from identification import RecursiveLeastSquares, kernel
-from identification.forgetting import numbers
-from identification.kernel.configuration import KINDS
+from identification import RecursiveLeastSquares
+from identification.recursive import kernel
+from identification.recursive.forgetting import numbers
+from identification.recursive.kernel.configuration import KINDS
 from studies import c_text
 from studies.c_text import identifier, literals, require_identifier, table
 from studies.files import write_text
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 _CMAKE_MARK = "# Written by symheli export estimator; rewritten by it while this line stays."
 TOLERANCE = {"double": 1e-9, "single": 1e-3}

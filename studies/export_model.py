@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from identification import Constant, LPVARXModel
-from identification.kernel.configuration import KINDS, Configuration
+from identification.recursive.kernel.configuration import KINDS, Configuration
 from studies.c_text import identifier, literals, require_identifier, rows, table
 from studies.export_estimator import TOLERANCE, samples
 from studies.files import write_text
 from symheli.errors import InputError
-from symheli.lpv import FlightRecord
-from symheli.lpv.arrays import Array
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
 
 
 def write_model(

@@ -11,76 +11,77 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from symheli.airspeed_sweep import sweep
-    from symheli.derivative_table import DerivativeTable, derivatives
+    from symheli.airframe.identified_models import identified_model
+    from symheli.airframe.vehicle import vehicles
     from symheli.environment import Dryden, Gust, Wind, standard_atmosphere
-    from symheli.equilibrium import TrimPoint, trim
     from symheli.errors import (
+        AccuracyError,
+        CertificateError,
+        CompilerWarning,
+        ConvergenceWarning,
+        DataWarning,
         ExcitationError,
         InputError,
+        PrecisionWarning,
+        SolverError,
         SymheliError,
         TrimError,
         UnknownNameError,
     )
     from symheli.flight import AirspeedSchedule, Excitation, Sensor, Servo, fly
-    from symheli.grid_sweep import sweep_grid
+    from symheli.flight.stitched_model import StitchedModel
     from symheli.helicopter import Helicopter
-    from symheli.identified import identified_model
     from symheli.integrate import Trajectory, simulate, simulate_batch
-    from symheli.linearization import linearize
-    from symheli.lpv import (
-        LFT,
-        FlightRecord,
-        LinearFamily,
-        LinearGrid,
-        LinearModel,
-        LPVStateSpace,
-        Scheduling,
-        Signal,
-    )
-    from symheli.stitched_model import StitchedModel
-    from symheli.trim_grid import TrimMap, trim_map
+    from symheli.lpv import LFT, LinearFamily, LinearGrid, LinearModel, LPVStateSpace, Scheduling
+    from symheli.records import FlightRecord
+    from symheli.steady.airspeed_sweep import sweep
+    from symheli.steady.derivative_table import DerivativeTable, derivatives
+    from symheli.steady.equilibrium import TrimPoint, trim
+    from symheli.steady.flight_condition import FlightCondition
+    from symheli.steady.grid_sweep import sweep_grid
+    from symheli.steady.linearization import linearize
+    from symheli.steady.trim_map import TrimMap, trim_map
+    from symheli.values import Signal
 
-_HOME = {
-    "Helicopter": "symheli.helicopter",
-    "trim": "symheli.equilibrium",
-    "TrimPoint": "symheli.equilibrium",
-    "linearize": "symheli.linearization",
-    **dict.fromkeys(("simulate", "simulate_batch", "Trajectory"), "symheli.integrate"),
-    "sweep": "symheli.airspeed_sweep",
-    "sweep_grid": "symheli.grid_sweep",
-    **dict.fromkeys(("TrimMap", "trim_map"), "symheli.trim_grid"),
-    **dict.fromkeys(("DerivativeTable", "derivatives"), "symheli.derivative_table"),
-    "identified_model": "symheli.identified",
-    "StitchedModel": "symheli.stitched_model",
-    **dict.fromkeys(("Dryden", "Gust", "Wind", "standard_atmosphere"), "symheli.environment"),
-    **dict.fromkeys(("fly", "AirspeedSchedule", "Excitation", "Sensor", "Servo"), "symheli.flight"),
-    **dict.fromkeys(
-        (
-            "LFT",
-            "FlightRecord",
-            "LinearFamily",
-            "LinearGrid",
-            "LinearModel",
-            "LPVStateSpace",
-            "Scheduling",
-            "Signal",
-        ),
-        "symheli.lpv",
-    ),
-    **dict.fromkeys(
-        ("SymheliError", "InputError", "UnknownNameError", "TrimError", "ExcitationError"),
-        "symheli.errors",
+_ROOMS = {
+    "symheli.helicopter": "Helicopter",
+    "symheli.airframe.vehicle": "vehicles",
+    "symheli.airframe.identified_models": "identified_model",
+    "symheli.steady.flight_condition": "FlightCondition",
+    "symheli.steady.equilibrium": "TrimPoint trim",
+    "symheli.steady.linearization": "linearize",
+    "symheli.steady.airspeed_sweep": "sweep",
+    "symheli.steady.grid_sweep": "sweep_grid",
+    "symheli.steady.trim_map": "TrimMap trim_map",
+    "symheli.steady.derivative_table": "DerivativeTable derivatives",
+    "symheli.integrate": "Trajectory simulate simulate_batch",
+    "symheli.flight": "AirspeedSchedule Excitation Sensor Servo fly",
+    "symheli.flight.stitched_model": "StitchedModel",
+    "symheli.environment": "Dryden Gust Wind standard_atmosphere",
+    "symheli.values": "Signal",
+    "symheli.records": "FlightRecord",
+    "symheli.lpv": "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling",
+    "symheli.errors": (
+        "AccuracyError CertificateError CompilerWarning ConvergenceWarning DataWarning"
+        " ExcitationError InputError PrecisionWarning SolverError SymheliError TrimError"
+        " UnknownNameError"
     ),
 }
+_HOME = {name: module for module, names in _ROOMS.items() for name in names.split()}
 
 __all__ = [
     "LFT",
+    "AccuracyError",
     "AirspeedSchedule",
+    "CertificateError",
+    "CompilerWarning",
+    "ConvergenceWarning",
+    "DataWarning",
     "DerivativeTable",
     "Dryden",
     "Excitation",
     "ExcitationError",
+    "FlightCondition",
     "FlightRecord",
     "Gust",
     "Helicopter",
@@ -89,10 +90,12 @@ __all__ = [
     "LinearFamily",
     "LinearGrid",
     "LinearModel",
+    "PrecisionWarning",
     "Scheduling",
     "Sensor",
     "Servo",
     "Signal",
+    "SolverError",
     "StitchedModel",
     "SymheliError",
     "Trajectory",
@@ -112,6 +115,7 @@ __all__ = [
     "sweep_grid",
     "trim",
     "trim_map",
+    "vehicles",
 ]
 __version__ = "0.1.0"
 

@@ -10,13 +10,13 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, Literal, NamedTuple
 
-from symheli import inflow
+from symheli.airframe.part import Part
+from symheli.codegen.symbolic import SX, Function, column, dense, jacobian, replaced
 from symheli.components import Flow, Motion, unnamed
-from symheli.drivetrain import Drive, ideal_governor, pi_governor
 from symheli.errors import InputError
-from symheli.lpv.signal import Signal, signals
-from symheli.part import Part
-from symheli.rigid_body import (
+from symheli.physics import inflow
+from symheli.physics.drivetrain import Drive, ideal_governor, pi_governor
+from symheli.physics.rigid_body import (
     GRAVITY,
     body_to_earth,
     euler_rates,
@@ -25,7 +25,7 @@ from symheli.rigid_body import (
     rotation,
     translation,
 )
-from symheli.symbolic import SX, Function, column, dense, jacobian, replaced
+from symheli.values.signal import Signal, signals
 
 VELOCITY = signals(("u", "v", "w", "p", "q", "r"))
 ATTITUDE = signals(("phi", "theta"))
@@ -182,7 +182,7 @@ class Dynamics:
         self, x: Any, u: Any, wind: Any, par: Any, solver: Callable[..., Any]
     ) -> tuple[Any, Sum]:
         """State derivative in Euler form, wind in body axes, with `solver` for the inflow
-        (`symheli.inflow`); and the sum of the parts.
+        (`symheli.physics.inflow`); and the sum of the parts.
         """
         air = _triple(lambda i: x[i] - wind[i])
         phi, theta = x[6], x[7]

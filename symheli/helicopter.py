@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import casadi
 import numpy as np
 
-from symheli import inflow
-from symheli.compile import compiled
+from symheli.airframe.printed_forms import PRINTED
+from symheli.airframe.vehicle import Vehicle, load_vehicle
+from symheli.codegen.compile import compiled
+from symheli.codegen.numeric import Numeric
+from symheli.codegen.symbolic import SX, Function, column
 from symheli.dynamics import INPUTS, Dynamics, Governor, Name
 from symheli.environment import standard_atmosphere
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.named_vector import NamedVector
-from symheli.lpv.signal import Signal, signals
-from symheli.numeric import Numeric
-from symheli.printed_forms import PRINTED
-from symheli.symbolic import SX, Function, column
-from symheli.vehicle import Vehicle, load_vehicle
+from symheli.physics import inflow
+from symheli.values.named_vector import NamedVector
+from symheli.values.signal import Signal, signals
 
 if TYPE_CHECKING:
     from symheli.equations import RightHandSide
@@ -72,8 +72,8 @@ class Helicopter:
         printed: Sequence[str] = (),
         smoothing: float = 0.0,
     ) -> Helicopter:
-        """By the name of a packaged airframe (`symheli.vehicle.vehicles()`) or the path of a
-        vehicle TOML file.
+        """By the name of a packaged airframe (`symheli.airframe.vehicle.vehicles()`) or the path of
+        a vehicle TOML file.
         """
         return cls(
             load_vehicle(vehicle), governor, float(density), frozenset(printed), float(smoothing)

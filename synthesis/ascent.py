@@ -167,8 +167,10 @@ def _step(
     matrix, right = None, None
     if math.isfinite(rate):
         next_minus_this = sparse.diags(
-            [np.full(count, -1.0), np.ones(count - 1)], [0, 1], shape=(count, count)
-        ).tolil()  # type: ignore[list-item]
+            [np.full(count, -1.0), np.ones(count - 1)],
+            [0, 1],  # type: ignore[arg-type]
+            shape=(count, count),
+        ).tolil()
         next_minus_this[count - 1, 0] += 1.0
         stretch = np.full((count, 1), -rate * spacing)
         matrix = sparse.bmat(

@@ -14,7 +14,7 @@ from scipy.linalg import eigvals
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.lpv.linear_model import feedback_matrix
-from symheli.lpv.signal import indices
+from symheli.values.signal import indices
 from synthesis.frozen import crossings, norm, to_continuous
 
 Array = np.ndarray

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import symheli
+from symheli.codegen.numeric import Numeric
 from symheli.integrate import runge_kutta
-from symheli.numeric import Numeric
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # benchmarks/ is not installed
 

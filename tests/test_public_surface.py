@@ -21,7 +21,13 @@ PACKAGES = (
     "identification",
     "synthesis",
 )
-SHARED = ("symheli.lpv", "symheli.errors", "symheli.extras")
+SHARED = (
+    "symheli.values",
+    "symheli.records",
+    "symheli.lpv",
+    "symheli.errors",
+    "symheli.extras",
+)
 """What identification and synthesis may see of the model's room."""
 
 
@@ -103,15 +109,23 @@ def test_the_rooms_import_one_way(room):
     assert not wrong, "\n".join(wrong)
 
 
-def test_the_value_types_know_no_physics():
-    """symheli.lpv is what the other rooms see: of its own room it may only use the errors, and the
-    log readers when called.
-    """
+@pytest.mark.parametrize(
+    ("room", "below"),
+    [
+        ("values", ()),
+        ("logs", ("symheli.values",)),
+        ("records", ("symheli.values", "symheli.logs")),
+        ("lpv", ("symheli.values",)),
+    ],
+)
+def test_the_value_rooms_know_no_physics(room, below):
+    """They are what the other rooms see, and stand on each other in this order, lazily or not."""
+    allowed = (f"symheli.{room}", "symheli.errors", "symheli.extras", *below)
     wrong = [
         f"{path.relative_to(ROOT)} imports {name}"
-        for path in sources("symheli/lpv")
+        for path in sources(f"symheli/{room}")
         for name in imported(path)
-        if inside(name, ("symheli",)) and not inside(name, (*SHARED, "symheli.logs"))
+        if inside(name, ("symheli",)) and not inside(name, allowed)
     ]
     assert not wrong, "\n".join(wrong)
 

@@ -89,7 +89,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Output:
     """Build the loop, prove, verify; exit status 1 where nothing could be proven."""
     import synthesis
-    from studies.lateral_loop import HOLD, lateral_loop
+    from studies.loops.lateral import HOLD, lateral_loop
 
     low, high = arguments.airspeeds
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")

@@ -28,8 +28,8 @@ def run(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
-    from studies.derivative_figure import plot
-    from studies.written import write
+    from studies.figures.derivatives import plot
+    from studies.figures.written import write
 
     low, high, n = arguments.airspeeds
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> Output:
     """Fly every candidate in the model; it shows its own progress."""
     import math
 
-    from studies import experiments
+    from studies.campaigns import experiments
     from studies.transition.axes import ALL, LATERAL, LONGITUDINAL
 
     axis = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}[arguments.axis]

@@ -38,8 +38,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Output:
     """Look, and exit with 1 where something required is missing."""
-    from identification.kernel import compiled_kernel, compiled_kernels
-    from symheli.compile import cache_directory, compiler
+    from identification.recursive.kernel import compiled_kernel, compiled_kernels
+    from symheli.codegen.compile import cache_directory, compiler
     from synthesis import installed_solvers
 
     required, optional = {n: _version(n) for n in REQUIRED}, {n: _version(n) for n in OPTIONAL}

@@ -37,8 +37,8 @@ def run(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
-    from studies.trim_map_figure import plot
-    from studies.written import write
+    from studies.figures.trim_map import plot
+    from studies.figures.written import write
 
     speeds, rates = (
         np.linspace(low, high, int(n))

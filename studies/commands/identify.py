@@ -15,7 +15,7 @@ from studies.output import Output
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from symheli.lpv import FlightRecord
+    from symheli.records import FlightRecord
 
 METHODS = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
 """Those of `identification.fit`."""
@@ -301,7 +301,7 @@ def _prepared(
     stop only where it is to be `cut`.
     """
     from studies.log.reading import COMBINED, format_of, read
-    from symheli.lpv import FlightRecord, conditioning
+    from symheli.records import FlightRecord, conditioning
 
     combined, scheduling = arguments.scheduling_from, signals.scheduling
     wanted = [

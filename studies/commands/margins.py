@@ -45,8 +45,8 @@ def run(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
-    from studies.lateral_loop import HOLD
-    from studies.margins import DELAY, LATERAL, LONGITUDINAL, over_airspeed
+    from studies.loops.lateral import HOLD
+    from studies.loops.margins import DELAY, LATERAL, LONGITUDINAL, over_airspeed
     from symheli.errors import InputError
 
     low, high = arguments.airspeeds

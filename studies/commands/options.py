@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from symheli import Helicopter
-    from symheli.equilibrium import TrimPoint
+    from symheli.steady.equilibrium import TrimPoint
 
 PICTURES = (".png", ".svg", ".pdf")
 

@@ -32,7 +32,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Output:
     """Fly, fit, judge; it shows its own progress."""
-    from studies import pays
+    from studies.campaigns import pays
 
     lines = list(pays.where_scheduling_pays(arguments.seeds, arguments.vehicle))
     return Output(pays.table(lines), {"lines": pays.data(lines)})

@@ -18,8 +18,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Output:
     """Name, title, source and assumptions of each."""
-    from symheli.identified import identified_model, identified_models
-    from symheli.vehicle import load_vehicle, vehicles
+    from symheli.airframe.identified_models import identified_model, identified_models
+    from symheli.airframe.vehicle import load_vehicle, vehicles
 
     airframes = [
         (name, v.title, v.source, len(v.quantities), v.assumed)

@@ -9,9 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from identification import LPVARX, LPVARXModel, fit, fit_percent
-from identification.leakage import MADE_OF_OUTPUTS, share_from_outputs
+from identification.design.leakage import MADE_OF_OUTPUTS, share_from_outputs
 from symheli.errors import ExcitationError, InputError
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 PAYS = 1.0
 """Points of held-out fit by which one model must beat another to be called better; what is printed

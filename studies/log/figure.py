@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies.log.comparison import Comparison, Scored, ahead, percent, steps
-from symheli.lpv.record_plot import draw, empty_figure, label, shade_missing
-from symheli.lpv.whole_files import write_bytes
+from symheli.records.record_plot import draw, empty_figure, label, shade_missing
+from symheli.values.whole_files import write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

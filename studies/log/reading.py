@@ -9,8 +9,8 @@ from typing import Literal
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.files import existing
 from symheli.logs.separated import SEPARATORS, SeparatedTable
-from symheli.lpv import FlightRecord
-from symheli.lpv.signal import UNITS
+from symheli.records import FlightRecord
+from symheli.values.signal import UNITS
 
 Format = Literal["xplane", "csv", "mat"]
 COMBINED = "speed"

@@ -10,7 +10,7 @@ import numpy as np
 from identification import residual_analysis, slow_modes, uncertainty
 from studies.log.comparison import HORIZONS, Comparison, coefficients, percent
 from studies.output import columns
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 CERTAIN = ("ls", "rls")
 """Methods whose coefficients have a covariance here."""

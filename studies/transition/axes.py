@@ -146,9 +146,9 @@ def identify(
         return fit(
             axis.structure(order, degree),
             training,
-            method=method,
+            method=method,  # type: ignore[arg-type]
             instruments=instruments(axis) if method == "iv" else (),
-        )  # type: ignore[arg-type]
+        )
 
 
 def update_time(axis: Axis, flight: FlightRecord) -> float:

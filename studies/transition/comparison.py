@@ -14,8 +14,8 @@ from identification import LPVARXModel, fit_percent
 from studies.transition.axes import HORIZON, SCHEDULING, Axis, rotor_mode
 from symheli import FlightRecord, Helicopter, LPVStateSpace
 from symheli.lpv import chordal_distance, nu_gap
-from symheli.lpv.arrays import Array
 from symheli.lpv.exponential import expm
+from symheli.values.arrays import Array
 
 SCALES = {
     "d_lon": 0.05,

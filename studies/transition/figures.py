@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED, draw
+from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED, draw
 from studies.transition.axes import LONGITUDINAL
 from studies.transition.comparison import FAST
 from studies.transition.guarantees import curves
@@ -16,7 +16,7 @@ from studies.transition.guarantees import curves
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from studies.gain_curve import GainCurve
+    from studies.figures.gain_curve import GainCurve
     from studies.transition.outcome import Outcome
 
 DEGREES = 180 / math.pi

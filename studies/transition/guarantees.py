@@ -12,14 +12,14 @@ import numpy as np
 
 import synthesis
 from identification import LPVARXModel
-from studies.exact_loop import ExactLateral
-from studies.gain_curve import GainCurve
-from studies.lateral_loop import STATES, close
+from studies.figures.gain_curve import GainCurve
+from studies.loops.exact_lateral import ExactLateral
+from studies.loops.lateral import STATES, close
 from studies.transition.flights import TOP
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
-from symheli.lpv.arrays import Array
 from symheli.lpv.bases import Polynomial
 from symheli.lpv.lpv_state_space import Matrices
+from symheli.values.arrays import Array
 from synthesis import Certificate, LFTCertificate, Relaxation, Search
 from synthesis.frozen import norm
 
@@ -48,7 +48,7 @@ MEMORIES = {
     for rate, lag, across in ((3.0, 0.6, 3), (4.5, 0.6, 3), (6.0, 0.5, 4))
 }
 """Accelerations (m/s^2) at which a P with a memory is tried, on a coarser mesh than
-`studies.bracket`, which takes minutes.
+`studies.bracket.measured`, which takes minutes.
 """
 
 

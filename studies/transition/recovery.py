@@ -13,7 +13,7 @@ from identification import LPVARX, Polynomial, fit
 from studies.transition.flights import TOP
 from symheli import FlightRecord, LinearFamily
 from symheli.lpv import simulate
-from symheli.lpv.signal import UNITS
+from symheli.values.signal import UNITS
 
 STATES = ("u", "w", "q", "theta", "a1")
 INPUTS = ("d_lon", "d_col")

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from studies.exact_loop import ExactLateral
-from studies.longitudinal_loop import longitudinal_loop
+from studies.loops.exact_lateral import ExactLateral
+from studies.loops.longitudinal import longitudinal_loop
 from studies.transition import axes, guarantees
 from studies.transition.axes import ALL, AXES, LATERAL, LATERAL_WITH_COLLECTIVE, LONGITUDINAL, Axis
 from studies.transition.baseline import build_baseline

@@ -47,9 +47,7 @@ def _marks(study: Outcome) -> str:
             marks = axis.marks.get(output)
             cells = []
             for k, score in enumerate(pair):
-                cells += [
-                    tables.percent(score.one_second[output]),
-                    f">= {marks[k]:.0f}" if marks else "",
-                ]  # type: ignore[union-attr]
+                fit = score.one_second[output]  # type: ignore[union-attr]
+                cells += [tables.percent(fit), f">= {marks[k]:.0f}" if marks else ""]
             table.rows.append([f"{output} ({axis.name})", *cells])
     return table.text()

@@ -12,7 +12,7 @@ import casadi
 import numpy as np
 
 from symheli.codegen.program import Operation, Program
-from symheli.symbolic import absolute, dense, sqrt, where
+from symheli.codegen.symbolic import absolute, dense, sqrt, where
 
 _OPERATIONS: dict[str, Callable[..., Any]] = {
     **{

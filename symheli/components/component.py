@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from symheli.errors import InputError
-from symheli.lpv.signal import Signal
+from symheli.values.signal import Signal
 
 
 class Motion(NamedTuple):
@@ -37,10 +37,10 @@ class Flow:
     """Flow quantities made by components evaluated earlier, by name, and the inflow solver of the
     rotors.
 
-    `inflow(c0, c1, ct_max, mu2, mu_z, efficiency)` returns lam0 (see `symheli.inflow.solve`).
-    `name(symbol, value)` gives an intermediate value its symbol in the field's notation (LaTeX):
-    where numbers are wanted it returns the value; where the equations are printed it keeps the
-    equation and returns the symbol.
+    `inflow(c0, c1, ct_max, mu2, mu_z, efficiency)` returns lam0 (see
+    `symheli.physics.inflow.solve`). `name(symbol, value)` gives an intermediate value its symbol in
+    the field's notation (LaTeX): where numbers are wanted it returns the value; where the equations
+    are printed it keeps the equation and returns the symbol.
     """
 
     inflow: Callable[..., Any]
@@ -76,8 +76,8 @@ class Component:
     in `positive` must be > 0, those in `counts` {name: least} whole numbers; `states` are its own;
     it may use the flow in `needs` and makes the flow in `makes`. `evaluate(parameters, motion,
     controls, own, flow)` returns an `Effect` under these names: where a vehicle has two of a kind
-    or puts one off the c.g., `symheli.part.Part` translates. In print, `subscript` marks its forces
-    and `symbols` {parameter: LaTeX} its parameters; without, their names do.
+    or puts one off the c.g., `symheli.airframe.part.Part` translates. In print, `subscript` marks
+    its forces and `symbols` {parameter: LaTeX} its parameters; without, their names do.
     """
 
     evaluate: Callable[

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
+from symheli.codegen.symbolic import absolute, clip
 from symheli.components.component import Component, Effect, Flow, Motion
-from symheli.symbolic import absolute, clip
 
 
 def evaluate(

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
+from symheli.codegen.symbolic import absolute, sqrt
 from symheli.components.component import Component, Effect, Flow, Motion
 from symheli.components.rotor import disc, load
-from symheli.lpv.signal import Signal
-from symheli.symbolic import absolute, sqrt
+from symheli.values.signal import Signal
 
 
 def flapping_slopes(

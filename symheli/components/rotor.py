@@ -6,9 +6,9 @@ from math import pi
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from symheli import inflow
+from symheli.codegen.symbolic import absolute, clip, sqrt
 from symheli.components.component import Flow
-from symheli.symbolic import absolute, clip, sqrt
+from symheli.physics import inflow
 
 
 class Disc(NamedTuple):

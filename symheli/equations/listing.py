@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from symheli import inflow, rigid_body
 from symheli.components import Component, Effect, Flow, Motion
 from symheli.equations.notation import dot, printed, real, symbol_of, upright
+from symheli.physics import inflow, rigid_body
 
 if TYPE_CHECKING:
     from symheli.helicopter import Helicopter

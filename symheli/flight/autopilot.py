@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from symheli.airspeed_sweep import sweep
 from symheli.errors import InputError
 from symheli.flight.servo import Servo
 from symheli.helicopter import Helicopter
 from symheli.lpv.linear_model import LinearModel
-from symheli.lpv.signal import Signal
+from symheli.steady.airspeed_sweep import sweep
+from symheli.values.signal import Signal
 
 UNMEASURED = ("a1", "b1")
 SCALE = {

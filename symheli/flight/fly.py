@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from symheli.attitude import flight_state
+from symheli.codegen.numeric import Numeric
 from symheli.environment import Wind
 from symheli.errors import InputError, SymheliError
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
@@ -19,11 +19,11 @@ from symheli.flight.sensor import Sensor, SensorBank
 from symheli.flight.servo import Servo, ServoBank
 from symheli.helicopter import Helicopter
 from symheli.integrate import runge_kutta
-from symheli.lpv.flight_record import FlightRecord
-from symheli.lpv.sample_period import same_period
-from symheli.lpv.signal import UNITS, Signal
-from symheli.numeric import Numeric
-from symheli.rigid_body import body_to_earth
+from symheli.physics.attitude import flight_state
+from symheli.physics.rigid_body import body_to_earth
+from symheli.records.flight_record import FlightRecord
+from symheli.values.sample_period import same_period
+from symheli.values.signal import UNITS, Signal
 
 MEASURED = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 CONTROL_PERIOD = 0.02  # s; slower sampling still flies at about this period

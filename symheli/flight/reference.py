@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from symheli.equilibrium import TrimPoint, trim
 from symheli.errors import TrimError
 from symheli.helicopter import Helicopter
-from symheli.lpv.signal import Signal
+from symheli.steady.equilibrium import TrimPoint, trim
+from symheli.values.signal import Signal
 
 LARGEST_MISS = 0.3
 """Residual of the accelerations (m/s^2, rad/s^2) a reference may have; feedback makes up for it."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
-from symheli.lpv.signal import Signal
+from symheli.values.signal import Signal
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,8 @@ class Servo:
             raise InputError(
                 "a servo needs natural_frequency > 0 rad/s, damping > 0 and rate > 0 rad/s"
             )
-        if (self.zero is None) != (self.pole is None) or (
-            self.zero is not None and not (self.zero > 0 and self.pole > 0)
-        ):  # type: ignore[operator]
+        pair = [value for value in (self.zero, self.pole) if value is not None]
+        if len(pair) == 1 or not all(value > 0 for value in pair):
             raise InputError("a servo's zero and pole are both given, > 0 rad/s, or both left out")
         if self.steps is not None and self.steps < 2:
             raise InputError(f"steps: expected at least 2 positions, got {self.steps}")

@@ -11,15 +11,15 @@ from typing import Literal
 import numpy as np
 
 from symheli.codegen import Layout
-from symheli.compile import compiler
+from symheli.codegen.compile import compiler
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
 from symheli.integrate.equations import equations
 from symheli.integrate.feedback import Feedback
 from symheli.integrate.problem import many_flights
 from symheli.integrate.rk4 import Flights, RungeKutta4
-from symheli.lpv.arrays import Array
-from symheli.lpv.signal import Signal, indices
+from symheli.values.arrays import Array
+from symheli.values.signal import Signal, indices
 
 SIDE_BY_SIDE = Layout(width=8, groups=2)
 """Flights in vector registers at a time: eight doubles fill the widest, two groups hide the latency

@@ -15,7 +15,7 @@ from symheli.integrate.equations import Equations
 from symheli.integrate.kernel import structure
 from symheli.integrate.problem import Problem
 from symheli.integrate.tableau import DORMAND_PRINCE, DORMAND_PRINCE_ERROR, Tableau
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 SCALE = {"m/s": 1.0, "rad/s": 1.0, "1": 0.1, "m": 1.0, "rad": 0.1}
 """Size of a state by its unit: what `absolute` is a fraction of."""

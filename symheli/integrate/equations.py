@@ -11,11 +11,11 @@ from importlib import resources
 from typing import Any, Literal
 
 from symheli.codegen import Layout, Program, as_casadi, c_function, program
-from symheli.compile import library
+from symheli.codegen.compile import library
+from symheli.codegen.numeric import Numeric
+from symheli.codegen.symbolic import SX, Function, adjoint_product, tangent_product
 from symheli.dynamics import Dynamics
 from symheli.helicopter import Helicopter
-from symheli.numeric import Numeric
-from symheli.symbolic import SX, Function, adjoint_product, tangent_product
 
 Which = Literal["rates", "tangent_rates", "adjoint_rates"]
 VARYING = {"rates": (0,), "tangent_rates": (0, 4), "adjoint_rates": (0, 4)}

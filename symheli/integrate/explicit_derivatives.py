@@ -15,7 +15,7 @@ from symheli.integrate.equations import Equations
 from symheli.integrate.kernel import structure
 from symheli.integrate.tableau import Tableau
 from symheli.integrate.trajectory import Trajectory
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 FUNCTIONS = ("rates", "tangent_rates", "adjoint_rates")
 SIDE_BY_SIDE = Layout(width=8)

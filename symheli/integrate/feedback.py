@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
-from symheli.lpv.arrays import Array, frozen
+from symheli.values.arrays import Array, frozen
 
 
 @dataclass(frozen=True, eq=False)

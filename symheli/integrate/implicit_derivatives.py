@@ -7,11 +7,11 @@ from __future__ import annotations
 import casadi
 import numpy as np
 
+from symheli.codegen.numeric import Numeric
 from symheli.integrate.equations import Equations
 from symheli.integrate.radau import sample_function
 from symheli.integrate.trajectory import Trajectory
-from symheli.lpv.arrays import Array
-from symheli.numeric import Numeric
+from symheli.values.arrays import Array
 
 
 def _held(flown: Trajectory, k: int) -> tuple[Array, Array, Array, Array]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symheli.attitude import flight_state
-from symheli.equilibrium import TrimPoint
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
-from symheli.lpv.arrays import Array, frozen
+from symheli.physics.attitude import flight_state
+from symheli.steady.equilibrium import TrimPoint
+from symheli.values.arrays import Array, frozen
 
 
 @dataclass(frozen=True, eq=False)

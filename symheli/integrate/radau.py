@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import casadi
 import numpy as np
 
+from symheli.codegen.numeric import Numeric
 from symheli.errors import InputError, SymheliError
 from symheli.integrate.equations import Equations
 from symheli.integrate.problem import Problem
-from symheli.lpv.arrays import Array
-from symheli.numeric import Numeric
+from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True)

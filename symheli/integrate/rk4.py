@@ -16,7 +16,7 @@ from symheli.integrate.feedback import Feedback
 from symheli.integrate.kernel import structure
 from symheli.integrate.problem import Problem
 from symheli.integrate.tableau import CLASSICAL, Tableau
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from symheli.integrate import explicit_derivatives, implicit_derivatives
 from symheli.integrate.equations import equations
 from symheli.integrate.radau import Radau
 from symheli.integrate.trajectory import Trajectory
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

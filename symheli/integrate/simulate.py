@@ -15,7 +15,7 @@ from symheli.integrate.problem import Problem, one_flight
 from symheli.integrate.radau import Radau
 from symheli.integrate.rk4 import Flights, RungeKutta4
 from symheli.integrate.trajectory import Trajectory
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 Method = RungeKutta4 | DormandPrince | Radau
 METHODS: dict[str, type[Method]] = {"rk4": RungeKutta4, "dopri": DormandPrince, "radau": Radau}

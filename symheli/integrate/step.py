@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi
 
-from symheli.compile import compiled
+from symheli.codegen.compile import compiled
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
 

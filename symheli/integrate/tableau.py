@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from symheli.attitude import euler_state
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
-from symheli.lpv.flight_record import FlightRecord
-from symheli.lpv.named_vector import NamedVector
-from symheli.lpv.signal import Signal, indices, signals
+from symheli.physics.attitude import euler_state
+from symheli.records.flight_record import FlightRecord
+from symheli.values.arrays import Array, frozen
+from symheli.values.named_vector import NamedVector
+from symheli.values.signal import Signal, indices, signals
 
 EULER = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.units import to_si
+from symheli.values.units import to_si
 
 Table = tuple[np.ndarray, dict[str, np.ndarray], dict[str, str]]
 """time (n,) in s, columns by name, unit of each column."""

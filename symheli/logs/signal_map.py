@@ -25,9 +25,12 @@ from pathlib import Path
 from typing import Any
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.logs.files import text
-from symheli.lpv.flight_record import FlightRecord
-from symheli.lpv.units import to_si
+from symheli.logs.csv import read_csv
+from symheli.logs.files import Table, text
+from symheli.logs.mat import read_mat
+from symheli.logs.ulog import read_ulog
+from symheli.logs.xplane import read_xplane
+from symheli.values.units import to_si
 
 FORMATS = {".csv": "csv", ".mat": "mat", ".ulg": "ulog"}
 KEYS = ("format", "time", "time_unit", "dt", "signals")
@@ -80,56 +83,57 @@ class SignalMap:
             raise InputError(f"{path}: dt must be a positive number of seconds, got {dt!r}")
         return cls(signals, kind, table.get("time"), str(table.get("time_unit", "s")), dt)
 
-    def read(self, log: str | os.PathLike[str]) -> FlightRecord:
-        """The record of a log: the mapped signals in SI, on a uniform step where `dt` says so."""
-        kind = self.format or FORMATS.get(Path(log).suffix.lower(), "xplane")
-        record = self._columns(log, kind)
-        units = {name: self._unit(name, source, record) for name, source in self.signals.items()}
-        columns = {}
+    def read(self, log: str | os.PathLike[str]) -> Table:
+        """Time (s), the mapped signals and their units."""
+        time, columns, units = self._columns(log, self._kind(log))
+        mapped = {}
         for name, source in self.signals.items():
-            # the record is in SI; scale and offset speak of the declared unit
-            factor = to_si(units[name])[0]
-            columns[name] = source.scale * record[source.column] / factor + source.offset
-        mapped = FlightRecord.from_arrays(record.time, units, record.note, **columns)
-        resample = self.dt is not None and kind in ("csv", "mat") and self.time is not None
-        return mapped.resample(self.dt) if resample else mapped  # type: ignore[arg-type]
+            if source.column not in columns:
+                raise UnknownNameError("signal", source.column, columns)
+            unit = self._unit(name, source, units[source.column])
+            # scale and offset speak of the declared unit
+            factor = to_si(units[source.column])[0] / to_si(unit)[0]
+            mapped[name] = source.scale * factor * columns[source.column] + source.offset, unit
+        return (
+            time,
+            {name: column for name, (column, _) in mapped.items()},
+            {name: unit for name, (_, unit) in mapped.items()},
+        )
 
-    def _columns(self, log: str | os.PathLike[str], kind: str) -> FlightRecord:
+    def step(self, log: str | os.PathLike[str]) -> float | None:
+        """The sample period (s) to which the log is still to be brought, None where it has it."""
+        return self.dt if self._kind(log) in ("csv", "mat") and self.time is not None else None
+
+    def _kind(self, log: str | os.PathLike[str]) -> str:
+        return self.format or FORMATS.get(Path(log).suffix.lower(), "xplane")
+
+    def _columns(self, log: str | os.PathLike[str], kind: str) -> Table:
         declared = {s.column: s.unit or "1" for s in self.signals.values()}
         match kind:
             case "xplane":
-                return FlightRecord.from_xplane(log, self.dt)
+                return read_xplane(log, self.dt)
             case "ulog":
                 if self.dt is None:
                     raise InputError(
                         f"{log}: the topics of a ULog have their own clocks; give dt (s) in the"
                         " signal map to resample them"
                     )
-                return FlightRecord.from_ulog(
-                    log,
-                    {column: (*_topic(column), unit) for column, unit in declared.items()},
-                    self.dt,
-                )
+                topics = {column: (*_topic(column), unit) for column, unit in declared.items()}
+                return read_ulog(log, topics, self.dt)
             case "mat":
                 if self.time is None:
                     raise InputError(f"{log}: name the time vector in the signal map: time = ...")
-                return FlightRecord.from_mat(log, self.time, declared, self.time_unit)
-        return FlightRecord.from_csv(
-            log, self.time, declared, self.dt if self.time is None else None, self.time_unit
-        )
+                return read_mat(log, self.time, declared, self.time_unit)
+        step = self.dt if self.time is None else None
+        return read_csv(log, self.time, declared, step, self.time_unit)
 
-    def _unit(self, name: str, source: Source, record: FlightRecord) -> str:
-        found = (
-            record.signals[record.signals.index(source.column)].unit
-            if source.column in record.signals
-            else None
-        )  # type: ignore[arg-type]
+    def _unit(self, name: str, source: Source, found: str) -> str:
         if source.unit is None:
-            return found or "1"
-        if found is not None and to_si(source.unit)[1] != found:
+            return found
+        if to_si(source.unit)[1] != to_si(found)[1]:
             raise InputError(
-                f"signals.{name}: {source.column} comes in {found}, which is no {source.unit};"
-                " correct or leave out the unit"
+                f"signals.{name}: {source.column} comes in {to_si(found)[1]}, which is no"
+                f" {source.unit}; correct or leave out the unit"
             )
         return source.unit
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.logs.files import Table, positive, text
-from symheli.lpv.units import to_si
+from symheli.values.units import to_si
 
 CLOCKS = ("totl,time", "real,time", "missn,time", "timer,time")
 """Columns that count seconds, the best first."""

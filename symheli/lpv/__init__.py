@@ -1,4 +1,4 @@
-"""The value types that every room shares: pure NumPy, no physics, no solver."""
+"""Linear, LPV and LFT models: pure NumPy, no physics, no solver."""
 
 from symheli.lpv.bases import (
     Basis,
@@ -11,9 +11,7 @@ from symheli.lpv.bases import (
     Spline,
     UserFunctions,
 )
-from symheli.lpv.conditioning import cut, decimate, low_pass, smooth, split, with_norm
 from symheli.lpv.delay import pade_delay
-from symheli.lpv.flight_record import FlightRecord
 from symheli.lpv.lft import (
     LFT,
     Block,
@@ -30,12 +28,9 @@ from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
-from symheli.lpv.named_vector import NamedVector
 from symheli.lpv.nu_gap import chordal_distance, nu_gap
-from symheli.lpv.operating_point import OperatingPoint
 from symheli.lpv.reduction import Reduction, reduce
 from symheli.lpv.scheduling import Scheduling
-from symheli.lpv.signal import Signal, signals
 from symheli.lpv.simulate import simulate
 from symheli.lpv.trim_schedule import TrimSchedule
 
@@ -44,7 +39,6 @@ __all__ = [
     "BSpline",
     "Basis",
     "Block",
-    "FlightRecord",
     "FunctionSpace",
     "HoldError",
     "LPVStateSpace",
@@ -52,15 +46,12 @@ __all__ = [
     "LinearGrid",
     "LinearModel",
     "Matrices",
-    "NamedVector",
-    "OperatingPoint",
     "Piece",
     "PiecewiseLinear",
     "Polynomial",
     "Product",
     "Reduction",
     "Scheduling",
-    "Signal",
     "Spline",
     "TrimSchedule",
     "Truncation",
@@ -69,18 +60,11 @@ __all__ = [
     "append",
     "chordal_distance",
     "connect",
-    "cut",
-    "decimate",
     "feedback",
-    "low_pass",
     "nu_gap",
     "pade_delay",
     "parallel",
     "reduce",
     "series",
-    "signals",
     "simulate",
-    "smooth",
-    "split",
-    "with_norm",
 ]

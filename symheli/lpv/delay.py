@@ -8,7 +8,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
-from symheli.lpv.signal import Signal
+from symheli.values.signal import Signal
 
 
 def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 SINGULAR = 1e12
 """An equilibrated matrix with a larger condition number counts as singular."""

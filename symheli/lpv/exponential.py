@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 
 def expm(M: Array) -> Array:

@@ -10,15 +10,15 @@ from typing import Literal
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Basis, PiecewiseLinear, Polynomial, Spline
 from symheli.lpv.equilibration import is_singular
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
-from symheli.lpv.operating_point import OperatingPoint
 from symheli.lpv.scheduling import Scheduling
-from symheli.lpv.signal import Signal, indices, signals
 from symheli.lpv.trim_schedule import TrimSchedule
+from symheli.values.arrays import Array, frozen
+from symheli.values.operating_point import OperatingPoint
+from symheli.values.signal import Signal, indices, signals
 
 Kind = Literal["polynomial", "spline", "linear"]
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_model import LinearModel
-from symheli.lpv.operating_point import OperatingPoint
-from symheli.lpv.signal import Signal
+from symheli.values.arrays import Array, frozen
+from symheli.values.operating_point import OperatingPoint
+from symheli.values.signal import Signal
 
 
 @dataclass(frozen=True, eq=False)

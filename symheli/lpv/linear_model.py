@@ -11,11 +11,11 @@ from scipy.linalg import block_diag
 from scipy.signal import cont2discrete
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.equilibration import loop_inverse
-from symheli.lpv.operating_point import OperatingPoint
-from symheli.lpv.sample_period import same_period
-from symheli.lpv.signal import Signal, indices, signals
+from symheli.values.arrays import Array, frozen
+from symheli.values.operating_point import OperatingPoint
+from symheli.values.sample_period import same_period
+from symheli.values.signal import Signal, indices, signals
 
 
 @dataclass(frozen=True, eq=False)

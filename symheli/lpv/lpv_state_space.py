@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Basis, Polynomial
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.scheduling import Scheduling
-from symheli.lpv.signal import Signal, indices, signals
 from symheli.lpv.trim_schedule import TrimSchedule
+from symheli.values.arrays import Array, frozen
+from symheli.values.signal import Signal, indices, signals
 
 if TYPE_CHECKING:
     from symheli.lpv.lft import LFT

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import frozen
 from symheli.lpv.linear_model import LinearModel
-from symheli.lpv.sample_period import same_period
+from symheli.values.arrays import frozen
+from symheli.values.sample_period import same_period
 
 ON_THE_CIRCLE = 1e3 * np.finfo(float).eps
 """A pole this close to the unit circle may be on it: what rounding moves the eigenvalues of a small

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
 from symheli.lpv.bases import Basis, Polynomial
 from symheli.lpv.equilibration import loop_inverse
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.values.arrays import Array
 
 ROUNDING = 64 * np.finfo(float).eps
 """An entry that changes over the range by less than this fraction of its own size is constant: its

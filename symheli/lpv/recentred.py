@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from symheli.lpv.arrays import Array
+from symheli.values.arrays import Array
 
 _exact = np.frompyfunc(Fraction, 1, 1)
 

@@ -11,11 +11,11 @@ import numpy as np
 from scipy.linalg import solve_continuous_are, solve_discrete_are
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.nu_gap import angles, nu_gap
-from symheli.lpv.signal import Signal
+from symheli.values.arrays import Array, frozen
+from symheli.values.signal import Signal
 
 Model = TypeVar("Model", LPVStateSpace, LinearModel)
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
+from symheli.values.arrays import Array, frozen
 
 
 @dataclass(frozen=True)

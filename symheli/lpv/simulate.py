@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.exponential import expm
 from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.values.arrays import Array, frozen
 
 
 def simulate(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases.basis import Basis
+from symheli.values.arrays import Array, frozen
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,10 @@ discrete time, P+ = P(p(k+1)):
     energy to peak   [A'P+A - P   A'P+B; .   B'P+B - I] < 0  and  [P 0 C'; 0 I D'; C D g I] > 0
     decay rate       A'P+A exp(2 alpha dt) - P < 0
 
-and P > 0; gain^2 = g. Sources: Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996),
-theorem 3.1; Rotea, "The generalized H2 control problem", Automatica 29 (1993); Boyd, El Ghaoui,
-Feron and Balakrishnan, "Linear Matrix Inequalities in System and Control Theory" (1994), sections
-5.1 and 6.
+and P > 0; gain^2 = g. Sources: Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6
+(1996), theorem 3.1; Rotea, "The generalized H2 control problem", Automatica 29 (1993); Boyd, El
+Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and Control Theory" (1994),
+sections 5.1 and 6.
 """
 
 from __future__ import annotations

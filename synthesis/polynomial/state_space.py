@@ -9,18 +9,10 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import (
-    LFT,
-    LinearModel,
-    LPVStateSpace,
-    Matrices,
-    Polynomial,
-    Scheduling,
-    Signal,
-    signals,
-)
+from symheli.lpv import LFT, LinearModel, LPVStateSpace, Matrices, Polynomial, Scheduling
 from symheli.lpv.lft import expanded
 from symheli.lpv.recentred import centre, recentred
+from symheli.values import Signal, signals
 from synthesis.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray

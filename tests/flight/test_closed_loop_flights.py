@@ -5,10 +5,10 @@ import pytest
 
 import symheli
 from symheli import AirspeedSchedule, Excitation, SymheliError, fly
+from symheli.codegen.numeric import Numeric
 from symheli.flight import gain_scheduled_lqr
 from symheli.flight.fly import MEASURED
 from symheli.integrate import runge_kutta
-from symheli.numeric import Numeric
 
 SMALL = Excitation({"d_lon": 0.006, "d_lat": 0.006, "d_col": 0.005, "d_ped": 0.01})
 SHORT = AirspeedSchedule((6.0, 0.0), (3.0, 3.0), (1.0, 4.0), lead=1.0)

@@ -8,8 +8,8 @@ import pytest
 
 import symheli
 from symheli import InputError, StitchedModel, UnknownNameError
+from symheli.codegen.numeric import Numeric
 from symheli.integrate import runge_kutta
-from symheli.numeric import Numeric
 
 SMOOTH = (4.0, 8.0)  # m/s: no wake edge, no stall between
 ANCHORS = np.linspace(*SMOOTH, 5)

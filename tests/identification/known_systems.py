@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from identification import LPVARX, Coefficients, Polynomial
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 
 def flown(arx, A, B, p, u, *, c=None, d=None, noise=0.0, seed=0, dt=0.1):

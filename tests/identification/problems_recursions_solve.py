@@ -7,7 +7,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 
-from identification.forgetting import Constant, Directional
+from identification.recursive.forgetting import Constant, Directional
 
 EPS = np.finfo(float).eps
 PRIOR = 32 * EPS

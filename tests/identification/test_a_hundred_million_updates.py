@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from identification import kernel
+from identification.recursive import kernel
 
 
 @pytest.mark.slow

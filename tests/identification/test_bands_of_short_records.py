@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from identification import LPVARX, Polynomial, fit, uncertainty
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 ARX = LPVARX("y", "u", "p", na=0, nb=1, delay=1, basis=Polynomial(1, 0.0, 13.0), offset=True)
 P = np.array([2.0, 6.5, 11.0])

@@ -7,12 +7,13 @@ import pytest
 from known_systems import Truth, moving, structure
 
 import identification as idn
-from identification import kernel
-from identification.kernel import twin
-from identification.kernel.configuration import Configuration
-from identification.online import Online
-from identification.regressors import regression
-from symheli.lpv import FlightRecord, Spline
+from identification.recursive import kernel
+from identification.recursive.kernel import twin
+from identification.recursive.kernel.configuration import Configuration
+from identification.recursive.online import Online
+from identification.structure.regressors import regression
+from symheli.lpv import Spline
+from symheli.records import FlightRecord
 
 WAYS = (
     1.0,

@@ -7,7 +7,7 @@ import pytest
 from known_systems import flown, structure
 
 import identification as idn
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 A1, A2, B1 = (
     np.array([-0.9, 0.35, 0.15]),

@@ -8,13 +8,13 @@ from known_systems import Truth, moving, structure
 from test_instruments import closed_loop
 
 import identification as idn
-from identification.observer import Observer
-from identification.output_error import SimulationError
-from identification.refined_instruments import refined_instruments
-from identification.regressors import stacked
-from identification.stretches import contracted, filtered, stretches
+from identification.estimators.observer import Observer
+from identification.estimators.output_error import SimulationError
+from identification.estimators.refined_instruments import refined_instruments
+from identification.model.stretches import contracted, filtered, stretches
+from identification.structure.regressors import stacked
 from symheli.errors import ConvergenceWarning, InputError
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 TRUE = np.array(
     [[-1.2, 0.4], [0.6, -0.2], [0.5, 0.3]]

@@ -9,7 +9,7 @@ import pytest
 from known_systems import Truth, moving, structure
 
 import identification as idn
-from identification import kernel
+from identification.recursive import kernel
 from symheli.errors import InputError
 
 WAYS = {

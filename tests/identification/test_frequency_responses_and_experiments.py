@@ -14,7 +14,8 @@ from identification import (
     uncertainty,
 )
 from symheli.errors import ExcitationError, InputError
-from symheli.lpv import FlightRecord, LinearModel
+from symheli.lpv import LinearModel
+from symheli.records import FlightRecord
 
 DT = 0.02
 

@@ -7,9 +7,9 @@ import pytest
 from known_systems import structure
 
 import identification as idn
-from identification.first_stage import first_stage
+from identification.estimators.first_stage import first_stage
 from symheli.errors import DataWarning, ExcitationError, InputError
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 GAIN = 0.35
 

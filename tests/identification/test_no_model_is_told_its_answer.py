@@ -10,7 +10,7 @@ from known_systems import Truth, moving, structure
 
 import identification as idn
 from symheli.errors import DataWarning, ExcitationError, InputError
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 STRUCTURES = {
     "lag": dict(

@@ -5,9 +5,9 @@ import pytest
 from known_systems import Truth, moving, structure
 
 import identification as idn
-from identification.lasso import lasso_path
-from identification.regressors import regression
-from identification.ridge import GRID
+from identification.estimators.lasso import lasso_path
+from identification.estimators.ridge import GRID
+from identification.structure.regressors import regression
 from symheli.errors import ExcitationError
 
 

@@ -12,8 +12,8 @@ import pytest
 from test_compiled_kernel_and_twin import STRUCTURES, WAYS, awkward
 
 import identification as idn
-from identification import kernel
-from identification.online import Online
+from identification.recursive import kernel
+from identification.recursive.online import Online
 
 compiled_only = pytest.mark.skipif(
     not kernel.compiled_kernels("double"), reason="no compiled kernel is installed"
@@ -47,7 +47,9 @@ def test_a_lesser_processor_takes_the_baseline(monkeypatch):
     kernel.compiled_kernel.cache_clear()
     try:
         assert list(kernel.compiled_kernels("double")) == ["baseline"]
-        assert kernel.compiled_kernel("double").__module__ == "identification.kernel._double"
+        assert (
+            kernel.compiled_kernel("double").__module__ == "identification.recursive.kernel._double"
+        )
     finally:
         kernel.compiled_kernel.cache_clear()
 
@@ -71,7 +73,7 @@ def test_what_runs_everywhere_holds_no_instruction_of_a_level_above(ending):
     """Registers ymm and zmm, and mnemonics with a leading v, came with AVX."""
     for module in (
         kernel.compiled_kernels(ending)["baseline"],
-        kernel.importlib.import_module("identification.kernel._processor"),
+        kernel.importlib.import_module("identification.recursive.kernel._processor"),
     ):
         code = subprocess.run(
             ["objdump", "-d", "--no-show-raw-insn", module.__file__],

@@ -5,7 +5,7 @@ import pytest
 from known_systems import Truth, moving, structure
 
 import identification as idn
-from identification.regressors import regression
+from identification.structure.regressors import regression
 from symheli.errors import InputError
 
 

@@ -9,7 +9,7 @@ from scipy.signal import cont2discrete
 
 import identification as idn
 from symheli.errors import InputError
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 DT = 0.02
 

@@ -10,10 +10,10 @@ from known_systems import Truth, structure
 from problems_recursions_solve import EPS, Rows, problem
 
 import identification as idn
-from identification import kernel
-from identification.determined import determined_columns, largest
-from identification.kernel import configuration as at
-from identification.regressors import regression
+from identification.design.determined import determined_columns, largest
+from identification.recursive import kernel
+from identification.recursive.kernel import configuration as at
+from identification.structure.regressors import regression
 
 WAYS = {
     "all": idn.Constant(1.0),
@@ -268,9 +268,11 @@ def test_a_corrupted_estimate_is_not_returned(monkeypatch):
 
     arx = structure()
     record = creeping(arx, rate=3e-3, noise=0.03)
-    least_squares = idn.estimate.least_squares_by_group
+    from identification.estimators import estimate
+
+    least_squares = estimate.least_squares_by_group
     monkeypatch.setattr(
-        idn.estimate, "least_squares_by_group", lambda *args: least_squares(*args) * (1 + 1e-8)
+        estimate, "least_squares_by_group", lambda *args: least_squares(*args) * (1 + 1e-8)
     )
     with pytest.raises(AccuracyError, match=r"not orthogonal to .*not the least-squares ones"):
         idn.fit(arx, record)

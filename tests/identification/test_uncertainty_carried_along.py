@@ -5,9 +5,9 @@ import pytest
 from known_systems import Truth, moving, structure
 
 import identification as idn
-from identification.coefficient_covariance import covariances
+from identification.judge.coefficient_covariance import covariances
 from symheli.errors import InputError
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 TWO = structure(
     outputs=("a", "b"),

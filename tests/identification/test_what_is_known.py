@@ -17,7 +17,7 @@ from identification import (
     uncertainty,
 )
 from symheli.errors import InputError
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 FIR = LPVARX(
     outputs=("y",),

@@ -8,7 +8,7 @@ from known_systems import Truth, moving, structure
 
 import identification as idn
 from symheli.errors import ExcitationError, InputError, SymheliError
-from symheli.lpv import FlightRecord, smooth
+from symheli.records import FlightRecord, smooth
 
 TRUTH = Truth(structure())
 RECORD = TRUTH.record(moving(300))

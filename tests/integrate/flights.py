@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import symheli
-from symheli.attitude import flight_state
+from symheli.physics.attitude import flight_state
 
 
 def manoeuvre(heli, airspeed=6.0, n=20, size=0.01, dt=0.02):

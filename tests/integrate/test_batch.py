@@ -10,9 +10,9 @@ import pytest
 from flights import manoeuvre, without_compiler
 
 from symheli import InputError, simulate, simulate_batch
-from symheli.attitude import euler_state
+from symheli.codegen.numeric import Numeric
 from symheli.integrate import Feedback, runge_kutta
-from symheli.numeric import Numeric
+from symheli.physics.attitude import euler_state
 
 
 def many(heli, count, n=5, seed=0):

@@ -8,10 +8,10 @@ import casadi
 import numpy as np
 import pytest
 
-from symheli import InputError, compile
-from symheli.codegen import Layout, as_casadi, c_function, evaluate, program
+from symheli import InputError
+from symheli.codegen import Layout, as_casadi, c_function, compile, evaluate, program
 from symheli.codegen.branches import branches
-from symheli.compile import compiler, library
+from symheli.codegen.compile import compiler, library
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 

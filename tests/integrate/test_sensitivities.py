@@ -9,8 +9,8 @@ from scipy.linalg import expm
 
 import symheli
 from symheli import InputError, simulate
-from symheli.attitude import euler_state, flight_state
 from symheli.integrate import DormandPrince, Radau, RungeKutta4, gradient, tangent
+from symheli.physics.attitude import euler_state, flight_state
 
 METHODS = [RungeKutta4(), DormandPrince(1e3, largest=0.01), Radau()]
 """The adaptive one with equal steps: derivatives are those at the steps taken, and differences must

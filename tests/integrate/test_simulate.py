@@ -8,9 +8,9 @@ from flights import manoeuvre, without_compiler
 
 import symheli
 from symheli import InputError, SymheliError, simulate
-from symheli.attitude import euler_state, flight_state
+from symheli.codegen.numeric import Numeric
 from symheli.integrate import DormandPrince, Feedback, Radau, RungeKutta4, runge_kutta
-from symheli.numeric import Numeric
+from symheli.physics.attitude import euler_state, flight_state
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from symheli.errors import DataWarning, InputError, UnknownNameError
 from symheli.logs.xplane import body_velocity
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 HEADER = (

@@ -16,7 +16,7 @@ from symheli.lpv import (
     Spline,
     UserFunctions,
 )
-from symheli.lpv.units import to_si
+from symheli.values.units import to_si
 
 NODES = (0.0, 1.0, 3.0, 7.0, 13.0)
 BASES = [

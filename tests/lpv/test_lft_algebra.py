@@ -6,17 +6,8 @@ import pytest
 from families import random_lpv
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import (
-    LFT,
-    LinearModel,
-    Scheduling,
-    Signal,
-    append,
-    connect,
-    feedback,
-    parallel,
-    series,
-)
+from symheli.lpv import LFT, LinearModel, Scheduling, append, connect, feedback, parallel, series
+from symheli.values import Signal
 
 OMEGA = np.array([0.05, 0.7, 9.0])
 

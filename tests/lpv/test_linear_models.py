@@ -6,7 +6,8 @@ from scipy.linalg import expm
 
 import symheli
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LinearModel, Signal, signals
+from symheli.lpv import LinearModel
+from symheli.values import Signal, signals
 
 
 def random_model(nx=4, nu=2, ny=2, seed=0):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from symheli import InputError, LinearModel
-from symheli.lpv import chordal_distance, nu_gap, signals
+from symheli.lpv import chordal_distance, nu_gap
+from symheli.values import signals
 
 
 def model(A, B, C, D, dt=0.1):

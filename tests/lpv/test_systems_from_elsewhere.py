@@ -8,6 +8,7 @@ import pytest
 from families import SPEED, random_lpv, stacked
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.flight.stitched_model import StitchedModel
 from symheli.lpv import (
     LinearFamily,
     LinearModel,
@@ -19,7 +20,6 @@ from symheli.lpv import (
     parallel,
     series,
 )
-from symheli.stitched_model import StitchedModel
 
 PLANT = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ("v",), ("d_col",), ("q",))
 

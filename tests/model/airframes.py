@@ -8,7 +8,7 @@ import re
 from importlib import resources
 from pathlib import Path
 
-XCELL = (resources.files("symheli.vehicles") / "xcell60.toml").read_text(encoding="utf-8")
+XCELL = (resources.files("symheli.airframe.vehicles") / "xcell60.toml").read_text(encoding="utf-8")
 
 
 def write(folder, *sections, name="mine.toml", **changes):

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli.lpv.units import to_si
-from symheli.vehicle import load_vehicle, vehicles
+from symheli.airframe.vehicle import load_vehicle, vehicles
+from symheli.values.units import to_si
 
-R50 = (resources.files("symheli.vehicles") / "r50_hover.linear.toml").read_text(encoding="utf-8")
+R50 = (resources.files("symheli.airframe.vehicles") / "r50_hover.linear.toml").read_text(
+    encoding="utf-8"
+)
 
 
 @pytest.mark.parametrize("governor", ["ideal", "pi"])

@@ -10,7 +10,7 @@ from derived_equations import derived
 from scipy.spatial.transform import Rotation
 
 import symheli
-from symheli.rigid_body import (
+from symheli.physics.rigid_body import (
     GRAVITY,
     body_to_earth,
     euler_rates,

@@ -10,9 +10,9 @@ import sympy
 from airframes import AFT_ROTOR, WING, WING_COMPONENT, write
 
 import symheli
+from symheli.airframe.printed_forms import PRINTED
 from symheli.equations.listing import listing
 from symheli.equations.notation import dot, printed, real, symbol_of, upright
-from symheli.printed_forms import PRINTED
 
 MODELS = ({}, {"governor": "ideal"}, {"smoothing": 0.1}, {"printed": sorted(PRINTED)})
 

@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import symheli
-from symheli.equilibrium import TOLERANCE
+from symheli.steady.equilibrium import TOLERANCE
 
 HELICOPTERS = {
     governor: symheli.Helicopter.load("xcell60", governor=governor) for governor in ("ideal", "pi")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli.derivative_table import ROW
+from symheli.steady.derivative_table import ROW
 
 SPEEDS = [0.0, 4.0, 9.0]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from symheli import inflow
+from symheli.physics import inflow
 
 A, SIGMA, ETA = 5.5, 0.0476, 0.9
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli import inflow
 from symheli.components import Flow, Motion
 from symheli.components.main_rotor import evaluate
+from symheli.physics import inflow
 
 TURNS = np.linspace(0.0, 2 * np.pi, 13)
 

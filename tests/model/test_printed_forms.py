@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli.printed_forms import PRINTED
-from symheli.rigid_body import GRAVITY
+from symheli.airframe.printed_forms import PRINTED
+from symheli.physics.rigid_body import GRAVITY
 
 OFF_TRIM = {
     "u": 6.0,
@@ -138,7 +138,7 @@ def test_ideal_inflow_gives_the_printed_hover_torque():
 
 
 def test_relaxed_inflow_finds_the_same_root_on_both_branches():
-    from symheli import inflow
+    from symheli.physics import inflow
 
     pitch, mu, mu_z = (
         grid.ravel()
@@ -186,7 +186,9 @@ def test_linear_tail_rotor_touches_the_full_one_at_its_trim_pitch():
 def test_linear_tail_rotor_asks_for_the_trim_pitch(tmp_path):
     from importlib import resources
 
-    text = (resources.files("symheli.vehicles") / "xcell60.toml").read_text(encoding="utf-8")
+    text = (resources.files("symheli.airframe.vehicles") / "xcell60.toml").read_text(
+        encoding="utf-8"
+    )
     path = tmp_path / "without.toml"
     path.write_text(
         "\n".join(line for line in text.splitlines() if not line.startswith("trim_pitch")),

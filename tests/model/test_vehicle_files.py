@@ -9,8 +9,8 @@ import pytest
 from airframes import XCELL, write
 
 import symheli
-from symheli.lpv.units import dimension, quotient, text, to_si
-from symheli.vehicle import load_vehicle
+from symheli.airframe.vehicle import load_vehicle
+from symheli.values.units import dimension, quotient, text, to_si
 
 MASS = 'mass = { value = 8.2, unit = "kg", source = "G15 Table 15.1" }'
 RADIUS = 'radius = { value = 0.775, unit = "m", source = "G15 Table 15.1" }'

@@ -5,8 +5,8 @@ tests.
 import pytest
 
 import synthesis
-from studies.bracket import FASTEST, Bracket, bracket, proves
-from studies.lateral_loop import lateral_loop
+from studies.bracket.measured import FASTEST, Bracket, bracket, proves
+from studies.loops.lateral import lateral_loop
 from synthesis import Relaxation, Search, Status
 
 QUICK = Search(levels=6, dwells=5, starts=1, nodes=40, evaluations=8, samples=5000)

@@ -90,7 +90,8 @@ def test_figures_draw_on_the_axes_they_are_given(ideal):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    from studies import derivative_figure, trim_map_figure
+    from studies.figures import derivatives as derivative_figure
+    from studies.figures import trim_map as trim_map_figure
 
     found = symheli.trim_map(ideal, [0.0, 5.0, 28.0], [-5.0, 0.0, 5.0])
     assert not found.attainable[2].all()

@@ -5,7 +5,7 @@ import pytest
 
 import synthesis
 from studies.cover import Remainder, covered_gain
-from studies.exact_loop import ExactLateral, Patches
+from studies.loops.exact_lateral import ExactLateral, Patches
 from synthesis import Relaxation
 
 

@@ -15,7 +15,7 @@ def test_matrices_come_back_for_another_helicopter(tmp_path, mass):
     """Rounding that was left of samples explained whole once became rows of no number, for one mass
     and not for another.
     """
-    packaged = Path(symheli.__file__).parent / "vehicles" / "xcell_kahn_hudson.toml"
+    packaged = Path(symheli.__file__).parent / "airframe" / "vehicles" / "xcell_kahn_hudson.toml"
     entry = f'mass = {{ value = {mass}, unit = "kg", source = "with a camera" }}'
     (tmp_path / "mine.toml").write_text(
         re.sub(r"(?m)^mass = .*", entry, packaged.read_text(encoding="utf-8")), encoding="utf-8"

@@ -3,7 +3,7 @@
 import numpy as np
 
 import symheli
-from studies.experiments import Candidate, design
+from studies.campaigns.experiments import Candidate, design
 from studies.transition.axes import LONGITUDINAL
 from studies.transition.flights import autopilot_for
 

@@ -12,7 +12,7 @@ import identification as idn
 from studies.cli import main
 from studies.export_model import write_model
 from symheli.errors import InputError
-from symheli.lpv import Signal
+from symheli.values import Signal
 
 CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")

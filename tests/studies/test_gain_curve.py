@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from studies.gain_curve import GainCurve, draw, save
+from studies.figures.gain_curve import GainCurve, draw, save
 from studies.transition import gain_tables, guarantees
 from symheli import LPVStateSpace, Scheduling
 from synthesis import Search

@@ -6,7 +6,7 @@ import pytest
 from identification import LPVARX, Polynomial
 from studies.log.comparison import compare
 from studies.log.figure import COLOURS, figure
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 
 def test_the_picture_holds_the_predictions_that_were_scored():

@@ -13,7 +13,7 @@ from identification import LPVARX, Polynomial, fit
 from studies import cli
 from studies.log.comparison import Comparison, Scored, compare, difference
 from symheli.errors import DataWarning
-from symheli.lpv import FlightRecord
+from symheli.records import FlightRecord
 
 NAMES = ("one step", "1 s", "free run")
 

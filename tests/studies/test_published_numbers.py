@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.published_numbers import published_numbers, table
+from studies.campaigns.published_numbers import published_numbers, table
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_side_slope_agrees_with_the_linear_model(ideal):
     by a known sign.
     """
     import symheli
-    from studies.published_numbers import _side_slope
+    from studies.campaigns.published_numbers import _side_slope
 
     point = symheli.trim(ideal, 0.0)
     lin = symheli.linearize(ideal, point)

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from studies import stamped_tables
-from studies.bracket_table import bracket_table
+from studies.bracket.table import bracket_table
 from symheli.errors import InputError
 
 PAGE = "before\n<!-- gains: written by its command -->\nold\n<!-- gains: end -->\nafter\n"

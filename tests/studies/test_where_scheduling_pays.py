@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from studies import pays
+from studies.campaigns import pays
 from studies.log.comparison import HORIZONS
 from studies.transition.flights import FlightPlan, autopilot_for
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
 from symheli.lpv.bases.function_space import FunctionSpace, Range
+from symheli.values.arrays import Array
 
 
 class Piece(NamedTuple):

@@ -9,8 +9,8 @@ from scipy.interpolate import BSpline as ScipyBSpline
 from scipy.interpolate import PPoly
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import frozen
 from symheli.lpv.bases.piecewise import PiecewisePolynomial
+from symheli.values.arrays import frozen
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
+from symheli.values.arrays import Array, frozen
 
 Range = tuple[float, float]
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import frozen
 from symheli.lpv.bases.piecewise import PiecewisePolynomial
+from symheli.values.arrays import frozen
 
 
 @dataclass(frozen=True)

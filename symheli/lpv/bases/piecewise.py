@@ -10,8 +10,8 @@ from math import comb
 import numpy as np
 from scipy.interpolate import PPoly
 
-from symheli.lpv.arrays import Array
 from symheli.lpv.bases.basis import Basis, Piece
+from symheli.values.arrays import Array
 
 
 class PiecewisePolynomial(Basis):

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from symheli.errors import InputError, PrecisionWarning, UnknownNameError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases.basis import Basis, Piece, check_range
 from symheli.lpv.recentred import centre, recentred
+from symheli.values.arrays import Array, frozen
 
 DIGITS = 8.0
 """More decimal digits lost than this, half of a double's, are worth a warning."""

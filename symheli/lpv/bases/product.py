@@ -9,10 +9,10 @@ from itertools import product
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
 from symheli.lpv.bases.basis import Basis
 from symheli.lpv.bases.function_space import FunctionSpace, Range
 from symheli.lpv.bases.polynomial import Polynomial
+from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
 from symheli.lpv.bases.basis import Basis, Piece, check_range
+from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True)

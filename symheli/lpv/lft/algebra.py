@@ -11,13 +11,13 @@ from itertools import chain
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.arrays import Array
 from symheli.lpv.equilibration import is_singular
 from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.lpv.lft.systems import System, as_lft
-from symheli.lpv.sample_period import same_period
 from symheli.lpv.scheduling import Scheduling
-from symheli.lpv.signal import Signal
+from symheli.values.arrays import Array
+from symheli.values.sample_period import same_period
+from symheli.values.signal import Signal
 
 
 def append(*systems: System) -> LFT:

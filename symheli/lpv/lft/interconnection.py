@@ -11,7 +11,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.lft.algebra import append, close
 from symheli.lpv.lft.model import LFT
 from symheli.lpv.lft.systems import System, as_lft
-from symheli.lpv.signal import Signal
+from symheli.values.signal import Signal
 
 
 def connect(
@@ -72,10 +72,9 @@ def connect(
     for row, name in enumerate(outputs):
         if name not in given_outputs:
             raise UnknownNameError("output", name, sorted(map(str, given_outputs)))
-        F[row, given_outputs.index(name)] = 1.0  # type: ignore[arg-type]
-    return close(
-        whole, K, E, F, external, [given_outputs[given_outputs.index(name)] for name in outputs]
-    )  # type: ignore[arg-type]
+        F[row, given_outputs.index(Signal(name))] = 1.0
+    kept = [given_outputs[given_outputs.index(Signal(name))] for name in outputs]
+    return close(whole, K, E, F, external, kept)
 
 
 def _external(name: str, inputs: Sequence[Signal]) -> Signal:

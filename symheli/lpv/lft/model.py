@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.scheduling import Scheduling
-from symheli.lpv.signal import Signal, indices, signals
+from symheli.values.arrays import Array, frozen
+from symheli.values.signal import Signal, indices, signals
 
 if TYPE_CHECKING:
     from symheli.lpv.lft.sampling import HoldError

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array, frozen
 from symheli.lpv.bases import Polynomial
 from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.lpv.lpv_state_space import LPVStateSpace, Residuals
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import Scheduling
-from symheli.lpv.signal import signals
+from symheli.values.arrays import Array, frozen
+from symheli.values.signal import signals
 
 ROUNDING = 16 * np.finfo(float).eps
 """By how much of itself an entry of an LFT may be off: it was rounded when the LFT was made."""

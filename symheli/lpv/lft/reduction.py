@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
 from symheli.lpv.equilibration import equilibrate, peaks_to_one, significant
 from symheli.lpv.lft.model import LFT, Block, parts
+from symheli.values.arrays import Array
 
 SAMPLES = 12
 """Points of the box at which the size of what depends on the parameters is looked at."""

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import frozen
 from symheli.lpv.lft.model import LFT
 from symheli.lpv.linear_model import LinearModel, is_control_system
 from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.values.arrays import frozen
 
 System = Any
 """An LFT, a LinearModel, an LPVStateSpace of polynomial dependence or a system of python-control;

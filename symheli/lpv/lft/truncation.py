@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.arrays import Array
 from symheli.lpv.equilibration import equilibrate, significant
 from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.lpv.lft.reduction import reduce
+from symheli.values.arrays import Array
 
 
 class Truncation(NamedTuple):

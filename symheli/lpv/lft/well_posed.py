@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv.arrays import Array
 from symheli.lpv.lft.model import LFT
+from symheli.values.arrays import Array
 
 
 class WellPosedness(NamedTuple):

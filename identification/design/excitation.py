@@ -1,0 +1,207 @@
+"""Whether a record can determine a structure: rank, spectrum, and what is missing in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.design.determined import determined_columns
+from identification.design.never_determined import never_determined
+from identification.structure.lpvarx import LPVARX, Group
+from identification.structure.regressors import Regression, as_records, stacked
+from symheli.errors import ExcitationError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+RANK_TOLERANCE = 1e-11
+"""A direction with a singular value below this fraction of the largest is lost to rounding (columns
+scaled to length 1).
+"""
+
+DISTINCT_TOLERANCE = 1e-6
+"""Two scheduling values closer than this fraction of the range count as one."""
+
+BINS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationReport:
+    """How well the scheduled regressors of a record determine the coefficients of a structure.
+
+    `singular_values` (n,) of the regressor matrix with columns scaled to length 1, largest first;
+    `condition` their ratio; `rank` how many regressors are determined
+    (`identification.design.determined`); `distinct` scheduling values found against `needed`;
+    `occupancy` samples in each of the bins with `edges` (unit of p) over the range of the basis, a
+    row for each of several parameters; `weakest` the direction (n,) the data determine worst, in
+    scaled regressors. `reason` is empty where the data suffice. Where the equations differ in their
+    regressors, this is the report on the worst of them, those of `outputs`.
+    """
+
+    names: tuple[str, ...]
+    samples: int
+    rank: int
+    singular_values: Array
+    condition: float
+    distinct: int
+    needed: int
+    edges: Array
+    occupancy: Array
+    weakest: Array
+    scheduling: str
+    reason: str
+    outputs: tuple[str, ...] = ()
+
+    @property
+    def sufficient(self) -> bool:
+        """Whether every coefficient is determined."""
+        return not self.reason
+
+    @property
+    def worst_direction(self) -> str:
+        """The combination of scaled regressors the data determine worst, its largest parts
+        first.
+        """
+        return direction_in_words(self.weakest, self.names)
+
+    def require(self) -> None:
+        """Raises `ExcitationError` with the reason unless the data suffice."""
+        if self.reason:
+            raise ExcitationError(self.reason, self)
+
+    def __str__(self) -> str:
+        return "\n".join(
+            [
+                (
+                    "excitation:"
+                    f" {'sufficient' if self.sufficient else 'NOT sufficient: ' + self.reason}"
+                ),
+                (
+                    f"  regressors {len(self.names)}, samples {self.samples}, rank {self.rank},"
+                    f" scaled condition {self.condition:.3g}"
+                ),
+                f"  distinct values of {self.scheduling}: {self.distinct}, needed {self.needed}",
+                f"  worst determined: {self.worst_direction}",
+                *self._bars(),
+            ]
+        )
+
+    def _bars(self) -> list[str]:
+        out = []
+        names = self.scheduling.split(", ")
+        for name, edges, occupancy in zip(
+            names, np.atleast_2d(self.edges), np.atleast_2d(self.occupancy), strict=True
+        ):
+            full = max(int(occupancy.max(initial=0)), 1)
+            out.append(f"  samples over {name}:")
+            for a, b, n in zip(edges[:-1], edges[1:], occupancy, strict=True):
+                out.append(f"  {a:9.3g} .. {b:<9.3g} {int(n):7d} {'#' * round(40 * int(n) / full)}")
+        return out
+
+
+def excitation_report(
+    arx: LPVARX, records: FlightRecord | Iterable[FlightRecord]
+) -> ExcitationReport:
+    """Can these records determine this structure? A value with the answer; nothing is raised for
+    poor data.
+    """
+    return excitation_of(arx, stacked(arx, as_records(records)))
+
+
+def excitation_of(arx: LPVARX, data: Regression) -> ExcitationReport:
+    """The same for regressors already built."""
+    reports = [_report(arx, data, group) for group in arx.groups]
+    return max(reports, key=lambda report: (not report.sufficient, report.condition))
+
+
+def _report(arx: LPVARX, data: Regression, group: Group) -> ExcitationReport:
+    regressors = arx.regressors(group)
+    names, n = tuple(arx.regressor_names[i] for i in regressors), len(regressors)
+    values, directions = spectrum(data.phi[:, regressors])
+    rank = int(np.sum(determined_columns(data.phi[:, regressors], arx.basis)))
+    ranges, scheduling = arx.basis.ranges, ", ".join(arx.parameters)
+    distinct, needed = distinct_values(data.p, ranges), arx.basis.distinct_values
+    bins = [
+        np.histogram(p, bins=BINS, range=limits)
+        for p, limits in zip(data.p.reshape(-1, len(ranges)).T, ranges, strict=True)
+    ]
+    occupancy, edges = (
+        np.array(parts[0] if len(ranges) == 1 else parts) for parts in zip(*bins, strict=True)
+    )
+    weakest = directions[-1]
+    reason = ""
+    if len(data.phi) < n:
+        reason = (
+            f"{len(data.phi)} usable samples cannot determine {n} coefficients an output; record"
+            f" longer, or lower na, nb or the size of the basis ({data.dropped} samples had no"
+            " complete regressor)"
+        )
+    elif distinct < needed:
+        smaller = f" (a polynomial of degree {distinct - 1} at most)" if len(ranges) == 1 else ""
+        reason = (
+            f"{scheduling} takes {distinct} distinct values and {arx.basis} needs {needed}; "
+            f"let {scheduling} visit more values, or choose a smaller basis{smaller}"
+        )
+    elif rank < n:
+        reason = never_determined(arx, group) or (
+            f"the regressors have rank {rank} of {n}: the data do not determine"
+            f" {direction_in_words(weakest, names)}; excite the inputs more richly while"
+            f" {scheduling} moves, or lower na, nb or the size of the basis"
+        )
+    return ExcitationReport(
+        names,
+        len(data.phi),
+        rank,
+        values,
+        values[0] / values[-1] if values[-1] > 0 else np.inf,
+        distinct,
+        needed,
+        edges,
+        occupancy,
+        weakest,
+        scheduling,
+        reason,
+        tuple(arx.outputs[y] for y in group.outputs),
+    )
+
+
+def column_scale(matrix: Array) -> Array:
+    """Length of each column, 1 where it is zero."""
+    scale = np.linalg.norm(matrix, axis=0)
+    return np.where(scale > 0, scale, 1.0)
+
+
+def spectrum(phi: Array) -> tuple[Array, Array]:
+    """Singular values (n,), padded with zeros, and right singular vectors (n, n) of `phi` with
+    columns of length 1.
+    """
+    n = phi.shape[1]
+    R = np.linalg.qr(phi / column_scale(phi), mode="r") if len(phi) else np.zeros((0, n))
+    _, values, directions = np.linalg.svd(R, full_matrices=True)
+    return np.pad(values, (0, n - len(values))), directions
+
+
+def distinct_values(p: Array, ranges: Sequence[tuple[float, float]]) -> int:
+    """Number of scheduling points p (m,) or (m, parameters) further apart than rounding, measured
+    by the ranges of the basis.
+    """
+    if len(p) == 0:
+        return 0
+    scaled = p.reshape(len(p), -1) / [high - low for low, high in ranges]
+    if len(ranges) == 1:
+        return 1 + int(np.sum(np.diff(np.sort(scaled[:, 0])) > DISTINCT_TOLERANCE))
+    return len(np.unique(np.round(scaled / DISTINCT_TOLERANCE), axis=0))
+
+
+def direction_in_words(direction: Array, names: tuple[str, ...], parts: int = 3) -> str:
+    """Its largest entries, such as "0.71 u(k-1) f0(p(k-1)) - 0.70 u(k-2) f0(p(k-2))"."""
+    largest = [
+        i for i in np.argsort(-np.abs(direction), kind="stable")[:parts] if abs(direction[i]) > 0.05
+    ]
+    sign = np.sign(direction[largest[0]])
+    text = " ".join(
+        f"{'+' if sign * direction[i] >= 0 else '-'} {abs(direction[i]):.2f} {names[i]}"
+        for i in largest
+    )
+    return text.removeprefix("+ ") + (" + ..." if np.sum(np.abs(direction) > 0.05) > parts else "")

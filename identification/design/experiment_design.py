@@ -1,0 +1,148 @@
+"""Which experiment tells most: candidates compared by the information their records would hold,
+within limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.design.excitation import RANK_TOLERANCE, column_scale
+from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import as_records, regression
+from symheli.errors import ExcitationError, InputError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A candidate with its information.
+
+    `factor` (n, n), upper triangular, with R' R = phi' phi, the information of the regressors
+    (never squared: it would lose half its digits); `bounds` (n,): standard errors it allows for
+    residuals of unit variance (infinite where it leaves a coefficient open). `exceeded`: {signal:
+    largest value} beyond its limit.
+    """
+
+    name: str
+    duration: float
+    factor: Array
+    exceeded: Mapping[str, float]
+
+    @property
+    def allowed(self) -> bool:
+        """Whether every limit is kept."""
+        return not self.exceeded
+
+    @property
+    def bounds(self) -> Array:
+        """(n,)"""
+        return standard_errors(self.factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The chosen experiments in order, and the standard errors (n,) they allow together for
+    residuals of unit variance.
+
+    `gains`: the growth of log det of the information with each, per regressor, from the second on.
+    """
+
+    experiments: tuple[Experiment, ...]
+    gains: tuple[float, ...]
+
+    @property
+    def bounds(self) -> Array:
+        """(n,)"""
+        return standard_errors(_triangle(*(e.factor for e in self.experiments)))
+
+
+def compare_experiments(
+    structure: LPVARX, candidates: Mapping[str, FlightRecord], limits: Mapping[str, float]
+) -> tuple[Experiment, ...]:
+    """The information in each candidate's record (simulated, or flown), for a structure whose
+    equations share their regressors.
+
+    `limits` {signal: largest absolute value} in the units of the record. A record that leaves the
+    range of the basis is refused (`InputError`). Order as given.
+    """
+    if len(structure.groups) > 1:
+        raise InputError(
+            "compare_experiments needs equations that share their regressors; compare one output at"
+            " a time"
+        )
+    records = dict(zip(candidates, as_records(candidates.values()), strict=True))
+    out = []
+    for name, record in records.items():
+        exceeded = {}
+        for signal, limit in limits.items():
+            top = float(np.nanmax(np.abs(record[signal])))
+            if top > limit:
+                exceeded[signal] = top
+        phi = regression(structure, record).phi
+        out.append(
+            Experiment(name, float(record.time[-1] - record.time[0]), _triangle(phi), exceeded)
+        )
+    return tuple(out)
+
+
+def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
+    """At most `count` allowed experiments, one after the other, each the one that most increases
+    log det of the information per second.
+
+    (A sequential D-optimal design: independent of the units of the coefficients.) Raises
+    `ExcitationError` where none is allowed. Source: Fedorov (1972), Theory of Optimal Experiments;
+    for flight tests Morelli (2012).
+    """
+    if count < 1:
+        raise InputError(f"count: expected at least one experiment, got {count}")
+    left = [e for e in experiments if e.allowed]
+    if not left:
+        worst = "; ".join(f"{e.name}: {', '.join(e.exceeded)}" for e in experiments)
+        raise ExcitationError(
+            f"no candidate keeps its limits ({worst}); lower the amplitudes or widen the limits"
+        )
+    scale = np.maximum(
+        np.max([np.linalg.norm(e.factor, axis=0) for e in left], axis=0), np.finfo(float).tiny
+    )
+    total, chosen, gains = np.zeros_like(left[0].factor), [], []
+    for _ in range(min(count, len(left))):
+        value = {e.name: _logdet(_triangle(total, e.factor) / scale) for e in left}
+        start = _logdet(total / scale)
+        best = max(left, key=lambda e: (value[e.name] - start) / e.duration)
+        if chosen:
+            gains.append((value[best.name] - start) / len(scale))
+        chosen.append(best)
+        left.remove(best)
+        total = _triangle(total, best.factor)
+    return Plan(tuple(chosen), tuple(gains))
+
+
+def standard_errors(factor: Array) -> Array:
+    """sqrt(diag((R'R)^-1)) (n,) of a factor R (n, n), infinite for coefficients whose direction it
+    leaves open.
+    """
+    scale = column_scale(factor)
+    _, values, directions = np.linalg.svd(factor / scale)
+    open_ = values <= RANK_TOLERANCE * values[0]
+    out = np.sqrt(np.sum((directions[~open_].T / values[~open_]) ** 2, axis=1)) / scale
+    return np.where(np.any(np.abs(directions[open_]) > 1e-6, axis=0), np.inf, out)
+
+
+def _triangle(*factors: Array) -> Array:
+    """R (n, n) with R' R the sum of F' F of the factors (m, n)."""
+    n = factors[0].shape[1]
+    stacked = np.vstack([*factors, np.zeros((max(n - sum(map(len, factors)), 0), n))])
+    return np.asarray(np.linalg.qr(stacked, mode="r"))
+
+
+def _logdet(factor: Array) -> float:
+    """Log determinant of R'R, singular values no lower than what rounding leaves of the largest
+    possible one.
+    """
+    return float(
+        2 * np.sum(np.log(np.maximum(np.linalg.svd(factor, compute_uv=False), RANK_TOLERANCE)))
+    )

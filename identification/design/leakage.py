@@ -1,0 +1,100 @@
+"""What a model may hear of its own answer: through a scheduling signal made of the outputs, or
+through samples made of others.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import as_records, scheduling_values
+from symheli.errors import DataWarning
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+MADE_OF_OUTPUTS = 0.5
+"""A scheduling signal of whose news the outputs of the same instant explain more than this is a
+measurement of them.
+"""
+
+PAST = 2
+"""Samples of p and the outputs that are known before the news at k."""
+
+NOTHING_NEW = 1e-6
+"""Of the spread of p from sample to sample; news below this is rounding."""
+
+
+def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecord]) -> Array:
+    """Share (parameters,) in [0, 1] of what is new in each scheduling parameter at k that the
+    outputs at k explain.
+
+    New is what p and the outputs at k-1 and k-2 do not tell (linear regression). About 1 for a
+    filtered output, 0 for a command: above `MADE_OF_OUTPUTS` p(k) hands a model the outputs it has
+    to predict.
+    """
+    now, past, p = [], [], []
+    for record in as_records(records):
+        y, s = record.columns(arx.outputs), scheduling_values(arx, record).reshape(len(record), -1)
+        for part in record.segments():
+            n = part.stop - part.start - PAST
+            if n > 0:
+                both = np.hstack([y[part], s[part]])
+                now.append(y[part][PAST:])
+                past.append(
+                    np.hstack(
+                        [
+                            np.ones((n, 1)),
+                            *(both[PAST - lag : PAST - lag + n] for lag in range(1, PAST + 1)),
+                        ]
+                    )
+                )
+                p.append(s[part][PAST:])
+    if not now:
+        return np.zeros(len(arx.parameters))
+    rows = np.hstack([np.vstack(past), np.vstack(now), np.vstack(p)])
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    known = rows.shape[1] - arx.ny - len(arx.parameters)
+    if len(rows) <= rows.shape[1]:
+        return np.zeros(len(arx.parameters))
+    new = (
+        rows[:, known:]
+        - rows[:, :known] @ np.linalg.lstsq(rows[:, :known], rows[:, known:], rcond=None)[0]
+    )
+    y, s = new[:, : arx.ny], new[:, arx.ny :]
+    left = s - y @ np.linalg.lstsq(y, s, rcond=None)[0]
+    change = np.sqrt(np.mean(np.diff(rows[:, known + arx.ny :], axis=0) ** 2, axis=0))
+    size = np.sqrt(np.mean(s**2, axis=0))
+    return np.where(
+        size > NOTHING_NEW * change,
+        1 - np.sum(left**2, axis=0) / np.maximum(np.sum(s**2, axis=0), np.finfo(float).tiny),
+        0.0,
+    )
+
+
+def warn_of_leakage(arx: LPVARX, records: Sequence[FlightRecord]) -> None:
+    """Warns (`DataWarning`) where y(k) stands among its own regressors, or an input at k that it
+    depends on is left out of them.
+    """
+    if arx.offset_rate or arx.scheduling_at == "now":
+        for parameter, share in zip(arx.parameters, share_from_outputs(arx, records), strict=True):
+            if share > MADE_OF_OUTPUTS:
+                term = "offset_rate" if arx.offset_rate else 'scheduling_at="now"'
+                warnings.warn(
+                    f"{parameter} is made of the outputs ({100 * share:.0f} % of what is new in it"
+                    f" at k is in the outputs at k): with {term} the model is told what it has to"
+                    " predict, and one step and free run flatter; schedule on a command, or leave"
+                    f" {term} out and score with hold_p=True",
+                    DataWarning,
+                    stacklevel=3,
+                )
+    made = next((record.resampled for record in records if record.resampled), "")
+    if made and arx.inputs and arx.input_lags and arx.input_lags.start > 0:
+        warnings.warn(
+            f"the samples are {made}: y(k) may depend on u(k), and delay {arx.input_lags.start}"
+            " leaves that out; give delay=0",
+            DataWarning,
+            stacklevel=3,
+        )

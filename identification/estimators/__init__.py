@@ -1,0 +1,1 @@
+"""From regressors to coefficients: least squares, instruments, penalties, output error."""

@@ -1,0 +1,41 @@
+"""Batch least squares, by orthogonal factors of scaled columns."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from identification.design.excitation import column_scale
+from identification.structure.lpvarx import LPVARX
+from symheli.values.arrays import Array
+
+
+def least_squares(phi: Array, y: Array) -> Array:
+    """theta (n, ny) that minimises |y - phi theta|, from phi (m, n) of full rank and y (m, ny).
+
+    QR of phi with columns scaled to length 1; the normal equations, which square the condition, are
+    never formed.
+    """
+    scale = column_scale(phi)
+    Q, R = np.linalg.qr(phi / scale)
+    return solve_triangular(R, Q.T @ y) / scale[:, None]
+
+
+def least_squares_by_group(arx: LPVARX, phi: Array, y: Array) -> Array:
+    """theta (n_regressors, ny) of a structure, each equation with its own regressors; zero where it
+    has none.
+    """
+    theta = np.zeros((arx.n_regressors, arx.ny))
+    for group in arx.groups:
+        regressors, outputs = arx.regressors(group), np.array(group.outputs)
+        theta[regressors[:, None], outputs] = least_squares(phi[:, regressors], y[:, outputs])
+    return theta
+
+
+def residual_covariance(arx: LPVARX, phi: Array, y: Array, theta: Array) -> Array:
+    """Covariance (ny, ny) of y - phi theta, per degree of freedom left (geometric mean of those of
+    two outputs).
+    """
+    error = y - phi @ theta
+    left = np.sqrt(np.maximum(len(phi) - np.sum(arx.free, axis=0), 1))
+    return error.T @ error / np.outer(left, left)

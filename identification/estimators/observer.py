@@ -1,0 +1,65 @@
+"""A Kalman observer in place of the free run: bounded also where the plant is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.values.arrays import Array
+
+DOUBT = 1e-4
+"""Variance of what drives the model beside its inputs, as a share of that of the noise on the
+outputs: small enough to whiten it, and enough to stay awake while a plant is stable, so that the
+estimate does not run away when it becomes unstable.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """For y = x + v, x(k) = -A(k) [x(k-1); x(k-2); ...] + known(k): A (n, ny, na ny), `gain` (n, na
+    ny, ny) of the past on the innovation.
+
+    While the plant is stable the gain is small, and the innovation is v; where it is unstable the
+    poles of the observer are its own mirrored at the unit circle, which leaves white noise white.
+    Source of the mirrored filter: Forssell and Ljung (2000), Identification of unstable systems
+    using output error and Box-Jenkins model structures, IEEE Trans. Automatic Control 45.
+    """
+
+    A: Array
+    gain: Array
+
+    @classmethod
+    def of(cls, A: Array, size: Array) -> Observer:
+        """The time-varying Kalman gain for white noise v with standard deviations `size` (ny,),
+        from a past measured with that noise.
+        """
+        n, ny, width = A.shape
+        R = np.diag(size**2)
+        P, drive = np.kron(np.eye(width // ny), R), np.zeros((width, width))
+        drive[:ny, :ny] = DOUBT * R
+        shift, gain = np.eye(width, k=-ny), np.empty((n, width, ny))
+        for k in range(n):
+            T = shift.copy()
+            T[:ny] = -A[k]
+            carried = P @ T[:ny].T
+            S, cross = T[:ny] @ carried + R, T @ carried
+            gain[k] = np.linalg.solve(S, cross.T).T
+            P = T @ P @ T.T - gain[k] @ cross.T + drive
+            P = 0.5 * (P + P.T)
+        return cls(A, gain)
+
+    def innovations(self, equation_error: Array) -> Array:
+        """What the observer does not foresee of y, (n, ny, m), where A y = known + `equation_error`
+        (n, ny, m); linear in it.
+        """
+        n, ny, m = equation_error.shape
+        width = self.A.shape[2]
+        out, past = np.empty_like(equation_error), np.zeros((width, m))
+        for k in range(n):
+            e = equation_error[k] - self.A[k] @ past
+            past[ny:] = past[: width - ny].copy()
+            past[:ny] = e
+            past -= self.gain[k] @ e
+            out[k] = e
+        return out

@@ -1,0 +1,213 @@
+"""Refined instrumental variables: the model's own noise-free response instruments, and filters, the
+next estimate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.design.excitation import (
+    RANK_TOLERANCE,
+    column_scale,
+    direction_in_words,
+    spectrum,
+)
+from identification.estimators.least_squares import least_squares
+from identification.estimators.observer import Observer
+from identification.model.stretches import (
+    Stretch,
+    contracted,
+    filtered,
+    free_of,
+    stretches,
+)
+from identification.structure.lpvarx import LPVARX
+from symheli.errors import ExcitationError, InputError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+Filter = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Iterations at most, the relative change of the coefficients that ends them, and the order of
+    the noise model.
+
+    `noise_order` is that of an autoregressive model of the output noise of each output; 0 takes it
+    as white.
+    """
+
+    iterations: int = 40
+    tolerance: float = 1e-6
+    noise_order: int = 0
+
+    def __post_init__(self) -> None:
+        if self.iterations < 1 or self.noise_order < 0 or not self.tolerance > 0:
+            given = f"{self.iterations}, {self.noise_order}, {self.tolerance}"
+            raise InputError(
+                f"expected iterations >= 1, noise_order >= 0 and a tolerance > 0, got {given}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """theta (n_regressors, ny), `noise` (ny, noise_order) autoregressive coefficients, and whether
+    the iteration `converged`.
+    """
+
+    theta: Array
+    noise: Array
+    iterations: int
+    converged: bool
+
+
+def refined_instruments(
+    arx: LPVARX,
+    records: Sequence[FlightRecord],
+    exogenous: Sequence[FlightRecord] | None,
+    start: Array,
+    options: Refined,
+) -> Refinement:
+    """Iterate from theta `start`: simulate, instrument and filter by the model found so far, solve,
+    until nothing moves.
+
+    With y = x + v, x the noise-free response, A(p) y = B(p) u + A(p) v: filtered by the last
+    A(p)^-1 the noise of the equation is v itself, and by the noise model white. The filter A(p)^-1
+    moves with p; it is applied to the products of signals and functions of p, which leaves the
+    equation linear in the coefficients whatever the basis and however the outputs are coupled. (The
+    published method filters by the constant part of A alone and so needs a basis with a constant.)
+    Instruments are the same products of the simulated response, so the fixed point is that of the
+    simulation error with white noise.
+
+    In closed loop `exogenous` are the records with inputs and outputs replaced by what the external
+    excitation explains of them (see `explained`): an observer driven by these takes the place of
+    the simulation, and filters, so that the plant may be unstable.
+
+    Raises `ExcitationError` where the response does not determine every coefficient. Source:
+    Laurain, Toth, Gilson and Garnier (2010), Refined instrumental variable methods for
+    identification of LPV Box-Jenkins models, Automatica 46, 959-967.
+    """
+    runs = stretches(arx, records, outputs=True)
+    if not runs:
+        raise ExcitationError(f"no unbroken stretch of more than {arx.memory} samples to simulate")
+    clean = runs if exogenous is None else stretches(arx, exogenous, outputs=True)
+    theta, noise, size = (
+        start,
+        np.zeros((arx.ny, options.noise_order)),
+        _size([run.target - run.regressors() @ start for run in runs]),
+    )
+    row, output = free_of(arx)
+    for iteration in range(1, options.iterations + 1):
+        model = contracted(arx, theta, clean) if exogenous is None else theta
+        filters = [
+            _filter(run.lag_coefficients(model), size, simulate=exogenous is None) for run in runs
+        ]
+        noise_free = [_response(run, model, by) for run, by in zip(clean, filters, strict=True)]
+        errors = [_error(run, model, by) for run, by in zip(runs, filters, strict=True)]
+        size, noise = _size(errors), _noise_model(errors, options.noise_order)
+        parts = [
+            _equations(run, c, by, noise, size)
+            for run, c, by in zip(runs, noise_free, filters, strict=True)
+        ]
+        Z, X, y = (np.concatenate(part) for part in zip(*parts, strict=True))
+        found = np.zeros_like(theta)
+        found[row, output] = _instrumented(arx, Z, X, y)
+        change = np.linalg.norm((found - theta)[row, output] * column_scale(X)) / max(
+            np.linalg.norm(y), 1e-300
+        )
+        theta = found
+        if change < options.tolerance:
+            return Refinement(theta, noise, iteration, True)
+    return Refinement(theta, noise, options.iterations, False)
+
+
+def _filter(A: Array, size: Array, *, simulate: bool) -> Filter:
+    """A(p)^-1, or where it may be unstable what an observer leaves of an equation error (n, ny,
+    m).
+    """
+    if simulate:
+        return lambda error: filtered(A, error, np.zeros((A.shape[2], error.shape[2])))
+    return Observer.of(A, size).innovations
+
+
+def _error(run: Stretch, theta: Array, by: Filter) -> Array:
+    """What the model does not explain of the outputs, (n - memory, ny)."""
+    return by((run.target - run.regressors() @ theta)[:, :, None])[:, :, 0]
+
+
+def _response(run: Stretch, theta: Array, by: Filter) -> Stretch:
+    """The stretch with what the model explains of the outputs."""
+    return run.with_outputs(run.target - _error(run, theta, by))
+
+
+def _equations(
+    run: Stretch, noise_free: Stretch, by: Filter, noise: Array, size: Array
+) -> tuple[Array, ...]:
+    """Instruments, regressors (rows, free coefficients) and outputs (rows,) of one stretch,
+    filtered and whitened.
+    """
+    signals = (
+        noise_free.spread_out(noise_free.regressors()),
+        run.spread_out(run.regressors()),
+        run.target[:, :, None],
+    )
+    return tuple(
+        (_whitened(by(part), noise) / size[None, :, None]).reshape(
+            -1, *part.shape[2:][: part.shape[2] > 1]
+        )
+        for part in signals
+    )
+
+
+def _whitened(signal: Array, noise: Array) -> Array:
+    out = signal.copy()
+    for lag in range(1, noise.shape[1] + 1):
+        out[lag:] += noise[None, :, lag - 1, None] * signal[:-lag]
+    return out[noise.shape[1] :]
+
+
+def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
+    """b with Z'(y - X b) = 0, by the orthonormal factor of the scaled instruments."""
+    scale = column_scale(X)
+    Q, _ = np.linalg.qr(Z / column_scale(Z))
+    square = Q.T @ (X / scale)
+    values, directions = spectrum(square)
+    if values[-1] <= RANK_TOLERANCE * values[0]:
+        row, output = free_of(arx)
+        names = tuple(
+            f"{arx.regressor_names[r]} in {arx.outputs[o]}"
+            for r, o in zip(row, output, strict=True)
+        )
+        missing = direction_in_words(directions[-1], names)
+        raise ExcitationError(
+            f"the simulated response leaves undetermined: {missing}; excite the inputs more richly,"
+            " or lower the orders"
+        )
+    return np.linalg.solve(square, Q.T @ y) / scale
+
+
+def _size(errors: Sequence[Array]) -> Array:
+    size = np.sqrt(np.mean(np.concatenate(errors) ** 2, axis=0))
+    return np.where(size > 0, size, 1.0)
+
+
+def _noise_model(errors: Sequence[Array], order: int) -> Array:
+    """Autoregressive coefficients (ny, order) of what the model leaves, v(k) + d_1 v(k-1) + ... =
+    e(k).
+    """
+    out = np.zeros((errors[0].shape[1], order))
+    for y in range(len(out) if order else 0):
+        past = np.vstack(
+            [
+                np.column_stack([-v[order - i : len(v) - i, y] for i in range(1, order + 1)])
+                for v in errors
+            ]
+        )
+        now = np.concatenate([v[order:, y] for v in errors])
+        if np.linalg.matrix_rank(past) == order:
+            out[y] = least_squares(past, now[:, None])[:, 0]
+    return out

@@ -1,0 +1,54 @@
+"""Coefficient functions as a picture: each over the scheduling parameter, with its confidence
+band.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.records.record_plot import GRID, LINE, empty_figure, label
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from identification.judge.uncertainty import Uncertainty
+
+COLUMNS = 4
+
+
+def plot_bands(known: Uncertainty, level: float = 0.95) -> Figure:
+    """A matplotlib figure with one panel a coefficient function: its value over p and the normal
+    confidence interval at each p.
+
+    Raises `InputError` for several scheduling parameters and a level outside (0, 1).
+    """
+    model = known.model
+    if len(model.parameters) != 1:
+        raise InputError(
+            "coefficients of several scheduling parameters are no curves; take bands(p) along a"
+            " line"
+        )
+    low, high = model.structure.basis.ranges[0]
+    p = np.linspace(low, high, 101)
+    shown = known.bands(p)
+    tall = -(-len(shown) // COLUMNS)
+    figure = empty_figure(2.6 * COLUMNS, 0.6 + 1.5 * tall)
+    axes = figure.subplots(tall, COLUMNS, sharex=True, squeeze=False).reshape(-1)
+    for ax, band in zip(axes, shown, strict=False):
+        ax.fill_between(p, *band.interval(level), color=LINE, alpha=0.25, linewidth=0)
+        ax.plot(p, band.value, color=LINE, linewidth=1.0)
+        ax.axhline(0.0, color="0.6", linewidth=0.6)
+        ax.set_title(f"{band.regressor} in {band.output}", fontsize=8, loc="left")
+        ax.grid(color=GRID, linewidth=0.6)
+        ax.tick_params(labelsize=7)
+        ax.spines[["top", "right"]].set_visible(False)
+    for ax in axes[len(shown) :]:
+        ax.set_visible(False)
+    for ax in axes[max(len(shown) - COLUMNS, 0) : len(shown)]:
+        ax.tick_params(labelbottom=True)
+        ax.set_xlabel(label(model.parameters[0]), fontsize=8)
+    figure.suptitle(f"coefficients with their {100 * level:g} % confidence bands", fontsize=9)
+    return figure

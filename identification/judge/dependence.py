@@ -1,0 +1,135 @@
+"""Whether the coefficients depend on p at other instants than the structure says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import f as fisher
+
+from identification.design.excitation import RANK_TOLERANCE, column_scale
+from identification.model.lpvarx_model import LPVARXModel
+from identification.structure.regressors import as_records, stacked
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+SIGNIFICANT = 1e-3
+"""A probability below this is not chance."""
+
+WORTH = 0.01
+"""Of the residual; less than this is not worth another structure, however significant."""
+
+MOST = 0.95
+"""Of the residual; what explains less may not be the whole story."""
+
+ROUNDING = 1e-9
+"""A residual below this fraction of the output is rounding: there is nothing left to explain."""
+
+
+@dataclass(frozen=True, eq=False)
+class DependenceReport:
+    """What p at the other instants explains of the one-step residuals of `outputs`, an entry an
+    output.
+
+    `at`, `other`: the instants of the model and those tried. `residual`: root mean square as a
+    fraction of that of the output; `explained`: share of the squared residual in [0, 1];
+    `probability` that chance explains as much (F test, white residuals assumed).
+    """
+
+    outputs: tuple[str, ...]
+    at: str
+    other: str
+    residual: Array
+    explained: Array
+    probability: Array
+
+    @property
+    def dynamic(self) -> tuple[bool, ...]:
+        """For which outputs the dependence on p is not the one of the structure."""
+        return tuple(
+            (
+                (self.probability < SIGNIFICANT)
+                & (self.explained > WORTH)
+                & (self.residual > ROUNDING)
+            ).tolist()
+        )
+
+    def __str__(self) -> str:
+        other = {"lag": "p(k - lag)", "now": "p(k)"}[self.other]
+        lines = []
+        for y, output in enumerate(self.outputs):
+            what = f"residual {100 * self.residual[y]:.3g} % of the output"
+            if self.residual[y] <= ROUNDING:
+                verdict = "nothing left to explain"
+            elif self.dynamic[y]:
+                verdict = (
+                    f"{other} explains {100 * self.explained[y]:.3g} % of it: the coefficients do"
+                    " NOT depend on p as the structure says; "
+                    f'try scheduling_at="{self.other}"'
+                )
+                if self.explained[y] < MOST:
+                    verdict += (
+                        "; the rest is noise, or dependence on several instants at once, which"
+                        " higher orders come nearer to"
+                    )
+            else:
+                verdict = (
+                    f"{other} explains {100 * self.explained[y]:.2g} % of it: no sign of another"
+                    " dependence on p"
+                )
+            lines.append(f"{output}: {what}; {verdict}")
+        return "\n".join(lines)
+
+
+def dependence_report(
+    model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord]
+) -> DependenceReport:
+    """Regress the one-step residuals on the same signals with the basis at the other instants: p(k)
+    for "lag", p(k - lag) for "now".
+
+    What a static dependence cannot express stays in the residual; where p moves slowly from sample
+    to sample the two hardly differ and little can be seen. Only what the regressors of the model do
+    not explain themselves counts.
+    """
+    arx, records = model.structure, as_records(records)
+    for record in records:
+        model.require_same_kind(record)
+    other = replace(arx, scheduling_at="now" if arx.scheduling_at == "lag" else "lag")
+    data, extra = stacked(arx, records), stacked(other, records)
+    common, mine, theirs = np.intersect1d(data.rows, extra.rows, return_indices=True)
+    phi, y, psi = data.phi[mine], data.y[mine], extra.phi[theirs]
+    error, m = y - phi @ model.theta, len(common)
+    explained, probability = np.zeros(arx.ny), np.ones(arx.ny)
+    for group in arx.groups:
+        regressors = arx.regressors(group)
+        Q = _range(phi[:, regressors])
+        new = psi[:, regressors] - Q @ (Q.T @ psi[:, regressors])
+        P = _range(new, psi[:, regressors])
+        left = m - Q.shape[1] - P.shape[1]
+        for output in group.outputs:
+            total, gained = (
+                float(error[:, output] @ error[:, output]),
+                float(np.sum((P.T @ error[:, output]) ** 2)),
+            )
+            if P.shape[1] and left > 0 and total > 0:
+                explained[output] = gained / total
+                statistic = (gained / P.shape[1]) / max(
+                    (total - gained) / left, np.finfo(float).tiny
+                )
+                probability[output] = fisher.sf(statistic, P.shape[1], left)
+    size = np.sqrt(np.mean(y**2, axis=0))
+    residual = np.sqrt(np.mean(error**2, axis=0)) / np.where(size > 0, size, 1.0)
+    return DependenceReport(
+        arx.outputs, arx.scheduling_at, other.scheduling_at, residual, explained, probability
+    )
+
+
+def _range(X: Array, measure: Array | None = None) -> Array:
+    """Orthonormal basis of the columns of X; what is rounding beside the columns of `measure`
+    (default X) is dropped.
+    """
+    U, values, _ = np.linalg.svd(
+        X / column_scale(X if measure is None else measure), full_matrices=False
+    )
+    return U[:, values > RANK_TOLERANCE * max(values[0], 1.0)] if len(values) else U

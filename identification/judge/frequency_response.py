@@ -1,0 +1,161 @@
+"""Frequency responses from records, with the coherence that says how far to believe them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.signal import csd, get_window
+
+from identification.structure.regressors import as_records, units_of
+from symheli.errors import ExcitationError, InputError
+from symheli.lpv import LinearModel
+from symheli.records import FlightRecord
+from symheli.values import Signal
+from symheli.values.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """G (n, ny, nu), complex, at `omega` (n,) rad/s, of `outputs` to `inputs`, the other inputs
+    taken off.
+
+    `coherence` (n, ny, nu): partial coherence in [0, 1], the share of what is left of an output
+    that goes with what is left of an input. `multiple` (n, ny): share of each output that all
+    inputs explain. `random_error` (n, ny, nu): normalised standard deviation of |G|.
+    """
+
+    omega: Array
+    G: Array
+    coherence: Array
+    multiple: Array
+    random_error: Array
+    outputs: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+
+    def mismatch(self, model: LinearModel, coherence: float = 0.6) -> Array:
+        """Mean squared mismatch cost J (ny, nu) of a model's response; below 100 is a good, below
+        50 an excellent match.
+
+        J = 20/n sum W [ (dB error)^2 + 0.01745 (degree error)^2 ], W = (1.58 (1 -
+        exp(-coherence)))^2, over the frequencies where the coherence exceeds the threshold; NaN
+        where there are none. `coherence` is gamma^2 itself, a share of power: W(0.6) = 0.51.
+        Source: Tischler and Remple (2012), Aircraft and Rotorcraft System Identification, eq. 11.4.
+        """
+        H = model.select(inputs=self.inputs, outputs=self.outputs).frequency_response(self.omega)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = self.G / H
+            error = (20 * np.log10(np.abs(ratio))) ** 2 + 0.01745 * np.degrees(np.angle(ratio)) ** 2
+        weight = (1.58 * (1 - np.exp(-self.coherence))) ** 2
+        good = (self.coherence > coherence) & np.isfinite(error)
+        count = good.sum(axis=0)
+        total = np.sum(np.where(good, weight * error, 0.0), axis=0)
+        return np.where(count > 0, 20 * total / np.maximum(count, 1), np.nan)
+
+
+def frequency_response(
+    records: FlightRecord | Iterable[FlightRecord],
+    outputs: Sequence[str],
+    inputs: Sequence[str],
+    *,
+    window: float,
+    band: tuple[float, float] | None = None,
+) -> FrequencyResponse:
+    """Spectral estimate from one record or several: Hann windows of `window` s, half overlapping,
+    averaged; G = Gyu Guu^-1.
+
+    A long window resolves low frequencies, a short one averages more: about five windows a record
+    are the least. `band` (rad/s) defaults to 2 pi/`window` .. half the sampling frequency. Windows
+    that a gap or a missing sample touches are left out. Feedback biases G where noise is fed back:
+    excite well. Raises `ExcitationError` where the inputs move together or too few windows remain.
+    Source: Bendat and Piersol (2010), Random Data, ch. 7 and 9; Tischler and Remple (2012), ch. 7
+    to 9.
+    """
+    records = as_records(records)
+    outputs, inputs = units_of(outputs, records), units_of(inputs, records)
+    dt = records[0].dt
+    if not 7.5 * dt < window < np.inf:
+        raise InputError(f"window: expected at least eight samples, {8 * dt:.3g} s, got {window} s")
+    n = round(window / dt)
+    omega = 2 * np.pi * np.fft.rfftfreq(n, dt)
+    low, high = band or (2 * np.pi / window, np.pi / dt)
+    keep = (omega >= low * (1 - 1e-9)) & (omega <= high * (1 + 1e-9)) & (omega > 0)
+    if not keep.any():
+        raise InputError(
+            f"band: no frequency of a {window} s window lies between {low} and {high} rad/s"
+        )
+    S, count = _spectra(records, (*inputs, *outputs), n, keep)
+    nu = len(inputs)
+    if count < nu + 1:
+        raise ExcitationError(
+            f"{count} unbroken windows of {window} s say nothing about {nu} inputs; record longer"
+            " or shorten the window"
+        )
+    Suu, Syu, Syy = S[:, :nu, :nu], S[:, nu:, :nu], S[:, nu:, nu:]
+    size = np.sqrt(np.einsum("kii->ki", Suu).real)
+    if np.any(size == 0) or np.linalg.cond(Suu / (size[:, :, None] * size[:, None, :])).max() > 1e8:
+        raise ExcitationError(
+            f"the inputs {', '.join(inputs)} move together, or not at all, at some frequency of the"
+            " band; excite each by itself"
+        )
+    G = np.swapaxes(np.linalg.solve(np.swapaxes(Suu, 1, 2), np.swapaxes(Syu, 1, 2)), 1, 2)
+    power = np.einsum("kii->ki", Syy).real
+    explained = np.einsum("kij,kjl,kil->ki", G, Suu, np.conj(G)).real
+    tiny = np.finfo(float).tiny
+    multiple = np.clip(explained / np.maximum(power, tiny), 0.0, 1.0)
+    # what is left of input j without the others is 1/(Suu^-1)_jj; of the output, what the others do
+    # not explain
+    alone = 1 / np.einsum("kjj->kj", np.linalg.inv(Suu)).real
+    own = np.abs(G) ** 2 * alone[:, None, :]
+    noise = np.maximum(power - explained, 0.0)
+    coherence = own / np.maximum(own + noise[:, :, None], tiny)
+    # half overlapping Hann windows are worth 0.55 of their number as independent averages (Tischler
+    # and Remple, sec. 7.5)
+    with np.errstate(divide="ignore"):
+        random_error = np.sqrt(
+            0.55 * (1 - coherence) / np.maximum(coherence, tiny) / (2 * max(_independent(count), 1))
+        )
+    return FrequencyResponse(omega[keep], G, coherence, multiple, random_error, outputs, inputs)
+
+
+def _independent(windows: int) -> float:
+    """Number of windows that do not overlap in as much data."""
+    return (windows + 1) / 2
+
+
+def _spectra(
+    records: Sequence[FlightRecord], names: Sequence[str], n: int, keep: Array
+) -> tuple[Array, int]:
+    """Cross spectral densities (nf, m, m), S[:, a, b] of a with the conjugate of b, and the number
+    of windows averaged.
+    """
+    m, hop, total, count = len(names), n // 2, 0.0, 0
+    taper: Any = np.asarray(get_window("hann", n))
+    untouched: Any = False
+    for record in records:
+        values = record.columns(names)
+        for part in record.segments():
+            for start in range(part.start, part.stop - n + 1, hop):
+                piece = values[start : start + n]
+                if not np.isfinite(piece).all():
+                    continue
+                piece = piece - piece.mean(axis=0)
+                a, b = np.meshgrid(np.arange(m), np.arange(m), indexing="ij")
+                # csd(x, y) averages conj(X) Y
+                S = csd(
+                    piece.T[b],
+                    piece.T[a],
+                    fs=1 / record.dt,
+                    window=taper,
+                    nperseg=n,
+                    detrend=untouched,
+                    axis=-1,
+                )[1]
+                total, count = total + np.moveaxis(S, -1, 0)[keep], count + 1
+    if not count:
+        raise ExcitationError(
+            f"no unbroken stretch of {n} samples; shorten the window or resample the record"
+        )
+    return np.asarray(total) / count, count

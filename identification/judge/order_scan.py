@@ -1,0 +1,160 @@
+"""Which orders and which degree: fits on data that were not used, beside information criteria."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from identification.estimators.estimate import fit
+from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import as_records, stacked
+from symheli.errors import ExcitationError, InputError
+from symheli.lpv import Polynomial
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One structure: fits in percent by output one step, `horizon` samples and a free run ahead,
+    mean over validation records.
+
+    `bic` (Bayesian information criterion of the training residuals, smaller is better; NaN where
+    refused); `refused`: why the data do not determine it, empty where they do.
+    """
+
+    structure: LPVARX
+    bic: float
+    one_step: Array
+    ahead: Array
+    free_run: Array
+    refused: str = ""
+
+    @property
+    def na(self) -> int:
+        """Order."""
+        return int(self.structure.na)  # type: ignore[arg-type]
+
+    @property
+    def degree(self) -> int:
+        """Degree of the coefficients."""
+        return self.structure.basis.size - 1
+
+
+@dataclass(frozen=True, eq=False)
+class OrderScan:
+    """Every trial of a scan over `horizon` samples; `str()` is a table."""
+
+    trials: tuple[Trial, ...]
+    horizon: int
+
+    def best(self, by: str = "ahead") -> Trial:
+        """The trial of the largest median fit over the outputs "one_step", "ahead" or in
+        "free_run"; or of the least "bic".
+        """
+        tried = [t for t in self.trials if not t.refused]
+        if not tried:
+            raise ExcitationError(
+                f"the data determine none of the structures: {self.trials[0].refused}"
+            )
+        if by == "bic":
+            return min(tried, key=lambda t: t.bic)
+        if by not in ("one_step", "ahead", "free_run"):
+            raise InputError(f'by: expected "one_step", "ahead", "free_run" or "bic", got {by!r}')
+        return max(tried, key=lambda t: float(np.median(getattr(t, by))))
+
+    def __str__(self) -> str:
+        outputs = self.trials[0].structure.outputs
+        head = "  ".join(f"{y:>22s}" for y in outputs)
+        lines = [
+            (
+                f"fit in percent: one step / {self.horizon} samples / free run (worse: below -1000,"
+                " inf: diverges)"
+            ),
+            f"{'na':>3s} {'degree':>6s} {'BIC':>10s}  {head}",
+        ]
+        for t in self.trials:
+            if t.refused:
+                lines.append(f"{t.na:3d} {t.degree:6d} {'':>10s}  refused: {t.refused}")
+                continue
+            fits = "  ".join(
+                " /".join(map(_cell, three))
+                for three in zip(t.one_step, t.ahead, t.free_run, strict=True)
+            )
+            lines.append(f"{t.na:3d} {t.degree:6d} {t.bic:10.0f}  {fits}")
+        return "\n".join(lines)
+
+
+def _cell(fit: float) -> str:
+    return (
+        f"{fit:6.1f}" if fit > -1000 else f"{'worse':>6s}" if np.isfinite(fit) else f"{'inf':>6s}"
+    )
+
+
+def order_scan(
+    structure: LPVARX,
+    training: FlightRecord | Iterable[FlightRecord],
+    validation: FlightRecord | Iterable[FlightRecord],
+    *,
+    orders: Sequence[int] = (1, 2, 3, 4),
+    degrees: Sequence[int] = (0, 1, 2, 3),
+    horizon: int = 50,
+    hold_p: bool = False,
+) -> OrderScan:
+    """Fit `structure` with every na = nb of `orders` and every polynomial degree, by least squares,
+    and judge it on other records.
+
+    Degree 0 is the LTI model; nb follows na. `hold_p` as in `LPVARXModel.predict`: for a measured
+    p. Raises `InputError` where the basis is no polynomial of one parameter.
+    """
+    basis = structure.basis
+    if not isinstance(basis, Polynomial):
+        raise InputError(
+            f"an order scan varies the degree of a polynomial basis; this one is {basis}"
+        )
+    if not (orders and degrees):
+        raise InputError("orders, degrees: name at least one of each")
+    train, test = as_records(training), as_records(validation)
+    trials = []
+    for degree, na in product(degrees, orders):
+        trial = replace(
+            structure,
+            na=na,
+            nb=na if structure.inputs else 0,
+            basis=Polynomial(degree, basis.low, basis.high),
+        )
+        trials.append(_judge(trial, train, test, horizon, hold_p))
+    return OrderScan(tuple(trials), horizon)
+
+
+def _judge(
+    structure: LPVARX,
+    train: Sequence[FlightRecord],
+    test: Sequence[FlightRecord],
+    horizon: int,
+    hold_p: bool,
+) -> Trial:
+    nothing = np.full(structure.ny, np.nan)
+    try:
+        model = fit(structure, train)
+    except ExcitationError as error:
+        return Trial(structure, np.nan, nothing, nothing, nothing, str(error))
+    data = stacked(structure, train)
+    error = data.y - data.phi @ model.theta
+    n = len(error)
+    sign, logdet = np.linalg.slogdet(error.T @ error / n)
+    bic = n * logdet + int(structure.free.sum()) * np.log(n) if sign > 0 else -np.inf
+    steps = [
+        np.mean(
+            [
+                model.score(record, horizon=h, hold_p=hold_p and h is not None).array
+                for record in test
+            ],
+            axis=0,
+        )
+        for h in (1, horizon, None)
+    ]
+    return Trial(structure, float(bic), *steps)

@@ -1,0 +1,207 @@
+"""How well the coefficients are known: their covariance, honest about coloured residuals, and bands
+over p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from identification.judge.coefficient_covariance import covariances
+from identification.judge.response_band import ResponseBand, response_band
+from identification.model.lpvarx_model import LPVARXModel
+from identification.structure.regressors import Regression, as_records, stacked
+from symheli.errors import InputError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Band(NamedTuple):
+    """One coefficient function of the equation of `output`: what it multiplies, its `value` (n,)
+    and `standard_error` (n,) at each p.
+
+    `freedom` and `stretch` are those of `Uncertainty`: they make intervals of short or coloured
+    records wider than the normal ones.
+    """
+
+    output: str
+    regressor: str
+    value: Array
+    standard_error: Array
+    freedom: float = float("inf")
+    stretch: float = 1.0
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Lower and upper end (n,) of the confidence interval at each p: Student's, `stretch` times
+        as wide.
+        """
+        if not 0 < level < 1:
+            raise InputError(f"level: expected a share in (0, 1) such as 0.95, got {level!r}")
+        half = student.ppf(0.5 + 0.5 * level, self.freedom) * self.stretch * self.standard_error
+        return self.value - half, self.value + half
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Covariance of the coefficients of `model`.
+
+    `joint` (ny, n, ny, n): of theta[i, y] with theta[j, z], zero for coefficients an equation does
+    not have. `white` (ny, n, n): of each equation by the formula for white residuals. `colour`
+    (ny,): by how much the standard errors grow on average where residuals are coloured (1: white).
+    `lags` of the correlation, `samples` of the fit; `freedom` (ny,) of the standard errors,
+    `stretch` of intervals: see `identification.judge.coefficient_covariance`. Where a record holds
+    fewer than about 15 independent residuals intervals hold the truth less often than they say
+    still (docs/identification.md).
+    """
+
+    model: LPVARXModel
+    joint: Array
+    white: Array
+    freedom: Array
+    lags: int
+    samples: int
+
+    @property
+    def stretch(self) -> float:
+        """What a taper over the fraction b of a record makes slow noise look smaller by: 1/sqrt(1 -
+        b + b^2/3).
+        """
+        b = min(self.lags / self.samples, 1.0)
+        return float(1 / np.sqrt(1 - b + b**2 / 3))
+
+    @property
+    def covariance(self) -> Array:
+        """(ny, n, n): of the coefficients of each equation, theta[:, y]."""
+        return np.einsum("yiyj->yij", self.joint)
+
+    @property
+    def standard_errors(self) -> Array:
+        """(n, ny), the Cramer-Rao bounds of normal residuals, corrected for their colour; like
+        `model.theta`.
+        """
+        return np.sqrt(np.maximum(np.einsum("yiyi->iy", self.joint), 0.0))
+
+    @property
+    def colour(self) -> Array:
+        """Mean ratio (ny,) of corrected to white standard errors."""
+        own = np.sqrt(np.einsum("yii->iy", self.white))
+        return np.array(
+            [
+                np.mean(self.standard_errors[free, y] / own[free, y])
+                for y, free in enumerate(self.model.structure.free.T)
+            ]
+        )
+
+    def bands(self, p: object) -> tuple[Band, ...]:
+        """Every coefficient function at p (n,) (or (n, parameters)), with its standard error."""
+        arx, theta = self.model.structure, self.model.theta
+        f = np.atleast_2d(arx.basis(p))
+        size = arx.basis.size
+        out = []
+        for y, output in enumerate(arx.outputs):
+            for entry in range(len(arx.entries)):
+                block = slice(entry * size, (entry + 1) * size)
+                if not arx.free[block, y].any():
+                    continue
+                error = np.sqrt(
+                    np.maximum(np.einsum("ki,ij,kj->k", f, self.joint[y, block, y, block], f), 0.0)
+                )
+                name = arx.regressor_names[block.start].rsplit(" f0(", 1)[0]
+                out.append(
+                    Band(
+                        output,
+                        name,
+                        f @ theta[block, y],
+                        error,
+                        float(self.freedom[y]),
+                        self.stretch,
+                    )
+                )
+        return tuple(out)
+
+    def draws(self, count: int, seed: int = 0) -> tuple[LPVARXModel, ...]:
+        """`count` models with coefficients drawn from the normal distribution of this covariance:
+        what the truth may be.
+
+        Whatever is made of the model (state space, reduction, a controller's margin) is made of
+        each of them to see how far it is certain.
+        """
+        if not isinstance(count, int | np.integer) or count < 1:
+            raise InputError(f"count: expected a whole number of models >= 1, got {count!r}")
+        arx, theta = self.model.structure, self.model.theta
+        free = arx.free.T.reshape(-1)
+        square = self.joint.reshape(len(free), len(free))[free][:, free]
+        scale = np.sqrt(np.diagonal(square))
+        scale = np.where(scale > 0, scale, 1.0)
+        values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
+        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        moved = np.tile(theta.T.reshape(-1), (count, 1))
+        moved[:, free] += np.random.default_rng(seed).standard_normal((count, len(root))) @ root.T
+        return tuple(replace(self.model, theta=row.reshape(arx.ny, -1).T) for row in moved)
+
+    def frequency_response(self, p: object, omega: object) -> ResponseBand:
+        """The response at `omega` (k,) in rad/s with the scheduling held at p, and its standard
+        error.
+
+        It is that of `at(p)` and of both exact state-space forms at p. Raises `InputError` for p
+        outside the basis.
+        """
+        return response_band(self.model, self.joint, p, omega)
+
+    def plot(self, level: float = 0.95) -> Figure:
+        """A figure of every coefficient function with its confidence band over p; see
+        `identification.judge.band_plot`.
+        """
+        from identification.judge.band_plot import plot_bands
+
+        return plot_bands(self, level)
+
+
+def uncertainty(
+    model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord], *, lags: int | None = None
+) -> Uncertainty:
+    """Covariance of the least-squares coefficients of `model` over the records it was fitted to.
+
+    With D = (Phi' Phi)^-1 and R(l) the correlation of the residuals, D [sum_k sum_l phi(k) R(k - l)
+    phi(l)'] D instead of sigma^2 D: modelling errors colour residuals, and the white formula is
+    then too optimistic, often by 5 to 10 times. R is tapered (Bartlett) over `lags` samples,
+    default a fifth of the longest run, as in the source. Instrumental-variable estimates are less
+    certain than this says: `InputError`. Source: Morelli and Klein, "Accuracy of aerodynamic model
+    parameters estimated from flight test data", J. Guidance, Control, and Dynamics 20 (1997).
+    """
+    records = as_records(records)
+    arx = model.structure
+    if model.method not in ("ls", "rls"):
+        raise InputError(
+            f'uncertainty is that of least squares; the model was fitted by "{model.method}"'
+        )
+    for record in records:
+        model.require_same_kind(record)
+    data = stacked(arx, records)
+    if len(data.phi) <= arx.n_regressors:
+        raise InputError(
+            f"{len(data.phi)} usable samples say nothing about the certainty of {arx.n_regressors}"
+            " coefficients an output"
+        )
+    runs = _runs(data)
+    longest = max(run.stop - run.start for run in runs)
+    reach = min(max(longest // 5, 1), longest - 1) if lags is None else lags
+    if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
+        raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
+    error, reach = data.y - data.phi @ model.theta, int(reach)
+    return Uncertainty(model, *covariances(arx, data.phi, error, runs, reach), reach, len(error))
+
+
+def _runs(data: Regression) -> list[slice]:
+    """Rows whose samples follow one another."""
+    breaks = np.flatnonzero(np.diff(data.rows) != 1) + 1
+    ends = [0, *breaks.tolist(), len(data.rows)]
+    return [slice(a, b) for a, b in pairwise(ends)]

@@ -1,0 +1,1 @@
+"""The identified model: coefficients, predictions, state-space forms, files."""

@@ -1,0 +1,216 @@
+"""An identified model: coefficients with names, units and sample period."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from identification.design.excitation import ExcitationReport
+from identification.model import prediction, realization
+from identification.model.coefficients import Coefficients
+from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import check_units
+from symheli.errors import InputError
+from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Reduction, Scheduling
+from symheli.records import FlightRecord
+from symheli.values import NamedVector, Signal, signals
+from symheli.values.arrays import Array, frozen
+from symheli.values.sample_period import JITTER, same_period
+
+
+@dataclass(frozen=True, eq=False)
+class LPVARXModel:
+    """A structure with its coefficients `theta` (n_regressors, ny) and the sample period `dt` (s)
+    they belong to.
+
+    `outputs`, `inputs`, `scheduling` (several where the structure has) carry the units of the
+    record. `residual_covariance` (ny, ny) of the one-step residuals, `rows_used` and `rows_dropped`
+    samples of the fit, `method` how it was fitted, `excitation` the report on the data, `details`
+    what the method chose (weights, iterations, ...): plain numbers and lists by name. `covariance`
+    (ny, n_regressors, n_regressors) of the coefficients, an equation at a time as
+    `Uncertainty.covariance`, where somebody put it there; it is carried along, saved and loaded.
+    """
+
+    structure: LPVARX
+    theta: Array
+    dt: float
+    outputs: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    scheduling: Signal | tuple[Signal, ...]
+    residual_covariance: Array
+    rows_used: int
+    rows_dropped: int = 0
+    method: str = "ls"
+    excitation: ExcitationReport | None = field(default=None, repr=False)
+    details: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    covariance: Array | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        arx = self.structure
+        object.__setattr__(self, "outputs", signals(self.outputs))
+        object.__setattr__(self, "inputs", signals(self.inputs))
+        parameters = signals(
+            [self.scheduling] if isinstance(self.scheduling, str) else self.scheduling
+        )
+        object.__setattr__(
+            self, "scheduling", parameters[0] if len(parameters) == 1 else parameters
+        )
+        object.__setattr__(self, "theta", frozen(self.theta, "theta", (arx.n_regressors, arx.ny)))
+        object.__setattr__(
+            self,
+            "residual_covariance",
+            frozen(self.residual_covariance, "residual covariance", (arx.ny, arx.ny)),
+        )
+        if self.covariance is not None:
+            n = arx.n_regressors
+            object.__setattr__(
+                self, "covariance", frozen(self.covariance, "covariance", (arx.ny, n, n))
+            )
+        own, given = (
+            (arx.outputs, arx.inputs, arx.parameters),
+            (self.outputs, self.inputs, parameters),
+        )
+        if own != given:
+            raise InputError(f"signals {given} are not those of the structure: {own}")
+        if np.any(self.theta[~arx.free]):
+            raise InputError("theta: coefficients that the structure leaves out must be zero")
+        if not (isinstance(self.dt, int | float | np.floating) and 0 < self.dt < np.inf):
+            raise InputError(f"dt must be a positive number of seconds, got {self.dt!r}")
+
+    @property
+    def parameters(self) -> tuple[Signal, ...]:
+        """The scheduling parameters, also where there is one."""
+        return (self.scheduling,) if isinstance(self.scheduling, Signal) else self.scheduling
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """A_i, B_j, c, d in the basis; `.at(p)` for values, `.monomial()` for powers of p."""
+        return Coefficients.of(self.structure, self.theta)
+
+    def predict(self, record: FlightRecord, horizon: int, *, hold_p: bool = False) -> Array:
+        """Predictions (n, ny) `horizon` samples ahead: outputs known up to t - horizon, inputs and
+        p up to t.
+
+        `hold_p`: p too is known up to t - horizon only and held from there. So judge a model that
+        is scheduled on a measurement: the p of later carries what the outputs will do. A commanded
+        p is known ahead.
+
+        NaN where a past is incomplete: the first memory + horizon - 1 samples of each segment, and
+        behind missing samples. Infinite where the prediction overflows. Raises `InputError` for
+        another sample period or unit.
+        """
+        if hold_p:
+            self.require_same_kind(record)
+            return prediction.predict_holding(self.structure, self.theta, record, horizon)
+        return prediction.predict(self._along(record), horizon)
+
+    def simulate(self, record: FlightRecord) -> Array:
+        """Free run (n, ny) from the first samples of each segment with the record's inputs and p.
+
+        NaN for the samples the run starts from and where inputs or p are missing (behind which it
+        starts again); infinite from where it diverges. Raises `InputError` for another sample
+        period or unit.
+        """
+        return prediction.simulate(self._along(record))
+
+    def score(
+        self, record: FlightRecord, horizon: int | None = None, *, hold_p: bool = False
+    ) -> NamedVector:
+        """Fit in percent of each output, `horizon` samples ahead or, with None, in free run; see
+        `fit_percent`.
+
+        `hold_p` as in `predict`; a free run follows p all along, so that it raises `InputError`
+        with it.
+        """
+        if horizon is None and hold_p:
+            raise InputError(
+                "hold_p: a free run follows p from its start to its end; give a horizon (samples)"
+                " to hold p over"
+            )
+        guess = (
+            self.simulate(record)
+            if horizon is None
+            else self.predict(record, horizon, hold_p=hold_p)
+        )
+        fit = prediction.fit_percent(record.columns(self.outputs), guess)
+        return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)
+
+    def at(self, p: float | Sequence[float]) -> LinearModel:
+        """The discrete model with the scheduling held at p (one number a parameter), in observer
+        form.
+
+        The offsets are left out: deviation dynamics.
+        """
+        return realization.at(self.coefficients, p, self.outputs, self.inputs, self.dt)
+
+    def to_state_space(self, route: Literal["shifted", "direct"] | None = None) -> LPVStateSpace:
+        """The discrete LPV model with static dependence on p(k) that responds exactly as this one,
+        however p moves.
+
+        "shifted" (for coefficients at the lag): observer form, minimal where the input lags do not
+        exceed na; with na = nb = delay = 1 the states are the outputs. "direct" (for coefficients
+        at "now"): past outputs and inputs as the state, not minimal. None chooses the right one,
+        the wrong one raises `InputError`. The offsets c(p) and d(p) are left out: the model
+        describes deviations from the moving trim. The range of p is that of the basis, its rate
+        unlimited: `.with_rate(...)`, `.with_scheduling(...)` say more. An `LPVStateSpace` has one
+        scheduling parameter: with several `InputError` is raised.
+        """
+        basis, p = realization.one_parameter(self.structure.basis), self.parameters[0]
+        build = {"shifted": realization.shifted, "direct": realization.direct}[
+            realization.route_for(self.structure, route)
+        ]
+        scheduling = Scheduling(str(p), p.unit, basis.low, basis.high)
+        return build(self.coefficients, scheduling, self.outputs, self.inputs, self.dt)
+
+    def reduce(
+        self, order: int, *, input_scale: object = 1.0, output_scale: object = 1.0
+    ) -> Reduction[LPVStateSpace]:
+        """The exact realization, reduced to `order` states, with the frozen error it makes; see
+        `symheli.lpv.reduce`.
+        """
+        return self.to_state_space().reduce(
+            order, input_scale=input_scale, output_scale=output_scale
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the model as JSON, every number exact, at once or not at all; see `load`."""
+        from identification.model import saved_model
+
+        return saved_model.save(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> LPVARXModel:
+        """A saved model, equal to the last bit; one with `UserFunctions` needs its `basis`. Raises
+        `InputError` for any other file.
+        """
+        from identification.model import saved_model
+
+        return saved_model.load(path, basis)
+
+    def save_mat(self, path: str | os.PathLike[str]) -> Path:
+        """Write coefficients, names and units as a MATLAB file (version 5), with a readme
+        inside.
+        """
+        from identification.model import saved_model
+
+        return saved_model.save_mat(self, path)
+
+    def require_same_kind(self, record: FlightRecord) -> None:
+        """Raises `InputError` where `record` has another sample period, or a signal of the model in
+        another unit.
+        """
+        check_units((*self.outputs, *self.inputs, *self.parameters), record)
+        if not same_period(record.dt, self.dt, JITTER):
+            raise InputError(
+                f"the model was identified at dt = {self.dt:.4g} s, the record has {record.dt:.4g}"
+                " s; resample it"
+            )
+
+    def _along(self, record: FlightRecord) -> prediction.Recursion:
+        self.require_same_kind(record)
+        return prediction.Recursion.along(self.structure, self.theta, record)

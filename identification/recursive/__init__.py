@@ -1,0 +1,1 @@
+"""Recursive least squares: the estimator, its memory and its compiled kernel."""

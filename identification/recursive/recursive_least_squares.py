@@ -1,0 +1,202 @@
+"""Recursive least squares as a square-root information filter: one triangular factor for all
+outputs that share a regressor.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from identification.recursive import kernel, saved_state
+from identification.recursive.forgetting import (
+    FLOOR,
+    Constant,
+    Directional,
+    Forgetting,
+    Variable,
+    check_floor,
+)
+from identification.recursive.history import History
+from identification.recursive.kernel.configuration import Configuration
+from identification.recursive.online import Online, vector
+from identification.recursive.rls_state import RLSInfo, RLSState
+from identification.structure.lpvarx import LPVARX, require_structure
+from identification.structure.regressors import Samples, as_records, units_of
+from symheli.errors import InputError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+PRECISIONS = {"double": np.float64, "single": np.float32}
+
+
+@dataclass(frozen=True)
+class RecursiveLeastSquares:
+    """Forgetting least squares, sample by sample: `init`, `update`, or `run` over a record;
+    `online` for real time.
+
+    Each sample rotates the row [phi', y'] into [sqrt(l) R, sqrt(l) Z] by square-root-free Givens
+    rotations; the covariance is never formed, so nothing can lose its definiteness. Outputs share
+    the factor, which nothing but data enters. The coefficients solve R theta = Z: from sample to
+    sample they move along the gain g = R^-1 (R^-T phi), theta += g (y - theta' phi)', and are
+    solved anew as soon as a running bound of the rounding errors along it is no longer small, so
+    that they are at every sample those of batch least squares on the weighted samples so far. What
+    these leave open is kept small by rows that are pretended: each coefficient is 0, with the
+    weight of 32 eps samples with its regressor at its largest (without forgetting; else see
+    `Constant`). `determined` says whether anything is left open, by the rule of
+    `identification.design.determined`.
+
+    `forgetting` is a factor l in (0, 1] (a sample k steps old has the weight l^k; then `floor` is
+    that of `Constant`), or one of `Constant`, `Variable`, `Directional`. `precision` "single"
+    computes as an autopilot without double precision would.
+
+    The arithmetic is C where a compiler was there when symheli was installed, else NumPy, with one
+    `CompilerWarning`: the same operations in the same order. Raises `InputError` for an option out
+    of range.
+    """
+
+    structure: LPVARX
+    forgetting: float | Forgetting = 1.0
+    floor: float | None = None
+    precision: Literal["double", "single"] = "double"
+
+    def __post_init__(self) -> None:
+        require_structure(self.structure)
+        if self.precision not in PRECISIONS:
+            raise InputError(f'precision: expected "double" or "single", got {self.precision!r}')
+        if isinstance(self.forgetting, Constant | Variable | Directional):
+            if self.floor is not None:
+                raise InputError(
+                    "floor: belongs to a forgetting factor; give it to"
+                    f" {type(self.forgetting).__name__} instead"
+                )
+        elif not isinstance(self.forgetting, int | float | np.floating):
+            raise InputError(
+                "forgetting: expected a factor, Constant, Variable or Directional, got"
+                f" {self.forgetting!r}"
+            )
+        else:
+            check_floor(FLOOR if self.floor is None else self.floor)
+            Constant(float(self.forgetting))
+
+    @cached_property
+    def configuration(self) -> Configuration:
+        """What the kernel is told; its `sizes` are the numbers of memory the estimator takes."""
+        forgetting = self.forgetting
+        if not isinstance(forgetting, Constant | Variable | Directional):
+            forgetting = Constant(float(forgetting), FLOOR if self.floor is None else self.floor)
+        return Configuration(self.structure, forgetting, PRECISIONS[self.precision])
+
+    def init(self) -> RLSState:
+        """The state that knows nothing."""
+        state, work = (
+            np.zeros(size, self.configuration.dtype) for size in self.configuration.sizes
+        )
+        self._kernel.start(state, work)
+        return RLSState(self.configuration, state)
+
+    def online(self, state: RLSState | None = None) -> Online:
+        """An estimator that goes on from `state`, or from nothing, changing in place."""
+        return Online(self.configuration, self._kernel, self._own(state))
+
+    def update(self, state: RLSState, y: object, u: object, p: object) -> tuple[RLSState, RLSInfo]:
+        """Take in the sample y (ny,), u (nu,), p of one instant; returns the new state and what it
+        did.
+
+        A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises
+        `InputError` for wrong shapes, infinite values and p outside the basis.
+        """
+        online = self.online(state)
+        return _outcome(online, online.update(y, u, p))
+
+    def absorb(self, state: RLSState, phi: Array, y: Array) -> tuple[RLSState, RLSInfo]:
+        """Take in one regressor phi (n,) with the outputs y (ny,) it must explain.
+
+        Raises `InputError` for another shape and numbers that are not finite.
+        """
+        phi, y = vector(phi, self.structure.n_regressors, "phi"), vector(y, self.structure.ny, "y")
+        if not (np.isfinite(phi).all() and np.isfinite(y).all()):
+            raise InputError("phi and y must be finite; leave an incomplete regressor out")
+        online = self.online(state)
+        return _outcome(online, online.absorb(phi, y))
+
+    def run(self, record: FlightRecord, state: RLSState | None = None) -> History:
+        """Every sample of a record in turn, from `state` or from nothing; lags never reach across a
+        gap.
+
+        The same as `update` sample by sample.
+        """
+        arx, records = self.structure, as_records(record)
+        if len(records) != 1:
+            raise InputError(
+                f"run takes one record, got {len(records)}; go on from its state: run(second,"
+                " run(first).state)"
+            )
+        record = records[0]
+        s, online = Samples.of(arx, record), self.online(state)
+        rows = np.column_stack([s.y, s.u, s.p])
+        online.forget_past()
+        parts = []
+        for segment in s.segments:
+            online.forget_past()
+            parts.append(online.run(rows[segment]))
+        learnt, innovations, coefficients = (
+            np.concatenate(part) for part in zip(*parts, strict=True)
+        )
+        return History(
+            structure=arx,
+            time=record.time,
+            coefficients=coefficients.astype(float, copy=False),
+            innovations=innovations.astype(float, copy=False),
+            state=online.state,
+            dt=record.dt,
+            outputs=units_of(arx.outputs, [record]),
+            inputs=units_of(arx.inputs, [record]),
+            scheduling=units_of(arx.parameters, [record]),
+            dropped=int(len(record) - learnt.sum()),
+        )
+
+    def save(self, state: RLSState, path: str | os.PathLike[str]) -> None:
+        """Write `state` to a file from which `load` brings it back to the last bit; an old file is
+        replaced at once or not at all.
+        """
+        saved_state.save(self._own(state), path)
+
+    def load(self, path: str | os.PathLike[str]) -> RLSState:
+        """The state in a file of `save`. Raises `InputError` for a damaged file, or one of another
+        structure, forgetting or precision.
+        """
+        return saved_state.load(self.configuration, path)
+
+    @cached_property
+    def _kernel(self) -> Any:
+        return kernel.kernel(self.configuration)
+
+    def _own(self, state: RLSState | None) -> RLSState:
+        if state is None:
+            return self.init()
+        if not isinstance(state, RLSState):
+            raise InputError(
+                f"state: expected one from init, update, run or load, got {state!r:.80}"
+            )
+        if (
+            state.configuration.structure != self.structure
+            or state.memory.dtype != self.configuration.dtype
+        ):
+            raise InputError(
+                "state: it belongs to an estimator with another structure or precision; start with"
+                " init()"
+            )
+        return state
+
+
+def _outcome(online: Online, available: bool) -> tuple[RLSState, RLSInfo]:
+    state = online.state
+    innovation, gain = (
+        part.astype(float) if available else np.full(part.shape, np.nan)
+        for part in (online.innovation, online.gain)
+    )
+    return state, RLSInfo(available, innovation, gain, state.theta, state.determined)

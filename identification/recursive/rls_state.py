@@ -1,0 +1,172 @@
+"""What a recursive estimator remembers, as a value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from identification.recursive.kernel import configuration as at
+from identification.recursive.kernel import twin
+from identification.recursive.kernel.configuration import Configuration, GroupLayout
+from symheli.errors import InputError
+from symheli.values.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class RLSState:
+    """All the estimator remembers; every update returns a new one. `memory` is the kernel's, the
+    properties are what it means.
+    """
+
+    configuration: Configuration
+    memory: Array
+    _learnt: dict[str, Array] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        self.memory.flags.writeable = False
+
+    def after_idling(self, memory: Array) -> RLSState:
+        """The state with another past and the same knowledge."""
+        return RLSState(self.configuration, memory, self._learnt)
+
+    @property
+    def factor(self) -> Array:
+        """(n + ny, n + ny), upper triangular, [[R, Z], [0, S]].
+
+        R'R is the weighted information of the regressors, R theta = Z, and S'S the weighted sum of
+        squared residuals. Raises `InputError` where outputs have different regressors, hence
+        several factors: see `factors`.
+        """
+        if len(self.configuration.groups) > 1:
+            raise InputError(
+                f"this structure has {len(self.configuration.groups)} groups of outputs, each with"
+                " its factor: see factors"
+            )
+        return self.factors[0]
+
+    @property
+    def factors(self) -> tuple[Array, ...]:
+        """The factor of each group of outputs that share a regressor."""
+        names = [f"factor {g}" for g in range(len(self.configuration.groups))]
+        return tuple(
+            (
+                self._remember(name, self._factor(layout))
+                if name not in self._learnt
+                else self._learnt[name]
+            )
+            for name, layout in zip(names, self.configuration.groups, strict=True)
+        )
+
+    @property
+    def theta(self) -> Array:
+        """Coefficients (n, ny)."""
+        if "theta" not in self._learnt:
+            self._remember("theta", twin.theta(self.configuration, self.memory).astype(float))
+        return self._learnt["theta"]
+
+    @property
+    def peak(self) -> Array:
+        """(n,) largest regressors to expect: each signal at its largest so far, times each function
+        at its largest.
+        """
+        out = np.zeros(self.configuration.structure.n_regressors)
+        for layout in self.configuration.groups:
+            out[self.configuration.structure.regressors(layout.group)] = self._part(layout, "peak")[
+                : layout.n
+            ]
+        return out
+
+    @property
+    def past(self) -> Array:
+        """The last samples, oldest first, rows [y, u, p, f(p)], at most memory + 1."""
+        rows = self.memory[self.configuration.past].reshape(-1, self.configuration.width)
+        return rows[: int(self.memory[at.FILLED])][::-1].astype(float)
+
+    @property
+    def count(self) -> int:
+        """Regressors absorbed."""
+        return int(self.memory[at.COUNT]) + at.MILLION * int(self.memory[at.MILLIONS])
+
+    @property
+    def weight(self) -> float:
+        """Their sum of weights: how many samples are remembered; the smallest of the groups."""
+        return min(self._header(at.WEIGHT))
+
+    @property
+    def determined(self) -> bool:
+        """Whether the data fix every coefficient."""
+        return all(self._header(at.DETERMINED))
+
+    @property
+    def saturated(self) -> bool:
+        """Whether an ordinary sample is lost to rounding: in single precision that never forgets,
+        after 8.4e6 samples.
+        """
+        return max(self._header(at.WEIGHT)) * float(np.finfo(self.configuration.dtype).eps) >= 1
+
+    def solve(self) -> Array:
+        """The least-squares coefficients (n, ny), R theta = Z, in double precision; `theta` agrees
+        with them to rounding.
+        """
+        structure = self.configuration.structure
+        out = np.zeros((structure.n_regressors, structure.ny))
+        for layout in self.configuration.groups:
+            n, triangle = (
+                layout.n,
+                layout.triangle.full(self._part(layout, "triangle").astype(float)),
+            )
+            where = structure.regressors(layout.group)[:, None], layout.group.outputs
+            out[where] = solve_triangular(triangle[:n, :n], triangle[:n, n:], unit_diagonal=True)
+        return out
+
+    @property
+    def residual_covariance(self) -> Array:
+        """Weighted covariance (ny, ny) of the residuals, per degree of freedom left; 0 between
+        outputs with different regressors.
+        """
+        ny = self.configuration.structure.ny
+        out = np.zeros((ny, ny))
+        for layout, factor, weight in zip(
+            self.configuration.groups, self.factors, self._header(at.WEIGHT), strict=True
+        ):
+            S = factor[layout.n :, layout.n :]
+            out[np.ix_(layout.group.outputs, layout.group.outputs)] = (
+                S.T @ S / max(weight - layout.n, 1.0)
+            )
+        return out
+
+    def _factor(self, layout: GroupLayout) -> Array:
+        d = self._part(layout, "d")[layout.triangle.used].astype(float)
+        return np.sqrt(d)[:, None] * layout.triangle.full(
+            self._part(layout, "triangle").astype(float)
+        )
+
+    def _part(self, layout: GroupLayout, name: str) -> Array:
+        return self.memory[layout.in_state[name]]
+
+    def _header(self, index: int) -> list[float]:
+        return [float(self._part(layout, "header")[index]) for layout in self.configuration.groups]
+
+    def _remember(self, name: str, value: Array) -> Array:
+        value.flags.writeable = False
+        self._learnt[name] = value
+        return value
+
+
+class RLSInfo(NamedTuple):
+    """What one sample did: `innovation` (ny,) y minus its prediction before the update, `gain`,
+    `coefficients` (n, ny).
+
+    `gain` (n,) is how the coefficients of an output move per unit of its innovation; (n, ny) where
+    outputs have different regressors. Without a complete regressor (`available` False) innovation
+    and gain are NaN and nothing was learnt.
+    """
+
+    available: bool
+    innovation: Array
+    gain: Array
+    coefficients: Array
+    determined: bool

@@ -1,0 +1,1 @@
+"""What is to be identified: signals, lags and functions of the scheduling, row by row."""

@@ -1,0 +1,323 @@
+"""What is to be identified: which signals, which lags, which functions of the scheduling
+parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from identification.structure.orders import Orders, Table, compact, table
+from symheli.errors import InputError
+from symheli.lpv import Basis, FunctionSpace, Polynomial, Product
+from symheli.values.arrays import Array
+
+
+class Term(NamedTuple):
+    """One block of regressors: signals of one kind at one lag (samples), each times the basis at
+    p(k - p_lag).
+
+    `signals` are positions among the outputs, the inputs or the scheduling parameters.
+    """
+
+    kind: Literal["output", "input", "offset", "increment"]
+    lag: int
+    p_lag: int
+    signals: tuple[int, ...]
+
+
+class Entry(NamedTuple):
+    """One signal of a term, by its position `channel` among those of its kind; it takes one
+    regressor for each function of the basis.
+    """
+
+    kind: Literal["output", "input", "offset", "increment"]
+    channel: int
+    lag: int
+    p_lag: int
+
+
+class Group(NamedTuple):
+    """Outputs whose equations have the same regressors: positions in `LPVARX.outputs` and in
+    `LPVARX.entries`, ascending.
+    """
+
+    outputs: tuple[int, ...]
+    entries: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class LPVARX:
+    """Linear difference equation whose coefficients are functions of scheduling parameters p, any
+    number of inputs and outputs.
+
+        y(k) = -sum_{i=1..na} A_i(p) y(k-i) + sum_{j=0..nb-1} B_j(p) u(k-delay-j)
+               + c(p) + d(p) (p(k) - p(k-1))
+
+    y (ny,) are the signals `outputs`, u (nu,) the signals `inputs`, in their own units; A_i (ny,
+    ny), B_j (ny, nu), c (ny,) and d (ny, parameters) are combinations of the functions of `basis`.
+    `delay` 0 is direct feedthrough. One formulation covers one or many inputs and outputs.
+
+    `na`, `nb` and `delay` are numbers for all signals, or tables: {output: number} says it for the
+    equation of each output, {input: number} (nb, delay) for each input in all equations, {output:
+    {signal: number}} for each signal in each equation; rows of numbers, one an output, say the
+    same. Order 0 leaves a signal out of an equation.
+
+    `scheduling` names one parameter, or several: then `basis` is a `Product`.
+
+    A scheduling parameter may be an output or an input too. For an output only "lag" without
+    `offset_rate` is causal then, and the offset's functions of p repeat some of the output's.
+
+    `scheduling_at="lag"` (default): each coefficient is taken at p(k - lag of its term), c and d at
+    p(k-1): the form that has a minimal state-space realization with static dependence. "now": every
+    coefficient at p(k), as in Budiyono and Sutarto, eqs 9-14.
+
+    `offset` adds c(p), the moving trim. `offset_rate` adds d(p) times the change of p over the step
+    that leads to y(k): causal, so that batch and recursive estimates see the same number, and free
+    of the sample period. For whole outputs that move about a trim x0(p), d(p) is x0'(p) to first
+    order in the step; d(p) dt multiplies dp/dt.
+
+    Raises `InputError` for repeated or missing names, negative orders, a basis of another number of
+    parameters, an unknown `scheduling_at` or an output that would predict itself. Source: Bamieh
+    and Giarre (2002), Identification of linear parameter varying models.
+    """
+
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    scheduling: str | tuple[str, ...]
+    na: Orders
+    nb: Orders
+    delay: Orders
+    basis: FunctionSpace
+    scheduling_at: Literal["lag", "now"] = "lag"
+    offset: bool = False
+    offset_rate: bool = False
+
+    def __post_init__(self) -> None:
+        for group in ("outputs", "inputs"):
+            object.__setattr__(self, group, _names(getattr(self, group), group))
+        if not self.outputs:
+            raise InputError("outputs: name at least one signal to predict")
+        both = sorted(set(self.outputs) & set(self.inputs))
+        if both:
+            raise InputError(f"a signal is either an output or an input; both: {', '.join(both)}")
+        for name, signals in (("na", self.outputs), ("nb", self.inputs), ("delay", self.inputs)):
+            object.__setattr__(
+                self, name, compact(getattr(self, name), name, self.outputs, signals)
+            )
+        parameters = _names(self.scheduling, "scheduling")
+        object.__setattr__(
+            self, "scheduling", parameters[0] if len(parameters) == 1 else parameters
+        )
+        if not isinstance(self.basis, FunctionSpace):
+            raise InputError(
+                "basis: expected a basis such as Polynomial(degree=2, low=0, high=13), got"
+                f" {self.basis!r}"
+            )
+        if self.basis.dimension != len(parameters):
+            raise InputError(
+                f"scheduling names {len(parameters)} parameters ({', '.join(parameters)}) and the"
+                f" basis has {self.basis.dimension}; bases of several parameters are products:"
+                " Product((Polynomial(...), Polynomial(...)))"
+            )
+        if self.scheduling_at not in ("lag", "now"):
+            raise InputError(f'scheduling_at: expected "lag" or "now", got {self.scheduling_at!r}')
+        known = sorted(set(self.outputs) & set(parameters))
+        if known and (self.offset_rate or self.scheduling_at == "now"):
+            what = "offset_rate" if self.offset_rate else 'scheduling_at="now"'
+            raise InputError(
+                f"{known[0]} is an output and schedules the coefficients: with {what} its own value"
+                " at k would predict it; "
+                f'leave offset_rate out and take scheduling_at="lag", or schedule on a command'
+            )
+        for flag in ("offset", "offset_rate"):
+            if not isinstance(getattr(self, flag), bool):
+                raise InputError(f"{flag}: expected True or False, got {getattr(self, flag)!r}")
+        empty = [y for y, used in zip(self.outputs, self.free.T, strict=True) if not used.any()]
+        if empty:
+            raise InputError(
+                f"nothing to identify for {', '.join(empty)}: give na >= 1, or nb >= 1 with inputs,"
+                " or offset=True"
+            )
+
+    @property
+    def ny(self) -> int:
+        """Number of outputs."""
+        return len(self.outputs)
+
+    @property
+    def nu(self) -> int:
+        """Number of inputs."""
+        return len(self.inputs)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the scheduling parameters, also where there is one."""
+        return (self.scheduling,) if isinstance(self.scheduling, str) else self.scheduling
+
+    @cached_property
+    def output_orders(self) -> Table:
+        """`na` in full: the order of each output (column) in the equation of each output (row)."""
+        return table(self.na, "na", self.outputs, self.outputs)
+
+    @cached_property
+    def input_lag_ranges(self) -> tuple[tuple[range, ...], ...]:
+        """The lags of each input (column) in the equation of each output (row): delay .. delay + nb
+        - 1.
+        """
+        orders, delays = (table(v, "nb", self.outputs, self.inputs) for v in (self.nb, self.delay))
+        return tuple(
+            tuple(range(d, d + n) for n, d in zip(*rows, strict=True))
+            for rows in zip(orders, delays, strict=True)
+        )
+
+    @cached_property
+    def output_lags(self) -> range:
+        """1 to the largest order of an output."""
+        return range(1, max((n for row in self.output_orders for n in row), default=0) + 1)
+
+    @cached_property
+    def input_lags(self) -> range:
+        """The smallest to the largest lag of an input; empty without inputs."""
+        lags = [lag for row in self.input_lag_ranges for lags in row for lag in lags]
+        return range(min(lags), max(lags) + 1) if lags else range(0)
+
+    @cached_property
+    def memory(self) -> int:
+        """How many samples before k the regressor of y(k) reaches back."""
+        return max((max(t.lag, t.p_lag) for t in self.terms), default=0)
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """The blocks of regressors in their order: outputs, inputs, offset, increment of p; those
+        some equation has.
+        """
+        return tuple(self._terms())
+
+    def _terms(self) -> Iterator[Term]:
+        at_lag = self.scheduling_at == "lag"
+        for kind, lags, count in (
+            ("output", self.output_lags, self.ny),
+            ("input", self.input_lags, self.nu),
+        ):
+            for lag in lags:
+                signals = tuple(
+                    s
+                    for s in range(count)
+                    if any(self._has(kind, lag, s, y) for y in range(self.ny))
+                )
+                if signals:
+                    yield Term(kind, lag, lag if at_lag else 0, signals)  # type: ignore[arg-type]
+        if self.offset:
+            yield Term("offset", 0, int(at_lag), (0,))
+        if self.offset_rate:
+            yield Term("increment", 1, int(at_lag), tuple(range(len(self.parameters))))
+
+    def _has(self, kind: str, lag: int, signal: int, output: int) -> bool:
+        """Whether the equation of an output contains a signal at a lag."""
+        match kind:
+            case "output":
+                return lag <= self.output_orders[output][signal]
+            case "input":
+                return lag in self.input_lag_ranges[output][signal]
+        return True
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """Every signal of every term, in the order of the regressors."""
+        return tuple(Entry(t.kind, s, t.lag, t.p_lag) for t in self.terms for s in t.signals)
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """Which outputs share their regressors: all of them, unless orders or delays differ between
+        equations.
+        """
+        members: dict[tuple[int, ...], list[int]] = {}
+        for y in range(self.ny):
+            used = tuple(
+                i for i, e in enumerate(self.entries) if self._has(e.kind, e.lag, e.channel, y)
+            )
+            members.setdefault(used, []).append(y)
+        return tuple(Group(tuple(outputs), entries) for entries, outputs in members.items())
+
+    def regressors(self, group: Group) -> Array:
+        """Positions (n,) of the regressors of a group among all of them."""
+        size = self.basis.size
+        return (np.array(group.entries, dtype=int)[:, None] * size + np.arange(size)).reshape(-1)
+
+    @cached_property
+    def free(self) -> Array:
+        """(n_regressors, ny), true where the equation of the output (column) has the regressor
+        (row).
+        """
+        out = np.zeros((self.n_regressors, self.ny), dtype=bool)
+        for group in self.groups:
+            out[self.regressors(group)[:, None], group.outputs] = True
+        return out
+
+    def channels(self, term: Term) -> tuple[str, ...]:
+        """Names of the signals of a term."""
+        match term.kind:
+            case "output":
+                return tuple(self.outputs[s] for s in term.signals)
+            case "input":
+                return tuple(self.inputs[s] for s in term.signals)
+            case "offset":
+                return ("1",)
+            case "increment":
+                return tuple(f"change of {p}" for p in self.parameters)
+
+    @cached_property
+    def n_regressors(self) -> int:
+        """Length of the regressor: unknown coefficients of each output, where all outputs have the
+        same.
+        """
+        return self.basis.size * len(self.entries)
+
+    @cached_property
+    def regressor_names(self) -> tuple[str, ...]:
+        """One name a regressor, such as "theta(k-1) f2(airspeed(k-1))"."""
+        return tuple(
+            f"{name}{_at(t.lag) if t.kind in ('output', 'input') else ''}"
+            f" f{j}({', '.join(p + _at(t.p_lag) for p in self.parameters)})"
+            for t in self.terms
+            for name in self.channels(t)
+            for j in range(self.basis.size)
+        )
+
+    def lti(self) -> LPVARX:
+        """The same signals, orders and delays with constant coefficients: the baseline that
+        scheduling must beat.
+        """
+        constants: list[Basis] = [Polynomial(0, low, high) for low, high in self.basis.ranges]
+        return replace(
+            self, basis=constants[0] if len(constants) == 1 else Product(tuple(constants))
+        )
+
+
+def _at(lag: int) -> str:
+    return f"(k-{lag})" if lag else "(k)"
+
+
+def require_structure(value: object) -> None:
+    """Raises `InputError` for anything but a structure."""
+    if not isinstance(value, LPVARX):
+        raise InputError(
+            "structure: expected LPVARX(outputs=..., inputs=..., scheduling=..., ...), got"
+            f" {value!r:.80}"
+        )
+
+
+def _names(value: object, group: str) -> tuple[str, ...]:
+    names: tuple[Any, ...] = (
+        (value,) if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+    )
+    if not all(isinstance(n, str) for n in names):
+        raise InputError(f"{group}: expected names of signals, got {value!r}")
+    if len(set(names)) != len(names):
+        raise InputError(f"{group}: names must differ, got {', '.join(names)}")
+    return names

@@ -1,0 +1,1 @@
+"""The loops the studies prove: lateral, longitudinal, exact, and their margins."""

@@ -1,0 +1,135 @@
+"""The lateral loop of the exact linearizations: polynomials between the corners of the model, free
+to jump at them.
+
+The linearizations are smooth between two corners (a stall, an edge of the wake) and may jump at
+one. A polynomial through many of them on each interval misses so little that `studies.cover` can
+carry it through a proof.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+import symheli
+from studies.loops.lateral import CHANNELS, STATES, close
+from symheli import Helicopter, LinearFamily, LPVStateSpace, Scheduling
+from symheli.lpv.bases.piecewise import PiecewisePolynomial
+
+Array = np.ndarray
+Channel = Literal["gust", "inputs"]
+
+INPUTS = ("d_lat", "d_ped", *CHANNELS["gust"])
+
+DEGREE = 4
+LONGEST = 3.0
+"""Longest interval, m/s: with `DEGREE` the entries are met to 1e-8 of the largest."""
+
+
+@dataclass(frozen=True)
+class Patches(PiecewisePolynomial):
+    """Powers up to `degree` on each interval between the `breaks`, zero elsewhere: nothing joins
+    them, a model may jump at a break.
+    """
+
+    degree: int
+    breaks: tuple[float, ...]
+
+    @property
+    def low(self) -> float:  # type: ignore[override]
+        """First break."""
+        return self.breaks[0]
+
+    @property
+    def high(self) -> float:  # type: ignore[override]
+        """Last break."""
+        return self.breaks[-1]
+
+    @property
+    def size(self) -> int:
+        """degree + 1 functions an interval."""
+        return (self.degree + 1) * (len(self.breaks) - 1)
+
+    @property
+    def distinct_values(self) -> int:
+        """degree + 1 in every interval."""
+        return self.size
+
+    def points(self, count: int) -> Array:
+        """`count` Chebyshev points inside every interval, in order."""
+        unit = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+        return np.concatenate([a + (b - a) * unit for a, b in pairwise(self.breaks)])
+
+    def _piecewise(self) -> PPoly:
+        n, widths = self.degree + 1, np.diff(self.breaks)
+        c = np.zeros((n, len(widths), self.size))
+        for s, width in enumerate(widths):
+            c[:, s, s * n : (s + 1) * n] = np.diag(width ** -np.arange(n - 1.0, -1.0, -1.0))
+        return PPoly(c, np.array(self.breaks))
+
+
+@dataclass(frozen=True)
+class ExactLateral:
+    """v p r phi b1 under d_lat, d_ped, v_w: exact models at `nodes`, others to judge by at
+    `between`, on the intervals of `basis`.
+    """
+
+    basis: Patches
+    nodes: LinearFamily
+    between: LinearFamily
+
+    @classmethod
+    def of(cls, heli: Helicopter, low: float = 0.0, high: float = 13.0) -> ExactLateral:
+        """From `low` to `high` m/s, cut at the corners of the model and where an interval would
+        exceed `LONGEST`.
+        """
+        found = _family(heli, np.linspace(low, high, max(2, math.ceil(4 * (high - low))))).kinks
+        ends = [low, *sorted(c for places in found.values() for c in places), high]
+        breaks = [
+            float(p)
+            for a, b in pairwise(ends)
+            for p in np.linspace(a, b, math.ceil((b - a) / LONGEST) + 1)[:-1]
+        ]
+        basis = Patches(DEGREE, (*breaks, high))
+        return cls(
+            basis,
+            _family(heli, basis.points(2 * DEGREE + 2)),
+            _family(heli, basis.points(4 * DEGREE + 5)),
+        )
+
+    def loop(self, channel: Channel = "gust", dt: float | None = None) -> LPVStateSpace:
+        """The loop of `studies.loops.lateral` with exact models; `dt` (s): each held for so long,
+        sampled.
+        """
+        family = self.nodes if dt is None else self.nodes.discretize(dt)
+        A, B, C, D = (
+            self.basis.fit(family.airspeeds, M) for M in (family.A, family.B, family.C, family.D)
+        )
+        scheduling = Scheduling("airspeed", "m/s", self.basis.low, self.basis.high)
+        return close(
+            LPVStateSpace(
+                self.basis, A, B, C, D, scheduling, family.states, family.inputs, family.outputs, dt
+            ),
+            channel,
+        )
+
+    def missed(self, loop: LPVStateSpace, channel: Channel = "gust") -> Array:
+        """[A B] of the exact loop minus that of `loop` at the models in between, (K, nx, nx +
+        nu).
+        """
+        family = self.between if loop.dt is None else self.between.discretize(loop.dt)
+        exact = close(family.interpolate("linear"), channel)
+        there, here = (
+            np.concatenate(model.matrices(family.airspeeds)[:2], axis=2) for model in (exact, loop)
+        )
+        return there - here
+
+
+def _family(heli: Helicopter, airspeeds: Sequence[float] | Array) -> LinearFamily:
+    return symheli.sweep(heli, airspeeds, inputs=INPUTS).select(STATES, INPUTS)  # type: ignore[arg-type]

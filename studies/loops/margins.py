@@ -1,0 +1,53 @@
+"""Margins of the attitude hold and bandwidths of the attitude responses over airspeed, with servos
+and a delay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import synthesis
+from studies.loops.lateral import HOLD
+from symheli import LinearModel
+from symheli.flight import XCELL_SERVOS
+from symheli.lpv import pade_delay
+from synthesis import Bandwidth, Margins
+
+DELAY = 0.02
+"""From measurement to command, s."""
+LATERAL = (("v", "p", "r", "phi", "b1"), ("d_lat", "d_ped"))
+LONGITUDINAL = (("u", "w", "q", "theta", "a1"), ("d_lon", "d_col"))
+
+
+@dataclass(frozen=True)
+class AtAirspeed:
+    """What the loops of one model stand at one airspeed (m/s): the roll hold d_lat = HOLD phi, and
+    the responses to the sticks.
+    """
+
+    airspeed: float
+    hold: Margins
+    roll: Bandwidth
+    pitch: Bandwidth
+
+
+def behind_servo(model: LinearModel, name: str) -> LinearModel:
+    """With the servo of the input `name` and the delay before it."""
+    return model.driven_by({name: XCELL_SERVOS[name].linear(name)}).driven_by(
+        {name: pade_delay(name, DELAY)}
+    )
+
+
+def over_airspeed(
+    airspeeds: Sequence[float], lateral: Sequence[LinearModel], longitudinal: Sequence[LinearModel]
+) -> Iterator[AtAirspeed]:
+    """One entry an airspeed from the continuous lateral and longitudinal models there."""
+    for airspeed, roll, pitch in zip(airspeeds, lateral, longitudinal, strict=True):
+        roll = behind_servo(roll, "d_lat")
+        held = roll.feedback({("d_lat", "phi"): HOLD}).select(inputs=["d_lat"], outputs=["phi"])
+        stick = behind_servo(pitch, "d_lon").select(inputs=["d_lon"], outputs=["theta"])
+        hold = synthesis.margins(synthesis.loop(roll, {("d_lat", "phi"): HOLD}, "d_lat"))
+        yield AtAirspeed(
+            float(airspeed), hold, synthesis.bandwidth(held), synthesis.bandwidth(stick)
+        )

@@ -1,0 +1,1 @@
+"""Airframes as data: vehicle files, their parts, and linear models others identified."""

@@ -1,0 +1,131 @@
+"""A component in its place in one airframe: where it sits, what drives it, and under which names it
+speaks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+from symheli.components import Component, Effect, Flow, Motion
+from symheli.values.signal import Signal
+
+PLACE = {"x": "m", "y": "m", "z": "m"}
+"""Optional entries of a component's section: its reference point from the c.g., body axes (x
+forward, y right, z down).
+"""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One section of a vehicle file.
+
+    suffix: added to the names of its states, flow and switches; empty for the first of a kind, "_"
+    + section for the others. controls: {control of the component: {control of the vehicle: gain}}
+    where they differ. flow: {needed: name it is taken from} where they differ. placed: whether it
+    has an x, y or z. given: the component's optional entries it has.
+    """
+
+    section: str
+    component: Component
+    suffix: str = ""
+    controls: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    flow: Mapping[str, str] = field(default_factory=dict)
+    placed: bool = False
+    given: tuple[str, ...] = ()
+
+    @property
+    def parameters(self) -> Mapping[str, str]:
+        """{entry: unit} of its numbers."""
+        optional = {entry: self.component.optional[entry] for entry in self.given}
+        return {**self.component.parameters, **optional, **(PLACE if self.placed else {})}
+
+    @property
+    def positive(self) -> tuple[str, ...]:
+        """Entries that must be > 0."""
+        return self.component.positive
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """{entry: least} of those that must be whole numbers."""
+        return self.component.counts
+
+    @property
+    def subscript(self) -> str:
+        """What marks its forces in print."""
+        return self.component.subscript + self.suffix
+
+    @property
+    def symbols(self) -> Mapping[str, str]:
+        """{entry: LaTeX} of its numbers."""
+        return self.component.symbols
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """Its own states as the vehicle names them."""
+        return tuple(Signal(f"{s}{self.suffix}", s.unit) for s in self.component.states)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The flow it takes, as the vehicle names it."""
+        return tuple(self.flow.get(name, name) for name in self.component.needs)
+
+    @property
+    def makes(self) -> tuple[str, ...]:
+        """The flow it makes, as the vehicle names it."""
+        return tuple(name + self.suffix for name in self.component.makes)
+
+    def evaluate(
+        self,
+        par: SimpleNamespace,
+        motion: Motion,
+        controls: Mapping[str, Any],
+        own: Mapping[str, Any],
+        flow: Flow,
+    ) -> Effect:
+        """Its effect about the c.g. and under the vehicle's names; arguments as in
+        `Component.evaluate`, of the vehicle.
+        """
+        inner = self.component.evaluate(
+            par,
+            _moved(motion, par) if self.placed else motion,
+            {
+                **controls,
+                **{
+                    name: sum(gain * controls[c] for c, gain in mix.items())
+                    for name, mix in self.controls.items()
+                },
+            },
+            {str(s): own[f"{s}{self.suffix}"] for s in self.component.states},
+            Flow(
+                flow.inflow,
+                {name: flow[self.flow.get(name, name)] for name in self.component.needs},
+                flow.name,
+            ),
+        )
+        prefix = f"{self.section} " if self.suffix else ""
+        return Effect(
+            force=inner.force,
+            moment=_about_cg(inner, par) if self.placed else inner.moment,
+            rates={name + self.suffix: rate for name, rate in inner.rates.items()},
+            shaft_torque=inner.shaft_torque,
+            flow={name + self.suffix: value for name, value in inner.flow.items()},
+            switches={prefix + name: value for name, value in inner.switches.items()},
+        )
+
+
+def _moved(motion: Motion, par: SimpleNamespace) -> Motion:
+    """The motion of the reference point: V + omega x r."""
+    return motion._replace(
+        u_a=motion.u_a + motion.q * par.z - motion.r * par.y,
+        v_a=motion.v_a + motion.r * par.x - motion.p * par.z,
+        w_a=motion.w_a + motion.p * par.y - motion.q * par.x,
+    )
+
+
+def _about_cg(effect: Effect, par: SimpleNamespace) -> tuple[Any, Any, Any]:
+    """Moment about the c.g.: M + r x F."""
+    (X, Y, Z), (L, M, N) = effect.force, effect.moment
+    return L + par.y * Z - par.z * Y, M + par.z * X - par.x * Z, N + par.x * Y - par.y * X

@@ -1,0 +1,147 @@
+"""An airframe as data: every number with its unit and source, read from a TOML file and checked."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+
+from symheli.airframe.identified_models import ENDING
+from symheli.airframe.part import Part
+from symheli.airframe.plausibility import impossibilities
+from symheli.airframe.quantity import Quantity
+from symheli.airframe.vehicle_file import VehicleFile
+from symheli.errors import InputError, UnknownNameError
+from symheli.values.units import dimension
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """An airframe: quantities by section and entry, and the part that each other section is."""
+
+    name: str
+    title: str
+    source: str
+    sections: Mapping[str, Mapping[str, Quantity]]
+    components: Mapping[str, Part]
+
+    def values(self, section: str) -> dict[str, float]:
+        """{entry: value in SI} of a section."""
+        return {entry: quantity.value for entry, quantity in self.sections[section].items()}
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """{"section.entry": quantity} of every entry that has a value of its own."""
+        return {
+            f"{s}.{e}": q
+            for s, entries in self.sections.items()
+            for e, q in entries.items()
+            if not q.ref
+        }
+
+    @property
+    def assumed(self) -> list[str]:
+        """Names of the entries that are assumptions."""
+        return [name for name, quantity in self.quantities.items() if quantity.assumed]
+
+    def with_values(self, changes: Mapping[str, float], source: str = "set by hand") -> Vehicle:
+        """The same airframe with other values (SI), {"body.mass": 9.0}; entries that refer to a
+        changed one follow it.
+        """
+        for name, value in changes.items():
+            if name not in self.quantities:
+                raise UnknownNameError("parameter", name, self.quantities)
+            if not isinstance(value, int | float) or not math.isfinite(value):
+                raise InputError(
+                    f"{name}: expected a finite number in {self.quantities[name].unit}, got"
+                    f" {value!r}"
+                )
+        changed = self._map(
+            lambda name, q: (
+                q._replace(value=float(changes[name]), source=f"{source}, was {q.value:g}")
+                if name in changes
+                else q
+            )
+        )
+        for section, entry, wrong in impossibilities(changed.sections, changed.components):
+            raise InputError(f"{self.title}, {section}.{entry}: {wrong}")
+        return changed
+
+    def scaled(self, factor: float) -> Vehicle:
+        """The Froude-scaled airframe: lengths times `factor` N, masses N^3, times sqrt(N), so that
+        gravity and air density stay.
+
+        The exponent of each entry follows from its unit: mass 3, length 1, time 1/2, so inertias
+        N^5, stiffness N^4, power N^3.5, rotor speed N^-0.5, while angles and ratios stay.
+        """
+        if not (math.isfinite(factor) and factor > 0):
+            raise InputError(
+                "scaling needs a factor > 0 (length of the copy by length of the original), got"
+                f" {factor}"
+            )
+
+        def scale(_: str, q: Quantity) -> Quantity:
+            powers = dimension(q.unit)
+            exponent = 3 * powers.get("kg", 0) + powers.get("m", 0) + powers.get("s", 0) / 2
+            return q._replace(
+                value=q.value * factor**exponent, source=f"{q.source}; Froude-scaled by {factor:g}"
+            )
+
+        return replace(self._map(scale), title=f"{self.title}, Froude-scaled by {factor:g}")
+
+    def _map(self, change: Callable[[str, Quantity], Quantity]) -> Vehicle:
+        """Every quantity changed; one that refers to another is changed as the other."""
+        sections = {
+            section: {
+                entry: change(q.ref or f"{section}.{entry}", q) for entry, q in entries.items()
+            }
+            for section, entries in self.sections.items()
+        }
+        return replace(self, sections=sections)
+
+
+def vehicles() -> list[str]:
+    """Names of the airframes that come with the package."""
+    files = [p.name for p in resources.files("symheli.airframe.vehicles").iterdir()]
+    return sorted(
+        name.removesuffix(".toml")
+        for name in files
+        if name.endswith(".toml") and not name.endswith(ENDING)
+    )
+
+
+def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
+    """Read a packaged airframe by name, or any TOML file by path. Raises `InputError` naming file,
+    line, entry and unit.
+    """
+    given = os.fspath(name_or_path)
+    if given.endswith(".toml"):
+        path = Path(given)
+        if not path.is_file():
+            raise InputError(
+                f"no vehicle file at {given}; packaged airframes: {', '.join(vehicles())}"
+            )
+        file, name = VehicleFile(given, path.read_text(encoding="utf-8"), path.parent), path.stem
+    else:
+        if given not in vehicles():
+            raise UnknownNameError("vehicle", given, vehicles())
+        file, name = (
+            VehicleFile(
+                given,
+                (resources.files("symheli.airframe.vehicles") / f"{given}.toml").read_text(
+                    encoding="utf-8"
+                ),
+            ),
+            given,
+        )
+    parts = file.parts()
+    return Vehicle(
+        name,
+        str(file.tables.get("title", name)),
+        str(file.tables.get("source", "")),
+        file.quantities(parts),
+        parts,
+    )

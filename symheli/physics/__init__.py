@@ -1,0 +1,1 @@
+"""Laws of motion that no airframe changes: rigid body, inflow, drivetrain, attitude."""

@@ -1,0 +1,156 @@
+"""What is done to a record before it is fitted; the caller's record stays as it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+
+from symheli.errors import InputError
+from symheli.records.flight_record import FlightRecord
+from symheli.values.arrays import Array
+
+
+def with_norm(record: FlightRecord, parts: Sequence[str], name: str = "speed") -> FlightRecord:
+    """With the signal `name`: the Euclidean length of `parts`, which must share one unit."""
+    found = {record.signals[record.signals.index(part)].unit for part in parts}  # type: ignore[arg-type]
+    if len(found) > 1:
+        raise InputError(
+            f"a length needs one unit, {', '.join(parts)} come in {', '.join(sorted(found))}"
+        )
+    return record.with_signals(
+        {name: found.pop()}, **{name: np.linalg.norm(record.columns(parts), axis=1)}
+    )
+
+
+def smooth(record: FlightRecord, name: str, seconds: float) -> FlightRecord:
+    """`name` after a causal first-order low-pass with this time constant (s), started anew in each
+    segment and behind missing samples.
+    """
+    if not 0 < seconds < math.inf:
+        raise InputError(f"seconds: expected a positive time constant, got {seconds}")
+    signal, out = record[name], np.full(len(record), np.nan)
+    for part in record.segments():
+        state = math.nan
+        for k in range(part.start, part.stop):
+            step = record.time[k] - record.time[k - 1] if k > part.start else 0.0
+            state = (
+                signal[k]
+                if not math.isfinite(state)
+                else state + (1 - math.exp(-step / seconds)) * (signal[k] - state)
+            )
+            out[k] = state
+    unit = record.signals[record.signals.index(name)].unit  # type: ignore[arg-type]
+    return record.with_signals({name: unit}, **{name: out})
+
+
+def low_pass(
+    record: FlightRecord,
+    cutoff: float,
+    order: int = 4,
+    *,
+    zero_phase: bool = False,
+    leave: Sequence[str] = (),
+) -> FlightRecord:
+    """All signals but those of `leave` through one Butterworth filter of `order` with its corner at
+    `cutoff` (Hz).
+
+    One filter for all keeps a linear relation between inputs and outputs; coefficients that move
+    with p keep it while p moves slowly against the filter, so the scheduling signal is best left as
+    it is. Causal, settled at the first sample of each stretch; `zero_phase` runs it forwards and
+    backwards (not for real time). Each unbroken stretch between missing samples is filtered by
+    itself, signal by signal. Raises `InputError` for a corner beyond half the sampling frequency.
+    """
+    rate = 1 / record.dt
+    if not 0 < cutoff < rate / 2 or order < 1:
+        raise InputError(
+            f"cutoff: expected a frequency between 0 and {rate / 2:.4g} Hz (half the sampling"
+            f" frequency), got {cutoff}"
+        )
+    if not isinstance(order, int | np.integer):
+        raise InputError(f"order: expected a whole number >= 1, got {order!r}")
+    for name in leave:
+        record.columns([name])  # raises UnknownNameError with the nearest names
+    sos, out = np.asarray(butter(order, cutoff, fs=rate, output="sos")), record.values.copy()
+    for i, signal in enumerate(record.signals):
+        if signal in leave:
+            continue
+        for part in record.segments():
+            for stretch in _unbroken(record.values[part, i]):
+                rows = slice(part.start + stretch.start, part.start + stretch.stop)
+                out[rows, i] = _filtered(sos, record.values[rows, i], zero_phase)
+    return replace(record, values=out)
+
+
+def _unbroken(column: Array) -> list[slice]:
+    """Stretches of finite values."""
+    known = np.concatenate([[False], np.isfinite(column), [False]])
+    edges = np.flatnonzero(np.diff(known.astype(int)))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _filtered(sos: Array, x: Array, zero_phase: bool) -> Array:
+    if zero_phase:
+        return sosfiltfilt(sos, x, padlen=min(6 * len(sos), len(x) - 1)) if len(x) > 1 else x
+    return sosfilt(sos, x, zi=x[0] * sosfilt_zi(sos))[0]
+
+
+def decimate(record: FlightRecord, n: int) -> FlightRecord:
+    """Means of `n` samples in a row, all signals alike: a linear relation between them is kept,
+    noise and dt change.
+
+    Within a mean the output has heard the input already: y(k) depends on u(k), whatever it did
+    before. Identify with delay 0; the record remembers (`resampled`), and `fit` warns. No other
+    filter avoids it: between slow samples what is band-limited is known from both sides.
+    """
+    if not isinstance(n, int | np.integer) or n < 1:
+        raise InputError(f"expected a whole number of samples >= 1 to take together, got {n!r}")
+    if n == 1:
+        return record
+    times, values = [], []
+    for part in record.segments():
+        rows = (part.stop - part.start) // n
+        stop = part.start + rows * n
+        times.append(record.time[part.start : stop].reshape(rows, n).mean(axis=1))
+        values.append(
+            record.values[part.start : stop].reshape(rows, n, len(record.signals)).mean(axis=1)
+        )
+    if sum(map(len, times)) < 2:
+        raise InputError(
+            f"taking {n} samples together leaves fewer than two; the record has {len(record)}"
+        )
+    return replace(
+        record,
+        time=np.concatenate(times),
+        values=np.concatenate(values),
+        resampled=f"means of {n} samples",
+    )
+
+
+def cut(record: FlightRecord, start: float | None, stop: float | None) -> FlightRecord:
+    """The samples from `start` to `stop` (s on the record's clock)."""
+    low, high = -math.inf if start is None else start, math.inf if stop is None else stop
+    keep = (record.time >= low) & (record.time < high)
+    if keep.sum() < 2:
+        raise InputError(
+            f"nothing is left between start and stop; the record goes from {record.time[0]:g} to"
+            f" {record.time[-1]:g} s"
+        )
+    return record.rows(keep)
+
+
+def split(record: FlightRecord, fraction: float) -> tuple[FlightRecord, FlightRecord | None]:
+    """The first `fraction` of the time to fit, and the rest held out (None where nothing rests)."""
+    edge = record.time[0] + fraction * (record.time[-1] - record.time[0])
+    early = record.time <= edge
+    if fraction >= 1 or early.all():
+        return record, None
+    if early.sum() < 2 or (~early).sum() < 2:
+        raise InputError(
+            f"a fraction of {fraction:g} leaves {int(early.sum())} samples to fit and"
+            f" {int((~early).sum())} to judge; record longer"
+        )
+    return record.rows(early), record.rows(~early)

@@ -1,0 +1,360 @@
+"""What was measured in a flight: one time axis, named signals with units, nothing guessed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.extras import extra
+from symheli.logs.csv import read_csv
+from symheli.logs.files import seconds_in
+from symheli.logs.mat import read_mat
+from symheli.logs.signal_map import SignalMap
+from symheli.logs.ulog import read_ulog
+from symheli.logs.xplane import read_xplane
+from symheli.values.arrays import Array, frozen
+from symheli.values.sample_period import JITTER, period_of, warn_of_odd_steps
+from symheli.values.signal import Signal, indices, signals
+from symheli.values.units import to_si
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+GAP = 1.5
+"""Two samples further apart than this many median steps have a gap between them."""
+
+
+FINER = 1e4
+"""`resample` refuses a step that makes this many times as many samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlightRecord:
+    """Samples `values` (n, m) of `signals` at `time` (n,) in s, in SI units and radians.
+
+    NaN marks a missing sample. A time step longer than 1.5 median steps is a gap: `segments()`
+    splits there, and no regressor reaches across. `note` says where the record comes from,
+    `resampled` how its samples were made of others ("means of 4 samples"; empty where each is what
+    was measured at its instant): then y(k) may depend on u(k).
+    """
+
+    time: Array
+    values: Array
+    signals: tuple[Signal, ...]
+    note: str = ""
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    resampled: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "signals", signals(self.signals))
+        object.__setattr__(self, "time", frozen(self.time, "time", (None,)))
+        object.__setattr__(
+            self,
+            "values",
+            frozen(self.values, "values", (len(self.time), len(self.signals)), finite=False),
+        )
+        if len(self.time) < 2:
+            raise InputError(f"a record needs at least two samples, got {len(self.time)}")
+        backwards = np.flatnonzero(np.diff(self.time) <= 0)
+        if len(backwards):
+            k = int(backwards[0])
+            raise InputError(
+                f"time must increase: sample {k + 1} is at {self.time[k + 1]:.6g} s after"
+                f" {self.time[k]:.6g} s; sort or drop repeats"
+            )
+        if np.any(np.isinf(self.values)):
+            row, column = (int(i) for i in np.argwhere(np.isinf(self.values))[0])
+            raise InputError(
+                f"{self.signals[column]} is infinite at {self.time[row]:.6g} s; mark missing"
+                " samples as NaN"
+            )
+
+    # --- reading ---------------------------------------------------------------------------------
+
+    @classmethod
+    def from_arrays(
+        cls, time: object, units: Mapping[str, str], note: str = "", **columns: Any
+    ) -> FlightRecord:
+        """From one array a signal, all as long as `time` (s); `units` declares the unit of each
+        signal.
+
+        Warns (`DataWarning`), as all readers do, where samples lie further apart than 1 s or closer
+        than 0.1 ms.
+        """
+        record = cls._in_si(time, units, note, columns)
+        warn_of_odd_steps(record.time)
+        return record
+
+    @classmethod
+    def _in_si(
+        cls, time: object, units: Mapping[str, str], note: str, columns: Mapping[str, Any]
+    ) -> FlightRecord:
+        values, names = [], []
+        length = np.asarray(time).size
+        for name, column in columns.items():
+            if name not in units:
+                raise InputError(
+                    f"declare the unit of {name!r}: units={{{name!r}: ...}} ('1' where it has none)"
+                )
+            factor, unit = to_si(units[name])
+            values.append(factor * frozen(column, name, (length,), finite=False))
+            names.append(Signal(name, unit))
+        table = np.column_stack(values) if values else np.zeros((length, 0))
+        return cls(time, table, tuple(names), note)  # type: ignore[arg-type]
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: pandas.DataFrame,
+        time: str,
+        units: Mapping[str, str],
+        time_unit: str = "s",
+        note: str = "",
+    ) -> FlightRecord:
+        """From a pandas DataFrame: `time` names the time column; the columns in `units` are taken
+        and converted to SI.
+
+        Raises `UnknownNameError` for a column that is not there, `InputError` for one of dates or
+        words.
+        """
+        for name in (time, *units):
+            if name not in frame.columns:
+                raise UnknownNameError("column", name, [str(c) for c in frame.columns])
+        factor = seconds_in(time_unit)
+        if frame[time].dtype.kind in "mM":
+            raise InputError(
+                f"{time!r} holds dates; give numbers: (frame[{time!r}] -"
+                f" frame[{time!r}].iloc[0]).dt.total_seconds()"
+            )
+        columns = {}
+        for name in dict.fromkeys((time, *units)):
+            try:
+                columns[name] = frame[name].to_numpy(float)
+            except (TypeError, ValueError) as error:
+                raise InputError(f"column {name!r}: expected numbers ({error})") from error
+        return cls.from_arrays(
+            factor * columns[time], units, note, **{str(n): columns[n] for n in units}
+        )
+
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | os.PathLike[str],
+        time: str | None,
+        units: Mapping[str, str],
+        dt: float | None = None,
+        time_unit: str = "s",
+    ) -> FlightRecord:
+        """From a table with a header line: commas, semicolons, tabs or blanks between cells,
+        decimal points or commas, # comments.
+
+        `time` names the time column, in `time_unit`. A file without one (`time=None`) needs the
+        sample period `dt` (s).
+        """
+        return cls._from_table(*read_csv(path, time, units, dt, time_unit), path)
+
+    @classmethod
+    def from_xplane(cls, path: str | os.PathLike[str], dt: float | None = None) -> FlightRecord:
+        """From an X-Plane Data.txt: body velocities, rates and attitude in SI, sticks in -1..1; see
+        `symheli.logs.xplane`.
+        """
+        return cls._from_table(*read_xplane(path, dt), path)
+
+    @classmethod
+    def from_ulog(
+        cls, path: str | os.PathLike[str], topics: Mapping[str, tuple[str, str, str]], dt: float
+    ) -> FlightRecord:
+        """From a PX4 ULog: {signal: (topic, field, unit)}, resampled to `dt` (s); needs pyulog
+        (extra "logs").
+        """
+        return replace(
+            cls._from_table(*read_ulog(path, topics, dt), path),
+            resampled=f"topics interpolated to {dt:g} s",
+        )
+
+    @classmethod
+    def from_mat(
+        cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s"
+    ) -> FlightRecord:
+        """From a MATLAB file (v7.2 or older) with one vector a signal, `time` in `time_unit`."""
+        return cls._from_table(*read_mat(path, time, units, time_unit), path)
+
+    @classmethod
+    def from_map(
+        cls, path: str | os.PathLike[str], signal_map: str | os.PathLike[str]
+    ) -> FlightRecord:
+        """From any of these logs by a TOML file that says which column is which signal; see
+        `symheli.logs.signal_map`.
+        """
+        found = SignalMap.load(signal_map)
+        record, step = cls._from_table(*found.read(path), path), found.step(path)
+        return record if step is None else record.resample(step)
+
+    @classmethod
+    def _from_table(
+        cls,
+        time: Array,
+        columns: Mapping[str, Array],
+        units: Mapping[str, str],
+        path: str | os.PathLike[str],
+    ) -> FlightRecord:
+        return cls.from_arrays(time, units, os.path.basename(os.fspath(path)), **columns)
+
+    # --- looking ---------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.values[:, indices([name], self.signals, "signal")[0]]
+
+    def columns(self, names: Iterable[str]) -> Array:
+        """The named signals side by side, (n, len(names))."""
+        return self.values[:, indices(names, self.signals, "signal")]
+
+    @property
+    def dt(self) -> float:
+        """Sample period (s): the roundest number that the stamps allow (`sample_period.period_of`),
+        so that 0.02 s is 0.02 s.
+
+        Raises `InputError` where the steps inside a segment vary by more than 1 %.
+        """
+        steps = np.diff(self.time)
+        dt = float(np.median(steps))
+        inside = steps[steps <= GAP * dt]
+        if np.ptp(inside) > JITTER * dt:
+            raise InputError(
+                f"sampling is irregular (steps {inside.min():.4g} to {inside.max():.4g} s);"
+                f" resample first: record.resample({dt:.3g})"
+            )
+        return period_of(inside, self.time[-1])
+
+    def segments(self) -> tuple[slice, ...]:
+        """Index ranges without a gap between them, in order."""
+        steps = np.diff(self.time)
+        cuts = [0, *(np.flatnonzero(steps > GAP * np.median(steps)) + 1).tolist(), len(self)]
+        return tuple(slice(a, b) for a, b in pairwise(cuts))
+
+    def derivative(self, name: str) -> Array:
+        """Central-difference time derivative (n,) of a signal, one-sided at the ends of each
+        segment.
+        """
+        values, out = self[name], np.full(len(self), np.nan)
+        for part in self.segments():
+            if part.stop - part.start > 1:
+                out[part] = np.gradient(values[part], self.time[part])
+        return out
+
+    def plot(self, names: Sequence[str] | None = None) -> Figure:
+        """A figure of these signals (default: all) against time, with units; gaps stay empty. See
+        `symheli.records.record_plot`.
+        """
+        from symheli.records.record_plot import plot_record
+
+        return plot_record(self, names)
+
+    # --- changing (a new record each time) -------------------------------------------------------
+
+    def between(self, start: float, stop: float) -> FlightRecord:
+        """The samples with start <= time < stop (s)."""
+        return self.rows((self.time >= start) & (self.time < stop))
+
+    def rows(self, keep: object) -> FlightRecord:
+        """The samples at these indices (slice, index array or mask)."""
+        return replace(self, time=self.time[keep], values=self.values[keep])  # type: ignore[index]
+
+    def select(self, names: Sequence[str]) -> FlightRecord:
+        """Only these signals."""
+        index = indices(names, self.signals, "signal")
+        return replace(
+            self, values=self.values[:, index], signals=tuple(self.signals[i] for i in index)
+        )
+
+    def with_signals(self, units: Mapping[str, str], **columns: Any) -> FlightRecord:
+        """With these signals added, or replaced where the name exists."""
+        other = FlightRecord._in_si(self.time, units, self.note, columns)
+        kept = [i for i, s in enumerate(self.signals) if s not in other.signals]
+        return replace(
+            self,
+            values=np.column_stack([self.values[:, kept], other.values]),
+            signals=(*(self.signals[i] for i in kept), *other.signals),
+        )
+
+    def resample(self, dt: float) -> FlightRecord:
+        """Linear interpolation to a uniform step `dt` (s) inside each segment; nothing is invented
+        across gaps.
+
+        To a longer step: `low_pass` or `decimate` first, or what is faster folds back into what is
+        slower. Between its neighbours an output has heard the input that stands beside it: identify
+        with delay 0.
+        """
+        if not 0 < dt < np.inf:
+            raise InputError(f"dt must be a positive number of seconds, got {dt}")
+        parts = self.segments()
+        samples = (
+            sum(float(self.time[part.stop - 1] - self.time[part.start]) for part in parts) / dt
+        )
+        if samples > FINER * len(self):
+            raise InputError(
+                f"dt of {dt:g} s makes {samples:.1e} samples of {len(self)}; dt is in seconds"
+            )
+        times, values, offset = [], [], None
+        for part in parts:
+            old = self.time[part]
+            offset = old[0] if offset is None else offset
+            new = offset + dt * np.arange(
+                np.ceil((old[0] - offset) / dt - 1e-9), np.floor((old[-1] - offset) / dt + 1e-9) + 1
+            )
+            if len(new):
+                times.append(new)
+                values.append(
+                    np.column_stack([np.interp(new, old, column) for column in self.values[part].T])
+                )
+        new, old = np.concatenate(times), float(np.median(np.diff(self.time)))
+        kept = len(new) == len(self) and np.allclose(new, self.time, rtol=0, atol=1e-9 * dt)
+        made = self.resampled if kept else f"interpolated to {dt:.4g} s from {old:.4g} s"
+        return replace(self, time=new, values=np.concatenate(values), resampled=made)
+
+    def low_pass(
+        self, cutoff: float, order: int = 4, *, zero_phase: bool = False, leave: Sequence[str] = ()
+    ) -> FlightRecord:
+        """All signals but those of `leave` through one Butterworth filter with its corner at
+        `cutoff` (Hz); see `symheli.records.low_pass`.
+        """
+        from symheli.records.conditioning import low_pass
+
+        return low_pass(self, cutoff, order, zero_phase=zero_phase, leave=leave)
+
+    def decimate(self, n: int) -> FlightRecord:
+        """Means of `n` samples in a row, all signals alike, to identify with delay 0; see
+        `symheli.records.decimate`.
+        """
+        from symheli.records.conditioning import decimate
+
+        return decimate(self, n)
+
+    def split(self, fraction: float) -> tuple[FlightRecord, FlightRecord | None]:
+        """The first `fraction` of the time to fit, the rest to judge (None where nothing rests);
+        see `symheli.records.split`.
+        """
+        from symheli.records.conditioning import split
+
+        return split(self, fraction)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A pandas DataFrame with a "t" column (s) and one column a signal. Raises `InputError`
+        without pandas.
+        """
+        with extra("logs", "a data frame"):
+            import pandas as pd
+
+        return pd.DataFrame(
+            {"t": self.time, **{str(s): self.values[:, i] for i, s in enumerate(self.signals)}}
+        )

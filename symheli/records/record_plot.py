@@ -1,0 +1,95 @@
+"""A record as a picture: one panel a signal over one time axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.values.arrays import Array
+from symheli.values.signal import Signal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from symheli.records.flight_record import FlightRecord
+
+LINE, SHADE, GRID = "#0b61a4", "#eceff1", "#e6e9ec"
+PANELS = 6
+"""More signals than this stand in two columns."""
+
+
+def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Figure:
+    """A matplotlib figure of the signals `names` (default: all) against time (s), with their units.
+
+    Shaded: gaps, and where a sample of that signal is missing; no line crosses them. A sample
+    between two missing ones is a dot. The figure belongs to no window:
+    `figure.savefig("record.png")`, or its display in a notebook. Raises `InputError` for no
+    signals, `UnknownNameError` for those the record lacks.
+    """
+    shown = record.select(
+        record.signals if names is None else [names] if isinstance(names, str) else list(names)
+    )
+    if not shown.signals:
+        raise InputError("name at least one signal to plot")
+    wide = 2 if len(shown.signals) > PANELS else 1
+    tall = -(-len(shown.signals) // wide)
+    figure = empty_figure(7.5 * (1.5 if wide == 2 else 1), 0.6 + 1.3 * tall)
+    axes = figure.subplots(tall, wide, sharex=True, squeeze=False).T.reshape(-1)
+    for ax, signal, column in zip(axes, shown.signals, shown.values.T, strict=False):
+        draw(ax, shown, column, color=LINE, linewidth=0.9)
+        shade_missing(ax, shown, column)
+        ax.set_title(label(signal), fontsize=9, loc="left")
+    for ax in axes[len(shown.signals) :]:
+        ax.set_visible(False)
+    for ax in (axes[len(shown.signals) - 1], axes[tall - 1]):
+        ax.tick_params(labelbottom=True)
+        ax.set_xlabel("time (s)")
+    if record.note:
+        figure.suptitle(record.note, fontsize=9)
+    return figure
+
+
+def empty_figure(width: float, height: float) -> Figure:
+    """A figure of this size (inches) that belongs to no window."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def label(signal: Signal) -> str:
+    """Name and unit; the name alone where it has none."""
+    return str(signal) if signal.unit == "1" else f"{signal} ({signal.unit})"
+
+
+def draw(ax: Axes, record: FlightRecord, column: Array, **style: object) -> None:
+    """`column` (n,) against the time of `record`: broken at gaps and where it is not finite, a dot
+    where a sample stands alone.
+    """
+    ends = [part.stop for part in record.segments()[:-1]]
+    time, values = (
+        np.insert(record.time, ends, np.nan),
+        np.insert(np.where(np.isfinite(column), column, np.nan), ends, np.nan),
+    )
+    (line,) = ax.plot(time, values, **style)  # type: ignore[arg-type]
+    known = np.concatenate([[False], np.isfinite(values), [False]])
+    alone = known[1:-1] & ~known[:-2] & ~known[2:]
+    ax.plot(time[alone], values[alone], ".", color=line.get_color(), markersize=3)
+    ax.grid(color=GRID, linewidth=0.6)
+    ax.margins(x=0.01)
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def shade_missing(ax: Axes, record: FlightRecord, column: Array) -> None:
+    """Grey from the last sample before a gap, or a missing one, to the next."""
+    known = np.flatnonzero(np.isfinite(column))
+    part_of = np.repeat(
+        np.arange(len(record.segments())), [part.stop - part.start for part in record.segments()]
+    )
+    for a, b in pairwise(known.tolist()):
+        if b > a + 1 or part_of[a] != part_of[b]:
+            ax.axvspan(record.time[a], record.time[b], color=SHADE, linewidth=0)

@@ -1,0 +1,74 @@
+"""The family of exact linear models along a range of airspeeds, and where it has corners."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import brentq
+
+from symheli.errors import InputError
+from symheli.helicopter import Helicopter
+from symheli.lpv.linear_family import LinearFamily
+from symheli.steady.equilibrium import TrimPoint, trim
+from symheli.steady.linearization import linearize
+
+_MEANINGLESS = 1e-7  # a switching function that stays below this is zero, not switching
+
+
+def sweep(
+    heli: Helicopter,
+    airspeeds: Sequence[float],
+    *,
+    climb_rate: float = 0.0,
+    inputs: Sequence[str] | None = None,
+    start: LinearFamily | None = None,
+) -> LinearFamily:
+    """Trim and linearize at each of `airspeeds` (m/s, increasing), each trim started from the one
+    before.
+
+    `inputs` as in `linearize`. `start`: a family at the same airspeeds whose trims are near, to
+    start from instead. `.kinks` of the result lists, by cause, the airspeeds between the first and
+    the last at which the linear models have a corner (a wake edge, a limit, a flow reversal).
+    Raises `TrimError`, `InputError`.
+    """
+    speeds = [float(v) for v in np.atleast_1d(airspeeds)]
+    if not speeds or any(b <= a for a, b in pairwise(speeds)):
+        raise InputError("sweep needs increasing airspeeds")
+    if start and not np.array_equal(start.airspeeds, speeds):
+        raise InputError("the family to start from has other airspeeds")
+    points: list[TrimPoint] = []
+    for k, speed in enumerate(speeds):
+        near = start.trims[k] if start else points[-1] if points else None
+        points.append(trim(heli, speed, climb_rate=climb_rate, start=near))  # type: ignore[arg-type]
+    models = [linearize(heli, point, inputs=inputs) for point in points]
+    return LinearFamily.from_models(speeds, models, kink_speeds(heli, points))
+
+
+def kink_speeds(heli: Helicopter, points: Sequence[TrimPoint]) -> Mapping[str, tuple[float, ...]]:
+    """Airspeeds (m/s) between neighbouring trims at which a switching function changes sign, to
+    1e-6 m/s, by cause.
+    """
+    values = [heli.in_air(p.density).switches(p.x.array, p.u.array, p.wind.array) for p in points]
+    kinks: dict[str, tuple[float, ...]] = {}
+    for name in values[0]:
+        if name.endswith("vortex ring"):  # a flag, not a corner
+            continue
+        found = []
+        for before, after, a, b in zip(
+            points[:-1], points[1:], values[:-1], values[1:], strict=True
+        ):
+            if a[name] * b[name] < 0 and min(abs(a[name]), abs(b[name])) > _MEANINGLESS:
+                found.append(_crossing(heli, name, before, after))
+        if found:
+            kinks[name] = tuple(found)
+    return kinks
+
+
+def _crossing(heli: Helicopter, name: str, before: TrimPoint, after: TrimPoint) -> float:
+    def value(speed: float) -> float:
+        point = trim(heli, speed, climb_rate=before.condition.climb_rate, start=before)
+        return heli.switches(point.x.array, point.u.array, point.wind.array)[name]
+
+    return float(brentq(value, before.airspeed, after.airspeed, xtol=1e-6))  # type: ignore[arg-type]

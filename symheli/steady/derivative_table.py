@@ -1,0 +1,129 @@
+"""Stability and control derivatives along the transition, in the field's nomenclature: X_u ...
+N_ped, L_b1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.linear_family import LinearFamily
+from symheli.values.arrays import Array, frozen
+from symheli.values.comma_separated import comma_separated
+from symheli.values.signal import Signal
+from symheli.values.units import quotient
+
+ROW = {"u": "X", "v": "Y", "w": "Z", "p": "L", "q": "M", "r": "N"}
+"""Symbol of the force or moment by the state whose derivative it makes; other states keep their
+name, as in a1dot_u.
+"""
+
+KINEMATIC = {
+    ("u", "q"): ("w", 1),
+    ("u", "r"): ("v", -1),
+    ("v", "r"): ("u", 1),
+    ("v", "p"): ("w", -1),
+    ("w", "p"): ("v", 1),
+    ("w", "q"): ("u", -1),
+}
+"""Entry of A: (trim velocity, sign) of what is added to leave the force: u' = v r - w q + X/m, so
+A[u, q] = X_q - w0.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class DerivativeTable:
+    """Derivatives (K, n) at K `airspeeds` (m/s): `names` are `Signal`s with units, table["M_q"] is
+    (K,).
+
+    Forces by mass and moments by moment of inertia: X_u = d(X/m)/du in 1/s, N_ped = d(N/Izz)/d
+    d_ped in 1/s^2. With the governor "ideal" the yaw inertia includes the rotor, whose speed it
+    holds.
+    """
+
+    airspeeds: Array
+    names: tuple[Signal, ...]
+    values: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
+        object.__setattr__(
+            self,
+            "values",
+            frozen(self.values, "derivatives", (len(self.airspeeds), len(self.names))),
+        )
+
+    def __getitem__(self, name: str) -> Array:
+        """One derivative along the airspeeds (K,)."""
+        if name not in self.names:
+            raise UnknownNameError("derivative", name, self.names)
+        return self.values[:, list(self.names).index(name)]  # type: ignore[arg-type]
+
+    def __iter__(self) -> Iterator[Signal]:
+        return iter(self.names)
+
+    def csv(self) -> str:
+        """One line an airspeed, one column a derivative, units in the second line."""
+        columns = zip(self.names, self.values.T, strict=True)
+        return comma_separated([(Signal("airspeed"), self.airspeeds), *columns])
+
+    def __str__(self) -> str:
+        """One line a derivative, one column an airspeed; derivatives that are zero throughout are
+        left out.
+        """
+        shown = [
+            (name, row) for name, row in zip(self.names, self.values.T, strict=True) if np.any(row)
+        ]
+        width = max(len(f"{name}") for name in self.names)
+        units = max(len(name.unit) for name in self.names)
+        head = f"{'':{width}s}  {'m/s':{units}s}" + "".join(f"{v:>11.4g}" for v in self.airspeeds)
+        return "\n".join(
+            [
+                head,
+                *(
+                    f"{name!s:{width}s}  {name.unit:{units}s}" + "".join(f"{v:>11.4g}" for v in row)
+                    for name, row in shown
+                ),
+            ]
+        )
+
+
+def derivatives(family: LinearFamily) -> DerivativeTable:
+    """The derivatives of a `sweep` in straight flight: entries of A and B without gravity and the
+    kinematic terms w0, v0, u0.
+
+    Raises `InputError` for discrete models and for trims that turn.
+    """
+    if family.dt is not None:
+        raise InputError(
+            f"derivatives are those of continuous models; this family has dt = {family.dt} s"
+        )
+    for point in family.known_trims("a table of derivatives"):
+        if any(
+            abs(point.x[rate]) > 1e-9 for rate in ("p", "q", "r") if rate in point.x
+        ):  # straight to the accuracy of a trim
+            raise InputError("derivatives are tabulated for straight flight; this family turns")
+    columns = [
+        s for s in family.states if s not in ("phi", "theta")
+    ]  # these enter by gravity and kinematics alone
+    names, values = [], []
+    for i, state in enumerate(family.states):
+        if state in ("phi", "theta"):
+            continue
+        symbol, unit = ROW.get(state, f"{state}dot"), quotient(state.unit, "s")
+        for column in columns:
+            entry = family.A[:, i, family.states.index(column)]
+            if (state, column) in KINEMATIC:
+                velocity, sign = KINEMATIC[str(state), str(column)]
+                entry = entry + sign * np.array([point.x[velocity] for point in family.trims])
+            names.append(Signal(f"{symbol}_{column}", quotient(unit, column.unit)))
+            values.append(entry)
+        for j, control in enumerate(family.inputs):
+            names.append(
+                Signal(f"{symbol}_{control.removeprefix('d_')}", quotient(unit, control.unit))
+            )
+            values.append(family.B[:, i, j])
+    return DerivativeTable(family.airspeeds, tuple(names), np.column_stack(values) + 0.0)

@@ -1,0 +1,55 @@
+"""Exact linear models about an operating point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.helicopter import Helicopter
+from symheli.lpv.linear_model import LinearModel
+from symheli.steady.equilibrium import TOLERANCE, TrimPoint
+from symheli.values.signal import indices
+
+
+def linearize(
+    heli: Helicopter,
+    point: TrimPoint,
+    *,
+    inputs: Sequence[str] | None = None,
+    allow_accelerating: bool = False,
+) -> LinearModel:
+    """A, B of the Euler form about `point` by algorithmic differentiation through the implicit
+    inflow; C = I, D = 0.
+
+    The air is that of the point. `inputs` defaults to the four controls; gust velocities u_w v_w
+    w_w (body axes, m/s) may be named too. A point that is not an equilibrium is refused with
+    `InputError` unless `allow_accelerating`.
+    """
+    if not allow_accelerating and not np.all(np.abs(point.xdot.array) < TOLERANCE):
+        raise InputError(
+            f"linearize needs an equilibrium: {point}; pass allow_accelerating=True for a model"
+            " about a trajectory point"
+        )
+    if point.x.signals != heli.states:
+        raise InputError(
+            f"the point has states {', '.join(point.x.signals)}, the helicopter"
+            f" {', '.join(heli.states)}: trim this helicopter"
+        )
+    heli = heli.in_air(point.density)
+    A, B, E = heli.numeric("jacobian")(point.x.array, point.u.array, point.wind.array)
+    names = (*heli.inputs, *heli.wind)
+    columns = indices(heli.inputs if inputs is None else inputs, names, "input")
+    B = np.hstack([B, E])[:, columns]
+    n = len(heli.states)
+    return LinearModel(
+        A,
+        B,
+        np.eye(n),
+        np.zeros((n, len(columns))),
+        heli.states,
+        tuple(names[i] for i in columns),
+        heli.states,
+        point=point,
+    )

@@ -1,0 +1,169 @@
+"""Trims over airspeed and climb rate, and where momentum theory promises nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.helicopter import Helicopter
+from symheli.steady.equilibrium import TrimPoint, trim
+from symheli.values.arrays import Array, frozen
+from symheli.values.comma_separated import comma_separated
+from symheli.values.signal import Signal
+
+POWER = Signal("power", "W")
+
+
+@dataclass(frozen=True, eq=False)
+class TrimMap:
+    """Trims at n `airspeeds` (of the whole motion, m/s) and m `climb_rates` (m/s, up).
+
+    points: (n, m) of `TrimPoint`, None where the climb rate exceeds the airspeed. power: engine
+    torque times rotor speed (n, m), W, NaN where there is no point. map["theta"] is any state,
+    input or "power" over the grid (n, m).
+    """
+
+    airspeeds: Array
+    climb_rates: Array
+    points: tuple[tuple[TrimPoint | None, ...], ...]
+    power: Array
+
+    def __post_init__(self) -> None:
+        for name in ("airspeeds", "climb_rates"):
+            object.__setattr__(self, name, _increasing(getattr(self, name), name))
+        shape = (len(self.airspeeds), len(self.climb_rates))
+        object.__setattr__(self, "power", frozen(self.power, "power", shape, finite=False))
+        if len(self.points) != shape[0] or any(len(row) != shape[1] for row in self.points):
+            raise InputError(
+                f"expected points of shape {shape}, one for each airspeed and climb rate"
+            )
+
+    @property
+    def success(self) -> Array:
+        """Whether the equations hold (n, m), bool."""
+        return self._flags("success")
+
+    @property
+    def attainable(self) -> Array:
+        """Whether they hold with every control within its travel (n, m), bool."""
+        return self._flags("attainable")
+
+    @property
+    def vortex_ring(self) -> Array:
+        """Whether a rotor is where momentum theory promises no accuracy (n, m), bool."""
+        return self._flags("vortex_ring")
+
+    @property
+    def possible(self) -> Array:
+        """Whether the airspeed is enough for the climb rate (n, m), bool."""
+        return np.array([[point is not None for point in row] for row in self.points])
+
+    @property
+    def level_speeds(self) -> Array:
+        """Horizontal part of the airspeed (n, m), m/s; NaN where the climb rate exceeds the
+        airspeed.
+        """
+        square = self.airspeeds[:, None] ** 2 - self.climb_rates**2
+        return np.sqrt(np.where(self.possible, np.maximum(square, 0.0), np.nan))
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """What the map holds: states, inputs, power, with their units."""
+        point = next(point for row in self.points for point in row if point is not None)
+        return (*point.x.signals, *point.u.signals, POWER)
+
+    def __getitem__(self, name: str) -> Array:
+        """A state, input or "power" over the grid (n, m), NaN where the equations do not hold."""
+        if name not in self.signals:
+            raise UnknownNameError("signal", name, self.signals)
+        if name == POWER:
+            return np.where(self.success, self.power, np.nan)
+
+        def value(point: TrimPoint | None) -> float:
+            if point is None or not point.success:
+                return np.nan
+            return point.x[name] if name in point.x else point.u[name]
+
+        return np.array([[value(point) for point in row] for row in self.points])
+
+    def at(self, i: int, j: int) -> TrimPoint | None:
+        """The trim at airspeed i and climb rate j."""
+        return self.points[i][j]
+
+    def csv(self) -> str:
+        """Every signal and flag, one line a grid point that is possible."""
+        keep = self.possible
+        speeds, rates = np.meshgrid(self.airspeeds, self.climb_rates, indexing="ij")
+        columns = [(Signal("airspeed"), speeds[keep]), (Signal("climb_rate", "m/s"), rates[keep])]
+        columns += [(name, self[name][keep]) for name in self.signals]
+        columns += [
+            (Signal(flag), getattr(self, flag)[keep])
+            for flag in ("success", "attainable", "vortex_ring")
+        ]
+        return comma_separated(columns)
+
+    def _flags(self, name: str) -> Array:
+        return np.array(
+            [[point is not None and getattr(point, name) for point in row] for row in self.points]
+        )
+
+
+def trim_map(
+    heli: Helicopter, airspeeds: Sequence[float] | Array, climb_rates: Sequence[float] | Array
+) -> TrimMap:
+    """Trim at every pair of `airspeeds` and `climb_rates` (m/s, both increasing), each from the
+    neighbours already found.
+
+    The airspeed is that of the whole motion: straight down is climb_rate = -airspeed. Failures are
+    kept, not raised: see `success`, `attainable` and `vortex_ring` of the result.
+    """
+    speeds, rates = _increasing(airspeeds, "airspeeds"), _increasing(climb_rates, "climb_rates")
+    if not np.any(np.abs(rates) <= speeds[-1]):
+        raise InputError("every climb rate exceeds the largest airspeed, which includes it")
+    points: list[list[TrimPoint | None]] = [[None] * len(rates) for _ in speeds]
+    power = np.full((len(speeds), len(rates)), np.nan)
+    outwards = np.argsort(
+        np.abs(rates), kind="stable"
+    )  # level flight first: the easiest trims start the others
+    for i, speed in enumerate(speeds):
+        for j in outwards:
+            if abs(rates[j]) <= speed:
+                point = points[i][j] = _from_neighbours(
+                    heli, float(speed), float(rates[j]), _neighbours(points, i, int(j))
+                )
+                power[i, j] = _power(heli, point)
+    return TrimMap(speeds, rates, tuple(map(tuple, points)), power)
+
+
+def _neighbours(points: list[list[TrimPoint | None]], i: int, j: int) -> Iterator[TrimPoint]:
+    for k, m in ((i, j - 1), (i, j + 1), (i - 1, j), (i - 1, j - 1), (i - 1, j + 1)):
+        if 0 <= k and 0 <= m < len(points[0]):
+            point = points[k][m]
+            if point is not None and point.success:
+                yield point
+
+
+def _from_neighbours(
+    heli: Helicopter, speed: float, rate: float, neighbours: Iterator[TrimPoint]
+) -> TrimPoint:
+    for start in neighbours:
+        point = trim(heli, speed, climb_rate=rate, start=start, throw=False, continuation=False)
+        if point.success:
+            return point
+    return trim(heli, speed, climb_rate=rate, throw=False)
+
+
+def _power(heli: Helicopter, point: TrimPoint) -> float:
+    values = heli.numeric("diagnostics")(point.x.array, point.u.array, point.wind.array)
+    torque = values[heli.diagnostics.name_out().index("Q_e")][0]
+    return float(torque) * (point.x["Om"] if "Om" in point.x else heli.nominal_speed)
+
+
+def _increasing(values: Sequence[float] | Array, name: str) -> Array:
+    array = frozen(values, name, (None,))
+    if len(array) == 0 or np.any(np.diff(array) <= 0):
+        raise InputError(f"{name}: expected increasing numbers (m/s), got {array.tolist()}")
+    return array
