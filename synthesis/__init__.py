@@ -25,7 +25,7 @@ from synthesis.lft import (
 from synthesis.lower_bound import LowerBound, Search, lower_bound
 from synthesis.lyapunov import MemoryLyapunov, SplineLyapunov
 from synthesis.margins import Margins, disk_margin, loop, margins
-from synthesis.polynomial import BoxCertificate, BoxLyapunov, PolynomialMatrix, PolynomialStateSpace
+from synthesis.polynomial import BoxCertificate, BoxLyapunov, PolynomialMatrix
 from synthesis.verdict import Seconds, Status, Trajectory, Verdict
 
 __all__ = [
@@ -43,7 +43,6 @@ __all__ = [
     "MemoryLyapunov",
     "Multiplier",
     "PolynomialMatrix",
-    "PolynomialStateSpace",
     "Relaxation",
     "Search",
     "Seconds",

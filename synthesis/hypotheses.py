@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from symheli.lpv import LPVStateSpace
+from symheli.lpv.bases.function_space import tensor_grid
 
 Array = np.ndarray
 
@@ -28,8 +29,9 @@ def fitted(model: object) -> tuple[str, ...]:
     """
     if not isinstance(model, LPVStateSpace) or model.residuals is None:
         return ()
-    s = model.scheduling
-    matrices = model.matrices(np.linspace(s.low, s.high, 41))
+    count = {1: 41, 2: 13}.get(len(model.parameters), 5)
+    axes = [np.linspace(s.low, s.high, count) for s in model.parameters]
+    matrices = model.matrices(axes[0] if len(axes) == 1 else tensor_grid(axes))
     worst, place = 0.0, ""
     for name, own, residual in zip("ABCD", matrices, model.residuals.matrices, strict=True):
         if not residual.size:

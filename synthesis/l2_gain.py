@@ -19,7 +19,7 @@ from synthesis.frozen import FrozenGain, frozen_gain, least_damped
 from synthesis.hypotheses import VERIFIED, fitted
 from synthesis.lower_bound import THOROUGH, Search, growing_trajectory, lower_bound
 from synthesis.lyapunov import Lyapunov
-from synthesis.polynomial import BoxCertificate, PolynomialStateSpace
+from synthesis.polynomial import BoxCertificate
 from synthesis.polynomial.analysis import Model, box_certificate
 from synthesis.proof_search import Result, prove, prove_gain
 from synthesis.rates import Rate, rates
@@ -40,7 +40,7 @@ def l2_gain(
 ) -> Certificate: ...
 @overload
 def l2_gain(
-    lpv: PolynomialStateSpace | LFT,
+    lpv: LPVStateSpace | LFT,
     rate: Rate = None,
     *,
     relaxation: Relaxation | None = None,
@@ -65,12 +65,12 @@ def l2_gain(
     bound). Raises `InputError`, `SolverError`; a failed solve is a certificate with gamma = inf and
     its reason in `status`.
 
-    A model in several parameters (`PolynomialStateSpace`, LFT; `rate` one for all, one each or by
+    A model in several parameters (LFTs too; `rate` one for all, one each or by
     name), or a relaxation other than plain Bernstein coefficients, gives a `BoxCertificate`, which
     answers the same questions.
     """
     relaxation, solver = relaxation or Relaxation(), _solver(solver)
-    if not isinstance(lpv, LPVStateSpace) or relaxation.needs_box:
+    if not isinstance(lpv, LPVStateSpace) or len(lpv.parameters) > 1 or relaxation.needs_box:
         return box_certificate(lpv, rate, "l2 gain", relaxation, solver, search)
     rate = _check(lpv, rate, relaxation, with_gain=True)
     start = time.perf_counter()
@@ -133,7 +133,7 @@ def stability(
 ) -> Certificate: ...
 @overload
 def stability(
-    lpv: PolynomialStateSpace | LFT,
+    lpv: LPVStateSpace | LFT,
     rate: Rate = None,
     *,
     relaxation: Relaxation | None = None,
@@ -155,7 +155,7 @@ def stability(
     NaN. Where no proof is found, `search` looks for a trajectory along which the state grows.
     """
     relaxation, solver = relaxation or Relaxation(), _solver(solver)
-    if not isinstance(lpv, LPVStateSpace) or relaxation.needs_box:
+    if not isinstance(lpv, LPVStateSpace) or len(lpv.parameters) > 1 or relaxation.needs_box:
         return box_certificate(lpv, rate, "stability", relaxation, solver, search)
     rate = _check(lpv, rate, relaxation, with_gain=False)
     margin, p = least_damped(lpv)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
+from symheli.lpv import Basis, LPVStateSpace, Piece
 from synthesis.bernstein import restriction
 
 Array = np.ndarray
@@ -53,10 +53,18 @@ def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
     The coefficients are doubles: an exact proof is about the model they define, which is the given
     one to rounding.
     """
-    low, high = lpv.scheduling.low, lpv.scheduling.high
+    s = lpv.scheduling
+    return tuple(
+        ModelPiece(a, b, *(_coefficients(M, functions) for M in (lpv.A, lpv.B, lpv.C, lpv.D)))
+        for a, b, functions in function_pieces(lpv.basis, s.low, s.high)  # type: ignore[arg-type]
+    )
+
+
+def function_pieces(basis: Basis, low: float, high: float) -> tuple[Piece, ...]:
+    """The pieces of the functions of a basis between `low` and `high`."""
     slack = 1e-9 * (high - low)
     out = []
-    for piece in lpv.basis.pieces():
+    for piece in basis.pieces():
         a, b = max(piece.low, low), min(piece.high, high)
         a, b = (low if abs(a - low) <= slack else a), (high if abs(b - high) <= slack else b)
         if b - a <= slack:
@@ -70,9 +78,7 @@ def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
                     functions.shape[1] - 1, (a - piece.low) / width, (b - piece.low) / width
                 ).T
             )
-        out.append(
-            ModelPiece(a, b, *(_coefficients(M, functions) for M in (lpv.A, lpv.B, lpv.C, lpv.D)))
-        )
+        out.append(Piece(a, b, functions))
     return tuple(out)
 
 

@@ -23,12 +23,12 @@ def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
     names = [s.name for s in parameters]
     found: list[Any]
     if rate is None:
-        found = [s.rate for s in parameters]
+        found = [s.limit for s in parameters]
     elif isinstance(rate, Mapping):
         for name in rate:
             if name not in names:
                 raise UnknownNameError("scheduling parameter", name, names)
-        found = [rate.get(s.name, s.rate) for s in parameters]
+        found = [rate[s.name] if s.name in rate else s.limit for s in parameters]
     else:
         found = (
             list(rate)

@@ -156,16 +156,17 @@ class LPVARXModel:
         exceed na; with na = nb = delay = 1 the states are the outputs. "direct" (for coefficients
         at "now"): past outputs and inputs as the state, not minimal. None chooses the right one,
         the wrong one raises `InputError`. The offsets c(p) and d(p) are left out: the model
-        describes deviations from the moving trim. The range of p is that of the basis, its rate
-        unlimited: `.with_rate(...)`, `.with_scheduling(...)` say more. An `LPVStateSpace` has one
-        scheduling parameter: with several `InputError` is raised.
+        describes deviations from the moving trim. The ranges of the parameters are those of the
+        basis, their rates unlimited: `.with_rate(...)`, `.with_scheduling(...)` say more.
         """
-        basis, p = realization.one_parameter(self.structure.basis), self.parameters[0]
         build = {"shifted": realization.shifted, "direct": realization.direct}[
             realization.route_for(self.structure, route)
         ]
-        scheduling = Scheduling(str(p), p.unit, basis.low, basis.high)
-        return build(self.coefficients, scheduling, self.outputs, self.inputs, self.dt)
+        parameters = tuple(
+            Scheduling(str(p), p.unit, low, high)
+            for p, (low, high) in zip(self.parameters, self.structure.basis.ranges, strict=True)
+        )
+        return build(self.coefficients, parameters, self.outputs, self.inputs, self.dt)
 
     def reduce(
         self, order: int, *, input_scale: object = 1.0, output_scale: object = 1.0

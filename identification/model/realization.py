@@ -9,15 +9,8 @@ import numpy as np
 from identification.model.coefficients import Coefficients
 from identification.structure.lpvarx import LPVARX
 from symheli.errors import InputError
-from symheli.lpv import (
-    Basis,
-    FunctionSpace,
-    LinearModel,
-    LPVStateSpace,
-    Matrices,
-    Polynomial,
-    Scheduling,
-)
+from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Matrices, Product, Scheduling
+from symheli.lpv.bases.polynomials import interpolation_points, polynomials
 from symheli.values import Signal
 from symheli.values.arrays import Array, frozen
 
@@ -38,21 +31,9 @@ def route_for(arx: LPVARX, route: str | None) -> str:
     )
 
 
-def one_parameter(basis: FunctionSpace) -> Basis:
-    """The basis itself; raises `InputError` where there are several parameters: an `LPVStateSpace`
-    has one.
-    """
-    if isinstance(basis, Basis):
-        return basis
-    raise InputError(
-        f"a state-space model has one scheduling parameter, this one has {basis.dimension};"
-        " predict, simulate and at(p) take them all"
-    )
-
-
 def shifted(
     coefficients: Coefficients,
-    scheduling: Scheduling,
+    parameters: tuple[Scheduling, ...],
     outputs: tuple[Signal, ...],
     inputs: tuple[Signal, ...],
     dt: float,
@@ -67,10 +48,10 @@ def shifted(
     With feedthrough A_i B_0 is a product of two functions of p: it needs a polynomial basis, whose
     degree doubles.
     """
-    basis, model = one_parameter(coefficients.basis), coefficients
+    basis, model = coefficients.basis, coefficients
     if coefficients.input_lags[:1] == (0,) and coefficients.A.size:
         basis, model = _doubled(coefficients)
-    one = _constant(basis)
+    one = basis.constant()
     stack = [_observer(model, j, c) for j, c in enumerate(one)]
     if basis is not coefficients.basis:
         stack = _with_feedthrough(coefficients, basis, stack)
@@ -81,7 +62,7 @@ def shifted(
         B,
         C,
         D,
-        scheduling,
+        parameters,
         _state_names(outputs, A.shape[1] // len(outputs)),
         inputs,
         outputs,
@@ -91,7 +72,7 @@ def shifted(
 
 def direct(
     coefficients: Coefficients,
-    scheduling: Scheduling,
+    parameters: tuple[Scheduling, ...],
     outputs: tuple[Signal, ...],
     inputs: tuple[Signal, ...],
     dt: float,
@@ -101,10 +82,10 @@ def direct(
 
     x(k) = [y(k-1) .. y(k-na), u(k-1) .. u(k-L)], L the largest input lag.
     """
-    basis, lags = one_parameter(coefficients.basis), coefficients.input_lags
+    basis, lags = coefficients.basis, coefficients.input_lags
     na, n, ny, nu = *coefficients.A.shape[:3], len(inputs)
     L = max(lags, default=0)
-    one, nx = _constant(basis), na * ny + L * nu
+    one, nx = basis.constant(), na * ny + L * nu
     A, B = np.zeros((n, nx, nx)), np.zeros((n, nx, nu))
     C, D = np.zeros((n, ny, nx)), np.zeros((n, ny, nu))
     for i in range(na):
@@ -123,7 +104,7 @@ def direct(
     states = [_lagged(s, i) for i in range(1, na + 1) for s in outputs] + [
         _lagged(s, i) for i in range(1, L + 1) for s in inputs
     ]
-    return LPVStateSpace(basis, A, B, C, D, scheduling, tuple(states), inputs, outputs, dt)
+    return LPVStateSpace(basis, A, B, C, D, parameters, tuple(states), inputs, outputs, dt)
 
 
 def one_value(p: object, basis: FunctionSpace) -> Array:
@@ -190,37 +171,40 @@ def _observer(coefficients: Coefficients, j: int, one: float) -> Matrices:
     return bare._replace(D=coefficients.B[0, j]) if lags[:1] == (0,) else bare
 
 
-def _doubled(coefficients: Coefficients) -> tuple[Polynomial, Coefficients]:
-    """The same coefficients in a polynomial basis of twice the degree."""
-    old = coefficients.basis
-    if not isinstance(old, Polynomial):
+def _doubled(coefficients: Coefficients) -> tuple[FunctionSpace, Coefficients]:
+    """The same coefficients in polynomials of twice the degrees."""
+    old, c = coefficients.basis, coefficients
+    if old.degrees is None:
         raise InputError(
             "feedthrough (delay=0) with past outputs needs a polynomial basis to be realized, got"
             f" {type(old).__name__}"
         )
-    new = Polynomial(2 * old.degree, old.low, old.high)
-    extra = (
-        new.size - old.size
-    )  # the Legendre functions of the smaller basis are the first ones of the larger
+    new = polynomials([2 * d for d in old.degrees], old.ranges)
+    # the Legendre functions of the smaller basis are among those of the larger
+    place = [_functions(new).index(f) for f in _functions(old)]
 
     def padded(values: Array, axis: int) -> Array:
-        return np.pad(values, [(0, extra if a == axis else 0) for a in range(values.ndim)])
+        out = np.zeros((*values.shape[:axis], new.size, *values.shape[axis + 1 :]))
+        out[(slice(None),) * axis + (place,)] = values
+        return out
 
-    c = coefficients
     return new, Coefficients(
         new, c.input_lags, padded(c.A, 1), padded(c.B, 1), padded(c.c, 0), padded(c.d, 0)
     )
 
 
+def _functions(basis: FunctionSpace) -> list[tuple[int, ...]]:
+    """Degree of every function in every parameter."""
+    return list(basis.indices) if isinstance(basis, Product) else [(i,) for i in range(basis.size)]
+
+
 def _with_feedthrough(
-    coefficients: Coefficients, basis: Basis, stack: list[Matrices]
+    coefficients: Coefficients, basis: FunctionSpace, stack: list[Matrices]
 ) -> list[Matrices]:
     """Adds -A_i(p) B_0(p), interpolated exactly at as many nodes as the larger basis has
     functions.
     """
-    nodes = 0.5 * (basis.low + basis.high) - 0.5 * (basis.high - basis.low) * np.cos(
-        np.pi * (np.arange(basis.size) + 0.5) / basis.size
-    )
+    nodes = interpolation_points(basis.degrees or (), basis.ranges)
     A, B, _, _ = coefficients.at(nodes)
     products = basis.fit(nodes, -np.einsum("kiyz,kzu->kiyu", A, B[:, 0]))
     out = []
@@ -229,15 +213,6 @@ def _with_feedthrough(
         G[: A.shape[1] * A.shape[2]] += product.reshape(-1, B.shape[-1])
         out.append(matrices._replace(B=G))
     return out
-
-
-def _constant(basis: Basis) -> Array:
-    """Coefficients (n,) of the function 1."""
-    if isinstance(basis, Polynomial):
-        return np.eye(basis.size)[0]
-    return basis.fit(
-        np.linspace(basis.low, basis.high, 8 * basis.size + 1), np.ones(8 * basis.size + 1)
-    )
 
 
 def _chain(start: int, lags: int, width: int) -> list[tuple[int, int]]:

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.bases import Basis, PiecewiseLinear, Polynomial, Spline
-from symheli.lpv.equilibration import is_singular
+from symheli.errors import InputError
+from symheli.lpv.interpolation import Kind, interpolated
 from symheli.lpv.linear_model import LinearModel
-from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
-from symheli.lpv.scheduling import Scheduling
-from symheli.lpv.trim_schedule import TrimSchedule
+from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
-from symheli.values.signal import Signal, indices, signals
+from symheli.values.signal import Signal, signals
 
-Kind = Literal["polynomial", "spline", "linear"]
+AIRSPEED = Signal("airspeed", "m/s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,82 +141,24 @@ class LinearFamily:
         """Remove these states by setting their derivatives to zero (quasi-steady), continuous time
         only.
         """
-        if self.dt is not None:
-            raise InputError("residualize continuous models, then discretize")
-        gone = indices(states, self.states, "state")
-        kept = [i for i in range(len(self.states)) if i not in gone]
-        rows = [i for i, y in enumerate(self.outputs) if y not in states]
-
-        def reduce(model: LinearModel) -> LinearModel:
-            A, B, C, D = model.A, model.B, model.C[rows], model.D[rows]
-            ss = A[np.ix_(gone, gone)]
-            if is_singular(ss):
-                raise InputError(
-                    f"cannot residualize {', '.join(states)}: they do not settle (singular"
-                    " dynamics)"
-                )
-            X, U = np.linalg.solve(ss, A[np.ix_(gone, kept)]), np.linalg.solve(ss, B[gone])
-            return replace(
-                model,
-                A=A[np.ix_(kept, kept)] - A[np.ix_(kept, gone)] @ X,
-                B=B[kept] - A[np.ix_(kept, gone)] @ U,
-                C=C[:, kept] - C[:, gone] @ X,
-                D=D - C[:, gone] @ U,
-                states=tuple(self.states[i] for i in kept),
-                outputs=tuple(self.outputs[i] for i in rows),
-            )
-
-        return self._map(reduce)
+        return self._map(lambda model: model.residualize(states))
 
     def discretize(self, dt: float) -> LinearFamily:
         """Zero-order-hold equivalent of each model at sample period `dt` (s)."""
         return self._map(lambda model: model.discretize(dt))
 
     def interpolate(
-        self, kind: Kind = "polynomial", degree: int = 3, *, rate: float = math.inf
+        self, kind: Kind = "polynomial", degree: int = 3, *, rate: Rates | None = None
     ) -> LPVStateSpace:
         """Element-wise interpolation of every entry of A, B, C, D over airspeed.
 
         "polynomial": least-squares fit of `degree`; "spline": cubic through the nodes; "linear":
         straight lines. `.residuals` of the result are fit minus node values. The trim schedule is
         always the cubic spline (linear below four nodes), none without trims: its slope is the
-        drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2.
+        drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2 (None: as fast as it likes).
         """
-        low, high = float(self.airspeeds[0]), float(self.airspeeds[-1])
-        if len(self) < 2:
-            raise InputError("interpolation needs at least two airspeeds")
-        nodes = tuple(float(p) for p in self.airspeeds)
-        basis: Basis
-        if kind == "polynomial":
-            basis = Polynomial(degree, low, high)
-        elif kind == "spline":
-            basis = Spline(nodes)
-        elif kind == "linear":
-            basis = PiecewiseLinear(nodes)
-        else:
-            raise UnknownNameError("interpolation kind", kind, ("polynomial", "spline", "linear"))
-        exact = Matrices(self.A, self.B, self.C, self.D)
-        fitted = Matrices(*(basis.fit(self.airspeeds, M) for M in exact))
-        model = LPVStateSpace(
-            basis,
-            *fitted,
-            Scheduling("airspeed", "m/s", low, high, rate),
-            self.states,
-            self.inputs,
-            self.outputs,
-            dt=self.dt,
-            trim=self._schedule(nodes),
-        )
-        return model.with_residuals(self.airspeeds, exact)
-
-    def _schedule(self, nodes: tuple[float, ...]) -> TrimSchedule | None:
-        if not self.trims:
-            return None
-        x0 = np.array([[trim.x[s] for s in self.states] for trim in self.trims])
-        u0 = np.array(
-            [[trim.u[i] if i in trim.u else 0.0 for i in self.inputs] for trim in self.trims]
-        )
-        return TrimSchedule(Spline(nodes) if len(self) >= 4 else PiecewiseLinear(nodes), x0, u0)
+        models = [self[k] for k in range(len(self))]
+        return interpolated(models, (AIRSPEED,), (self.airspeeds,), kind, degree, rate)
 
     def _map(self, change) -> LinearFamily:
         return LinearFamily.from_models(

@@ -1,14 +1,19 @@
-"""Linear models over airspeed and one more quantity."""
+"""Linear models over airspeed and other quantities."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.linear_family import LinearFamily
+from symheli.lpv.interpolation import Kind, interpolated
+from symheli.lpv.linear_family import AIRSPEED, LinearFamily
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.signal import Signal
@@ -16,95 +21,186 @@ from symheli.values.signal import Signal
 
 @dataclass(frozen=True, eq=False)
 class LinearGrid:
-    """Models at n1 airspeeds (m/s) and n2 `values` of `axis` (a `Signal` with its unit), both
-    increasing.
+    """Linear models at every combination of the `values` (n1, n2, ...) of d `axes`.
 
-    families: one `LinearFamily` over the same airspeeds a value. A is (n1, n2, nx, nx), B (n1, n2,
-    nx, nu), C and D alike.
+    Parameters
+    ----------
+    axes : sequence of Signal
+        What varies, with units; the first is usually the airspeed.
+    values : sequence of array_like
+        Increasing values of each axis, in its unit.
+    models : sequence of LinearModel
+        n1 n2 ... models with equal names and sample period, the last axis running fastest; with
+        their operating points or without.
+
+    Raises
+    ------
+    InputError
+        Wrong numbers of values or models, values that do not increase, models that differ in names.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> grid = symheli.sweep_grid(heli, [4.0, 6.0], acceleration=[-2.0, 0.0, 2.0])
+    >>> grid.A.shape
+    (2, 3, 10, 10)
+    >>> lpv = grid.interpolate(degree=1)
+    >>> [(s.name, s.rate) for s in lpv.parameters]
+    [('airspeed', 'acceleration'), ('acceleration', inf)]
     """
 
-    axis: Signal
-    values: Array
-    families: tuple[LinearFamily, ...]
+    axes: tuple[Signal, ...]
+    values: tuple[Array, ...]
+    models: tuple[LinearModel, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "values", frozen(self.values, str(self.axis), (len(self.families),))
-        )
-        if len(self.values) == 0 or np.any(np.diff(self.values) <= 0):
-            raise InputError(f"{self.axis}: expected increasing values, got {self.values.tolist()}")
-        first = self.families[0]
-        for family in self.families:
-            same = (family.states, family.inputs, family.outputs) == (
+        axes = tuple(a if isinstance(a, Signal) else Signal(a) for a in self.axes)
+        object.__setattr__(self, "axes", axes)
+        if len(self.values) != len(axes) or len(set(axes)) < len(axes):
+            raise InputError(
+                f"expected values for each of different axes, got {len(self.values)} sets for"
+                f" {', '.join(axes)}"
+            )
+        values = tuple(frozen(v, str(a), (None,)) for a, v in zip(axes, self.values, strict=True))
+        object.__setattr__(self, "values", values)
+        for axis, nodes in zip(axes, values, strict=True):
+            if not len(nodes) or np.any(np.diff(nodes) <= 0):
+                raise InputError(f"{axis}: expected increasing values, got {nodes.tolist()}")
+        object.__setattr__(self, "models", tuple(self.models))
+        if len(self.models) != math.prod(self.shape):
+            raise InputError(
+                f"expected {math.prod(self.shape)} models, one a combination of the values, got"
+                f" {len(self.models)}"
+            )
+        first = self.models[0]
+        for model in self.models:
+            if (model.states, model.inputs, model.outputs, model.dt) != (
                 first.states,
                 first.inputs,
                 first.outputs,
-            )
-            if not same or not np.array_equal(family.airspeeds, first.airspeeds):
-                raise InputError("a grid needs families with equal names at equal airspeeds")
+                first.dt,
+            ):
+                raise InputError("a grid needs models with equal names and sample period")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis."""
+        return tuple(len(nodes) for nodes in self.values)
 
     @property
     def airspeeds(self) -> Array:
-        """First axis (n1,), m/s."""
-        return self.families[0].airspeeds
+        """Values of the airspeed, m/s; raises `UnknownNameError` where it is no axis."""
+        return self.values[self._axis(AIRSPEED)]
 
     @property
     def states(self) -> tuple[Signal, ...]:
         """States with units."""
-        return self.families[0].states
+        return self.models[0].states
 
     @property
     def inputs(self) -> tuple[Signal, ...]:
         """Inputs with units."""
-        return self.families[0].inputs
+        return self.models[0].inputs
 
     @property
     def outputs(self) -> tuple[Signal, ...]:
         """Outputs with units."""
-        return self.families[0].outputs
+        return self.models[0].outputs
 
     @property
     def A(self) -> Array:
-        """(n1, n2, nx, nx)."""
-        return np.stack([family.A for family in self.families], axis=1)
+        """(n1, n2, ..., nx, nx)."""
+        return self._stacked("A")
 
     @property
     def B(self) -> Array:
-        """(n1, n2, nx, nu)."""
-        return np.stack([family.B for family in self.families], axis=1)
+        """(n1, n2, ..., nx, nu)."""
+        return self._stacked("B")
 
     @property
     def C(self) -> Array:
-        """(n1, n2, ny, nx)."""
-        return np.stack([family.C for family in self.families], axis=1)
+        """(n1, n2, ..., ny, nx)."""
+        return self._stacked("C")
 
     @property
     def D(self) -> Array:
-        """(n1, n2, ny, nu)."""
-        return np.stack([family.D for family in self.families], axis=1)
+        """(n1, n2, ..., ny, nu)."""
+        return self._stacked("D")
 
-    @property
-    def trims(self) -> tuple[tuple[OperatingPoint, ...], ...]:
-        """Operating points, n1 rows of n2."""
-        return tuple(zip(*(family.trims for family in self.families), strict=True))
+    def at(self, *index: int) -> LinearModel:
+        """The model at these positions along the axes."""
+        return self.models[int(np.ravel_multi_index(index, self.shape))]
 
-    def at(self, i: int, j: int) -> LinearModel:
-        """The model at airspeed i and value j."""
-        return self.families[j][i]
+    def trim(self, *index: int) -> OperatingPoint | None:
+        """Its operating point, None where none is known."""
+        return self.at(*index).point
 
-    def family(self, **value: float) -> LinearFamily:
-        """The models over airspeed at one value of the axis, as in family(mass=8.2); it must be on
-        the grid.
+    def family(self, **fixed: float) -> LinearFamily:
+        """The models over airspeed at one value of every other axis, as in family(mass=8.2); it
+        must be on the grid.
         """
-        if list(value) != [str(self.axis)]:
-            raise UnknownNameError("axis", ", ".join(value) or "(none)", [str(self.axis)])
-        wanted = value[str(self.axis)]
-        miss = np.abs(self.values - wanted)
-        if not miss.min() <= 1e-9 * max(
-            abs(wanted), np.ptp(self.values)
-        ):  # the same number, rounded otherwise
+        others = [a for a in self.axes if a != AIRSPEED]
+        if set(fixed) != set(map(str, others)):
+            raise UnknownNameError("axes", ", ".join(fixed) or "(none)", [", ".join(others)])
+        index: list[int | slice] = [slice(None)] * len(self.axes)
+        for name, value in fixed.items():
+            index[self._axis(name)] = self._position(name, value)
+        chosen = np.arange(len(self.models)).reshape(self.shape)[tuple(index)]
+        return LinearFamily.from_models(self.airspeeds, [self.models[k] for k in chosen])
+
+    def select(
+        self,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> LinearGrid:
+        """Keep these states (rows and columns of the others are deleted), inputs and outputs."""
+        return self._map(lambda model: model.select(states, inputs, outputs))
+
+    def residualize(self, states: Sequence[str]) -> LinearGrid:
+        """Remove these states by setting their derivatives to zero, continuous time only."""
+        return self._map(lambda model: model.residualize(states))
+
+    def discretize(self, dt: float) -> LinearGrid:
+        """Zero-order-hold equivalent of each model at sample period `dt` (s)."""
+        return self._map(lambda model: model.discretize(dt))
+
+    def interpolate(
+        self,
+        kind: Kind = "polynomial",
+        degree: int | Sequence[int] = 3,
+        *,
+        rate: Rates | None = None,
+    ) -> LPVStateSpace:
+        """Element-wise interpolation of every entry over all axes.
+
+        As `LinearFamily.interpolate`, with products of its functions; `degree` one for all axes or
+        one each. `rate`: one for all axes, one each or {axis: rate}, in the unit of the axis per
+        second, or the name of the axis that is the rate; None: as fast as they like, but an
+        airspeed beside an acceleration changes as that says.
+        """
+        return interpolated(self.models, self.axes, self.values, kind, degree, rate)
+
+    def _stacked(self, name: str) -> Array:
+        every = np.stack([getattr(model, name) for model in self.models])
+        return every.reshape(*self.shape, *every.shape[1:])
+
+    def _axis(self, name: str) -> int:
+        if name not in self.axes:
+            raise UnknownNameError("axis", name, list(map(str, self.axes)))
+        return self.axes.index(Signal(name))
+
+    def _position(self, name: str, wanted: float) -> int:
+        axis = self._axis(name)
+        nodes, unit = self.values[axis], self.axes[axis].unit
+        miss = np.abs(nodes - wanted)
+        # the same number, rounded otherwise
+        if not miss.min() <= 1e-9 * max(abs(wanted), np.ptp(nodes)):
             raise InputError(
-                f"{self.axis} = {wanted} {self.axis.unit} is not on the grid:"
-                f" {', '.join(f'{v:g}' for v in self.values)}"
+                f"{name} = {wanted} {unit} is not on the grid: {', '.join(f'{v:g}' for v in nodes)}"
             )
-        return self.families[int(miss.argmin())]
+        return int(miss.argmin())
+
+    def _map(self, change: Callable[[LinearModel], LinearModel]) -> LinearGrid:
+        return replace(self, models=tuple(change(model) for model in self.models))

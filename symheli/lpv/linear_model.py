@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from scipy.signal import cont2discrete
 
 from symheli.errors import InputError
-from symheli.lpv.equilibration import loop_inverse
+from symheli.lpv.equilibration import is_singular, loop_inverse
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.sample_period import same_period
@@ -80,6 +80,32 @@ class LinearModel:
             states=tuple(self.states[i] for i in ix),
             inputs=tuple(self.inputs[i] for i in iu),
             outputs=tuple(self.outputs[i] for i in iy),
+        )
+
+    def residualize(self, states: Sequence[str]) -> LinearModel:
+        """Remove these states by setting their derivatives to zero (quasi-steady), continuous time
+        only.
+        """
+        if self.dt is not None:
+            raise InputError("residualize continuous models, then discretize")
+        gone = indices(states, self.states, "state")
+        kept = [i for i in range(len(self.states)) if i not in gone]
+        rows = [i for i, y in enumerate(self.outputs) if y not in states]
+        A, B, C, D = self.A, self.B, self.C[rows], self.D[rows]
+        ss = A[np.ix_(gone, gone)]
+        if is_singular(ss):
+            raise InputError(
+                f"cannot residualize {', '.join(states)}: they do not settle (singular dynamics)"
+            )
+        X, U = np.linalg.solve(ss, A[np.ix_(gone, kept)]), np.linalg.solve(ss, B[gone])
+        return replace(
+            self,
+            A=A[np.ix_(kept, kept)] - A[np.ix_(kept, gone)] @ X,
+            B=B[kept] - A[np.ix_(kept, gone)] @ U,
+            C=C[:, kept] - C[:, gone] @ X,
+            D=D - C[:, gone] @ U,
+            states=tuple(self.states[i] for i in kept),
+            outputs=tuple(self.outputs[i] for i in rows),
         )
 
     def discretize(self, dt: float) -> LinearModel:

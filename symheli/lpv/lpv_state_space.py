@@ -1,4 +1,4 @@
-"""A linear parameter-varying model whose every entry is a function of the scheduling parameter."""
+"""A linear parameter-varying model: every entry a function of the scheduling parameters."""
 
 from __future__ import annotations
 
@@ -9,15 +9,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.bases import Basis, Polynomial
+from symheli.lpv.bases.function_space import FunctionSpace
+from symheli.lpv.bases.polynomials import coefficients_of, lobatto_points, polynomials
+from symheli.lpv.bases.restricted import Restricted
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
-from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.monomials import as_blocks
+from symheli.lpv.recentred import centre, recentred
+from symheli.lpv.scheduling import Rates, Scheduling, check_all, parameters, with_rates
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
 
 if TYPE_CHECKING:
     from symheli.lpv.lft import LFT
+    from symheli.lpv.prediction import Prediction
     from symheli.lpv.reduction import Reduction
 
 
@@ -31,8 +36,8 @@ class Matrices(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Fit minus what it was fitted to at `nodes` (K,): A (K, nx, nx), B (K, nx, nu), C (K, ny, nx),
-    D (K, ny, nu).
+    """Fit minus what it was fitted to at `nodes` (K,), (K, d) with d parameters: A (K, nx, nx),
+    B (K, nx, nu), C (K, ny, nx), D (K, ny, nu).
     """
 
     nodes: Array
@@ -49,21 +54,52 @@ class Residuals(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LPVStateSpace:
-    """dx/dt = A(p) x + B(p) u, y = C(p) x + D(p) u (dt None), or x(k+1) = A(p(k)) x(k) + ... (dt in
-    s).
+    """dx/dt = A(p) x + B(p) u, y = C(p) x + D(p) u, or sampled x(k+1) = A(p(k)) x(k) + ...
 
-    A (n, nx, nx), B (n, nx, nu), C (n, ny, nx), D (n, ny, nu) are coefficients: A(p) = sum_j f_j(p)
-    A_j with the n functions f_j of `basis`. x and u are deviations from the schedule `trim` where
-    there is one. `residuals`, where the model was fitted to a family or sampled: fit minus what it
-    was fitted to, at its nodes.
+    A(p) = sum_j f_j(p) A_j with the n functions f_j of `basis`, of one scheduling parameter p or of
+    several. With one, p may have any shape; with d, the last axis of p holds them.
+
+    Parameters
+    ----------
+    basis : FunctionSpace
+        The functions f_j, over a box that holds the ranges of the parameters.
+    A, B, C, D : array_like
+        Coefficients (n, nx, nx), (n, nx, nu), (n, ny, nx), (n, ny, nu).
+    parameters : Scheduling or sequence of Scheduling
+        Names, units, ranges and rate limits, in the order of the basis.
+    states, inputs, outputs : sequence of str
+        Names, with units where they are `Signal`s. States and inputs are deviations from `trim`
+        where there is one.
+    dt : float, optional
+        Sample period in s; None in continuous time.
+    trim : TrimSchedule, optional
+        x0(p), u0(p) about which the model holds.
+    residuals : Residuals, optional
+        Where the model was fitted or sampled: fit minus what it was fitted to, at its nodes.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, numbers that are not finite, ranges beyond the basis.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> p = symheli.Scheduling("p", "1", low=0.0, high=1.0, rate=0.5)
+    >>> A = [[[0, 1.0], [-2, -1]], [[0, 0], [-0.5, 0]]]
+    >>> B, C, D = [[[0], [1.0]]], [[[1.0, 0]]], [[[0.0]]]
+    >>> lpv = symheli.LPVStateSpace.polynomial(A, B, C, D, p)
+    >>> lpv.at(0.5).A
+    array([[ 0.  ,  1.  ],
+           [-2.25, -1.  ]])
     """
 
-    basis: Basis
+    basis: FunctionSpace
     A: Array
     B: Array
     C: Array
     D: Array
-    scheduling: Scheduling
+    parameters: tuple[Scheduling, ...]
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
@@ -72,6 +108,7 @@ class LPVStateSpace:
     residuals: Residuals | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", parameters(self.parameters))
         for group in ("states", "inputs", "outputs"):
             object.__setattr__(self, group, signals(getattr(self, group)))
         n, nx, nu, ny = self.basis.size, len(self.states), len(self.inputs), len(self.outputs)
@@ -82,87 +119,123 @@ class LPVStateSpace:
             ("D", (n, ny, nu)),
         ):
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
-        slack = 1e-9 * (self.scheduling.high - self.scheduling.low)
-        if (
-            self.basis.low > self.scheduling.low + slack
-            or self.basis.high < self.scheduling.high - slack
-        ):
+        if self.basis.dimension != len(self.parameters):
             raise InputError(
-                f"the basis covers [{self.basis.low}, {self.basis.high}] but scheduling"
-                f" {self.scheduling.name} ranges over [{self.scheduling.low},"
-                f" {self.scheduling.high}]"
+                f"the basis is one of {self.basis.dimension} parameter(s), the model has"
+                f" {len(self.parameters)}: {', '.join(s.name for s in self.parameters)}"
             )
+        for s, (low, high) in zip(self.parameters, self.basis.ranges, strict=True):
+            slack = 1e-9 * (s.high - s.low)
+            if low > s.low + slack or high < s.high - slack:
+                raise InputError(
+                    f"the basis covers [{low}, {high}] but scheduling {s.name} ranges over"
+                    f" [{s.low}, {s.high}]"
+                )
         if self.dt is not None and not self.dt > 0:
             raise InputError(f"dt must be a positive number of seconds or None, got {self.dt}")
 
     @classmethod
     def polynomial(
         cls,
-        A: Sequence[Any],
-        B: Sequence[Any],
-        C: Sequence[Any],
-        D: Sequence[Any],
-        scheduling: Scheduling,
+        A: Sequence[Any] | Mapping[Any, Any],
+        B: Sequence[Any] | Mapping[Any, Any],
+        C: Sequence[Any] | Mapping[Any, Any],
+        D: Sequence[Any] | Mapping[Any, Any],
+        scheduling: Scheduling | Sequence[Scheduling],
         dt: float | None = None,
         states: Sequence[str] | None = None,
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
     ) -> LPVStateSpace:
-        """From monomial coefficients: A(p) = A[0] + p A[1] + p^2 A[2] + ..., p in physical units.
+        """From monomial coefficients, p in physical units.
 
-        The lists may differ in length; each entry is a matrix. Names default to x1.., u1.., y1...
+        One parameter: lists, A(p) = A[0] + p A[1] + p^2 A[2] + ..., which may differ in length.
+        Several (or one): {exponents: matrix}, A={(0, 0): A0, (1, 0): A1, (0, 2): A2} is A0 + p1 A1
+        + p2^2 A2. Names default to x1.., u1.., y1... Raises `InputError` for shapes that do not
+        fit.
         """
-        shapes = {}
-        for name, matrices in (("A", A), ("B", B), ("C", C), ("D", D)):
-            if not len(matrices):
-                raise InputError(
-                    f"{name}: expected a list of at least one coefficient matrix [{name}0, {name}1,"
-                    " ...]"
-                )
-            stack = [frozen(m, f"{name}[{i}]", (None, None)) for i, m in enumerate(matrices)]
-            if len({m.shape for m in stack}) > 1:
-                raise InputError(
-                    f"{name}: coefficient matrices differ in shape:"
-                    f" {', '.join(str(m.shape) for m in stack)}"
-                )
-            shapes[name] = np.stack(stack)
-        basis = Polynomial(
-            max(len(m) for m in shapes.values()) - 1, scheduling.low, scheduling.high
-        )
-        nx, nu, ny = shapes["A"].shape[1], shapes["B"].shape[2], shapes["C"].shape[1]
+        given = parameters(scheduling)
+        matrices = [
+            _by_exponents(name, M, len(given)) for name, M in zip("ABCD", (A, B, C, D), strict=True)
+        ]
+        whole, nx = as_blocks(*matrices, count=len(given))
+        ranges = [(s.low, s.high) for s in given]
+        scaled = recentred(whole, [centre(*bounds) for bounds in ranges])
+        scaled.setdefault((0,) * len(given), np.zeros_like(next(iter(whole.values()))))
+        basis, M = coefficients_of(scaled, ranges)
         return cls(
             basis,
-            basis.from_monomial(shapes["A"]),
-            basis.from_monomial(shapes["B"]),
-            basis.from_monomial(shapes["C"]),
-            basis.from_monomial(shapes["D"]),
-            scheduling,
-            states=signals(states or [f"x{i + 1}" for i in range(nx)]),
-            inputs=signals(inputs or [f"u{i + 1}" for i in range(nu)]),
-            outputs=signals(outputs or [f"y{i + 1}" for i in range(ny)]),
-            dt=dt,
+            M[:, :nx, :nx],
+            M[:, :nx, nx:],
+            M[:, nx:, :nx],
+            M[:, nx:, nx:],
+            given,
+            signals(states or [f"x{i + 1}" for i in range(nx)]),
+            signals(inputs or [f"u{i + 1}" for i in range(M.shape[2] - nx)]),
+            signals(outputs or [f"y{i + 1}" for i in range(M.shape[1] - nx)]),
+            dt,
         )
+
+    @property
+    def scheduling(self) -> Scheduling:
+        """The scheduling parameter; raises `InputError` where there are several."""
+        if len(self.parameters) > 1:
+            raise InputError(
+                f"the model has {len(self.parameters)} scheduling parameters"
+                f" ({', '.join(s.name for s in self.parameters)}): use .parameters"
+            )
+        return next(iter(self.parameters))
+
+    @property
+    def box(self) -> tuple[tuple[float, float], ...]:
+        """(low, high) of each parameter."""
+        return tuple((s.low, s.high) for s in self.parameters)
 
     def matrices(self, p: object) -> Matrices:
-        """A, B, C, D at p; an axis of p comes first. Raises `InputError` outside the scheduling
-        range.
+        """A, B, C, D at p; the axes of p come first, that of several parameters left out. Raises
+        `InputError` outside the ranges.
         """
-        f = self.basis(self.scheduling.check(p))
+        f = self.basis(check_all(self.parameters, p))
         return Matrices(*(np.tensordot(f, M, axes=1) for M in (self.A, self.B, self.C, self.D)))
 
-    def at(self, p: float) -> LinearModel:
-        """The model frozen at p."""
-        return LinearModel(
-            *self.matrices(float(p)), self.states, self.inputs, self.outputs, dt=self.dt
+    def at(self, *p: float) -> LinearModel:
+        """The model frozen at p, one value a parameter."""
+        if len(p) != len(self.parameters):
+            raise InputError(
+                f"at: expected {len(self.parameters)} value(s), one for each of"
+                f" {', '.join(s.name for s in self.parameters)}, got {len(p)}"
+            )
+        point = np.array([float(v) for v in p])
+        frozen_at = self.matrices(point if len(p) > 1 else point[0])
+        return LinearModel(*frozen_at, self.states, self.inputs, self.outputs, dt=self.dt)
+
+    def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> LPVStateSpace:
+        """The same model over narrower ranges or with other rate limits."""
+        return replace(self, parameters=parameters(scheduling))
+
+    def with_rate(self, rate: Rates) -> LPVStateSpace:
+        """The same model with |dp/dt| <= rate: one for all parameters, one each or by name; the
+        name of a parameter says that it is the rate.
+        """
+        return replace(self, parameters=with_rates(self.parameters, rate))
+
+    def along(self, start: Sequence[float], end: Sequence[float]) -> LPVStateSpace:
+        """The model on the straight line from `start` (s = -1) to `end` (s = 1), one parameter s.
+
+        Its rate, per second, is the largest at which no parameter exceeds its own; `InputError`
+        where that of one is another parameter.
+        """
+        first, last = (check_all(self.parameters, np.reshape(p, -1)) for p in (start, end))
+        half = 0.5 * np.abs(last - first)
+        rate = min(s.limit / h for s, h in zip(self.parameters, half, strict=True) if h > 0)
+        line = Restricted(self.basis, tuple(first.tolist()), tuple(last.tolist()))
+        return replace(
+            self,
+            basis=line,
+            parameters=(Scheduling("line", "1", -1.0, 1.0, rate),),
+            trim=None,
+            residuals=None,
         )
-
-    def with_scheduling(self, scheduling: Scheduling) -> LPVStateSpace:
-        """The same model over a narrower range or with another rate limit."""
-        return replace(self, scheduling=scheduling)
-
-    def with_rate(self, rate: float) -> LPVStateSpace:
-        """The same model with |dp/dt| <= rate."""
-        return replace(self, scheduling=self.scheduling.with_rate(rate))
 
     def select(
         self,
@@ -214,32 +287,32 @@ class LPVStateSpace:
 
         return close(self, feedback_matrix(gains, self.inputs, self.outputs))
 
-    def discretize(self, dt: float, *, degree: int | None = None, nodes: int = 41) -> LPVStateSpace:
-        """Zero-order-hold equivalent at each of `nodes` frozen p, fitted element-wise by a
-        polynomial of `degree`.
+    def discretize(
+        self, dt: float, *, degree: int | Sequence[int] | None = None, nodes: int | None = None
+    ) -> LPVStateSpace:
+        """Zero-order-hold equivalent at frozen p, fitted element-wise by polynomials of `degree`.
 
-        `degree` defaults to that of the basis (needed where the basis is no polynomial). The misfit
-        at the nodes is in `.residuals`: the exponential of a polynomial is no polynomial. So is the
-        misfit to the sampled models of the family that this model was fitted to, at the nodes of
-        that.
+        `nodes` values of each parameter (None: 41 of one, 13 each of several). `degree`, one for
+        all parameters or one each, defaults to that of the basis (needed where the basis is no
+        polynomial). The misfit at the nodes is in `.residuals`: the exponential of a polynomial is
+        no polynomial. So is the misfit to the sampled models of the family that this model was
+        fitted to, at the nodes of that.
         """
         if self.dt is not None:
             raise InputError(f"the model is already discrete (dt = {self.dt} s)")
-        if degree is None:
-            if not isinstance(self.basis, Polynomial):
-                raise InputError("give `degree`: the discrete entries are fitted by polynomials")
-            degree = self.basis.degree
-        low, high = self.scheduling.low, self.scheduling.high
-        # Chebyshev-Lobatto nodes: the fit stays close to the best one between them too
-        p = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(nodes) / (nodes - 1))
+        count = len(self.parameters)
+        degrees = self.basis.degrees if degree is None else np.broadcast_to(degree, count).tolist()
+        if degrees is None:
+            raise InputError("give `degree`: the discrete entries are fitted by polynomials")
+        p = lobatto_points((41 if count == 1 else 13) if nodes is None else nodes, self.box)
         sampled = self._sampled(self.matrices(p), dt)
-        basis = Polynomial(degree, low, high)
+        basis = polynomials(degrees, self.box)
         fitted = Matrices(*(basis.fit(p, M) for M in sampled))
         model = replace(
             self, basis=basis, A=fitted.A, B=fitted.B, C=fitted.C, D=fitted.D, dt=dt, residuals=None
         )
         if (origin := self.fitted_to) is not None:
-            p = np.append(p, origin.nodes)
+            p = np.concatenate([p, origin.nodes])
             sampled = Matrices(
                 *map(np.concatenate, zip(sampled, self._sampled(origin.matrices, dt), strict=True))
             )
@@ -261,7 +334,7 @@ class LPVStateSpace:
         return Residuals(self.residuals.nodes, *exact)
 
     def with_residuals(self, nodes: Array, exact: Matrices) -> LPVStateSpace:
-        """The same model as a fit of `exact` (K, ...) at `nodes` (K,)."""
+        """The same model as a fit of `exact` (K, ...) at `nodes` (K,), or (K, d)."""
         off = (M - E for M, E in zip(self.matrices(nodes), exact, strict=True))
         return replace(self, residuals=Residuals(nodes, *off))
 
@@ -282,6 +355,40 @@ class LPVStateSpace:
 
         return reduce(self, order, nodes=nodes, input_scale=input_scale, output_scale=output_scale)
 
+    def simulate(
+        self,
+        p: object,
+        u: object,
+        x0: object | None = None,
+        *,
+        dt: float | None = None,
+        drift: object | None = None,
+    ) -> tuple[Array, Array]:
+        """States (n, nx) and outputs (n, ny) along p (n,) or (n, d); see `symheli.lpv.simulate`."""
+        from symheli.lpv.simulate import simulate
+
+        return simulate(self, p, u, x0, dt=dt, drift=drift)
+
+    def predict(
+        self,
+        p: object,
+        u: object,
+        x: object,
+        *,
+        dt: float | None = None,
+        rate: object | None = None,
+    ) -> Prediction:
+        """What the model says of a flight: any number of samples ahead, or in free run; see
+        `symheli.lpv.predict`.
+        """
+        from symheli.lpv.prediction import predict
+
+        return predict(self, p, u, x, dt=dt, rate=rate)
+
+    def to_control(self, *p: float) -> Any:
+        """A python-control `StateSpace` with the same names, p held: one value a parameter."""
+        return self.at(*p).to_control()
+
     def to_lft(self) -> LFT:
         """The equivalent linear fractional transformation (polynomial dependence only), not yet
         reduced.
@@ -289,3 +396,21 @@ class LPVStateSpace:
         from symheli.lpv.lft import LFT
 
         return LFT.from_polynomial(self)
+
+
+def _by_exponents(
+    name: str, matrices: Sequence[Any] | Mapping[Any, Any], count: int
+) -> Mapping[Any, Any]:
+    """{exponents: matrix}, also of a list [of p^0, p^1, ...] where there is one parameter."""
+    if isinstance(matrices, Mapping):
+        return matrices
+    if count > 1:
+        raise InputError(
+            f"{name}: expected {{exponents: matrix}}, such as {{{(0,) * count}: {name}0}}, with"
+            f" {count} parameters"
+        )
+    if not len(matrices):
+        raise InputError(
+            f"{name}: expected a list of at least one coefficient matrix [{name}0, {name}1, ...]"
+        )
+    return {(i,): M for i, M in enumerate(matrices)}

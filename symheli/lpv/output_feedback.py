@@ -5,12 +5,14 @@ inputs.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.bases import Basis, Polynomial
+from symheli.lpv.bases.function_space import tensor_grid
+from symheli.lpv.bases.polynomials import factors_of, polynomials
 from symheli.lpv.equilibration import loop_inverse
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.values.arrays import Array
@@ -42,8 +44,7 @@ def close(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
 
 
 def _closed(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
-    nodes = _nodes(lpv.basis, lpv.scheduling.low, lpv.scheduling.high)
-    values = lpv.matrices(nodes)
+    values = lpv.matrices(lpv.basis.samples(lpv.box))
     fed = np.any(K, axis=0)  # outputs that are fed back
     if not _is_constant(values.D[:, fed]):
         raise InputError(
@@ -62,8 +63,8 @@ def _closed(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
         closed = Matrices(
             lpv.A + values.B[0] @ back, lpv.B @ N, lpv.C + values.D[0] @ back, lpv.D @ N
         )
-    elif isinstance(lpv.basis, Polynomial):
-        return _product(lpv, lpv.basis, loop)
+    elif lpv.basis.degrees is not None:
+        return _product(lpv, lpv.basis.degrees, loop)
     else:
         raise InputError(
             "an output that is fed back depends on the scheduling, and so do the inputs: their"
@@ -73,25 +74,36 @@ def _closed(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
     return replace(lpv, A=closed.A, B=closed.B, C=closed.C, D=closed.D, trim=None, residuals=None)
 
 
-def _product(lpv: LPVStateSpace, basis: Polynomial, loop: _Loop) -> LPVStateSpace:
-    """A + B N K C and its like, of up to twice the degree: exact, by values at as many nodes as
+def _product(lpv: LPVStateSpace, degrees: tuple[int, ...], loop: _Loop) -> LPVStateSpace:
+    """A + B N K C and its like, of up to twice the degrees: exact, by values at as many points as
     there are coefficients.
     """
-    product = Polynomial(2 * basis.degree, basis.low, basis.high)
-    x, weights = np.polynomial.legendre.leggauss(product.size)
-    p = 0.5 * (basis.low + basis.high) + 0.5 * (basis.high - basis.low) * x
-    f = basis(p)
+    ranges = lpv.basis.ranges
+    double = polynomials([2 * d for d in degrees], ranges)
+    axes = [_gauss(f.size, *f.ranges[0]) for f in factors_of(double)]
+    points = axes[0][0] if len(axes) == 1 else tensor_grid([p for p, _ in axes])
+    weights = reduce(np.multiply.outer, [w for _, w in axes]).ravel()
+    f = lpv.basis(points)
     A, B, C, D = (np.tensordot(f, M, axes=1) for M in (lpv.A, lpv.B, lpv.C, lpv.D))
     LC = loop.L @ C
-    # the functions are orthonormal for the mean over the range, which Gauss's rule takes exactly
-    project = (product(p) * (0.5 * weights)[:, None]).T
+    # the functions are orthonormal for the mean over the box, which Gauss's rule takes exactly
+    project = (double(points) * weights[:, None]).T
     closed = [
         np.tensordot(project, M, axes=1) for M in (A + B @ LC, B @ loop.N, C + D @ LC, D @ loop.N)
     ]
-    size = 1 + max(int(np.flatnonzero(_matters(M)).max(initial=0)) for M in closed)
-    A, B, C, D = (M[:size] for M in closed)
-    basis = Polynomial(size - 1, basis.low, basis.high)
+    found = np.any([_matters(M) for M in closed], axis=0)
+    exponents = np.array(double.indices) if len(degrees) > 1 else np.arange(double.size)[:, None]  # type: ignore[union-attr]
+    kept = [int(d) for d in exponents[found].max(axis=0, initial=0)]
+    smaller = np.all(exponents <= kept, axis=1)
+    A, B, C, D = (M[smaller] for M in closed)
+    basis = polynomials(kept, ranges)
     return replace(lpv, basis=basis, A=A, B=B, C=C, D=D, trim=None, residuals=None)
+
+
+def _gauss(count: int, low: float, high: float) -> tuple[Array, Array]:
+    """Points of [low, high] and weights of Gauss's rule for the mean."""
+    x, weights = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (low + high) + 0.5 * (high - low) * x, 0.5 * weights
 
 
 def _matters(coefficients: Array) -> Array:
@@ -107,18 +119,3 @@ def _is_constant(values: Array) -> bool:
     return bool(
         np.all(np.ptp(values, axis=0) <= ROUNDING * np.abs(values).max(axis=0, initial=0.0))
     )
-
-
-def _nodes(basis: Basis, low: float, high: float) -> Array:
-    """Points in [low, high] at which functions of the basis that are constant there can be told
-    from those that are not.
-    """
-    try:
-        pieces = basis.pieces()
-    except InputError:  # functions brought along, which no finite number of points tells apart
-        return np.linspace(low, high, 4 * basis.size + 1)
-    edges = [
-        (max(piece.low, low), min(piece.high, high), piece.bernstein.shape[1] + 1)
-        for piece in pieces
-    ]
-    return np.concatenate([np.linspace(a, b, count) for a, b, count in edges if a < b])

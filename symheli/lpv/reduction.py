@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_are, solve_discrete_are
 
 from symheli.errors import InputError
+from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.nu_gap import angles, nu_gap
@@ -33,7 +34,8 @@ class Reduction(Generic[Model]):
     `singular_values` (nx,): importance of each balanced state, those beyond the order were left
     out. `nu_gap` (K,) in [0, 1] between reduced and full model. `error` (K,): largest gain of their
     difference over frequency by that of the full model, NaN where one of them is unstable. Both
-    with scaled channels, on a frequency grid. Nothing is promised for p that moves.
+    with scaled channels, on a frequency grid. With d scheduling parameters `p` is (K, d). Nothing
+    is promised for p that moves.
     """
 
     model: Model
@@ -88,26 +90,31 @@ def reduce(
     size = np.sqrt(values[:order])
     left, right = Lx @ U[:, :order] / size, Ly @ V[:order].T / size
     small = _projected(model, left, right)
-    pairs = list(zip(_nodes(model, 2 * nodes - 1), _nodes(small, 2 * nodes - 1), strict=True))
-    pairs = pairs[1::2] or pairs
+    pairs = list(zip(_between(model, nodes), _between(small, nodes), strict=True))
     compared = [_comparable(full, reduced) for (_, full), (_, reduced) in pairs]
     gaps = [nu_gap(*pair, input_scale=su, output_scale=sy) for pair in compared]
     errors = [_relative_error(*pair, su, sy) for pair in compared]
-    return Reduction(
-        small, values, np.array([p for (p, _), _ in pairs]), np.array(gaps), np.array(errors)
-    )
+    p = np.array([np.squeeze(p) for (p, _), _ in pairs])
+    return Reduction(small, values, p, np.array(gaps), np.array(errors))
 
 
-def _nodes(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[float, LinearModel]]:
+def _nodes(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array, LinearModel]]:
+    """Models at `count` values of every parameter."""
     if isinstance(model, LinearModel):
-        return [(np.nan, model)]
-    return [
-        (float(p), model.at(float(p)))
-        for p in np.linspace(model.scheduling.low, model.scheduling.high, count)
-    ]
+        return [(np.array([np.nan]), model)]
+    axes = [np.linspace(s.low, s.high, count) for s in model.parameters]
+    return [(p, model.at(*p)) for p in tensor_grid(axes)]
 
 
-def _gramians(model: LinearModel, su: Array, sy: Array, p: float) -> tuple[Array, Array]:
+def _between(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array, LinearModel]]:
+    """Models half way between those."""
+    if isinstance(model, LinearModel):
+        return _nodes(model, count)
+    axes = [np.linspace(s.low, s.high, 2 * count - 1)[1::2] for s in model.parameters]
+    return [(p, model.at(*p)) for p in tensor_grid(axes)]
+
+
+def _gramians(model: LinearModel, su: Array, sy: Array, p: Array) -> tuple[Array, Array]:
     """Solutions of the control and filter Riccati equations with scaled channels."""
     A, B, C, D = model.A, model.B * su, model.C / sy[:, None], model.D * su / sy[:, None]
     solve = solve_continuous_are if model.dt is None else solve_discrete_are
@@ -115,7 +122,7 @@ def _gramians(model: LinearModel, su: Array, sy: Array, p: float) -> tuple[Array
         X = solve(A, B, C.T @ C, np.eye(B.shape[1]) + D.T @ D, s=C.T @ D)
         Y = solve(A.T, C.T, B @ B.T, np.eye(C.shape[0]) + D @ D.T, s=B @ D.T)
     except (np.linalg.LinAlgError, ValueError) as error:
-        where = "" if np.isnan(p) else f" at p = {p:.4g}"
+        where = "" if np.isnan(p).any() else f" at p = {', '.join(f'{v:.4g}' for v in p)}"
         raise InputError(
             f"the frozen model{where} is not stabilisable and detectable, it cannot be balanced"
             f" ({error})"
@@ -133,7 +140,7 @@ def _projected(model: Model, left: Array, right: Array) -> Model:
     parts = dict(A=left.T @ model.A @ right, B=left.T @ model.B, C=model.C @ right, states=states)
     if isinstance(model, LinearModel):
         return replace(model, **parts, point=None)
-    trim = model.trim and replace(model.trim, x=model.trim.x @ left)
+    trim = model.trim and model.trim.projected(left)
     return replace(model, **parts, trim=trim, residuals=None)
 
 

@@ -1,36 +1,64 @@
-"""The scheduling parameter: what it is called, where it lives and how fast it may move."""
+"""The scheduling parameters: what they are called, where they live and how fast they may move."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from symheli.errors import InputError
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
 from symheli.values.arrays import Array, frozen
+from symheli.values.units import dimension, quotient
+
+Limit = float | str
+"""How fast a parameter may move: a number in its unit per second (math.inf: as fast as it likes),
+or the name of the parameter that is its rate.
+"""
+Rates = Limit | Sequence[Limit] | Mapping[str, Limit]
+"""One limit for all parameters, one for each in order, or {name: limit}."""
 
 
 @dataclass(frozen=True)
 class Scheduling:
-    """A scheduling parameter p in [low, high] with |dp/dt| <= rate.
+    """A scheduling parameter p in [low, high] with |dp/dt| <= rate, or dp/dt another parameter.
 
-    `low`, `high` in `unit`, `rate` in `unit` per second (math.inf: as fast as it likes).
+    `low`, `high` in `unit`, `rate` in `unit` per second (math.inf: as fast as it likes) or the name
+    of another parameter of the same model, which then is dp/dt: an airspeed with
+    rate="acceleration" changes as the acceleration says, no faster and no slower.
     """
 
     name: str
     unit: str
     low: float
     high: float
-    rate: float = math.inf
+    rate: Limit = math.inf
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
             raise InputError(
                 f"scheduling {self.name}: expected finite low < high, got [{self.low}, {self.high}]"
             )
-        if not self.rate >= 0:
+        if isinstance(self.rate, str):
+            if not self.rate or self.rate == self.name:
+                raise InputError(
+                    f"scheduling {self.name}: rate must be a number or the name of another"
+                    f" parameter, got {self.rate!r}"
+                )
+        elif not self.rate >= 0:
             raise InputError(
                 f"scheduling {self.name}: rate must be >= 0 {self.unit}/s, got {self.rate}"
             )
+
+    @property
+    def limit(self) -> float:
+        """The rate as a number; raises `InputError` where it is another parameter."""
+        if isinstance(self.rate, str):
+            raise InputError(
+                f"the rate of {self.name} is the parameter {self.rate}, not a number: give a rate"
+            )
+        return self.rate
 
     @property
     def middle(self) -> float:
@@ -46,7 +74,7 @@ class Scheduling:
         """p as a number from -1 at `low` to 1 at `high`; no digit of p is lost far from zero."""
         return ((p - self.low) - (self.high - p)) / (self.high - self.low)
 
-    def with_rate(self, rate: float) -> Scheduling:
+    def with_rate(self, rate: Limit) -> Scheduling:
         """The same parameter with another rate limit."""
         return replace(self, rate=rate)
 
@@ -63,3 +91,70 @@ class Scheduling:
                 " wider range"
             )
         return p
+
+
+def parameters(given: Scheduling | Sequence[Scheduling]) -> tuple[Scheduling, ...]:
+    """One or several parameters as a tuple; raises `InputError` for names that repeat or a rate
+    that is none of them, or of another unit.
+    """
+    out = (given,) if isinstance(given, Scheduling) else tuple(given)
+    if not out or not all(isinstance(s, Scheduling) for s in out):
+        raise InputError(f"expected a Scheduling or several, got {given!r:.120}")
+    names = [s.name for s in out]
+    if len(set(names)) < len(names):
+        raise InputError(f"scheduling parameters need names of their own, got {', '.join(names)}")
+    for s in out:
+        if not isinstance(s.rate, str):
+            continue
+        if s.rate not in names:
+            raise UnknownNameError(f"scheduling parameter (the rate of {s.name})", s.rate, names)
+        other = out[names.index(s.rate)]
+        if isinstance(other.rate, str):
+            raise InputError(
+                f"the rate of {s.name} is {other.name}, whose own rate must then be a number"
+                f" ({other.unit}/s), got {other.rate!r}"
+            )
+        if dimension(other.unit) != dimension(quotient(s.unit, "s")):
+            raise InputError(
+                f"{other.name} ({other.unit}) cannot be the rate of {s.name} ({s.unit}): expected"
+                f" {s.unit}/s"
+            )
+    return out
+
+
+def with_rates(given: Sequence[Scheduling], rate: Rates) -> tuple[Scheduling, ...]:
+    """The same parameters with these limits; raises `InputError` for a wrong number of them,
+    `UnknownNameError` for a name that is none of theirs.
+    """
+    names = [s.name for s in given]
+    if isinstance(rate, Mapping):
+        for name in rate:
+            if name not in names:
+                raise UnknownNameError("scheduling parameter", name, names)
+        limits = [rate.get(s.name, s.rate) for s in given]
+    elif isinstance(rate, Sequence | np.ndarray) and not isinstance(rate, str):
+        limits = list(rate)
+        if len(limits) != len(names):
+            raise InputError(
+                f"rate: expected one for each of {', '.join(names)}, got {len(limits)}"
+            )
+    else:
+        limits = [rate] * len(names)
+    return parameters([s.with_rate(limit) for s, limit in zip(given, limits, strict=True)])
+
+
+def check_all(given: Sequence[Scheduling], p: object) -> Array:
+    """p (..., d) as an array, p of any shape with one parameter; raises `InputError` outside the
+    ranges and for a wrong number of parameters.
+    """
+    if len(given) == 1:
+        return given[0].check(p)
+    p = frozen(p, "scheduling parameters")
+    if p.shape[-1:] != (len(given),):
+        raise InputError(
+            f"expected the {len(given)} parameters {', '.join(s.name for s in given)} along the"
+            f" last axis, got shape {p.shape}"
+        )
+    for i, s in enumerate(given):
+        s.check(p[..., i])
+    return p

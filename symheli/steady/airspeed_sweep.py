@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
 from symheli.lpv.linear_family import LinearFamily
+from symheli.lpv.linear_model import LinearModel
 from symheli.steady.equilibrium import TrimPoint, trim
 from symheli.steady.linearization import linearize
 
@@ -22,17 +23,42 @@ def sweep(
     airspeeds: Sequence[float],
     *,
     climb_rate: float = 0.0,
+    acceleration: float = 0.0,
     inputs: Sequence[str] | None = None,
     start: LinearFamily | None = None,
 ) -> LinearFamily:
     """Trim and linearize at each of `airspeeds` (m/s, increasing), each trim started from the one
     before.
 
-    `inputs` as in `linearize`. `start`: a family at the same airspeeds whose trims are near, to
-    start from instead. `.kinks` of the result lists, by cause, the airspeeds between the first and
-    the last at which the linear models have a corner (a wake edge, a limit, a flow reversal).
-    Raises `TrimError`, `InputError`.
+    `acceleration` (m/s^2, horizontal, along the nose): quasi-steady points of an accelerating
+    flight, linearized there. `inputs` as in `linearize`. `start`: a family at the same airspeeds
+    whose trims are near, to start from instead. `.kinks` of the result lists, by cause, the
+    airspeeds between the first and the last at which the linear models have a corner (a wake edge,
+    a limit, a flow reversal). Raises `TrimError`, `InputError`.
     """
+    models = models_along(
+        heli,
+        airspeeds,
+        climb_rate=climb_rate,
+        acceleration=acceleration,
+        inputs=inputs,
+        start=start,
+    )
+    points: list[TrimPoint] = [model.point for model in models]  # type: ignore[misc]
+    speeds = [point.airspeed for point in points]
+    return LinearFamily.from_models(speeds, models, kink_speeds(heli, points))
+
+
+def models_along(
+    heli: Helicopter,
+    airspeeds: Sequence[float],
+    *,
+    climb_rate: float,
+    acceleration: float,
+    inputs: Sequence[str] | None,
+    start: LinearFamily | None,
+) -> list[LinearModel]:
+    """The models of `sweep`, without looking for corners between them."""
     speeds = [float(v) for v in np.atleast_1d(airspeeds)]
     if not speeds or any(b <= a for a, b in pairwise(speeds)):
         raise InputError("sweep needs increasing airspeeds")
@@ -41,9 +67,11 @@ def sweep(
     points: list[TrimPoint] = []
     for k, speed in enumerate(speeds):
         near = start.trims[k] if start else points[-1] if points else None
-        points.append(trim(heli, speed, climb_rate=climb_rate, start=near))  # type: ignore[arg-type]
-    models = [linearize(heli, point, inputs=inputs) for point in points]
-    return LinearFamily.from_models(speeds, models, kink_speeds(heli, points))
+        points.append(
+            trim(heli, speed, climb_rate=climb_rate, acceleration=acceleration, start=near)  # type: ignore[arg-type]
+        )
+    moving = acceleration != 0
+    return [linearize(heli, point, inputs=inputs, allow_accelerating=moving) for point in points]
 
 
 def kink_speeds(heli: Helicopter, points: Sequence[TrimPoint]) -> Mapping[str, tuple[float, ...]]:
@@ -68,7 +96,16 @@ def kink_speeds(heli: Helicopter, points: Sequence[TrimPoint]) -> Mapping[str, t
 
 def _crossing(heli: Helicopter, name: str, before: TrimPoint, after: TrimPoint) -> float:
     def value(speed: float) -> float:
-        point = trim(heli, speed, climb_rate=before.condition.climb_rate, start=before)
+        asked = before.condition
+        # where the equations jump there may be no trim, and the nearest point says which side it is
+        point = trim(
+            heli,
+            speed,
+            climb_rate=asked.climb_rate,
+            acceleration=asked.acceleration,
+            start=before,
+            throw=False,
+        )
         return heli.switches(point.x.array, point.u.array, point.wind.array)[name]
 
     return float(brentq(value, before.airspeed, after.airspeed, xtol=1e-6))  # type: ignore[arg-type]

@@ -1,19 +1,23 @@
-"""Exact linear models over airspeed and climb rate, air density, altitude, mass or rotor speed."""
+"""Exact linear models over airspeed and acceleration, climb rate, air density, altitude, mass or
+rotor speed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
-from symheli.lpv.linear_family import LinearFamily
+from symheli.lpv.linear_family import AIRSPEED, LinearFamily
 from symheli.lpv.linear_grid import LinearGrid
-from symheli.steady.airspeed_sweep import sweep
+from symheli.steady.airspeed_sweep import models_along
 from symheli.values.signal import Signal
 
 AXES = {
+    "acceleration": Signal("acceleration", "m/s^2"),
     "climb_rate": Signal("climb_rate", "m/s"),
     "density": Signal("density", "kg/m^3"),
     "altitude": Signal("altitude", "m"),
@@ -22,12 +26,15 @@ AXES = {
 }
 PARAMETER = {"density": "density", "mass": "body.mass", "rotor_speed": "drivetrain.nominal_speed"}
 """Which of the helicopter's parameters an axis changes; the inertias stay when the mass changes."""
+CONDITION = ("acceleration", "climb_rate")
+"""Axes that are part of the flight condition."""
 
 
 def sweep_grid(
     heli: Helicopter,
     airspeeds: Sequence[float],
     *,
+    acceleration: Sequence[float] | None = None,
     climb_rate: Sequence[float] | None = None,
     density: Sequence[float] | None = None,
     altitude: Sequence[float] | None = None,
@@ -35,40 +42,83 @@ def sweep_grid(
     rotor_speed: Sequence[float] | None = None,
     inputs: Sequence[str] | None = None,
 ) -> LinearGrid:
-    """`sweep` for every value of one more axis, increasing: sweep_grid(heli, speeds, mass=[7.0,
-    8.2, 9.5]).
+    """`sweep` at every combination of the values of one more axis or several.
 
-    climb_rate in m/s, density in kg/m^3, altitude in m of the standard atmosphere, mass in kg (the
-    inertias stay), rotor_speed in rad/s. Trims start from those of the neighbouring value, and
-    nothing is compiled anew. Raises `TrimError`, `InputError`.
+    Parameters
+    ----------
+    heli : Helicopter
+    airspeeds : sequence of float
+        m/s, increasing.
+    acceleration : sequence of float, optional
+        m/s^2, horizontal, along the nose: quasi-steady trims, linearized there.
+    climb_rate, density, altitude, mass, rotor_speed : sequence of float, optional
+        m/s; kg/m^3; m of the standard atmosphere; kg (the inertias stay); rad/s. Increasing.
+    inputs : sequence of str, optional
+        As in `linearize`.
+
+    Returns
+    -------
+    LinearGrid
+        Axes: airspeed, then those given, in the order above. Trims start from those of the
+        neighbouring value, and nothing is compiled anew.
+
+    Raises
+    ------
+    TrimError
+        Where a point cannot be trimmed.
+    InputError
+        No axis, values that do not increase, density and altitude both.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> grid = symheli.sweep_grid(heli, [3.0, 8.0], mass=[7.0, 8.2, 9.5])
+    >>> grid.A.shape
+    (2, 3, 10, 10)
     """
     asked = {
+        "acceleration": acceleration,
         "climb_rate": climb_rate,
         "density": density,
         "altitude": altitude,
         "mass": mass,
         "rotor_speed": rotor_speed,
     }
-    given = {name: values for name, values in asked.items() if values is not None}
-    if len(given) != 1:
-        raise InputError(
-            f"sweep_grid needs exactly one of {', '.join(AXES)}; got {', '.join(given) or 'none'}"
-        )
-    ((name, values),) = given.items()
-    grid = np.atleast_1d(np.asarray(values, float))
+    given = {
+        name: np.atleast_1d(np.asarray(values, float)).tolist()
+        for name, values in asked.items()
+        if values is not None
+    }
+    if not given:
+        raise InputError(f"sweep_grid needs one of {', '.join(AXES)}; for airspeed alone use sweep")
+    if "density" in given and "altitude" in given:
+        raise InputError("density and altitude are one axis: give one of them")
     families: list[LinearFamily] = []
-    for value in grid.tolist():
+    for point in product(*given.values()):
+        values = dict(zip(given, point, strict=True))
+        condition = {name: values[name] for name in CONDITION if name in values}
         near = families[-1] if families else None
-        climb = value if name == "climb_rate" else 0.0
-        families.append(
-            sweep(
-                _variant(heli, name, value), airspeeds, climb_rate=climb, inputs=inputs, start=near
-            )
+        heli_there = _variant(heli, values)
+        models = models_along(
+            heli_there,
+            airspeeds,
+            climb_rate=condition.get("climb_rate", 0.0),
+            acceleration=condition.get("acceleration", 0.0),
+            inputs=inputs,
+            start=near,
         )
-    return LinearGrid(AXES[name], grid, tuple(families))
+        families.append(LinearFamily.from_models(airspeeds, models))
+    speeds = families[0].airspeeds
+    return LinearGrid(
+        (AIRSPEED, *(AXES[name] for name in given)),
+        (speeds, *map(np.asarray, given.values())),
+        tuple(family[k] for k in range(len(speeds)) for family in families),
+    )
 
 
-def _variant(heli: Helicopter, name: str, value: float) -> Helicopter:
-    if name == "altitude":
-        return heli.at_altitude(value)
-    return heli.with_parameters({PARAMETER[name]: value}) if name in PARAMETER else heli
+def _variant(heli: Helicopter, values: dict[str, float]) -> Helicopter:
+    if "altitude" in values:
+        heli = heli.at_altitude(values["altitude"])
+    changed = {PARAMETER[name]: v for name, v in values.items() if name in PARAMETER}
+    return heli.with_parameters(changed) if changed else heli

@@ -122,7 +122,7 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
     gain.
     """
     best = LowerBound(frozen.gamma, None)
-    limits = [s.rate / s.radius for s in lft.parameters if math.isfinite(s.rate) and s.rate > 0]
+    limits = [s.limit / s.radius for s in lft.parameters if 0 < s.limit < math.inf]
     tries = (
         [(*line, rate) for rate in (math.inf, *limits[:1]) for line in _lines(len(lft.blocks))]
         if search

@@ -5,6 +5,5 @@ matrices over a box.
 from synthesis.polynomial.certificate import BoxCertificate
 from synthesis.polynomial.lyapunov import BoxLyapunov
 from synthesis.polynomial.matrix import PolynomialMatrix
-from synthesis.polynomial.state_space import PolynomialStateSpace
 
-__all__ = ["BoxCertificate", "BoxLyapunov", "PolynomialMatrix", "PolynomialStateSpace"]
+__all__ = ["BoxCertificate", "BoxLyapunov", "PolynomialMatrix"]

@@ -37,7 +37,6 @@ from synthesis.polynomial.lyapunov import BoxLyapunov
 from synthesis.polynomial.program import Shape, affine_inequalities, assemble
 from synthesis.polynomial.proof import Evidence, Units
 from synthesis.polynomial.regions import Pieces, pieces
-from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.proof_search import CLOSE, NOTHING
 from synthesis.rates import Rate, rates
 from synthesis.scaling import in_its_own_scale, model_scaling
@@ -45,7 +44,7 @@ from synthesis.symmetric import length, smat
 from synthesis.verdict import Kind, Seconds, Status, Trajectory
 
 Array = np.ndarray
-Model = LPVStateSpace | PolynomialStateSpace | LFT
+Model = LPVStateSpace | LFT
 
 DECAY_TOLERANCE = 2e-3
 """The decay rate is found to this fraction of the frozen one."""
@@ -437,16 +436,21 @@ _MEANING = {
 }
 
 
-def _accepted(model: Model) -> LPVStateSpace | PolynomialStateSpace:
-    if isinstance(model, LFT):
-        return PolynomialStateSpace.from_lft(model)
-    if not isinstance(model, LPVStateSpace | PolynomialStateSpace):
+def _accepted(model: Model) -> LPVStateSpace:
+    if isinstance(model, LPVStateSpace):
+        return model
+    if not isinstance(model, LFT):
         raise InputError(
-            "expected an LPVStateSpace, a PolynomialStateSpace or an LFT, got"
-            f" {type(model).__name__}; make one with LPVStateSpace.polynomial(...),"
-            " PolynomialStateSpace.polynomial(...) or LinearFamily.interpolate()"
+            f"expected an LPVStateSpace or an LFT, got {type(model).__name__}; make one with"
+            " LPVStateSpace.polynomial(...) or LinearFamily.interpolate()"
         )
-    return model
+    try:
+        return model.to_lpv()
+    except InputError as error:
+        raise InputError(
+            "the LFT depends on its parameters as a rational function, not a polynomial; use"
+            " lft_gain, or fit a polynomial: to_lpv(degree=...)"
+        ) from error
 
 
 def _check_channels(model: Pieces, kind: Kind) -> None:

@@ -21,7 +21,6 @@ from synthesis.lower_bound import Search, growing_trajectory, lower_bound
 from synthesis.periodic import multiplier
 from synthesis.polynomial.inequalities import Demand
 from synthesis.polynomial.regions import Pieces
-from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.scaling import balance
 from synthesis.spectrum import surely_unstable
 from synthesis.verdict import Trajectory
@@ -151,7 +150,7 @@ def _grid(model: Pieces) -> Array:
 
 
 def worst_moving(
-    model: LPVStateSpace | PolynomialStateSpace,
+    model: LPVStateSpace,
     demand: Demand,
     frozen: Worst,
     search: Search | None,
@@ -173,7 +172,8 @@ def worst_moving(
         if budget.over:
             break
         budget.tell("line %d of %d, %.6g so far", k + 1, len(lines), abs(best.value))
-        rate, search = line.scheduling.rate, replace(search, seconds=budget.left / (len(lines) - k))
+        rate = line.scheduling.limit
+        search = replace(search, seconds=budget.left / (len(lines) - k))
         if demand.kind == "l2 gain":
             found = lower_bound(
                 line, rate, frozen=FrozenGain(frozen.value, 0.0, 0.0), search=search
@@ -190,9 +190,7 @@ def worst_moving(
     return best
 
 
-def growing(
-    model: LPVStateSpace | PolynomialStateSpace, demand: Demand, search: Search | None
-) -> Trajectory | None:
+def growing(model: LPVStateSpace, demand: Demand, search: Search | None) -> Trajectory | None:
     """A p(t) on such a line along which the state grows, None where none was found."""
     if search is None:
         return None
@@ -202,7 +200,7 @@ def growing(
             break
         budget.tell("line %d of %d", k + 1, len(lines))
         search = replace(search, seconds=budget.left / (len(lines) - k))
-        found = growing_trajectory(line, line.scheduling.rate, search)
+        found = growing_trajectory(line, line.scheduling.limit, search)
         if found is not None:
             return Trajectory(found.time, back(found.p))
     return None
@@ -263,14 +261,15 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
 
 
 def _lines(
-    model: LPVStateSpace | PolynomialStateSpace, rates: Sequence[float]
+    model: LPVStateSpace, rates: Sequence[float]
 ) -> Iterator[tuple[LPVStateSpace, Callable[[Array], Array]]]:
     """Diagonals and axes of the box as models of one parameter within the rates, and the way back
     to p.
     """
-    if isinstance(model, LPVStateSpace):
+    if len(model.parameters) == 1:
         yield model.with_rate(rates[0]), lambda p: p
         return
+    model = model.with_rate(rates)
     low, high = np.array(model.box).T
     m = len(low)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)

@@ -6,16 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise, product
+from math import comb
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, Matrices, Scheduling
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace, Matrices, Piece, Product, Scheduling
 from synthesis.bernstein import composition
 from synthesis.cells import Strip, strips
-from synthesis.pieces import ModelPiece, model_pieces
+from synthesis.pieces import CONSTANT, ModelPiece, function_pieces, model_pieces
 from synthesis.polynomial.matrix import Box, PolynomialMatrix
-from synthesis.polynomial.state_space import PolynomialStateSpace
 
 Array = np.ndarray
 Number = Callable[[float], Any]
@@ -28,7 +29,7 @@ class Pieces(NamedTuple):
     `source` is the model as it was given.
     """
 
-    source: LPVStateSpace | PolynomialStateSpace
+    source: LPVStateSpace
     parameters: tuple[Scheduling, ...]
     breaks: tuple[tuple[float, ...], ...]
     models: dict[tuple[int, ...], tuple[PolynomialMatrix, ...]]
@@ -36,7 +37,7 @@ class Pieces(NamedTuple):
 
     def at(self, p: Array) -> Matrices:
         """The matrices at p (k, m) by the model's own code, for checks."""
-        return self.source.matrices(p[..., 0] if isinstance(self.source, LPVStateSpace) else p)
+        return self.source.matrices(p[..., 0] if len(self.parameters) == 1 else p)
 
     @property
     def passes_peaks(self) -> bool:
@@ -89,26 +90,60 @@ class Pieces(NamedTuple):
         return self._replace(models=models)
 
 
-def pieces(model: LPVStateSpace | PolynomialStateSpace) -> Pieces:
+def pieces(model: LPVStateSpace) -> Pieces:
     """The model in polynomial pieces over its box."""
-    if isinstance(model, PolynomialStateSpace):
-        return Pieces(
-            model,
-            model.parameters,
-            model.box,
-            {(0,) * len(model.box): (model.A, model.B, model.C, model.D)},
-            model.dt,
+    s = model.parameters
+    if len(s) == 1:
+        parts = model_pieces(model)
+        models = {
+            (k,): tuple(
+                PolynomialMatrix(((piece.low, piece.high),), M)
+                for M in (piece.A, piece.B, piece.C, piece.D)
+            )
+            for k, piece in enumerate(parts)
+        }
+        breaks = ((parts[0].low, *(piece.high for piece in parts)),)
+        return Pieces(model, s, breaks, models, model.dt)
+    basis = model.basis
+    if not isinstance(basis, Product):
+        raise InputError(
+            f"{type(basis).__name__} is not known to be polynomial in each of {len(s)} parameters;"
+            " use a Product of one-parameter bases"
         )
-    parts = model_pieces(model)
-    models = {
-        (k,): tuple(
-            PolynomialMatrix(((piece.low, piece.high),), M)
-            for M in (piece.A, piece.B, piece.C, piece.D)
+    axes = [function_pieces(f, q.low, q.high) for f, q in zip(basis.factors, s, strict=True)]
+    models = {}
+    for key in product(*(range(len(axis)) for axis in axes)):
+        chosen = [axis[k] for axis, k in zip(axes, key, strict=True)]
+        models[key] = tuple(
+            _over_box(basis.tensor(M), chosen) for M in (model.A, model.B, model.C, model.D)
         )
-        for k, piece in enumerate(parts)
-    }
-    breaks = (parts[0].low, *(piece.high for piece in parts))
-    return Pieces(model, (model.scheduling,), (breaks,), models, model.dt)
+    breaks = tuple((axis[0].low, *(piece.high for piece in axis)) for axis in axes)
+    return Pieces(model, s, breaks, models, model.dt)
+
+
+def _over_box(tensor: Array, chosen: Sequence[Piece]) -> PolynomialMatrix:
+    """Bernstein coefficients of sum_j f_j M_j, f_j products of functions on one piece each."""
+    coefficients = tensor
+    for i, piece in enumerate(chosen):
+        coefficients = np.moveaxis(np.tensordot(piece.bernstein.T, coefficients, axes=(1, i)), 0, i)
+    for i in range(len(chosen)):
+        coefficients = _lowered(coefficients, i)
+    return PolynomialMatrix(tuple((q.low, q.high) for q in chosen), coefficients)
+
+
+def _lowered(coefficients: Array, axis: int) -> Array:
+    """The same polynomial written in the degree it has along one axis, to rounding."""
+    c = np.moveaxis(coefficients, axis, 0)
+    while (d := len(c) - 1) > 0:
+        binomials = np.array([comb(d, k) for k in range(d + 1)], dtype=float)
+        top = np.tensordot(binomials * (-1.0) ** np.arange(d + 1), c, axes=1)
+        if np.any(np.abs(top) > CONSTANT * np.tensordot(binomials, np.abs(c), axes=1)):
+            break
+        raised = np.zeros((d + 1, d))
+        k = np.arange(d)
+        raised[k, k], raised[k + 1, k] = 1 - k / d, (k + 1) / d
+        c = np.tensordot(np.linalg.pinv(raised), c, axes=1)
+    return np.moveaxis(c, 0, axis)
 
 
 class Region(NamedTuple):

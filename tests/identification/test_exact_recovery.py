@@ -104,7 +104,7 @@ def test_whatever_the_basis_the_coefficients_the_predictions_and_the_free_run_co
     )
 
 
-def test_a_model_of_several_parameters_freezes_and_refuses_a_state_space_of_one():
+def test_a_model_of_several_parameters_freezes():
     functions, p = BASES["total degree"]
     truth = Truth(structure(outputs=("a", "b"), basis=functions, scheduling=("p", "q"), delay=0))
     model = idn.fit(truth.arx, truth.record(p))
@@ -114,8 +114,6 @@ def test_a_model_of_several_parameters_freezes_and_refuses_a_state_space_of_one(
     np.testing.assert_allclose(
         model.at([4.0, 1.2]).frequency_response(omega)[0], np.linalg.solve(left, right), **EXACT
     )
-    with pytest.raises(InputError, match="has one scheduling parameter, this one has 2"):
-        model.to_state_space()
     with pytest.raises(InputError, match="expected 2 along the last axis"):
         model.at(4.0)
     with pytest.raises(InputError, match="expected one value of p"):

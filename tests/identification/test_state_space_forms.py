@@ -6,8 +6,12 @@ from known_systems import Truth, moving, structure
 
 import identification as idn
 from symheli.errors import InputError
-from symheli.lpv import Spline, simulate
+from symheli.lpv import Polynomial, Product, Spline, simulate
 
+TWO = dict(
+    basis=Product((Polynomial(2, 0.0, 13.0), Polynomial(1, -2.0, 2.0)), total_degree=2),
+    scheduling=("p", "q"),
+)
 CASES = {
     "shifted, three lags": (
         "shifted",
@@ -27,6 +31,17 @@ CASES = {
     ),
     "direct, feedthrough": ("direct", dict(na=2, nb=3, delay=0, scheduling_at="now")),
     "direct, static": ("direct", dict(na=0, nb=1, delay=0, scheduling_at="now")),
+    "shifted, two parameters": ("shifted", dict(na=2, nb=2, delay=1, **TWO)),
+    "shifted, two parameters, feedthrough": ("shifted", dict(na=2, nb=2, delay=0, **TWO)),
+    "direct, two parameters": ("direct", dict(na=2, nb=2, scheduling_at="now", **TWO)),
+    "direct, a spline and a polynomial": (
+        "direct",
+        dict(
+            basis=Product((Spline((0.0, 3.0, 8.0, 13.0)), Polynomial(1, -2.0, 2.0))),
+            scheduling=("p", "q"),
+            scheduling_at="now",
+        ),
+    ),
 }
 
 
@@ -34,11 +49,14 @@ CASES = {
 def test_realization_responds_as_the_difference_equation_however_p_moves(case):
     route, over = CASES[case]
     truth = Truth(structure(**over), size=0.8)
-    record = truth.record(moving(200), noise=0.1)
+    two = truth.arx.basis.dimension == 2
+    p = np.column_stack([moving(400), 2 * np.sin(0.7 * np.arange(400))]) if two else moving(200)
+    record = truth.record(p, noise=0.1)
     model = idn.fit(truth.arx, record)
     free = model.simulate(record)
     lpv = model.to_state_space(route)
-    p, u, m = record["p"], record.columns(truth.arx.inputs), truth.arx.memory
+    p = record.columns(truth.arx.parameters) if two else record["p"]
+    u, m = record.columns(truth.arx.inputs), truth.arx.memory
     x0 = _state_at(lpv, record, m, p, u) if lpv.states else np.zeros(0)
     _, y = simulate(lpv, p[m:], u[m:], x0)
     # 1e-10: rounding through a stable recursion of 200 steps and, with feedthrough, an exact

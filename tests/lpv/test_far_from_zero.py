@@ -58,11 +58,10 @@ def test_powers_of_p_keep_every_digit_wherever_p_lives(bounds, degree):
 
 
 def test_a_polynomial_state_space_keeps_every_digit_too():
-    from synthesis import PolynomialStateSpace
 
     powers, value = centred(1e5, 1e5 + 1, 3)
     s, zero = Scheduling("p", "1", 1e5, 1e5 + 1), {(0,): [[0.0]]}
-    model = PolynomialStateSpace.polynomial(
+    model = LPVStateSpace.polynomial(
         {(i,): [[c]] for i, c in enumerate(powers)}, zero, zero, zero, [s]
     )
     size = max(abs(value(p)) for p in np.linspace(1e5, 1e5 + 1, 50))

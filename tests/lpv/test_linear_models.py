@@ -110,7 +110,7 @@ def test_residuals_of_a_coarse_fit_are_fit_minus_family(family):
 def test_interpolation_names_what_it_cannot_do(family):
     with pytest.raises(UnknownNameError, match="interpolation kind"):
         family.interpolate("cubic")
-    with pytest.raises(InputError, match="needs 6 distinct nodes, got 5"):
+    with pytest.raises(InputError, match="needs 6 values of each parameter, got 5"):
         family.interpolate("polynomial", 5)
 
 

@@ -8,9 +8,8 @@ import pytest
 from models import lateral, spring
 
 from symheli.errors import InputError
-from symheli.lpv import Scheduling
+from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
-    PolynomialStateSpace,
     Relaxation,
     Search,
     generalized_h2,
@@ -22,12 +21,12 @@ from synthesis import (
 
 def mass_spring():
     stiffness, damping = (Scheduling(name, "1", -1, 1, rate=0.3) for name in "kd")
-    return PolynomialStateSpace.polynomial(
+    return LPVStateSpace.polynomial(
         A={(0, 0): [[0, 1], [-1, -0.6]], (1, 0): [[0, 0], [-0.3, 0]], (0, 1): [[0, 0], [0, -0.2]]},
         B={(0, 0): [[0], [1]]},
         C={(0, 0): [[1, 0]]},
         D={(0, 0): [[0]]},
-        parameters=[stiffness, damping],
+        scheduling=[stiffness, damping],
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from models import lag, random_stable
 from scipy.linalg import block_diag
 
-from synthesis import PolynomialStateSpace, frozen_gain, l2_gain
+from synthesis import frozen_gain, l2_gain
 from synthesis.frozen import norm
 
 
@@ -146,7 +146,7 @@ def test_a_gain_that_is_loose_for_its_sample_period_says_so(box):
     """
     for dt in (0.1, 1e-3, 1e-7):
         sampled = lag().discretize(dt)
-        proven = l2_gain(PolynomialStateSpace.from_lpv(sampled) if box else sampled, search=None)
+        proven = l2_gain(sampled.to_lft() if box else sampled, search=None)
         said = any("the bound may be loose for that alone" in line for line in proven.hypotheses)
         assert said or proven.gamma <= 1.01 * proven.lower
         assert not (said and dt > 0.01)

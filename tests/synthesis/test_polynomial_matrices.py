@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from symheli.errors import InputError
-from symheli.lpv import LFT, Scheduling
-from synthesis import PolynomialMatrix, PolynomialStateSpace
+from symheli.lpv import LFT, LPVStateSpace, Scheduling
+from synthesis import PolynomialMatrix, l2_gain
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
 from synthesis.polynomial.imposed import coefficient_conditions, sums_of_squares, vertex_conditions
 from synthesis.polynomial.matrix import block
-from synthesis.polynomial.regions import convert
+from synthesis.polynomial.regions import convert, pieces
 from synthesis.symmetric import smat, svec
 from synthesis.verify import rational
 
@@ -141,10 +141,11 @@ def test_a_model_from_an_lft_is_the_same_model():
     p, q = Scheduling("p", "1", 1.0, 3.0), Scheduling("q", "1", -1.0, 2.0, 0.5)
     A = {(0, 0): [[-1.0, 0.2], [0.0, -2.0]], (2, 1): [[0.1, 0.0], [0.3, 0.0]]}
     B, C, D = {(0, 1): [[1.0], [0.5]]}, {(0, 0): [[1.0, 0.0]]}, {(0, 0): [[0.0]]}
-    model = PolynomialStateSpace.polynomial(A, B, C, D, [p, q])
-    other = PolynomialStateSpace.from_lft(LFT.polynomial(A, B, C, D, [p, q]).reduce())
-    assert other.A.degrees == (2, 1)
-    assert other.C.degrees == (0, 0)
+    model = LPVStateSpace.polynomial(A, B, C, D, [p, q])
+    other = LFT.polynomial(A, B, C, D, [p, q]).reduce().to_lpv()
+    ((A, _, C, _),) = pieces(other).models.values()
+    assert A.degrees == (2, 1)
+    assert C.degrees == (0, 0)
     points = np.array([[1.0, -1.0], [2.2, 0.7], [3.0, 2.0]])
     for one, two in zip(model.matrices(points), other.matrices(points), strict=True):
         np.testing.assert_allclose(one, two, atol=1e-11)
@@ -164,7 +165,7 @@ def test_a_rational_lft_is_refused():
         [s],
     )
     with pytest.raises(InputError, match="rational function"):
-        PolynomialStateSpace.from_lft(rational_loop.feedback({("u1", "y1"): 0.5}))
+        l2_gain(rational_loop.feedback({("u1", "y1"): 0.5}))
 
 
 def test_wrong_input_gets_a_sentence():
@@ -177,7 +178,7 @@ def test_wrong_input_gets_a_sentence():
     with pytest.raises(InputError, match="axes of coefficients"):
         PolynomialMatrix(BOX, np.zeros((2, 2)))
     parameters = [Scheduling("p", "1", 0.0, 1.0)]
-    with pytest.raises(InputError, match="B: expected polynomial matrices of shape"):
-        PolynomialStateSpace.polynomial(
+    with pytest.raises(InputError, match=r"B: expected matrices of shape \(2, 1\)"):
+        LPVStateSpace.polynomial(
             {(0,): -np.eye(2)}, {(0,): [[1.0]]}, {(0,): [[1.0, 0]]}, {(0,): [[0.0]]}, parameters
         )

@@ -14,7 +14,6 @@ from test_reference_cases import GOLDEN, INFLATED, between, oscillator, scalar
 
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
-    PolynomialStateSpace,
     Relaxation,
     Search,
     Status,
@@ -29,7 +28,7 @@ QUICK = Search(levels=4, dwells=5, starts=1, nodes=40, evaluations=12, steps=120
 def square(A, B, C, rate, dt=None):
     """A model of p and q in [0, 1] at the same rate, from monomials."""
     parameters = [Scheduling(name, "1", 0.0, 1.0, rate) for name in ("p", "q")]
-    return PolynomialStateSpace.polynomial(A, B, C, {(0, 0): [[0.0]]}, parameters, dt)
+    return LPVStateSpace.polynomial(A, B, C, {(0, 0): [[0.0]]}, parameters, dt)
 
 
 # energy to peak: max |y| over inputs of unit energy
@@ -219,9 +218,7 @@ def golden(s):
     }
     parameters = [Scheduling(name, "1", 0.0, 1.0, math.inf) for name in ("a", "b")]
     eye = {(0, 0): np.eye(2)}
-    return PolynomialStateSpace.polynomial(
-        A, eye, eye, {(0, 0): np.zeros((2, 2))}, parameters, dt=1.0
-    )
+    return LPVStateSpace.polynomial(A, eye, eye, {(0, 0): np.zeros((2, 2))}, parameters, dt=1.0)
 
 
 def test_two_entries_that_jump_are_proven_up_to_their_joint_spectral_radius():

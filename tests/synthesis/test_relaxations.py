@@ -11,9 +11,8 @@ from models import lag, random_stable, spring
 from test_never_call_unstable_stable import unstable
 
 from symheli.errors import CertificateError, InputError, UnknownNameError
-from symheli.lpv import LFT, Scheduling
+from symheli.lpv import LFT, LPVStateSpace, Scheduling
 from synthesis import (
-    PolynomialStateSpace,
     Relaxation,
     Solver,
     Status,
@@ -41,7 +40,7 @@ def two_lags(rate=(0.5, 2.0), dt=None):
         Scheduling("a", "1", -1.0, 1.0, rate[0]),
         Scheduling("b", "1", -1.0, 1.0, rate[1]),
     ]
-    return PolynomialStateSpace.polynomial(
+    return LPVStateSpace.polynomial(
         A, {(0, 0): [[h]]}, {(0, 0): [[1.0]]}, {(0, 0): [[0.0]]}, parameters, dt
     )
 
@@ -56,7 +55,7 @@ def mass_spring(rate=0.1, dt=None, spring=0.3):
     if dt is not None:
         A = {e: dt * M + np.eye(2) * (e == (0, 0)) for e, M in A.items()}
     parameters = [Scheduling("k", "1", -1.0, 1.0, rate), Scheduling("d", "1", -1.0, 1.0, rate)]
-    return PolynomialStateSpace.polynomial(
+    return LPVStateSpace.polynomial(
         A, {(0, 0): [[0.0], [dt or 1.0]]}, {(0, 0): [[1.0, 0]]}, {(0, 0): [[0.0]]}, parameters, dt
     )
 
@@ -139,7 +138,7 @@ def test_several_parameters_of_an_lft_or_one_polynomial_alike():
     lft = LFT.polynomial(
         A, B, {(0,): [[1.0]]}, {(0,): [[0.0]]}, [Scheduling("p", "1", 0.0, 1.0, 1.0)]
     )
-    for model in (lft, PolynomialStateSpace.from_lpv(lag())):
+    for model in (lft, lag().to_lft()):
         assert l2_gain(model, relaxation=QUICK, search=None).gamma == pytest.approx(1.0, rel=5e-6)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,17 +36,26 @@ class Basis(FunctionSpace):
         """((low, high),)."""
         return ((self.low, self.high),)
 
+    def samples(self, ranges: Sequence[Range] | None = None) -> Array:
+        """One point more than coefficients on every piece; functions brought along, which no finite
+        number of points tells apart, at four times as many as there are.
+        """
+        ((low, high),) = self.ranges if ranges is None else ranges
+        try:
+            pieces = self.pieces()
+        except InputError:
+            return np.linspace(low, high, 4 * self.size + 1)
+        edges = [
+            (max(piece.low, low), min(piece.high, high), piece.bernstein.shape[1] + 1)
+            for piece in pieces
+        ]
+        return np.concatenate([np.linspace(a, b, count) for a, b, count in edges if a < b])
+
     @abstractmethod
     def pieces(self) -> tuple[Piece, ...]:
         """The polynomial pieces of the functions, in order of p; `InputError` where they are not
         piecewise polynomial.
         """
-
-    def __call__(self, p: object, derivative: int = 0) -> Array:
-        """Values (or derivatives, per unit of p) of the functions at p, shape p.shape + (n,).
-        Raises `InputError` outside the range.
-        """
-        return self._values(self._inside(p), derivative)
 
 
 def check_range(low: float, high: float) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +12,8 @@ from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
 
 Range = tuple[float, float]
+Order = int | tuple[int, ...]
+"""How often a function is differentiated: a number, or one for each of several parameters."""
 
 
 class FunctionSpace(ABC):
@@ -36,12 +40,38 @@ class FunctionSpace(ABC):
         """How many distinct p are needed before the functions can be told apart."""
 
     @abstractmethod
-    def _values(self, p: Array, derivative: int) -> Array: ...
+    def _values(self, p: Array, derivative: Any) -> Array: ...
 
     @property
     def dimension(self) -> int:
         """Number of scheduling parameters d."""
         return len(self.ranges)
+
+    @property
+    def degrees(self) -> tuple[int, ...] | None:
+        """Highest degree in each parameter where all functions are polynomials, else None."""
+        return None
+
+    def constant(self) -> Array:
+        """Coefficients (n,) of the function 1; raises `InputError` where the space lacks it."""
+        p = self.samples()
+        one = self.fit(p, np.ones(len(p)))
+        if np.abs(self(p) @ one - 1).max() > 1e-9:
+            raise InputError(f"{self} does not contain the constants; add the function 1")
+        return one
+
+    @abstractmethod
+    def samples(self, ranges: Sequence[Range] | None = None) -> Array:
+        """Points (K,) or (K, d) of the box, or of smaller `ranges`, at which combinations of the
+        functions that differ there can be told apart.
+        """
+
+    def gradient(self, p: object) -> Array:
+        """Slopes of the functions by each parameter, (..., d, n), per unit of it."""
+        if self.dimension == 1:
+            return self(p, 1)[..., None, :]
+        along = np.eye(self.dimension, dtype=int).tolist()
+        return np.stack([self(p, tuple(order)) for order in along], axis=-2)
 
     def form(self, name: str) -> Array:
         """Matrix T (n, m) with f_j = sum_i T[j, i] g_i for the functions g of the named form;
@@ -54,11 +84,12 @@ class FunctionSpace(ABC):
             " functions"
         )
 
-    def __call__(self, p: object) -> Array:
-        """Values of the functions at p; raises `InputError` outside the ranges and for a wrong
-        number of parameters.
+    def __call__(self, p: object, derivative: Order = 0) -> Array:
+        """Values of the functions, or derivatives per unit of p, at p.
+
+        Raises `InputError` outside the ranges and for a wrong number of parameters.
         """
-        return self._values(self._inside(p), 0)
+        return self._values(self._inside(p), derivative)
 
     def fit(self, p: object, values: object) -> Array:
         """Least-squares coefficients (n, ...) of `values` (K, ...) sampled at `p` (K,), or (K, d)
@@ -98,3 +129,8 @@ class FunctionSpace(ABC):
                     " of the data"
                 )
         return p
+
+
+def tensor_grid(axes: Sequence[Array]) -> Array:
+    """Every combination (K, d) of the values along d `axes`, the last running fastest."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from functools import cached_property
 from itertools import pairwise
 from math import comb
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PPoly
@@ -21,11 +22,15 @@ class PiecewisePolynomial(Basis):
     def _piecewise(self) -> PPoly:
         """All functions side by side."""
 
+    def constant(self) -> Array:
+        """Ones: the functions of every such basis add up to 1."""
+        return np.ones(self.size)
+
     @cached_property
     def _functions(self) -> PPoly:
         return self._piecewise()
 
-    def _values(self, p: Array, derivative: int) -> Array:
+    def _values(self, p: Array, derivative: Any) -> Array:
         return np.asarray(self._functions(np.clip(p, self.low, self.high), nu=derivative))
 
     def pieces(self) -> tuple[Piece, ...]:

@@ -6,7 +6,7 @@ import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb, log10
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
@@ -53,11 +53,20 @@ class Polynomial(Basis):
         """degree + 1 values of p determine a polynomial."""
         return self.degree + 1
 
+    @property
+    def degrees(self) -> tuple[int]:
+        """(degree,)."""
+        return (self.degree,)
+
+    def constant(self) -> Array:
+        """(1, 0, ..., 0)."""
+        return np.eye(self.size)[0]
+
     @cached_property
     def _norms(self) -> Array:
         return np.sqrt(2.0 * np.arange(self.size) + 1.0)
 
-    def _values(self, p: Array, derivative: int) -> Array:
+    def _values(self, p: Array, derivative: Any) -> Array:
         x = ((p - self.low) - (self.high - p)) / (
             self.high - self.low
         )  # no digit of p is lost far from zero
@@ -160,7 +169,14 @@ class Polynomial(Basis):
         padded = np.zeros((self.size, *given.shape[1:]))
         for (i,), M in x.items():
             padded[i] = M
-        return np.linalg.solve(self._powers.T, padded.reshape(self.size, -1)).reshape(padded.shape)
+        return self.from_scaled(padded)
+
+    def from_scaled(self, coefficients: Array) -> Array:
+        """Coefficients in this basis (n, ...) of sum_i x^i M_i, x from -1 at `low` to 1 at
+        `high`.
+        """
+        flat = np.reshape(coefficients, (self.size, -1))
+        return np.linalg.solve(self._powers.T, flat).reshape(np.shape(coefficients))
 
     def to_monomial(self, coefficients: object) -> Array:
         """Monomial coefficients M_i (n, ...) in physical units of p from coefficients in this basis

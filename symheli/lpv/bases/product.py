@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.bases.basis import Basis
-from symheli.lpv.bases.function_space import FunctionSpace, Range
+from symheli.lpv.bases.function_space import FunctionSpace, Range, tensor_grid
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.values.arrays import Array
 
@@ -68,12 +70,44 @@ class Product(FunctionSpace):
         """As many points as functions (in general position)."""
         return self.size
 
-    def _values(self, p: Array, derivative: int) -> Array:
-        if derivative:
+    @property
+    def degrees(self) -> tuple[int, ...] | None:
+        """Degree in each parameter where all factors are polynomials, else None."""
+        degrees = [f.degrees for f in self.factors]
+        return None if None in degrees else tuple(d for (d,) in degrees)  # type: ignore[misc]
+
+    def constant(self) -> Array:
+        """The product of the constants of the factors."""
+        every = reduce(np.multiply.outer, [f.constant() for f in self.factors])
+        return np.array([every[i] for i in self.indices])
+
+    def samples(self, ranges: Sequence[Range] | None = None) -> Array:
+        """Every combination of the samples of the factors."""
+        wanted = self.ranges if ranges is None else ranges
+        return tensor_grid([f.samples([r]) for f, r in zip(self.factors, wanted, strict=True)])
+
+    def tensor(self, coefficients: Array) -> Array:
+        """Coefficients (n, ...) as (n_1, n_2, ..., ...), one axis a factor, 0 for products left
+        out.
+        """
+        out = np.zeros((*(f.size for f in self.factors), *coefficients.shape[1:]))
+        out[tuple(np.array(self.indices).T)] = coefficients
+        return out
+
+    def from_tensor(self, tensor: Array) -> Array:
+        """The inverse of `tensor`, without the products left out."""
+        return tensor[tuple(np.array(self.indices).T)]
+
+    def _values(self, p: Array, derivative: Any) -> Array:
+        orders = (0,) * self.dimension if derivative == 0 else derivative
+        if not isinstance(orders, tuple) or len(orders) != self.dimension:
             raise InputError(
-                "products of bases have no derivative by one number; differentiate the factors"
+                f"derivative: expected {self.dimension} numbers, one a parameter, got"
+                f" {derivative!r}"
             )
-        values = [f(p[..., i]) for i, f in enumerate(self.factors)]
+        values = [
+            f(p[..., i], k) for i, (f, k) in enumerate(zip(self.factors, orders, strict=True))
+        ]
         return reduce(
             np.multiply,
             (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,7 @@ class UserFunctions(Basis):
         """As many as there are functions."""
         return self.size
 
-    def _values(self, p: Array, derivative: int) -> Array:
+    def _values(self, p: Array, derivative: Any) -> Array:
         if derivative:
             raise InputError(
                 "functions brought along have no known derivative; use a polynomial or spline basis"

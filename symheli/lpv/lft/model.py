@@ -365,10 +365,11 @@ class LFT:
 
         return hold_error(self, dt, band)
 
-    def to_lpv(self, degree: int | None = None) -> LPVStateSpace:
-        """The polynomial model of one parameter, exact where the dependence is polynomial.
+    def to_lpv(self, degree: int | Sequence[int] | None = None) -> LPVStateSpace:
+        """The polynomial model in the same parameters, exact where the dependence is polynomial.
 
-        Rational dependence needs a `degree`: a Chebyshev fit whose misfit is in `.residuals`.
+        Rational dependence needs a `degree`, one for all parameters or one each: a Chebyshev fit
+        whose misfit is in `.residuals`.
         """
         from symheli.lpv.lft.polynomial import to_lpv
 

@@ -8,12 +8,18 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.bases import Polynomial
+from symheli.lpv.bases.polynomials import (
+    coefficients_of,
+    interpolation_points,
+    polynomials,
+    scaled_powers,
+)
 from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.lpv.lpv_state_space import LPVStateSpace, Residuals
+from symheli.lpv.monomials import as_blocks
 from symheli.lpv.recentred import centre, recentred
 from symheli.lpv.scheduling import Scheduling
-from symheli.values.arrays import Array, frozen
+from symheli.values.arrays import Array
 from symheli.values.signal import signals
 
 ROUNDING = 16 * np.finfo(float).eps
@@ -21,22 +27,25 @@ ROUNDING = 16 * np.finfo(float).eps
 
 
 def from_lpv(lpv: LPVStateSpace) -> LFT:
-    """M(delta) = M_0 + delta M_1 + ... + delta^d M_d by Horner's rule: order d (nx + nu), exact."""
-    if not isinstance(lpv.basis, Polynomial):
+    """M(delta) as a sum of monomials by Horner's rule, exact; with one parameter of degree d the
+    order is d (nx + nu).
+    """
+    degrees = lpv.basis.degrees
+    if degrees is None:
         raise InputError(
             "an LFT needs polynomial (or rational) dependence; interpolate with kind='polynomial'"
             " first"
         )
-    stacked = np.block([[lpv.A, lpv.B], [lpv.C, lpv.D]])
-    if (lpv.basis.low, lpv.basis.high) != (lpv.scheduling.low, lpv.scheduling.high):
-        inner = Polynomial(lpv.basis.degree, lpv.scheduling.low, lpv.scheduling.high)
-        nodes = lpv.scheduling.middle + lpv.scheduling.radius * np.cos(
-            np.pi * (np.arange(inner.size) + 0.5) / inner.size
-        )
-        stacked = inner.fit(nodes, np.tensordot(lpv.basis(nodes), stacked, axes=1))
-    power = Polynomial(lpv.basis.degree, -1.0, 1.0).to_monomial(stacked)
-    coefficients = {(i,): M for i, M in enumerate(power)}
-    return _chains(coefficients, (lpv.scheduling,), lpv.states, lpv.inputs, lpv.outputs, lpv.dt)
+    stacked, basis = np.block([[lpv.A, lpv.B], [lpv.C, lpv.D]]), lpv.basis
+    if basis.ranges != lpv.box:
+        nodes = interpolation_points(degrees, lpv.box)
+        stacked = np.tensordot(basis(nodes), stacked, axes=1)
+        basis = polynomials(degrees, lpv.box)
+        stacked = basis.fit(nodes, stacked)
+    monomials = scaled_powers(basis, stacked)
+    constant = (0,) * len(degrees)
+    kept = {e: M for e, M in monomials.items() if e == constant or len(degrees) == 1 or np.any(M)}
+    return _chains(kept, lpv.parameters, lpv.states, lpv.inputs, lpv.outputs, lpv.dt)
 
 
 def from_monomials(
@@ -52,52 +61,16 @@ def from_monomials(
 ) -> LFT:
     """See `LFT.polynomial`."""
     parameters = tuple(parameters)
-    given = {
-        name: _coefficients(name, M, len(parameters))
-        for name, M in (("A", A), ("B", B), ("C", C), ("D", D))
-    }
-    (nx, _), (_, nu), (ny, _) = given["A"][0], given["B"][0], given["C"][0]
-    for name, shape in (("A", (nx, nx)), ("B", (nx, nu)), ("C", (ny, nx)), ("D", (ny, nu))):
-        if given[name][0] != shape:
-            raise InputError(f"{name}: expected matrices of shape {shape}, got {given[name][0]}")
-    zero = {name: np.zeros(shape) for name, (shape, _) in given.items()}
-    whole = {}
-    for exponents in sorted({e for _, matrices in given.values() for e in matrices}):
-        M = {name: matrices.get(exponents, zero[name]) for name, (_, matrices) in given.items()}
-        whole[exponents] = np.block([[M["A"], M["B"]], [M["C"], M["D"]]])
+    whole, nx = as_blocks(A, B, C, D, count=len(parameters))
+    rows, columns = next(iter(whole.values())).shape
     return _chains(
         recentred(whole, [centre(s.low, s.high) for s in parameters]),
         parameters,
         signals(states or [f"x{i + 1}" for i in range(nx)]),
-        signals(inputs or [f"u{i + 1}" for i in range(nu)]),
-        signals(outputs or [f"y{i + 1}" for i in range(ny)]),
+        signals(inputs or [f"u{i + 1}" for i in range(columns - nx)]),
+        signals(outputs or [f"y{i + 1}" for i in range(rows - nx)]),
         dt,
     )
-
-
-def _coefficients(
-    name: str, matrices: Mapping[Any, Any], count: int
-) -> tuple[tuple[int, int], dict[tuple[int, ...], Array]]:
-    """(shape, {exponents: matrix}) after checking both."""
-    if not isinstance(matrices, Mapping) or not matrices:
-        raise InputError(
-            f"{name}: expected {{exponents: matrix}} with at least one entry, such as"
-            f" {{{(0,) * count}: {name}0}}"
-        )
-    out = {}
-    for key, M in matrices.items():
-        exponents = tuple(key) if isinstance(key, tuple | list) else (key,)
-        if len(exponents) != count or any(int(e) != e or e < 0 for e in exponents):
-            raise InputError(
-                f"{name}: expected {count} exponent(s) >= 0, one a parameter, got {key!r}"
-            )
-        out[tuple(int(e) for e in exponents)] = frozen(M, f"{name}{exponents}", (None, None))
-    if len({M.shape for M in out.values()}) > 1:
-        raise InputError(
-            f"{name}: coefficient matrices differ in shape:"
-            f" {', '.join(str(M.shape) for M in out.values())}"
-        )
-    return next(iter(out.values())).shape, out  # type: ignore[return-value]
 
 
 def _chains(
@@ -216,47 +189,39 @@ def _times_delta(word: Mapping[tuple[int, ...], Array], lft: LFT) -> dict[tuple[
     return out
 
 
-def to_lpv(lft: LFT, degree: int | None) -> LPVStateSpace:
+def to_lpv(lft: LFT, degree: int | Sequence[int] | None) -> LPVStateSpace:
     """See `LFT.to_lpv`."""
-    s, nx = lft.scheduling, len(lft.states)
+    nx, box = len(lft.states), [(s.low, s.high) for s in lft.parameters]
     terms = expanded(lft)
-    exact = (
-        None
-        if terms is None
-        else [terms.get((i,), np.zeros_like(lft.M22)) for i in range(max(terms)[0] + 1)]
-    )
-    if exact is None and degree is None:
+    found = None if terms is None else [max(column) for column in zip(*terms, strict=True)]
+    wanted = found if degree is None else np.broadcast_to(degree, len(box)).tolist()
+    if wanted is None:
         raise InputError(
-            "this LFT depends on its parameter rationally; to_lpv(degree=...) fits polynomials and"
+            "this LFT depends on its parameters rationally; to_lpv(degree=...) fits polynomials and"
             " reports the misfit"
         )
-    if degree is not None and exact is not None and degree < len(exact) - 1:
-        exact = None
-    if exact is not None:
-        degree = len(exact) - 1 if degree is None else degree
-        M = Polynomial(degree, -1.0, 1.0).from_monomial(np.stack(exact))
-        misfit = None
+    misfit = None
+    if found is not None and all(a <= b for a, b in zip(found, wanted, strict=True)):
+        padded = {tuple(wanted): np.zeros_like(lft.M22), **(terms or {})}
+        basis, M = coefficients_of(padded, box)
     else:
-        assert degree is not None  # noqa: S101 - refused above
-        basis = Polynomial(degree, s.low, s.high)
-        nodes = s.middle + s.radius * np.cos(
-            np.pi * (np.arange(8 * (degree + 1)) + 0.5) / (8 * (degree + 1))
-        )
-        values = lft.matrix(s.normalised(nodes)[:, None])
+        basis = polynomials(wanted, box)
+        nodes = interpolation_points([8 * (d + 1) - 1 for d in wanted], box)
+        columns = nodes[:, None] if len(box) == 1 else nodes
+        delta = [s.normalised(columns[:, i]) for i, s in enumerate(lft.parameters)]
+        values = lft.matrix(np.stack(delta, axis=-1))
         M = basis.fit(nodes, values)
         wrong = np.tensordot(basis(nodes), M, axes=1) - values
         misfit = Residuals(
             nodes, wrong[:, :nx, :nx], wrong[:, :nx, nx:], wrong[:, nx:, :nx], wrong[:, nx:, nx:]
         )
-    # the orthonormal polynomials over [-1, 1] in delta are those over [low, high] in p
-    basis = Polynomial(degree, s.low, s.high)
     return LPVStateSpace(
         basis,
         M[:, :nx, :nx],
         M[:, :nx, nx:],
         M[:, nx:, :nx],
         M[:, nx:, nx:],
-        s,
+        lft.parameters,
         lft.states,
         lft.inputs,
         lft.outputs,
