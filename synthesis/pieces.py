@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Basis, LPVStateSpace, Piece
+from symheli.lpv import FunctionSpace, LPVStateSpace, Piece
 from synthesis.bernstein import restriction
 
 Array = np.ndarray
@@ -56,11 +56,11 @@ def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
     s = lpv.scheduling
     return tuple(
         ModelPiece(a, b, *(_coefficients(M, functions) for M in (lpv.A, lpv.B, lpv.C, lpv.D)))
-        for a, b, functions in function_pieces(lpv.basis, s.low, s.high)  # type: ignore[arg-type]
+        for a, b, functions in function_pieces(lpv.basis, s.low, s.high)
     )
 
 
-def function_pieces(basis: Basis, low: float, high: float) -> tuple[Piece, ...]:
+def function_pieces(basis: FunctionSpace, low: float, high: float) -> tuple[Piece, ...]:
     """The pieces of the functions of a basis between `low` and `high`."""
     slack = 1e-9 * (high - low)
     out = []

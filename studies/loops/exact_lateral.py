@@ -111,7 +111,7 @@ class ExactLateral:
         A, B, C, D = (
             self.basis.fit(family.airspeeds, M) for M in (family.A, family.B, family.C, family.D)
         )
-        scheduling = Scheduling("airspeed", "m/s", self.basis.low, self.basis.high)
+        scheduling = (Scheduling("airspeed", "m/s", self.basis.low, self.basis.high),)
         return close(
             LPVStateSpace(
                 self.basis, A, B, C, D, scheduling, family.states, family.inputs, family.outputs, dt

@@ -166,7 +166,7 @@ def worst_moving(
         return best
     budget, lines = (
         Budget(search.seconds),
-        [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.rate > 0],
+        [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.limit > 0],
     )
     for k, (line, back) in enumerate(lines):
         if budget.over:

@@ -83,7 +83,9 @@ def test_the_gain_does_not_depend_on_the_unit_of_time():
     lpv = random_stable(5, rate=0.3)
     s = lpv.scheduling
     # milliseconds instead of seconds
-    other = replace(lpv, A=lpv.A * 1e-3, B=lpv.B * 1e-3, scheduling=replace(s, rate=s.rate * 1e-3))
+    other = replace(
+        lpv, A=lpv.A * 1e-3, B=lpv.B * 1e-3, parameters=(replace(s, rate=s.rate * 1e-3),)
+    )
     a, b = (l2_gain(model, relaxation=COARSE, search=None).gamma for model in (lpv, other))
     assert b == pytest.approx(a, rel=1e-4)
 

@@ -3,7 +3,6 @@ case known in closed form.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -122,7 +121,7 @@ def test_the_search_finds_more_than_the_waves_it_starts_from():
     search = Search(
         levels=6, dwells=5, starts=1, nodes=40, evaluations=15, steps=80, samples=20_000
     )
-    lpv = replace(lateral(), scheduling=lateral().scheduling.with_rate(3.0))
+    lpv = lateral().with_rate(3.0)
     hunt = _Hunt(lpv, 3.0, search)
     waves = max(
         gain

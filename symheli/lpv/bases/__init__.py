@@ -1,8 +1,8 @@
 """Families of functions of the scheduling parameters."""
 
-from symheli.lpv.bases.basis import Basis, Piece
+from symheli.lpv.bases.basis import Basis
 from symheli.lpv.bases.bspline import BSpline
-from symheli.lpv.bases.function_space import FunctionSpace
+from symheli.lpv.bases.function_space import FunctionSpace, Piece
 from symheli.lpv.bases.interpolating import PiecewiseLinear, Spline
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.product import Product

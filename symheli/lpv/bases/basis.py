@@ -4,23 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.bases.function_space import FunctionSpace, Range
+from symheli.lpv.bases.function_space import FunctionSpace, Piece, Range
 from symheli.values.arrays import Array
-
-
-class Piece(NamedTuple):
-    """One polynomial piece of a basis: on [low, high], f_j(p) = sum_i bernstein[j, i] B_i(x), x =
-    (p-low)/(high-low).
-    """
-
-    low: float
-    high: float
-    bernstein: Array
 
 
 class Basis(FunctionSpace):

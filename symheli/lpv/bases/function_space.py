@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,16 @@ from symheli.values.arrays import Array, frozen
 Range = tuple[float, float]
 Order = int | tuple[int, ...]
 """How often a function is differentiated: a number, or one for each of several parameters."""
+
+
+class Piece(NamedTuple):
+    """One polynomial piece of a basis: on [low, high], f_j(p) = sum_i bernstein[j, i] B_i(x), x =
+    (p-low)/(high-low).
+    """
+
+    low: float
+    high: float
+    bernstein: Array
 
 
 class FunctionSpace(ABC):
@@ -65,6 +75,12 @@ class FunctionSpace(ABC):
         """Points (K,) or (K, d) of the box, or of smaller `ranges`, at which combinations of the
         functions that differ there can be told apart.
         """
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """The polynomial pieces of the functions of one parameter, in order of p; `InputError`
+        where they are not piecewise polynomial, or of several parameters.
+        """
+        raise InputError(f"{type(self).__name__} has no pieces over one parameter")
 
     def gradient(self, p: object) -> Array:
         """Slopes of the functions by each parameter, (..., d, n), per unit of it."""

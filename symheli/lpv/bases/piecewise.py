@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PPoly
 
-from symheli.lpv.bases.basis import Basis, Piece
+from symheli.lpv.bases.basis import Basis
+from symheli.lpv.bases.function_space import Piece
 from symheli.values.arrays import Array
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from symheli.errors import InputError, PrecisionWarning, UnknownNameError
-from symheli.lpv.bases.basis import Basis, Piece, check_range
+from symheli.lpv.bases.basis import Basis, check_range
+from symheli.lpv.bases.function_space import Piece
 from symheli.lpv.recentred import centre, recentred
 from symheli.values.arrays import Array, frozen
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.bases.basis import Basis, Piece
-from symheli.lpv.bases.function_space import FunctionSpace
+from symheli.lpv.bases.basis import Basis
+from symheli.lpv.bases.function_space import FunctionSpace, Piece
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.polynomials import factors_of, interpolation_points
 from symheli.values.arrays import Array
@@ -66,7 +66,7 @@ class Restricted(Basis):
         for a, b, factor in zip(self.start, self.end, factors_of(self.basis), strict=True):
             if a == b:
                 continue
-            found = factor.pieces()  # type: ignore[attr-defined]
+            found = factor.pieces()
             degree += max(piece.bernstein.shape[1] - 1 for piece in found)
             crossings = [2 * (piece.low - a) / (b - a) - 1 for piece in found[1:]]
             cuts |= {s for s in crossings if -1 + 1e-9 < s < 1 - 1e-9}

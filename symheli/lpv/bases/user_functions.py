@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv.bases.basis import Basis, Piece, check_range
+from symheli.lpv.bases.basis import Basis, check_range
+from symheli.lpv.bases.function_space import Piece
 from symheli.values.arrays import Array
 
 
