@@ -9,12 +9,12 @@ import pytest
 from models import lag, random_stable
 
 from synthesis import SplineLyapunov
-from synthesis.bernstein import blossom, composition, elevate, multiply, restriction
-from synthesis.cells import strips
-from synthesis.claim import Claim, lmi_polynomials
-from synthesis.lyapunov import graded_knots
-from synthesis.pieces import model_pieces
-from synthesis.symmetric import smat, svec
+from synthesis.lyapunov.spline import graded_knots
+from synthesis.polynomial.bernstein import blossom, composition, elevate, multiply, restriction
+from synthesis.polynomial.cells import strips
+from synthesis.polynomial.pieces import model_pieces
+from synthesis.polynomial.symmetric import smat, svec
+from synthesis.proof.claim import Claim, lmi_polynomials
 
 
 def value(F, x, s=0.0):

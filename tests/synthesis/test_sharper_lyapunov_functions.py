@@ -27,13 +27,12 @@ from synthesis import (
     lower_bound,
     stability,
 )
-from synthesis.bernstein import blossom
-from synthesis.claim import Claim, lmi_polynomials
+from synthesis.analysis.one_parameter import prove
 from synthesis.forms import scaled_problem
-from synthesis.lag import LagRegion
-from synthesis.pieces import model_pieces
-from synthesis.proof_search import prove
-from synthesis.symmetric_power import (
+from synthesis.lyapunov.lag import LagRegion
+from synthesis.polynomial.bernstein import blossom
+from synthesis.polynomial.pieces import model_pieces
+from synthesis.polynomial.symmetric_power import (
     generator,
     monomials,
     null_matrix,
@@ -41,6 +40,7 @@ from synthesis.symmetric_power import (
     null_weights,
     power,
 )
+from synthesis.proof.claim import Claim, lmi_polynomials
 
 MEMORY = Relaxation(segments=(8,), degree=2, grading=1.0, memory=1.5, memory_segments=2)
 QUARTIC = Relaxation(segments=(4,), order=2)
@@ -263,7 +263,7 @@ def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(
 ):
     # the function of that name hides the module
     for work in ("frozen_gain", "least_damped"):
-        monkeypatch.setattr(sys.modules["synthesis.l2_gain"], work, None)
+        monkeypatch.setattr(sys.modules["synthesis.analysis.l2_gain"], work, None)
     sampled = spring().discretize(0.1)
     for analysis in (l2_gain, stability):
         with pytest.raises(
