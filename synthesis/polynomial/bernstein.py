@@ -1,11 +1,10 @@
-"""Polynomials in Bernstein form on an interval: products, restriction, elevation, in any
-arithmetic.
+"""The linear maps between Bernstein coefficients on an interval: blossoms, restriction,
+composition, products, elevation, in any arithmetic.
 
-A matrix polynomial of degrees (a, b) in two variables x, s in [0, 1] is an array (a + 1, b + 1, n,
-m) of its Bernstein coefficients; one variable is b = 0. A polynomial lies in the convex hull of its
-coefficients, so definite coefficients mean a definite polynomial on the whole interval. Every
-function takes floats and exact rationals (NumPy object arrays) alike. Source: Farouki, "The
-Bernstein polynomial basis: a centennial retrospective" (2012).
+A polynomial lies in the convex hull of its coefficients, so definite coefficients mean a definite
+polynomial on the whole interval; `PolynomialMatrix` is the type made of them. Floats and exact
+rationals (NumPy object arrays) alike. Source: Farouki, "The Bernstein polynomial basis: a
+centennial retrospective" (2012).
 """
 
 from __future__ import annotations
@@ -58,59 +57,6 @@ def composition(degree: int, corners: Sequence[Sequence[Any]]) -> Array:
             for i in range(degree + 1)
         ]
     )
-
-
-def binomials(degrees: Sequence[int]) -> Array:
-    """C(a, i) C(b, k) as an array (a + 1, b + 1, 1, 1)."""
-    a, b = degrees
-    return np.array(
-        [[comb(a, i) * comb(b, k) for k in range(b + 1)] for i in range(a + 1)], dtype=object
-    )[:, :, None, None]
-
-
-def _weighted(F: Array) -> Array:
-    weights = binomials((F.shape[0] - 1, F.shape[1] - 1))
-    return F * (weights if F.dtype == object else weights.astype(float))
-
-
-def _unweighted(F: Array) -> Array:
-    weights = binomials((F.shape[0] - 1, F.shape[1] - 1))
-    return (
-        np.asarray(_exact_quotient(F, weights)) if F.dtype == object else F / weights.astype(float)
-    )
-
-
-# the integer 0 of an empty sum must not become the float 0.0
-_exact_quotient = np.frompyfunc(
-    lambda numerator, weight: numerator if numerator == 0 else numerator / weight, 2, 1
-)
-
-
-def multiply(F: Array, G: Array) -> Array:
-    """Coefficients of the matrix product F G; degrees add."""
-    Fw, Gw = _weighted(F), _weighted(G)
-    shape = (F.shape[0] + G.shape[0] - 1, F.shape[1] + G.shape[1] - 1, F.shape[2], G.shape[3])
-    out = np.zeros(shape, dtype=Fw.dtype)
-    for i, k in np.ndindex(F.shape[:2]):
-        out[i : i + G.shape[0], k : k + G.shape[1]] += Fw[i, k] @ Gw
-    return _unweighted(out)
-
-
-def elevate(F: Array, degrees: Sequence[int]) -> Array:
-    """The same polynomial with coefficients of these higher degrees."""
-    extra = (degrees[0] - F.shape[0] + 1, degrees[1] - F.shape[1] + 1)
-    if extra == (0, 0):
-        return F
-    Fw, ones = _weighted(F), binomials(extra)
-    out = np.zeros((degrees[0] + 1, degrees[1] + 1, *F.shape[2:]), dtype=F.dtype)
-    for i, k in np.ndindex(ones.shape[:2]):
-        out[i : i + F.shape[0], k : k + F.shape[1]] += int(ones[i, k, 0, 0]) * Fw
-    return _unweighted(out)
-
-
-def transpose(F: Array) -> Array:
-    """F(x, s)' coefficient by coefficient."""
-    return np.swapaxes(F, -1, -2)
 
 
 def product_weights(a: int, b: int) -> Array:

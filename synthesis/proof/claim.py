@@ -15,22 +15,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
-from synthesis.polynomial.bernstein import composition, elevate, multiply, restriction, transpose
+from synthesis.polynomial.bernstein import composition, restriction
 from synthesis.polynomial.cells import Cell, Strip, cells, strips
 from synthesis.polynomial.exact import Number, exact
+from synthesis.polynomial.matrix import PolynomialMatrix, block
 from synthesis.polynomial.pieces import ModelPiece
 from synthesis.polynomial.symmetric_power import generator, null_matrix
 
 Array = np.ndarray
+UNIT = ((0, 1), (0, 1))
+"""The box of the two local variables."""
 
 
 class Form(NamedTuple):
-    """Bernstein coefficients (a + 1, b + 1, N, N) of a block with g = 0, and those of the positive
-    weight of g, (a + 1, b + 1).
+    """A block with g = 0, and the positive weight of g, (1, 1): polynomials in two local variables,
+    along p and across.
     """
 
-    block: Array
-    weight: Array
+    block: PolynomialMatrix
+    weight: PolynomialMatrix
 
 
 class Claim(NamedTuple):
@@ -78,112 +81,104 @@ def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
         if P.slack is None
         else null_matrix(exact(P.slack, number), claim.pieces[0].A.shape[1], P.order)
     )
-    for block, weight in _polynomials(claim, number):
-        degrees = (block.shape[0] - 1 + claim.elevation, block.shape[1] - 1)
-        block = elevate(block, degrees)
+    for F, weight in _polynomials(claim, number):
+        degrees = (F.degrees[0] + claim.elevation, F.degrees[1])
+        F = F.elevate(degrees)
         if slack is not None:
-            own = slack[used : used + len(block)]
+            c = F.coefficients
+            own = slack[used : used + len(c)]
             # where P carries too little of it the blocks stand as they are
-            block, used = (
-                np.concatenate([block[: len(own)] + own[:, None], block[len(own) :]]),
+            c, used = (
+                np.concatenate([c[: len(own)] + own[:, None], c[len(own) :]]),
                 used + len(own),
             )
-        yield Form(block, elevate(weight[..., None, None], degrees)[..., 0, 0])
+            F = _local(c)
+        yield Form(F, weight.elevate(degrees))
 
 
-def _polynomials(claim: Claim, number: Number) -> Iterator[tuple[Array, Array]]:
+def _polynomials(
+    claim: Claim, number: Number
+) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
     pieces, P, rate, dt, _ = claim
     assert claim.meaningful  # noqa: S101 - checked by the callers
-    one = np.array([[number(1.0)]])
+    one = PolynomialMatrix.constant(np.array([[number(1.0)]]), UNIT)
     if isinstance(P, MemoryLyapunov):
         for cell in cells(pieces, P.knots):
             yield from _remembering(cell, P, rate, number)
     elif dt is None:
         for cell in cells(pieces, P.knots):
-            yield from ((block, one) for block in _continuous(cell, P, rate, number))
+            yield from ((F, one) for F in _continuous(cell, P, rate, number))
     else:
         step = rate * dt if P.degree else 0.0
         for strip in strips(pieces, P.knots, step):
             yield _discrete(strip, P, number), one
 
 
-def _continuous(cell: Cell, P: SplineLyapunov, rate: float, number: Number) -> Iterator[Array]:
+def _continuous(
+    cell: Cell, P: SplineLyapunov, rate: float, number: Number
+) -> Iterator[PolynomialMatrix]:
     A, B, C, D = _model(cell, number, P.order)
-    a, b, width = _local(cell.low, cell.high, P.knots, cell.segment, number)
-    Pc = _apply(restriction(P.degree, a, b), exact(P.segment(cell.segment), number))[:, None]
-    still = multiply(transpose(A), Pc)
-    still, side = (
-        [still, transpose(still), multiply(transpose(C), C)],
-        [multiply(Pc, B), multiply(transpose(C), D)],
-    )
-    corner = [multiply(transpose(D), D)]
+    here, span = _now(cell, P, number)
+    flow = A.T @ here
+    top, side, corner = flow + flow.T + C.T @ C, here @ B + C.T @ D, D.T @ D
     if P.degree == 0 or rate == 0:
-        yield _stack(still, side, corner)
+        yield block([[top, side], [side.T, corner]])
         return
-    slope = P.degree * (Pc[1:] - Pc[:-1]) / ((b - a) * width)
+    slope = here.derivative(0) * (number(1.0) / span)
     for nu in (-number(rate), number(rate)):
-        yield _stack([*still, nu * slope], side, corner)
+        yield block([[top + nu * slope, side], [side.T, corner]])
 
 
 def _remembering(
     cell: Cell, P: MemoryLyapunov, rate: float, number: Number
-) -> Iterator[tuple[Array, Array]]:
+) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
     """Blocks times height(p) = upper - lower, in (x, y): along the cell, and across one segment of
     the lead.
     """
     A, B, C, D = _model(cell, number, 1)
-    a, b, width = _local(cell.low, cell.high, P.knots, cell.segment, number)
+    a, b, width = _within(cell, P.knots, number)
     j, region = cell.segment, P.region
     low, high = (
         [number(float(v[j])) + t * (number(float(v[j + 1])) - number(float(v[j]))) for t in (a, b)]
         for v in (region.lower, region.upper)
     )
-    lower, height = (
-        np.array(low)[:, None],
-        np.array([u - v for u, v in zip(high, low, strict=True)])[:, None],
-    )
     span = (b - a) * width
-    rise, widening = (low[1] - low[0]) / span, (height[1, 0] - height[0, 0]) / span
-    outer = [
-        _scaled(height, F)
-        for F in (multiply(transpose(C), C), multiply(transpose(C), D), multiply(transpose(D), D))
-    ]
+    lower, height = _scalar(np.array(low)[:, None]), _scalar(np.subtract(high, low)[:, None])
+    rise, widening = (low[1] - low[0]) / span, (high[1] - low[1] - high[0] + low[0]) / span
+    outer = [_times(height, F) for F in (C.T @ C, C.T @ D, D.T @ D)]
     for i, ends in enumerate(pairwise(P.lead_knots)):
         share = np.array([[number(float(s)) for s in ends]])
         patch = exact(P.patch(j, i), number)
-        here = _apply(restriction(P.degree, a, b), patch)
-        still = _scaled(height, multiply(transpose(A), here))
-        in_p = _scaled(height, P.degree * (here[1:] - here[:-1]) / span)
-        in_share = P.lead_degree * (here[:, 1:] - here[:, :-1]) / (share[0, 1] - share[0, 0])
-        lead = lower + height * share
+        here = _local(_apply(restriction(P.degree, a, b), patch))
+        flow = _times(height, A.T @ here)
+        in_p = _times(height, here.derivative(0)) * (number(1.0) / span)
+        in_share = here.derivative(1) * (number(1.0) / (share[0, 1] - share[0, 0]))
+        lead = lower + height @ _scalar(share)
+        side = _times(height, here @ B) + outer[1]
         for nu in (-number(rate), number(rate)):
-            drift = nu * (1 - rise - widening * share) - lead / number(region.time)
-            top = [still, transpose(still), outer[0], nu * in_p, _scaled(drift, in_share)]
-            block = _stack(top, [_scaled(height, multiply(here, B)), outer[1]], [outer[2]])
-            degrees = (block.shape[0] - 1, block.shape[1] - 1)
-            yield block, elevate(height[..., None, None], degrees)[..., 0, 0]
+            drift = _scalar(nu * (1 - rise - widening * share)) - lead * (
+                number(1.0) / number(region.time)
+            )
+            top = flow + flow.T + outer[0] + nu * in_p + _times(drift, in_share)
+            yield block([[top, side], [side.T, outer[2]]]), height
 
 
-def _discrete(strip: Strip, P: SplineLyapunov, number: Number) -> Array:
-    cell = strip.cell
-    A, B, C, D = _model(cell, number, 1)
-    a, b, _ = _local(cell.low, cell.high, P.knots, cell.segment, number)
-    now = _apply(restriction(P.degree, a, b), exact(P.segment(cell.segment), number))[:, None]
+def _discrete(strip: Strip, P: SplineLyapunov, number: Number) -> PolynomialMatrix:
+    A, B, C, D = _model(strip.cell, number, 1)
+    here, _ = _now(strip.cell, P, number)
     bottom, top = (
         number(float(P.knots[strip.next_segment])),
         number(float(P.knots[strip.next_segment + 1])),
     )
     corners = [[(number(q) - bottom) / (top - bottom) for q in pair] for pair in strip.corners]
-    after = _apply(composition(P.degree, corners), exact(P.segment(strip.next_segment), number))
-    left_A, left_B = multiply(transpose(A), after), multiply(transpose(B), after)
-    return _stack(
-        [multiply(left_A, A), -now, multiply(transpose(C), C)],
-        [multiply(left_A, B), multiply(transpose(C), D)],
-        [multiply(left_B, B), multiply(transpose(D), D)],
-    )
+    there = exact(P.segment(strip.next_segment), number)
+    after = _local(_apply(composition(P.degree, corners), there))
+    left_A, left_B = A.T @ after, B.T @ after
+    state, side = left_A @ A - here + C.T @ C, left_A @ B + C.T @ D
+    return block([[state, side], [side.T, left_B @ B + D.T @ D]])
 
 
-def _model(cell: Cell, number: Number, order: int) -> list[Array]:
+def _model(cell: Cell, number: Number, order: int) -> list[PolynomialMatrix]:
     """A, B, C, D over the cell; for `order` > 1 the generator of the monomials, and no channels."""
     low, high = number(cell.piece.low), number(cell.piece.high)
     a, b = (number(cell.low) - low) / (high - low), (number(cell.high) - low) / (high - low)
@@ -197,16 +192,22 @@ def _model(cell: Cell, number: Number, order: int) -> list[Array]:
             np.zeros((1, N, 0), dtype=coefficients[0].dtype),
             np.zeros((1, 0, N), dtype=coefficients[0].dtype),
         ]
-    return [_apply(restriction(len(M) - 1, a, b), M)[:, None] for M in coefficients]
+    return [_local(_apply(restriction(len(M) - 1, a, b), M)[:, None]) for M in coefficients]
 
 
-def _local(
-    low: float, high: float, knots: Array, segment: int, number: Number
-) -> tuple[Any, Any, Any]:
-    bottom, top = number(float(knots[segment])), number(float(knots[segment + 1]))
+def _now(cell: Cell, P: SplineLyapunov, number: Number) -> tuple[PolynomialMatrix, Any]:
+    """P over the cell, and how wide that is."""
+    a, b, width = _within(cell, P.knots, number)
+    own = _apply(restriction(P.degree, a, b), exact(P.segment(cell.segment), number))
+    return _local(own[:, None]), (b - a) * width
+
+
+def _within(cell: Cell, knots: Array, number: Number) -> tuple[Any, Any, Any]:
+    """The cell's ends as fractions of its segment, and the segment's width."""
+    bottom, top = number(float(knots[cell.segment])), number(float(knots[cell.segment + 1]))
     return (
-        (number(low) - bottom) / (top - bottom),
-        (number(high) - bottom) / (top - bottom),
+        (number(cell.low) - bottom) / (top - bottom),
+        (number(cell.high) - bottom) / (top - bottom),
         top - bottom,
     )
 
@@ -219,18 +220,14 @@ def _apply(weights: Array, coefficients: Array) -> Array:
     )
 
 
-def _scaled(f: Array, F: Array) -> Array:
-    """f F for a scalar polynomial f (a + 1, b + 1)."""
-    return multiply(f[..., None, None] * np.eye(F.shape[2], dtype=int), F)
+def _local(coefficients: Array) -> PolynomialMatrix:
+    return PolynomialMatrix(UNIT, coefficients)
 
 
-def _stack(top: list[Array], side: list[Array], corner: list[Array]) -> Array:
-    every = [*top, *side, *corner]
-    degrees = (max(F.shape[0] for F in every) - 1, max(F.shape[1] for F in every) - 1)
-    sums = [
-        sum((elevate(F, degrees) for F in part[1:]), elevate(part[0], degrees))
-        for part in (top, side, corner)
-    ]
-    upper = np.concatenate([sums[0], sums[1]], axis=-1)
-    lower = np.concatenate([transpose(sums[1]), sums[2]], axis=-1)
-    return np.concatenate([upper, lower], axis=-2)
+def _scalar(values: Array) -> PolynomialMatrix:
+    return _local(values[..., None, None])
+
+
+def _times(f: PolynomialMatrix, F: PolynomialMatrix) -> PolynomialMatrix:
+    """f F for a scalar polynomial f."""
+    return _local(f.coefficients * np.eye(F.shape[0], dtype=int)) @ F

@@ -12,7 +12,6 @@ import numpy as np
 from symheli.lpv import LPVStateSpace, Matrices
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.polynomial import structure
-from synthesis.polynomial.bernstein import transpose
 from synthesis.polynomial.exact import Number, positive_definite, rational
 from synthesis.polynomial.pieces import ModelPiece, model_pieces, same_pieces
 from synthesis.polynomial.symmetric import extended, symmetrized
@@ -52,7 +51,7 @@ def examine(claim: Claim, weight: Array) -> Findings:
     conditioning = float(np.max(values[:, -1] / values[:, 0])) if positive else math.inf
     decreasing, g = True, 0.0
     for form in lmi_polynomials(claim, float):
-        F = form.block.reshape(-1, *form.block.shape[-2:])
+        F = form.block.coefficients.reshape(-1, *form.block.shape)
         if len(weight) == n:
             W = extended(weight, F.shape[1] - n)
             F = symmetrized(W.T @ F @ W)
@@ -66,7 +65,10 @@ def examine(claim: Claim, weight: Array) -> Findings:
         if F.shape[1] > n:
             side, corner = F[:, :n, n:], F[:, n:, n:]
             schur = corner - np.swapaxes(side, 1, 2) @ np.linalg.solve(top, side)
-            g = max(g, float((np.linalg.eigvalsh(schur)[:, -1] / form.weight.ravel()).max()))
+            g = max(
+                g,
+                float((np.linalg.eigvalsh(schur)[:, -1] / form.weight.coefficients.ravel()).max()),
+            )
     return Findings(positive, decreasing, g, conditioning)
 
 
@@ -110,22 +112,22 @@ def _holds_in_p(
     if lpv.dt is None:
         slopes = [nu * P.derivative(grid) for nu in ((-rate, rate) if moving else (0.0,))]
         moves = [
-            state.T @ now @ M + transpose(M) @ now @ state + state.T @ slope @ state
+            state.T @ now @ M + np.swapaxes(M, -1, -2) @ now @ state + state.T @ slope @ state
             for slope in slopes
         ]
     else:
         step = min(rate * lpv.dt, high - low) if moving else 0.0
         after = [P.at(np.clip(grid + side, low, high)) for side in (-step, 0.0, step)]
-        moves = [transpose(M) @ Q @ M - state.T @ now @ state for Q in after]
+        moves = [np.swapaxes(M, -1, -2) @ Q @ M - state.T @ now @ state for Q in after]
     whole = np.block([[transform, widen], [widen.T, np.eye(B.shape[2])]])
     for move in moves:
         F = (
             move
             if math.isnan(gamma)
-            else move + transpose(outer) @ outer - gamma**2 * inputs.T @ inputs
+            else move + np.swapaxes(outer, -1, -2) @ outer - gamma**2 * inputs.T @ inputs
         )
         F = whole.T @ F @ whole
-        if np.linalg.eigvalsh(0.5 * (F + transpose(F))).max() >= 0:
+        if np.linalg.eigvalsh(0.5 * (F + np.swapaxes(F, -1, -2))).max() >= 0:
             return False
     return True
 
@@ -207,7 +209,9 @@ def proven(claim: Claim, gamma: float) -> bool:
             return False
     g = None if math.isnan(gamma) else number(gamma) * number(gamma)
     for block, weight in lmi_polynomials(claim, number):
-        for F, factor in zip(block.reshape(-1, *block.shape[-2:]), weight.ravel(), strict=True):
+        for F, factor in zip(
+            block.coefficients.reshape(-1, *block.shape), weight.coefficients.ravel(), strict=True
+        ):
             M = -F
             if g is None:
                 M = M[:n, :n]

@@ -134,8 +134,8 @@ def test_memory_polynomials_are_the_lmi_at_every_point():
     for form, nu in zip(forms[6:], (-rate, rate), strict=True):
         top = A.T @ value + value @ A + nu * in_p + (nu - e / 0.4) * in_e
         expected = np.block([[top, value @ B], [B.T @ value, np.zeros((2, 2))]]) + Y.T @ Y
-        assert np.allclose(polynomial(form.block), height * expected, atol=1e-10)
-        assert polynomial(form.weight) == pytest.approx(height)
+        assert np.allclose(polynomial(form.block.coefficients), height * expected, atol=1e-10)
+        assert polynomial(form.weight.coefficients) == pytest.approx(height)
 
 
 def test_higher_degrees_close_in_on_the_damping_that_a_jumping_spring_needs():
