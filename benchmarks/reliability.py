@@ -23,8 +23,8 @@ import numpy as np
 from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.lpv.exponential import expm
 from synthesis import Relaxation, Solver, l2_gain, lft_gain, stability
+from synthesis.analysis.one_parameter import prove
 from synthesis.forms import scaled_problem
-from synthesis.proof_search import prove
 
 ROUTES = (
     "stability by splines",

@@ -4,29 +4,26 @@ after the solver.
 No solver is loaded by importing this package.
 """
 
+from synthesis.analysis.decay_rate import decay_rate
+from synthesis.analysis.generalized_h2 import generalized_h2
+from synthesis.analysis.l2_gain import l2_gain, stability
 from synthesis.certificate import Attempt, Certificate
-from synthesis.cone_program import Solver, installed_solvers
-from synthesis.decay_rate import decay_rate
 from synthesis.forms import Relaxation
-from synthesis.frozen import FrozenGain, frozen_gain
-from synthesis.generalized_h2 import generalized_h2
-from synthesis.handling_qualities import Bandwidth, bandwidth
-from synthesis.l2_gain import l2_gain, stability
-from synthesis.lft import (
-    SCALINGS,
-    BoxGain,
-    LFTCertificate,
-    Multiplier,
-    Trial,
-    frozen_box_gain,
-    lft_gain,
-    lft_stability,
-)
-from synthesis.lower_bound import LowerBound, Search, lower_bound
-from synthesis.lyapunov import MemoryLyapunov, SplineLyapunov
-from synthesis.margins import Margins, disk_margin, loop, margins
-from synthesis.polynomial import BoxCertificate, BoxLyapunov, PolynomialMatrix
-from synthesis.verdict import Seconds, Status, Trajectory, Verdict
+from synthesis.lft.bounds import BoxGain, frozen_box_gain
+from synthesis.lft.certificate import LFTCertificate, Trial
+from synthesis.lft.gain import lft_gain, lft_stability
+from synthesis.lft.multipliers import SCALINGS, Multiplier
+from synthesis.loops.handling_qualities import Bandwidth, bandwidth
+from synthesis.loops.margins import Margins, disk_margin, loop, margins
+from synthesis.lyapunov.box import BoxLyapunov
+from synthesis.lyapunov.spline import MemoryLyapunov, SplineLyapunov
+from synthesis.polynomial.certificate import BoxCertificate
+from synthesis.polynomial.matrix import PolynomialMatrix
+from synthesis.program.cone_program import Solver, installed_solvers
+from synthesis.verdict import Seconds, Status, Verdict
+from synthesis.worst.frozen import FrozenGain, frozen_gain
+from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
+from synthesis.worst.trajectory import Trajectory
 
 __all__ = [
     "SCALINGS",

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from synthesis.lyapunov import Lyapunov
+from synthesis.lyapunov.spline import Lyapunov
+from synthesis.proof.one_parameter import Evidence
 from synthesis.verdict import Verdict
-from synthesis.verify import Evidence
 
 
 class Attempt(NamedTuple):

@@ -14,16 +14,16 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LPVStateSpace
-from synthesis.bounded_real import Blocks, continuous_blocks, discrete_blocks
-from synthesis.cells import cells, strips
-from synthesis.lag import LagRegion
-from synthesis.lyapunov import Lyapunov, MemoryLyapunov, SplineLyapunov, graded_knots
-from synthesis.memory_blocks import memory_blocks
-from synthesis.pieces import ModelPiece, model_pieces
-from synthesis.scaling import Scaling, scaling
-from synthesis.symmetric import extended, length, smat, svec
-from synthesis.symmetric_power import generator, monomials, null_matrix, null_size
-from synthesis.verify import Evidence
+from synthesis.assemble.bounded_real import Blocks, continuous_blocks, discrete_blocks
+from synthesis.assemble.memory_blocks import memory_blocks
+from synthesis.lyapunov.lag import LagRegion
+from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov, graded_knots
+from synthesis.polynomial.cells import cells, strips
+from synthesis.polynomial.pieces import ModelPiece, model_pieces
+from synthesis.polynomial.symmetric import extended, length, smat, svec
+from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
+from synthesis.program.scaling import Scaling, scaling
+from synthesis.proof.one_parameter import Evidence
 
 Array = np.ndarray
 

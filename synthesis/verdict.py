@@ -14,7 +14,8 @@ from typing import Any, Literal, NamedTuple, Protocol, Self, get_args
 import numpy as np
 
 from symheli.errors import CertificateError, InputError
-from synthesis.cone_program import Answer
+from synthesis.program.cone_program import Answer
+from synthesis.worst.trajectory import Trajectory
 
 Array = np.ndarray
 Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
@@ -59,18 +60,6 @@ class Seconds(NamedTuple):
             f"build {self.build:.2f} s, solve {self.solve:.2f} s, verify {self.verify:.2f} s,"
             f" bounds {self.bounds:.2f} s"
         )
-
-
-class Trajectory(NamedTuple):
-    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines between
-    them; a jump has one time twice.
-
-    Discrete time: one p for every sample. A cycle is to be repeated. Several parameters: `p` (n,
-    m).
-    """
-
-    time: Array
-    p: Array
 
 
 class Judge(Protocol):

@@ -21,7 +21,7 @@ from symheli.lpv.bases import Polynomial
 from symheli.lpv.lpv_state_space import Matrices
 from symheli.values.arrays import Array
 from synthesis import Certificate, LFTCertificate, Relaxation, Search
-from synthesis.frozen import norm
+from synthesis.worst.frozen import norm
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
 """A disturbance of this size (rad) and an output of this size (rad/s, rad) count as 1 on the servo

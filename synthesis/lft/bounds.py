@@ -14,10 +14,10 @@ from scipy.optimize import minimize
 
 from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
-from synthesis.budget import Budget
-from synthesis.frozen import FrozenGain, norm
-from synthesis.lower_bound import LowerBound, Search, growing_trajectory, lower_bound
-from synthesis.verdict import Trajectory
+from synthesis.worst.budget import Budget
+from synthesis.worst.frozen import FrozenGain, norm
+from synthesis.worst.lower_bound import LowerBound, Search, growing_trajectory, lower_bound
+from synthesis.worst.trajectory import Trajectory
 
 Array = np.ndarray
 

@@ -9,7 +9,7 @@ from scipy import linalg
 
 from symheli.lpv import LFT, Matrices
 from symheli.lpv.lft.model import parts
-from synthesis.scaling import Scaling, model_scaling
+from synthesis.program.scaling import Scaling, model_scaling
 
 Array = np.ndarray
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT
-from synthesis.budget import said
-from synthesis.cone_program import Answer, Candidate, ConeProgram, Solver, solve
-from synthesis.hypotheses import VERIFIED
+from synthesis.analysis.hypotheses import VERIFIED
+from synthesis.analysis.one_parameter import NOTHING, inflated
 from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
 from synthesis.lft.certificate import LFTCertificate, Trial
 from synthesis.lft.coordinates import coordinates, scaled
@@ -24,11 +23,13 @@ from synthesis.lft.program import (
     with_state_channels,
 )
 from synthesis.lft.proof import Evidence, Quadratic
-from synthesis.lower_bound import THOROUGH, LowerBound, Search
-from synthesis.proof_search import NOTHING, inflated
-from synthesis.scaling import in_its_own_scale
-from synthesis.spectrum import surely_unstable
-from synthesis.verdict import Seconds, Status, Trajectory
+from synthesis.program.cone_program import Answer, Candidate, ConeProgram, Solver, solve
+from synthesis.program.scaling import in_its_own_scale
+from synthesis.verdict import Seconds, Status
+from synthesis.worst.budget import said
+from synthesis.worst.lower_bound import THOROUGH, LowerBound, Search
+from synthesis.worst.spectrum import surely_unstable
+from synthesis.worst.trajectory import Trajectory
 
 Array = np.ndarray
 

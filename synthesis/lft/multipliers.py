@@ -28,8 +28,8 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.lft.model import parts
-from synthesis import structure
-from synthesis.symmetric import basis
+from synthesis.polynomial import structure
+from synthesis.polynomial.symmetric import basis
 
 Array = np.ndarray
 

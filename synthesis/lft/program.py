@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from synthesis.cone_program import ConeProgram
 from synthesis.lft.coordinates import Loop
 from synthesis.lft.multipliers import Class
-from synthesis.symmetric import basis, extended, smat, svec
+from synthesis.polynomial.symmetric import basis, extended, smat, svec
+from synthesis.program.cone_program import ConeProgram
 
 Array = np.ndarray
 

@@ -7,21 +7,21 @@ Nothing here is shared with the assembly of the cone program: an error there can
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from symheli.lpv import LFT, Matrices
 from symheli.lpv.lft.model import parts
-from synthesis import pointwise, structure
 from synthesis.lft.coordinates import Coordinates
 from synthesis.lft.multipliers import Multiplier
-from synthesis.verify import positive_definite, rational
+from synthesis.polynomial import structure
+from synthesis.polynomial.exact import Number, exact, positive_definite, rational
+from synthesis.proof import pointwise
 
 Array = np.ndarray
-Number = Callable[[float], Any]
 
 CORNERS = 6
 """Most parameters at all of whose corners a proof is checked once more."""
@@ -110,7 +110,7 @@ class Evidence(NamedTuple):
                 F[i, i] = F[i, i] + number(gamma) * number(gamma)
         exactly = all(
             positive_definite(M)
-            for M in (_exact(proof.P, number), *_conditions(proof.multiplier, number), F)
+            for M in (exact(proof.P, number), *_conditions(proof.multiplier, number), F)
         )
         return exactly and self.witnessed(proof, gamma, number)
 
@@ -119,14 +119,14 @@ class Evidence(NamedTuple):
         model's own matrices.
         """
         g = None if math.isnan(gamma) else number(gamma) * number(gamma)
-        P, m = _exact(proof.P, number), len(self.lft.parameters)
+        P, m = exact(proof.P, number), len(self.lft.parameters)
         corners = product((-1.0, 1.0), repeat=m) if m <= CORNERS else ()
         diagonals = (np.where(np.arange(m) % 2, -t, t) for t in np.linspace(-0.9, 0.9, 7))
         for delta in (*corners, *diagonals):
             model = self.lft.at(
                 *(s.middle + d * s.radius for s, d in zip(self.lft.parameters, delta, strict=True))
             )
-            own = Matrices(*(_exact(M, number) for M in (model.A, model.B, model.C, model.D)))
+            own = Matrices(*(exact(M, number) for M in (model.A, model.B, model.C, model.D)))
             F = pointwise.dissipation(own, P, None, None if self.lft.dt is None else P, g)
             if not positive_definite(-F):
                 return False
@@ -149,14 +149,14 @@ def _left_side(lft: LFT, proof: Quadratic, number: Number) -> Array:
     """The quadratic form on (w, x, u) with gamma = 0: rows of the LFT are (z, dx/dt or x(k+1),
     y).
     """
-    M11, M12, M21, M22 = (_exact(M, number) for M in (lft.M11, lft.M12, lft.M21, lft.M22))
+    M11, M12, M21, M22 = (exact(M, number) for M in (lft.M11, lft.M12, lft.M21, lft.M22))
     n, x = lft.order, len(lft.states)
     z = np.concatenate([M11, M12], axis=1)
     below = np.concatenate([M21, M22], axis=1)
     move, y = below[:x], below[x:]
-    P = _exact(proof.P, number)
+    P = exact(proof.P, number)
     Q, S, R = (
-        _exact(M, number) for M in (proof.multiplier.Q, proof.multiplier.S, proof.multiplier.R)
+        exact(M, number) for M in (proof.multiplier.Q, proof.multiplier.S, proof.multiplier.R)
     )
     F = z.T @ R @ z + y.T @ y
     cross = S @ z
@@ -202,7 +202,7 @@ def _structure_holds(multiplier: Multiplier, lft: LFT) -> bool:
 
 def _conditions(multiplier: Multiplier, number: Number) -> Iterator[Array]:
     """What must be positive for the multiplier to hold on the whole box, given its structure."""
-    Q, S, R = (_exact(M, number) for M in (multiplier.Q, multiplier.S, multiplier.R))
+    Q, S, R = (exact(M, number) for M in (multiplier.Q, multiplier.S, multiplier.R))
     for part in parts(multiplier.sizes):
         yield -Q[part, part]
     if multiplier.scaling == "full block":
@@ -211,15 +211,6 @@ def _conditions(multiplier: Multiplier, number: Number) -> Iterator[Array]:
             signs = np.repeat([1 if corner >> i & 1 else -1 for i in range(m)], multiplier.sizes)
             turned = S * signs[:, None]
             yield Q * signs[:, None] * signs + turned + turned.T + R
-
-
-def _exact(M: Array, number: Number) -> Array:
-    if number is float:
-        return np.array(M, dtype=float)
-    out = np.empty(M.shape, dtype=object)
-    for index, value in np.ndenumerate(M):
-        out[index] = number(float(value))
-    return out
 
 
 def _negative(M: Array) -> bool:

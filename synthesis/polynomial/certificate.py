@@ -8,8 +8,8 @@ import math
 from dataclasses import dataclass, field
 
 from symheli.errors import CertificateError
-from synthesis.polynomial.lyapunov import BoxLyapunov
-from synthesis.polynomial.proof import Evidence
+from synthesis.lyapunov.box import BoxLyapunov
+from synthesis.proof.box import Evidence
 from synthesis.verdict import Verdict
 
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from synthesis.polynomial.exact import positive_definite
 from synthesis.polynomial.matrix import PolynomialMatrix
-from synthesis.verify import positive_definite
 
 Array = np.ndarray
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
-from synthesis.bernstein import blossom, elevation_matrix, restriction
+from synthesis.polynomial.bernstein import blossom, elevation_matrix, restriction
 
 Array = np.ndarray
 Box = tuple[tuple[Any, Any], ...]

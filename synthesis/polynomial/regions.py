@@ -4,146 +4,19 @@ arithmetic.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise, product
-from math import comb
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Matrices, Piece, Product, Scheduling
-from synthesis.bernstein import composition
-from synthesis.cells import Strip, strips
-from synthesis.pieces import CONSTANT, ModelPiece, function_pieces, model_pieces
+from synthesis.polynomial.bernstein import composition
+from synthesis.polynomial.cells import Strip, strips
+from synthesis.polynomial.exact import Number, exact
 from synthesis.polynomial.matrix import Box, PolynomialMatrix
+from synthesis.polynomial.pieces import ModelPiece, Pieces
 
 Array = np.ndarray
-Number = Callable[[float], Any]
-
-
-class Pieces(NamedTuple):
-    """A model of one or several parameters, polynomial between the `breaks` of each (most have none
-    inside their range).
-
-    `source` is the model as it was given.
-    """
-
-    source: LPVStateSpace
-    parameters: tuple[Scheduling, ...]
-    breaks: tuple[tuple[float, ...], ...]
-    models: dict[tuple[int, ...], tuple[PolynomialMatrix, ...]]
-    dt: float | None
-
-    def at(self, p: Array) -> Matrices:
-        """The matrices at p (k, m) by the model's own code, for checks."""
-        return self.source.matrices(p[..., 0] if len(self.parameters) == 1 else p)
-
-    @property
-    def passes_peaks(self) -> bool:
-        """Whether an input of any height passes at once to the outputs: feedthrough in continuous
-        time.
-        """
-        return self.dt is None and any(np.any(D.coefficients) for *_, D in self.models.values())
-
-    @property
-    def original(self) -> bool:
-        """Whether these are the pieces of the `source`, to the last bit."""
-        own = pieces(self.source)
-        same = (self.parameters, self.breaks, self.dt, self.models.keys()) == (
-            own.parameters,
-            own.breaks,
-            own.dt,
-            own.models.keys(),
-        )
-        return same and all(
-            M.box == N.box and np.array_equal(M.coefficients, N.coefficients)
-            for key in own.models
-            for M, N in zip(self.models[key], own.models[key], strict=True)
-        )
-
-    @property
-    def sizes(self) -> tuple[int, int, int]:
-        """Number of states, inputs and outputs."""
-        A, B, C, _ = next(iter(self.models.values()))
-        return A.shape[0], B.shape[1], C.shape[0]
-
-    def scaled(
-        self, left: Array, right: Array, inputs: float, outputs: float, time: float
-    ) -> Pieces:
-        """x = right z, dt = time dtau, u and y in the units `inputs` and `outputs`."""
-
-        def change(M: PolynomialMatrix, L: Any, R: Any, factor: float) -> PolynomialMatrix:
-            return PolynomialMatrix(M.box, factor * (L @ M.coefficients @ R))
-
-        _, nu, ny = self.sizes
-        one, two = np.eye(ny), np.eye(nu)
-        models = {
-            key: (
-                change(A, left, right, time),
-                change(B, left, two, time * inputs),
-                change(C, one, right, 1 / outputs),
-                change(D, one, two, inputs / outputs),
-            )
-            for key, (A, B, C, D) in self.models.items()
-        }
-        return self._replace(models=models)
-
-
-def pieces(model: LPVStateSpace) -> Pieces:
-    """The model in polynomial pieces over its box."""
-    s = model.parameters
-    if len(s) == 1:
-        parts = model_pieces(model)
-        models = {
-            (k,): tuple(
-                PolynomialMatrix(((piece.low, piece.high),), M)
-                for M in (piece.A, piece.B, piece.C, piece.D)
-            )
-            for k, piece in enumerate(parts)
-        }
-        breaks = ((parts[0].low, *(piece.high for piece in parts)),)
-        return Pieces(model, s, breaks, models, model.dt)
-    basis = model.basis
-    if not isinstance(basis, Product):
-        raise InputError(
-            f"{type(basis).__name__} is not known to be polynomial in each of {len(s)} parameters;"
-            " use a Product of one-parameter bases"
-        )
-    axes = [function_pieces(f, q.low, q.high) for f, q in zip(basis.factors, s, strict=True)]
-    models = {}
-    for key in product(*(range(len(axis)) for axis in axes)):
-        chosen = [axis[k] for axis, k in zip(axes, key, strict=True)]
-        models[key] = tuple(
-            _over_box(basis.tensor(M), chosen) for M in (model.A, model.B, model.C, model.D)
-        )
-    breaks = tuple((axis[0].low, *(piece.high for piece in axis)) for axis in axes)
-    return Pieces(model, s, breaks, models, model.dt)
-
-
-def _over_box(tensor: Array, chosen: Sequence[Piece]) -> PolynomialMatrix:
-    """Bernstein coefficients of sum_j f_j M_j, f_j products of functions on one piece each."""
-    coefficients = tensor
-    for i, piece in enumerate(chosen):
-        coefficients = np.moveaxis(np.tensordot(piece.bernstein.T, coefficients, axes=(1, i)), 0, i)
-    for i in range(len(chosen)):
-        coefficients = _lowered(coefficients, i)
-    return PolynomialMatrix(tuple((q.low, q.high) for q in chosen), coefficients)
-
-
-def _lowered(coefficients: Array, axis: int) -> Array:
-    """The same polynomial written in the degree it has along one axis, to rounding."""
-    c = np.moveaxis(coefficients, axis, 0)
-    while (d := len(c) - 1) > 0:
-        binomials = np.array([comb(d, k) for k in range(d + 1)], dtype=float)
-        top = np.tensordot(binomials * (-1.0) ** np.arange(d + 1), c, axes=1)
-        if np.any(np.abs(top) > CONSTANT * np.tensordot(binomials, np.abs(c), axes=1)):
-            break
-        raised = np.zeros((d + 1, d))
-        k = np.arange(d)
-        raised[k, k], raised[k + 1, k] = 1 - k / d, (k + 1) / d
-        c = np.tensordot(np.linalg.pinv(raised), c, axes=1)
-    return np.moveaxis(c, 0, axis)
 
 
 class Region(NamedTuple):
@@ -188,15 +61,6 @@ def regions(model: Pieces, knots: Sequence[Array], steps: Sequence[float]) -> It
             for b, s in zip(model.breaks, choice, strict=True)
         ]
         yield Region(choice, tuple(index))
-
-
-def exact(values: Array, number: Number) -> Array:
-    """The doubles as numbers of the arithmetic."""
-    return (
-        np.asarray(values, dtype=float)
-        if number is float
-        else np.asarray(np.frompyfunc(number, 1, 1)(values), dtype=object)
-    )
 
 
 def convert(F: PolynomialMatrix, number: Number) -> PolynomialMatrix:

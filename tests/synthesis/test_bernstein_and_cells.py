@@ -9,12 +9,13 @@ import pytest
 from models import lag, random_stable
 
 from synthesis import SplineLyapunov
-from synthesis.bernstein import blossom, composition, elevate, multiply, restriction
-from synthesis.cells import strips
-from synthesis.claim import Claim, lmi_polynomials
-from synthesis.lyapunov import graded_knots
-from synthesis.pieces import model_pieces
-from synthesis.symmetric import smat, svec
+from synthesis.lyapunov.spline import graded_knots
+from synthesis.polynomial.bernstein import blossom, composition, restriction
+from synthesis.polynomial.cells import strips
+from synthesis.polynomial.matrix import PolynomialMatrix
+from synthesis.polynomial.pieces import model_pieces
+from synthesis.polynomial.symmetric import smat, svec
+from synthesis.proof.claim import Claim, lmi_polynomials
 
 
 def value(F, x, s=0.0):
@@ -25,10 +26,12 @@ def value(F, x, s=0.0):
 
 def test_products_and_elevations_keep_their_values():
     rng = np.random.default_rng(0)
-    F, G = rng.standard_normal((4, 2, 2, 3)), rng.standard_normal((3, 3, 3, 2))
+    f, g = rng.standard_normal((4, 2, 2, 3)), rng.standard_normal((3, 3, 3, 2))
+    F, G = (PolynomialMatrix(((0.0, 1.0), (0.0, 1.0)), c) for c in (f, g))
+    product, raised = (F @ G).coefficients, F.elevate((6, 4)).coefficients
     for x, s in rng.uniform(0, 1, (5, 2)):
-        assert np.allclose(value(multiply(F, G), x, s), value(F, x, s) @ value(G, x, s), atol=1e-12)
-        assert np.allclose(value(elevate(F, (6, 4)), x, s), value(F, x, s), atol=1e-12)
+        assert np.allclose(value(product, x, s), value(f, x, s) @ value(g, x, s), atol=1e-12)
+        assert np.allclose(value(raised, x, s), value(f, x, s), atol=1e-12)
 
 
 def test_restriction_and_composition_are_the_same_polynomial_elsewhere():
@@ -95,7 +98,10 @@ def test_lmi_polynomials_are_the_lmi_at_every_point(dt):
     P = SplineLyapunov(
         np.array([0.0, 0.25, 1.0]), 2, coefficients + np.swapaxes(coefficients, 1, 2)
     )
-    forms = [form.block for form in lmi_polynomials(Claim(model_pieces(lpv), P, 0.7, dt), float)]
+    forms = [
+        form.block.coefficients
+        for form in lmi_polynomials(Claim(model_pieces(lpv), P, 0.7, dt), float)
+    ]
     p = 0.6
     A, B, C, D = lpv.matrices(p)
     Y = np.hstack([C, D])

@@ -9,7 +9,7 @@ from models import lag, random_stable
 from scipy.linalg import block_diag
 
 from synthesis import frozen_gain, l2_gain
-from synthesis.frozen import norm
+from synthesis.worst.frozen import norm
 
 
 def lightly_damped(seed, decades=0.7, least=-3.5):

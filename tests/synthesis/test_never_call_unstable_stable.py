@@ -21,8 +21,8 @@ from synthesis import (
     l2_gain,
     stability,
 )
+from synthesis.analysis.one_parameter import prove
 from synthesis.forms import scaled_problem
-from synthesis.proof_search import prove
 
 COARSE = Relaxation(segments=(2,), degree=2)
 
@@ -111,10 +111,10 @@ def test_exact_arithmetic_confirms_a_good_certificate_and_rejects_a_tampered_one
 def test_the_fractions_of_the_standard_library_prove_the_same(monkeypatch):
     from fractions import Fraction
 
-    import synthesis.verify
+    import synthesis.proof.one_parameter
 
     cert = l2_gain(lag(), relaxation=COARSE, search=None)
-    monkeypatch.setattr(synthesis.verify, "rational", lambda: Fraction)
+    monkeypatch.setattr(synthesis.proof.one_parameter, "rational", lambda: Fraction)
     assert cert.verify(rigorous=True)
     assert not replace(cert, gamma=0.9, frozen=0.0, lower=0.0).verify(rigorous=True)
 

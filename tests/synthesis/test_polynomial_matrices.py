@@ -8,12 +8,13 @@ import pytest
 from symheli.errors import InputError
 from symheli.lpv import LFT, LPVStateSpace, Scheduling
 from synthesis import PolynomialMatrix, l2_gain
+from synthesis.assemble.imposed import coefficient_conditions, sums_of_squares, vertex_conditions
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
-from synthesis.polynomial.imposed import coefficient_conditions, sums_of_squares, vertex_conditions
+from synthesis.polynomial.exact import rational
 from synthesis.polynomial.matrix import block
-from synthesis.polynomial.regions import convert, pieces
-from synthesis.symmetric import smat, svec
-from synthesis.verify import rational
+from synthesis.polynomial.pieces import pieces
+from synthesis.polynomial.regions import convert
+from synthesis.polynomial.symmetric import smat, svec
 
 BOX = ((-1.0, 2.0), (0.5, 3.0))
 POINTS = np.array([[-1.0, 0.5], [2.0, 3.0], [0.3, 1.7], [1.9, 0.6]])

@@ -22,9 +22,9 @@ from synthesis import (
     l2_gain,
     stability,
 )
-from synthesis.polynomial.analysis import _Hunt
-from synthesis.polynomial.inequalities import Demand
-from synthesis.polynomial.regions import pieces
+from synthesis.analysis.box import _Hunt
+from synthesis.polynomial.pieces import pieces
+from synthesis.proof.inequalities import Demand
 
 PROOFS = ("bernstein", "sos", "vertices")
 QUICK = Relaxation(degree=1)
@@ -321,9 +321,9 @@ def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
     """P(p(k+1)) does not depend on p(k) where p jumps: its degree in p is that of A'A alone, two,
     and not two more.
     """
-    from synthesis.polynomial.inequalities import decrease
-    from synthesis.polynomial.program import Shape, _pair
+    from synthesis.assemble.box import Shape, _pair
     from synthesis.polynomial.regions import regions
+    from synthesis.proof.inequalities import decrease
 
     model, shape = pieces(mass_spring(dt=0.1)), Shape((np.array([-1.0, 1]),) * 2, (2, 2))
     degrees = {}

@@ -14,7 +14,6 @@ from synthesis import (
     Relaxation,
     Solver,
     Status,
-    cone_program,
     decay_rate,
     generalized_h2,
     l2_gain,
@@ -22,6 +21,7 @@ from synthesis import (
     lft_stability,
     stability,
 )
+from synthesis.program import cone_program
 
 COARSE = Relaxation(segments=(2,), degree=2)
 SOS = Relaxation(kind="sos", degree=1, segments=(1,))

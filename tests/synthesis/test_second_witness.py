@@ -12,16 +12,17 @@ from symheli.errors import CertificateError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
     Relaxation,
-    claim,
     decay_rate,
     forms,
     generalized_h2,
     l2_gain,
-    pieces,
     stability,
-    verify,
 )
-from synthesis.polynomial import program, proof, regions
+from synthesis.assemble import box as program
+from synthesis.polynomial import pieces, regions
+from synthesis.proof import box as proof
+from synthesis.proof import claim
+from synthesis.proof import one_parameter as verify
 
 COARSE = Relaxation(segments=(4,), degree=2, grading=1.0)
 BOX = Relaxation(kind="sos", segments=(4,), degree=2, grading=1.0)
@@ -105,7 +106,7 @@ def perturb_a_weight(monkeypatch):
             for q in original(lpv)
         )
 
-    everywhere(monkeypatch, "model_pieces", weaker, forms, verify, regions)
+    everywhere(monkeypatch, "model_pieces", weaker, forms, verify, pieces)
 
 
 def _weakened(coefficients):

@@ -27,13 +27,12 @@ from synthesis import (
     lower_bound,
     stability,
 )
-from synthesis.bernstein import blossom
-from synthesis.claim import Claim, lmi_polynomials
+from synthesis.analysis.one_parameter import prove
 from synthesis.forms import scaled_problem
-from synthesis.lag import LagRegion
-from synthesis.pieces import model_pieces
-from synthesis.proof_search import prove
-from synthesis.symmetric_power import (
+from synthesis.lyapunov.lag import LagRegion
+from synthesis.polynomial.bernstein import blossom
+from synthesis.polynomial.pieces import model_pieces
+from synthesis.polynomial.symmetric_power import (
     generator,
     monomials,
     null_matrix,
@@ -41,6 +40,7 @@ from synthesis.symmetric_power import (
     null_weights,
     power,
 )
+from synthesis.proof.claim import Claim, lmi_polynomials
 
 MEMORY = Relaxation(segments=(8,), degree=2, grading=1.0, memory=1.5, memory_segments=2)
 QUARTIC = Relaxation(segments=(4,), order=2)
@@ -134,8 +134,8 @@ def test_memory_polynomials_are_the_lmi_at_every_point():
     for form, nu in zip(forms[6:], (-rate, rate), strict=True):
         top = A.T @ value + value @ A + nu * in_p + (nu - e / 0.4) * in_e
         expected = np.block([[top, value @ B], [B.T @ value, np.zeros((2, 2))]]) + Y.T @ Y
-        assert np.allclose(polynomial(form.block), height * expected, atol=1e-10)
-        assert polynomial(form.weight) == pytest.approx(height)
+        assert np.allclose(polynomial(form.block.coefficients), height * expected, atol=1e-10)
+        assert polynomial(form.weight.coefficients) == pytest.approx(height)
 
 
 def test_higher_degrees_close_in_on_the_damping_that_a_jumping_spring_needs():
@@ -263,7 +263,7 @@ def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(
 ):
     # the function of that name hides the module
     for work in ("frozen_gain", "least_damped"):
-        monkeypatch.setattr(sys.modules["synthesis.l2_gain"], work, None)
+        monkeypatch.setattr(sys.modules["synthesis.analysis.l2_gain"], work, None)
     sampled = spring().discretize(0.1)
     for analysis in (l2_gain, stability):
         with pytest.raises(

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from models import fastest_growth, lateral, random_stable, spring
 
-from synthesis.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
-from synthesis.corners import Corners, climb, gradient
-from synthesis.periodic import Lifted, gain, growth, ratio_from_rest, worst_input
-from synthesis.verdict import Trajectory
-from synthesis.waves import Wave, steps
+from synthesis.worst.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
+from synthesis.worst.corners import Corners, climb, gradient
+from synthesis.worst.periodic import Lifted, gain, growth, ratio_from_rest, worst_input
+from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.waves import Wave, steps
 
 
 def bumpy(lpv, period=4.0, nodes=24):
@@ -116,7 +116,7 @@ def test_the_ascent_keeps_range_and_rate_and_never_loses(dt):
 
 def test_the_search_finds_more_than_the_waves_it_starts_from():
     from synthesis import Search, lower_bound
-    from synthesis.lower_bound import _Hunt
+    from synthesis.worst.lower_bound import _Hunt
 
     search = Search(
         levels=6, dwells=5, starts=1, nodes=40, evaluations=15, steps=80, samples=20_000

@@ -1,0 +1,257 @@
+"""The bounded real lemma for LPV models as a cone program, one block per Bernstein coefficient.
+
+Continuous time, V = x' P(p) x, for |dp/dt| <= rate:
+
+    [A'P + PA + nu dP/dp + C'C   PB + C'D ]
+    [B'P + D'C                   D'D - g I]  < 0,   nu = -rate, +rate,   g = gamma^2,
+
+discrete time, P+ = P(p(k+1)), |p(k+1) - p(k)| <= rate dt:
+
+    [A'P+A - P + C'C   A'P+B + C'D      ]
+    [B'P+A + D'C       B'P+B + D'D - g I]  < 0.
+
+Source: Wu, Yang, Packard and Becker, "Induced L2-norm control for LPV systems with bounded
+parameter variation rates", Int. J. Robust and Nonlinear Control 6 (1996), theorem 3.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from synthesis.polynomial.bernstein import (
+    composition,
+    elevation_matrix,
+    product_weights,
+    restriction,
+)
+from synthesis.polynomial.cells import Cell, Strip
+from synthesis.polynomial.symmetric import basis, smat, svec
+from synthesis.program.cone_program import ConeProgram
+
+Array = np.ndarray
+
+
+class Blocks(NamedTuple):
+    """LMI blocks F = sum_j linear[., j] P_columns[j] + constant - weight g diag(0, I), svec'd along
+    the last axis.
+
+    `columns` (k,) says which coefficients of P are involved; `linear` (m, k, n (n + 1)/2, L),
+    `constant` (m, L), of matrices (N, N) with L = N (N + 1)/2; `weight` (m,) > 0. `likely`:
+    expected to be among the binding ones.
+    """
+
+    columns: Array
+    linear: Array
+    constant: Array
+    weight: Array
+    likely: bool = True
+
+    def values(self, P: Array, N: int) -> Array:
+        """F (m, N, N) with g = 0 at the coefficients P (k, n (n + 1)/2) of the whole spline."""
+        return smat(np.einsum("mjvl,jv->ml", self.linear, P[self.columns]) + self.constant, N)
+
+    def congruent(self, W: Array) -> Blocks:
+        """W' F W for every F, W (N, N) not acting on the part with g."""
+        N = len(W)
+        K = svec(W.T @ basis(N) @ W)
+        return self._replace(linear=self.linear @ K, constant=self.constant @ K)
+
+    def keep(self, which: Array) -> Blocks:
+        """Only these of the m blocks."""
+        return self._replace(
+            linear=self.linear[which], constant=self.constant[which], weight=self.weight[which]
+        )
+
+
+def continuous_blocks(
+    cells: Sequence[Cell], knots: Array, degree: int, rate: float, extra: int
+) -> Iterator[Blocks]:
+    """The blocks of every cell for both signs of the rate; `extra` raises the degree of the
+    Bernstein form.
+    """
+    for cell in cells:
+        A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
+        E = basis(A.shape[1])
+        lyapunov = E @ A[:, None]
+        coupling = E @ B[:, None]
+        operator = svec(bordered(lyapunov + np.swapaxes(lyapunov, -1, -2), coupling))
+        direct = svec(bordered(E, np.zeros((*E.shape[:2], B.shape[2]))))
+        output = output_terms(cell)
+        d = max(degree + dM, len(output) - 1) + extra
+        a, b, width = local_coordinates(cell, knots)
+        here = restriction(degree, a, b)
+        up = elevation_matrix(degree + dM, d)
+        product = np.einsum("qm,mik,kj->qij", up, product_weights(dM, degree), here)
+        linear = np.einsum("mij,ivl->mjvl", product, operator)
+        constant = elevation_matrix(len(output) - 1, d) @ svec(output)
+        slope = slope_over(degree, here, (b - a) * width)
+        slope = elevation_matrix(len(slope) - 1, d) @ slope
+        for nu in (-rate, rate) if rate > 0 else (0.0,):
+            drift = nu * slope[:, :, None, None] * direct
+            yield Blocks(
+                cell.segment * degree + np.arange(degree + 1),
+                linear + drift,
+                constant,
+                np.ones(d + 1),
+            )
+
+
+def discrete_blocks(
+    strips: Sequence[Strip], knots: Array, degree: int, extra: int
+) -> Iterator[Blocks]:
+    """The blocks of every strip. Likely to bind: the border lines of the widest cell of each
+    segment and piece.
+    """
+    widest: dict[tuple[int, float], float] = {}
+    for cell in (strip.cell for strip in strips):
+        place = (cell.segment, cell.piece.low)
+        widest[place] = max(widest.get(place, 0.0), cell.high - cell.low)
+    for strip in strips:
+        cell = strip.cell
+        wide_cell = cell.high - cell.low >= 0.5 * widest[cell.segment, cell.piece.low]
+        A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
+        M = np.concatenate([A, B], axis=2)
+        E = basis(A.shape[1])
+        inner = E @ M[:, None]
+        pairs = np.einsum("rik,iab,kvac->rvbc", product_weights(dM, dM), M, inner, optimize=True)
+        operator = svec(0.5 * (pairs + np.swapaxes(pairs, -1, -2)))
+        direct = svec(bordered(E, np.zeros((*E.shape[:2], B.shape[2]))))
+        output = output_terms(cell)
+        d = max(degree + 2 * dM, len(output) - 1) + extra
+        a, b, _ = local_coordinates(cell, knots)
+        here = elevation_matrix(degree, d) @ restriction(degree, a, b)
+        constant = elevation_matrix(len(output) - 1, d) @ svec(output)
+        low, high = knots[strip.next_segment], knots[strip.next_segment + 1]
+        corners = [[(q - low) / (high - low) for q in pair] for pair in strip.corners]
+        after = composition(degree, corners)
+        up = elevation_matrix(degree + 2 * dM, d)
+        now = here[:, :, None, None] * direct
+        for k in range(degree + 1):
+            after_k = np.einsum(
+                "qm,mri,ij,rvl->qjvl",
+                up,
+                product_weights(2 * dM, degree),
+                after[:, k],
+                operator,
+                optimize=True,
+            )
+            first = min(strip.next_segment, cell.segment)
+            count = (abs(strip.next_segment - cell.segment) + 1) * degree + 1
+            linear = np.zeros((len(after_k), count, *after_k.shape[2:]))
+            start, own = (strip.next_segment - first) * degree, (cell.segment - first) * degree
+            linear[:, start : start + degree + 1] += after_k
+            linear[:, own : own + degree + 1] -= now
+            columns = first * degree + np.arange(count)
+            yield Blocks(columns, linear, constant, np.ones(d + 1), wide_cell and k in (0, degree))
+
+
+def assemble(
+    blocks: Sequence[Blocks],
+    states: int,
+    inputs: int,
+    unknowns: int,
+    margin: float,
+    floor: float,
+    null: Array | None = None,
+) -> ConeProgram:
+    """minimise g subject to every block <= -margin diag(I, 0) and every coefficient of P >= floor
+    I.
+
+    Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability.
+    Both I are times the weight of the block. `null` (s, L): symmetric matrices that may be added to
+    each block, with weights of its own. The unknowns: P, coefficient by coefficient; the weights of
+    `null`, block by block; g or t.
+    """
+    N, nv = states + inputs, states * (states + 1) // 2
+    of_P, of_block = unknowns * nv, 0 if null is None else len(null)
+    eye, zero = np.eye(states), np.zeros((states, inputs))
+    gain = -svec(np.block([[0 * eye, zero], [zero.T, np.eye(inputs)]])) if inputs else svec(eye)
+    back_off = (
+        margin * svec(np.block([[eye, zero], [zero.T, np.zeros((inputs, inputs))]]))
+        if inputs
+        else 0 * gain
+    )
+    L = len(gain)
+    weights = np.concatenate([block.weight for block in blocks])
+    columns = of_P + of_block * len(weights) + 1
+    data, index, pointer, top = [], [], [], 0
+    for block in blocks:
+        m, count = block.linear.shape[:2]
+        rows = np.moveaxis(block.linear, 3, 1).reshape(m * L, count * nv)
+        place = (block.columns[:, None] * nv + np.arange(nv)).ravel()
+        where = np.nonzero(rows)
+        data.append(rows[where])
+        index.append(where[0] + top)
+        pointer.append(place[where[1]])
+        top += m * L
+    lmi = sparse.coo_matrix(
+        (np.concatenate(data), (np.concatenate(index), np.concatenate(pointer))), shape=(top, of_P)
+    )
+    parts: list[Any] = [lmi]
+    if null is not None:
+        parts.append(sparse.kron(sparse.identity(len(weights)), sparse.csc_matrix(null.T)))
+    A = [sparse.hstack([*parts, sparse.csc_matrix(np.outer(weights, gain).reshape(-1, 1))])]
+    b = [
+        -np.concatenate([block.constant for block in blocks]).ravel()
+        - np.outer(weights, back_off).ravel()
+    ]
+    positive = sparse.hstack([-sparse.identity(of_P), sparse.csc_matrix((of_P, columns - of_P))])
+    identities = np.tile(svec(eye), unknowns)
+    for sign, bound in ((1, -floor),) if inputs else ((1, 0), (-1, 1)):
+        A.append(sign * positive)
+        b.append(bound * identities)
+    sizes = [N] * len(weights) + [states] * (unknowns * (len(A) - 1))
+    c = np.append(np.zeros(columns - 1), 1.0 if inputs else -1.0)
+    return ConeProgram(c, sparse.csc_matrix(sparse.vstack(A)), np.concatenate(b), tuple(sizes))
+
+
+def common_degree(A: Array, B: Array, cell: Cell) -> tuple[Array, Array, int]:
+    """A and B over the cell with coefficients of the same degree, and that degree."""
+    A, B = (_restrict(M, cell) for M in (A, B))
+    d = max(len(A), len(B)) - 1
+    return _raise(A, d), _raise(B, d), d
+
+
+def _raise(M: Array, degree: int) -> Array:
+    return np.tensordot(elevation_matrix(len(M) - 1, degree), M, axes=1)
+
+
+def _restrict(M: Array, cell: Cell) -> Array:
+    width = cell.piece.high - cell.piece.low
+    a, b = (cell.low - cell.piece.low) / width, (cell.high - cell.piece.low) / width
+    return np.tensordot(restriction(len(M) - 1, a, b), M, axes=1)
+
+
+def local_coordinates(cell: Cell, knots: Array) -> tuple[float, float, float]:
+    """The cell's ends as fractions of its segment, and the segment's width."""
+    low, high = float(knots[cell.segment]), float(knots[cell.segment + 1])
+    return (cell.low - low) / (high - low), (cell.high - low) / (high - low), high - low
+
+
+def slope_over(degree: int, here: Array, width: float) -> Array:
+    """Bernstein coefficients (degree, columns) of dP/dp over the cell."""
+    return np.zeros((1, here.shape[1])) if degree == 0 else degree * np.diff(here, axis=0) / width
+
+
+def bordered(top: Array, side: Array) -> Array:
+    """[top side; side' 0]."""
+    corner = np.zeros((*side.shape[:-2], side.shape[-1], side.shape[-1]))
+    return np.concatenate(
+        [
+            np.concatenate([top, side], axis=-1),
+            np.concatenate([np.swapaxes(side, -1, -2), corner], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+def output_terms(cell: Cell) -> Array:
+    """Bernstein coefficients of [C D]'[C D] over the cell."""
+    C, D = (_restrict(M, cell) for M in (cell.piece.C, cell.piece.D))
+    d = max(len(C), len(D)) - 1
+    Y = np.concatenate([_raise(C, d), _raise(D, d)], axis=2)
+    return np.einsum("rik,iab,kac->rbc", product_weights(d, d), Y, Y)

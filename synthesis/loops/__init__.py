@@ -1,0 +1,1 @@
+"""Classical measures of one loop: margins, bandwidth, phase delay."""

@@ -1,0 +1,187 @@
+"""How much gain, phase, delay, or both at once, a feedback loop stands before it becomes
+unstable.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import eigvals
+
+from symheli.errors import InputError
+from symheli.lpv import LinearModel
+from symheli.lpv.linear_model import feedback_matrix
+from symheli.values.signal import indices
+from synthesis.worst.frozen import crossings, norm, to_continuous
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Margins:
+    """What a stable loop stands; every number is that of an unstable loop's onset, infinite where
+    there is none.
+
+    gain: factors (below 1, above 1) between which the loop gain may be changed. phase (rad) may be
+    lost or gained, delay (s) added. disk: radius of the largest balanced disk, alpha: gain within
+    `disk_gain` and phase within `disk_phase` (rad) may change together, at any frequency.
+    crossover: frequencies of unit gain (rad/s). A loop that is unstable as it is has `stable` False
+    and no margin.
+    """
+
+    stable: bool
+    gain: tuple[float, float]
+    phase: float
+    delay: float
+    disk: float
+    crossover: tuple[float, ...]
+
+    @property
+    def disk_gain(self) -> tuple[float, float]:
+        """Gain factors inside the disk."""
+        return max((2 - self.disk) / (2 + self.disk), 0.0), (
+            (2 + self.disk) / (2 - self.disk) if self.disk < 2 else math.inf
+        )
+
+    @property
+    def disk_phase(self) -> float:
+        """Phase (rad) inside the disk."""
+        return 2 * math.atan(self.disk / 2)
+
+
+UNSTABLE = Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, ())
+
+
+def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str) -> LinearModel:
+    """The loop of u = feedback y broken at the input `at`, the others closed, as L of 1 + L
+    (negative feedback).
+
+    `feedback` {(input, output): gain} as in `LinearModel.feedback`. Outputs fed back must have no
+    feedthrough (`InputError`).
+    """
+    (i,) = indices([at], plant.inputs, "input")
+    row = feedback_matrix(
+        {pair: gain for pair, gain in feedback.items() if pair[0] == at},
+        plant.inputs,
+        plant.outputs,
+    )[[i]]
+    others = plant.feedback({pair: gain for pair, gain in feedback.items() if pair[0] != at})
+    if np.abs(row @ plant.D).max(initial=0.0) > 0:
+        raise InputError(
+            "an output that is fed back depends on an input directly; put an actuator or a delay"
+            " between"
+        )
+    signal = (plant.inputs[i],)
+    return LinearModel(
+        others.A,
+        others.B[:, [i]],
+        -row @ others.C,
+        np.zeros((1, 1)),
+        plant.states,
+        signal,
+        signal,
+        plant.dt,
+    )
+
+
+def margins(loop: LinearModel) -> Margins:
+    """Gain, phase, delay and disk margins of a scalar loop L under negative feedback, without a
+    frequency grid.
+
+    Unit-gain crossings are eigenvalues of a Hamiltonian matrix, phase crossings zeros of L(s) -
+    L(-s), the disk an H-infinity norm. In discrete time delays count in whole and broken samples
+    alike (a phase of omega times the delay). Source: Seiler, Packard and Gahinet, "An introduction
+    to disk margins", IEEE Control Systems Magazine 40 (2020).
+    """
+    if len(loop.inputs) != 1 or len(loop.outputs) != 1:
+        raise InputError(
+            f"margins need a loop of one input and one output, got {len(loop.inputs)} and"
+            f" {len(loop.outputs)}; break it with loop()"
+        )
+    if not _closed(loop).is_stable():
+        return UNSTABLE
+    A, B, C, D = (
+        (loop.A, loop.B, loop.C, loop.D)
+        if loop.dt is None
+        else to_continuous(loop.A, loop.B, loop.C, loop.D)
+    )
+
+    def physical(omega: Array) -> Array:
+        return omega if loop.dt is None else 2 * np.arctan(omega) / loop.dt
+
+    def response(omega: Array) -> Array:
+        return loop.frequency_response(physical(omega))[:, 0, 0]
+
+    unit = crossings(A, B, C, D, 1.0)
+    unit = unit[unit > 0]
+    if len(unit):
+        unit = unit[
+            np.abs(np.abs(response(unit)) - 1) < 1e-4
+        ]  # eigenvalues near the axis that are no crossings go
+    lag = np.angle(-response(unit)) if len(unit) else unit  # the angle by which L differs from -1
+    real = _real_axis(A, B, C)
+    values = np.real(response(real)) if len(real) else real
+    values = np.concatenate([values, D[0]])
+    factors = -1 / values[values < 0]
+    delays = np.mod(lag, 2 * np.pi) / physical(unit) if len(unit) else np.zeros(0)
+    return Margins(
+        True,
+        (
+            float(factors[factors < 1].max(initial=0.0)),
+            float(factors[factors > 1].min(initial=math.inf)),
+        ),
+        float(np.abs(lag).min(initial=math.inf)),
+        float(delays.min(initial=math.inf)),
+        disk_margin(loop),
+        tuple(float(w) for w in physical(unit)),
+    )
+
+
+def disk_margin(loop: LinearModel) -> float:
+    """alpha of the balanced disk: 1/|S - I/2| in the H-infinity norm, 0 where the loop is unstable.
+
+    For a square loop of several channels all may change at once and independently, and be coupled:
+    a lower bound of what a diagonal change needs.
+    """
+    if len(loop.inputs) != len(loop.outputs):
+        raise InputError(
+            f"a loop needs as many outputs as inputs, got {len(loop.outputs)} and"
+            f" {len(loop.inputs)}"
+        )
+    S = _closed(loop)
+    if not S.is_stable():
+        return 0.0
+    gain = norm(S.A, S.B, S.C, S.D - 0.5 * np.eye(len(S.inputs)), S.dt)[0]
+    return math.inf if gain == 0 else 1 / gain
+
+
+def _closed(loop: LinearModel) -> LinearModel:
+    """S = (I + L)^-1."""
+    inverse = np.linalg.inv(np.eye(len(loop.inputs)) + loop.D)
+    B = loop.B @ inverse
+    return replace(loop, A=loop.A - B @ loop.C, B=B, C=-inverse @ loop.C, D=inverse)
+
+
+def _real_axis(A: Array, B: Array, C: Array) -> Array:
+    """Frequencies >= 0 (rad/s) at which a scalar L is real: imaginary zeros of L(s) - L(-s)."""
+    n = len(A)
+    pencil = np.zeros((2 * n + 1, 2 * n + 1))
+    pencil[:n, :n], pencil[n : 2 * n, n : 2 * n] = A, -A
+    pencil[:n, [-1]] = pencil[n : 2 * n, [-1]] = B
+    pencil[[-1], :n] = pencil[[-1], n : 2 * n] = C
+    mass = np.diag([1.0] * (2 * n) + [0.0])
+    zeros = eigvals(pencil, mass)
+    zeros = zeros[np.isfinite(zeros)]
+    size = np.abs(np.linalg.eigvals(A)).max(initial=1e-12)
+    zeros = zeros[np.abs(zeros) < 1e6 * size]
+    on_axis = np.abs(np.real(zeros)) <= 1e-6 * (np.abs(zeros) + 1e-3 * size)
+    frequencies = np.unique(np.abs(np.imag(zeros[on_axis])))
+    poles_at_rest = np.any(np.abs(np.linalg.eigvals(A)) < 1e-9 * size)
+    return (
+        frequencies[frequencies > 1e-6 * size]
+        if poles_at_rest
+        else np.unique(np.concatenate([[0.0], frequencies]))
+    )

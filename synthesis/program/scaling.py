@@ -1,0 +1,212 @@
+"""One constant change of coordinates in which the numbers of an LMI are of order one, whatever the
+units of the states.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from scipy import linalg
+
+from symheli.lpv import LinearModel, LPVStateSpace, Matrices
+from synthesis.polynomial import structure
+from synthesis.polynomial.symmetric import symmetrized
+
+Array = np.ndarray
+
+UNSEEN = 0.3
+"""Every state is driven and seen by this fraction of what inputs and outputs do: what they do not
+reach needs a scale too.
+"""
+DECOUPLED = 1e-3
+"""Balancing leaves a coupling alone where both of its directions are below this fraction of the
+states' own pace.
+"""
+NOTHING = 1e-6
+"""A gain below this fraction of the response of the states is what cancellation leaves, and no
+scale of anything.
+"""
+START = 0.1
+"""Fraction of that response from which a proof then sets out."""
+FAR = 30.0
+"""A bound this many times larger or smaller than the scale it was found in deserves its own."""
+RESCALED = 3
+"""Most changes of scale."""
+SWEEPS = 100
+"""Most sweeps of balancing."""
+
+
+T = TypeVar("T")
+
+
+class Scaling(NamedTuple):
+    """x = right z, left = right^-1, outputs in units of `channel`, time in units of `time` (s; 1 in
+    discrete time).
+
+    `weight` (n, n): in the coordinates weight^-1 z the state block of the LMI is near -I where P is
+    near I: slow and fast states then count alike.
+    """
+
+    left: Array
+    right: Array
+    channel: float
+    time: float
+    weight: Array
+
+    def fault(self, states: int) -> str | None:
+        """What keeps these from being coordinates of so many states, None where nothing does."""
+        return structure.first(
+            structure.coordinates(self.left, self.right, (self.channel, self.time), states),
+            structure.symmetric(np.asarray(self.weight), (states, states), "the weight"),
+        )
+
+    def to_physical(self, P: Array) -> Array:
+        """Lyapunov matrices in physical units from those in z."""
+        return symmetrized(self.channel**2 * self.left.T @ P @ self.left)
+
+    def to_scaled(self, P: Array) -> Array:
+        """The inverse of `to_physical`."""
+        return symmetrized(self.right.T @ P @ self.right / self.channel**2)
+
+
+def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
+    """From the model at mid-range, and what drives and shows the states all over it; `gain` is the
+    expected one.
+    """
+    s = lpv.scheduling
+    return model_scaling(lpv.at(s.middle), gain, lpv.matrices(np.linspace(s.low, s.high, 9)))
+
+
+def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = None) -> Scaling:
+    """The same from one frozen model, with the size of its matrices `elsewhere` (K, ...).
+
+    The Lyapunov function of order one is the sum of that by the outputs and the inverse of the
+    Gramian of the inputs, between which those of the bounded real lemma lie: both go with the
+    coordinates, so that units cancel. A model that is not stable is made so by a shift.
+    """
+    n, continuous = len(model.states), model.dt is None
+    every = elsewhere or Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D)))
+    B, C = np.hstack([*every.B]), np.vstack([*every.C])
+    D = balance(np.abs(every.A).max(axis=0), B, C)
+    A, B, C = model.A * D / D[:, None], B / D[:, None], C * D
+    poles = np.linalg.eigvals(A)
+    pace = np.abs(poles if continuous else poles - 1.0)
+    time = 1.0 / float(np.median(pace)) if continuous and np.median(pace) > 0 else 1.0
+    A = _stabilised(A, poles, continuous)
+    own = _pace(A if continuous else A - np.eye(n))
+    reached = np.hstack([B, UNSEEN * _size(B) * np.diag(np.sqrt(own))])
+    seen = np.vstack([C, UNSEEN * _size(C) * np.diag(np.sqrt(own))])
+    Wc, Wo = _gramian(A, reached, continuous), _gramian(A.T, seen.T, continuous)
+    inverse = linalg.inv(Wc)
+    # where inputs and outputs weigh alike: the geometric mean of the Hankel singular values
+    level = np.exp(0.5 * (np.linalg.slogdet(Wo)[1] + np.linalg.slogdet(Wc)[1]) / n)
+    X = symmetrized(Wo / level + level * inverse)
+    side = inverse @ reached
+    Q = seen.T @ seen / level + level * (
+        side @ side.T if continuous else inverse - A.T @ inverse @ A
+    )
+    root = linalg.inv(linalg.cholesky(X))
+    weight = _inverse_root(root.T @ symmetrized(Q) @ root * (time if continuous else 1.0))
+    channel = _channel(gain, float(np.sqrt(np.trace(Wc) * np.trace(Wo))))
+    size_B, size_C = (
+        np.linalg.norm(weight @ linalg.solve(root, B)),
+        np.linalg.norm(C @ root @ weight) / channel,
+    )
+    # P = alpha I with alpha = |C|/|B| weighs inputs and outputs alike; put it into the coordinates
+    alpha = size_C / size_B if size_B > 0 and size_C > 0 else 1.0
+    right = D[:, None] * root / np.sqrt(alpha)
+    return Scaling(np.sqrt(alpha) * linalg.inv(root) / D, right, channel, time, weight)
+
+
+def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected: float) -> list[T]:
+    """What `found(expected)` brings, (result, bound, scale it was found in); again in the scale of
+    the bound while that is far off.
+
+    The frozen gain is a scale that no search changes, but a moving p may have a gain of another
+    order.
+    """
+    results: list[T] = []
+    least = 0.0
+    for _ in range(1 + RESCALED):
+        result, bound, scale = found(expected)
+        results.append(result)
+        least = least or NOTHING * scale
+        if not least < bound < math.inf or scale / FAR < bound < scale * FAR:
+            break
+        expected = bound
+    return results
+
+
+def balance(A: Array, B: Array, C: Array) -> Array:
+    """d (n,) such that what enters each state of z = x/d from other states and inputs is as large
+    as what leaves it.
+
+    A (n, n) of sizes, its diagonal the states' own. Osborne's balancing of the whole system matrix;
+    a state that is reached or seen by nothing else ends at `DECOUPLED`.
+    """
+    n = len(A)
+    d, own = np.ones(n), np.abs(np.diag(A))
+    own = np.where(own > 0, own, max(float(np.abs(A).max(initial=0.0)), 1.0))
+    A, into, out = (
+        np.abs(A - np.diag(np.diag(A))),
+        np.linalg.norm(B, axis=1),
+        np.linalg.norm(C, axis=0),
+    )
+    for _ in range(SWEEPS):
+        # inputs and outputs in the units in which they are as large as one another
+        ratio = _size(out * d) / _size(into / d)
+        unit = np.sqrt(ratio) if into.any() and out.any() else 1.0
+        before = d.copy()
+        for i in range(n):
+            entering = A[i] @ d / d[i] + into[i] * unit / d[i] + DECOUPLED * own[i]
+            leaving = A[:, i] @ (1 / d) * d[i] + out[i] / unit * d[i] + DECOUPLED * own[i]
+            d[i] *= np.sqrt(entering / leaving)
+        if np.abs(np.log(d / before)).max(initial=0.0) < 0.05:
+            break
+    return d
+
+
+def _channel(gain: float, response: float) -> float:
+    """The gain expected; where that is nothing beside the `response` of the states to inputs and
+    outputs, a gain to begin with.
+    """
+    return gain if math.isfinite(gain) and gain > NOTHING * response else START * response
+
+
+def _size(M: Array) -> float:
+    """Largest entry, 1 where there is none."""
+    return float(np.abs(M).max(initial=0.0)) or 1.0
+
+
+def _pace(A: Array) -> Array:
+    """How fast each state moves (n,), relative ones at least 1e-12 of the fastest."""
+    size = np.maximum(np.linalg.norm(A, axis=0), np.linalg.norm(A, axis=1))
+    return np.maximum(size, 1e-12 * _size(size))
+
+
+def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
+    """A with its poles moved inside the stability region by as little as the Gramians need."""
+    if continuous:
+        shift = float(poles.real.max()) + 1e-6 * float(
+            np.abs(poles).min() or np.abs(poles).max() or 1.0
+        )
+        return A - max(shift, 0.0) * np.eye(len(A))
+    return A / max(1.0, float(np.abs(poles).max()) * (1 + 1e-6))
+
+
+def _gramian(A: Array, B: Array, continuous: bool) -> Array:
+    X = (
+        linalg.solve_continuous_lyapunov(A, -B @ B.T)
+        if continuous
+        else linalg.solve_discrete_lyapunov(A, B @ B.T)
+    )
+    values, vectors = linalg.eigh(symmetrized(X))
+    return (vectors * np.maximum(values, 1e-12 * abs(values[-1]))) @ vectors.T
+
+
+def _inverse_root(Q: Array) -> Array:
+    values, vectors = linalg.eigh(symmetrized(Q))
+    return symmetrized((vectors / np.sqrt(np.maximum(values, 1e-12 * abs(values[-1])))) @ vectors.T)

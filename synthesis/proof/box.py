@@ -1,0 +1,487 @@
+"""Is this P(p) a proof on the whole box? Recomputed from the model and P alone, whichever
+relaxation found P.
+
+Floating point: Bernstein coefficients, boxes halved until they tell, and a grid through the model's
+own code. Exact: the same boxes in rational arithmetic, and single p by `pointwise`. The
+inequalities themselves (`inequalities`), the regions and the algebra of polynomials are those from
+which the cone program was assembled; `pointwise` has none of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise, product
+from typing import NamedTuple
+
+import numpy as np
+
+from symheli.lpv import Matrices
+from synthesis.lyapunov.box import BoxLyapunov
+from synthesis.polynomial import structure
+from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
+from synthesis.polynomial.exact import Number, exact, positive_definite, rational
+from synthesis.polynomial.matrix import PolynomialMatrix
+from synthesis.polynomial.pieces import Pieces
+from synthesis.polynomial.regions import convert, regions
+from synthesis.polynomial.symmetric import symmetrized
+from synthesis.proof import pointwise
+from synthesis.proof.inequalities import Demand, Pair, decrease, peak, positivity
+
+Array = np.ndarray
+
+LADDER = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+"""The bound is loosened by these fractions in turn until the whole box is shown to admit it."""
+
+
+FURTHER = (1e2, 1e4, 1e6)
+"""Steps beyond, where the model has no response to compare rounding with."""
+
+WITNESSES = 40
+"""Values of several parameters at which a proof is checked once more, through the model's own
+matrices.
+"""
+
+TINY = 1e-8
+"""Least g in scaled units: a model without response is given a small gain rather than none."""
+
+
+class Units(NamedTuple):
+    """x = right z, left = right^-1; units of inputs, outputs, time (s) and of V in which the
+    numbers are of order one.
+
+    `weight` as in `Scaling`.
+    """
+
+    left: Array
+    right: Array
+    inputs: float
+    outputs: float
+    time: float
+    storage: float
+    weight: Array
+
+    def to_physical(self, P: Array) -> Array:
+        """P of V in physical units from that in z."""
+        return symmetrized(self.storage * self.left.T @ P @ self.left)
+
+    def to_scaled(self, P: Array) -> Array:
+        """The inverse."""
+        return symmetrized(self.right.T @ P @ self.right / self.storage)
+
+
+class Evidence(NamedTuple):
+    """A model and what is asked of it, against which any P and bound can be checked; `demand.shift`
+    is left to the bound.
+    """
+
+    model: Pieces
+    units: Units
+    demand: Demand
+
+    def fault(self, P: BoxLyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
+        """What keeps P from being about this model and this claim, before any inequality; None
+        where nothing does.
+        """
+        if not isinstance(P, BoxLyapunov):
+            return f"expected a BoxLyapunov, got {type(P).__name__}"
+        if kind != self.demand.kind or self.demand.shift != 0.0:
+            return f"the proof is of the {self.demand.kind}, the claim of the {kind}"
+        if (
+            len(rates) != len(self.model.parameters)
+            or not all(r >= 0 for r in rates)
+            or rates != self.demand.rates
+        ):
+            return f"the proof is for rates {self.demand.rates}, the claim for {rates}"
+        if not self.model.original:
+            return "the pieces are not those of the model"
+        if kind == "energy-to-peak gain" and self.model.passes_peaks:
+            return "the energy-to-peak gain of a continuous model needs D = 0"
+        u = self.units
+        return structure.first(
+            P.fault_for([(s.low, s.high) for s in self.model.parameters], self.model.sizes[0]),
+            structure.coordinates(
+                u.left, u.right, (u.inputs, u.outputs, u.time, u.storage), self.model.sizes[0]
+            ),
+            structure.symmetric(np.asarray(u.weight), (self.model.sizes[0],) * 2, "the weight"),
+        )
+
+    @property
+    def scaled(self) -> tuple[Pieces, Demand]:
+        """Model and demand in the scaled units."""
+        u = self.units
+        rates = (
+            tuple(r * u.time for r in self.demand.rates)
+            if self.model.dt is None
+            else self.demand.rates
+        )
+        return self.model.scaled(
+            u.left, u.right, u.inputs, u.outputs, u.time
+        ), self.demand._replace(rates=rates)
+
+    def in_units(self, value: float) -> float:
+        """A physical gain (decay rate, 1/s) in the scaled units."""
+        u = self.units
+        if self.demand.kind == "decay rate":
+            return value * u.time if self.model.dt is None else value
+        channel = (
+            u.outputs
+            if self.demand.kind == "energy-to-peak gain"
+            else u.outputs * math.sqrt(u.time)
+        )
+        return value / channel
+
+    def sampled(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float]:
+        """(P, the bound it admits at `points` values of each parameter in every region); inf
+        (decay: -inf) where none.
+
+        For the energy-to-peak gain P is scaled so that its first inequality just holds; NaN for
+        stability.
+        """
+        kind, units = self.demand.kind, self.units
+        model, demand = self.scaled
+        if not demand.meaningful(model.dt, P.degrees):
+            return P, -math.inf if kind == "decay rate" else math.inf
+        back = BoxLyapunov(P.knots, P.degrees, units.to_scaled(P.coefficients))
+        if kind == "stability":
+            return P, math.nan
+        samples = _samples(model, back, demand, points)
+        if kind == "decay rate":
+            alpha = samples.decay(model.dt)
+            return P, alpha / self.in_units(1.0)
+        g = samples.gain()
+        if kind == "l2 gain" or not 0 < g < math.inf:
+            return P, math.sqrt(g) / self.in_units(1.0)
+        factor = 1.0 / (g * (1 + LADDER[0]))
+        P = BoxLyapunov(P.knots, P.degrees, P.coefficients * factor)
+        back = BoxLyapunov(P.knots, P.degrees, units.to_scaled(P.coefficients))
+        return P, math.sqrt(_samples(model, back, demand, points).peak()) / self.in_units(1.0)
+
+    def least(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float] | None:
+        """(P, the best bound shown to hold on the whole box), None where P proves nothing. Floating
+        point.
+        """
+        P, value = self.sampled(P, points)
+        kind = self.demand.kind
+        if math.isinf(value):
+            return None
+        nothing = kind.endswith("gain") and value * self.in_units(1.0) <= math.sqrt(
+            TINY * (1 + LADDER[0])
+        )
+        for fraction in (*LADDER, *FURTHER) if nothing else LADDER:
+            # gains: of gamma^2
+            bound = (
+                value
+                if kind == "stability"
+                else (
+                    value - fraction * abs(value)
+                    if kind == "decay rate"
+                    else value * math.sqrt(1 + fraction)
+                )
+            )
+            if kind == "energy-to-peak gain":
+                trial = BoxLyapunov(P.knots, P.degrees, P.coefficients / (1 + fraction))
+                bound *= math.sqrt(1 + fraction)
+            else:
+                trial = P
+            if self.floating(trial, bound):
+                return trial, bound
+            if kind == "stability":
+                break
+        return None
+
+    def conditioning(self, P: BoxLyapunov) -> float:
+        """Largest condition number of P in scaled coordinates, at its knots and a few values
+        between; inf where P is not positive.
+        """
+        axes = [np.unique([np.linspace(a, b, 5) for a, b in pairwise(k)]) for k in P.knots]
+        values = np.linalg.eigvalsh(self.units.to_scaled(P.at(np.array(list(product(*axes))))))
+        return float((values[:, -1] / values[:, 0]).max()) if values.min() > 0 else math.inf
+
+    def floating(self, P: BoxLyapunov, bound: float) -> bool:
+        """The whole box in floating point, and a grid of p through the model's own matrices."""
+        model, demand = self.scaled
+        if not demand.meaningful(model.dt, P.degrees) or math.isinf(bound):
+            return False
+        back = BoxLyapunov(P.knots, P.degrees, self.units.to_scaled(P.coefficients))
+        if not all(
+            map(negative_definite, polynomials(model, back, demand, self.in_units(bound), float))
+        ):
+            return False
+        return self.on_grid(P, bound)
+
+    def exact(self, P: BoxLyapunov, bound: float) -> bool:
+        """The whole box in rational arithmetic: the doubles of model, P, rates and bound as the
+        rationals they are.
+        """
+        if not self.demand.meaningful(self.model.dt, P.degrees) or math.isinf(bound):
+            return False
+        exactly = all(
+            map(
+                negative_definite_exactly,
+                polynomials(self.model, P, self.demand, bound, rational()),
+            )
+        )
+        return exactly and self.witnessed(P, bound, rational())
+
+    def witnessed(self, P: BoxLyapunov, bound: float, number: Number) -> bool:
+        """The pieces are the model, and the inequalities hold at some p without them; see
+        `pointwise`.
+        """
+        model, demand, dt = self.model, self.demand, self.model.dt
+        box = [(s.low, s.high) for s in model.parameters]
+        axes = [
+            pointwise.inside([*breaks, *knots])
+            for breaks, knots in zip(model.breaks, P.knots, strict=True)
+        ]
+        # all of a single axis, of several a diagonal through their product
+        count = WITNESSES if len(axes) > 1 else len(axes[0])
+        points = np.array(
+            [
+                [axis[(k * (3 * i + 1)) % len(axis)] for i, axis in enumerate(axes)]
+                for k in range(count)
+            ]
+        )
+        own = model.at(points)
+        alpha = number(bound) if demand.kind == "decay rate" else number(0.0)
+        g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
+        steps = demand.steps(dt, P.degrees)
+        corners = list(
+            product(
+                *(
+                    (-1, 1) if d and r > 0 else (0,)
+                    for d, r in zip(P.degrees, demand.rates, strict=True)
+                )
+            )
+        )
+        for k, p in enumerate(points):
+            if not self._reproduced(p, [M[k] for M in own]):
+                return False
+            A, B, C, D = (pointwise.numbers(M[k], number) for M in own)
+            here, slopes = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, p, number)
+            forms: list[Array] = [-here]
+            through = Matrices(A, B, C, D)
+            if demand.kind == "energy-to-peak gain":
+                # V grows by at most the energy of the input, and the outputs are seen by it
+                through = Matrices(A, B, C * 0, D * 0)
+                if dt is None:
+                    forms.append(-np.block([[here, C.T], [C, np.eye(len(C), dtype=int) * g]]))
+                else:
+                    eye, zero = (
+                        np.eye(B.shape[1], dtype=int) * number(1.0),
+                        np.zeros((A.shape[0], B.shape[1]), dtype=int) * number(1.0),
+                    )
+                    forms.append(
+                        -np.block(
+                            [
+                                [here, zero, C.T],
+                                [zero.T, eye, D.T],
+                                [C, D, np.eye(len(C), dtype=int) * g],
+                            ]
+                        )
+                    )
+            level = number(1.0) if demand.kind == "energy-to-peak gain" else g
+            if dt is None:
+                for signs in corners:
+                    moving = zip(signs, demand.rates, slopes, strict=True)
+                    drift = 2 * alpha * here
+                    for sign, r, slope in moving:
+                        drift = drift + sign * number(r) * slope if sign else drift
+                    forms.append(pointwise.dissipation(through, here, drift, None, level))
+            else:
+                growth = (
+                    number(math.exp(2.0 * bound * dt))
+                    if demand.kind == "decay rate"
+                    else number(1.0)
+                )
+                for q in pointwise.reached(p, steps, box):
+                    after = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, q, number)[
+                        0
+                    ]
+                    forms.append(pointwise.dissipation(through, here, None, after * growth, level))
+            if not all(positive_definite(-F) for F in forms):
+                return False
+        return True
+
+    def _reproduced(self, p: Array, own: list[Array]) -> bool:
+        index = tuple(
+            pointwise.segment_of(np.array(b), float(q))
+            for b, q in zip(self.model.breaks, p, strict=True)
+        )
+        for M, expected in zip(self.model.models[index], own, strict=True):
+            size = np.abs(M.coefficients).max(axis=tuple(range(len(p))))
+            if not pointwise.same_entries(
+                pointwise.tensor(M.coefficients, M.box, p), expected, size
+            ):
+                return False
+        return True
+
+    def on_grid(self, P: BoxLyapunov, bound: float) -> bool:
+        """The inequalities at a grid of p and the corners of what p may do next, written out
+        without polynomials.
+        """
+        m = len(self.model.parameters)
+        count = {1: 101, 2: 11}.get(m, 4)
+        grid = np.array(
+            list(product(*(np.linspace(s.low, s.high, count) for s in self.model.parameters)))
+        )
+        A, B, C, D = self.model.at(grid)
+        T = self.units.right @ self.units.weight
+        here = P.at(grid)
+        if np.linalg.eigvalsh(T.T @ here @ T).min() <= 0:
+            return False
+        kind, nx, nu = self.demand.kind, T.shape[0], B.shape[2]
+        alpha = bound if kind == "decay rate" else 0.0
+        g = bound**2
+        for move in self._moves(P, grid, here, A, B, alpha):
+            F = move
+            if kind == "l2 gain":
+                Y = np.concatenate([C, D], axis=2)
+                F = F + np.swapaxes(Y, 1, 2) @ Y
+            if kind in ("l2 gain", "energy-to-peak gain"):
+                F[:, nx:, nx:] -= (g if kind == "l2 gain" else 1.0) * np.eye(nu)
+            else:
+                F = F[:, :nx, :nx]
+            W = np.eye(F.shape[1])
+            W[:nx, :nx] = T
+            if np.linalg.eigvalsh(W.T @ F @ W).max() >= 0:
+                return False
+        if kind == "energy-to-peak gain":
+            size = C @ np.linalg.solve(here, np.swapaxes(C, 1, 2)) + D @ np.swapaxes(D, 1, 2)
+            return bool(np.linalg.eigvalsh(size).max() < g)
+        return True
+
+    def _moves(
+        self, P: BoxLyapunov, grid: Array, here: Array, A: Array, B: Array, alpha: float
+    ) -> Iterator[Array]:
+        nx, nu, dt = A.shape[1], B.shape[2], self.model.dt
+        M = np.concatenate([A, B], axis=2)
+        E = np.concatenate([np.eye(nx), np.zeros((nx, nu))], axis=1)
+        if dt is None:
+            still = E.T @ here @ M + np.swapaxes(M, 1, 2) @ here @ E + 2 * alpha * E.T @ here @ E
+            varying = [(i, r) for i, r in enumerate(self.demand.rates) if P.degrees[i] and r > 0]
+            slopes = [r * (E.T @ P.derivative(grid, i) @ E) for i, r in varying]
+            for signs in product((-1.0, 1.0), repeat=len(slopes)):
+                yield sum((s * slope for s, slope in zip(signs, slopes, strict=True)), still.copy())
+            return
+        low, high = np.array([(s.low, s.high) for s in self.model.parameters]).T
+        steps = np.array(self.demand.steps(dt, P.degrees))
+        for signs in product((-1.0, 0.0, 1.0), repeat=int((steps > 0).sum())):
+            move = np.zeros(len(steps))
+            move[steps > 0] = np.array(signs) * np.minimum(steps, high - low)[steps > 0]
+            there = P.at(np.clip(grid + move, low, high))
+            yield math.exp(2 * alpha * dt) * np.swapaxes(M, 1, 2) @ there @ M - E.T @ here @ E
+
+
+def polynomials(
+    model: Pieces, P: BoxLyapunov, demand: Demand, bound: float, number: Number
+) -> Iterator[PolynomialMatrix]:
+    """Every polynomial matrix that must be negative definite, with the bound in its place."""
+    for index in np.ndindex(*P.segments):
+        yield positivity(convert(P.segment(index), number))
+    nx, nu, ny = model.sizes
+    g = number(bound) * number(bound) if demand.kind in ("l2 gain", "energy-to-peak gain") else None
+    if demand.kind == "decay rate":
+        demand = demand._replace(shift=bound)
+    for region in regions(model, P.knots, demand.steps(model.dt, P.degrees)):
+        pair = Pair(
+            *(convert(P.segment(index), number) for index in (region.segment, region.next_segment))
+        )
+        for F in decrease(model, region, pair, demand, number):
+            if demand.kind == "l2 gain":
+                F = _less(F, np.r_[np.zeros(nx), np.ones(nu)], g, number)
+            elif demand.kind == "energy-to-peak gain":
+                F = _less(F, np.r_[np.zeros(nx), np.ones(nu)], number(1.0), number)
+            yield F
+        if demand.kind == "energy-to-peak gain" and region.next_segment == region.segment:
+            F = peak(model, region, pair.here, number)
+            yield _less(F, np.r_[np.zeros(F.shape[0] - ny), np.ones(ny)], g, number)
+
+
+def _less(F: PolynomialMatrix, where: Array, g: object, number: Number) -> PolynomialMatrix:
+    return F - PolynomialMatrix.constant(exact(np.diag(where), number) * g, F.box)
+
+
+class _Samples(NamedTuple):
+    """Values of the inequalities and of P at points: `moves` of V, `here` P itself; `outputs` of
+    the second inequality.
+    """
+
+    moves: list[Array]
+    here: list[Array]
+    outputs: list[Array]
+    nx: int
+    ny: int
+
+    def gain(self) -> float:
+        """Least g of the corner block, by Schur complement."""
+        g = TINY
+        for F, P in zip(self.moves, self.here, strict=True):
+            top = F[:, : self.nx, : self.nx]
+            if np.linalg.eigvalsh(P).min() <= 0 or np.linalg.eigvalsh(top).max() >= 0:
+                return math.inf
+            side, corner = F[:, : self.nx, self.nx :], F[:, self.nx :, self.nx :]
+            g = max(
+                g,
+                float(
+                    np.linalg.eigvalsh(
+                        corner - np.swapaxes(side, 1, 2) @ np.linalg.solve(top, side)
+                    ).max()
+                ),
+            )
+        return g
+
+    def peak(self) -> float:
+        """Least g of the second inequality."""
+        g = TINY
+        for F in self.outputs:
+            n = F.shape[1] - self.ny
+            top, side = F[:, :n, :n], F[:, :n, n:]
+            if np.linalg.eigvalsh(top).max() >= 0:
+                return math.inf
+            g = max(
+                g,
+                float(
+                    np.linalg.eigvalsh(-np.swapaxes(side, 1, 2) @ np.linalg.solve(top, side)).max()
+                ),
+            )
+        return g
+
+    def decay(self, dt: float | None) -> float:
+        """Largest alpha."""
+        worst = math.inf
+        for F, P in zip(self.moves, self.here, strict=True):
+            if np.linalg.eigvalsh(P).min() <= 0:
+                return -math.inf
+            L = np.linalg.inv(np.linalg.cholesky(P))
+            value = float(np.linalg.eigvalsh(L @ F @ np.swapaxes(L, 1, 2)).max())
+            if dt is None:
+                worst = min(worst, -0.5 * value)
+            else:
+                # A'P+A - P <= value P
+                worst = min(worst, -math.log(max(1 + value, 1e-300)) / (2 * dt))
+        return worst
+
+
+def _samples(model: Pieces, P: BoxLyapunov, demand: Demand, points: int) -> _Samples:
+    nx, _, ny = model.sizes
+    moves, here, outputs = [], [], []
+    for region in regions(model, P.knots, demand.steps(model.dt, P.degrees)):
+        pair = Pair(P.segment(region.segment), P.segment(region.next_segment))
+        for F in decrease(model, region, pair, demand, float):
+            local = _grid(F, points)
+            moves.append(F(local))
+            here.append(pair.here(local[:, : len(region.box)]))
+        if demand.kind == "energy-to-peak gain":
+            F = peak(model, region, pair.here, float)
+            outputs.append(F(_grid(F, points)))
+    return _Samples(moves, here, outputs, nx, ny)
+
+
+def _grid(F: PolynomialMatrix, points: int) -> Array:
+    """Points of the box, ends included."""
+    every = [
+        np.linspace(low, high, points if d else 1)
+        for d, (low, high) in zip(F.degrees, F.box, strict=True)
+    ]
+    return np.array(list(product(*every)))

@@ -1,0 +1,233 @@
+"""What a proof asserts, as polynomials with Bernstein coefficients in any arithmetic.
+
+The inequalities are written out here once more, but what they are written on is shared with the
+assembly of the cone program: the pieces of the model, cells and strips, restriction and composition
+by blossoms. An error there both would believe; `pointwise` would not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
+from synthesis.polynomial.bernstein import composition, restriction
+from synthesis.polynomial.cells import Cell, Strip, cells, strips
+from synthesis.polynomial.exact import Number, exact
+from synthesis.polynomial.matrix import PolynomialMatrix, block
+from synthesis.polynomial.pieces import ModelPiece
+from synthesis.polynomial.symmetric_power import generator, null_matrix
+
+Array = np.ndarray
+UNIT = ((0, 1), (0, 1))
+"""The box of the two local variables."""
+
+
+class Form(NamedTuple):
+    """A block with g = 0, and the positive weight of g, (1, 1): polynomials in two local variables,
+    along p and across.
+    """
+
+    block: PolynomialMatrix
+    weight: PolynomialMatrix
+
+
+class Claim(NamedTuple):
+    """What is to be verified: the pieces of the model, P, the rate (units of p per second) and dt
+    (s, None: continuous).
+
+    `elevation` raises the degree of the Bernstein forms, which brings their coefficients closer to
+    the values.
+    """
+
+    pieces: tuple[ModelPiece, ...]
+    P: Lyapunov
+    rate: float
+    dt: float | None
+    elevation: int = 0
+
+    @property
+    def meaningful(self) -> bool:
+        """False where a P that varies meets a p that may jump in continuous time: dV/dt has no
+        bound then.
+
+        False also where this form of V is not written for the model: a memory or a higher order in
+        discrete time or with channels.
+        """
+        if isinstance(self.P, MemoryLyapunov):
+            return self.dt is None and math.isfinite(self.rate)
+        if self.P.order > 1 and (
+            self.dt is not None or any(piece.B.shape[2] or len(piece.C[0]) for piece in self.pieces)
+        ):
+            return False
+        return self.dt is not None or self.P.degree == 0 or math.isfinite(self.rate)
+
+    def invariant(self, number: Number) -> bool:
+        """Whether p, with its lag where P has one, stays where the claim is made."""
+        return not isinstance(self.P, MemoryLyapunov) or self.P.region.invariant(self.rate, number)
+
+
+def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
+    """Every block over the whole range, with g = 0. `number` turns a double into the arithmetic of
+    the proof.
+    """
+    P, used = claim.P, 0
+    slack = (
+        None
+        if P.slack is None
+        else null_matrix(exact(P.slack, number), claim.pieces[0].A.shape[1], P.order)
+    )
+    for F, weight in _polynomials(claim, number):
+        degrees = (F.degrees[0] + claim.elevation, F.degrees[1])
+        F = F.elevate(degrees)
+        if slack is not None:
+            c = F.coefficients
+            own = slack[used : used + len(c)]
+            # where P carries too little of it the blocks stand as they are
+            c, used = (
+                np.concatenate([c[: len(own)] + own[:, None], c[len(own) :]]),
+                used + len(own),
+            )
+            F = _local(c)
+        yield Form(F, weight.elevate(degrees))
+
+
+def _polynomials(
+    claim: Claim, number: Number
+) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
+    pieces, P, rate, dt, _ = claim
+    assert claim.meaningful  # noqa: S101 - checked by the callers
+    one = PolynomialMatrix.constant(np.array([[number(1.0)]]), UNIT)
+    if isinstance(P, MemoryLyapunov):
+        for cell in cells(pieces, P.knots):
+            yield from _remembering(cell, P, rate, number)
+    elif dt is None:
+        for cell in cells(pieces, P.knots):
+            yield from ((F, one) for F in _continuous(cell, P, rate, number))
+    else:
+        step = rate * dt if P.degree else 0.0
+        for strip in strips(pieces, P.knots, step):
+            yield _discrete(strip, P, number), one
+
+
+def _continuous(
+    cell: Cell, P: SplineLyapunov, rate: float, number: Number
+) -> Iterator[PolynomialMatrix]:
+    A, B, C, D = _model(cell, number, P.order)
+    here, span = _now(cell, P, number)
+    flow = A.T @ here
+    top, side, corner = flow + flow.T + C.T @ C, here @ B + C.T @ D, D.T @ D
+    if P.degree == 0 or rate == 0:
+        yield block([[top, side], [side.T, corner]])
+        return
+    slope = here.derivative(0) * (number(1.0) / span)
+    for nu in (-number(rate), number(rate)):
+        yield block([[top + nu * slope, side], [side.T, corner]])
+
+
+def _remembering(
+    cell: Cell, P: MemoryLyapunov, rate: float, number: Number
+) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
+    """Blocks times height(p) = upper - lower, in (x, y): along the cell, and across one segment of
+    the lead.
+    """
+    A, B, C, D = _model(cell, number, 1)
+    a, b, width = _within(cell, P.knots, number)
+    j, region = cell.segment, P.region
+    low, high = (
+        [number(float(v[j])) + t * (number(float(v[j + 1])) - number(float(v[j]))) for t in (a, b)]
+        for v in (region.lower, region.upper)
+    )
+    span = (b - a) * width
+    lower, height = _scalar(np.array(low)[:, None]), _scalar(np.subtract(high, low)[:, None])
+    rise, widening = (low[1] - low[0]) / span, (high[1] - low[1] - high[0] + low[0]) / span
+    outer = [_times(height, F) for F in (C.T @ C, C.T @ D, D.T @ D)]
+    for i, ends in enumerate(pairwise(P.lead_knots)):
+        share = np.array([[number(float(s)) for s in ends]])
+        patch = exact(P.patch(j, i), number)
+        here = _local(_apply(restriction(P.degree, a, b), patch))
+        flow = _times(height, A.T @ here)
+        in_p = _times(height, here.derivative(0)) * (number(1.0) / span)
+        in_share = here.derivative(1) * (number(1.0) / (share[0, 1] - share[0, 0]))
+        lead = lower + height @ _scalar(share)
+        side = _times(height, here @ B) + outer[1]
+        for nu in (-number(rate), number(rate)):
+            drift = _scalar(nu * (1 - rise - widening * share)) - lead * (
+                number(1.0) / number(region.time)
+            )
+            top = flow + flow.T + outer[0] + nu * in_p + _times(drift, in_share)
+            yield block([[top, side], [side.T, outer[2]]]), height
+
+
+def _discrete(strip: Strip, P: SplineLyapunov, number: Number) -> PolynomialMatrix:
+    A, B, C, D = _model(strip.cell, number, 1)
+    here, _ = _now(strip.cell, P, number)
+    bottom, top = (
+        number(float(P.knots[strip.next_segment])),
+        number(float(P.knots[strip.next_segment + 1])),
+    )
+    corners = [[(number(q) - bottom) / (top - bottom) for q in pair] for pair in strip.corners]
+    there = exact(P.segment(strip.next_segment), number)
+    after = _local(_apply(composition(P.degree, corners), there))
+    left_A, left_B = A.T @ after, B.T @ after
+    state, side = left_A @ A - here + C.T @ C, left_A @ B + C.T @ D
+    return block([[state, side], [side.T, left_B @ B + D.T @ D]])
+
+
+def _model(cell: Cell, number: Number, order: int) -> list[PolynomialMatrix]:
+    """A, B, C, D over the cell; for `order` > 1 the generator of the monomials, and no channels."""
+    low, high = number(cell.piece.low), number(cell.piece.high)
+    a, b = (number(cell.low) - low) / (high - low), (number(cell.high) - low) / (high - low)
+    coefficients = [
+        exact(M, number) for M in (cell.piece.A, cell.piece.B, cell.piece.C, cell.piece.D)
+    ]
+    if order > 1:
+        coefficients[0] = generator(coefficients[0], order)
+        N = coefficients[0].shape[1]
+        coefficients[1:3] = [
+            np.zeros((1, N, 0), dtype=coefficients[0].dtype),
+            np.zeros((1, 0, N), dtype=coefficients[0].dtype),
+        ]
+    return [_local(_apply(restriction(len(M) - 1, a, b), M)[:, None]) for M in coefficients]
+
+
+def _now(cell: Cell, P: SplineLyapunov, number: Number) -> tuple[PolynomialMatrix, Any]:
+    """P over the cell, and how wide that is."""
+    a, b, width = _within(cell, P.knots, number)
+    own = _apply(restriction(P.degree, a, b), exact(P.segment(cell.segment), number))
+    return _local(own[:, None]), (b - a) * width
+
+
+def _within(cell: Cell, knots: Array, number: Number) -> tuple[Any, Any, Any]:
+    """The cell's ends as fractions of its segment, and the segment's width."""
+    bottom, top = number(float(knots[cell.segment])), number(float(knots[cell.segment + 1]))
+    return (
+        (number(cell.low) - bottom) / (top - bottom),
+        (number(cell.high) - bottom) / (top - bottom),
+        top - bottom,
+    )
+
+
+def _apply(weights: Array, coefficients: Array) -> Array:
+    """sum_j weights[..., j] coefficients[j], in any arithmetic."""
+    flat = coefficients.reshape(len(coefficients), -1)
+    return (weights.reshape(-1, weights.shape[-1]) @ flat).reshape(
+        *weights.shape[:-1], *coefficients.shape[1:]
+    )
+
+
+def _local(coefficients: Array) -> PolynomialMatrix:
+    return PolynomialMatrix(UNIT, coefficients)
+
+
+def _scalar(values: Array) -> PolynomialMatrix:
+    return _local(values[..., None, None])
+
+
+def _times(f: PolynomialMatrix, F: PolynomialMatrix) -> PolynomialMatrix:
+    """f F for a scalar polynomial f."""
+    return _local(f.coefficients * np.eye(F.shape[0], dtype=int)) @ F

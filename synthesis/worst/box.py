@@ -1,0 +1,287 @@
+"""What no certificate over a box can beat: frozen models all over it, and trajectories along
+straight lines through it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import linalg
+from scipy.optimize import minimize
+
+from symheli.lpv import LPVStateSpace
+from synthesis.polynomial.pieces import Pieces
+from synthesis.program.scaling import balance
+from synthesis.proof.inequalities import Demand
+from synthesis.worst.budget import Budget
+from synthesis.worst.frozen import FrozenGain, norm, to_continuous
+from synthesis.worst.lower_bound import Search, growing_trajectory, lower_bound
+from synthesis.worst.periodic import multiplier
+from synthesis.worst.spectrum import surely_unstable
+from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.wave_family import WaveFamily
+from synthesis.worst.waves import samples, steps
+
+Array = np.ndarray
+Measure = Callable[[Array, Array, Array, Array], float]
+
+WAVES = 30
+"""Waves looked at along each line for peaks and slow decay, those of the fastest growth first; for
+peaks, those of many periods too.
+"""
+
+
+class Worst(NamedTuple):
+    """The worst value of a measure and where it occurs: `p` (m,) frozen, or `trajectory`."""
+
+    value: float
+    p: tuple[float, ...] | None = None
+    trajectory: Trajectory | None = None
+
+
+def measure(demand: Demand, dt: float | None) -> Measure:
+    """What a frozen model is measured by, larger is worse: its gain, or minus its decay rate (1/s)
+    for stability too.
+    """
+    if demand.kind == "l2 gain":
+        return lambda A, B, C, D: norm(A, B, C, D, dt)[0]
+    if demand.kind == "energy-to-peak gain":
+        return lambda A, B, C, D: energy_to_peak(A, B, C, D, dt)
+    return lambda A, B, C, D: -frozen_decay(A, dt)
+
+
+def frozen_decay(A: Array, dt: float | None) -> float:
+    """Decay rate of the slowest mode, 1/s; negative where it grows."""
+    poles = np.linalg.eigvals(A)
+    return (
+        float(-poles.real.max())
+        if dt is None
+        else -math.log(max(float(np.abs(poles).max()), 1e-300)) / dt
+    )
+
+
+def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> float:
+    """max |y(t)| over inputs of unit energy: sqrt of the largest eigenvalue of C X C' (+ D D'), X
+    the controllability Gramian.
+
+    inf where the model is not stable. Source: Rotea (1993); discrete time by the same argument.
+    """
+    poles = np.linalg.eigvals(A)
+    if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
+        return math.inf
+    d = balance(np.abs(A), B, C)
+    A, B, C = A * d / d[:, None], B / d[:, None], C * d
+    # the bilinear change keeps the Gramian
+    F, G = (A, B) if dt is None else to_continuous(A, B, C, D)[:2]
+    X = linalg.solve_continuous_lyapunov(F, -G @ G.T)
+    size = C @ X @ C.T + (D @ D.T if dt is not None else 0.0)
+    return math.sqrt(max(float(np.linalg.eigvalsh(0.5 * (size + size.T)).max(initial=0.0)), 0.0))
+
+
+def worst_frozen(model: Pieces, size: Measure) -> Worst:
+    """The largest over a grid of the box, and a local search from its best points."""
+    low, high = np.array([(s.low, s.high) for s in model.parameters]).T
+    m, count, grid = len(low), _count(model), _grid(model)
+
+    def at(p: Array) -> float:
+        return size(*(M[0] for M in model.at(np.clip(p, low, high)[None])))
+
+    values = np.array([size(*matrices) for matrices in zip(*model.at(grid), strict=True)])
+    best = int(values.argmax())
+    worst = Worst(float(values[best]), tuple(map(float, grid[best])))
+    if math.isinf(worst.value):
+        return worst
+    for k in np.argsort(-values)[:2]:
+        step = (high - low) / (count - 1)
+        simplex = np.vstack(
+            [
+                grid[k],
+                *(grid[k] + d * np.where(grid[k] + d > high, -1.0, 1.0) for d in np.diag(step)),
+            ]
+        )
+        found: Any = minimize(
+            lambda p: -min(at(p), 1e300),
+            grid[k],
+            method="Nelder-Mead",
+            bounds=list(zip(low, high, strict=True)),
+            options={
+                "initial_simplex": simplex,
+                "maxfev": 40 * m,
+                "xatol": 1e-7 * float((high - low).min()),
+                "fatol": 1e-12,
+            },
+        )
+        value = at(found.x)
+        if value > worst.value:
+            worst = Worst(value, tuple(map(float, np.clip(found.x, low, high))))
+    return worst
+
+
+def unstable_at(model: Pieces, suspect: tuple[float, ...]) -> tuple[float, ...] | None:
+    """A p, the suspect one first, at which the frozen model is unstable beyond rounding; None where
+    there is none on the grid.
+    """
+    points = np.vstack([suspect, _grid(model)])
+    return next(
+        (
+            tuple(map(float, p))
+            for p, A in zip(points, model.at(points).A, strict=True)
+            if surely_unstable(A, model.dt)
+        ),
+        None,
+    )
+
+
+def _count(model: Pieces) -> int:
+    return {1: 61, 2: 15, 3: 7}.get(len(model.parameters), 3)
+
+
+def _grid(model: Pieces) -> Array:
+    axes = [
+        np.unique(np.r_[np.linspace(s.low, s.high, _count(model)), b])
+        for s, b in zip(model.parameters, model.breaks, strict=True)
+    ]
+    return np.array(list(product(*axes)))
+
+
+def worst_moving(
+    model: LPVStateSpace,
+    demand: Demand,
+    frozen: Worst,
+    search: Search | None,
+) -> Worst:
+    """The worst found along p that moves on lines through the box within its rates; `frozen` where
+    nothing is worse.
+
+    Gains and minus decay rates: inf (gain) or a value >= 0 (decay) means a trajectory along which
+    the state grows.
+    """
+    best = frozen
+    if search is None or all(rate == 0 for rate in demand.rates):
+        return best
+    budget, lines = (
+        Budget(search.seconds),
+        [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.limit > 0],
+    )
+    for k, (line, back) in enumerate(lines):
+        if budget.over:
+            break
+        budget.tell("line %d of %d, %.6g so far", k + 1, len(lines), abs(best.value))
+        rate = line.scheduling.limit
+        search = replace(search, seconds=budget.left / (len(lines) - k))
+        if demand.kind == "l2 gain":
+            found = lower_bound(
+                line, rate, frozen=FrozenGain(frozen.value, 0.0, 0.0), search=search
+            )
+            value, trajectory = found.gamma, found.trajectory
+        elif demand.kind == "energy-to-peak gain":
+            value, trajectory = _peaks(line, rate, search)
+        else:
+            value, trajectory = _slowest(line, rate, search)
+        if trajectory is not None and value > best.value:
+            best = Worst(value, None, Trajectory(trajectory.time, back(trajectory.p)))
+        if math.isinf(best.value):
+            break
+    return best
+
+
+def growing(model: LPVStateSpace, demand: Demand, search: Search | None) -> Trajectory | None:
+    """A p(t) on such a line along which the state grows, None where none was found."""
+    if search is None:
+        return None
+    budget, lines = Budget(search.seconds), list(_lines(model, demand.rates))
+    for k, (line, back) in enumerate(lines):
+        if budget.over:
+            break
+        budget.tell("line %d of %d", k + 1, len(lines))
+        search = replace(search, seconds=budget.left / (len(lines) - k))
+        found = growing_trajectory(line, line.scheduling.limit, search)
+        if found is not None:
+            return Trajectory(found.time, back(found.p))
+    return None
+
+
+def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:
+    """Energy to peak along waves: the Gramian of inputs held over each step, from rest over some
+    cycles.
+    """
+    family = WaveFamily(line, rate, search)
+    best: tuple[float, Trajectory | None] = (0.0, None)
+    # where A does not depend on p, growth ranks nothing
+    budget = Budget(search.seconds)
+    for wave in (*family.coarse()[:WAVES], *family.spread()):
+        if budget.over:
+            break
+        cycle = Trajectory(*wave.vertices())
+        system = steps(line, cycle.time, cycle.p, max(family.longest, wave.period / search.steps))
+        shown = cycle if line.dt is None else samples(cycle, line.dt)
+        after = np.interp(system.time[1:], *cycle) if line.dt is None else np.roll(shown.p, -1)
+        C, D = line.matrices(np.clip(after, line.scheduling.low, line.scheduling.high))[2:]
+        n, X, peak = system.states, np.zeros((system.states, system.states)), 0.0
+        cycles = max(3, min(20, math.ceil(2 * family.slow / wave.period)))
+        for k in range(cycles * len(system.step)):
+            j = k % len(system.step)
+            Phi, Gamma = system.step[j, :n, :n], system.step[j, :n, n:]
+            X = Phi @ X @ Phi.T + Gamma @ Gamma.T
+            size = C[j] @ X @ C[j].T + (D[j] @ D[j].T if line.dt is not None else 0.0)
+            peak = max(peak, float(np.linalg.eigvalsh(size).max()))
+        # the time steps are good to about 1e-4
+        value = math.sqrt(peak) * (1 - 1e-4 * (line.dt is None))
+        if value > best[0]:
+            best = value, shown
+    return best
+
+
+def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:
+    """Minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers; the error
+    of the time steps taken off.
+    """
+    family = WaveFamily(line, rate, search)
+    best: tuple[float, Trajectory | None] = (-math.inf, None)
+    budget = Budget(search.seconds)
+    for wave in family.coarse()[:WAVES]:
+        if budget.over:
+            break
+        cycle = Trajectory(*wave.vertices())
+        longest = max(family.longest, wave.period / search.steps)
+        rates = [
+            math.log(max(multiplier(steps(line, cycle.time, cycle.p, longest / finer)), 1e-300))
+            / wave.period
+            for finer in ((2, 4) if line.dt is None else (1, 1))
+        ]
+        value = rates[1] - abs(rates[1] - rates[0])
+        if value > best[0]:
+            best = value, cycle if line.dt is None else samples(cycle, line.dt)
+    return best
+
+
+def _lines(
+    model: LPVStateSpace, rates: Sequence[float]
+) -> Iterator[tuple[LPVStateSpace, Callable[[Array], Array]]]:
+    """Diagonals and axes of the box as models of one parameter within the rates, and the way back
+    to p.
+    """
+    if len(model.parameters) == 1:
+        yield model.with_rate(rates[0]), lambda p: p
+        return
+    model = model.with_rate(rates)
+    low, high = np.array(model.box).T
+    m = len(low)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    directions = [np.array((1.0, *signs)) for signs in product((1.0, -1.0), repeat=m - 1)] + (
+        list(np.eye(m)) if m > 1 else []
+    )
+    for d in directions:
+        line = model.along(middle - d * half, middle + d * half)
+        rate = min(r / h for r, h, used in zip(rates, half, d, strict=True) if used)
+        yield (
+            line.with_rate(rate),
+            lambda s, d=d: (
+                middle + np.multiply.outer(s, d * half) if m > 1 else middle[0] + s * half[0]
+            ),
+        )

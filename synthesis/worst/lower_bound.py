@@ -1,0 +1,342 @@
+"""Bad scheduling trajectories: a gain that no certificate may undercut, or growth that no
+certificate can deny.
+
+Trapezoid waves within the range and the rate are the start: the Floquet multipliers of a coarse
+family from a table of transition matrices, and for the gain waves of many periods. From the best of
+them ascents on the whole trajectory and on the corners of a wave (`corners`), first for growth,
+then for the gain of the periodic system. What is reported is growth beyond the error of the time
+steps, or |y|/|u| of an explicit input from rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import NamedTuple
+
+import numpy as np
+
+from symheli.errors import InputError
+from synthesis.worst.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
+from synthesis.worst.budget import Budget
+from synthesis.worst.corners import Corners, climb
+from synthesis.worst.frozen import FrozenGain, frozen_gain
+from synthesis.worst.periodic import Lifted, multiplier, ratio_from_rest, worst_input
+from synthesis.worst.rates import Rate, rates
+from synthesis.worst.scheduled import Scheduled
+from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.wave_family import WaveFamily
+from synthesis.worst.waves import Steps, samples, steps
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Search:
+    """How hard to look for bad trajectories.
+
+    `levels` values of p and `dwells` dwell times span the coarse family of waves; an ascent begins
+    from the best `starts` of them, on about `nodes` nodes a cycle, with at most `evaluations`
+    gradients each; a cycle lasts at most `cycles` of the slowest mode or, for the gain, as long as
+    a slow p takes to cross its range; `steps` bounds the time steps of a cycle, `samples` those of
+    the explicit input. It ends after `seconds` of wall time, for all lines through a box together;
+    math.inf makes the result independent of the machine. The logger "synthesis" tells how far it is
+    (INFO).
+    """
+
+    levels: int = 12
+    dwells: int = 13
+    starts: int = 3
+    nodes: int = 100
+    evaluations: int = 40
+    cycles: float = 3.0
+    steps: int = 200
+    samples: int = 150_000
+    seconds: float = 10.0
+
+    def __post_init__(self) -> None:
+        least = {
+            "levels": 2,
+            "dwells": 1,
+            "starts": 1,
+            "nodes": 8,
+            "evaluations": 1,
+            "steps": 8,
+            "samples": 8,
+        }
+        wrong = [f"{name} >= {low}" for name, low in least.items() if getattr(self, name) < low]
+        if wrong or not self.cycles > 0 or not self.seconds > 0:
+            raise InputError(
+                f"expected {', '.join([*wrong, 'cycles > 0', 'seconds > 0'])}, got {self}"
+            )
+
+
+THOROUGH = Search()
+"""The default: some seconds for five states, ten at most."""
+
+
+class LowerBound(NamedTuple):
+    """`gamma`: no smaller L2 gain can be certified (inf: the state grows along `trajectory`,
+    repeated).
+
+    `trajectory` None: p constant, the frozen gain is the best found; in discrete time it has one p
+    a sample. `input` (n, nu): the input with |y| = gamma |u|, held from each time of the trajectory
+    to the next; None where none was computed. `growth`: factor of the state in one cycle.
+    """
+
+    gamma: float
+    trajectory: Trajectory | None
+    input: Array | None = None
+    growth: float = math.nan
+
+
+def lower_bound(
+    lpv: Scheduled,
+    rate: Rate = None,
+    *,
+    frozen: FrozenGain | None = None,
+    search: Search | None = THOROUGH,
+) -> LowerBound:
+    """A lower bound of the L2 gain over p(t) in range with |dp/dt| <= `rate` (default the model's
+    own; inf: p may jump).
+
+    `lpv` may also be an LFT of one parameter. Deterministic as long as `search.seconds` suffice.
+    With `search` None, or rate 0, the `frozen` gain. In continuous time the error of the time
+    steps, judged by halving them, is taken off.
+    """
+    (limit,) = rates((lpv.scheduling,), rate)
+    frozen = frozen or frozen_gain(lpv)
+    best = LowerBound(frozen.gamma, None)
+    if search is None or limit == 0 or not math.isfinite(frozen.gamma):
+        return best
+    hunt = _Hunt(lpv, limit, search)
+    cycles, growing = hunt.fastest()
+    if growing is not None:
+        return growing
+    near, spread = (
+        hunt.ranked(hunt.near()),
+        hunt.ranked(wave.cycle() for wave in hunt.family.spread(frozen.p)),
+    )
+    # of the spread the best alone: long cycles begin high and have less room to rise
+    tops = [*sorted([*hunt.ranked(cycles), *near], key=_first)[-search.starts :], *spread[-1:]]
+    # the starts stay beside what they lead to: corners may fall between the nodes
+    found = list(tops)
+    for cycle in hunt.improved(tops, [*near[-1:], *spread[-1:]]):
+        if hunt.grows(cycle):
+            return hunt.growing(cycle)
+        found += hunt.ranked([cycle])
+        hunt.budget.tell("gain %.6g", max(gain for gain, _ in found) if found else best.gamma)
+    if not found:
+        return best
+    explicit = hunt.explicit(max(found, key=_first)[1])
+    return explicit if explicit.gamma > best.gamma else best
+
+
+def growing_trajectory(
+    lpv: Scheduled, rate: float, search: Search | None = THOROUGH
+) -> Trajectory | None:
+    """One cycle of a p(t) within the limits along which the free state grows, repeated; None where
+    none was found.
+    """
+    if search is None or rate == 0:
+        return None
+    growing = _Hunt(lpv, rate, search).fastest()[1]
+    return growing.trajectory if growing else None
+
+
+class _Hunt:
+    """The search along one model at one rate."""
+
+    def __init__(self, lpv: Scheduled, rate: float, search: Search):
+        self.lpv, self.rate, self.search = lpv, rate, search
+        self.budget = Budget(search.seconds)
+        self.family = WaveFamily(lpv, rate, search)
+
+    def fastest(self) -> tuple[list[Trajectory], LowerBound | None]:
+        """Cycles made to grow as fast as they can, the fastest last; and the verdict where one of
+        them grows.
+        """
+        reached: list[tuple[float, Trajectory]] = []
+        for cycle in self._steepening():
+            if self.budget.over and reached:
+                break
+            if self.grows(cycle):
+                return [], self.growing(cycle)
+            reached.append(
+                (math.log(max(self.multiplier(cycle), 1e-300)) / float(cycle.time[-1]), cycle)
+            )
+        return [cycle for _, cycle in sorted(reached, key=_first)[-self.search.starts :]], None
+
+    def improved(
+        self, tops: list[tuple[float, Trajectory]], waves: list[tuple[float, Trajectory]]
+    ) -> Iterator[Trajectory]:
+        """What ascents of the gain lead to: on the nodes of the `tops`, on the corners of the
+        `waves`; as far as there is time.
+        """
+        for _, cycle in tops:
+            if not self.budget.over:
+                yield self.ascend(cycle, GAIN)
+        for _, cycle in waves:
+            if not self.budget.over:
+                yield from self.climb(cycle, GAIN)
+
+    def _steepening(self) -> Iterator[Trajectory]:
+        waves = [wave.cycle() for wave in self.family.coarse()[: self.search.starts]]
+        yield from waves
+        for wave in waves[:1]:
+            yield from self.climb(wave, GROWTH)
+        for wave in waves:
+            yield self.ascend(wave, GROWTH)
+
+    def near(self) -> list[Trajectory]:
+        """Waves of fast growth, and slower ones, which now and then are worse."""
+        slower = (
+            self.rate / 2
+            if math.isfinite(self.rate)
+            else 4 * self.lpv.scheduling.radius / self.family.slow
+        )
+        families = (self.family.coarse(), WaveFamily(self.lpv, slower, self.search).coarse())
+        mixed = [
+            wave.cycle() for pair in zip_longest(*families) for wave in pair if wave is not None
+        ]
+        return mixed[: max(self.search.starts, self.search.evaluations)]
+
+    def ranked(self, cycles: Iterable[Trajectory]) -> list[tuple[float, Trajectory]]:
+        """Gains of the repeated cycles, the largest last, without those along which the state
+        grows.
+        """
+        # one at least, so that there is something to improve
+        gains = (
+            (self.gain(cycle), cycle)
+            for k, cycle in enumerate(cycles)
+            if k == 0 or not self.budget.over
+        )
+        return sorted(((gain, cycle) for gain, cycle in gains if math.isfinite(gain)), key=_first)
+
+    def climb(self, wave: Trajectory, objective: Objective) -> Iterator[Trajectory]:
+        """The cycles that ascents on the corners of a wave lead to: two corners, and where growth
+        is asked four; none in discrete time.
+        """
+        if self.lpv.dt is not None:
+            return
+        period = self.limit(wave)
+        longest = max(self.family.longest, period / self.search.steps)
+        corners = Corners.of(wave)
+        for again in (False, True)[: 1 + objective.a_second]:
+            start = corners.twice() if again else corners
+            corners = climb(
+                self.lpv,
+                self.rate,
+                start,
+                objective,
+                longest,
+                period,
+                self.search.evaluations // 2,
+                self.budget,
+            )
+            yield corners.cycle(self.rate)
+
+    def ascend(self, cycle: Trajectory, objective: Objective) -> Trajectory:
+        """The cycle a whole ascent leads to."""
+        limit = self.limit(cycle)
+        # nodes as close in a slow cycle, as far as the time steps allow
+        nodes = self.search.nodes * min(
+            limit / self.family.longest_period, self.search.steps / self.search.nodes
+        )
+        start = on_nodes(cycle, max(self.search.nodes, round(nodes)), self.lpv.dt)
+        return ascend(
+            self.lpv, self.rate, start, objective, limit, self.search.evaluations, self.budget
+        )[0]
+
+    def limit(self, cycle: Trajectory) -> float:
+        """How long an ascent may make this cycle, s: a slow one as long as p needs to cross its
+        range and come back.
+        """
+        return (
+            self.family.longest_period
+            if cycle.time[-1] <= self.family.longest_period
+            else self.family.slowest_period
+        )
+
+    def along(self, cycle: Trajectory, finer: int = 1, split: int = 1) -> Steps:
+        """The model along one cycle."""
+        longest = max(self.family.longest, float(cycle.time[-1]) / self.search.steps) / finer
+        return steps(self.lpv, *cycle, longest, split)
+
+    def multiplier(self, cycle: Trajectory, finer: int = 1) -> float:
+        """Largest Floquet multiplier (modulus) of one cycle."""
+        return multiplier(self.along(cycle, finer))
+
+    def grows(self, cycle: Trajectory) -> bool:
+        """Whether a multiplier exceeds one by more than the time steps can be wrong."""
+        coarse, fine = self.multiplier(cycle, 2), self.multiplier(cycle, 4)
+        return fine - abs(fine - coarse) > 1 + 1e-7
+
+    def growing(self, cycle: Trajectory) -> LowerBound:
+        """The verdict on a cycle along which the state grows."""
+        shown = cycle if self.lpv.dt is None else samples(cycle, self.lpv.dt)
+        return LowerBound(math.inf, shown, None, self.multiplier(cycle, 4))
+
+    def gain(self, cycle: Trajectory) -> float:
+        """L2 gain of the periodic system, inf where it grows."""
+        return worst_input(self.along(cycle))[0]
+
+    def explicit(self, cycle: Trajectory) -> LowerBound:
+        """|y|/|u| of an explicit input over many cycles from rest."""
+        system = self.along(cycle, finer=2)
+        lifted = Lifted.of(system)
+        gain, angle, shape = worst_input(system, lifted)
+        if math.isinf(gain):
+            return LowerBound(0.0, None)
+        growth = multiplier(system)
+        count = int(
+            np.clip(
+                math.ceil(50.0 / max(1.0 - growth, 1e-3)),
+                8,
+                max(8, self.search.samples // len(system.step)),
+            )
+        )
+        window = np.sin(np.pi * (np.arange(count) + 0.5) / count)
+        turn = np.exp(1j * angle * np.arange(count)) * window
+        start = np.real(turn[:, None] * shape.reshape(1, -1))
+        ratio, inputs = ratio_from_rest(lifted, start, rounds=6)
+        inputs = inputs.reshape(-1, shape.shape[1])
+        if self.lpv.dt is None:
+            # the same input in steps half as long: what changes is the error of the steps, taken
+            # off
+            halved = np.repeat(inputs, 2, axis=0).reshape(count, -1)
+            half, _ = ratio_from_rest(
+                Lifted.of(self.along(cycle, finer=2, split=2)), halved, rounds=1
+            )
+            ratio = min(ratio, half) - abs(ratio - half)
+        if self.lpv.dt is not None:
+            p = np.tile(samples(cycle, self.lpv.dt).p, count)
+            return LowerBound(ratio, Trajectory(self.lpv.dt * np.arange(len(p)), p), inputs, growth)
+        width = np.tile(np.diff(system.time), count)
+        return LowerBound(
+            ratio, *_flown(cycle, system.time, count, inputs / np.sqrt(width)[:, None]), growth
+        )
+
+
+def _first(pair: tuple[float, Trajectory]) -> float:
+    return pair[0]
+
+
+def _flown(cycle: Trajectory, at: Array, count: int, held: Array) -> tuple[Trajectory, Array]:
+    """The cycle so many times over, and the input held from each time to the next; where p jumps,
+    one time with both values.
+    """
+    start = np.interp(at[:-1], *cycle)
+    # the value a step ends with: of two at the same time interpolation takes the later one,
+    # backwards the earlier
+    end = np.interp(-at[1:], -cycle.time[::-1], cycle.p[::-1])
+    jumping = bool(np.any(np.diff(cycle.time) == 0))
+    jumps = np.flatnonzero(jumping & (np.abs(end - np.roll(start, -1)) > 1e-9 * np.ptp(cycle.p)))
+    time, p = np.insert(at[:-1], jumps + 1, at[jumps + 1]), np.insert(start, jumps + 1, end[jumps])
+    each = held.reshape(count, len(start), -1)
+    time = np.concatenate([time + k * at[-1] for k in range(count)])
+    return Trajectory(time, np.tile(p, count)), np.insert(
+        each, jumps + 1, each[:, jumps], axis=1
+    ).reshape(len(time), -1)

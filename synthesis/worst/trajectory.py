@@ -1,0 +1,21 @@
+"""A path of the scheduling parameters."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+Array = np.ndarray
+
+
+class Trajectory(NamedTuple):
+    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines between
+    them; a jump has one time twice.
+
+    Discrete time: one p for every sample. A cycle is to be repeated. Several parameters: `p` (n,
+    m).
+    """
+
+    time: Array
+    p: Array
