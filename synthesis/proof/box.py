@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Matrices
+from symheli.lpv import Matrices, Scheduling
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.polynomial import structure
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
@@ -78,6 +78,11 @@ class Evidence(NamedTuple):
     model: Pieces
     units: Units
     demand: Demand
+
+    @property
+    def parameters(self) -> tuple[Scheduling, ...]:
+        """The parameters of the model."""
+        return self.model.parameters
 
     def fault(self, P: BoxLyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
         """What keeps P from being about this model and this claim, before any inequality; None

@@ -27,11 +27,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from synthesis.certificate import Kind
 from synthesis.polynomial.exact import Number, exact
 from synthesis.polynomial.matrix import PolynomialMatrix, block
 from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import Region, model_on, now, successor
-from synthesis.verdict import Kind
 
 Array = np.ndarray
 
