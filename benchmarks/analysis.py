@@ -30,11 +30,11 @@ from benchmarks.timing import arguments, keep  # noqa: E402
 from studies.loops.lateral import HOLD, OUTPUTS, STATES, lateral_loop  # noqa: E402
 from symheli.flight import XCELL_SERVOS  # noqa: E402
 from symheli.lpv import LFT, LPVStateSpace, Scheduling, pade_delay  # noqa: E402
-from synthesis import Certificate, LFTCertificate, Relaxation, l2_gain, lft_gain  # noqa: E402
+from synthesis import Certificate, Spline, l2_gain, lft_gain  # noqa: E402
 
 RATE = 1.0
 """Acceleration, m/s^2."""
-PROOF = Relaxation(segments=(8,))
+PROOF = Spline(segments=8)
 """Cubic spline on 8 segments: 25 matrices."""
 DELAY = 0.02
 """Before the servo, s."""
@@ -112,8 +112,8 @@ def springs(parameters: int) -> LFT:
     return LFT.polynomial(A, {none: B}, {none: C}, {none: np.zeros((1, 1))}, ranges).reduce()
 
 
-def proof(loop: LPVStateSpace, relaxation: Relaxation = PROOF) -> Certificate:
-    return l2_gain(loop, RATE, relaxation=relaxation, search=None)
+def proof(loop: LPVStateSpace, form: Spline = PROOF) -> Certificate:
+    return l2_gain(loop, RATE, form=form, search=None)
 
 
 def gridded(loop: LPVStateSpace, degree: int) -> tuple[float, float]:
@@ -126,7 +126,7 @@ def gridded(loop: LPVStateSpace, degree: int) -> tuple[float, float]:
     return gridded_lmi.gain(matrices, loop.scheduling.low, loop.scheduling.high, RATE, degree)
 
 
-def d_scaled(loop: LPVStateSpace) -> LFTCertificate:
+def d_scaled(loop: LPVStateSpace) -> Certificate:
     return lft_gain(loop.to_lft().reduce(), "D", search=None)
 
 
@@ -184,7 +184,7 @@ def exponent(sizes: list[int], times: list[float]) -> float:
 
 def growth(loops: dict[int, LPVStateSpace], quick: bool) -> dict[str, list[tuple[int, float]]]:
     """Times, s, against states, degree of P, and parameters of an LFT."""
-    few = Relaxation(segments=(4,), degree=2)
+    few = Spline(segments=4, degree=2)
 
     def timed(call: Callable[[], object]) -> float:
         begin = time.perf_counter()
@@ -198,8 +198,7 @@ def growth(loops: dict[int, LPVStateSpace], quick: bool) -> dict[str, list[tuple
             (n, timed(lambda loop=loop: proof(loop, few))) for n, loop in loops.items()
         ],
         "degree of P (5 states, 4 segments)": [
-            (d, timed(lambda d=d: proof(loops[5], Relaxation(segments=(4,), degree=d))))
-            for d in degrees
+            (d, timed(lambda d=d: proof(loops[5], Spline(segments=4, degree=d)))) for d in degrees
         ],
         "parameters, LFT test D/G (twice as many states)": [
             (m, timed(lambda lft=lft: lft_gain(lft, "DG", search=None))) for m, lft in lfts.items()

@@ -22,9 +22,9 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.lpv.exponential import expm
-from synthesis import Relaxation, Solver, l2_gain, lft_gain, stability
-from synthesis.analysis.one_parameter import prove
-from synthesis.forms import scaled_problem
+from synthesis import Solver, Spline, SumOfSquares, l2_gain, lft_gain, stability
+from synthesis.analysis.certify import route as searching
+from synthesis.analysis.question import question
 
 ROUTES = (
     "stability by splines",
@@ -34,8 +34,9 @@ ROUTES = (
     "gain as an LFT",
     "past the frozen poles",
 )
-COARSE = Relaxation(segments=(2,), degree=2)
-BOX = Relaxation(kind="sos", segments=(1,), degree=1)
+COARSE = Spline(segments=2, degree=2)
+SPLINES = {"form": COARSE}
+BOX = {"form": Spline(segments=1, degree=1), "impose": SumOfSquares()}
 
 
 class Plant(NamedTuple):
@@ -82,21 +83,14 @@ def judge(seed: int) -> tuple[str, bool, str]:
     route = ROUTES[seed % len(ROUTES)]
     gamma = math.inf
     if route == "past the frozen poles":
-        proven = (
-            prove(
-                scaled_problem(lpv, lpv.scheduling.rate, 1.0, with_gain=False),
-                COARSE,
-                Solver(),
-                math.inf,
-            ).lyapunov
-            is not None
-        )
+        asked = question(lpv, None, "stability", COARSE, None, Solver(), None)
+        proven = searching(asked).search(math.inf).proof is not None
     else:
         if route.endswith("LFT"):
             cert = lft_gain(lpv.to_lft().reduce(), search=None)
         else:
             analysis = stability if route.startswith("stability") else l2_gain
-            cert = analysis(lpv, relaxation=COARSE if "splines" in route else BOX, search=None)
+            cert = analysis(lpv, **(SPLINES if "splines" in route else BOX), search=None)
         proven, gamma = cert.verified, cert.gamma
     return (
         route,

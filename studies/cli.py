@@ -23,6 +23,7 @@ VERBS = (
     "identify",
     "margins",
     "certify",
+    "verify",
     "export",
     "campaign",
     "pays",

@@ -11,7 +11,8 @@ import numpy as np
 
 import synthesis
 from symheli import LPVStateSpace
-from synthesis import Certificate, Relaxation
+from synthesis import Certificate
+from synthesis.forms import LyapunovForm
 
 Array = np.ndarray
 
@@ -82,14 +83,14 @@ def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
 
 
 def covered_gain(
-    lpv: LPVStateSpace, rest: Remainder, rate: float, relaxation: Relaxation, gain: float
+    lpv: LPVStateSpace, rest: Remainder, rate: float, form: LyapunovForm, gain: float
 ) -> tuple[float, Certificate | None]:
     """(gain proven for `lpv` and every remainder, the certificate of `covering`) near its own
     `gain`; (inf, None) where none is.
     """
     for room in ROOMS:
         certificate = synthesis.l2_gain(
-            covering(lpv, rest, room * gain), rate, relaxation=relaxation, search=None
+            covering(lpv, rest, room * gain), rate, form=form, search=None
         )
         if certificate.gamma <= 1:
             return room * gain * certificate.gamma, certificate

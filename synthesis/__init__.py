@@ -6,22 +6,21 @@ No solver is loaded by importing this package.
 
 from synthesis.analysis.decay_rate import decay_rate
 from synthesis.analysis.generalized_h2 import generalized_h2
-from synthesis.analysis.l2_gain import l2_gain, stability
-from synthesis.certificate import Attempt, Certificate
-from synthesis.forms import Relaxation
-from synthesis.lft.bounds import BoxGain, frozen_box_gain
-from synthesis.lft.certificate import LFTCertificate, Trial
+from synthesis.analysis.l2_gain import l2_gain
+from synthesis.analysis.stability import stability
+from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
+from synthesis.forms import HigherOrder, Memory, Spline
+from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
 from synthesis.lft.gain import lft_gain, lft_stability
 from synthesis.lft.multipliers import SCALINGS, Multiplier
 from synthesis.loops.handling_qualities import Bandwidth, bandwidth
 from synthesis.loops.margins import Margins, disk_margin, loop, margins
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.lyapunov.spline import MemoryLyapunov, SplineLyapunov
-from synthesis.polynomial.certificate import BoxCertificate
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.program.cone_program import Solver, installed_solvers
-from synthesis.verdict import Seconds, Status, Verdict
 from synthesis.worst.frozen import FrozenGain, frozen_gain
+from synthesis.worst.lft import BoxGain, frozen_box_gain
 from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
 from synthesis.worst.trajectory import Trajectory
 
@@ -29,26 +28,29 @@ __all__ = [
     "SCALINGS",
     "Attempt",
     "Bandwidth",
-    "BoxCertificate",
+    "Bernstein",
     "BoxGain",
     "BoxLyapunov",
     "Certificate",
     "FrozenGain",
-    "LFTCertificate",
+    "Grid",
+    "HigherOrder",
     "LowerBound",
     "Margins",
+    "Memory",
     "MemoryLyapunov",
     "Multiplier",
     "PolynomialMatrix",
-    "Relaxation",
+    "Proof",
     "Search",
     "Seconds",
     "Solver",
+    "Spline",
     "SplineLyapunov",
     "Status",
+    "SumOfSquares",
     "Trajectory",
-    "Trial",
-    "Verdict",
+    "Vertices",
     "bandwidth",
     "decay_rate",
     "disk_margin",

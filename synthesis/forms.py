@@ -1,386 +1,203 @@
-"""The forms of V that a proof can take: what is unknown in each, its LMI blocks, and the V they
-lead to.
-"""
+"""The forms of the Lyapunov function V that a proof can take, as one asks for them."""
 
 from __future__ import annotations
 
-import math
-from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LPVStateSpace
-from synthesis.assemble.bounded_real import Blocks, continuous_blocks, discrete_blocks
-from synthesis.assemble.memory_blocks import memory_blocks
-from synthesis.lyapunov.lag import LagRegion
-from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov, graded_knots
-from synthesis.polynomial.cells import cells, strips
-from synthesis.polynomial.pieces import ModelPiece, model_pieces
-from synthesis.polynomial.symmetric import extended, length, smat, svec
-from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
-from synthesis.program.scaling import Scaling, scaling
-from synthesis.proof.one_parameter import Evidence
-
-Array = np.ndarray
-
-KINDS = ("bernstein", "sos", "vertices", "grid")
+from symheli.errors import InputError
 
 
-@dataclass(frozen=True)
-class Relaxation:
-    """The form of P(p) and of the LMIs.
+@dataclass(frozen=True, kw_only=True)
+class _InP:
+    """How P depends on p: see `Spline`."""
 
-    `kind` is how an LMI is imposed for every p: "bernstein", "sos" (sums of squares), "vertices" or
-    "grid" (proves nothing); docs/relaxations.md says what each promises.
+    degree: int | tuple[int, ...] | None = None
+    segments: int | tuple[int | tuple[int, ...], ...] | None = None
+    grading: float | None = None
+    accept: float | None = None
 
-    P is a continuous spline of `degree` (None: 3 in continuous, 2 in discrete time) on K segments,
-    K from `segments` (None: 16, 32 in continuous, 8, 16 in discrete time) in turn until the bound
-    is proven and gamma <= `accept` times the lower bound. Knots low + (high - low)(k/K)^`grading`.
-    A constant P has no knots, but its LMIs are cut there (None: 8). `elevation` raises the
-    Bernstein degree of the LMIs, or that of the sums of squares; `subdivision` halves every range
-    that often before the Bernstein coefficients are taken; `points` a parameter in every region for
-    the grid. Several parameters: degree None is 2 in continuous and 1 in discrete time, segments
-    (1,), `total_degree` limits the sum of the degrees. `margins`: state blocks are held below
-    -margin I in scaled coordinates, tried in turn. `floor`: P >= floor I.
+    def __post_init__(self) -> None:
+        degrees = self.degree if isinstance(self.degree, tuple) else (self.degree,)
+        if self.degree is not None and not all(d in (0, 1, 2, 3, 4) for d in degrees):
+            raise InputError(f"degree of P must be 0 .. 4, got {self.degree!r}")
+        segments: Any = self.segments
+        segments = (segments,) if isinstance(segments, int | np.integer) else segments
+        if segments is not None and not (
+            isinstance(segments, tuple | list)
+            and segments
+            and all(
+                isinstance(k, int | np.integer) and k >= 1
+                for each in segments
+                for k in (each if isinstance(each, tuple) else (each,))
+            )
+        ):
+            raise InputError(
+                "segments must be an integer >= 1, or a tuple of them to try in turn, got"
+                f" {self.segments!r}"
+            )
+        object.__setattr__(self, "segments", None if segments is None else tuple(segments))
+        if self.grading is not None and not self.grading >= 1:
+            raise InputError(f"grading must be >= 1, got {self.grading!r}")
+        if self.accept is not None and not self.accept >= 1:
+            raise InputError(f"accept must be >= 1, got {self.accept!r}")
 
-    `order` m > 1: V of degree 2m in the states, for `stability` in continuous time; costs grow with
-    the sixth power of the number of monomials of degree m. `memory`: V = x' P(p, p - q) x with q
-    the lag of p of so many seconds (about the time in which the worst p turns round), in continuous
-    time; across, P has `memory_degree` on `memory_segments` segments. Either way P has the degree
-    and segments above in p (None: 2 on 4, then 8 with an order; 3 on 12 with a memory).
+    def degrees(self, parameters: int) -> list[int | None]:
+        """One for each of so many parameters, None for the usual one; `InputError` for another
+        number of them.
+        """
+        return _each(self.degree, parameters, "degree")
+
+    def segments_tried(self, parameters: int) -> list[list[Any]] | None:
+        """Numbers of segments, one for each of so many parameters, to try in turn; None for the
+        usual ones.
+        """
+        segments: Any = self.segments
+        return segments and [_each(k, parameters, "segments") for k in segments]
+
+    @property
+    def near(self) -> float:
+        """`accept`, or what is usual."""
+        return 2.0 if self.accept is None else self.accept
+
+
+def _each(given: Any, parameters: int, name: str) -> list[Any]:
+    if not isinstance(given, tuple):
+        return [given] * parameters
+    if len(given) != parameters:
+        raise InputError(f"{name}: expected one for each of {parameters} parameter(s), got {given}")
+    return list(given)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spline(_InP):
+    """V = x' P(p) x with P a continuous spline in each parameter.
+
+    Parameters
+    ----------
+    degree : int or tuple of int, optional
+        Of P in every parameter, or one each, 0 to 4; 0 is a constant P. By default for `l2_gain`
+        and `stability` of one parameter 3 in continuous and 2 in discrete time, for several 2 and
+        1, but as for one in a parameter whose rate is another. Where p may jump P is constant,
+        whatever the degree.
+    segments : int or tuple, optional
+        Of P in every parameter; several numbers are tried in turn until the bound is good enough,
+        each an integer or a tuple of one a parameter. By default 16 and 32, in discrete time 8 and
+        16; 4 and 8 in the general analysis of one parameter and of one whose rate is another, 1 of
+        several. A constant P has no knots, but its LMIs are cut there (8).
+    grading : float, optional
+        Knots at low + (high - low)(k/K)^grading; by default 2 for one parameter and for one whose
+        rate is another, 1 for several.
+    total_degree : int, optional
+        Limits the sum of the degrees in several parameters; needs one segment.
+    accept : float, optional
+        A bound within this factor of the worst frozen one is good enough (2).
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+
+    Examples
+    --------
+    >>> Spline(degree=2, segments=(8, 16)).segments
+    (8, 16)
     """
 
-    degree: int | None = None
-    segments: tuple[int, ...] | None = None
-    grading: float = 2.0
-    elevation: int = 0
-    margins: tuple[float, ...] = (1e-6, 1e-4)
-    floor: float = 1e-6
-    accept: float = 2.0
-    order: int = 1
-    memory: float | None = None
-    memory_segments: int = 3
-    memory_degree: int = 2
-    kind: Literal["bernstein", "sos", "vertices", "grid"] = "bernstein"
-    subdivision: int = 0
-    points: int = 11
     total_degree: int | None = None
 
     def __post_init__(self) -> None:
-        if self.degree is not None and self.degree not in (0, 1, 2, 3, 4):
-            raise InputError(f"degree of P must be 0 .. 4, got {self.degree}")
-        if self.segments is not None and (not self.segments or min(self.segments) < 1):
-            raise InputError(f"segments must be a tuple of integers >= 1, got {self.segments}")
-        if (
-            self.grading < 1
-            or self.elevation < 0
-            or self.floor < 0
-            or not self.margins
-            or min(self.margins) < 0
-            or self.accept < 1
-        ):
-            raise InputError(
-                "expected grading >= 1, elevation >= 0, floor >= 0, margins >= 0 and accept >= 1"
-            )
-        if self.order not in (1, 2, 3) or (self.order > 1 and self.memory is not None):
-            raise InputError(
-                f"expected order 1, 2 or 3, and no memory beside an order > 1, got {self.order} and"
-                f" memory {self.memory}"
-            )
-        if self.memory is not None and not (
-            self.memory > 0 and self.memory_segments >= 1 and self.memory_degree in (1, 2, 3, 4)
-        ):
-            raise InputError("expected memory > 0 s, memory_segments >= 1 and memory_degree 1 .. 4")
-        if self.kind not in KINDS:
-            raise UnknownNameError("relaxation", self.kind, KINDS)
-        if (
-            self.subdivision < 0
-            or self.points < 2
-            or (self.total_degree is not None and self.total_degree < 0)
-        ):
-            raise InputError("expected subdivision >= 0, points >= 2 and total_degree >= 0 or None")
-        if self.needs_box and (self.order > 1 or self.memory is not None):
-            raise InputError(
-                "order and memory go with plain Bernstein coefficients: leave kind, subdivision and"
-                " total_degree alone"
-            )
-
-    @property
-    def needs_box(self) -> bool:
-        """Whether this is more than plain Bernstein coefficients for one parameter: see
-        `synthesis.polynomial`.
-        """
-        return self.kind != "bernstein" or self.subdivision > 0 or self.total_degree is not None
-
-    def check(self, dt: float | None, *, with_gain: bool) -> None:
-        """Raises `InputError` where the form of V does not suit the question."""
-        if dt is not None and (self.order > 1 or self.memory is not None):
-            name, value = ("order", self.order) if self.order > 1 else ("memory", self.memory)
-            raise InputError(
-                "an order > 1 or a memory is for continuous time; this model is sampled every"
-                f" {dt:g} s: leave {name}={value} out, or analyse the model before discretize(), as"
-                " one in continuous time"
-            )
-        if with_gain and self.order > 1:
-            raise InputError(
-                "an order > 1 proves stability only: a V of that degree does not balance energies;"
-                " for a gain use a memory"
-            )
+        super().__post_init__()
+        if self.total_degree is not None and not self.total_degree >= 0:
+            raise InputError(f"total_degree must be >= 0 or None, got {self.total_degree!r}")
 
 
-class Problem(NamedTuple):
-    """What every attempt shares: the model in physical and in scaled units."""
+@dataclass(frozen=True)
+class Memory(_InP):
+    """V = x' P(p, p - q) x with q a first-order lag of p: P knows where p came from.
 
-    lpv: LPVStateSpace
-    rate: float
-    pieces: tuple[ModelPiece, ...]
-    scaled: tuple[ModelPiece, ...]
-    units: Scaling
-    with_gain: bool
+    For `l2_gain` and `stability` of one parameter in continuous time. A finite memory of the
+    parameter makes a quadratic V exact in the limit.
 
-    @property
-    def scaled_rate(self) -> float:
-        """Largest change of p per scaled unit of time."""
-        return self.rate * self.units.time
+    Parameters
+    ----------
+    seconds : float
+        Time constant of the lag, s; about the time in which the worst p turns round.
+    degree, segments, grading, accept
+        Of P in p, as in `Spline`; by default degree 3 on 12 segments.
+    across_segments, across_degree : int
+        Of P in p - q.
 
-    def evidence(self, elevation: int) -> Evidence:
-        """What verifies a P for this problem."""
-        return Evidence(self.lpv, self.pieces, self.units, self.rate, elevation)
+    Raises
+    ------
+    InputError
+        For a number out of range.
 
-    @property
-    def step(self) -> float:
-        """Largest change of p in one sample."""
-        return self.rate * (self.lpv.dt or 0.0)
+    References
+    ----------
+    Lee and Dullerud, "Uniform stabilization of discrete-time switched and Markovian jump linear
+    systems", Automatica 42 (2006), for the idea in discrete time.
 
-
-def scaled_problem(lpv: LPVStateSpace, rate: float, gain: float, *, with_gain: bool) -> Problem:
-    """The model scaled for an expected `gain`; without channels where only stability is asked."""
-    if not with_gain:
-        lpv = replace(
-            lpv,
-            B=lpv.B[:, :, :0],
-            C=lpv.C[:, :0],
-            D=lpv.D[:, :0, :0],
-            inputs=(),
-            outputs=(),
-            trim=None,
-            residuals=None,
-        )
-    units, pieces = scaling(lpv, gain), model_pieces(lpv)
-    scaled = tuple(
-        piece.scaled(units.left, units.right, units.channel, units.time) for piece in pieces
-    )
-    return Problem(lpv, rate, pieces, scaled, units, with_gain)
-
-
-class Form(ABC):
-    """A V with unknown coefficients, in the scaled units of a problem: `size` is that of P,
-    `degree` that in p on the `knots`.
+    Examples
+    --------
+    >>> Memory(0.6, across_segments=3).seconds
+    0.6
     """
 
-    knots: Array
-    degree: int
-    size: int
-    null: Array | None = None
-    """What may be added to each block, (s, L) as vectors."""
+    seconds: float
+    across_segments: int = 3
+    across_degree: int = 2
 
-    @property
-    @abstractmethod
-    def unknowns(self) -> int:
-        """Number of coefficients of P."""
-
-    @abstractmethod
-    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
-        """The LMIs, their Bernstein degree raised by `extra`."""
-
-    @abstractmethod
-    def lyapunov(self, x: Array) -> Lyapunov:
-        """V at the solver's point x, in scaled units."""
-
-    def weighed(self, problem: Problem, extra: int) -> list[Blocks]:
-        """The same in coordinates in which slow and fast states count alike."""
-        W = extended(problem.units.weight, len(problem.lpv.inputs))
-        return [block.congruent(W) for block in self.blocks(problem, extra)]
-
-    def coefficients(self, x: Array) -> Array:
-        """Coefficients of P (unknowns, size (size + 1)/2) as vectors."""
-        return x[: self.unknowns * length(self.size)].reshape(self.unknowns, -1)
-
-
-@dataclass(frozen=True, eq=False)
-class Quadratic(Form):
-    """V = x' P(p) x, P a spline."""
-
-    knots: Array
-    degree: int
-    size: int
-
-    @property
-    def unknowns(self) -> int:
-        """Number of coefficients of P."""
-        return (len(self.knots) - 1) * self.degree + 1
-
-    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
-        """One block per Bernstein coefficient, cell or strip, and sign of the rate."""
-        if problem.lpv.dt is None:
-            rate = problem.scaled_rate if self.degree else 0.0
-            return list(
-                continuous_blocks(
-                    cells(problem.scaled, self.knots), self.knots, self.degree, rate, extra
-                )
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (
+            self.seconds > 0 and self.across_segments >= 1 and self.across_degree in (1, 2, 3, 4)
+        ):
+            raise InputError(
+                "expected seconds > 0, across_segments >= 1 and across_degree 1 .. 4, got"
+                f" {self.seconds!r}, {self.across_segments!r} and {self.across_degree!r}"
             )
-        regions = strips(problem.scaled, self.knots, problem.step if self.degree else 0.0)
-        return list(discrete_blocks(regions, self.knots, self.degree, extra))
-
-    def lyapunov(self, x: Array) -> SplineLyapunov:
-        """V at the solver's point x."""
-        return SplineLyapunov(self.knots, self.degree, smat(self.coefficients(x), self.size))
 
 
-class HigherOrder(Quadratic):
-    """V = z' P(p) z with the monomials z of degree `order` in the states: a sum-of-squares proof
-    for each coefficient.
+@dataclass(frozen=True)
+class HigherOrder(_InP):
+    """V of degree 2 `order` in the states: V = z' P(p) z, z the monomials of degree `order`.
+
+    For `stability` of one parameter in continuous time; costs grow with the sixth power of the
+    number of monomials.
+
+    Parameters
+    ----------
+    order : int
+        2 or 3; 1 is `Spline`.
+    degree, segments, grading
+        Of P in p, as in `Spline`; by default degree 2 on 4, then 8 segments.
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+
+    References
+    ----------
+    Chesi, Garulli, Tesi and Vicino, "Homogeneous Lyapunov functions for systems with structured
+    uncertainties", Automatica 39 (2003).
+
+    Examples
+    --------
+    >>> HigherOrder(2, segments=4).order
+    2
     """
 
-    states: int
     order: int
 
-    def __init__(self, knots: Array, degree: int, states: int, order: int):
-        super().__init__(knots, degree, len(monomials(states, order)))
-        matrices = null_matrix(np.eye(null_size(states, order)), states, order)
-        for name, value in {"states": states, "order": order, "null": svec(matrices)}.items():
-            object.__setattr__(self, name, value)
-
-    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
-        """As for a quadratic V, of the linear system that the monomials follow."""
-        N = self.size
-        lifted = tuple(
-            q._replace(
-                A=generator(q.A, self.order),
-                B=np.zeros((1, N, 0)),
-                C=np.zeros((1, 0, N)),
-                D=np.zeros((1, 0, 0)),
-            )
-            for q in problem.scaled
-        )
-        return super().blocks(problem._replace(scaled=lifted), extra)
-
-    def weighed(self, problem: Problem, extra: int) -> list[Blocks]:
-        """The blocks as they are: what is added to them is in the coordinates of P."""
-        return self.blocks(problem, extra)
-
-    def lyapunov(self, x: Array) -> SplineLyapunov:
-        """V at the solver's point x, with the slack of every block."""
-        size = null_size(self.states, self.order)
-        # of one state there is one monomial, and nothing to add
-        slack = x[self.unknowns * length(self.size) : -1].reshape(-1, size) if size else None
-        return SplineLyapunov(
-            self.knots, self.degree, smat(self.coefficients(x), self.size), self.order, slack
-        )
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.order not in (2, 3):
+            raise InputError(f"expected order 2 or 3 (1 is a Spline), got {self.order!r}")
 
 
-@dataclass(frozen=True, eq=False)
-class Remembering(Form):
-    """V = x' P(p, p - q) x, q a lag of p; `region` in scaled units of time."""
-
-    region: LagRegion
-    degree: int
-    lead_knots: Array
-    lead_degree: int
-    size: int
-
-    @property
-    def knots(self) -> Array:  # type: ignore[override]
-        """Knots in p."""
-        return self.region.knots
-
-    @property
-    def _across(self) -> int:
-        return (len(self.lead_knots) - 1) * self.lead_degree + 1
-
-    @property
-    def unknowns(self) -> int:
-        """Number of coefficients of P."""
-        return ((len(self.knots) - 1) * self.degree + 1) * self._across
-
-    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
-        """One block per Bernstein coefficient in p and across, patch, and sign of the rate."""
-        regions = cells(problem.scaled, self.knots)
-        return list(
-            memory_blocks(
-                regions,
-                self.region,
-                self.lead_knots,
-                self.degree,
-                self.lead_degree,
-                problem.scaled_rate,
-                extra,
-            )
-        )
-
-    def lyapunov(self, x: Array) -> MemoryLyapunov:
-        """V at the solver's point x."""
-        P = smat(self.coefficients(x), self.size).reshape(-1, self._across, self.size, self.size)
-        return MemoryLyapunov(self.region, self.degree, self.lead_knots, self.lead_degree, P)
-
-
-def forms(problem: Problem, relaxation: Relaxation) -> Iterator[Form]:
-    """The forms to try in turn."""
-    n, sampled = len(problem.lpv.states), problem.lpv.dt is not None
-    remembers = relaxation.memory is not None and 0 < problem.rate < math.inf
-    constant = math.isinf(problem.rate) or relaxation.degree == 0
-    usual = 2 if relaxation.order > 1 or sampled else 3
-    degree = 0 if constant and not remembers else (relaxation.degree or usual)
-    default = (
-        (8,)
-        if not degree
-        else (
-            (12,)
-            if remembers
-            else (4, 8)
-            if relaxation.order > 1
-            else (8, 16)
-            if sampled
-            else (16, 32)
-        )
-    )
-    for segments in relaxation.segments or default:
-        knots = _knots(problem, relaxation, segments, degree)
-        if remembers:
-            region = LagRegion.reached(knots, problem.rate, float(relaxation.memory))  # type: ignore[arg-type]
-            region = replace(region, time=region.time / problem.units.time)
-            across = np.linspace(0.0, 1.0, relaxation.memory_segments + 1)
-            yield Remembering(region, degree, across, relaxation.memory_degree, n)
-        elif relaxation.order > 1:
-            yield HigherOrder(knots, degree, n, relaxation.order)
-        else:
-            yield Quadratic(knots, degree, n)
-
-
-def constant_form(problem: Problem, relaxation: Relaxation) -> Form:
-    """A constant P, which proves for every rate what it proves for jumps."""
-    n, knots = len(problem.lpv.states), _knots(problem, relaxation, 8, 0)
-    return (
-        HigherOrder(knots, 0, n, relaxation.order)
-        if relaxation.order > 1
-        else Quadratic(knots, 0, n)
-    )
-
-
-def _knots(problem: Problem, relaxation: Relaxation, segments: int, degree: int) -> Array:
-    low, high = problem.pieces[0].low, problem.pieces[-1].high
-    breaks = [piece.low for piece in problem.pieces[1:]]
-    if degree and 2.5 * problem.step >= high - low:
-        return np.array([low, high])
-    return graded_knots(
-        low,
-        high,
-        segments,
-        relaxation.grading,
-        breaks,
-        shortest=2.5 * problem.step if degree else 0.0,
-    )
+LyapunovForm = Spline | Memory | HigherOrder
+"""What `form` may be."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,12 +25,13 @@ from studies.output import as_json, columns, progress
 from studies.stamped_tables import DOCS, keep, parsed, processor
 from symheli import Helicopter, LPVStateSpace
 from symheli.lpv.bases import Polynomial
-from synthesis import Relaxation, Search, Solver
+from synthesis import HigherOrder, Memory, Search, Solver, Spline
+from synthesis.forms import LyapunovForm
 
-SLOW = Relaxation(memory=1.2, segments=(12,), grading=1.5, memory_segments=4, memory_degree=2)
-FAST = Relaxation(memory=0.6, segments=(12,), grading=1.5, memory_segments=4, memory_degree=3)
-FASTEST = Relaxation(memory=0.5, segments=(12,), grading=1.5, memory_segments=6, memory_degree=3)
-FURTHEST = Relaxation(memory=0.45, segments=(12,), grading=1.5, memory_segments=8, memory_degree=3)
+SLOW = Memory(1.2, segments=12, grading=1.5, across_segments=4, across_degree=2)
+FAST = Memory(0.6, segments=12, grading=1.5, across_segments=4, across_degree=3)
+FASTEST = Memory(0.5, segments=12, grading=1.5, across_segments=6, across_degree=3)
+FURTHEST = Memory(0.45, segments=12, grading=1.5, across_segments=8, across_degree=3)
 """The faster the airspeed turns round, the shorter the lag that tells most, and the finer P has to
 be across.
 """
@@ -54,19 +55,19 @@ FEWER = {rate: GAINS[rate] for rate in (0.1, 1.0, 3.0, 4.5, 6.0)}
 """Those of the exact model."""
 
 STABLE = {
-    "P(p)": (Relaxation(), (4.5, 5.0)),
-    "V of degree four": (Relaxation(order=2, segments=(4,)), (6.0, 6.5)),
+    "P(p)": (Spline(), (4.5, 5.0)),
+    "V of degree four": (HigherOrder(2, segments=4), (6.0, 6.5)),
     "P(p, lag)": (FURTHEST, (7.1, 7.2)),
 }
 """Forms of V, and accelerations (m/s^2) at which each is tried: the second is beyond it."""
 
-STABLE_EXACT = {"P(p)": (Relaxation(), (4.0, 4.5)), "P(p, lag)": (FURTHEST, (6.5, 7.0))}
+STABLE_EXACT = {"P(p)": (Spline(), (4.0, 4.5)), "P(p, lag)": (FURTHEST, (6.5, 7.0))}
 """The same for the exact model."""
 
 GROWING = (7.5, 7.52, 7.54, 7.6)
 """Accelerations (m/s^2) at which growth is looked for."""
 
-COVER = Relaxation(segments=(16,))
+COVER = Spline(segments=16)
 """The P(p) that covers a remainder; on 32 segments the solver fails where it matters."""
 
 PATIENT = Solver(time_limit=3600.0)
@@ -95,7 +96,7 @@ class Bracket(NamedTuple):
 def bracket(
     loop: LPVStateSpace,
     rate: float,
-    relaxation: Relaxation,
+    form: LyapunovForm,
     search: Search | None = None,
     rest: Remainder | None = None,
 ) -> Bracket:
@@ -104,7 +105,7 @@ def bracket(
     """
     plain = synthesis.l2_gain(loop, rate, search=None)
     memory = synthesis.l2_gain(
-        loop, rate, relaxation=relaxation, search=search or Search(seconds=math.inf), solver=PATIENT
+        loop, rate, form=form, search=search or Search(seconds=math.inf), solver=PATIENT
     )
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
@@ -114,22 +115,22 @@ def bracket(
             rest,
             rate,
             COVER,
-            synthesis.l2_gain(loop, rate, relaxation=COVER, search=None).gamma,
+            synthesis.l2_gain(loop, rate, form=COVER, search=None).gamma,
         )
     exact = better.verify(rigorous=True) and (proof is None or proof.verify(rigorous=True))
     return Bracket(rate, memory.lower, memory.gamma, plain.gamma, exact, covered)
 
 
-def proves(loop: LPVStateSpace, rate: float, relaxation: Relaxation) -> bool:
+def proves(loop: LPVStateSpace, rate: float, form: LyapunovForm) -> bool:
     """Whether this form of V proves stability at this acceleration, in exact arithmetic."""
-    return synthesis.stability(
-        loop, rate, relaxation=relaxation, search=None, solver=PATIENT
-    ).verify(rigorous=True)
+    return synthesis.stability(loop, rate, form=form, search=None, solver=PATIENT).verify(
+        rigorous=True
+    )
 
 
 def measure(
     loop: LPVStateSpace,
-    gains: dict[float, Relaxation],
+    gains: Mapping[float, LyapunovForm],
     stable: dict[str, Any],
     rest: Remainder | None = None,
 ) -> Iterator[tuple[str, Any]]:
@@ -147,12 +148,12 @@ def measure(
     for rate in GROWING:
         found = synthesis.lower_bound(loop, rate)
         yield f"growth at {rate:g} m/s^2", found.growth if math.isinf(found.gamma) else "none found"
-    for rate, relaxation in gains.items():
-        found = bracket(loop, rate, relaxation, rest=rest)
+    for rate, form in gains.items():
+        found = bracket(loop, rate, form, rest=rest)
         yield f"gain at {rate:g} m/s^2", {**found._asdict(), "gap": found.gap}
-    for name, (relaxation, rates) in stable.items():
+    for name, (form, rates) in stable.items():
         for rate in rates:
-            yield f"stable at {rate:g} m/s^2 by {name}", proves(loop, rate, relaxation)
+            yield f"stable at {rate:g} m/s^2 by {name}", proves(loop, rate, form)
 
 
 def curve(found: dict[str, Any], title: str) -> GainCurve:

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 
 from studies.commands import options
 from studies.output import Output, progress
+from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from synthesis import Certificate, LFTCertificate, Relaxation
+    from synthesis import Certificate
+    from synthesis.forms import LyapunovForm
 
 HELP = "proven gain and stability of the lateral loop for a rate of airspeed"
 
@@ -56,7 +58,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--across",
         type=options.at_least_one,
         nargs=2,
-        default=(3, 2),
         metavar=("L", "D"),
         help="segments and degree of the memory (3 2)",
     )
@@ -82,6 +83,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--stability", action="store_true", help="stability only, no gain")
     parser.add_argument(
+        "--save", metavar="FILE", help="keep the certificate; symheli verify FILE proves it again"
+    )
+    parser.add_argument(
         "--rigorous", action="store_true", help="verify once more in exact rational arithmetic"
     )
 
@@ -94,8 +98,9 @@ def run(arguments: argparse.Namespace) -> Output:
     low, high = arguments.airspeeds
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
     loop = lateral_loop(options.helicopter(arguments), low, high, arguments.channel)
-    cert: Certificate | LFTCertificate
+    cert: Certificate
     if arguments.lft:
+        _refuse_form(arguments)
         progress(f"LFT test with {arguments.lft} for an airspeed that may jump")
         test = synthesis.lft_stability if arguments.stability else synthesis.lft_gain
         cert, rate = test(loop.to_lft().reduce(), arguments.lft), math.inf
@@ -103,13 +108,15 @@ def run(arguments: argparse.Namespace) -> Output:
         progress(f"searching a Lyapunov function for |dV/dt| <= {arguments.rate:g} m/s^2")
         certify = synthesis.stability if arguments.stability else synthesis.l2_gain
         cert, rate = (
-            certify(loop, rate=arguments.rate, relaxation=_relaxation(arguments)),
+            certify(loop, rate=arguments.rate, form=_form(arguments)),
             arguments.rate,
         )
     exact = None
     if arguments.rigorous:
         progress("verifying in rational arithmetic")
         exact = cert.verify(rigorous=True)
+    if arguments.save:
+        cert.save(arguments.save)
     head = (
         f"lateral loop of {arguments.vehicle}, d_lat = {HOLD:g} phi, {low:g} to {high:g} m/s,"
         f" {arguments.channel} -> r, phi (SI)"
@@ -135,15 +142,34 @@ def run(arguments: argparse.Namespace) -> Output:
     return Output(text, data, status=0 if cert.verified and exact is not False else 1)
 
 
-def _relaxation(arguments: argparse.Namespace) -> Relaxation:
-    from synthesis import Relaxation
+def _refuse_form(arguments: argparse.Namespace) -> None:
+    given = ("memory", "across", "segments", "grading")
+    names = [name for name in given if getattr(arguments, name)]
+    names += ["order"] if arguments.order > 1 else []
+    if names:
+        raise InputError(
+            f"an LFT test has a constant P: leave out --{', --'.join(names)}, or leave out --lft"
+        )
 
-    segments, (across, degree) = arguments.segments, arguments.across
-    return Relaxation(
-        segments=tuple(segments) if segments else None,
-        grading=arguments.grading or (1.5 if arguments.memory else 2.0),
-        order=arguments.order,
-        memory=arguments.memory,
-        memory_segments=across,
-        memory_degree=degree,
-    )
+
+def _form(arguments: argparse.Namespace) -> LyapunovForm:
+    """Raises `InputError` for options that do not go together."""
+    from synthesis import HigherOrder, Memory, Spline
+
+    if arguments.memory and arguments.order > 1:
+        raise InputError("expected --memory or --order, not both: each is a form of V of its own")
+    if arguments.across and not arguments.memory:
+        raise InputError("--across says how P depends on the memory; give --memory S with it")
+    segments = tuple(arguments.segments) if arguments.segments else None
+    if arguments.memory:
+        across, degree = arguments.across or (3, 2)
+        return Memory(
+            arguments.memory,
+            segments=segments,
+            grading=arguments.grading or 1.5,
+            across_segments=across,
+            across_degree=degree,
+        )
+    if arguments.order > 1:
+        return HigherOrder(arguments.order, segments=segments, grading=arguments.grading)
+    return Spline(segments=segments, grading=arguments.grading)

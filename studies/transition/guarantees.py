@@ -20,7 +20,7 @@ from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Schedu
 from symheli.lpv.bases import Polynomial
 from symheli.lpv.lpv_state_space import Matrices
 from symheli.values.arrays import Array
-from synthesis import Certificate, LFTCertificate, Relaxation, Search
+from synthesis import Certificate, Memory, Search, Spline
 from synthesis.worst.frozen import norm
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
@@ -42,9 +42,7 @@ FORMS = (MEMORY, PLAIN, CONSTANT, *LFT_TESTS)
 """Forms of a proof, the least conservative first; from `CONSTANT` on they let the airspeed jump."""
 
 MEMORIES = {
-    rate: Relaxation(
-        memory=lag, segments=(8,), grading=1.5, memory_segments=across, memory_degree=3
-    )
+    rate: Memory(lag, segments=8, grading=1.5, across_segments=across, across_degree=3)
     for rate, lag, across in ((3.0, 0.6, 3), (4.5, 0.6, 3), (6.0, 0.5, 4))
 }
 """Accelerations (m/s^2) at which a P with a memory is tried, on a coarser mesh than
@@ -62,7 +60,7 @@ class Bound:
     channel: str
     rate: float
     form: str
-    certificate: Certificate | LFTCertificate
+    certificate: Certificate
 
 
 def scaled(lpv: LPVStateSpace) -> LPVStateSpace:
@@ -171,13 +169,13 @@ def bounds(
     `search` sets how hard the lower bound is looked for; among airspeeds that jump, a search that
     spares nothing is quick.
     """
-    relaxation = Relaxation(segments=segments)
+    spline = Spline(segments=segments)
     for rate in rates:
         form = CONSTANT if math.isinf(rate) else PLAIN
         certificate = synthesis.l2_gain(
             lpv,
             rate,
-            relaxation=relaxation,
+            form=spline,
             search=Search(seconds=math.inf) if math.isinf(rate) else search,
         )
         yield Bound(name, channel, rate, form, certificate)
@@ -187,7 +185,7 @@ def bounds(
                 channel,
                 rate,
                 form,
-                synthesis.stability(lpv, rate, relaxation=relaxation, search=None),
+                synthesis.stability(lpv, rate, form=spline, search=None),
             )
 
 
@@ -195,9 +193,9 @@ def memory_bounds(
     name: str, channel: str, lpv: LPVStateSpace, known: Sequence[float], search: Search
 ) -> Iterator[Bound]:
     """Gains by a P with a memory; the lower bound is looked for where it is not `known`."""
-    for rate, relaxation in MEMORIES.items():
+    for rate, form in MEMORIES.items():
         certificate = synthesis.l2_gain(
-            lpv, rate, relaxation=relaxation, search=None if rate in known else search
+            lpv, rate, form=form, search=None if rate in known else search
         )
         yield Bound(name, channel, rate, MEMORY, certificate)
 

@@ -46,7 +46,7 @@ class Scheduling:
                     f"scheduling {self.name}: rate must be a number or the name of another"
                     f" parameter, got {self.rate!r}"
                 )
-        elif not self.rate >= 0:
+        elif isinstance(self.rate, bool) or not float(self.rate) >= 0:
             raise InputError(
                 f"scheduling {self.name}: rate must be >= 0 {self.unit}/s, got {self.rate}"
             )
@@ -140,6 +140,7 @@ def with_rates(given: Sequence[Scheduling], rate: Rates) -> tuple[Scheduling, ..
             )
     else:
         limits = [rate] * len(names)
+    limits = [limit if isinstance(limit, str) else float(limit) for limit in limits]
     return parameters([s.with_rate(limit) for s, limit in zip(given, limits, strict=True)])
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from synthesis.analysis.box import Model, box_certificate
-from synthesis.forms import Relaxation
-from synthesis.polynomial.certificate import BoxCertificate
+from synthesis.analysis.certify import certify
+from synthesis.analysis.question import Model, question
+from synthesis.certificate import Certificate
+from synthesis.forms import Spline
+from synthesis.impose import Imposed
 from synthesis.program.cone_program import Solver
 from synthesis.worst.lower_bound import THOROUGH, Search
 from synthesis.worst.rates import Rate
@@ -14,16 +16,57 @@ def decay_rate(
     model: Model,
     rate: Rate = None,
     *,
-    relaxation: Relaxation | None = None,
+    form: Spline | None = None,
+    impose: Imposed | None = None,
     solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
-) -> BoxCertificate:
-    """Largest alpha (1/s) found such that |x(t)| <= c exp(-alpha t) |x(0)| for every p(t) in its
-    box within its rates.
+) -> Certificate:
+    """Largest alpha found such that |x(t)| <= c exp(-alpha t) |x(0)| for every admissible p(t).
 
-    `rate` as in `generalized_h2`. `.alpha` is proven, `.upper` no proof can exceed: the slowest
-    frozen mode, or growth along a trajectory `search` found. To 0.2 % of `.upper` where P admits
-    that. Raises `InputError`, `SolverError`.
+    Found by bisection, to 0.2 % of `upper` where P admits that.
+
+    Parameters
+    ----------
+    model : LPVStateSpace or LFT
+        The model.
+    rate : float, sequence or mapping, optional
+        Largest |dp/dt| in units of p per second: one for all parameters, one each, or by name; by
+        default the model's own. math.inf: p may jump, and P is constant; 0: every frozen model.
+    form : Spline, optional
+        The form of the Lyapunov function.
+    impose : Bernstein, SumOfSquares, Vertices or Grid, optional
+        How the inequalities are imposed for every p; Bernstein coefficients by default.
+    solver : Solver or str
+        Which solver, and when it stops.
+    search : Search or None
+        How hard to look for bad trajectories; with None the
+        slowest frozen mode is the upper bound.
+
+    Returns
+    -------
+    Certificate
+        `alpha` (1/s) is proven, `upper` no proof can exceed: the slowest frozen mode, or growth
+        along a trajectory.
+
+    Raises
+    ------
+    InputError
+        For an option that has no meaning here, with what to do.
+    SolverError
+        For a solver that is not installed.
+
+    References
+    ----------
+    Boyd, El Ghaoui, Feron and Balakrishnan, "Linear Matrix Inequalities in System and Control
+    Theory" (1994), section 5.1.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> cert = decay_rate(lag, search=None)
+    >>> 0.997 < cert.alpha <= cert.upper <= 1.0
+    True
     """
-    solver = solver if isinstance(solver, Solver) else Solver(solver)
-    return box_certificate(model, rate, "decay rate", relaxation or Relaxation(), solver, search)
+    return certify(question(model, rate, "decay rate", form, impose, solver, search))

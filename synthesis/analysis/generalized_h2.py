@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from synthesis.analysis.box import Model, box_certificate
-from synthesis.forms import Relaxation
-from synthesis.polynomial.certificate import BoxCertificate
+from synthesis.analysis.certify import certify
+from synthesis.analysis.question import Model, question
+from synthesis.certificate import Certificate
+from synthesis.forms import Spline
+from synthesis.impose import Imposed
 from synthesis.program.cone_program import Solver
 from synthesis.worst.lower_bound import THOROUGH, Search
 from synthesis.worst.rates import Rate
@@ -14,21 +16,55 @@ def generalized_h2(
     model: Model,
     rate: Rate = None,
     *,
-    relaxation: Relaxation | None = None,
+    form: Spline | None = None,
+    impose: Imposed | None = None,
     solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
-) -> BoxCertificate:
-    """Certified upper bound of max_t |y(t)| / |u|_2 over every p(t) in its box within its rates,
-    from rest.
+) -> Certificate:
+    """Certified upper bound of max_t |y(t)| / |u|_2, from rest, over every admissible p(t).
 
-    In units of y per unit of u and root second (root sample). `rate` in units of p per second: one
-    for all parameters, one each, by name, or None for the model's own; math.inf: it may jump, 0:
-    every frozen model. A gust of known energy then moves the outputs by at most gamma times its
-    root. Continuous models need D = 0. `search` looks for a worse trajectory than any frozen p.
-    Raises `InputError`, `SolverError`; a failed solve is a certificate with gamma = inf and its
-    reason.
+    A gust of known energy then moves the outputs by at most gamma times its root.
+
+    Parameters
+    ----------
+    model : LPVStateSpace or LFT
+        The model, without feedthrough in continuous time.
+    rate : float, sequence or mapping, optional
+        Largest |dp/dt| in units of p per second: one for all parameters, one each, or by name; by
+        default the model's own. math.inf: p may jump, and P is constant; 0: every frozen model.
+    form : Spline, optional
+        The form of the Lyapunov function.
+    impose : Bernstein, SumOfSquares, Vertices or Grid, optional
+        How the inequalities are imposed for every p; Bernstein coefficients by default.
+    solver : Solver or str
+        Which solver, and when it stops.
+    search : Search or None
+        How hard to look for bad trajectories; with None the
+        worst frozen gain is the lower bound.
+
+    Returns
+    -------
+    Certificate
+        `gamma` bounds the gain, in units of y per unit of u and root second (root sample).
+
+    Raises
+    ------
+    InputError
+        For an option that has no meaning here, with what to do.
+    SolverError
+        For a solver that is not installed.
+
+    References
+    ----------
+    Rotea, "The generalized H2 control problem", Automatica 29 (1993).
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> cert = generalized_h2(lag, search=None)  # exactly sqrt(1/2)
+    >>> print(f"{cert.gamma:.3f}")
+    0.707
     """
-    solver = solver if isinstance(solver, Solver) else Solver(solver)
-    return box_certificate(
-        model, rate, "energy-to-peak gain", relaxation or Relaxation(), solver, search
-    )
+    return certify(question(model, rate, "energy-to-peak gain", form, impose, solver, search))

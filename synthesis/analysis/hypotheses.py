@@ -4,10 +4,14 @@ and which code is trusted.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
+from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.lpv.bases.function_space import tensor_grid
+from synthesis.certificate import Kind
 
 Array = np.ndarray
 
@@ -21,6 +25,61 @@ VERIFIED = (
     " looks at some p once more through the model's own matrices: {shared} are shared by the search"
     " for P and the proof"
 )
+
+
+MEANING: dict[Kind, str] = {
+    "l2 gain": (
+        "the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs"
+        " together"
+    ),
+    "energy-to-peak gain": (
+        "the gain is from zero initial state, max_t |y(t)| < gamma |u|_2, the Euclidean norm of"
+        " all outputs"
+    ),
+    "decay rate": "|x(t)| <= c exp(-alpha t) |x(0)| for some c, along every admissible p(t)",
+}
+
+
+def hypotheses(
+    kind: Kind,
+    parameters: Sequence[Scheduling],
+    rates: Sequence[float],
+    model: object,
+    found: Sequence[str],
+) -> tuple[str, ...]:
+    """How p may move, how far the model is from what it was made of, how the proof was `found`, and
+    what the bound means.
+    """
+    moving = tuple(motion(s, rate) for s, rate in zip(parameters, rates, strict=True))
+    meaning = (MEANING[kind],) if kind in MEANING else ()
+    return (*moving, *fitted(model), *drifting(model), *found, *meaning)
+
+
+def motion(s: Scheduling, rate: float) -> str:
+    """The range and the rate of one parameter."""
+    unit = "" if s.unit == "1" else f" {s.unit}"
+    if isinstance(s.rate, str):
+        return (
+            f"{s.name} is in [{s.low:g}, {s.high:g}]{unit}, d{s.name}/dt is {s.rate}, which keeps"
+            f" to what lets {s.name} stay in that range"
+        )
+    speed = (
+        "arbitrarily fast"
+        if math.isinf(rate)
+        else "constant"
+        if rate == 0
+        else f"|d{s.name}/dt| <= {rate:g}{unit} per second"
+    )
+    return f"{s.name} is exogenous, in [{s.low:g}, {s.high:g}]{unit}, {speed}"
+
+
+def drifting(model: object) -> tuple[str, ...]:
+    """What is left out where the model is one about a moving trim."""
+    if not isinstance(model, LPVStateSpace) or model.trim is None:
+        return ()
+    return (
+        "the drift of a moving trim, -x0'(p) dp/dt, is left out: it acts as a further disturbance",
+    )
 
 
 def fitted(model: object) -> tuple[str, ...]:

@@ -1,4 +1,8 @@
-"""The inequalities of a problem as a cone program, under the relaxation that was chosen."""
+"""The inequalities of a problem over a box as a cone program, imposed as was chosen.
+
+The general assembly: any number of parameters, any way to impose. It shares its inequalities with
+the proof; `pointwise` does not.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ from synthesis.assemble.imposed import (
     sums_of_squares,
     vertex_conditions,
 )
-from synthesis.forms import Relaxation
+from synthesis.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.lyapunov.box import segment_slices
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.pieces import Pieces
@@ -104,7 +108,7 @@ def affine_inequalities(
         back_off = margin * svec(np.diag(np.r_[np.ones(nx), np.zeros(nu)]))
     else:
         level, fixed, back_off = svec(eye), 0 * eye, nothing
-    for region in regions(model, shape.knots, demand.steps(model.dt, shape.degrees)):
+    for region in regions(model, shape.knots, demand.motion, demand.moving(shape.degrees)):
         columns, pair = _pair(shape, region, nx)
         for F in decrease(model, region, pair, demand, float):
             W = extended(weight, F.shape[0] - nx)
@@ -130,7 +134,7 @@ def assemble(
     inequalities: Sequence[Affine],
     shape: Shape,
     states: int,
-    relaxation: Relaxation,
+    impose: Imposed,
     *,
     maximise: bool,
 ) -> ConeProgram:
@@ -144,8 +148,8 @@ def assemble(
     zero, cone, sizes, squares = [], [], [], []
     for F in inequalities:
         P = _columns(F, tensor)
-        if relaxation.kind == "sos":
-            F, P = _raised(F, relaxation.elevation, tensor)
+        if isinstance(impose, SumOfSquares):
+            F, P = _raised(F, impose.elevation, tensor)
             terms = list(sums_of_squares(F.degrees, F.N))
             level = np.tile(F.level, len(F.constant))
             zero.append(
@@ -158,7 +162,7 @@ def assemble(
             )
             squares += [t.size for t in terms]
             continue
-        conditions = _conditions(relaxation, F.degrees)
+        conditions = _conditions(impose, F.degrees)
         lift = sparse.kron(
             sparse.csr_matrix(conditions.negative), sparse.identity(length(F.N)), format="csr"
         )
@@ -194,12 +198,12 @@ def assemble(
     return ConeProgram(c, sparse.csc_matrix(A), b, tuple(sizes), equalities)
 
 
-def _conditions(relaxation: Relaxation, degrees: tuple[int, ...]) -> Conditions:
-    if relaxation.kind == "grid":
-        return grid_conditions(degrees, relaxation.points)
-    if relaxation.kind == "vertices":
+def _conditions(impose: Bernstein | Vertices | Grid, degrees: tuple[int, ...]) -> Conditions:
+    if isinstance(impose, Grid):
+        return grid_conditions(degrees, impose.points)
+    if isinstance(impose, Vertices):
         return vertex_conditions(degrees)
-    return coefficient_conditions(degrees, relaxation.elevation, relaxation.subdivision)
+    return coefficient_conditions(degrees, impose.elevation, impose.subdivision)
 
 
 def _columns(F: Affine, tensor: int) -> sparse.csr_matrix:

@@ -9,10 +9,9 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LFT
-from synthesis.analysis.hypotheses import VERIFIED
-from synthesis.analysis.one_parameter import NOTHING, inflated
-from synthesis.lft.bounds import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
-from synthesis.lft.certificate import LFTCertificate, Trial
+from synthesis.analysis.hypotheses import VERIFIED, hypotheses
+from synthesis.analysis.ladder import NOTHING, inflated
+from synthesis.certificate import Attempt, Certificate, Kind, Proof, Seconds, Status
 from synthesis.lft.coordinates import coordinates, scaled
 from synthesis.lft.multipliers import Class, Multiplier, check_scaling, multiplier_class
 from synthesis.lft.program import (
@@ -25,8 +24,8 @@ from synthesis.lft.program import (
 from synthesis.lft.proof import Evidence, Quadratic
 from synthesis.program.cone_program import Answer, Candidate, ConeProgram, Solver, solve
 from synthesis.program.scaling import in_its_own_scale
-from synthesis.verdict import Seconds, Status
 from synthesis.worst.budget import said
+from synthesis.worst.lft import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
 from synthesis.worst.lower_bound import THOROUGH, LowerBound, Search
 from synthesis.worst.spectrum import surely_unstable
 from synthesis.worst.trajectory import Trajectory
@@ -45,15 +44,48 @@ def lft_gain(
     *,
     solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
-) -> LFTCertificate:
-    """Certified upper bound of the L2 gain of `lft` over every p(t) in its box, as fast as it
-    likes.
+) -> Certificate:
+    """Certified upper bound of the L2 gain of an LFT while p(t) moves in its box as fast as it likes.
 
-    `scaling`: "small gain", "D", "DG" or "full block", from the most conservative to the least (see
-    `multipliers`). The gain is recomputed from P and the multiplier alone and verified. `search`
-    looks for the worst trajectory (None: the frozen gain is the lower bound). Raises `InputError`,
-    `SolverError`; a failed solve is a certificate with gamma = inf and its reason in `status`.
-    Reduce the LFT first: superfluous copies of a parameter cost time.
+    Parameters
+    ----------
+    lft : LFT
+        The model. Reduce it first: superfluous copies of a parameter cost time.
+    scaling : str
+        "small gain", "D", "DG" or "full block", from the most conservative to the least.
+    solver : Solver or str
+        Which solver, and when it stops.
+    search : Search or None
+        How hard to look for bad trajectories; None: not at all.
+
+    Returns
+    -------
+    Certificate
+        `gamma` bounds the gain; it is recomputed from P and the multiplier alone and verified. A
+        failed solve is a certificate with gamma = inf and its reason in `status`.
+
+    Raises
+    ------
+    InputError
+        For a model that is no LFT or has no channels.
+    UnknownNameError
+        For a scaling of another name.
+    SolverError
+        For a solver that is not installed.
+
+    References
+    ----------
+    Fan, Tits and Doyle, IEEE Trans. Automatic Control 36 (1991), D and G scalings; Scherer, "LPV
+    control and full block multipliers", Automatica 37 (2001), full blocks.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0)
+    >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> cert = lft_gain(lag.to_lft().reduce(), search=None)
+    >>> print(f"{cert.gamma:.3f}")
+    1.000
     """
     solver = _checked(lft, scaling, solver)
     if not (lft.inputs and lft.outputs):
@@ -99,12 +131,47 @@ def lft_stability(
     *,
     solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
-) -> LFTCertificate:
-    """Proof that the state decays for every p(t) in the box, as fast as it likes; channels play no
-    part.
+) -> Certificate:
+    """Proof that the state of an LFT decays for every p(t) in its box, as fast as it likes.
 
-    As `lft_gain`: `.verified` is the answer, `.gamma`, `.lower` and `.frozen` are NaN. Where no
-    proof is found, `search` looks for a trajectory along which the state grows.
+    Parameters
+    ----------
+    lft : LFT
+        The model; its channels play no part. Reduce it first: superfluous copies of a parameter
+        cost time.
+    scaling : str
+        "small gain", "D", "DG" or "full block", from the most conservative to the least.
+    solver : Solver or str
+        Which solver, and when it stops.
+    search : Search or None
+        How hard to look for bad trajectories; None: not at all.
+
+    Returns
+    -------
+    Certificate
+        `verified` is the answer; `gamma`, `lower` and `frozen` are NaN.
+
+    Raises
+    ------
+    InputError
+        For a model that is no LFT.
+    UnknownNameError
+        For a scaling of another name.
+    SolverError
+        For a solver that is not installed.
+
+    References
+    ----------
+    Fan, Tits and Doyle, IEEE Trans. Automatic Control 36 (1991), D and G scalings; Scherer, "LPV
+    control and full block multipliers", Automatica 37 (2001), full blocks.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0)
+    >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> lft_stability(lag.to_lft().reduce()).verified
+    True
     """
     solver = _checked(lft, scaling, solver)
     frozen = frozen_box_gain(lft.select(inputs=(), outputs=()))
@@ -145,9 +212,9 @@ class _Attempt:
         self.linear = inequality(loop, self.multipliers, lft.dt is None).congruent(
             self.evidence.coordinates.units.weight
         )
-        self.proof: Quadratic | None = None
+        self.proof: Proof | None = None
         self.gamma, self.conditioning, self.answer = math.inf, math.inf, Answer.FAILED
-        self.trials: list[Trial] = []
+        self.attempts: list[Attempt] = []
         self.solving = self.verifying = 0.0
 
     @property
@@ -179,7 +246,7 @@ class _Attempt:
 
     def add(self, other: _Attempt) -> None:
         """The programs and the time of another attempt at the same gain."""
-        self.trials = other.trials + self.trials
+        self.attempts = other.attempts + self.attempts
         self.solving, self.verifying = (
             self.solving + other.solving,
             self.verifying + other.verifying,
@@ -205,12 +272,13 @@ class _Attempt:
             gamma = inflated(least, self.evidence.coordinates.units.channel)
             if gamma >= best or not self.evidence.floating(proof, gamma):
                 continue
-            self.proof, self.gamma, self.conditioning, best = proof, gamma, conditioning, gamma
+            self.proof = Proof(self.evidence, proof)
+            self.gamma, self.conditioning, best = gamma, conditioning, gamma
             if math.isnan(gamma):  # stability alone: one multiple is as good as another
                 break
         self.verifying += time.perf_counter() - start
         words = f"{candidate.message}, {'not verified' if self.proof is None else 'verified'}"
-        self.trials.append(Trial(program, margin, words, best))
+        self.attempts.append(Attempt(program, margin, words, best))
 
     def _physical(self, x: Array) -> Quadratic:
         P, Q, S, R = unpack(x, self.multipliers, len(self.lft.states))
@@ -246,11 +314,11 @@ def _certificate(
     below: LowerBound,
     frozen: float,
     bounds: float,
-) -> LFTCertificate:
+) -> Certificate:
     """The certificate of what was `found`; None: a frozen model is unstable and nothing was
     tried.
     """
-    kind = "stability" if math.isnan(below.gamma) else "l2 gain"
+    kind: Kind = "stability" if math.isnan(below.gamma) else "l2 gain"
     proof = found.proof if found else None
     growing = math.isinf(below.gamma) if kind == "l2 gain" else below.trajectory is not None
     if proof is not None:
@@ -261,25 +329,28 @@ def _certificate(
         status = Status.GROWING
     else:
         status = Status.without_proof(found.answer)
-    gamma = math.nan if kind == "stability" else found.gamma if found else math.inf
-    seconds = Seconds(*(found.seconds if found else (0.0, 0.0, 0.0)), bounds)
-    return LFTCertificate(
+    rates = (math.inf,) * len(lft.parameters)
+    how = ["a limit on the rate is not used", f"constant P; {_CLASS[scaling]}"]
+    if proof is not None:
+        how.append(
+            VERIFIED.format(what="finitely many matrices", shared="only the matrices of the LFT")
+        )
+    return Certificate(
         kind=kind,
-        scaling=scaling,
-        gamma=gamma,
+        gamma=math.nan if kind == "stability" else found.gamma if found else math.inf,
         lower=below.gamma,
         frozen=frozen,
         status=status,
         verified=proof is not None,
-        proof=proof,
-        rates=(math.inf,) * len(lft.parameters),
-        hypotheses=_hypotheses(lft, scaling, proof, kind),
+        rates=rates,
+        hypotheses=hypotheses(kind, lft.parameters, rates, lft, how),
+        method=f"LFT test with {scaling}, p arbitrarily fast",
         solver=str(solver),
-        seconds=seconds,
+        seconds=Seconds(*(found.seconds if found else (0.0, 0.0, 0.0)), bounds),
         conditioning=found.conditioning if found else math.inf,
-        attempts=tuple(found.trials) if found else (),
+        attempts=tuple(found.attempts) if found else (),
         worst=below.trajectory,
-        evidence=found.evidence if found else None,
+        proof=proof,
     )
 
 
@@ -297,27 +368,3 @@ _CLASS = {
         "a full block multiplier, concave in each parameter, positive at the corners of the box"
     ),
 }
-
-
-def _hypotheses(lft: LFT, scaling: str, proof: Quadratic | None, kind: str) -> tuple[str, ...]:
-    ranges = ", ".join(
-        f"{s.name} in [{s.low:g}, {s.high:g}]{'' if s.unit == '1' else ' ' + s.unit}"
-        for s in lft.parameters
-    )
-    out = [
-        (
-            f"{ranges or 'no parameter'}: exogenous, as fast as it likes; a limit on its rate is"
-            " not used"
-        ),
-        f"constant P; {_CLASS[scaling]}",
-    ]
-    if proof is not None:
-        out.append(
-            VERIFIED.format(what="finitely many matrices", shared="only the matrices of the LFT")
-        )
-    if kind == "l2 gain":
-        out.append(
-            "the gain is from zero initial state, |y|_2 < gamma |u|_2, all inputs to all outputs"
-            " together"
-        )
-    return tuple(out)

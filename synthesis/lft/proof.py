@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LFT, Matrices
+from symheli.lpv import LFT, Matrices, Scheduling
 from symheli.lpv.lft.model import parts
 from synthesis.lft.coordinates import Coordinates
 from synthesis.lft.multipliers import Multiplier
@@ -35,12 +35,22 @@ class Quadratic(NamedTuple):
     P: Array
     multiplier: Multiplier
 
+    @property
+    def form(self) -> str:
+        """The form in words."""
+        return f"V = x'Px, multiplier of the class {self.multiplier.scaling!r}"
+
 
 class Evidence(NamedTuple):
     """An LFT, and the coordinates in which its numbers are of order one."""
 
     lft: LFT
     coordinates: Coordinates
+
+    @property
+    def parameters(self) -> tuple[Scheduling, ...]:
+        """The parameters of the LFT."""
+        return self.lft.parameters
 
     def fault(self, proof: Quadratic, kind: str, rates: tuple[float, ...]) -> str | None:
         """What keeps the proof from being about this LFT and this claim, before any inequality;

@@ -52,26 +52,35 @@ def cells(
     return tuple(out)
 
 
-def strips(pieces: Sequence[ModelPiece], knots: Array, step: float) -> tuple[Strip, ...]:
-    """All (p, p(k+1)) with |p(k+1) - p| <= `step`, both in range, covered without gaps.
+def strips(
+    pieces: Sequence[ModelPiece],
+    knots: Array,
+    span: tuple[float, float],
+    cuts: Sequence[float] = (),
+) -> tuple[Strip, ...]:
+    """All (p, p(k+1)) with p(k+1) - p in the `span` (least, largest), both in range, covered
+    without gaps.
 
-    The range is cut at the knots and one step to either side of them; over each such cell the
-    limits p - step and p + step are straight lines that cross no knot, and the knots between them
-    cut the band into strips. The step is widened by 1e-12 of the range, which absorbs the rounding
-    of the cuts.
+    The range is cut at the knots, at the ends of the span to either side of them and at the extra
+    `cuts`; over each such cell the limits of p(k+1) are straight lines that cross no knot, and the
+    knots between them cut the band into strips. The span is widened by 1e-12 of the range, which
+    absorbs the rounding of the cuts.
     """
-    if step == 0:
+    if span == (0, 0):
         return tuple(
-            Strip(c, c.segment, ((c.low, c.low), (c.high, c.high))) for c in cells(pieces, knots)
+            Strip(c, c.segment, ((c.low, c.low), (c.high, c.high)))
+            for c in cells(pieces, knots, cuts)
         )
     low, high = float(knots[0]), float(knots[-1])
-    step = min(step, high - low) + 1e-12 * (high - low)
+    slack = 1e-12 * (high - low)
+    back, on = max(span[0], low - high) - slack, min(span[1], high - low) + slack
     out = []
-    for cell in cells(pieces, knots, [float(k) + side for k in knots for side in (-step, step)]):
+    every = [*cuts, *(float(k) - side for k in knots for side in (back, on))]
+    for cell in cells(pieces, knots, every):
         middle = 0.5 * (cell.low + cell.high)
         levels = [
-            max(low, middle - step),
-            *(float(k) for k in knots if low < k < high and abs(k - middle) < step),
+            min(max(low, middle + back), high),
+            *(float(k) for k in knots if low < k < high and back < k - middle < on),
         ]
         for level in levels:
             segment = min(int(np.searchsorted(knots, level, side="right") - 1), len(knots) - 2)
@@ -80,6 +89,6 @@ def strips(pieces: Sequence[ModelPiece], knots: Array, step: float) -> tuple[Str
             def inside(value: float, bottom: float = bottom, top: float = top) -> float:
                 return min(max(value, bottom), top)
 
-            corners = tuple((inside(p - step), inside(p + step)) for p in (cell.low, cell.high))
+            corners = tuple((inside(p + back), inside(p + on)) for p in (cell.low, cell.high))
             out.append(Strip(cell, segment, corners))  # type: ignore[arg-type]
     return tuple(out)

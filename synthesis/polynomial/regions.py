@@ -4,7 +4,7 @@ arithmetic.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise, product
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from synthesis.polynomial.bernstein import composition
 from synthesis.polynomial.cells import Strip, strips
 from synthesis.polynomial.exact import Number, exact
 from synthesis.polynomial.matrix import Box, PolynomialMatrix
+from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import ModelPiece, Pieces
 
 Array = np.ndarray
@@ -43,24 +44,53 @@ class Region(NamedTuple):
         return tuple(s.next_segment for s in self.strips)
 
 
-def regions(model: Pieces, knots: Sequence[Array], steps: Sequence[float]) -> Iterator[Region]:
-    """All of them: the ranges cut at knots and breaks, and where p moves by at most `steps` a
-    sample, where that leads to.
+def regions(
+    model: Pieces, knots: Sequence[Array], motion: Motion, varying: Sequence[bool]
+) -> Iterator[Region]:
+    """All of them: the ranges cut at knots and breaks, and in discrete time where p may be next, as
+    far as P is `varying` with it. What p cannot reach is left out.
     """
+    m = len(motion.box)
+    free = [i for i in range(m) if motion.ties[i] is None]
+    first = [_strips(model, knots, motion, varying, i, None) for i in free]
+    for choice in product(*first):
+        found: dict[int, Strip] = dict(zip(free, choice, strict=True))
+        cell = {i: (s.cell.low, s.cell.high) for i, s in found.items()}
+        second = [_strips(model, knots, motion, varying, i, cell) for i, _ in motion.tied]
+        for rest in product(*second):
+            found.update(zip((i for i, _ in motion.tied), rest, strict=True))
+            region = _region(model, tuple(found[i] for i in range(m)))
+            if motion.reaches(region.box):
+                yield region
+
+
+def _strips(
+    model: Pieces,
+    knots: Sequence[Array],
+    motion: Motion,
+    varying: Sequence[bool],
+    i: int,
+    cell: Mapping[int, tuple[float, float]] | None,
+) -> tuple[Strip, ...]:
+    """Those of one parameter; of one whose rate is another, where that is in its `cell`."""
     nothing = np.zeros((1, 0, 0))
-    every = []
-    for breaks, k, step in zip(model.breaks, knots, steps, strict=True):
-        # only the ends of the pieces matter here
-        stretches = [
-            ModelPiece(a, b, nothing, nothing, nothing, nothing) for a, b in pairwise(breaks)
-        ]
-        every.append(strips(stretches, k, step))
-    for choice in product(*every):
-        index = [
-            int(np.searchsorted(b, 0.5 * (s.cell.low + s.cell.high)) - 1)
-            for b, s in zip(model.breaks, choice, strict=True)
-        ]
-        yield Region(choice, tuple(index))
+    # only the ends of the pieces matter here
+    stretches = [
+        ModelPiece(a, b, nothing, nothing, nothing, nothing) for a, b in pairwise(model.breaks[i])
+    ]
+    span = (0.0, 0.0)
+    if model.dt is not None and varying[i]:
+        own = [(0.0, 0.0) if cell is None else cell.get(k, (0.0, 0.0)) for k in range(len(knots))]
+        span = motion.span(i, own, model.dt)
+    return strips(stretches, knots[i], span, motion.cuts(i, model.dt is None))
+
+
+def _region(model: Pieces, choice: tuple[Strip, ...]) -> Region:
+    index = [
+        int(np.searchsorted(b, 0.5 * (s.cell.low + s.cell.high)) - 1)
+        for b, s in zip(model.breaks, choice, strict=True)
+    ]
+    return Region(choice, tuple(index))
 
 
 def convert(F: PolynomialMatrix, number: Number) -> PolynomialMatrix:

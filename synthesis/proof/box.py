@@ -16,12 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import Matrices
+from symheli.lpv import Matrices, Scheduling
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.polynomial import structure
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
 from synthesis.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.polynomial.matrix import PolynomialMatrix
+from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import convert, regions
 from synthesis.polynomial.symmetric import symmetrized
@@ -79,6 +80,11 @@ class Evidence(NamedTuple):
     units: Units
     demand: Demand
 
+    @property
+    def parameters(self) -> tuple[Scheduling, ...]:
+        """The parameters of the model."""
+        return self.model.parameters
+
     def fault(self, P: BoxLyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
         """What keeps P from being about this model and this claim, before any inequality; None
         where nothing does.
@@ -93,6 +99,8 @@ class Evidence(NamedTuple):
             or rates != self.demand.rates
         ):
             return f"the proof is for rates {self.demand.rates}, the claim for {rates}"
+        if self.demand.motion != Motion.of(self.model.parameters) or self.demand.time != 1.0:
+            return "the parameters of the model do not move as those of the proof"
         if not self.model.original:
             return "the pieces are not those of the model"
         if kind == "energy-to-peak gain" and self.model.passes_peaks:
@@ -110,14 +118,10 @@ class Evidence(NamedTuple):
     def scaled(self) -> tuple[Pieces, Demand]:
         """Model and demand in the scaled units."""
         u = self.units
-        rates = (
-            tuple(r * u.time for r in self.demand.rates)
-            if self.model.dt is None
-            else self.demand.rates
-        )
+        time = u.time if self.model.dt is None else 1.0
         return self.model.scaled(
             u.left, u.right, u.inputs, u.outputs, u.time
-        ), self.demand._replace(rates=rates)
+        ), self.demand._replace(time=time)
 
     def in_units(self, value: float) -> float:
         """A physical gain (decay rate, 1/s) in the scaled units."""
@@ -242,18 +246,10 @@ class Evidence(NamedTuple):
                 for k in range(count)
             ]
         )
+        points = points[[demand.motion.reaches([(q, q) for q in p]) for p in points]]
         own = model.at(points)
         alpha = number(bound) if demand.kind == "decay rate" else number(0.0)
         g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
-        steps = demand.steps(dt, P.degrees)
-        corners = list(
-            product(
-                *(
-                    (-1, 1) if d and r > 0 else (0,)
-                    for d, r in zip(P.degrees, demand.rates, strict=True)
-                )
-            )
-        )
         for k, p in enumerate(points):
             if not self._reproduced(p, [M[k] for M in own]):
                 return False
@@ -282,11 +278,10 @@ class Evidence(NamedTuple):
                     )
             level = number(1.0) if demand.kind == "energy-to-peak gain" else g
             if dt is None:
-                for signs in corners:
-                    moving = zip(signs, demand.rates, slopes, strict=True)
+                for pace in pointwise.paces(p, demand.rates, demand.motion.ties, P.degrees, number):
                     drift = 2 * alpha * here
-                    for sign, r, slope in moving:
-                        drift = drift + sign * number(r) * slope if sign else drift
+                    for nu, slope in zip(pace, slopes, strict=True):
+                        drift = drift + nu * slope
                     forms.append(pointwise.dissipation(through, here, drift, None, level))
             else:
                 growth = (
@@ -294,7 +289,8 @@ class Evidence(NamedTuple):
                     if demand.kind == "decay rate"
                     else number(1.0)
                 )
-                for q in pointwise.reached(p, steps, box):
+                spans = pointwise.spans(p, demand.rates, demand.motion.ties, P.degrees, box, dt)
+                for q in pointwise.reached(p, spans, box):
                     after = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, q, number)[
                         0
                     ]
@@ -325,6 +321,7 @@ class Evidence(NamedTuple):
         grid = np.array(
             list(product(*(np.linspace(s.low, s.high, count) for s in self.model.parameters)))
         )
+        grid = grid[[self.demand.motion.reaches([(q, q) for q in p]) for p in grid]]
         A, B, C, D = self.model.at(grid)
         T = self.units.right @ self.units.weight
         here = P.at(grid)
@@ -359,17 +356,26 @@ class Evidence(NamedTuple):
         E = np.concatenate([np.eye(nx), np.zeros((nx, nu))], axis=1)
         if dt is None:
             still = E.T @ here @ M + np.swapaxes(M, 1, 2) @ here @ E + 2 * alpha * E.T @ here @ E
-            varying = [(i, r) for i, r in enumerate(self.demand.rates) if P.degrees[i] and r > 0]
-            slopes = [r * (E.T @ P.derivative(grid, i) @ E) for i, r in varying]
-            for signs in product((-1.0, 1.0), repeat=len(slopes)):
-                yield sum((s * slope for s, slope in zip(signs, slopes, strict=True)), still.copy())
+            for drift in self.demand.motion.drifts(self.demand.moving(P.degrees)):
+                move = still.copy()
+                for i, (rate, tie) in enumerate(zip(drift.rates, drift.ties, strict=True)):
+                    if rate == 0 and tie is None:
+                        continue
+                    pace = rate if tie is None else grid[:, tie, None, None]
+                    move += pace * (E.T @ P.derivative(grid, i) @ E)
+                yield move
             return
         low, high = np.array([(s.low, s.high) for s in self.model.parameters]).T
-        steps = np.array(self.demand.steps(dt, P.degrees))
-        for signs in product((-1.0, 0.0, 1.0), repeat=int((steps > 0).sum())):
-            move = np.zeros(len(steps))
-            move[steps > 0] = np.array(signs) * np.minimum(steps, high - low)[steps > 0]
-            there = P.at(np.clip(grid + move, low, high))
+        motion, moving = self.demand.motion, self.demand.moving(P.degrees)
+        back, on = np.zeros_like(grid), np.zeros_like(grid)
+        for k, p in enumerate(grid):
+            for i in np.flatnonzero(moving).tolist():
+                back[k, i], on[k, i] = motion.span(i, [(q, q) for q in p], dt)
+        back, on = np.maximum(back, low - high), np.minimum(on, high - low)
+        for shares in product((0.0, 0.5, 1.0), repeat=sum(moving)):
+            share = np.zeros(len(low))
+            share[moving] = shares
+            there = P.at(np.clip(grid + back + share * (on - back), low, high))
             yield math.exp(2 * alpha * dt) * np.swapaxes(M, 1, 2) @ there @ M - E.T @ here @ E
 
 
@@ -383,7 +389,7 @@ def polynomials(
     g = number(bound) * number(bound) if demand.kind in ("l2 gain", "energy-to-peak gain") else None
     if demand.kind == "decay rate":
         demand = demand._replace(shift=bound)
-    for region in regions(model, P.knots, demand.steps(model.dt, P.degrees)):
+    for region in regions(model, P.knots, demand.motion, demand.moving(P.degrees)):
         pair = Pair(
             *(convert(P.segment(index), number) for index in (region.segment, region.next_segment))
         )
@@ -466,7 +472,7 @@ class _Samples(NamedTuple):
 def _samples(model: Pieces, P: BoxLyapunov, demand: Demand, points: int) -> _Samples:
     nx, _, ny = model.sizes
     moves, here, outputs = [], [], []
-    for region in regions(model, P.knots, demand.steps(model.dt, P.degrees)):
+    for region in regions(model, P.knots, demand.motion, demand.moving(P.degrees)):
         pair = Pair(P.segment(region.segment), P.segment(region.next_segment))
         for F in decrease(model, region, pair, demand, float):
             local = _grid(F, points)

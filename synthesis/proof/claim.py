@@ -110,7 +110,7 @@ def _polynomials(
             yield from ((F, one) for F in _continuous(cell, P, rate, number))
     else:
         step = rate * dt if P.degree else 0.0
-        for strip in strips(pieces, P.knots, step):
+        for strip in strips(pieces, P.knots, (-step, step)):
             yield _discrete(strip, P, number), one
 
 

@@ -1,6 +1,7 @@
 """What must be negative definite over the box, as polynomial matrices in p, linear in P.
 
-Continuous time, V = x' P(p) x, at every corner nu of the box of rates, Pdot = sum_i nu_i dP/dp_i:
+Continuous time, V = x' P(p) x, at every corner nu of the box of rates, Pdot = sum_i nu_i dP/dp_i,
+nu_i = p_j where the rate of p_i is p_j:
 
     L2 gain          [A'P + PA + Pdot + C'C   PB + C'D; .   D'D - g I] < 0
     energy to peak   [A'P + PA + Pdot   PB; .   -I] < 0  and  [P   C'; .   g I] > 0, D = 0
@@ -22,28 +23,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from synthesis.certificate import Kind
 from synthesis.polynomial.exact import Number, exact
 from synthesis.polynomial.matrix import PolynomialMatrix, block
+from synthesis.polynomial.motion import Drift, Motion
 from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import Region, model_on, now, successor
-from synthesis.verdict import Kind
 
 Array = np.ndarray
 
 
 class Demand(NamedTuple):
-    """What is asked: `kind`; `rates` of the parameters in their units per second; `shift`: alpha of
-    a decay rate, 1/s, else 0.
+    """What is asked: `kind`; how p moves; `shift`: alpha of a decay rate, 1/s, else 0.
+
+    `time`: seconds in the unit of time of the model in continuous time.
     """
 
     kind: Kind
-    rates: tuple[float, ...]
+    motion: Motion
     shift: float = 0.0
+    time: float = 1.0
+
+    @property
+    def rates(self) -> tuple[float, ...]:
+        """Largest rate of each parameter, in its unit per second."""
+        return self.motion.rates
+
+    def moving(self, degrees: Sequence[int]) -> list[bool]:
+        """Which parameters move in a way that matters to P."""
+        return [bool(d) and rate > 0 for d, rate in zip(degrees, self.rates, strict=True)]
 
     def steps(self, dt: float | None, degrees: Sequence[int]) -> tuple[float, ...]:
         """Largest change of each parameter in a sample that matters to P; 0 in continuous time."""
@@ -84,7 +96,7 @@ def decrease(
     gain = demand.kind == "l2 gain"
     channels = demand.kind in ("l2 gain", "energy-to-peak gain")
     if model.dt is not None:
-        moving = [step > 0 for step in demand.steps(model.dt, P.here.degrees)]
+        moving = demand.moving(P.here.degrees)
         there = successor(P.there, region, number, moving)
         unit = there.box[m:]
         A, B, C, D, here = (M.extend(unit) for M in (A, B, C, D, here))
@@ -96,18 +108,9 @@ def decrease(
         PA = here @ A
         top = PA + PA.T + here * (2 * number(demand.shift)) if demand.shift else PA + PA.T
         side, corner = here @ B, B.T @ B * 0
-        varying = [(i, rate) for i, rate in enumerate(demand.rates) if here.degrees[i] and rate > 0]
-        slopes = [here.derivative(i) * number(rate) for i, rate in varying]
         drifts = [
-            (
-                sum(
-                    (s * sign for s, sign in zip(slopes[1:], signs[1:], strict=True)),
-                    slopes[0] * signs[0],
-                )
-                if slopes
-                else None
-            )
-            for signs in product((-1, 1), repeat=len(slopes))
+            _slope(here, drift, demand.time, number)
+            for drift in demand.motion.drifts(demand.moving(here.degrees))
         ]
     if gain:
         top, side, corner = top + C.T @ C, side + C.T @ D, corner + D.T @ D
@@ -126,3 +129,27 @@ def peak(model: Pieces, region: Region, P: PolynomialMatrix, number: Number) -> 
     eye = PolynomialMatrix.constant(exact(np.eye(nu), number), here.box)
     zero = PolynomialMatrix.constant(exact(np.zeros((nx, nu)), number), here.box)
     return -block([[here, zero, C.T], [zero.T, eye, D.T], [C, D, C @ C.T * 0]])
+
+
+def _slope(
+    here: PolynomialMatrix, drift: Drift, time: float, number: Number
+) -> PolynomialMatrix | None:
+    """dP/dt while p moves so; None where it does not."""
+    total = None
+    for i, (rate, j) in enumerate(zip(drift.rates, drift.ties, strict=True)):
+        if rate == 0 and j is None:
+            continue
+        term = here.derivative(i)
+        term = term * (number(rate) * number(time)) if j is None else _times(term, j) * number(time)
+        total = term if total is None else total + term
+    return total
+
+
+def _times(F: PolynomialMatrix, axis: int) -> PolynomialMatrix:
+    """The polynomial times the parameter of that axis."""
+    low, high = F.box[axis]
+    shape = [1] * len(F.box)
+    shape[axis] = 2
+    eye = np.eye(F.shape[0], dtype=int)
+    ends = np.stack([low * eye, high * eye]).reshape(*shape, *eye.shape)
+    return F @ PolynomialMatrix(F.box, ends)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, Matrices
+from symheli.lpv import LPVStateSpace, Matrices, Scheduling
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.polynomial import structure
 from synthesis.polynomial.exact import Number, positive_definite, rational
@@ -234,6 +234,11 @@ class Evidence(NamedTuple):
     units: Scaling
     rate: float
     elevation: int
+
+    @property
+    def parameters(self) -> tuple[Scheduling, ...]:
+        """The one parameter of the model."""
+        return (self.lpv.scheduling,)
 
     def fault(self, P: Lyapunov, kind: str, rates: tuple[float, ...]) -> str | None:
         """What keeps P from being about this model and this claim, before any inequality; None

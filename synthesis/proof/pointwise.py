@@ -131,22 +131,61 @@ def dissipation(
     return np.block([[top, side], [side.T, corner - np.eye(len(corner), dtype=int) * g]])
 
 
-def reached(
-    p: Any, steps: Sequence[float], box: Sequence[tuple[float, float]]
-) -> Iterator[tuple[float, ...]]:
-    """Values of p(k+1): as far as it goes in every direction, part of the way, and where it is."""
+def paces(
+    p: Any,
+    rates: Sequence[float],
+    ties: Sequence[int | None],
+    degrees: Sequence[int],
+    number: Number,
+) -> Iterator[tuple[Any, ...]]:
+    """Every extreme dp/dt that matters to P: plus or minus its rate, or the parameter it is."""
     each = [
-        (
-            sorted(
-                {min(max(q + share * step, low), high) for share in (-1.0, -0.382, 0.0, 0.618, 1.0)}
-            )
-            if step > 0
-            else [q]
-        )
-        for q, step, (low, high) in zip(
-            p, (min(s, b - a) for s, (a, b) in zip(steps, box, strict=True)), box, strict=True
-        )
+        (0,)
+        if not d
+        else (number(float(p[j])),)
+        if j is not None
+        else (number(-r), number(r))
+        if r > 0
+        else (0,)
+        for r, j, d in zip(rates, ties, degrees, strict=True)
     ]
+    return product(*each)
+
+
+def spans(
+    p: Any,
+    rates: Sequence[float],
+    ties: Sequence[int | None],
+    degrees: Sequence[int],
+    box: Sequence[tuple[float, float]],
+    dt: float,
+) -> list[tuple[float, float]]:
+    """(least, largest) change of each parameter in a sample that matters to P: dt p_j with an error
+    of dt^2/2 times the rate of p_j where p_j is the rate.
+    """
+    out = []
+    for r, j, d in zip(rates, ties, degrees, strict=True):
+        if not d:
+            out.append((0.0, 0.0))
+        elif j is None:
+            out.append((-r * dt, r * dt))
+        else:
+            slack, (low, high) = 0.5 * rates[j] * dt * dt, box[j]
+            out.append((max(p[j] * dt - slack, low * dt), min(p[j] * dt + slack, high * dt)))
+    return out
+
+
+def reached(
+    p: Any, moves: Sequence[tuple[float, float]], box: Sequence[tuple[float, float]]
+) -> Iterator[tuple[float, ...]]:
+    """Values of p(k+1) where each parameter changes by (least, largest): as far as it goes either
+    way, and part of the way.
+    """
+    each = []
+    for q, (back, on), (low, high) in zip(p, moves, box, strict=True):
+        back, on = max(back, low - high), min(on, high - low)
+        shares = (0.0, 0.309, 0.5, 0.809, 1.0) if on > back else (0.0,)
+        each.append(sorted({min(max(q + back + t * (on - back), low), high) for t in shares}))
     return product(*each)
 
 
@@ -164,7 +203,8 @@ def spline_inequalities(
     here, slope = spline(P.knots, P.degree, P.coefficients, p, number)
     yield -here
     if dt is not None:
-        for (q,) in reached((p,), (rate * dt if P.degree else 0.0,), (ends,)):
+        step = rate * dt if P.degree else 0.0
+        for (q,) in reached((p,), [(-step, step)], (ends,)):
             yield dissipation(
                 model, here, None, spline(P.knots, P.degree, P.coefficients, q, number)[0], g
             )

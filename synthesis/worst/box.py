@@ -8,19 +8,20 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
-from scipy.optimize import minimize
 
 from symheli.lpv import LPVStateSpace
+from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces
 from synthesis.program.scaling import balance
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.budget import Budget
 from synthesis.worst.frozen import FrozenGain, norm, to_continuous
 from synthesis.worst.lower_bound import Search, growing_trajectory, lower_bound
+from synthesis.worst.over_box import grid_of, worst_over
 from synthesis.worst.periodic import multiplier
 from synthesis.worst.spectrum import surely_unstable
 from synthesis.worst.trajectory import Trajectory
@@ -84,49 +85,20 @@ def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> 
 
 
 def worst_frozen(model: Pieces, size: Measure) -> Worst:
-    """The largest over a grid of the box, and a local search from its best points."""
-    low, high = np.array([(s.low, s.high) for s in model.parameters]).T
-    m, count, grid = len(low), _count(model), _grid(model)
+    """The largest over the box."""
 
     def at(p: Array) -> float:
-        return size(*(M[0] for M in model.at(np.clip(p, low, high)[None])))
+        return size(*(M[0] for M in model.at(p[None])))
 
-    values = np.array([size(*matrices) for matrices in zip(*model.at(grid), strict=True)])
-    best = int(values.argmax())
-    worst = Worst(float(values[best]), tuple(map(float, grid[best])))
-    if math.isinf(worst.value):
-        return worst
-    for k in np.argsort(-values)[:2]:
-        step = (high - low) / (count - 1)
-        simplex = np.vstack(
-            [
-                grid[k],
-                *(grid[k] + d * np.where(grid[k] + d > high, -1.0, 1.0) for d in np.diag(step)),
-            ]
-        )
-        found: Any = minimize(
-            lambda p: -min(at(p), 1e300),
-            grid[k],
-            method="Nelder-Mead",
-            bounds=list(zip(low, high, strict=True)),
-            options={
-                "initial_simplex": simplex,
-                "maxfev": 40 * m,
-                "xatol": 1e-7 * float((high - low).min()),
-                "fatol": 1e-12,
-            },
-        )
-        value = at(found.x)
-        if value > worst.value:
-            worst = Worst(value, tuple(map(float, np.clip(found.x, low, high))))
-    return worst
+    value, p = worst_over(at, _axes(model))
+    return Worst(value, tuple(map(float, p)))
 
 
 def unstable_at(model: Pieces, suspect: tuple[float, ...]) -> tuple[float, ...] | None:
     """A p, the suspect one first, at which the frozen model is unstable beyond rounding; None where
     there is none on the grid.
     """
-    points = np.vstack([suspect, _grid(model)])
+    points = np.vstack([suspect, grid_of(_axes(model))])
     return next(
         (
             tuple(map(float, p))
@@ -137,16 +109,13 @@ def unstable_at(model: Pieces, suspect: tuple[float, ...]) -> tuple[float, ...] 
     )
 
 
-def _count(model: Pieces) -> int:
-    return {1: 61, 2: 15, 3: 7}.get(len(model.parameters), 3)
-
-
-def _grid(model: Pieces) -> Array:
-    axes = [
-        np.unique(np.r_[np.linspace(s.low, s.high, _count(model)), b])
-        for s, b in zip(model.parameters, model.breaks, strict=True)
+def _axes(model: Pieces) -> list[Array]:
+    rest = Motion.of(model.parameters).at_rest()
+    count = {1: 61, 2: 15, 3: 7}.get(len(model.parameters) - len(rest), 3)
+    return [
+        np.array([0.0]) if i in rest else np.unique(np.r_[np.linspace(s.low, s.high, count), b])
+        for i, (s, b) in enumerate(zip(model.parameters, model.breaks, strict=True))
     ]
-    return np.array(list(product(*axes)))
 
 
 def worst_moving(
@@ -168,6 +137,7 @@ def worst_moving(
         Budget(search.seconds),
         [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.limit > 0],
     )
+    near = frozen.p[0] if isinstance(model, LPVStateSpace) and frozen.p else 0.0
     for k, (line, back) in enumerate(lines):
         if budget.over:
             break
@@ -176,7 +146,7 @@ def worst_moving(
         search = replace(search, seconds=budget.left / (len(lines) - k))
         if demand.kind == "l2 gain":
             found = lower_bound(
-                line, rate, frozen=FrozenGain(frozen.value, 0.0, 0.0), search=search
+                line, rate, frozen=FrozenGain(frozen.value, near, math.nan), search=search
             )
             value, trajectory = found.gamma, found.trajectory
         elif demand.kind == "energy-to-peak gain":

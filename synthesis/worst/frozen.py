@@ -5,13 +5,13 @@ undercut.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
-from scipy.optimize import minimize_scalar
 
 from symheli.lpv import LPVStateSpace
+from synthesis.worst.over_box import worst_over
 from synthesis.worst.scheduled import Scheduled
 
 Array = np.ndarray
@@ -28,58 +28,48 @@ class FrozenGain(NamedTuple):
 
 
 def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) -> FrozenGain:
-    """max over p of the H-infinity norm of the frozen models, by a grid of `points` and local
-    search around its peaks.
+    """Largest H-infinity norm of the models frozen at each p, which no gain of the LPV model can
+    undercut.
 
-    Each norm by the level-set method on a Hamiltonian matrix (Boyd and Balakrishnan 1990; Bruinsma
-    and Steinbuch 1990), to a relative `tolerance` from below. gamma is inf where a frozen model is
-    unstable. The breaks of a spline are on the grid.
+    Parameters
+    ----------
+    lpv : LPVStateSpace or LFT of one parameter
+        The model.
+    points : int
+        Of the grid whose highest peaks are climbed; the breaks of a spline are on it too.
+    tolerance : float
+        Relative accuracy of each norm, from below.
+
+    Returns
+    -------
+    FrozenGain
+        `gamma` (inf where a frozen model is unstable), `p` and `omega` (rad/s) where it occurs.
+
+    References
+    ----------
+    Boyd and Balakrishnan, Systems and Control Letters 15 (1990); Bruinsma and Steinbuch, Systems
+    and Control Letters 14 (1990): the level-set method on a Hamiltonian matrix.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0)
+    >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> frozen_gain(lag)  # 1/(1 + p), at p = 0
+    FrozenGain(gamma=1.0, p=0.0, omega=0.0)
     """
     low, high = lpv.scheduling.low, lpv.scheduling.high
     grid = np.linspace(low, high, points)
     if isinstance(lpv, LPVStateSpace):
-        grid = np.unique(
-            np.concatenate(
-                [
-                    grid,
-                    [
-                        p
-                        for piece in lpv.basis.pieces()
-                        for p in (piece.low, piece.high)
-                        if low < p < high
-                    ],
-                ]
-            )
-        )
-    found: list[FrozenGain] = []
-    for p in grid:
-        gain, omega = norm(*lpv.matrices(float(p)), lpv.dt, tolerance)
-        found.append(FrozenGain(gain, float(p), omega))
-        if math.isinf(gain):
-            return found[-1]
-    best = max(found, key=lambda f: f.gamma)
-    for k in _peaks([f.gamma for f in found])[:3]:
-        a, b = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
-        result: Any = minimize_scalar(
-            lambda p: -norm(*lpv.matrices(float(p)), lpv.dt, tolerance)[0],
-            bounds=(a, b),
-            method="bounded",
-            options={"xatol": 1e-6 * (b - a)},
-        )
-        gain, omega = norm(*lpv.matrices(float(result.x)), lpv.dt, tolerance)
-        best = max(best, FrozenGain(gain, float(result.x), omega), key=lambda f: f.gamma)
-    return best
+        ends = [p for piece in lpv.basis.pieces() for p in (piece.low, piece.high)]
+        grid = np.unique([*grid, *(p for p in ends if low < p < high)])
 
+    def size(p: Array) -> float:
+        return norm(*lpv.matrices(float(p[0])), lpv.dt, tolerance)[0]
 
-def least_damped(lpv: Scheduled, points: int = 201) -> tuple[float, float]:
-    """(stability margin, p) of the worst frozen model: min of -Re(pole) (rad/s), or of 1 - |pole|
-    in discrete time.
-    """
-    grid = np.linspace(lpv.scheduling.low, lpv.scheduling.high, points)
-    poles = np.linalg.eigvals(lpv.matrices(grid).A)
-    margins = (-poles.real if lpv.dt is None else 1 - np.abs(poles)).min(axis=1)
-    k = int(np.argmin(margins))
-    return float(margins[k]), float(grid[k])
+    gamma, at = worst_over(size, [grid])
+    p = float(at[0])
+    return FrozenGain(gamma, p, norm(*lpv.matrices(p), lpv.dt, tolerance)[1])
 
 
 def norm(
@@ -232,13 +222,3 @@ def to_continuous(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array,
     inverse = np.linalg.inv(A + np.eye(n))
     root = math.sqrt(2.0)
     return inverse @ (A - np.eye(n)), root * inverse @ B, root * C @ inverse, D - C @ inverse @ B
-
-
-def _peaks(values: list[float]) -> list[int]:
-    last = len(values) - 1
-    local = [
-        k
-        for k in range(len(values))
-        if values[k] >= values[max(k - 1, 0)] and values[k] >= values[min(k + 1, last)]
-    ]
-    return sorted(local, key=lambda k: -values[k])

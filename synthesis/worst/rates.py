@@ -2,47 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-import numpy as np
+from collections.abc import Sequence
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import Scheduling
+from symheli.lpv.scheduling import Rates, with_rates
 
-Rate = float | Sequence[float] | Mapping[str, float] | None
+Rate = Rates | None
 """In units of p per second: one for all parameters, one for each in order, or {name: rate}; the
-parameter's own where none is given.
+name of a parameter says that it is the rate; the parameter's own where none is given.
 """
 
 
-def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
-    """One rate a parameter; raises `InputError` for a wrong number of them or one that is not >= 0,
-    `UnknownNameError` for a name.
+def asked(parameters: Sequence[Scheduling], rate: Rate) -> tuple[Scheduling, ...]:
+    """The parameters with the limits asked for; raises `InputError` for a wrong number of them or
+    one that is not >= 0, `UnknownNameError` for a name.
     """
-    names = [s.name for s in parameters]
-    found: list[Any]
     if rate is None:
-        found = [s.limit for s in parameters]
-    elif isinstance(rate, Mapping):
-        for name in rate:
-            if name not in names:
-                raise UnknownNameError("scheduling parameter", name, names)
-        found = [rate[s.name] if s.name in rate else s.limit for s in parameters]
-    else:
-        found = (
-            list(rate)
-            if isinstance(rate, Sequence | np.ndarray) and not isinstance(rate, str)
-            else [rate] * len(names)
-        )
+        return tuple(parameters)
     try:
-        numbers = tuple(float(value) for value in found)
-    except (TypeError, ValueError):
-        numbers = ()
-    if len(numbers) != len(names) or not all(value >= 0 for value in numbers):
+        return with_rates(parameters, rate)
+    except UnknownNameError:
+        raise
+    except (TypeError, ValueError) as error:
         units = ", ".join(f"{s.name} ({s.unit}/s)" for s in parameters)
         raise InputError(
             "rate must be >= 0 (math.inf: as fast as it likes), one for all, one for each of"
-            f" {units}, or by name, got {rate!r}"
-        )
-    return numbers
+            f" {units}, or by name, got {rate!r} ({error})"
+        ) from error
+
+
+def rates(parameters: Sequence[Scheduling], rate: Rate) -> tuple[float, ...]:
+    """One number a parameter; raises `InputError` where it is another parameter."""
+    return tuple(s.limit for s in asked(parameters, rate))

@@ -8,9 +8,9 @@ import pytest
 import synthesis
 from studies.cover import SAFETY, Remainder, covered_gain, covering
 from symheli import LPVStateSpace, Scheduling
-from synthesis import Relaxation
+from synthesis import Spline
 
-PLAIN = Relaxation(degree=0)
+PLAIN = Spline(degree=0)
 
 
 def lag(pole=1.0):
@@ -51,5 +51,5 @@ def test_every_measured_difference_is_within_the_remainder_with_the_promised_saf
 def test_without_a_remainder_the_covering_model_has_the_gain_of_the_model():
     rest = Remainder.of(left_out(1e-12))
     assert synthesis.l2_gain(
-        covering(lag(), rest, 2.0), 0.0, relaxation=PLAIN, search=None
+        covering(lag(), rest, 2.0), 0.0, form=PLAIN, search=None
     ).gamma == pytest.approx(0.5, rel=1e-3)

@@ -6,7 +6,7 @@ import pytest
 import synthesis
 from studies.cover import Remainder, covered_gain
 from studies.loops.exact_lateral import ExactLateral, Patches
-from synthesis import Relaxation
+from synthesis import Spline
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +41,9 @@ def test_the_models_jump_where_the_fin_stalls(models):
 def test_the_covered_gain_is_hardly_above_that_of_the_polynomials(ideal):
     models = ExactLateral.of(ideal, 5.0, 8.0)
     loop = models.loop()
-    plain = synthesis.l2_gain(loop, 1.0, relaxation=Relaxation(segments=(2,)), search=None)
+    plain = synthesis.l2_gain(loop, 1.0, form=Spline(segments=2), search=None)
     covered, certificate = covered_gain(
-        loop, Remainder.of(models.missed(loop)), 1.0, Relaxation(segments=(2,)), plain.gamma
+        loop, Remainder.of(models.missed(loop)), 1.0, Spline(segments=2), plain.gamma
     )
     assert plain.frozen < covered < 1.01 * plain.gamma
     assert certificate.verify(rigorous=True)

@@ -115,9 +115,7 @@ def test_a_moving_trim_needs_its_drift(baseline, flown):
 
 def test_gust_loop_is_proven_for_slow_airspeed_and_grows_when_it_may_jump(baseline):
     loop = guarantees.gust_loop(baseline.nodes)
-    slow = synthesis.l2_gain(
-        loop, rate=1.0, relaxation=synthesis.Relaxation(segments=(8,)), search=None
-    )
+    slow = synthesis.l2_gain(loop, rate=1.0, form=synthesis.Spline(segments=8), search=None)
     assert slow.verified
     assert slow.verify(rigorous=True)
     assert slow.frozen == pytest.approx(

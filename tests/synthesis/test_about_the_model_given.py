@@ -14,9 +14,12 @@ from models import lag, random_stable, spring
 
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
-    Relaxation,
+    HigherOrder,
+    Memory,
     Search,
+    Spline,
     Status,
+    SumOfSquares,
     decay_rate,
     generalized_h2,
     l2_gain,
@@ -25,15 +28,15 @@ from synthesis import (
 )
 
 QUICK = Search(levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000)
-COARSE = Relaxation(segments=(2,), degree=2)
-SOS = Relaxation(kind="sos", segments=(1,), degree=1)
+COARSE = Spline(segments=2, degree=2)
+SOS = {"form": Spline(segments=1, degree=1), "impose": SumOfSquares()}
 ROUTES = {
-    "splines": lambda lpv, rate, search: l2_gain(lpv, rate, relaxation=COARSE, search=search),
-    "box": lambda lpv, rate, search: l2_gain(lpv, rate, relaxation=SOS, search=search),
+    "splines": lambda lpv, rate, search: l2_gain(lpv, rate, form=COARSE, search=search),
+    "box": lambda lpv, rate, search: l2_gain(lpv, rate, **SOS, search=search),
     "energy to peak": lambda lpv, rate, search: generalized_h2(
-        replace(lpv, D=0 * lpv.D), rate, relaxation=SOS, search=search
+        replace(lpv, D=0 * lpv.D), rate, **SOS, search=search
     ),
-    "decay": lambda lpv, rate, search: decay_rate(lpv, rate, relaxation=SOS, search=search),
+    "decay": lambda lpv, rate, search: decay_rate(lpv, rate, **SOS, search=search),
     "lft": lambda lpv, rate, search: lft_gain(lpv.to_lft().reduce(), search=search),
 }
 
@@ -111,8 +114,8 @@ def test_stability_under_jumps_is_stability_under_any_limit(rate):
     assert cert.verified
     assert cert.verify(rigorous=True)
     # with a higher degree and a memory too: their constant P is one
-    for relaxation in (Relaxation(order=2, segments=(2,)), Relaxation(memory=1.0, segments=(3,))):
-        assert stability(spring(damping=0.8), rate, relaxation=relaxation, search=None).verified
+    for form in (HigherOrder(2, segments=2), Memory(1.0, segments=3)):
+        assert stability(spring(damping=0.8), rate, form=form, search=None).verified
 
 
 def silent(how):

@@ -10,8 +10,8 @@ from models import lateral, spring
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
-    Relaxation,
     Search,
+    Spline,
     generalized_h2,
     l2_gain,
     lft_gain,
@@ -33,7 +33,7 @@ def mass_spring():
 @pytest.mark.parametrize("seconds", [0.3, 1.0])
 def test_a_search_over_a_box_keeps_to_its_budget_and_says_so(seconds):
     began = time.process_time()
-    cert = l2_gain(mass_spring(), relaxation=Relaxation(degree=1), search=Search(seconds=seconds))
+    cert = l2_gain(mass_spring(), form=Spline(degree=1), search=Search(seconds=seconds))
     spent = time.process_time() - began
     # every line ends with what it has begun: the steps of one cycle, and the response to its
     # explicit input
@@ -66,7 +66,7 @@ def test_more_time_is_never_worse_and_no_time_still_a_bound():
 
 def test_progress_is_logged(caplog):
     with caplog.at_level(logging.INFO, logger="synthesis"):
-        l2_gain(mass_spring(), relaxation=Relaxation(degree=1), search=Search(seconds=0.3))
+        l2_gain(mass_spring(), form=Spline(degree=1), search=Search(seconds=0.3))
     assert any("line 1 of" in message and "s left" in message for message in caplog.messages)
 
 

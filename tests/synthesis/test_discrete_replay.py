@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from models import random_stable, spring
 
 from symheli.lpv import LPVStateSpace, Scheduling, simulate
-from synthesis import Relaxation, Search, decay_rate, generalized_h2, l2_gain, lower_bound
+from synthesis import Search, Spline, SumOfSquares, decay_rate, generalized_h2, l2_gain, lower_bound
 
 QUICK = Search(levels=4, dwells=4, starts=1, nodes=20, evaluations=4, steps=40, samples=1000)
-SOS = Relaxation(kind="sos", segments=(1,), degree=1)
+SOS = {"form": Spline(segments=1, degree=1), "impose": SumOfSquares()}
+OPTIONS = [SOS, {"form": Spline(segments=1, degree=1)}]
 common = settings(
     max_examples=6, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
 )
@@ -75,13 +76,9 @@ def test_the_input_along_the_worst_trajectory_shows_the_gain(lpv, rate):
 
 
 @common
-@given(
-    lpv=models, rate=rates, relaxation=st.sampled_from([SOS, Relaxation(segments=(1,), degree=1)])
-)
-def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(
-    lpv, rate, relaxation
-):
-    cert = l2_gain(lpv, rate, relaxation=relaxation, search=QUICK)
+@given(lpv=models, rate=rates, options=st.sampled_from(OPTIONS))
+def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(lpv, rate, options):
+    cert = l2_gain(lpv, rate, **options, search=QUICK)
     if cert.worst is None or math.isinf(cert.lower):
         return
     within(lpv, rate, cert.worst)
@@ -105,7 +102,7 @@ def test_no_input_has_less_than_the_claim_along_the_trajectory_of_a_certificate(
 @common
 @given(lpv=models, rate=rates)
 def test_the_repeated_cycle_shows_the_peak_and_the_decay(lpv, rate):
-    peak = generalized_h2(lpv, rate, relaxation=SOS, search=QUICK)
+    peak = generalized_h2(lpv, rate, **SOS, search=QUICK)
     if peak.worst is not None and math.isfinite(peak.lower):
         within(lpv, rate, peak.worst)
         A, B, C, D = lpv.matrices(np.tile(peak.worst.p, 60))
@@ -115,7 +112,7 @@ def test_the_repeated_cycle_shows_the_peak_and_the_decay(lpv, rate):
             X = a @ X @ a.T + b @ b.T
         # more cycles than the search flew only raise the peak
         assert math.sqrt(size) >= peak.lower * (1 - 1e-6)
-    slow = decay_rate(lpv, rate, relaxation=SOS, search=QUICK)
+    slow = decay_rate(lpv, rate, **SOS, search=QUICK)
     if slow.worst is not None and len(slow.worst.p) > 1:
         within(lpv, rate, slow.worst)
         A = lpv.matrices(slow.worst.p).A

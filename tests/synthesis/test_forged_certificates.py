@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from models import lag, random_stable, spring
+from models import forged, lag, random_stable, spring
 
 from symheli.errors import SymheliError
 from symheli.lpv import LPVStateSpace
 from synthesis import (
-    Relaxation,
+    HigherOrder,
+    Memory,
+    Spline,
+    SumOfSquares,
     decay_rate,
     generalized_h2,
     l2_gain,
@@ -24,24 +27,20 @@ from synthesis import (
     stability,
 )
 
-COARSE = Relaxation(segments=(2,), degree=2)
-BOX = Relaxation(kind="sos", segments=(2,), degree=1)
+COARSE = Spline(segments=2, degree=2)
+BOX = {"form": Spline(segments=2, degree=1), "impose": SumOfSquares()}
 damped = spring(damping=0.4)
 FORMS = {
-    "spline": lambda: l2_gain(random_stable(2), relaxation=COARSE, search=None),
+    "spline": lambda: l2_gain(random_stable(2), form=COARSE, search=None),
     "constant": lambda: l2_gain(lag(), math.inf, search=None),
-    "sampled": lambda: l2_gain(random_stable(2, dt=0.1), relaxation=COARSE, search=None),
-    "stability": lambda: stability(damped, 0.1, relaxation=COARSE, search=None),
-    "degree four": lambda: stability(
-        damped, 0.1, relaxation=Relaxation(order=2, segments=(2,)), search=None
-    ),
-    "memory": lambda: l2_gain(
-        damped, 0.5, relaxation=Relaxation(memory=1.0, segments=(3,), degree=2), search=None
-    ),
-    "box": lambda: l2_gain(damped, 0.1, relaxation=BOX, search=None),
-    "box stability": lambda: stability(damped, 0.1, relaxation=BOX, search=None),
-    "energy to peak": lambda: generalized_h2(damped, 0.1, relaxation=BOX, search=None),
-    "decay": lambda: decay_rate(damped, 0.1, relaxation=BOX, search=None),
+    "sampled": lambda: l2_gain(random_stable(2, dt=0.1), form=COARSE, search=None),
+    "stability": lambda: stability(damped, 0.1, form=COARSE, search=None),
+    "degree four": lambda: stability(damped, 0.1, form=HigherOrder(2, segments=2), search=None),
+    "memory": lambda: l2_gain(damped, 0.5, form=Memory(1.0, segments=3, degree=2), search=None),
+    "box": lambda: l2_gain(damped, 0.1, **BOX, search=None),
+    "box stability": lambda: stability(damped, 0.1, **BOX, search=None),
+    "energy to peak": lambda: generalized_h2(damped, 0.1, **BOX, search=None),
+    "decay": lambda: decay_rate(damped, 0.1, **BOX, search=None),
     "lft, small gain": lambda: lft_gain(lag().to_lft().reduce(), "small gain", search=None),
     "lft, D": lambda: lft_gain(lag().to_lft().reduce(), "D", search=None),
     "lft, DG": lambda: lft_gain(damped.to_lft().reduce(), "DG", search=None),
@@ -71,8 +70,7 @@ SAID = {
     "conditioning",
     "attempts",
     "worst",
-    "unit",
-    "relaxation",
+    "method",
     "indicative",
     "frozen",
     "status",
@@ -229,24 +227,23 @@ def test_a_bound_beyond_the_proof_is_refused(form):
 @pytest.mark.parametrize("other", ["spline", "constant", "lft, D"])
 def test_the_proof_of_another_model_is_refused(form, other):
     cert, foreign = genuine(form), genuine(other)
-    name = "proof" if "lft" in form else "lyapunov"
-    theirs = foreign._proof[0]
     # proofs of one model are proofs of each other's claim to the last digit or two
     if form == other or {form, other} <= {"constant", "lft, small gain", "lft, D"}:
         return
-    assert refused(lambda: replace(cert, **{name: theirs}))
-    assert refused(lambda: replace(cert, evidence=foreign.evidence))
+    assert refused(lambda: forged(cert, lyapunov=foreign.lyapunov))
+    assert refused(lambda: forged(cert, evidence=foreign.proof.evidence))
 
 
 def test_the_reason_of_a_refusal_can_be_read():
     cert = genuine("spline")
+    evidence = cert.proof.evidence
     assert "rates (0.3,), the claim for (2.0,)" in replace(cert, rates=(2.0,)).fault
     assert (
         "not those of the model"
-        in replace(cert, evidence=cert.evidence._replace(pieces=cert.evidence.pieces[:0])).fault
+        in forged(cert, evidence=evidence._replace(pieces=evidence.pieces[:0])).fault
     )
     part = replace(cert.lyapunov, knots=0.5 * cert.lyapunov.knots)
-    assert "P is known for p in [0, 0.5]" in replace(cert, lyapunov=part).fault
+    assert "P is known for p in [0, 0.5]" in forged(cert, lyapunov=part).fault
 
 
 def same(a, b):

@@ -9,14 +9,14 @@ import pytest
 from models import constant, lag, lateral, random_stable
 
 from symheli.lpv import LPVStateSpace, Scheduling
-from synthesis import Relaxation, frozen_gain, l2_gain, stability
+from synthesis import Spline, frozen_gain, l2_gain, stability
 
-COARSE = Relaxation(segments=(4,))
+COARSE = Spline(segments=4)
 
 
 @pytest.mark.parametrize("rate", [0.0, 1.0, math.inf])
 def test_a_lag_has_its_static_gain_at_any_rate(rate):
-    cert = l2_gain(lag(), rate, relaxation=COARSE, search=None)
+    cert = l2_gain(lag(), rate, form=COARSE, search=None)
     # 5e-7 is the inflation of gamma, 1e-6 the solver's gap
     assert 1.0 <= cert.gamma <= 1.0 + 3e-6
     assert cert.frozen == pytest.approx(1.0, abs=1e-7)
@@ -30,7 +30,7 @@ def test_a_constant_model_has_its_h_infinity_norm(seed, dt):
     lpv = constant(m.A, m.B, m.C, m.D, dt)
     assert frozen_gain(lpv).gamma == pytest.approx(expected, rel=1e-6)
     # the bounded real lemma is exact here: what is left is the solver's gap and the margin
-    assert l2_gain(lpv, relaxation=COARSE, search=None).gamma == pytest.approx(expected, rel=1e-4)
+    assert l2_gain(lpv, form=COARSE, search=None).gamma == pytest.approx(expected, rel=1e-4)
 
 
 def test_frozen_gain_finds_a_peak_between_grid_points_and_its_frequency():
@@ -56,7 +56,7 @@ def test_feedthrough_alone_is_its_largest_singular_value():
         [np.diag([1.0, 2.0]), np.diag([0.0, 1.0])],
         Scheduling("p", "1", 0.0, 1.0),
     )
-    cert = l2_gain(lpv, 1.0, relaxation=COARSE, search=None)
+    cert = l2_gain(lpv, 1.0, form=COARSE, search=None)
     assert cert.frozen == pytest.approx(3.0, rel=1e-9)
     assert cert.gamma == pytest.approx(3.0, rel=2e-6)
 
@@ -67,7 +67,7 @@ def test_the_gain_does_not_depend_on_units_of_the_states(dt):
     T = np.diag([1e3, 1.0, 1e-3])
     inverse = np.linalg.inv(T)
     other = replace(lpv, A=T @ lpv.A @ inverse, B=T @ lpv.B, C=lpv.C @ inverse)
-    a, b = (l2_gain(model, relaxation=COARSE, search=None).gamma for model in (lpv, other))
+    a, b = (l2_gain(model, form=COARSE, search=None).gamma for model in (lpv, other))
     assert b == pytest.approx(a, rel=1e-4)
 
 
@@ -75,7 +75,7 @@ def test_the_gain_does_not_depend_on_units_of_the_states(dt):
 def test_the_gain_scales_with_the_output(factor):
     lpv = random_stable(4)
     scaled = replace(lpv, C=factor * lpv.C, D=factor * lpv.D)
-    a, b = (l2_gain(model, relaxation=COARSE, search=None).gamma for model in (lpv, scaled))
+    a, b = (l2_gain(model, form=COARSE, search=None).gamma for model in (lpv, scaled))
     assert b == pytest.approx(factor * a, rel=1e-5)
 
 
@@ -83,36 +83,32 @@ def test_the_gain_does_not_depend_on_the_unit_of_time():
     lpv = random_stable(5, rate=0.3)
     s = lpv.scheduling
     # milliseconds instead of seconds
-    other = replace(
-        lpv, A=lpv.A * 1e-3, B=lpv.B * 1e-3, parameters=(replace(s, rate=s.rate * 1e-3),)
-    )
-    a, b = (l2_gain(model, relaxation=COARSE, search=None).gamma for model in (lpv, other))
+    slower = (replace(s, rate=s.rate * 1e-3),)
+    other = replace(lpv, A=lpv.A * 1e-3, B=lpv.B * 1e-3, parameters=slower)
+    a, b = (l2_gain(model, form=COARSE, search=None).gamma for model in (lpv, other))
     assert b == pytest.approx(a, rel=1e-4)
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.1, 2.0])
 def test_a_fast_sampled_model_has_the_gain_of_the_continuous_one(rate):
     lpv = random_stable(6, degree=1)
-    continuous = l2_gain(lpv, rate, relaxation=COARSE, search=None)
-    sampled = l2_gain(
-        lpv.discretize(0.01), rate, relaxation=Relaxation(degree=3, segments=(4,)), search=None
-    )
+    continuous = l2_gain(lpv, rate, form=COARSE, search=None)
+    sampled = l2_gain(lpv.discretize(0.01), rate, form=Spline(degree=3, segments=4), search=None)
     # hold and sampling shift the response by half a sample: O(dt |A|) of a gain difference
     assert sampled.verified
     assert sampled.gamma == pytest.approx(continuous.gamma, rel=0.03)
 
 
 def test_a_spline_model_has_the_gain_of_the_polynomial_it_samples():
-    from symheli.lpv import Spline
+    from symheli.lpv import Spline as Cubic
 
     lpv = random_stable(7, degree=2)
     nodes = tuple(np.linspace(0, 1, 6))
-    basis = Spline(nodes)
+    basis = Cubic(nodes)
     sampled = lpv.matrices(np.array(nodes))
     spline = replace(lpv, basis=basis, A=sampled.A, B=sampled.B, C=sampled.C, D=sampled.D)
     a, b = (
-        l2_gain(model, relaxation=Relaxation(segments=(5,), grading=1.0), search=None)
-        for model in (lpv, spline)
+        l2_gain(model, form=Spline(segments=5, grading=1.0), search=None) for model in (lpv, spline)
     )
     # a cubic spline reproduces quadratics; the LMIs sit on other intervals
     assert b.gamma == pytest.approx(a.gamma, rel=1e-4)
@@ -131,14 +127,14 @@ def test_a_piecewise_linear_model_is_certified_up_to_its_corners():
         C=np.ones((3, 1, 1)),
         D=np.zeros((3, 1, 1)),
     )
-    cert = l2_gain(lpv, 0.5, relaxation=COARSE, search=None)
+    cert = l2_gain(lpv, 0.5, form=COARSE, search=None)
     assert cert.frozen == pytest.approx(1.0, rel=1e-6)
     assert 1.0 <= cert.gamma <= 1.0 + 1e-5
 
 
 def test_a_narrower_range_than_the_basis_is_certified_on_that_range_only():
     lpv = lag().with_scheduling(Scheduling("p", "1", 0.5, 0.9, 1.0))
-    cert = l2_gain(lpv, relaxation=COARSE, search=None)
+    cert = l2_gain(lpv, form=COARSE, search=None)
     assert cert.gamma == pytest.approx(1 / 1.5, rel=1e-5)
     assert cert.lyapunov is not None
     assert cert.lyapunov.knots[0] == 0.5
@@ -150,7 +146,7 @@ def test_stability_needs_no_channels():
     bare = replace(
         lpv, B=lpv.B[:, :, :0], C=lpv.C[:, :0], D=lpv.D[:, :0, :0], inputs=(), outputs=()
     )
-    cert = stability(bare, 0.1, relaxation=COARSE)
+    cert = stability(bare, 0.1, form=COARSE)
     assert cert.verified
     assert math.isnan(cert.gamma)
     assert cert.verify(rigorous=True)

@@ -8,15 +8,15 @@ from models import lag, spring
 
 from symheli.lpv import LPVStateSpace
 from symheli.lpv.lpv_state_space import Residuals
-from synthesis import Relaxation, decay_rate, l2_gain, lft_gain, stability
+from synthesis import Spline, SumOfSquares, decay_rate, l2_gain, lft_gain, stability
 
-COARSE = Relaxation(segments=(2,), degree=2)
-SOS = Relaxation(kind="sos", degree=1, segments=(1,))
+COARSE = Spline(segments=2, degree=2)
+SOS = {"form": Spline(degree=1, segments=1), "impose": SumOfSquares()}
 
 
-@pytest.mark.parametrize("relaxation", [COARSE, SOS])
+@pytest.mark.parametrize("options", [{"form": COARSE}, SOS])
 @pytest.mark.parametrize("analysis", [l2_gain, stability])
-def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, relaxation):
+def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, options):
     lpv = lag()
     s = lpv.scheduling
     # the family had 2 % more in A at one node, and only that: A is -1 .. -2
@@ -25,19 +25,19 @@ def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, relaxati
     text = str(
         analysis(
             replace(lpv, residuals=Residuals(np.linspace(s.low, s.high, 3), *off)),
-            relaxation=relaxation,
+            **options,
             search=None,
         )
     )
     assert (
         "differs from what it was fitted to by at most 2 % of its largest value, in A[1, 1]" in text
     )
-    assert "fitted to" not in str(analysis(lpv, relaxation=relaxation, search=None))
+    assert "fitted to" not in str(analysis(lpv, **options, search=None))
 
 
 def test_the_misfit_of_a_sampled_model_is_measured_from_its_own_samples():
     lpv = spring(damping=0.4).discretize(1.0)
-    text = str(l2_gain(lpv, 0.1, relaxation=COARSE, search=None))
+    text = str(l2_gain(lpv, 0.1, form=COARSE, search=None))
     # by another route: the zero-order hold at the nodes of the fit
     p = -np.cos(np.pi * np.arange(41) / 40)
     exact = np.array([spring(damping=0.4).at(q).discretize(1.0).A for q in p])
@@ -71,13 +71,13 @@ def test_the_misfit_survives_closing_a_loop_and_sampling(change):
         )
         off = changed.at(p).A - change(plain).at(p).A
         np.testing.assert_allclose(changed.residuals.A[k - len(nodes)], off, atol=1e-12)
-    assert "fitted to by at most" in str(stability(changed, relaxation=COARSE, search=None))
+    assert "fitted to by at most" in str(stability(changed, form=COARSE, search=None))
 
 
 def test_what_is_trusted_is_said():
     for cert in (
-        l2_gain(lag(), relaxation=COARSE, search=None),
-        decay_rate(lag(), relaxation=SOS, search=None),
+        l2_gain(lag(), form=COARSE, search=None),
+        decay_rate(lag(), **SOS, search=None),
     ):
         assert "through the model's own matrices" in str(cert)
         assert "are shared by the search for P and the proof" in str(cert)

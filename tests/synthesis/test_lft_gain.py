@@ -15,8 +15,8 @@ from symheli.errors import CertificateError, InputError, UnknownNameError
 from symheli.lpv import LFT, LinearModel, Scheduling, connect
 from synthesis import (
     SCALINGS,
+    Bernstein,
     Multiplier,
-    Relaxation,
     Search,
     Solver,
     Status,
@@ -169,7 +169,7 @@ def test_for_one_parameter_d_and_g_lose_nothing_against_any_constant_p(seed):
     assert full == pytest.approx(DG, rel=CLOSE)
     # the Bernstein form of the same constant P can only be more conservative, and is not with its
     # degree raised
-    bernstein = l2_gain(lpv, math.inf, relaxation=Relaxation(elevation=6), search=None).gamma
+    bernstein = l2_gain(lpv, math.inf, impose=Bernstein(elevation=6), search=None).gamma
     assert DG <= bernstein * (1 + CLOSE)
     assert bernstein == pytest.approx(DG, rel=1e-3)
 
@@ -337,13 +337,11 @@ def test_stability_needs_no_channels():
 
 def test_a_proof_that_was_touched_is_no_longer_one():
     cert = lft_gain(reduced(random_stable(3)), "DG", search=None)
-    proof = cert.proof
-    assert proof is not None
-    assert cert.evidence is not None
+    proof = cert.lyapunov
 
     def verdicts(proof, gamma=cert.gamma):
-        assert cert.evidence is not None
-        return [cert.evidence.floating(proof, gamma), cert.evidence.exact(proof, gamma)]
+        evidence = cert.proof.evidence
+        return [evidence.floating(proof, gamma), evidence.exact(proof, gamma)]
 
     assert verdicts(proof) == [True, True]
     assert verdicts(proof, 0.999 * cert.gamma) == [False, False]
@@ -363,8 +361,7 @@ def test_a_proof_that_was_touched_is_no_longer_one():
 @pytest.mark.parametrize("scaling", SCALINGS)
 def test_multipliers_hold_on_the_whole_box(scaling):
     cert = lft_gain(two_parameters(0.2), scaling, search=None)
-    assert cert.proof is not None
-    m = cert.proof.multiplier
+    m = cert.lyapunov.multiplier
     rng = np.random.default_rng(0)
     for delta in rng.uniform(-1, 1, (200, 2)):
         outer = np.vstack([np.diag(delta), np.eye(2)])
@@ -378,7 +375,7 @@ def test_a_solver_that_stops_early_proves_nothing_and_says_so():
     cert = lft_gain(oscillator(0.2609), "DG", solver=Solver("CLARABEL", iterations=1), search=None)
     assert cert.status is Status.FAILED
     assert math.isinf(cert.gamma)
-    assert len(cert.trials) > 1
+    assert len(cert.attempts) > 1
     assert "not verified" in str(cert)
 
 

@@ -11,9 +11,9 @@ from models import lag, lateral, random_stable, spring
 
 from symheli.errors import CertificateError
 from symheli.lpv import simulate
-from synthesis import Relaxation, Search, Status, l2_gain, lower_bound, stability
+from synthesis import Search, Spline, Status, l2_gain, lower_bound, stability
 
-COARSE = Relaxation(segments=(4,))
+COARSE = Spline(segments=4)
 QUICK = Search(levels=6, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=2000)
 
 
@@ -56,7 +56,7 @@ def response(lpv, time, p, u, x, step):
 @pytest.mark.parametrize("dt", [None, 0.1])
 @pytest.mark.parametrize("seed", range(5))
 def test_upper_bounds_are_never_below_lower_bounds(seed, dt):
-    cert = l2_gain(random_stable(seed, dt=dt, rate=1.0), relaxation=COARSE, search=QUICK)
+    cert = l2_gain(random_stable(seed, dt=dt, rate=1.0), form=COARSE, search=QUICK)
     # 1e-6: the frozen norm is computed to 1e-8, gamma is inflated by 5e-7
     assert cert.frozen <= cert.lower * (1 + 1e-9)
     assert cert.lower <= cert.gamma * (1 + 1e-6)
@@ -65,7 +65,7 @@ def test_upper_bounds_are_never_below_lower_bounds(seed, dt):
 @pytest.mark.parametrize("dt", [None, 0.25])
 def test_the_gain_does_not_fall_when_p_may_move_faster(dt):
     lpv = spring() if dt is None else spring().discretize(dt)
-    gains = [l2_gain(lpv, rate, relaxation=COARSE, search=None).gamma for rate in (0.0, 0.01, 0.03)]
+    gains = [l2_gain(lpv, rate, form=COARSE, search=None).gamma for rate in (0.0, 0.01, 0.03)]
     # 1e-4: each optimum is found to the solver's gap and lies above it by the margin
     assert all(slow <= fast * (1 + 1e-4) for slow, fast in pairwise(gains))
     assert gains[-1] > 1.02 * gains[0]
@@ -73,16 +73,14 @@ def test_the_gain_does_not_fall_when_p_may_move_faster(dt):
 
 def test_a_finer_spline_does_not_prove_less():
     gains = [
-        l2_gain(
-            spring(), 0.03, relaxation=Relaxation(segments=(k,), grading=1.0), search=None
-        ).gamma
+        l2_gain(spring(), 0.03, form=Spline(segments=(k,), grading=1.0), search=None).gamma
         for k in (2, 4, 8)
     ]
     assert gains[2] <= gains[1] * (1 + 1e-4) <= gains[0] * (1 + 2e-4)
 
 
 def test_parametric_resonance_is_proven_when_slow_and_found_when_fast():
-    assert stability(spring(), 0.02, relaxation=COARSE).verified
+    assert stability(spring(), 0.02, form=COARSE).verified
     fast = stability(spring(), math.inf, search=QUICK)
     assert not fast.verified
     assert fast.status is Status.GROWING
@@ -127,7 +125,7 @@ def test_the_lower_bound_is_the_ratio_of_an_input_that_can_be_flown(dt):
         )
     # continuous: the last input sample is left out
     assert ratio == pytest.approx(found.gamma, rel=1e-3 if dt is None else 1e-6)
-    assert found.gamma > l2_gain(lpv, 0.0, relaxation=COARSE, search=None).frozen
+    assert found.gamma > l2_gain(lpv, 0.0, form=COARSE, search=None).frozen
 
 
 def test_the_search_for_bad_trajectories_is_deterministic():
@@ -139,14 +137,14 @@ def test_a_rate_of_zero_leaves_the_frozen_gain():
     found = lower_bound(spring(), 0.0)
     assert found.trajectory is None
     assert found.gamma == pytest.approx(
-        l2_gain(spring(), 0.0, relaxation=Relaxation(segments=(8,)), search=None).gamma, rel=1e-3
+        l2_gain(spring(), 0.0, form=Spline(segments=8), search=None).gamma, rel=1e-3
     )
 
 
 def test_a_certificate_that_contradicts_its_lower_bound_cannot_be_made():
     from dataclasses import replace
 
-    cert = l2_gain(lag(), relaxation=COARSE, search=None)
+    cert = l2_gain(lag(), form=COARSE, search=None)
     with pytest.raises(CertificateError, match="frozen gain"):
         replace(cert, frozen=1.1)
     with pytest.raises(CertificateError, match="lower bound"):

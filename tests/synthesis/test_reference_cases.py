@@ -17,9 +17,11 @@ from scipy.optimize import brentq
 
 from symheli.lpv import LFT, LPVStateSpace, Scheduling
 from synthesis import (
-    Relaxation,
+    HigherOrder,
     Solver,
+    Spline,
     Status,
+    SumOfSquares,
     frozen_gain,
     l2_gain,
     lft_gain,
@@ -27,7 +29,7 @@ from synthesis import (
     stability,
 )
 
-COARSE = Relaxation(segments=(4,))
+COARSE = Spline(segments=4)
 GOLDEN = (1 + math.sqrt(5)) / 2
 INFLATED = 3e-6
 """gamma is raised by 5e-7 and the solver's gap is about 1e-6."""
@@ -91,8 +93,8 @@ def test_a_constant_p_reaches_the_circle_criterion():
     # the solver failed
     for excess in (1e-4, 0.1):
         beyond = oscillator(1, 2, 2 + limit * (1 + excess))
-        for relaxation in (None, Relaxation(kind="sos", degree=0)):
-            assert stability(beyond, relaxation=relaxation, search=None).status is Status.INFEASIBLE
+        for options in ({}, {"form": Spline(degree=0), "impose": SumOfSquares()}):
+            assert stability(beyond, **options, search=None).status is Status.INFEASIBLE
         assert l2_gain(beyond, search=None).status is Status.INFEASIBLE
 
 
@@ -100,11 +102,8 @@ def test_a_solver_stopped_early_is_not_taken_for_an_answer():
     """A P exists, 1 % below the limit, but one iteration does not find it: nothing is known."""
     inside, hasty = oscillator(1, 2, 2 + 0.99 * (1 + 2 * math.sqrt(2))), Solver(iterations=1)
     for analysis in (stability, l2_gain):
-        for relaxation in (None, Relaxation(kind="sos", degree=0)):
-            assert (
-                analysis(inside, relaxation=relaxation, solver=hasty, search=None).status
-                is Status.FAILED
-            )
+        for options in ({}, {"form": Spline(degree=0), "impose": SumOfSquares()}):
+            assert analysis(inside, **options, solver=hasty, search=None).status is Status.FAILED
 
 
 @pytest.mark.parametrize("scaling", ["D", "DG"])
@@ -139,12 +138,12 @@ def test_a_form_of_degree_six_proves_what_piecewise_quadratic_functions_did():
     """Printed 6.2 for a piecewise quadratic V in Xie, Shishkin and Fu (1997); a V of degree four
     reaches 5.7, short of it.
     """
-    six, four = Relaxation(order=3), Relaxation(order=2)
-    assert stability(oscillator(1, 2, 2 + 6.2), relaxation=six).verify(rigorous=True)
-    assert stability(oscillator(1, 2, 2 + 5.7), relaxation=four).verify(rigorous=True)
-    assert not stability(oscillator(1, 2, 2 + 6.2), relaxation=four, search=None).verified
+    six, four = HigherOrder(3), HigherOrder(2)
+    assert stability(oscillator(1, 2, 2 + 6.2), form=six).verify(rigorous=True)
+    assert stability(oscillator(1, 2, 2 + 5.7), form=four).verify(rigorous=True)
+    assert not stability(oscillator(1, 2, 2 + 6.2), form=four, search=None).verified
     # the worst switching, above: no V of any degree
-    assert not stability(oscillator(1, 2, 2 + 6.99), relaxation=six, search=None).verified
+    assert not stability(oscillator(1, 2, 2 + 6.99), form=six, search=None).verified
 
 
 # Mathieu's and Meissner's equations, x'' + 2 z x' + (1 + e p(t)) x = 0 with |p| <= 1, z = 0.05
@@ -181,7 +180,7 @@ def test_the_mathieu_equation_is_proven_below_its_first_tongue_and_refused_above
         oscillator(2 * z, 1 - e, 1 + e, rate=2 * e) for e in (0.85 * tongue, 1.001 * tongue)
     )
     assert stability(below).verify(rigorous=True)
-    assert stability(above, relaxation=Relaxation(segments=(8,))).status is Status.GROWING
+    assert stability(above, form=Spline(segments=8)).status is Status.GROWING
 
 
 def test_meissners_equation_limits_what_is_proven_when_p_jumps():
@@ -310,7 +309,7 @@ def scalar_gain(rate):
 @pytest.mark.parametrize("rate", [0.01, 0.1, 1.0, 10.0])
 def test_a_first_order_gain_between_frozen_and_jumping_follows_its_differential_equation(rate):
     exact = scalar_gain(rate)
-    cert = l2_gain(scalar(rate), relaxation=Relaxation(segments=(16,)), search=None)
+    cert = l2_gain(scalar(rate), form=Spline(segments=16), search=None)
     # 5e-5: a cubic spline on 16 segments against the exact P(p), which has a corner in its slope
     assert exact <= cert.gamma * (1 + 1e-6) <= exact * (1 + 5e-5)
 
@@ -322,11 +321,7 @@ def test_a_first_order_gain_at_its_two_ends_is_known():
     first-order systems.
     """
     # 5e-5: as above
-    assert (
-        2.25
-        <= l2_gain(scalar(0.0), relaxation=Relaxation(segments=(16,))).gamma
-        <= 2.25 * (1 + 5e-5)
-    )
+    assert 2.25 <= l2_gain(scalar(0.0), form=Spline(segments=16)).gamma <= 2.25 * (1 + 5e-5)
     cert = l2_gain(scalar(math.inf), search=None)
     assert 2.5 <= cert.gamma <= 2.5 * (1 + INFLATED)
 
@@ -341,7 +336,7 @@ def test_the_lower_bound_of_a_first_order_gain_comes_close_to_its_exact_value(ra
     reached, rounded down.
     """
     exact = 2.5 if math.isinf(rate) else scalar_gain(rate)
-    assert share < l2_gain(scalar(rate), relaxation=COARSE).lower / exact <= 1.0
+    assert share < l2_gain(scalar(rate), form=COARSE).lower / exact <= 1.0
 
 
 @pytest.mark.parametrize("rate", [0.0, 1.0, math.inf])
@@ -350,7 +345,7 @@ def test_a_gyroscopic_term_does_not_change_the_gain(rate):
     whatever w(t).
     """
     cert = l2_gain(
-        between([[-1, -5], [5, -1]], [[-1, 5], [-5, -1]]), rate, relaxation=COARSE, search=None
+        between([[-1, -5], [5, -1]], [[-1, 5], [-5, -1]]), rate, form=COARSE, search=None
     )
     assert cert.frozen == pytest.approx(1.0, rel=1e-8)
     assert 1.0 <= cert.gamma <= 1.0 + INFLATED
@@ -365,7 +360,7 @@ def test_a_positive_model_has_the_static_gain_of_its_largest_member(rate):
     cert = l2_gain(
         between([[-2, 0], [1, -2]], [[-2, 1], [1, -2]], [[1], [1]], [[1, 1]]),
         rate,
-        relaxation=COARSE,
+        form=COARSE,
         search=None,
     )
     assert cert.lower == pytest.approx(2.0, rel=1e-7)
@@ -435,9 +430,7 @@ def test_the_discrete_norm_of_the_manual_comes_back():
         np.polyval(numerator, np.exp(0.30178j)) / np.polyval(denominator, np.exp(0.30178j))
     )
     assert 2.57205 <= at_printed <= found.gamma
-    assert l2_gain(lpv, relaxation=COARSE, search=None).gamma == pytest.approx(
-        found.gamma, rel=1e-4
-    )
+    assert l2_gain(lpv, form=COARSE, search=None).gamma == pytest.approx(found.gamma, rel=1e-4)
 
 
 def test_a_time_invariant_gain_agrees_with_thirty_digits():
@@ -451,7 +444,7 @@ def test_a_time_invariant_gain_agrees_with_thirty_digits():
     A = np.vstack([-denominator[1:], np.eye(5)[:4]])
     lpv = constant(A, np.eye(5)[:, :1], np.eye(5)[4:], [[0.0]])
     assert frozen_gain(lpv).gamma == pytest.approx(exact, rel=1e-8)
-    cert = l2_gain(lpv, 0.0, relaxation=COARSE, search=None)
+    cert = l2_gain(lpv, 0.0, form=COARSE, search=None)
     # the frozen norm is computed from below, gamma from above; 2e-4: on a resonance of quality 50
     # the solver stops before its tolerance, and gamma is what the P it left admits
     assert exact * (1 - 1e-8) <= cert.gamma <= exact * (1 + 2e-4)

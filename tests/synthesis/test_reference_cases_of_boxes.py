@@ -14,9 +14,10 @@ from test_reference_cases import GOLDEN, INFLATED, between, oscillator, scalar
 
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
-    Relaxation,
     Search,
+    Spline,
     Status,
+    SumOfSquares,
     generalized_h2,
     l2_gain,
     stability,
@@ -69,7 +70,7 @@ def test_the_peak_of_a_first_order_model_lies_between_its_bounds(rate, above, be
     jump.
     """
     exact = {0.0: 2.25 / math.sqrt(2), math.inf: 2 * math.sqrt(2)}.get(rate) or peak_of_scalar(rate)
-    cert = generalized_h2(scalar(rate), relaxation=Relaxation(segments=(16,)))
+    cert = generalized_h2(scalar(rate), form=Spline(segments=16))
     assert cert.frozen == pytest.approx(2.25 / math.sqrt(2), rel=1e-8)
     # `above`: the degree of P; `below`: how near the waves looked at come. Both are what was
     # reached, rounded up
@@ -85,7 +86,7 @@ def test_a_gyroscopic_term_does_not_change_the_peak(rate):
     cert = generalized_h2(
         between([[-1, -5], [5, -1]], [[-1, 5], [-5, -1]]),
         rate,
-        relaxation=Relaxation(degree=1, segments=(2,)),
+        form=Spline(degree=1, segments=2),
         search=QUICK,
     )
     assert cert.lower == pytest.approx(math.sqrt(0.5), rel=1e-8)
@@ -97,7 +98,7 @@ def test_the_peak_of_a_frozen_oscillator_is_that_of_its_gramian():
     largest at the smallest q.
     """
     exact = 1 / math.sqrt(2 * 0.4 * 0.5)
-    cert = generalized_h2(oscillator(0.4, 0.5, 2.0), 0.0, relaxation=Relaxation(segments=(8,)))
+    cert = generalized_h2(oscillator(0.4, 0.5, 2.0), 0.0, form=Spline(segments=8))
     assert cert.frozen == cert.lower == pytest.approx(exact, rel=1e-8)
     # a cubic P on eight segments: what was reached, rounded up
     assert exact <= cert.gamma <= exact * (1 + 1e-3)
@@ -171,7 +172,7 @@ def test_the_peak_of_two_parameters_lies_between_its_bounds(rate):
     C = {(0, 0): [[1.0]], (1, 0): [[1.0]], (0, 1): [[1.0]], (1, 1): [[1.0]]}
     exact = 16 / math.sqrt(2) if math.isinf(rate) else product_peak(rate)
     cert = generalized_h2(
-        square({(0, 0): [[-1.0]]}, B, C, rate), relaxation=Relaxation(kind="sos"), search=QUICK
+        square({(0, 0): [[-1.0]]}, B, C, rate), impose=SumOfSquares(), search=QUICK
     )
     assert cert.frozen == pytest.approx(2.25**2 / math.sqrt(2), rel=1e-7)
     # from below the waves along the diagonal, from above a P of degree two: what was reached,
@@ -196,7 +197,7 @@ def product():
 
 def test_a_first_order_gain_in_the_product_of_two_parameters_is_known():
     """2.25 frozen and 2.5 where they jump, as in test_reference_cases."""
-    frozen = l2_gain(product(), 0.0, relaxation=Relaxation(kind="sos"))
+    frozen = l2_gain(product(), 0.0, impose=SumOfSquares())
     assert 2.25 * (1 - 1e-7) <= frozen.lower <= frozen.gamma <= 2.25 * (1 + INFLATED)
     cert = l2_gain(product(), search=None)
     assert cert.frozen == pytest.approx(2.25, rel=1e-7)

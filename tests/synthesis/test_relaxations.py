@@ -7,27 +7,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import lag, random_stable, spring
+from models import forged, lag, random_stable, searched, spring
 from test_never_call_unstable_stable import unstable
 
 from symheli.errors import CertificateError, InputError, UnknownNameError
 from symheli.lpv import LFT, LPVStateSpace, Scheduling
 from synthesis import (
-    Relaxation,
+    Bernstein,
+    Grid,
+    Memory,
     Solver,
+    Spline,
     Status,
+    SumOfSquares,
+    Vertices,
     decay_rate,
     generalized_h2,
     installed_solvers,
     l2_gain,
     stability,
 )
-from synthesis.analysis.box import _Hunt
 from synthesis.polynomial.pieces import pieces
 from synthesis.proof.inequalities import Demand
 
-PROOFS = ("bernstein", "sos", "vertices")
-QUICK = Relaxation(degree=1)
+PROOFS = {"bernstein": Bernstein(), "sos": SumOfSquares(), "vertices": Vertices()}
+QUICK = Spline(degree=1)
 
 
 def two_lags(rate=(0.5, 2.0), dt=None):
@@ -66,7 +70,7 @@ def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
     """Constant P = 1 proves what the slowest corner attains: gain 1/0.3, peak 1/sqrt(0.6), decay
     0.3.
     """
-    relaxation, model = Relaxation(kind=kind, degree=0), two_lags(dt=dt)
+    options, model = {"form": Spline(degree=0), "impose": PROOFS[kind]}, two_lags(dt=dt)
     slow = 0.3 if dt is None else (1 - 0.03)
     expected = {
         l2_gain: 1 / 0.3,
@@ -74,13 +78,13 @@ def test_a_scalar_system_of_two_parameters_has_its_closed_forms(kind, dt):
         decay_rate: slow if dt is None else -math.log(slow) / dt,
     }
     for analysis, value in expected.items():
-        cert = analysis(model, relaxation=relaxation, search=None)
+        cert = analysis(model, **options, search=None)
         assert cert.verified
         assert cert.verify(rigorous=True)
         # 5e-7 and more of loosening, the solver's gap, and the margin of the state block
         assert cert.proven == pytest.approx(value, rel=2e-5)
         assert cert.frozen == pytest.approx(value, rel=1e-7)
-    assert stability(model, relaxation=relaxation).verify(rigorous=True)
+    assert stability(model, **options).verify(rigorous=True)
 
 
 def test_sums_of_squares_lie_between_grid_and_bernstein():
@@ -90,8 +94,9 @@ def test_sums_of_squares_lie_between_grid_and_bernstein():
     model = mass_spring()
     for analysis in (l2_gain, generalized_h2):
         found = {
-            kind: analysis(model, relaxation=replace(QUICK, kind=kind), search=None)
-            for kind in ("bernstein", "sos", "grid")
+            kind: analysis(model, form=QUICK, impose=impose, search=None)
+            for kind, impose in {**PROOFS, "grid": Grid()}.items()
+            if kind != "vertices"
         }
         # gamma is loosened by 1e-6 .. 1e-5 where it is proven; the grid is the solver's
         assert found["sos"].gamma <= found["bernstein"].gamma * (1 + 1e-4)
@@ -102,11 +107,11 @@ def test_sums_of_squares_lie_between_grid_and_bernstein():
 
 def test_subdivision_and_elevation_bring_bernstein_to_the_sums_of_squares():
     model = replace(spring(0.3), B=spring().B)
-    one = Relaxation(degree=2, segments=(1,))
-    exact = l2_gain(model, 0.02, relaxation=replace(one, kind="sos"), search=None).gamma
-    plain = l2_gain(model, 0.02, relaxation=one, search=None).gamma
-    cut = l2_gain(model, 0.02, relaxation=replace(one, subdivision=3), search=None).gamma
-    raised = l2_gain(model, 0.02, relaxation=replace(one, elevation=6), search=None).gamma
+    one = Spline(degree=2, segments=1)
+    exact = l2_gain(model, 0.02, form=one, impose=SumOfSquares(), search=None).gamma
+    plain = l2_gain(model, 0.02, form=one, search=None).gamma
+    cut = l2_gain(model, 0.02, form=one, impose=Bernstein(subdivision=3), search=None).gamma
+    raised = l2_gain(model, 0.02, form=one, impose=Bernstein(elevation=6), search=None).gamma
     # exact in one parameter: nothing that proves can be better, to the loosening of 1e-4
     assert exact * (1 - 1e-4) <= cut <= plain * (1 + 1e-4)
     assert exact * (1 - 1e-4) <= raised <= plain * (1 + 1e-4)
@@ -118,17 +123,15 @@ def test_subdivision_and_elevation_bring_bernstein_to_the_sums_of_squares():
 @pytest.mark.parametrize("dt", [None, 0.1])
 def test_both_routes_to_one_parameter_agree(dt):
     model = random_stable(1, dt=dt)
-    spline = Relaxation(segments=(2,), degree=2)
-    old = l2_gain(model, relaxation=spline, search=None)
+    spline = Spline(segments=2, degree=2)
+    old = l2_gain(model, form=spline, search=None)
     # a total degree of 2 on one segment takes the other route with the same P
-    one = l2_gain(model, relaxation=Relaxation(segments=(1,), degree=2), search=None)
-    new = l2_gain(
-        model, relaxation=Relaxation(segments=(1,), degree=2, total_degree=2), search=None
-    )
+    one = l2_gain(model, form=Spline(segments=1, degree=2), search=None)
+    new = l2_gain(model, form=Spline(segments=1, degree=2, total_degree=2), search=None)
     assert new.gamma == pytest.approx(one.gamma, rel=1e-3)
     if dt is not None:
         return  # p and p(k+1) make sums of squares in two variables: slow
-    sos = l2_gain(model, relaxation=replace(spline, kind="sos"), search=None)
+    sos = l2_gain(model, form=spline, impose=SumOfSquares(), search=None)
     assert sos.frozen == pytest.approx(old.frozen, rel=1e-7)
     assert sos.frozen <= sos.gamma <= old.gamma * (1 + 1e-4)
 
@@ -139,23 +142,21 @@ def test_several_parameters_of_an_lft_or_one_polynomial_alike():
         A, B, {(0,): [[1.0]]}, {(0,): [[0.0]]}, [Scheduling("p", "1", 0.0, 1.0, 1.0)]
     )
     for model in (lft, lag().to_lft()):
-        assert l2_gain(model, relaxation=QUICK, search=None).gamma == pytest.approx(1.0, rel=5e-6)
+        assert l2_gain(model, form=QUICK, search=None).gamma == pytest.approx(1.0, rel=5e-6)
 
 
 @pytest.mark.slow
 def test_faster_parameters_cost_and_slower_ones_gain():
-    gains = [
-        l2_gain(mass_spring(rate), relaxation=QUICK, search=None).gamma for rate in (0.0, 0.1, 0.4)
-    ]
+    gains = [l2_gain(mass_spring(rate), form=QUICK, search=None).gamma for rate in (0.0, 0.1, 0.4)]
     assert gains == sorted(gains)
-    assert l2_gain(
-        mass_spring(), {"k": 0.4, "d": 0.0}, relaxation=QUICK, search=None
-    ).gamma <= gains[2] * (1 + 1e-4)
+    assert l2_gain(mass_spring(), {"k": 0.4, "d": 0.0}, form=QUICK, search=None).gamma <= gains[
+        2
+    ] * (1 + 1e-4)
 
 
 def test_a_decay_rate_of_constant_coefficients_is_that_of_the_slowest_mode():
     model = mass_spring(spring=0.0)
-    cert = decay_rate(model, 0.0, relaxation=replace(QUICK, kind="sos", degree=2), search=None)
+    cert = decay_rate(model, 0.0, form=Spline(degree=2), impose=SumOfSquares(), search=None)
     # 0.2: damping 0.6 - 0.2 at d = -1, halved; exp(-alpha t) to the tolerance of the bisection and
     # the degree of P
     assert cert.frozen == pytest.approx(0.2, rel=1e-7)
@@ -168,9 +169,7 @@ def test_the_energy_to_peak_gain_of_an_oscillator():
     equation by hand).
     """
     model = mass_spring(spring=0.0)
-    cert = generalized_h2(
-        model, {"k": 0.0, "d": 0.0}, relaxation=replace(QUICK, degree=2), search=None
-    )
+    cert = generalized_h2(model, {"k": 0.0, "d": 0.0}, form=Spline(degree=2), search=None)
     assert cert.frozen == pytest.approx(1 / math.sqrt(2 * 0.4), rel=1e-7)
     assert cert.frozen <= cert.gamma <= 1.05 * cert.frozen
 
@@ -195,41 +194,32 @@ def never_proven(solver, scale, excess):
     quick = Solver(solver, iterations=100 if solver == "SCS" else None)
     for dt in (None, 0.1):
         model = unstable(excess, scale, dt)
-        for kind in (*PROOFS, "grid"):
-            relaxation = Relaxation(
-                kind=kind, degree=1, segments=(1,), points=4, margins=(1e-6,), subdivision=1
-            )
+        form = Spline(degree=1, segments=1)
+        for impose in (Bernstein(subdivision=1), SumOfSquares(), Vertices(), Grid(4)):
             for analysis in (l2_gain, generalized_h2, decay_rate, stability):
-                cert = analysis(model, relaxation=relaxation, solver=quick, search=None)
+                cert = analysis(model, form=form, impose=impose, solver=quick, search=None)
                 assert cert.status is Status.UNSTABLE
                 assert not cert.verified
-            if kind == "grid":
+            if isinstance(impose, Grid):
                 continue
-            for demand in (
-                Demand("stability", (0.0,)),
-                Demand("l2 gain", (0.1,)),
-                Demand("energy-to-peak gain", (0.1,)),
-            ):
-                assert (
-                    _Hunt(pieces(model), demand, relaxation, quick, 1.0).gain(math.inf).lyapunov
-                    is None
-                )
+            for kind, rate in (("stability", 0.0), ("l2 gain", 0.1), ("energy-to-peak gain", 0.1)):
+                # one margin is enough of the gains
+                once = replace(impose, margins=(1e-6,)) if kind.endswith("gain") else impose
+                assert searched(model, rate, kind, form, once, quick).proof is None
 
 
 def test_a_grid_sees_no_instability_between_its_points_and_says_so():
     """Unstable for p near 0.5, where a grid of two points does not look."""
     model = unstable(1e-3, 1.0)
-    relaxation = Relaxation(kind="grid", degree=0, points=2)
-    hunt = _Hunt(pieces(model), Demand("l2 gain", (0.1,)), relaxation, Solver(), 1.0)
-    found = hunt.gain(math.inf)
-    assert found.lyapunov is not None
-    assert not hunt.evidence.floating(found.lyapunov, found.bound)
-    assert not hunt.evidence.exact(found.lyapunov, found.bound)
+    found = searched(model, 0.1, "l2 gain", Spline(degree=0), Grid(2))
+    assert found.proof is not None
+    assert not found.proof.floating(found.bound)
+    assert not found.proof.exact(found.bound)
 
 
 @pytest.mark.parametrize("analysis", [l2_gain, generalized_h2, decay_rate, stability])
 def test_a_grid_is_never_a_proof(analysis):
-    cert = analysis(lag(), 1.0, relaxation=Relaxation(kind="grid", degree=1), search=None)
+    cert = analysis(lag(), 1.0, form=Spline(degree=1), impose=Grid(), search=None)
     assert cert.status is Status.UNPROVEN
     assert not cert.verified
     assert not cert.verify()
@@ -247,7 +237,7 @@ def test_a_grid_is_never_a_proof(analysis):
 def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
     model = mass_spring(dt=dt, spring=0.3 if dt is None else 0.1)
     for analysis in (l2_gain, generalized_h2, decay_rate):
-        cert = analysis(model, relaxation=Relaxation(degree=1 if dt is None else 0), search=None)
+        cert = analysis(model, form=Spline(degree=1 if dt is None else 0), search=None)
         assert cert.verify()
         assert cert.verify(rigorous=True)
         P = cert.lyapunov
@@ -257,7 +247,7 @@ def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
             replace(
                 cert, verified=False, **{"alpha" if analysis is decay_rate else "gamma": better}
             ),
-            replace(cert, lyapunov=replace(P, coefficients=-P.coefficients)),
+            forged(cert, lyapunov=replace(P, coefficients=-P.coefficients)),
         ):
             assert not bad.verify()
             assert not bad.verify(rigorous=True)
@@ -266,19 +256,19 @@ def test_exact_arithmetic_rejects_a_tampered_certificate(dt):
 @pytest.mark.slow
 def test_a_worst_trajectory_is_found_and_its_order_is_kept():
     model = mass_spring(0.8, spring=0.6)
-    peak = generalized_h2(model, relaxation=QUICK)
+    peak = generalized_h2(model, form=QUICK)
     assert peak.frozen <= peak.lower <= peak.gamma * (1 + 1e-6)
-    slow = decay_rate(spring(damping=0.3), 0.5, relaxation=Relaxation(degree=2, segments=(2,)))
+    slow = decay_rate(spring(damping=0.3), 0.5, form=Spline(degree=2, segments=2))
     assert slow.alpha <= slow.upper < slow.frozen
     assert slow.worst is not None
     assert np.abs(np.diff(slow.worst.p)).max() <= 2.0
 
 
 def test_a_certificate_that_contradicts_a_frozen_model_cannot_be_made():
-    cert = decay_rate(two_lags(), relaxation=QUICK, search=None)
+    cert = decay_rate(two_lags(), form=QUICK, search=None)
     with pytest.raises(CertificateError, match="frozen decay rate"):
         replace(cert, alpha=1.01 * cert.frozen)
-    gain = l2_gain(two_lags(), relaxation=QUICK, search=None)
+    gain = l2_gain(two_lags(), form=QUICK, search=None)
     with pytest.raises(CertificateError, match="frozen gain"):
         replace(gain, gamma=0.99 * gain.frozen)
 
@@ -291,8 +281,23 @@ def test_growth_along_a_trajectory_is_a_refusal():
 
 
 def test_wrong_input_gets_a_sentence():
-    with pytest.raises(UnknownNameError, match="relaxation"):
-        Relaxation(kind="sosp")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="impose must be Bernstein"):
+        l2_gain(lag(), impose="sos")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="form must be a Spline"):
+        l2_gain(lag(), form="spline")  # type: ignore[arg-type]
+    for wrong in (
+        lambda: Bernstein(elevation=-1),
+        lambda: Bernstein(subdivision=0.5),
+        lambda: Grid(1),
+        lambda: SumOfSquares(margins=()),
+        lambda: Vertices(floor=-1.0),
+        lambda: Spline(grading=0.5),
+        lambda: Spline(segments=0),
+        lambda: Spline(total_degree=-1),
+        lambda: Spline(accept=0.5),
+    ):
+        with pytest.raises(InputError):
+            wrong()
     with pytest.raises(UnknownNameError, match="scheduling parameter"):
         l2_gain(two_lags(), {"c": 1.0})
     with pytest.raises(InputError, match="rate must be >= 0"):
@@ -302,7 +307,7 @@ def test_wrong_input_gets_a_sentence():
     with pytest.raises(InputError, match="or an LFT"):
         decay_rate(np.eye(2))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="total degree of P needs one segment"):
-        l2_gain(lag(), relaxation=Relaxation(degree=2, segments=(2,), total_degree=2), search=None)
+        l2_gain(lag(), form=Spline(degree=2, segments=2, total_degree=2), search=None)
 
 
 def test_a_program_too_large_for_the_memory_is_left_alone_and_says_so():
@@ -310,7 +315,7 @@ def test_a_program_too_large_for_the_memory_is_left_alone_and_says_so():
     the operating system.
     """
     cert = l2_gain(
-        mass_spring(0.5, dt=0.1), relaxation=Relaxation(kind="sos", degree=2), search=None
+        mass_spring(0.5, dt=0.1), form=Spline(degree=2), impose=SumOfSquares(), search=None
     )
     assert cert.status is Status.UNTRIED
     assert "would need several times" in str(cert)
@@ -334,3 +339,19 @@ def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
             F.degrees for F in decrease(model, region, _pair(shape, region, 2)[1], demand, float)
         ]
     assert degrees == {math.inf: [(2, 2, 2, 2)], 1.0: [(4, 4, 2, 2)]}
+
+
+@pytest.mark.parametrize(
+    ("analysis", "options", "said"),
+    [
+        (stability, {"form": Spline(accept=2.0)}, "stability has none"),
+        (stability, {"impose": Bernstein(margins=(1e-3,))}, "margins and floor are for gains"),
+        (decay_rate, {"impose": SumOfSquares(floor=1e-3)}, "margins and floor are for gains"),
+        (l2_gain, {"form": Memory(1.0), "impose": SumOfSquares()}, "plain Bernstein coefficients"),
+        (l2_gain, {"form": Memory(1.0), "impose": Bernstein(subdivision=1)}, "plain Bernstein"),
+        (generalized_h2, {"form": Memory(1.0)}, "for l2_gain and stability"),
+    ],
+)
+def test_an_option_without_a_meaning_for_the_question_is_refused(analysis, options, said):
+    with pytest.raises(InputError, match=said):
+        analysis(lag(), **options)

@@ -11,9 +11,10 @@ from models import constant, lag, spring
 from symheli.errors import CertificateError, InputError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
-    Relaxation,
     Solver,
+    Spline,
     Status,
+    SumOfSquares,
     decay_rate,
     generalized_h2,
     l2_gain,
@@ -23,8 +24,8 @@ from synthesis import (
 )
 from synthesis.program import cone_program
 
-COARSE = Relaxation(segments=(2,), degree=2)
-SOS = Relaxation(kind="sos", degree=1, segments=(1,))
+COARSE = Spline(segments=2, degree=2)
+SOS = {"form": Spline(degree=1, segments=1), "impose": SumOfSquares()}
 
 
 @pytest.mark.parametrize("name", ["CLARABEL", "SCS", "CVXOPT", "MOSEK", "SDPA", "COPT"])
@@ -62,7 +63,7 @@ def test_what_is_printed_is_what_the_solver_was_given(monkeypatch):
     monkeypatch.setattr(scs, "SCS", spy)
     assert (
         "tolerance 1e-05, at most 20000 iterations, 600 s"
-        in l2_gain(lag(), relaxation=COARSE, solver="SCS", search=None).solver
+        in l2_gain(lag(), form=COARSE, solver="SCS", search=None).solver
     )
     assert given == {
         "verbose": False,
@@ -72,7 +73,7 @@ def test_what_is_printed_is_what_the_solver_was_given(monkeypatch):
         "time_limit_secs": 600.0,
     }
     sharp = l2_gain(
-        lag(), relaxation=COARSE, solver=Solver("SCS", tolerance=1e-7, iterations=300), search=None
+        lag(), form=COARSE, solver=Solver("SCS", tolerance=1e-7, iterations=300), search=None
     )
     assert "tolerance 1e-07, at most 300 iterations" in str(sharp)
     assert (given["eps_abs"], given["eps_rel"], given["max_iters"]) == (1e-7, 1e-7, 300)
@@ -81,8 +82,8 @@ def test_what_is_printed_is_what_the_solver_was_given(monkeypatch):
 @pytest.mark.parametrize("analysis", [l2_gain, stability, generalized_h2, decay_rate])
 def test_what_was_never_tried_has_not_failed(analysis, monkeypatch):
     monkeypatch.setattr(cone_program, "MEMORY", 1.0)
-    for relaxation in (COARSE, SOS):
-        cert = analysis(spring(damping=0.4), 0.1, relaxation=relaxation, search=None)
+    for options in ({"form": COARSE}, SOS):
+        cert = analysis(spring(damping=0.4), 0.1, **options, search=None)
         assert cert.status is Status.UNTRIED
         assert "not tried: the programs of this form are too large" in str(cert)
         assert "solver failed" not in str(cert)
@@ -108,24 +109,24 @@ def test_the_rounding_of_an_eigenvalue_makes_no_plant_unstable():
     # the computed eigenvalues say so; the poles are at -1e-5
     assert np.linalg.eigvals(lpv.matrices(0.5).A).real.max() > 0
     certs = [
-        l2_gain(lpv, relaxation=COARSE, search=None),
-        l2_gain(lpv, relaxation=SOS, search=None),
-        stability(lpv, relaxation=COARSE, search=None),
+        l2_gain(lpv, form=COARSE, search=None),
+        l2_gain(lpv, **SOS, search=None),
+        stability(lpv, form=COARSE, search=None),
     ]
     certs += [
-        stability(lpv, relaxation=SOS, search=None),
+        stability(lpv, **SOS, search=None),
         lft_gain(lpv.to_lft().reduce(), search=None),
     ]
     certs += [
-        generalized_h2(lpv, relaxation=SOS, search=None),
-        decay_rate(lpv, relaxation=SOS, search=None),
+        generalized_h2(lpv, **SOS, search=None),
+        decay_rate(lpv, **SOS, search=None),
     ]
     assert all(cert.status is not Status.UNSTABLE for cert in certs), [
         cert.status for cert in certs
     ]
     # and by more than rounding it is
-    assert l2_gain(chain(0.1), relaxation=COARSE, search=None).status is Status.UNSTABLE
-    assert stability(chain(0.1), relaxation=SOS, search=None).status is Status.UNSTABLE
+    assert l2_gain(chain(0.1), form=COARSE, search=None).status is Status.UNSTABLE
+    assert stability(chain(0.1), **SOS, search=None).status is Status.UNSTABLE
 
 
 def test_a_decay_that_is_growth_is_never_proven():
@@ -134,9 +135,9 @@ def test_a_decay_that_is_growth_is_never_proven():
     lpv = LPVStateSpace.polynomial(
         A, [np.eye(2)], [np.eye(2)], [np.zeros((2, 2))], Scheduling("p", "1", -1.0, 1.0, 5.0)
     )
-    cert = decay_rate(lpv, relaxation=SOS, search=None)
+    cert = decay_rate(lpv, **SOS, search=None)
     assert not cert.verified
     assert cert.alpha == -np.inf
-    good = decay_rate(lag(), relaxation=SOS, search=None)
+    good = decay_rate(lag(), **SOS, search=None)
     with pytest.raises(CertificateError, match="is growth"):
         replace(good, alpha=-0.1)

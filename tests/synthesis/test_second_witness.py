@@ -11,21 +11,24 @@ from models import random_stable, spring
 from symheli.errors import CertificateError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
-    Relaxation,
+    HigherOrder,
+    Memory,
+    Spline,
+    SumOfSquares,
     decay_rate,
-    forms,
     generalized_h2,
     l2_gain,
     stability,
 )
 from synthesis.assemble import box as program
+from synthesis.assemble import unknowns as forms
 from synthesis.polynomial import pieces, regions
 from synthesis.proof import box as proof
 from synthesis.proof import claim
 from synthesis.proof import one_parameter as verify
 
-COARSE = Relaxation(segments=(4,), degree=2, grading=1.0)
-BOX = Relaxation(kind="sos", segments=(4,), degree=2, grading=1.0)
+COARSE = Spline(segments=4, degree=2, grading=1.0)
+BOX = {"form": Spline(segments=4, degree=2, grading=1.0), "impose": SumOfSquares()}
 
 
 def two_ends(rate, dt=None):
@@ -123,9 +126,9 @@ CASES = {
     "perturb a weight": (perturb_a_weight, lambda: random_stable(3)),
 }
 ANALYSES = {
-    "splines": lambda lpv: l2_gain(lpv, relaxation=COARSE, search=None),
-    "box": lambda lpv: l2_gain(lpv, relaxation=BOX, search=None),
-    "energy to peak": lambda lpv: generalized_h2(no_feedthrough(lpv), relaxation=BOX, search=None),
+    "splines": lambda lpv: l2_gain(lpv, form=COARSE, search=None),
+    "box": lambda lpv: l2_gain(lpv, **BOX, search=None),
+    "energy to peak": lambda lpv: generalized_h2(no_feedthrough(lpv), **BOX, search=None),
 }
 
 
@@ -149,8 +152,8 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
         except CertificateError:
             # so wrong that it contradicts the frozen model
             return
-    P, judge = cert._proof
-    assert P is not None, "the mutant found nothing"
+    assert cert.proof is not None, "the mutant found nothing"
+    judge, P = cert.proof
     number = verify.rational()
     believed = (
         verify.proven(judge._claim(P), cert.gamma)
@@ -167,19 +170,17 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
 
 
 def test_the_witness_of_the_decay_and_of_higher_degrees_looks_too(monkeypatch):
-    decay = decay_rate(spring(damping=0.4), 0.2, relaxation=BOX, search=None)
-    quartic = stability(
-        spring(damping=0.4), 0.2, relaxation=Relaxation(order=2, segments=(2,)), search=None
-    )
+    decay = decay_rate(spring(damping=0.4), 0.2, **BOX, search=None)
+    quartic = stability(spring(damping=0.4), 0.2, form=HigherOrder(2, segments=2), search=None)
     memory = l2_gain(
         spring(damping=0.4),
         0.5,
-        relaxation=Relaxation(memory=1.0, segments=(3,), degree=2),
+        form=Memory(1.0, segments=3, degree=2),
         search=None,
     )
     for cert in (decay, quartic, memory):
         assert cert.verify(rigorous=True)
-        P, judge = cert._proof
+        judge, P = cert.proof
         assert judge.witnessed(P, cert.proven, verify.rational())
         # the same P against a model that grows: without proof and pieces the witness must see it
         lpv = judge.model.source if cert is decay else judge.lpv

@@ -3,23 +3,23 @@ they never prove too much.
 """
 
 import math
-import sys
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from models import fastest_growth, lag, lateral, random_stable, spring
+from models import fastest_growth, forged, lag, lateral, random_stable, searched, spring
 from scipy.optimize import brentq
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
+    HigherOrder,
+    Memory,
     MemoryLyapunov,
-    Relaxation,
     Search,
-    Solver,
+    Spline,
     Status,
     decay_rate,
     generalized_h2,
@@ -27,8 +27,6 @@ from synthesis import (
     lower_bound,
     stability,
 )
-from synthesis.analysis.one_parameter import prove
-from synthesis.forms import scaled_problem
 from synthesis.lyapunov.lag import LagRegion
 from synthesis.polynomial.bernstein import blossom
 from synthesis.polynomial.pieces import model_pieces
@@ -42,8 +40,8 @@ from synthesis.polynomial.symmetric_power import (
 )
 from synthesis.proof.claim import Claim, lmi_polynomials
 
-MEMORY = Relaxation(segments=(8,), degree=2, grading=1.0, memory=1.5, memory_segments=2)
-QUARTIC = Relaxation(segments=(4,), order=2)
+MEMORY = Memory(1.5, segments=8, degree=2, grading=1.0, across_segments=2)
+QUARTIC = HigherOrder(2, segments=4)
 SHARPER = (MEMORY, QUARTIC)
 
 
@@ -143,32 +141,30 @@ def test_higher_degrees_close_in_on_the_damping_that_a_jumping_spring_needs():
     change = 0.6
     truth = brentq(lambda d: fastest_growth(d, change), 0.05, 0.5)
     needed = []
-    for order in (1, 2, 3):
+    for form in (Spline(), HigherOrder(2), HigherOrder(3)):
         low, high = truth, 3 * truth
         for _ in range(9):
             middle = 0.5 * (low + high)
             proof = stability(
                 spring(damping=middle, change=change),
                 math.inf,
-                relaxation=Relaxation(order=order),
+                form=form,
                 search=None,
             )
             low, high = (low, middle) if proof.verified else (middle, high)
         needed.append(high)
         too_little = spring(damping=truth * (1 - 1e-3), change=change)
-        assert not stability(
-            too_little, math.inf, relaxation=Relaxation(order=order), search=None
-        ).verified
+        assert not stability(too_little, math.inf, form=form, search=None).verified
     # one in 250 of the truth is the resolution of the bisection
     assert needed[0] > 1.2 * needed[1] > 1.2 * 1.05 * needed[2]
     assert needed[2] < 1.12 * truth
 
 
-@pytest.mark.parametrize("relaxation", SHARPER)
-def test_they_prove_a_spring_at_a_rate_at_which_a_quadratic_does_not(relaxation):
-    plain = Relaxation(segments=(8, 16), grading=1.0)
-    assert stability(spring(), 0.25, relaxation=plain, search=None).status is Status.INFEASIBLE
-    proof = stability(spring(), 0.25, relaxation=relaxation, search=None)
+@pytest.mark.parametrize("form", SHARPER)
+def test_they_prove_a_spring_at_a_rate_at_which_a_quadratic_does_not(form):
+    plain = Spline(segments=(8, 16), grading=1.0)
+    assert stability(spring(), 0.25, form=plain, search=None).status is Status.INFEASIBLE
+    proof = stability(spring(), 0.25, form=form, search=None)
     assert proof.verified, proof
     assert proof.verify(rigorous=True)
 
@@ -177,30 +173,30 @@ def test_memory_brings_the_gain_nearer_to_its_lower_bound():
     search = Search(levels=4, dwells=5, starts=1, nodes=40, evaluations=12, steps=80, samples=5000)
     below = lower_bound(spring(), 0.2, search=search).gamma
     plain, memory = (
-        l2_gain(spring(), 0.2, relaxation=form, search=None)
-        for form in (Relaxation(segments=(8,), grading=1.0), MEMORY)
+        l2_gain(spring(), 0.2, form=form, search=None)
+        for form in (Spline(segments=8, grading=1.0), MEMORY)
     )
     assert memory.verify(rigorous=True)
     assert below <= memory.gamma < 0.9 * plain.gamma
 
 
-@pytest.mark.parametrize("relaxation", SHARPER)
-def test_a_growing_spring_is_never_called_stable(relaxation):
+@pytest.mark.parametrize("form", SHARPER)
+def test_a_growing_spring_is_never_called_stable(form):
     # the search finds growth here, whatever form is asked
     for rate in (1.0, 4.0, math.inf):
         proof = stability(
             spring(),
             rate,
-            relaxation=relaxation,
+            form=form,
             search=Search(levels=4, dwells=7, starts=1, nodes=40, evaluations=12),
         )
         assert proof.status is Status.GROWING
         assert not proof.verified
 
 
-@pytest.mark.parametrize("relaxation", SHARPER)
+@pytest.mark.parametrize("form", SHARPER)
 @pytest.mark.parametrize("excess", [1e-1, 1e-4, 1e-8])
-def test_an_unstable_plant_is_never_called_stable(relaxation, excess):
+def test_an_unstable_plant_is_never_called_stable(form, excess):
     A = [[[excess - 0.25, 1.0], [0.0, -1.0]], [[1.0, 0], [0, 0]], [[-1.0, 0], [0, 0]]]
     for scale in (1e-4, 1.0, 1e4):
         T = np.diag([scale, 1.0])
@@ -212,23 +208,18 @@ def test_an_unstable_plant_is_never_called_stable(relaxation, excess):
             Scheduling("p", "1", 0.0, 1.0, 0.1),
         )
         # without the look at the frozen poles: the solver and the verification alone
-        for with_gain in (False,) if relaxation.order > 1 else (False, True):
-            found = prove(
-                scaled_problem(lpv, 0.1, 1.0, with_gain=with_gain), relaxation, Solver(), math.inf
-            )
-            assert found.lyapunov is None
+        for kind in ("stability",) if form is QUARTIC else ("stability", "l2 gain"):
+            assert searched(lpv, 0.1, kind, form).proof is None
 
 
 def test_a_lag_keeps_its_static_gain_with_a_memory():
-    cert = l2_gain(lag(), 1.0, relaxation=MEMORY, search=None)
+    cert = l2_gain(lag(), 1.0, form=MEMORY, search=None)
     assert 1.0 <= cert.gamma <= 1.0 + 3e-6
     assert cert.verify(rigorous=True)
 
 
 def test_tampered_proofs_fail_in_either_arithmetic():
-    remembered, quartic = (
-        stability(spring(), 0.05, relaxation=form, search=None) for form in SHARPER
-    )
+    remembered, quartic = (stability(spring(), 0.05, form=form, search=None) for form in SHARPER)
     P, V = remembered.lyapunov, quartic.lyapunov
     assert isinstance(P, MemoryLyapunov)
     assert V is not None
@@ -237,67 +228,62 @@ def test_tampered_proofs_fail_in_either_arithmetic():
     worse = P.coefficients.copy()
     worse[2, 1] *= 2.0
     bad = [
-        replace(remembered, lyapunov=replace(P, region=wider)),
-        replace(remembered, lyapunov=replace(P, coefficients=worse)),
-        replace(quartic, lyapunov=replace(V, slack=V.slack + np.abs(V.slack).max())),
-        replace(quartic, lyapunov=replace(V, coefficients=-V.coefficients)),
+        forged(remembered, lyapunov=replace(P, region=wider)),
+        forged(remembered, lyapunov=replace(P, coefficients=worse)),
+        forged(quartic, lyapunov=replace(V, slack=V.slack + np.abs(V.slack).max())),
+        forged(quartic, lyapunov=replace(V, coefficients=-V.coefficients)),
     ]
     for cert in (remembered, quartic):
         assert cert.verify()
         assert cert.verify(rigorous=True)
-        evidence = cert.evidence
-        assert evidence is not None
+        evidence = cert.proof.evidence
         # faster than was proven: the region, or the LMIs, no longer hold
-        bad += [replace(cert, evidence=evidence._replace(rate=rate)) for rate in (2.0, math.inf)]
+        bad += [forged(cert, evidence=evidence._replace(rate=rate)) for rate in (2.0, math.inf)]
     for cert in bad:
         assert not cert.verify()
         assert not cert.verify(rigorous=True)
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.1, math.inf])
-@pytest.mark.parametrize(
-    ("form", "said"), [(MEMORY, "leave memory=1.5 out"), (QUARTIC, "leave order=2 out")]
-)
+@pytest.mark.parametrize(("form", "said"), [(MEMORY, "Memory"), (QUARTIC, "HigherOrder")])
 def test_in_discrete_time_a_memory_or_an_order_is_refused_before_any_work(
     form, said, rate, monkeypatch
 ):
-    # the function of that name hides the module
-    for work in ("frozen_gain", "least_damped"):
-        monkeypatch.setattr(sys.modules["synthesis.analysis.l2_gain"], work, None)
+    monkeypatch.setattr("synthesis.analysis.certify.worst_frozen", None)
     sampled = spring().discretize(0.1)
     for analysis in (l2_gain, stability):
         with pytest.raises(
-            InputError, match=rf"continuous time; this model is sampled every 0\.1 s: {said}"
+            InputError, match=rf"{said} is for continuous time; this model is sampled every 0\.1 s"
         ):
-            analysis(sampled, rate, relaxation=form)
+            analysis(sampled, rate, form=form)
     for analysis in (generalized_h2, decay_rate):
-        with pytest.raises(InputError, match="order and memory of V are for l2_gain and stability"):
-            analysis(sampled, rate, relaxation=form)
+        with pytest.raises(InputError, match=f"{said} is a form for l2_gain and stability"):
+            analysis(sampled, rate, form=form)
 
 
 def test_one_state_has_a_form_of_higher_degree_too():
     """Its one monomial leaves nothing to add to a block, which once was an array that could not be
     reshaped.
     """
-    assert stability(lag(), relaxation=QUARTIC).verify(rigorous=True)
+    assert stability(lag(), form=QUARTIC).verify(rigorous=True)
     assert not stability(
-        replace(lag(), A=lag().A + np.array([[[1.0]], [[0.0]]])), relaxation=QUARTIC
+        replace(lag(), A=lag().A + np.array([[[1.0]], [[0.0]]])), form=QUARTIC
     ).verified
 
 
 def test_forms_that_do_not_suit_the_question_are_refused():
     with pytest.raises(InputError, match="stability only"):
-        l2_gain(spring(), 0.1, relaxation=QUARTIC, search=None)
-    with pytest.raises(InputError, match="no memory beside"):
-        Relaxation(order=2, memory=1.0)
-    with pytest.raises(InputError, match="memory > 0"):
-        Relaxation(memory=-1.0)
+        l2_gain(spring(), 0.1, form=QUARTIC, search=None)
+    with pytest.raises(InputError, match="order 2 or 3"):
+        HigherOrder(1)
+    with pytest.raises(InputError, match="seconds > 0"):
+        Memory(-1.0)
 
 
 @pytest.mark.slow
 def test_the_lateral_loop_is_bracketed_within_a_quarter():
     lpv = lateral()
-    cert = l2_gain(lpv, 3.0, relaxation=Relaxation(memory=0.6, grading=1.5))
+    cert = l2_gain(lpv, 3.0, form=Memory(0.6, grading=1.5))
     assert cert.verify(rigorous=True)
     assert cert.gap < 1.25
     assert cert.gamma < 0.8 * l2_gain(lpv, 3.0, search=None).gamma

@@ -10,8 +10,9 @@ from models import lag
 
 from symheli.errors import CertificateError
 from synthesis import (
-    Relaxation,
-    Verdict,
+    Certificate,
+    Spline,
+    SumOfSquares,
     decay_rate,
     generalized_h2,
     l2_gain,
@@ -21,20 +22,14 @@ from synthesis import (
 )
 
 ANALYSES = {
-    "splines": lambda: l2_gain(lag(), relaxation=Relaxation(segments=(2,)), search=None),
-    "box": lambda: l2_gain(lag(), relaxation=Relaxation(kind="sos", degree=1), search=None),
-    "energy to peak": lambda: generalized_h2(
-        lag(), relaxation=Relaxation(degree=1, segments=(1,)), search=None
-    ),
-    "decay rate": lambda: decay_rate(
-        lag(), relaxation=Relaxation(degree=1, segments=(1,)), search=None
-    ),
+    "splines": lambda: l2_gain(lag(), form=Spline(segments=2), search=None),
+    "box": lambda: l2_gain(lag(), form=Spline(degree=1), impose=SumOfSquares(), search=None),
+    "energy to peak": lambda: generalized_h2(lag(), form=Spline(degree=1, segments=1), search=None),
+    "decay rate": lambda: decay_rate(lag(), form=Spline(degree=1, segments=1), search=None),
     "lft": lambda: lft_gain(lag().to_lft().reduce(), search=None),
-    "stability, splines": lambda: stability(
-        lag(), relaxation=Relaxation(segments=(2,)), search=None
-    ),
+    "stability, splines": lambda: stability(lag(), form=Spline(segments=2), search=None),
     "stability, box": lambda: stability(
-        lag(), relaxation=Relaxation(kind="sos", degree=1), search=None
+        lag(), form=Spline(degree=1), impose=SumOfSquares(), search=None
     ),
     "stability, lft": lambda: lft_stability(lag().to_lft().reduce(), search=None),
 }
@@ -43,7 +38,7 @@ ANALYSES = {
 @pytest.mark.parametrize("analysis", ANALYSES)
 def test_every_certificate_answers_the_same_questions(analysis):
     cert = ANALYSES[analysis]()
-    assert isinstance(cert, Verdict)
+    assert isinstance(cert, Certificate)
     assert cert.verified
     assert cert.verify()
     assert cert.verify(rigorous=True)

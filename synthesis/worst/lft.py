@@ -7,16 +7,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
 from synthesis.worst.budget import Budget
 from synthesis.worst.frozen import FrozenGain, norm
 from synthesis.worst.lower_bound import LowerBound, Search, growing_trajectory, lower_bound
+from synthesis.worst.over_box import grid_of, worst_over
 from synthesis.worst.trajectory import Trajectory
 
 Array = np.ndarray
@@ -33,47 +33,39 @@ class BoxGain(NamedTuple):
 
 
 def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
-    """max over the box of the H-infinity norm of the frozen models: a grid, and a local search from
-    its best points.
+    """Largest H-infinity norm of the frozen models over the box of an LFT.
 
-    Without channels: 0 where every model of the grid is stable.
+    Parameters
+    ----------
+    lft : LFT
+        The model; without channels 0 where every model of the grid is stable.
+    tolerance : float
+        Relative accuracy of each norm, from below.
+
+    Returns
+    -------
+    BoxGain
+        `gamma` (inf where a frozen model is unstable), `p` (m,) and `omega` (rad/s).
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0)
+    >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> frozen_box_gain(lag.to_lft()).p
+    (0.0,)
     """
 
-    def at(delta: Array) -> BoxGain:
-        delta = np.clip(delta, -1.0, 1.0)
+    def at(delta: Array) -> tuple[float, float]:
         M, x = lft.matrix(delta), len(lft.states)
-        gain, omega = norm(M[:x, :x], M[:x, x:], M[x:, :x], M[x:, x:], lft.dt, tolerance)
-        return BoxGain(gain, _physical(lft, delta), omega)
+        return norm(M[:x, :x], M[:x, x:], M[x:, :x], M[x:, x:], lft.dt, tolerance)
 
     m = len(lft.blocks)
     points = {0: 1, 1: 61, 2: 15, 3: 7}.get(m, 3)
-    grid = np.array(list(product(np.linspace(-1.0, 1.0, points), repeat=m)))
-    values = _at_poles(lft, grid)
-    k = int(values.argmax())
-    if math.isinf(values[k]):
-        return BoxGain(math.inf, _physical(lft, grid[k]), math.nan)
-    best = at(grid[k])
-    if m == 0 or best.gamma == 0.0:
-        return best
-    step = 1.0 / (points - 1)
-    for k in _peaks(values, grid, 2 * step)[:3]:
-        simplex = np.vstack(
-            [grid[k], *(grid[k] + step * np.where(grid[k] > 0, -1.0, 1.0) * e for e in np.eye(m))]
-        )
-        result: Any = minimize(
-            lambda delta: -min(at(delta).gamma, 1e300),
-            grid[k],
-            method="Nelder-Mead",
-            bounds=[(-1.0, 1.0)] * m,
-            options={
-                "initial_simplex": simplex,
-                "maxfev": 30 * m,
-                "xatol": 1e-6,
-                "fatol": 1e-9 * best.gamma,
-            },
-        )
-        best = max(best, at(result.x), key=lambda f: f.gamma)
-    return best
+    axes = [np.linspace(-1.0, 1.0, points)] * m
+    gamma, delta = worst_over(lambda d: at(d)[0], axes, _at_poles(lft, grid_of(axes)))
+    omega = math.nan if math.isinf(gamma) else at(delta)[1]
+    return BoxGain(gamma, _physical(lft, delta), omega)
 
 
 def _at_poles(lft: LFT, grid: Array) -> Array:
@@ -205,13 +197,3 @@ def _in_box(lft: LFT, line: Trajectory, start: Array, end: Array) -> Trajectory:
 
 def _physical(lft: LFT, delta: Array) -> tuple[float, ...]:
     return tuple(float(s.middle + s.radius * d) for s, d in zip(lft.parameters, delta, strict=True))
-
-
-def _peaks(values: Array, grid: Array, spacing: float) -> list[int]:
-    """Indices that no neighbour on the grid exceeds, the largest first."""
-    local = []
-    for k, point in enumerate(grid):
-        near = np.abs(grid - point).max(axis=1) < 1.5 * spacing
-        if values[k] >= values[near].max():
-            local.append(k)
-    return sorted(local, key=lambda k: -values[k])

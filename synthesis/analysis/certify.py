@@ -1,0 +1,173 @@
+"""From a question to a certificate: what no proof can beat, the search for a proof, what it rests
+on.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from synthesis.analysis.fine_sampling import fine_sampling
+from synthesis.analysis.general_search import General
+from synthesis.analysis.hypotheses import VERIFIED, hypotheses
+from synthesis.analysis.ladder import Found, Ladder
+from synthesis.analysis.one_parameter_search import OneParameter
+from synthesis.analysis.question import Question
+from synthesis.certificate import Certificate, Seconds, Status
+from synthesis.impose import Grid
+from synthesis.worst.box import (
+    Worst,
+    growing,
+    measure,
+    unstable_at,
+    worst_frozen,
+    worst_moving,
+)
+from synthesis.worst.budget import said
+from synthesis.worst.trajectory import Trajectory
+
+Array = np.ndarray
+
+ROUNDED = 1e-12
+"""What is looked for where the slowest frozen mode is stable or not to rounding, 1/s."""
+
+
+class Beaten(NamedTuple):
+    """What no proof can beat, in the sign of the bound, and the seconds it took to find it."""
+
+    frozen: float
+    limit: float
+    worst: Trajectory | None
+    seconds: float
+
+
+def certify(asked: Question) -> Certificate:
+    """The answer to the question."""
+    model, demand, search = asked.model, asked.demand, asked.search
+    sign = 1.0 if asked.gains else -1.0
+    start = time.perf_counter()
+    frozen = worst_frozen(model, measure(demand, model.dt))
+    report = _Report(asked)
+    if math.isinf(frozen.value) if asked.gains else frozen.value >= 0:
+        at = unstable_at(model, frozen.p or ())
+        if at is not None:
+            p = np.array(at) if len(at) == 1 else np.array([at])
+            beaten = Beaten(
+                sign * frozen.value,
+                sign * frozen.value,
+                Trajectory(np.zeros(1), p),
+                time.perf_counter() - start,
+            )
+            return report.nothing(Status.UNSTABLE, beaten)
+        # stable or not to rounding: nothing is known from below
+        frozen, search = Worst(0.0 if asked.gains else -ROUNDED, frozen.p), None
+    stability = demand.kind == "stability"
+    limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
+    beaten = Beaten(
+        sign * frozen.value, sign * limit.value, limit.trajectory, time.perf_counter() - start
+    )
+    if math.isinf(limit.value) if asked.gains else limit.value >= 0:
+        return report.nothing(Status.GROWING, beaten)
+    ladder = route(asked)
+    best = ladder.search(math.inf if stability else abs(frozen.value))
+    if best.proof is None and stability:
+        start = time.perf_counter()
+        worst = growing(model.source, demand, search)
+        beaten = beaten._replace(seconds=beaten.seconds + time.perf_counter() - start)
+        if worst is not None:
+            return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
+    cert = report.found(best, beaten, ladder)
+    return cert if stability else cert.resting_on(said(search and search.seconds, beaten.seconds))
+
+
+def route(asked: Question) -> Ladder:
+    """The search for a proof alone."""
+    return (OneParameter if asked.one_parameter else General)(asked)
+
+
+@dataclass(frozen=True, eq=False)
+class _Report:
+    """How a certificate is written down."""
+
+    asked: Question
+
+    def nothing(self, status: Status, beaten: Beaten, ladder: Ladder | None = None) -> Certificate:
+        """Nothing is proven, and it is known why."""
+        return self._made(Found(math.inf), beaten, ladder, status)
+
+    def found(self, best: Found, beaten: Beaten, ladder: Ladder) -> Certificate:
+        """What the search brought."""
+        if best.proof is None:
+            status = Status.without_proof(best.answer)
+        else:
+            status = Status.UNPROVEN if isinstance(self.asked.impose, Grid) else Status.PROVEN
+        return self._made(best, beaten, ladder, status)
+
+    def _made(
+        self, best: Found, beaten: Beaten, ladder: Ladder | None, status: Status
+    ) -> Certificate:
+        asked, kind, proven = self.asked, self.asked.demand.kind, status is Status.PROVEN
+        nothing = -math.inf if kind == "decay rate" else math.inf
+        names = {"stability": (), "decay rate": ("alpha", "upper", "frozen")}.get(
+            kind, ("gamma", "lower", "frozen")
+        )
+        values = (best.bound if proven else nothing, beaten.limit, beaten.frozen)
+        bounds = dict(zip(names, values, strict=False))
+        spent = ladder.spent if ladder else np.zeros(3)
+        return Certificate(
+            kind=kind,
+            **bounds,
+            status=status,
+            verified=proven,
+            rates=asked.demand.rates,
+            hypotheses=hypotheses(
+                kind,
+                asked.model.parameters,
+                asked.demand.rates,
+                asked.model.source,
+                (*self._how(best, status), *self._sampling(bounds)),
+            ),
+            method=f"{type(asked.form).__name__}, {asked.impose.found_by}",
+            solver=str(asked.solver),
+            seconds=Seconds(*(float(s) for s in spent), bounds=beaten.seconds),
+            conditioning=best.conditioning,
+            attempts=tuple(ladder.attempts) if ladder else (),
+            worst=beaten.worst,
+            indicative=best.bound if status is Status.UNPROVEN else math.nan,
+            proof=best.proof,
+        )
+
+    def _how(self, best: Found, status: Status) -> tuple[str, ...]:
+        if status is Status.UNPROVEN and isinstance(self.asked.impose, Grid):
+            return (
+                f"the inequalities hold at {self.asked.impose.points} values of each parameter in"
+                " every region: no guarantee",
+            )
+        if best.proof is None:
+            return ()
+        if self.asked.one_parameter:
+            what, shared = (
+                "every coefficient, and a grid of p",
+                "pieces, cells, strips and blossoms",
+            )
+        else:
+            what = "the whole box, halved where needed, and a grid of p"
+            shared = "pieces, regions, products of polynomials and the inequalities themselves"
+        return (
+            f"{best.proof.lyapunov.form}; {self.asked.impose.found_by}, for every p in its range"
+            " and every admissible rate",
+            VERIFIED.format(what=what, shared=shared),
+        )
+
+    def _sampling(self, bounds: dict[str, float]) -> tuple[str, ...]:
+        if "gamma" not in bounds:
+            return ()
+        points = 41 if len(self.asked.model.parameters) == 1 else 3
+        grid = product(*(np.linspace(s.low, s.high, points) for s in self.asked.model.parameters))
+        A = self.asked.model.at(np.array(list(grid))).A
+        return fine_sampling(A, self.asked.model.dt, bounds["gamma"], bounds["lower"])

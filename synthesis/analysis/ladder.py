@@ -1,0 +1,188 @@
+"""The search for a proof, whatever the route: finer and finer P, margins in turn, a constant P at
+last.
+
+A route says how to set its units, which P to try and how to try one; the ladder is one for all.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from synthesis.analysis.question import Question
+from synthesis.certificate import Attempt, Proof
+from synthesis.program.cone_program import Answer
+from synthesis.program.scaling import in_its_own_scale
+
+INFLATION = 1e-6
+"""gamma^2 is raised by this fraction above what P admits in floating point, so that an exact proof
+has room.
+"""
+SMALLEST = 1e-6
+"""Least gain in scaled units: a model without response is given a small gain rather than none,
+which no strict inequality proves.
+"""
+NOTHING = 1e-6
+"""A largest margin of stability below this (P <= I, scaled) counts as none: the solver is no more
+accurate than that.
+"""
+CLOSE = 1e-3
+"""A bound within this fraction of what no proof can beat is not tried to improve upon by a constant
+P.
+"""
+DECAY_TOLERANCE = 2e-3
+"""The decay rate is found to this fraction of the frozen one."""
+
+
+class Found(NamedTuple):
+    """The best proof verified (None: none was), the bound it gives (NaN for stability), and what
+    the solver said.
+    """
+
+    bound: float
+    proof: Proof | None = None
+    answer: Answer = Answer.UNTRIED
+    conditioning: float = math.inf
+
+    def or_better(self, other: Found, sign: float) -> Found:
+        """The better of the two; `sign` 1: a smaller bound is better, -1: a larger one."""
+        if other.proof is not None:
+            better = self.proof is None or sign * other.bound < sign * self.bound
+            return other if better else self
+        if self.proof is None and other.answer is not Answer.UNTRIED:
+            return self._replace(answer=other.answer)
+        return self
+
+
+class Ladder(ABC):
+    """The rungs of one route: what was tried on them (`attempts`), and the seconds it took to
+    build, solve and verify (`spent`).
+    """
+
+    def __init__(self, asked: Question):
+        self.asked = asked
+        self.attempts: list[Attempt] = []
+        self.spent = np.zeros(3)
+        self.expect(1.0)
+
+    @abstractmethod
+    def expect(self, bound: float) -> float:
+        """Set the units in which numbers are of order one where the bound is near this one; the
+        unit of gains.
+        """
+
+    @abstractmethod
+    def shapes(self) -> list[Any]:
+        """The P to try in turn, finer and finer."""
+
+    @abstractmethod
+    def constant(self) -> Any:
+        """A constant P, which proves for every rate what it proves for jumps."""
+
+    @abstractmethod
+    def varies(self, shape: Any) -> bool:
+        """Whether P depends on p."""
+
+    @abstractmethod
+    def attempt(self, shape: Any, margin: float, alpha: float = 0.0) -> Found:
+        """Assemble, solve, verify; `alpha` is the decay rate asked for, 1/s."""
+
+    def search(self, limit: float) -> Found:
+        """The best bound found. `limit`, the worst frozen one, alone sets the first scale and says
+        what is good enough.
+
+        What trajectories show plays no part: a longer search for them must not change what is
+        proven.
+        """
+        if self.asked.demand.kind == "decay rate":
+            return self._decay(limit)
+        if not self.asked.gains:
+            return self._least(limit)
+
+        def found(expected: float) -> tuple[Found, float, float]:
+            scale = self.expect(expected)
+            best = self._least(limit)
+            return best, best.bound, scale
+
+        best = min(in_its_own_scale(found, limit), key=lambda tried: tried.bound)
+        if best.proof is None and best.answer is not Answer.INFEASIBLE:
+            best = best._replace(answer=self._whether_any(best.answer))
+        return best
+
+    def _whether_any(self, answer: Answer) -> Answer:
+        """Whether there is a P at all is a question with a bounded answer, which solvers handle
+        better than an infinite gain.
+        """
+        asked = self.asked
+        other = type(self)(asked._replace(demand=asked.demand._replace(kind="stability")))
+        stable = other.search(math.inf)
+        self.attempts += other.attempts
+        self.spent += other.spent
+        return Answer.INFEASIBLE if stable.answer is Answer.INFEASIBLE else answer
+
+    def _least(self, limit: float) -> Found:
+        gains = self.asked.gains
+        best, shape, near = Found(math.inf if gains else math.nan), None, self.asked.form.near
+        for shape in self.shapes():
+            best = self._margins(shape, best)
+            if best.proof is not None and not best.bound > near * limit:
+                break
+        short = best.proof is None or best.bound > (1 + CLOSE) * limit
+        if shape is not None and self.varies(shape) and short:
+            # that there is no P is said of the form that was asked for, of which a constant is one
+            answer, best = best.answer, self._margins(self.constant(), best)
+            best = best if best.proof is not None else best._replace(answer=answer)
+        return best
+
+    def _margins(self, shape: Any, best: Found) -> Found:
+        # without a gain the margin itself is what is maximised
+        for margin in self.asked.impose.tried if self.asked.gains else (0.0,):
+            found = self.attempt(shape, margin)
+            best = best.or_better(found, 1.0)
+            if found.proof is not None or found.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
+                break
+        return best
+
+    def _decay(self, limit: float) -> Found:
+        """The largest decay rate, between 0 and `limit` (1/s); each P counts for all that it
+        proves.
+        """
+        best, shape = Found(-math.inf), None
+        tolerance = DECAY_TOLERANCE * limit
+        for shape in self.shapes():
+            best = self._bisected(shape, best, limit - tolerance, limit)
+            if best.proof is not None and best.bound * self.asked.form.near >= limit:
+                break
+        if shape is not None and self.varies(shape) and best.bound < limit - 2 * tolerance:
+            # asked first whether a constant P proves more
+            trial = limit - tolerance if best.proof is None else best.bound + tolerance
+            answer, best = best.answer, self._bisected(self.constant(), best, trial, limit)
+            best = best if best.proof is not None else best._replace(answer=answer)
+        return best
+
+    def _bisected(self, shape: Any, best: Found, trial: float, limit: float) -> Found:
+        tolerance = DECAY_TOLERANCE * limit
+        low, high = max(best.bound, 0.0), limit
+        while True:
+            found = self.attempt(shape, 0.0, trial)
+            if found.proof is None or found.bound > 0:
+                best = best.or_better(found, -1.0)
+            if found.answer is Answer.UNTRIED:
+                return best
+            # a P that proves less than was asked for: the half below is left, whatever it would
+            # have allowed
+            low = max(low, found.bound if found.proof is not None else 0.0)
+            high = high if low >= trial else trial
+            if high - low <= tolerance:
+                return best
+            trial = 0.5 * (low + high)
+
+
+def inflated(least: float, channel: float) -> float:
+    """The gain to be verified where a proof admits `least` in floating point, `channel` the unit of
+    gains; NaN stays.
+    """
+    return least if math.isnan(least) else max(least, SMALLEST * channel) * math.sqrt(1 + INFLATION)

@@ -1,0 +1,139 @@
+"""The route of one parameter: the fast assembly, and blocks that join as they are violated."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from symheli.lpv import LPVStateSpace
+from synthesis.analysis.ladder import NOTHING, Found, Ladder, inflated
+from synthesis.assemble.bounded_real import Blocks, assemble
+from synthesis.assemble.unknowns import Unknown, constant, scaled_problem, unknowns
+from synthesis.certificate import Attempt, Proof
+from synthesis.impose import Bernstein
+from synthesis.program.cone_program import Answer, Candidate, solve
+
+Array = np.ndarray
+
+VIOLATED = 1e-8
+"""A block left out of the program joins it when its largest eigenvalue (scaled) exceeds this."""
+ROUNDS = 12
+"""Most rounds of adding violated blocks; what then remains violated only makes the recomputed gain
+larger.
+"""
+
+
+class OneParameter(Ladder):
+    """Splines P(p), with a memory of p or of higher order in x, in the scaled units of a
+    `problem`.
+    """
+
+    def expect(self, bound: float) -> float:
+        """Set the units; the unit of gains."""
+        lpv, (rate,) = self.asked.model.source, self.asked.demand.rates
+        assert isinstance(lpv, LPVStateSpace)  # noqa: S101 - see `Question.one_parameter`
+        self.problem = scaled_problem(lpv, rate, bound, with_gain=self.asked.gains)
+        return self.problem.units.channel
+
+    def shapes(self) -> list[Unknown]:
+        """Those of the form, each number of knots once."""
+        return list(
+            {len(u.knots): u for u in reversed([*unknowns(self.problem, self.asked.form)])}.values()
+        )[::-1]
+
+    def constant(self) -> Unknown:
+        """A constant P of that form."""
+        return constant(self.problem, self.asked.form)
+
+    def varies(self, shape: Unknown) -> bool:
+        """Whether P depends on p."""
+        return shape.degree > 0
+
+    @property
+    def elevation(self) -> int:
+        """How far the degree of the Bernstein forms is raised."""
+        assert isinstance(self.asked.impose, Bernstein)  # noqa: S101 - see `Question`
+        return self.asked.impose.elevation
+
+    def attempt(self, shape: Unknown, margin: float, alpha: float = 0.0) -> Found:
+        """One P and one margin."""
+        start = time.perf_counter()
+        blocks = shape.weighed(self.problem, self.elevation)
+        candidate, rounds = self._solve_by_rounds(shape, blocks, margin)
+        solved = time.perf_counter()
+        found = self._judged(candidate, shape)
+        self.spent += (
+            solved - start - candidate.seconds,
+            candidate.seconds,
+            time.perf_counter() - solved,
+        )
+        verified = "verified" if found.proof is not None else "not verified"
+        words = f"{candidate.message} ({rounds} round(s)), {verified}"
+        if self.asked.gains and found.proof is not None:
+            words += f", gamma {found.bound:.6g}"
+        program = f"{len(shape.knots) - 1} segments of degree {shape.degree}"
+        self.attempts.append(Attempt(program, margin, words, found.bound))
+        return found
+
+    def _solve_by_rounds(
+        self, form: Unknown, blocks: list[Blocks], margin: float
+    ) -> tuple[Candidate, int]:
+        """Solve with the blocks likely to bind, add those that came out violated, and so on: far
+        fewer blocks in all.
+        """
+        n, m = form.size, len(self.problem.lpv.inputs)
+        active = [np.full(len(block.constant), block.likely) for block in blocks]
+        seconds, rounds = 0.0, 0
+        while True:
+            rounds += 1
+            chosen = [
+                block.keep(which)
+                for block, which in zip(blocks, active, strict=True)
+                if which.any()
+            ]
+            candidate = solve(
+                assemble(chosen, n, m, form.unknowns, margin, self.asked.impose.least, form.null),
+                self.asked.solver,
+            )
+            seconds += candidate.seconds
+            if candidate.x is None or rounds == ROUNDS or all(which.all() for which in active):
+                break
+            P, level = form.coefficients(candidate.x), candidate.x[-1]
+            target = (
+                np.diag(np.concatenate([np.zeros(n), np.full(m, level)]))
+                if self.asked.gains
+                else -level * np.eye(n)
+            )
+            added = 0
+            for block, which in zip(blocks, active, strict=True):
+                if which.all():
+                    continue
+                excess = block.values(P, n + m) - block.weight[:, None, None] * target
+                new = ~which & (np.linalg.eigvalsh(excess)[:, -1] > VIOLATED)
+                which |= new
+                added += int(new.sum())
+            if not added:
+                break
+        return replace(candidate, seconds=seconds), rounds
+
+    def _judged(self, candidate: Candidate, shape: Unknown) -> Found:
+        """The gain that P itself admits, whatever the solver said."""
+        problem, answer = self.problem, candidate.answer
+        if candidate.x is None:
+            return Found(math.inf, None, answer)
+        # a largest margin of nothing, for fewer blocks or for all of them: there is no P
+        if not self.asked.gains and candidate.x[-1] <= NOTHING and answer is Answer.SOLVED:
+            answer = Answer.INFEASIBLE
+        # judged as it is stored, in physical units
+        P = shape.lyapunov(candidate.x).in_units(
+            problem.units.left, problem.units.channel**2, 1.0 / problem.units.time
+        )
+        evidence = problem.evidence(self.elevation)
+        least, conditioning = evidence.least_gain(P)
+        gamma = inflated(least, problem.units.channel)
+        if math.isinf(least) or not evidence.floating(P, gamma):
+            return Found(math.inf, None, answer)
+        return Found(gamma, Proof(evidence, P), answer, conditioning)

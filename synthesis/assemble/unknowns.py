@@ -1,0 +1,277 @@
+"""What is unknown in each form of V for one parameter, its LMI blocks, and the V they lead to.
+
+This is the fast assembly: arrays, and blocks that join the program as they are violated. The
+general one for boxes (`box`) is built on polynomials that know their box, several times slower.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from symheli.lpv import LPVStateSpace
+from synthesis.assemble.bounded_real import Blocks, continuous_blocks, discrete_blocks
+from synthesis.assemble.memory_blocks import memory_blocks
+from synthesis.forms import HigherOrder, LyapunovForm, Memory
+from synthesis.lyapunov.lag import LagRegion
+from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov, graded_knots
+from synthesis.polynomial.cells import cells, strips
+from synthesis.polynomial.pieces import ModelPiece, model_pieces
+from synthesis.polynomial.symmetric import extended, length, smat, svec
+from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
+from synthesis.program.scaling import Scaling, scaling
+from synthesis.proof.one_parameter import Evidence
+
+Array = np.ndarray
+
+
+class Problem(NamedTuple):
+    """What every attempt shares: the model in physical and in scaled units."""
+
+    lpv: LPVStateSpace
+    rate: float
+    pieces: tuple[ModelPiece, ...]
+    scaled: tuple[ModelPiece, ...]
+    units: Scaling
+    with_gain: bool
+
+    @property
+    def scaled_rate(self) -> float:
+        """Largest change of p per scaled unit of time."""
+        return self.rate * self.units.time
+
+    def evidence(self, elevation: int) -> Evidence:
+        """What verifies a P for this problem."""
+        return Evidence(self.lpv, self.pieces, self.units, self.rate, elevation)
+
+    @property
+    def step(self) -> float:
+        """Largest change of p in one sample."""
+        return self.rate * (self.lpv.dt or 0.0)
+
+
+def scaled_problem(lpv: LPVStateSpace, rate: float, gain: float, *, with_gain: bool) -> Problem:
+    """The model scaled for an expected `gain`; without channels where only stability is asked."""
+    if not with_gain:
+        lpv = replace(
+            lpv,
+            B=lpv.B[:, :, :0],
+            C=lpv.C[:, :0],
+            D=lpv.D[:, :0, :0],
+            inputs=(),
+            outputs=(),
+            trim=None,
+            residuals=None,
+        )
+    units, pieces = scaling(lpv, gain), model_pieces(lpv)
+    scaled = tuple(
+        piece.scaled(units.left, units.right, units.channel, units.time) for piece in pieces
+    )
+    return Problem(lpv, rate, pieces, scaled, units, with_gain)
+
+
+class Unknown(ABC):
+    """A V with unknown coefficients, in the scaled units of a problem: `size` is that of P,
+    `degree` that in p on the `knots`.
+    """
+
+    knots: Array
+    degree: int
+    size: int
+    null: Array | None = None
+    """What may be added to each block, (s, L) as vectors."""
+
+    @property
+    @abstractmethod
+    def unknowns(self) -> int:
+        """Number of coefficients of P."""
+
+    @abstractmethod
+    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
+        """The LMIs, their Bernstein degree raised by `extra`."""
+
+    @abstractmethod
+    def lyapunov(self, x: Array) -> Lyapunov:
+        """V at the solver's point x, in scaled units."""
+
+    def weighed(self, problem: Problem, extra: int) -> list[Blocks]:
+        """The same in coordinates in which slow and fast states count alike."""
+        W = extended(problem.units.weight, len(problem.lpv.inputs))
+        return [block.congruent(W) for block in self.blocks(problem, extra)]
+
+    def coefficients(self, x: Array) -> Array:
+        """Coefficients of P (unknowns, size (size + 1)/2) as vectors."""
+        return x[: self.unknowns * length(self.size)].reshape(self.unknowns, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic(Unknown):
+    """V = x' P(p) x, P a spline."""
+
+    knots: Array
+    degree: int
+    size: int
+
+    @property
+    def unknowns(self) -> int:
+        """Number of coefficients of P."""
+        return (len(self.knots) - 1) * self.degree + 1
+
+    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
+        """One block per Bernstein coefficient, cell or strip, and sign of the rate."""
+        if problem.lpv.dt is None:
+            rate = problem.scaled_rate if self.degree else 0.0
+            return list(
+                continuous_blocks(
+                    cells(problem.scaled, self.knots), self.knots, self.degree, rate, extra
+                )
+            )
+        step = problem.step if self.degree else 0.0
+        regions = strips(problem.scaled, self.knots, (-step, step))
+        return list(discrete_blocks(regions, self.knots, self.degree, extra))
+
+    def lyapunov(self, x: Array) -> SplineLyapunov:
+        """V at the solver's point x."""
+        return SplineLyapunov(self.knots, self.degree, smat(self.coefficients(x), self.size))
+
+
+class OfMonomials(Quadratic):
+    """V = z' P(p) z with the monomials z of degree `order` in the states: a sum-of-squares proof
+    for each coefficient.
+    """
+
+    states: int
+    order: int
+
+    def __init__(self, knots: Array, degree: int, states: int, order: int):
+        super().__init__(knots, degree, len(monomials(states, order)))
+        matrices = null_matrix(np.eye(null_size(states, order)), states, order)
+        for name, value in {"states": states, "order": order, "null": svec(matrices)}.items():
+            object.__setattr__(self, name, value)
+
+    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
+        """As for a quadratic V, of the linear system that the monomials follow."""
+        N = self.size
+        lifted = tuple(
+            q._replace(
+                A=generator(q.A, self.order),
+                B=np.zeros((1, N, 0)),
+                C=np.zeros((1, 0, N)),
+                D=np.zeros((1, 0, 0)),
+            )
+            for q in problem.scaled
+        )
+        return super().blocks(problem._replace(scaled=lifted), extra)
+
+    def weighed(self, problem: Problem, extra: int) -> list[Blocks]:
+        """The blocks as they are: what is added to them is in the coordinates of P."""
+        return self.blocks(problem, extra)
+
+    def lyapunov(self, x: Array) -> SplineLyapunov:
+        """V at the solver's point x, with the slack of every block."""
+        size = null_size(self.states, self.order)
+        # of one state there is one monomial, and nothing to add
+        slack = x[self.unknowns * length(self.size) : -1].reshape(-1, size) if size else None
+        return SplineLyapunov(
+            self.knots, self.degree, smat(self.coefficients(x), self.size), self.order, slack
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Remembering(Unknown):
+    """V = x' P(p, p - q) x, q a lag of p; `region` in scaled units of time."""
+
+    region: LagRegion
+    degree: int
+    lead_knots: Array
+    lead_degree: int
+    size: int
+
+    @property
+    def knots(self) -> Array:  # type: ignore[override]
+        """Knots in p."""
+        return self.region.knots
+
+    @property
+    def _across(self) -> int:
+        return (len(self.lead_knots) - 1) * self.lead_degree + 1
+
+    @property
+    def unknowns(self) -> int:
+        """Number of coefficients of P."""
+        return ((len(self.knots) - 1) * self.degree + 1) * self._across
+
+    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
+        """One block per Bernstein coefficient in p and across, patch, and sign of the rate."""
+        regions = cells(problem.scaled, self.knots)
+        return list(
+            memory_blocks(
+                regions,
+                self.region,
+                self.lead_knots,
+                self.degree,
+                self.lead_degree,
+                problem.scaled_rate,
+                extra,
+            )
+        )
+
+    def lyapunov(self, x: Array) -> MemoryLyapunov:
+        """V at the solver's point x."""
+        P = smat(self.coefficients(x), self.size).reshape(-1, self._across, self.size, self.size)
+        return MemoryLyapunov(self.region, self.degree, self.lead_knots, self.lead_degree, P)
+
+
+def unknowns(problem: Problem, form: LyapunovForm) -> Iterator[Unknown]:
+    """The finer and finer P to try in turn."""
+    n, sampled = len(problem.lpv.states), problem.lpv.dt is not None
+    higher = isinstance(form, HigherOrder)
+    remembers = isinstance(form, Memory) and 0 < problem.rate < math.inf
+    (own,) = form.degrees(1)
+    constant = math.isinf(problem.rate) or own == 0
+    degree = 0 if constant and not remembers else (own or (2 if higher or sampled else 3))
+    if not degree:
+        usual = (8,)
+    elif remembers:
+        usual = (12,)
+    else:
+        usual = (4, 8) if higher else (8, 16) if sampled else (16, 32)
+    for (segments,) in form.segments_tried(1) or [[k] for k in usual]:
+        knots = _knots(problem, form, segments, degree)
+        if isinstance(form, Memory) and remembers:
+            region = LagRegion.reached(knots, problem.rate, float(form.seconds))
+            region = replace(region, time=region.time / problem.units.time)
+            across = np.linspace(0.0, 1.0, form.across_segments + 1)
+            yield Remembering(region, degree, across, form.across_degree, n)
+        elif isinstance(form, HigherOrder):
+            yield OfMonomials(knots, degree, n, form.order)
+        else:
+            yield Quadratic(knots, degree, n)
+
+
+def constant(problem: Problem, form: LyapunovForm) -> Unknown:
+    """A constant P, which proves for every rate what it proves for jumps."""
+    n, knots = len(problem.lpv.states), _knots(problem, form, 8, 0)
+    if isinstance(form, HigherOrder):
+        return OfMonomials(knots, 0, n, form.order)
+    return Quadratic(knots, 0, n)
+
+
+def _knots(problem: Problem, form: LyapunovForm, segments: int, degree: int) -> Array:
+    low, high = problem.pieces[0].low, problem.pieces[-1].high
+    breaks = [piece.low for piece in problem.pieces[1:]]
+    if degree and 2.5 * problem.step >= high - low:
+        return np.array([low, high])
+    return graded_knots(
+        low,
+        high,
+        segments,
+        2.0 if form.grading is None else form.grading,
+        breaks,
+        shortest=2.5 * problem.step if degree else 0.0,
+    )

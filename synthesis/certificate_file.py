@@ -1,0 +1,247 @@
+"""Certificates as JSON files, from which alone they are verified again.
+
+A file has a schema and its version, the claim, and the proof: model, units and Lyapunov function.
+Every value is a number, a text or a list, an array with its shape, or a value of one of the `TYPES`
+by its name and fields. Doubles are written in the digits that give them back. What can be derived
+from the model (its pieces) is derived anew. Reading believes nothing: each value is checked where
+it is made, and the proof once more in floating point.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symheli.errors import CertificateError, InputError
+from symheli.lpv import LFT, LPVStateSpace, Scheduling, bases
+from symheli.lpv.lft import Block
+from symheli.values import Signal
+from symheli.values.whole_files import write_text
+from synthesis.analysis.hypotheses import motion
+from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
+from synthesis.lft import proof as lft_proof
+from synthesis.lft.coordinates import Coordinates
+from synthesis.lft.multipliers import Multiplier
+from synthesis.lyapunov.box import BoxLyapunov
+from synthesis.lyapunov.lag import LagRegion
+from synthesis.lyapunov.spline import MemoryLyapunov, SplineLyapunov
+from synthesis.polynomial.matrix import PolynomialMatrix
+from synthesis.polynomial.motion import Motion
+from synthesis.polynomial.pieces import model_pieces, pieces
+from synthesis.program.scaling import Scaling
+from synthesis.proof import box, one_parameter
+from synthesis.proof.inequalities import Demand
+from synthesis.worst.trajectory import Trajectory
+
+SCHEMA = "symheli certificate"
+VERSION = 1
+
+TYPES: dict[str, Any] = {
+    kind.__name__: kind
+    for kind in (
+        *(Attempt, Seconds, Trajectory, Scheduling, Block, LFT, LPVStateSpace),
+        *(PolynomialMatrix, Motion, Scaling, box.Units, Demand, Coordinates),
+        *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
+        *(Multiplier, lft_proof.Quadratic),
+        *(bases.Polynomial, bases.BSpline, bases.PiecewiseLinear, bases.Spline, bases.Product),
+    )
+}
+"""What a file may contain, by name."""
+
+LEFT_OUT = {LPVStateSpace: ("trim", "residuals")}
+"""What the model of a proof does without."""
+
+ROUTES = {
+    "one parameter": one_parameter.Evidence,
+    "box": box.Evidence,
+    "lft": lft_proof.Evidence,
+}
+DERIVED = {"pieces", "model"}
+
+
+def written(cert: Certificate, path: str | os.PathLike[str]) -> Path:
+    """Write the certificate; see `Certificate.save`."""
+    claim = {f.name: getattr(cert, f.name) for f in fields(cert) if f.name != "proof"}
+    content = {
+        "schema": SCHEMA,
+        "version": VERSION,
+        **_encoded({**claim, "status": cert.status.name}),
+        "proof": None if cert.proof is None else _encoded_proof(cert.proof),
+    }
+    return write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def read(path: str | os.PathLike[str]) -> Certificate:
+    """Read a certificate; see `Certificate.load`."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"{path}: expected a certificate as JSON, got a file that is damaged or none ({error});"
+            " write it again with Certificate.save"
+        ) from None
+    if not isinstance(content, dict) or content.get("schema") != SCHEMA:
+        raise InputError(
+            f"{path}: expected the schema {SCHEMA!r}; this file was not written by Certificate.save"
+        )
+    if content.get("version") != VERSION or isinstance(content.get("version"), bool):
+        raise InputError(
+            f"{path}: expected version {VERSION} of the schema, got {content.get('version')!r:.60};"
+            " read it with the version of symheli that wrote it"
+        )
+    try:
+        with np.errstate(all="ignore"):
+            cert = _certificate(content)
+    except (CertificateError, InputError) as error:
+        raise type(error)(f"{path}: {error}") from None
+    except (
+        *(TypeError, ValueError, AttributeError, LookupError),
+        *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
+    ) as error:
+        raise InputError(f"{path}: damaged, a value is not what it should be ({error})") from None
+    if cert.verified and not cert.verify():
+        why = cert.fault or "the inequalities do not hold with this bound"
+        raise CertificateError(f"{path}: the proof does not prove the claim: {why}")
+    return cert
+
+
+def _certificate(content: Mapping[str, Any]) -> Certificate:
+    names = {f.name for f in fields(Certificate)}
+    missing, foreign = names - content.keys(), content.keys() - names - {"schema", "version"}
+    if missing or foreign:
+        raise InputError(
+            f"expected the fields of a certificate; missing: {', '.join(sorted(missing)) or 'none'}"
+            f"; unknown: {', '.join(sorted(foreign)) or 'none'}"
+        )
+    claim = {name: _decoded(content[name]) for name in names if name != "proof"}
+    if claim["status"] not in Status.__members__:
+        raise InputError(f"expected the name of a status, got {claim['status']!r:.60}")
+    claim["status"] = Status[claim["status"]]
+    if not isinstance(claim["verified"], bool):
+        raise InputError(f"verified must be true or false, got {claim['verified']!r:.60}")
+    for name, kind in (("seconds", Seconds), ("worst", Trajectory | None)):
+        if not isinstance(claim[name], kind):
+            raise InputError(f"{name} is not what it should be: {claim[name]!r:.60}")
+    for name, kind in (("hypotheses", str), ("attempts", Attempt)):
+        values = claim[name]
+        if not isinstance(values, tuple) or not all(isinstance(v, kind) for v in values):
+            raise InputError(f"{name} are not what they should be: {values!r:.60}")
+    if not isinstance(claim["method"], str) or not isinstance(claim["solver"], str):
+        raise InputError("method and solver must be texts")
+    proof = content["proof"]
+    cert = Certificate(**claim, proof=None if proof is None else _decoded_proof(proof))
+    if cert.proof is not None:
+        for s, rate in zip(cert.proof.evidence.parameters, cert.rates, strict=True):
+            if motion(s, rate) not in cert.hypotheses:
+                raise CertificateError(
+                    "the hypotheses do not say for which range and rate of"
+                    f" {s.name} the proof holds: {motion(s, rate)}"
+                )
+    return cert
+
+
+def _encoded_proof(proof: Proof) -> dict[str, Any]:
+    evidence = proof.evidence
+    route = next(name for name, kind in ROUTES.items() if isinstance(evidence, kind))
+    own = {
+        name: value
+        for name, value in evidence._asdict().items()  # type: ignore[attr-defined]
+        if name not in DERIVED
+    }
+    if isinstance(evidence, box.Evidence):
+        own["source"] = evidence.model.source
+    return {"route": route, **_encoded(own), "lyapunov": _encoded(proof.lyapunov)}
+
+
+def _decoded_proof(content: Any) -> Proof:
+    if not isinstance(content, dict) or content.get("route") not in ROUTES:
+        raise InputError(f"expected a proof by one of the routes {', '.join(ROUTES)}")
+    route = content["route"]
+    own = {name: _decoded(v) for name, v in content.items() if name not in ("route", "lyapunov")}
+    if route == "one parameter":
+        own["pieces"] = model_pieces(_a(LPVStateSpace, own["lpv"]))
+    elif route == "box":
+        own["model"] = pieces(_a(LPVStateSpace, own.pop("source")))
+    else:
+        _a(LFT, own["lft"])
+    for name, kind in (
+        ("units", Scaling if route == "one parameter" else box.Units),
+        ("demand", Demand),
+        ("coordinates", Coordinates),
+    ):
+        if name in own:
+            _a(kind, own[name])
+    return Proof(ROUTES[route](**own), _decoded(content["lyapunov"]))
+
+
+def _a(kind: Any, value: Any) -> Any:
+    if not isinstance(value, kind):
+        raise InputError(f"expected {getattr(kind, '__name__', kind)}, got {value!r:.60}")
+    return value
+
+
+def _encoded(value: Any) -> Any:
+    if isinstance(value, Signal):
+        return {"signal": str(value), "unit": value.unit}
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else {"float": repr(float(value))}
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.ndarray):
+        numbers = [_encoded(v) for v in value.ravel().tolist()]
+        return {"shape": list(value.shape), "array": numbers}
+    if isinstance(value, dict):
+        return {name: _encoded(v) for name, v in value.items()}
+    if type(value) in TYPES.values():
+        left_out = LEFT_OUT.get(type(value), ())
+        names = (
+            [f.name for f in fields(value) if f.init]
+            if is_dataclass(value)
+            else list(value._fields)
+        )
+        own = {name: _encoded(getattr(value, name)) for name in names if name not in left_out}
+        return {"type": type(value).__name__, **own}
+    if isinstance(value, tuple | list):
+        return [_encoded(v) for v in value]
+    raise InputError(
+        f"a {type(value).__name__} cannot be written to a file; fit the model to a polynomial or"
+        " spline basis first, or keep the certificate in memory"
+    )
+
+
+def _decoded(value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(map(_decoded, value))
+    if not isinstance(value, dict):
+        return value
+    if value.keys() == {"float"}:
+        number = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}.get(value["float"])
+        if number is None:
+            raise InputError(f"expected nan, inf or -inf, got {value['float']!r:.60}")
+        return number
+    if value.keys() == {"signal", "unit"}:
+        return Signal(_a(str, value["signal"]), _a(str, value["unit"]))
+    if value.keys() == {"shape", "array"}:
+        numbers = [_decoded(v) for v in _a(list, value["array"])]
+        if not all(isinstance(v, float | int) and not isinstance(v, bool) for v in numbers):
+            raise InputError("expected an array of numbers")
+        return np.array(numbers, dtype=float).reshape(_a(list, value["shape"]))
+    kind = TYPES.get(value.get("type", ""))
+    if kind is None:
+        raise InputError(f"unknown kind of value {value.get('type')!r:.60}")
+    return kind(**{name: _decoded(v) for name, v in value.items() if name != "type"})
+
+
+def _refused(constant: str) -> None:
+    raise ValueError(f"{constant} is not JSON")

@@ -1,0 +1,178 @@
+"""How an inequality is imposed for every p of a range, as one asks for it; docs/relaxations.md says
+what each promises.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from symheli.errors import InputError
+
+MARGINS = (1e-6, 1e-4)
+"""State blocks are held below -margin I in scaled coordinates, tried in turn."""
+FLOOR = 1e-6
+"""P is held above floor I in scaled coordinates."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Strictly:
+    """How strictly: see `Bernstein`."""
+
+    margins: tuple[float, ...] | None = None
+    floor: float | None = None
+
+    found_by: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        if self.margins is not None and not (self.margins and min(self.margins) >= 0):
+            raise InputError(f"margins must be numbers >= 0, got {self.margins!r}")
+        if self.floor is not None and not self.floor >= 0:
+            raise InputError(f"floor must be >= 0, got {self.floor!r}")
+
+    @property
+    def tried(self) -> tuple[float, ...]:
+        """The margins, or the usual ones."""
+        return MARGINS if self.margins is None else self.margins
+
+    @property
+    def least(self) -> float:
+        """The floor, or the usual one."""
+        return FLOOR if self.floor is None else self.floor
+
+
+def _counted(**counts: tuple[int, int]) -> None:
+    for name, (value, least) in counts.items():
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise InputError(f"{name} must be an integer >= {least}, got {value!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bernstein(_Strictly):
+    """One LMI per Bernstein coefficient: sufficient, and exact in the limit.
+
+    Parameters
+    ----------
+    elevation : int
+        Raises the degree of the Bernstein form, which brings its coefficients closer to the values.
+    subdivision : int
+        Halves every range that often before the coefficients are taken.
+    margins : tuple of float, optional
+        State blocks are held below -margin I in scaled coordinates, tried in turn: (1e-6, 1e-4).
+        For gains alone.
+    floor : float, optional
+        P is held above floor I in scaled coordinates: 1e-6. For gains alone.
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+
+    Examples
+    --------
+    >>> Bernstein(elevation=1).tried
+    (1e-06, 0.0001)
+    """
+
+    elevation: int = 0
+    subdivision: int = 0
+
+    found_by = "one LMI per Bernstein coefficient"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _counted(elevation=(self.elevation, 0), subdivision=(self.subdivision, 0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SumOfSquares(_Strictly):
+    """Matrix sums of squares: sufficient; for one parameter exact. Never worse than `Bernstein`.
+
+    Parameters
+    ----------
+    elevation : int
+        Raises the degree of the sums of squares.
+    margins, floor
+        As in `Bernstein`.
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+
+    References
+    ----------
+    Scherer and Hol, "Matrix sum-of-squares relaxations for robust semi-definite programs",
+    Mathematical Programming 107 (2006).
+
+    Examples
+    --------
+    >>> SumOfSquares().found_by
+    'matrix sums of squares'
+    """
+
+    elevation: int = 0
+
+    found_by = "matrix sums of squares"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _counted(elevation=(self.elevation, 0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vertices(_Strictly):
+    """At the corners, with convexity along every axis: sufficient; exact for multi-affine LMIs.
+
+    Parameters
+    ----------
+    margins, floor
+        As in `Bernstein`.
+
+    References
+    ----------
+    Gahinet, Apkarian and Chilali, "Affine parameter-dependent Lyapunov functions and real
+    parametric uncertainty", IEEE Trans. Automatic Control 41 (1996).
+
+    Examples
+    --------
+    >>> Vertices().found_by
+    'LMIs at the vertices with convexity along every axis'
+    """
+
+    found_by = "LMIs at the vertices with convexity along every axis"
+
+
+@dataclass(frozen=True)
+class Grid(_Strictly):
+    """On a grid: proves nothing; the certificate is `UNPROVEN` and gives an `indicative` bound.
+
+    Parameters
+    ----------
+    points : int
+        Of each parameter in every region.
+    margins, floor
+        As in `Bernstein`.
+
+    Raises
+    ------
+    InputError
+        For fewer than two points.
+
+    Examples
+    --------
+    >>> Grid(21).points
+    21
+    """
+
+    points: int = 11
+
+    found_by = "LMIs on a grid"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _counted(points=(self.points, 2))
+
+
+Imposed = Bernstein | SumOfSquares | Vertices | Grid
+"""What `impose` may be."""
