@@ -37,6 +37,7 @@ from synthesis.polynomial.pieces import model_pieces, pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.program.scaling import Scaling
 from synthesis.proof import box, one_parameter
+from synthesis.proof.drift import Drift
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.trajectory import Trajectory
 
@@ -47,7 +48,7 @@ TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
         *(Attempt, Seconds, Trajectory, Scheduling, Block, LFT, LPVStateSpace),
-        *(PolynomialMatrix, PolynomialStateSpace, Scaling, box.Units, Demand, Coordinates),
+        *(PolynomialMatrix, PolynomialStateSpace, Scaling, box.Units, Demand, Drift, Coordinates),
         *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
         *(Multiplier, lft_proof.Quadratic),
         *(bases.Polynomial, bases.BSpline, bases.PiecewiseLinear, bases.Spline, bases.Product),

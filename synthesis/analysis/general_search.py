@@ -58,7 +58,7 @@ class General(Ladder):
             0 if model.dt is None and math.isinf(rate) else degree
             for rate in self.asked.demand.rates
         )
-        steps = self.asked.demand.steps(model.dt, degrees)
+        steps = self.asked.demand.drift.steps(model.dt, degrees)
         total = form.total_degree if isinstance(form, Spline) else None
         out: list[Shape] = []
         for segments in form.tried or ((4, 8) if m == 1 else (1,)):

@@ -12,6 +12,7 @@ from synthesis.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.polynomial.pieces import Pieces, pieces
 from synthesis.polynomial.state_space import PolynomialStateSpace
 from synthesis.program.cone_program import Solver
+from synthesis.proof.drift import Drift
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.lower_bound import Search
 from synthesis.worst.rates import Rate, rates
@@ -72,7 +73,9 @@ def question(
     if search is not None and not isinstance(search, Search):
         raise InputError(f"search must be a Search, or None for none, got {search!r:.60}")
     own = pieces(_accepted(model))
-    asked = Question(own, Demand(kind, rates(own.parameters, rate)), form, impose, solver, search)
+    asked = Question(
+        own, Demand(kind, Drift(rates(own.parameters, rate))), form, impose, solver, search
+    )
     _check_channels(asked)
     _check_options(asked)
     return asked

@@ -108,7 +108,7 @@ def affine_inequalities(
         back_off = margin * svec(np.diag(np.r_[np.ones(nx), np.zeros(nu)]))
     else:
         level, fixed, back_off = svec(eye), 0 * eye, nothing
-    for region in regions(model, shape.knots, demand.steps(model.dt, shape.degrees)):
+    for region in regions(model, shape.knots, demand.drift.steps(model.dt, shape.degrees)):
         columns, pair = _pair(shape, region, nx)
         for F in decrease(model, region, pair, demand, float):
             W = extended(weight, F.shape[0] - nx)

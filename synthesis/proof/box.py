@@ -115,14 +115,11 @@ class Evidence(NamedTuple):
     def scaled(self) -> tuple[Pieces, Demand]:
         """Model and demand in the scaled units."""
         u = self.units
-        rates = (
-            tuple(r * u.time for r in self.demand.rates)
-            if self.model.dt is None
-            else self.demand.rates
-        )
+        drift = self.demand.drift
+        drift = drift.in_units(u.time) if self.model.dt is None else drift
         return self.model.scaled(
             u.left, u.right, u.inputs, u.outputs, u.time
-        ), self.demand._replace(rates=rates)
+        ), self.demand._replace(drift=drift)
 
     def in_units(self, value: float) -> float:
         """A physical gain (decay rate, 1/s) in the scaled units."""
@@ -145,7 +142,7 @@ class Evidence(NamedTuple):
         """
         kind, units = self.demand.kind, self.units
         model, demand = self.scaled
-        if not demand.meaningful(model.dt, P.degrees):
+        if not demand.drift.meaningful(model.dt, P.degrees):
             return P, -math.inf if kind == "decay rate" else math.inf
         back = BoxLyapunov(P.knots, P.degrees, units.to_scaled(P.coefficients))
         if kind == "stability":
@@ -206,7 +203,7 @@ class Evidence(NamedTuple):
     def floating(self, P: BoxLyapunov, bound: float) -> bool:
         """The whole box in floating point, and a grid of p through the model's own matrices."""
         model, demand = self.scaled
-        if not demand.meaningful(model.dt, P.degrees) or math.isinf(bound):
+        if not demand.drift.meaningful(model.dt, P.degrees) or math.isinf(bound):
             return False
         back = BoxLyapunov(P.knots, P.degrees, self.units.to_scaled(P.coefficients))
         if not all(
@@ -219,7 +216,7 @@ class Evidence(NamedTuple):
         """The whole box in rational arithmetic: the doubles of model, P, rates and bound as the
         rationals they are.
         """
-        if not self.demand.meaningful(self.model.dt, P.degrees) or math.isinf(bound):
+        if not self.demand.drift.meaningful(self.model.dt, P.degrees) or math.isinf(bound):
             return False
         exactly = all(
             map(
@@ -250,19 +247,12 @@ class Evidence(NamedTuple):
         own = model.at(points)
         alpha = number(bound) if demand.kind == "decay rate" else number(0.0)
         g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
-        steps = demand.steps(dt, P.degrees)
-        corners = list(
-            product(
-                *(
-                    (-1, 1) if d and r > 0 else (0,)
-                    for d, r in zip(P.degrees, demand.rates, strict=True)
-                )
-            )
-        )
+        steps = demand.drift.steps(dt, P.degrees)
+        directions = list(demand.drift.directions(P.degrees)) or [()]
         for k, p in enumerate(points):
             if not self._reproduced(p, [M[k] for M in own]):
                 return False
-            A, B, C, D = (pointwise.numbers(M[k], number) for M in own)
+            A, B, C, D = (exact(M[k], number) for M in own)
             here, slopes = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, p, number)
             forms: list[Array] = [-here]
             through = Matrices(A, B, C, D)
@@ -287,11 +277,10 @@ class Evidence(NamedTuple):
                     )
             level = number(1.0) if demand.kind == "energy-to-peak gain" else g
             if dt is None:
-                for signs in corners:
-                    moving = zip(signs, demand.rates, slopes, strict=True)
+                for direction in directions:
                     drift = 2 * alpha * here
-                    for sign, r, slope in moving:
-                        drift = drift + sign * number(r) * slope if sign else drift
+                    for i, speed in direction:
+                        drift = drift + number(speed) * slopes[i]
                     forms.append(pointwise.dissipation(through, here, drift, None, level))
             else:
                 growth = (
@@ -364,13 +353,14 @@ class Evidence(NamedTuple):
         E = np.concatenate([np.eye(nx), np.zeros((nx, nu))], axis=1)
         if dt is None:
             still = E.T @ here @ M + np.swapaxes(M, 1, 2) @ here @ E + 2 * alpha * E.T @ here @ E
-            varying = [(i, r) for i, r in enumerate(self.demand.rates) if P.degrees[i] and r > 0]
-            slopes = [r * (E.T @ P.derivative(grid, i) @ E) for i, r in varying]
-            for signs in product((-1.0, 1.0), repeat=len(slopes)):
-                yield sum((s * slope for s, slope in zip(signs, slopes, strict=True)), still.copy())
+            slopes = {
+                i: E.T @ P.derivative(grid, i) @ E for i in self.demand.drift.moving(P.degrees)
+            }
+            for direction in list(self.demand.drift.directions(P.degrees)) or [()]:
+                yield sum((speed * slopes[i] for i, speed in direction), still.copy())
             return
         low, high = np.array([(s.low, s.high) for s in self.model.parameters]).T
-        steps = np.array(self.demand.steps(dt, P.degrees))
+        steps = np.array(self.demand.drift.steps(dt, P.degrees))
         for signs in product((-1.0, 0.0, 1.0), repeat=int((steps > 0).sum())):
             move = np.zeros(len(steps))
             move[steps > 0] = np.array(signs) * np.minimum(steps, high - low)[steps > 0]
@@ -388,7 +378,7 @@ def polynomials(
     g = number(bound) * number(bound) if demand.kind in ("l2 gain", "energy-to-peak gain") else None
     if demand.kind == "decay rate":
         demand = demand._replace(shift=bound)
-    for region in regions(model, P.knots, demand.steps(model.dt, P.degrees)):
+    for region in regions(model, P.knots, demand.drift.steps(model.dt, P.degrees)):
         pair = Pair(
             *(convert(P.segment(index), number) for index in (region.segment, region.next_segment))
         )
@@ -471,7 +461,7 @@ class _Samples(NamedTuple):
 def _samples(model: Pieces, P: BoxLyapunov, demand: Demand, points: int) -> _Samples:
     nx, _, ny = model.sizes
     moves, here, outputs = [], [], []
-    for region in regions(model, P.knots, demand.steps(model.dt, P.degrees)):
+    for region in regions(model, P.knots, demand.drift.steps(model.dt, P.degrees)):
         pair = Pair(P.segment(region.segment), P.segment(region.next_segment))
         for F in decrease(model, region, pair, demand, float):
             local = _grid(F, points)

@@ -21,8 +21,7 @@ sections 5.1 and 6.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from itertools import product
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,32 +31,24 @@ from synthesis.polynomial.exact import Number, exact
 from synthesis.polynomial.matrix import PolynomialMatrix, block
 from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import Region, model_on, now, successor
+from synthesis.proof.drift import Drift
 
 Array = np.ndarray
 
 
 class Demand(NamedTuple):
-    """What is asked: `kind`; `rates` of the parameters in their units per second; `shift`: alpha of
-    a decay rate, 1/s, else 0.
+    """What is asked: `kind`; the `drift` of the parameters; `shift`: alpha of a decay rate, 1/s,
+    else 0.
     """
 
     kind: Kind
-    rates: tuple[float, ...]
+    drift: Drift
     shift: float = 0.0
 
-    def steps(self, dt: float | None, degrees: Sequence[int]) -> tuple[float, ...]:
-        """Largest change of each parameter in a sample that matters to P; 0 in continuous time."""
-        return tuple(
-            rate * dt if dt and d else 0.0 for rate, d in zip(self.rates, degrees, strict=True)
-        )
-
-    def meaningful(self, dt: float | None, degrees: Sequence[int]) -> bool:
-        """False where P varies with a p that may jump in continuous time: dV/dt has no bound
-        then.
-        """
-        return dt is not None or all(
-            math.isfinite(r) or d == 0 for r, d in zip(self.rates, degrees, strict=True)
-        )
+    @property
+    def rates(self) -> tuple[float, ...]:
+        """Bounds on the rates, in units of the parameters per second."""
+        return self.drift.rates
 
 
 class Pair(NamedTuple):
@@ -84,7 +75,7 @@ def decrease(
     gain = demand.kind == "l2 gain"
     channels = demand.kind in ("l2 gain", "energy-to-peak gain")
     if model.dt is not None:
-        moving = [step > 0 for step in demand.steps(model.dt, P.here.degrees)]
+        moving = [step > 0 for step in demand.drift.steps(model.dt, P.here.degrees)]
         there = successor(P.there, region, number, moving)
         unit = there.box[m:]
         A, B, C, D, here = (M.extend(unit) for M in (A, B, C, D, here))
@@ -96,19 +87,11 @@ def decrease(
         PA = here @ A
         top = PA + PA.T + here * (2 * number(demand.shift)) if demand.shift else PA + PA.T
         side, corner = here @ B, B.T @ B * 0
-        varying = [(i, rate) for i, rate in enumerate(demand.rates) if here.degrees[i] and rate > 0]
-        slopes = [here.derivative(i) * number(rate) for i, rate in varying]
+        slopes = {i: here.derivative(i) for i in demand.drift.moving(here.degrees)}
         drifts = [
-            (
-                sum(
-                    (s * sign for s, sign in zip(slopes[1:], signs[1:], strict=True)),
-                    slopes[0] * signs[0],
-                )
-                if slopes
-                else None
-            )
-            for signs in product((-1, 1), repeat=len(slopes))
-        ]
+            sum((slopes[i] * number(v) for i, v in rest), slopes[first] * number(speed))
+            for (first, speed), *rest in demand.drift.directions(here.degrees)
+        ] or [None]
     if gain:
         top, side, corner = top + C.T @ C, side + C.T @ D, corner + D.T @ D
     for drift in drifts:

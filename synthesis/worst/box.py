@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +18,8 @@ from synthesis.program.scaling import balance
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.budget import Budget
 from synthesis.worst.frozen import FrozenGain, norm, to_continuous
-from synthesis.worst.lower_bound import Search, growing_trajectory, lower_bound
+from synthesis.worst.lines import Line, alone, directions, growing_on, shared
+from synthesis.worst.lower_bound import Search, lower_bound
 from synthesis.worst.over_box import grid_of, worst_over
 from synthesis.worst.periodic import multiplier
 from synthesis.worst.spectrum import surely_unstable
@@ -130,29 +129,19 @@ def worst_moving(
     the state grows.
     """
     best = frozen
-    if search is None or all(rate == 0 for rate in demand.rates):
-        return best
-    budget, lines = (
-        Budget(search.seconds),
-        [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.rate > 0],
-    )
+    lines = [line for line in _lines(model, demand.rates) if line.rate > 0]
     near = frozen.p[0] if isinstance(model, LPVStateSpace) and frozen.p else 0.0
-    for k, (line, back) in enumerate(lines):
-        if budget.over:
-            break
-        budget.tell("line %d of %d, %.6g so far", k + 1, len(lines), abs(best.value))
-        rate, search = line.scheduling.rate, replace(search, seconds=budget.left / (len(lines) - k))
+    for line, share in shared(lines, search):
         if demand.kind == "l2 gain":
-            found = lower_bound(
-                line, rate, frozen=FrozenGain(frozen.value, near, math.nan), search=search
-            )
+            known = FrozenGain(frozen.value, near, math.nan)
+            found = lower_bound(line.model, line.rate, frozen=known, search=share)
             value, trajectory = found.gamma, found.trajectory
         elif demand.kind == "energy-to-peak gain":
-            value, trajectory = _peaks(line, rate, search)
+            value, trajectory = _peaks(line.model, line.rate, share)
         else:
-            value, trajectory = _slowest(line, rate, search)
+            value, trajectory = _slowest(line.model, line.rate, share)
         if trajectory is not None and value > best.value:
-            best = Worst(value, None, Trajectory(trajectory.time, back(trajectory.p)))
+            best = Worst(value, None, line.in_box(trajectory))
         if math.isinf(best.value):
             break
     return best
@@ -162,18 +151,7 @@ def growing(
     model: LPVStateSpace | PolynomialStateSpace, demand: Demand, search: Search | None
 ) -> Trajectory | None:
     """A p(t) on such a line along which the state grows, None where none was found."""
-    if search is None:
-        return None
-    budget, lines = Budget(search.seconds), list(_lines(model, demand.rates))
-    for k, (line, back) in enumerate(lines):
-        if budget.over:
-            break
-        budget.tell("line %d of %d", k + 1, len(lines))
-        search = replace(search, seconds=budget.left / (len(lines) - k))
-        found = growing_trajectory(line, line.scheduling.rate, search)
-        if found is not None:
-            return Trajectory(found.time, back(found.p))
-    return None
+    return growing_on(_lines(model, demand.rates), search)
 
 
 def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:
@@ -230,27 +208,14 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
     return best
 
 
-def _lines(
-    model: LPVStateSpace | PolynomialStateSpace, rates: Sequence[float]
-) -> Iterator[tuple[LPVStateSpace, Callable[[Array], Array]]]:
-    """Diagonals and axes of the box as models of one parameter within the rates, and the way back
-    to p.
-    """
+def _lines(model: LPVStateSpace | PolynomialStateSpace, rates: Sequence[float]) -> Iterator[Line]:
+    """Diagonals and axes of the box as models of one parameter within the rates."""
     if isinstance(model, LPVStateSpace):
-        yield model.with_rate(rates[0]), lambda p: p
+        yield Line(model.with_rate(rates[0]), rates[0], lambda p: p)
         return
     low, high = np.array(model.box).T
-    m = len(low)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    directions = [np.array((1.0, *signs)) for signs in product((1.0, -1.0), repeat=m - 1)] + (
-        list(np.eye(m)) if m > 1 else []
-    )
-    for d in directions:
-        line = model.along(middle - d * half, middle + d * half)
+    for d in directions(len(low)):
         rate = min(r / h for r, h, used in zip(rates, half, d, strict=True) if used)
-        yield (
-            line.with_rate(rate),
-            lambda s, d=d: (
-                middle + np.multiply.outer(s, d * half) if m > 1 else middle[0] + s * half[0]
-            ),
-        )
+        own = model.along(middle - d * half, middle + d * half).with_rate(rate)
+        yield Line(own, rate, lambda s, d=d: alone(middle + np.multiply.outer(s, d * half)))
