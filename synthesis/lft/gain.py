@@ -45,7 +45,7 @@ def lft_gain(
     solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
 ) -> Certificate:
-    """Certified upper bound of the L2 gain of an LFT while p(t) moves in its box as fast as it likes.
+    """Certified upper bound of the L2 gain of an LFT, p(t) in its box as fast as it likes.
 
     Parameters
     ----------

@@ -37,13 +37,40 @@ class Bandwidth(NamedTuple):
 def bandwidth(
     model: LinearModel, band: tuple[float, float] = (1.0, 60.0), points: int = 2000
 ) -> Bandwidth:
-    """ADS-33 bandwidth and phase delay of the attitude response `model` (one input, one output: rad
-    per rad of stick).
+    """ADS-33 bandwidth and phase delay of an attitude response.
 
-    `band` (rad/s) is searched; its lower end lies above the phugoid, where attitude already
-    integrates rate (phase near -90 deg); a response of opposite sign is turned round. Put servos
-    and delays into the model first. Raises `InputError`. Source: ADS-33E-PRF (2000), figure 5
-    (definitions of bandwidth and phase delay).
+    Parameters
+    ----------
+    model : LinearModel
+        One input, one output: rad per rad of stick. Put servos and delays into it first; a response
+        of opposite sign is turned round.
+    band : (float, float)
+        Searched, rad/s; its lower end lies above the phugoid, where attitude already integrates
+        rate (phase near -90 deg).
+    points : int
+        Of the frequency grid.
+
+    Returns
+    -------
+    Bandwidth
+        In rad/s, and the phase delay in s.
+
+    Raises
+    ------
+    InputError
+        For several channels, an empty band or no response.
+
+    References
+    ----------
+    ADS-33E-PRF (2000), figure 5.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LinearModel
+    >>> A, B = [[-4.0, 0.0], [1.0, 0.0]], [[1.0], [0.0]]  # 1/(s (s + 4)): 45 deg left at 4 rad/s
+    >>> roll = LinearModel(A, B, [[0.0, 1.0]], [[0.0]], ["p", "phi"], ["d_lat"], ["phi"])
+    >>> print(f"{bandwidth(roll).attitude_response:.2f} rad/s")
+    4.00 rad/s
     """
     if len(model.inputs) != 1 or len(model.outputs) != 1:
         raise InputError(

@@ -56,11 +56,37 @@ UNSTABLE = Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, ())
 
 
 def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str) -> LinearModel:
-    """The loop of u = feedback y broken at the input `at`, the others closed, as L of 1 + L
-    (negative feedback).
+    """The loop of u = feedback y broken at one input, as L of 1 + L (negative feedback).
 
-    `feedback` {(input, output): gain} as in `LinearModel.feedback`. Outputs fed back must have no
-    feedthrough (`InputError`).
+    Parameters
+    ----------
+    plant : LinearModel
+        The model, nx states.
+    feedback : mapping
+        {(input, output): gain} as in `LinearModel.feedback`; gains in units of the input per unit
+        of the output.
+    at : str
+        The input at which the loop is broken; the others stay closed.
+
+    Returns
+    -------
+    LinearModel
+        L, from that input to itself.
+
+    Raises
+    ------
+    InputError
+        Where an output that is fed back has feedthrough.
+    UnknownNameError
+        For an input that the plant does not have.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LinearModel
+    >>> plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"])  # 1/s
+    >>> L = loop(plant, {("u", "y"): -2.0}, "u")  # 2/s
+    >>> float(L.C[0, 0])
+    2.0
     """
     (i,) = indices([at], plant.inputs, "input")
     row = feedback_matrix(
@@ -88,13 +114,40 @@ def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str)
 
 
 def margins(loop: LinearModel) -> Margins:
-    """Gain, phase, delay and disk margins of a scalar loop L under negative feedback, without a
-    frequency grid.
+    """Gain, phase, delay and disk margins of a scalar loop L under negative feedback.
 
-    Unit-gain crossings are eigenvalues of a Hamiltonian matrix, phase crossings zeros of L(s) -
-    L(-s), the disk an H-infinity norm. In discrete time delays count in whole and broken samples
-    alike (a phase of omega times the delay). Source: Seiler, Packard and Gahinet, "An introduction
-    to disk margins", IEEE Control Systems Magazine 40 (2020).
+    Without a frequency grid: unit-gain crossings are eigenvalues of a Hamiltonian matrix, phase
+    crossings zeros of L(s) - L(-s), the disk an H-infinity norm. In discrete time delays count in
+    whole and broken samples alike (a phase of omega times the delay).
+
+    Parameters
+    ----------
+    loop : LinearModel
+        L, one input and one output.
+
+    Returns
+    -------
+    Margins
+        Gain factors, phase (rad), delay (s) and the disk.
+
+    Raises
+    ------
+    InputError
+        For a loop of several channels.
+
+    References
+    ----------
+    Seiler, Packard and Gahinet, "An introduction to disk margins", IEEE Control Systems Magazine 40
+    (2020).
+
+    Examples
+    --------
+    >>> from symheli.lpv import LinearModel
+    >>> plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"])  # 1/s
+    >>> from synthesis import loop
+    >>> found = margins(loop(plant, {("u", "y"): -2.0}, "u"))  # 2/s: 90 deg at 2 rad/s
+    >>> print(f"{found.phase:.4f} rad, {found.delay:.4f} s")
+    1.5708 rad, 0.7854 s
     """
     if len(loop.inputs) != 1 or len(loop.outputs) != 1:
         raise InputError(
@@ -141,10 +194,38 @@ def margins(loop: LinearModel) -> Margins:
 
 
 def disk_margin(loop: LinearModel) -> float:
-    """alpha of the balanced disk: 1/|S - I/2| in the H-infinity norm, 0 where the loop is unstable.
+    """alpha of the balanced disk, 1/|S - I/2| in the H-infinity norm; 0 for an unstable loop.
 
     For a square loop of several channels all may change at once and independently, and be coupled:
     a lower bound of what a diagonal change needs.
+
+    Parameters
+    ----------
+    loop : LinearModel
+        L, as many inputs as outputs.
+
+    Returns
+    -------
+    float
+        alpha: 2 at most, without unit.
+
+    Raises
+    ------
+    InputError
+        For a loop that is not square.
+
+    References
+    ----------
+    Seiler, Packard and Gahinet, "An introduction to disk margins", IEEE Control Systems Magazine 40
+    (2020).
+
+    Examples
+    --------
+    >>> from symheli.lpv import LinearModel
+    >>> plant = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["y"], ["u"], ["y"])  # 1/s
+    >>> from synthesis import loop
+    >>> print(f"{disk_margin(loop(plant, {('u', 'y'): -2.0}, 'u')):.3f}")
+    2.000
     """
     if len(loop.inputs) != len(loop.outputs):
         raise InputError(

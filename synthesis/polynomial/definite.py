@@ -57,10 +57,7 @@ def negative_definite_exactly(F: PolynomialMatrix, cells: int = CELLS) -> bool:
         promising = bool(np.all(np.linalg.eigvalsh(_normalised(numbers))[:, -1] < 0))
         if promising and all(positive_definite(-M) for M in matrices):
             continue
-        corners = G.coefficients[tuple(slice(None, None, max(d, 1)) for d in G.degrees)].reshape(
-            -1, *G.shape
-        )
-        if not all(positive_definite(-M) for M in corners):
+        if not all(positive_definite(-M) for M in G.corners()):
             return False
         curvature = _curvature(numbers.reshape(1, *G.coefficients.shape), len(G.box))[0]
         if curvature.max() == 0.0:

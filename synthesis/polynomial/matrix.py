@@ -21,13 +21,37 @@ Box = tuple[tuple[Any, Any], ...]
 
 @dataclass(frozen=True, eq=False)
 class PolynomialMatrix:
-    """F(p) for p in `box`, one (low, high) a parameter, by its Bernstein coefficients.
+    """F(p) for p in `box`, by its coefficients in tensor-product Bernstein form.
 
-    `coefficients` (d_1 + 1, ..., d_m + 1, ..., rows, columns) of degree d_i in parameter i; axes
-    between the m first and the two last are a stack of matrices, which broadcast. Floats, or exact
-    rationals in object arrays (the box in the same arithmetic). On the whole box F(p) lies in the
-    convex hull of its coefficients; those at the corners are its values there. Operands must share
-    the box. Raises `InputError` otherwise, and for coefficients of fewer than m + 2 axes.
+    On the whole box F(p) lies in the convex hull of its coefficients; those at the corners are its
+    values there. Operands must share the box.
+
+    Parameters
+    ----------
+    box : sequence of (low, high)
+        One a parameter, in its units.
+    coefficients : ndarray (d_1 + 1, ..., d_m + 1, ..., rows, columns)
+        Of degree d_i in parameter i; axes between the m first and the two last are a stack of
+        matrices, which broadcast. Floats, or exact rationals in object arrays (the box in the same
+        arithmetic).
+
+    Raises
+    ------
+    InputError
+        For fewer than m + 2 axes, or a box without width.
+
+    References
+    ----------
+    Farouki, "The Bernstein polynomial basis: a centennial retrospective", Computer Aided Geometric
+    Design 29 (2012).
+
+    Examples
+    --------
+    >>> F = PolynomialMatrix.from_monomials({(0,): [[1.0]], (2,): [[1.0]]}, [(0.0, 2.0)])
+    >>> (F @ F)([1.0]).item()  # (1 + p^2)^2 at p = 1
+    4.0
+    >>> print(*F.restrict(((0.0, 1.0),)).extremes())  # bounds of every entry
+    1.0 2.0
     """
 
     box: Box
@@ -198,6 +222,15 @@ class PolynomialMatrix:
             self.restrict((*self.box[:axis], part, *self.box[axis + 1 :]))
             for part in ((low, middle), (middle, high))
         )  # type: ignore[return-value]
+
+    def extremes(self) -> tuple[Any, Any]:
+        """(lowest, highest) coefficient: bounds of every entry on the whole box."""
+        return self.coefficients.min(), self.coefficients.max()
+
+    def corners(self) -> Array:
+        """The values (2^m or fewer, rows, columns) at the corners of the box."""
+        ends = tuple(slice(None, None, max(d, 1)) for d in self.degrees)
+        return self.coefficients[ends].reshape(-1, *self.shape)
 
     def extend(self, box: Box) -> PolynomialMatrix:
         """The same with further parameters, those of `box`, on which it does not depend."""

@@ -45,12 +45,29 @@ class Answer(Enum):
 class Solver:
     """Which solver, and when it stops.
 
-    `name` as cvxpy spells it; `tolerance` on residuals and gap (relative); `iterations` at most;
-    `time_limit` in s. What is None is set to what suits the solver: 1e-8, 200 and 600 s; SCS, a
-    first-order method, 1e-5 and 20000, since the gain is recomputed from P afterwards and more
-    digits cost minutes; no time limit for CVXOPT and SDPA, which have no option for one. Raises
-    `InputError` for a setting out of range or without an option, `SolverError` for a solver that is
-    not installed.
+    Parameters
+    ----------
+    name : str
+        As cvxpy spells it.
+    tolerance : float, optional
+        On residuals and gap, relative: 1e-8; SCS, a first-order method, 1e-5, since the gain is
+        recomputed from P afterwards and more digits cost minutes.
+    iterations : int, optional
+        At most: 200; SCS 20000.
+    time_limit : float, optional
+        s: 600; none for CVXOPT and SDPA, which have no option for one.
+
+    Raises
+    ------
+    InputError
+        For a setting out of range, or one that the solver has no option for.
+    SolverError
+        For a solver that is not installed.
+
+    Examples
+    --------
+    >>> Solver("clarabel", iterations=50).options["max_iter"]
+    50
     """
 
     name: str = "CLARABEL"
@@ -150,7 +167,18 @@ option.
 
 
 def installed_solvers() -> tuple[str, ...]:
-    """Semidefinite solvers that can be used here, in the order of preference."""
+    """Semidefinite solvers that can be used here.
+
+    Returns
+    -------
+    tuple of str
+        Their names, in the order of preference.
+
+    Examples
+    --------
+    >>> "CLARABEL" in installed_solvers()
+    True
+    """
 
     def there(package: str) -> bool:
         try:

@@ -253,7 +253,7 @@ class Evidence(NamedTuple):
         for k, p in enumerate(points):
             if not self._reproduced(p, [M[k] for M in own]):
                 return False
-            A, B, C, D = (pointwise.numbers(M[k], number) for M in own)
+            A, B, C, D = (exact(M[k], number) for M in own)
             here, slopes = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, p, number)
             forms: list[Array] = [-here]
             through = Matrices(A, B, C, D)

@@ -12,7 +12,7 @@ import numpy as np
 from symheli.lpv import LPVStateSpace, Matrices, Scheduling
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.polynomial import structure
-from synthesis.polynomial.exact import Number, positive_definite, rational
+from synthesis.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.polynomial.pieces import ModelPiece, model_pieces, same_pieces
 from synthesis.polynomial.symmetric import extended, symmetrized
 from synthesis.polynomial.symmetric_power import generator, monomials
@@ -308,7 +308,7 @@ class Evidence(NamedTuple):
         if not all(self._reproduced(p) for p in pointwise.inside([s.low, s.high, *breaks])):
             return False
         for p in points:
-            model = Matrices(*(pointwise.numbers(M, number) for M in lpv.matrices(p)))
+            model = Matrices(*(exact(M, number) for M in lpv.matrices(p)))
             if isinstance(P, SplineLyapunov) and P.order > 1:
                 if not pointwise.decreases(P, p, model.A, self.rate, self.units.right, number):
                     return False

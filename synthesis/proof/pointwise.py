@@ -10,7 +10,7 @@ where it matters.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations_with_replacement, pairwise, product
 from math import comb
 from typing import Any
@@ -19,9 +19,9 @@ import numpy as np
 
 from symheli.lpv import Matrices
 from synthesis.lyapunov.spline import MemoryLyapunov, SplineLyapunov
+from synthesis.polynomial.exact import Number, exact
 
 Array = np.ndarray
-Number = Callable[[float], Any]
 
 INSIDE = (0.03, 0.382, 0.764, 0.97)
 """Where in a stretch between knots and breaks an inequality is looked at: near its ends, where
@@ -31,16 +31,6 @@ ROUNDING = 1e-10
 """Largest difference of an entry of a polynomial piece from the model's own, as a fraction of what
 its terms add up to in size.
 """
-
-
-def numbers(values: Any, number: Number) -> Array:
-    """The doubles as numbers of the arithmetic."""
-    values = np.asarray(values, dtype=float)
-    return (
-        values
-        if number is float
-        else np.asarray(np.frompyfunc(number, 1, 1)(values), dtype=object).reshape(values.shape)
-    )
 
 
 def inside(points: Any) -> list[float]:
@@ -73,7 +63,7 @@ def spline(
     low, width = number(float(knots[j])), number(float(knots[j + 1])) - number(float(knots[j]))
     t, c = (
         (number(p) - low) / width,
-        numbers(coefficients[j * degree : (j + 1) * degree + 1], number),
+        exact(coefficients[j * degree : (j + 1) * degree + 1], number),
     )
     return bernstein(c, t), bernstein(c[1:] - c[:-1], t) * degree / width if degree else c[0] * 0
 
@@ -92,7 +82,7 @@ def tensor_spline(
         tuple(slice(j * d, (j + 1) * d + 1) for j, d in zip(index, degrees, strict=True))
     ]
     c, local = (
-        numbers(part, number),
+        exact(part, number),
         [(number(float(q)) - a) / (b - a) for q, (a, b) in zip(p, ends, strict=True)],
     )
     slopes = []
@@ -259,7 +249,7 @@ def decreases(
     """
     here, slope = spline(P.knots, P.degree, P.coefficients, p, number)
     for direction in np.random.default_rng(0).standard_normal((20, len(A))):
-        x = numbers(transform @ direction, number)
+        x = exact(transform @ direction, number)
         move = A @ x
         z, dz = [], []
         for factors in combinations_with_replacement(range(len(A)), P.order):

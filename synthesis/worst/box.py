@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -20,10 +18,12 @@ from synthesis.program.scaling import balance
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.budget import Budget
 from synthesis.worst.frozen import FrozenGain, norm, to_continuous
-from synthesis.worst.lower_bound import Search, growing_trajectory, lower_bound
+from synthesis.worst.lines import Line, alone, directions, growing_on, shared
+from synthesis.worst.lower_bound import Search, lower_bound
 from synthesis.worst.over_box import grid_of, worst_over
 from synthesis.worst.periodic import multiplier
 from synthesis.worst.spectrum import surely_unstable
+from synthesis.worst.tied import tied_lower_bound
 from synthesis.worst.trajectory import Trajectory
 from synthesis.worst.wave_family import WaveFamily
 from synthesis.worst.waves import samples, steps
@@ -131,30 +131,21 @@ def worst_moving(
     the state grows.
     """
     best = frozen
-    if search is None or all(rate == 0 for rate in demand.rates):
-        return best
-    budget, lines = (
-        Budget(search.seconds),
-        [pair for pair in _lines(model, demand.rates) if pair[0].scheduling.limit > 0],
-    )
-    near = frozen.p[0] if isinstance(model, LPVStateSpace) and frozen.p else 0.0
-    for k, (line, back) in enumerate(lines):
-        if budget.over:
-            break
-        budget.tell("line %d of %d, %.6g so far", k + 1, len(lines), abs(best.value))
-        rate = line.scheduling.limit
-        search = replace(search, seconds=budget.left / (len(lines) - k))
+    if demand.motion.tied:
+        return worst_tied(model, demand, frozen, search)
+    lines = [line for line in _lines(model, demand.rates) if line.rate > 0]
+    near = frozen.p[0] if len(model.parameters) == 1 and frozen.p else 0.0
+    for line, share in shared(lines, search):
         if demand.kind == "l2 gain":
-            found = lower_bound(
-                line, rate, frozen=FrozenGain(frozen.value, near, math.nan), search=search
-            )
+            known = FrozenGain(frozen.value, near, math.nan)
+            found = lower_bound(line.model, line.rate, frozen=known, search=share)
             value, trajectory = found.gamma, found.trajectory
         elif demand.kind == "energy-to-peak gain":
-            value, trajectory = _peaks(line, rate, search)
+            value, trajectory = _peaks(line.model, line.rate, share)
         else:
-            value, trajectory = _slowest(line, rate, search)
+            value, trajectory = _slowest(line.model, line.rate, share)
         if trajectory is not None and value > best.value:
-            best = Worst(value, None, Trajectory(trajectory.time, back(trajectory.p)))
+            best = Worst(value, None, line.in_box(trajectory))
         if math.isinf(best.value):
             break
     return best
@@ -162,18 +153,21 @@ def worst_moving(
 
 def growing(model: LPVStateSpace, demand: Demand, search: Search | None) -> Trajectory | None:
     """A p(t) on such a line along which the state grows, None where none was found."""
-    if search is None:
-        return None
-    budget, lines = Budget(search.seconds), list(_lines(model, demand.rates))
-    for k, (line, back) in enumerate(lines):
-        if budget.over:
-            break
-        budget.tell("line %d of %d", k + 1, len(lines))
-        search = replace(search, seconds=budget.left / (len(lines) - k))
-        found = growing_trajectory(line, line.scheduling.limit, search)
-        if found is not None:
-            return Trajectory(found.time, back(found.p))
-    return None
+    if demand.motion.tied:
+        return worst_tied(model, demand, Worst(0.0), search).trajectory
+    return growing_on(_lines(model, demand.rates), search)
+
+
+def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Search | None) -> Worst:
+    """The worst found along cycles that keep to rate and jerk; for gains and growth alone."""
+    if search is None or demand.kind not in ("l2 gain", "stability"):
+        return frozen
+    found = tied_lower_bound(model, demand.motion, search)
+    if found is None or not found.gamma > frozen.value:
+        return frozen
+    if demand.kind == "stability" and not math.isinf(found.gamma):
+        return frozen
+    return Worst(found.gamma, None, found.trajectory)
 
 
 def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:
@@ -230,28 +224,15 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
     return best
 
 
-def _lines(
-    model: LPVStateSpace, rates: Sequence[float]
-) -> Iterator[tuple[LPVStateSpace, Callable[[Array], Array]]]:
-    """Diagonals and axes of the box as models of one parameter within the rates, and the way back
-    to p.
-    """
+def _lines(model: LPVStateSpace, rates: Sequence[float]) -> Iterator[Line]:
+    """Diagonals and axes of the box as models of one parameter within the rates."""
     if len(model.parameters) == 1:
-        yield model.with_rate(rates[0]), lambda p: p
+        yield Line(model.with_rate(rates[0]), rates[0], lambda p: p)
         return
     model = model.with_rate(rates)
     low, high = np.array(model.box).T
-    m = len(low)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    directions = [np.array((1.0, *signs)) for signs in product((1.0, -1.0), repeat=m - 1)] + (
-        list(np.eye(m)) if m > 1 else []
-    )
-    for d in directions:
-        line = model.along(middle - d * half, middle + d * half)
+    for d in directions(len(low)):
         rate = min(r / h for r, h, used in zip(rates, half, d, strict=True) if used)
-        yield (
-            line.with_rate(rate),
-            lambda s, d=d: (
-                middle + np.multiply.outer(s, d * half) if m > 1 else middle[0] + s * half[0]
-            ),
-        )
+        own = model.along(middle - d * half, middle + d * half).with_rate(rate)
+        yield Line(own, rate, lambda s, d=d: alone(middle + np.multiply.outer(s, d * half)))

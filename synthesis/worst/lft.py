@@ -5,17 +5,16 @@ straight lines through it.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from itertools import product
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
-from synthesis.worst.budget import Budget
 from synthesis.worst.frozen import FrozenGain, norm
-from synthesis.worst.lower_bound import LowerBound, Search, growing_trajectory, lower_bound
+from synthesis.worst.lines import Line, alone, directions, growing_on, shared
+from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
 from synthesis.worst.over_box import grid_of, worst_over
 from synthesis.worst.trajectory import Trajectory
 
@@ -115,27 +114,12 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
     """
     best = LowerBound(frozen.gamma, None)
     limits = [s.limit / s.radius for s in lft.parameters if 0 < s.limit < math.inf]
-    tries = (
-        [(*line, rate) for rate in (math.inf, *limits[:1]) for line in _lines(len(lft.blocks))]
-        if search
-        else []
-    )
-    budget = Budget(search.seconds if search else math.inf)
-    for k, (start, end, rate) in enumerate(tries):
-        if search is None or budget.over:
-            break
-        budget.tell("line %d of %d, gain %.6g so far", k + 1, len(tries), best.gamma)
-        search = replace(search, seconds=budget.left / (len(tries) - k))
-        found = lower_bound(
-            along(lft, start, end),
-            rate,
-            frozen=FrozenGain(frozen.gamma, 0.0, frozen.omega),
-            search=search,
-        )
+    tries = [line for rate in (math.inf, *limits[:1]) for line in _lines(lft, rate)]
+    for line, share in shared(tries, search):
+        known = FrozenGain(frozen.gamma, 0.0, frozen.omega)
+        found = lower_bound(line.model, line.rate, frozen=known, search=share)
         if found.gamma > best.gamma:
-            best = found._replace(
-                trajectory=found.trajectory and _in_box(lft, found.trajectory, start, end)
-            )
+            best = found._replace(trajectory=found.trajectory and line.in_box(found.trajectory))
         if math.isinf(best.gamma):
             break
     return best
@@ -143,18 +127,7 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
 
 def box_growing_trajectory(lft: LFT, search: Search | None) -> Trajectory | None:
     """A p(t) along such a line on which the free state grows, None where none was found."""
-    if search is None:
-        return None
-    budget, lines = Budget(search.seconds), _lines(len(lft.blocks))
-    for k, (start, end) in enumerate(lines):
-        if budget.over:
-            break
-        budget.tell("line %d of %d", k + 1, len(lines))
-        search = replace(search, seconds=budget.left / (len(lines) - k))
-        found = growing_trajectory(along(lft, start, end), math.inf, search)
-        if found is not None:
-            return _in_box(lft, found, start, end)
-    return None
+    return growing_on(_lines(lft, math.inf), search)
 
 
 def along(lft: LFT, start: Array, end: Array) -> LFT:
@@ -183,16 +156,14 @@ def along(lft: LFT, start: Array, end: Array) -> LFT:
     )
 
 
-def _lines(m: int) -> list[tuple[Array, Array]]:
-    diagonals = [np.array((-1.0, *signs)) for signs in product((-1.0, 1.0), repeat=max(m - 1, 0))]
-    axes = list(np.eye(m)) if m > 1 else []
-    return [(-d, d) for d in (*diagonals, *axes)] if m else []
-
-
-def _in_box(lft: LFT, line: Trajectory, start: Array, end: Array) -> Trajectory:
-    delta = 0.5 * (start + end) + 0.5 * (end - start) * line.p[:, None]
-    p = np.array([s.middle + s.radius * delta[:, i] for i, s in enumerate(lft.parameters)]).T
-    return Trajectory(line.time, p[:, 0] if len(lft.blocks) == 1 else p)
+def _lines(lft: LFT, rate: float) -> Iterator[Line]:
+    middle, radius = np.array([(s.middle, s.radius) for s in lft.parameters]).reshape(-1, 2).T
+    for d in directions(len(lft.blocks)):
+        yield Line(
+            along(lft, -d, d),
+            rate,
+            lambda s, d=d: alone(middle + np.multiply.outer(s, d) * radius),
+        )
 
 
 def _physical(lft: LFT, delta: Array) -> tuple[float, ...]:

@@ -35,15 +35,38 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Search:
-    """How hard to look for bad trajectories.
+    """How hard to look for bad trajectories. The logger "synthesis" tells how far it is (INFO).
 
-    `levels` values of p and `dwells` dwell times span the coarse family of waves; an ascent begins
-    from the best `starts` of them, on about `nodes` nodes a cycle, with at most `evaluations`
-    gradients each; a cycle lasts at most `cycles` of the slowest mode or, for the gain, as long as
-    a slow p takes to cross its range; `steps` bounds the time steps of a cycle, `samples` those of
-    the explicit input. It ends after `seconds` of wall time, for all lines through a box together;
-    math.inf makes the result independent of the machine. The logger "synthesis" tells how far it is
-    (INFO).
+    Parameters
+    ----------
+    levels, dwells : int
+        Values of p and dwell times that span the coarse family of waves.
+    starts : int
+        An ascent begins from the best so many of them.
+    nodes : int
+        Of a cycle in an ascent, about.
+    evaluations : int
+        Gradients of an ascent, at most.
+    cycles : float
+        A cycle lasts at most so many of the slowest mode or, for the gain, as long as a slow p
+        takes to cross its range.
+    steps : int
+        Time steps of a cycle, at most.
+    samples : int
+        Of the explicit input, at most.
+    seconds : float
+        Wall time, for all lines through a box together; math.inf makes the result independent of
+        the machine.
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+
+    Examples
+    --------
+    >>> Search(starts=1, seconds=2.0).starts
+    1
     """
 
     levels: int = 12
@@ -99,12 +122,44 @@ def lower_bound(
     frozen: FrozenGain | None = None,
     search: Search | None = THOROUGH,
 ) -> LowerBound:
-    """A lower bound of the L2 gain over p(t) in range with |dp/dt| <= `rate` (default the model's
-    own; inf: p may jump).
+    """A lower bound of the L2 gain, from the worst trajectory of p that is found.
 
-    `lpv` may also be an LFT of one parameter. Deterministic as long as `search.seconds` suffice.
-    With `search` None, or rate 0, the `frozen` gain. In continuous time the error of the time
+    Deterministic as long as `search.seconds` suffice. In continuous time the error of the time
     steps, judged by halving them, is taken off.
+
+    Parameters
+    ----------
+    lpv : LPVStateSpace or LFT of one parameter
+        The model.
+    rate : float, optional
+        Largest |dp/dt|, units of p per second; by default the model's own, math.inf: p may jump.
+    frozen : FrozenGain, optional
+        Where it is known already.
+    search : Search or None
+        How hard to look; with None, or rate 0, the frozen gain is the bound.
+
+    Returns
+    -------
+    LowerBound
+        `gamma`, no smaller gain can be certified; the trajectory and the input that show it.
+
+    Raises
+    ------
+    InputError
+        For a rate that is not >= 0.
+
+    References
+    ----------
+    Margaliot, "Stability analysis of switched systems using variational principles: an
+    introduction", Automatica 42 (2006), for the ascents.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> lower_bound(lag, search=None).gamma
+    1.0
     """
     (limit,) = rates((lpv.scheduling,), rate)
     frozen = frozen or frozen_gain(lpv)
@@ -144,6 +199,12 @@ def growing_trajectory(
         return None
     growing = _Hunt(lpv, rate, search).fastest()[1]
     return growing.trajectory if growing else None
+
+
+def along_cycle(lpv: Scheduled, cycle: Trajectory, search: Search) -> LowerBound:
+    """What one cycle shows, repeated: growth, or the gain of an explicit input from rest."""
+    hunt = _Hunt(lpv, lpv.scheduling.limit, search)
+    return hunt.growing(cycle) if hunt.grows(cycle) else hunt.explicit(cycle)
 
 
 class _Hunt:

@@ -112,6 +112,40 @@ def test_certify_takes_a_memory_and_a_degree(answer, run):
     assert "proves stability only" in err
 
 
+def test_a_saved_certificate_is_proven_again_from_its_file(answer, run, tmp_path):
+    path = tmp_path / "proof.json"
+    made = answer("certify", "--rate", 0, "--airspeeds", 4, 9, "--save", path)
+    got = answer("verify", path)
+    assert got["exact"]
+    assert got["gamma"] == made["gamma"]
+    assert got["kind"] == "l2 gain"
+    status, out, _ = run("verify", path)
+    assert status == 0
+    assert "proven in exact arithmetic: l2 gain" in out
+    path.write_text(path.read_text().replace('"gamma": ', '"gamma": 0.5, "was": '))
+    status, _, err = run("verify", path)
+    assert status == 1
+    assert "unknown: was" in err
+    path.write_text(path.read_text()[:100])
+    status, _, err = run("verify", path)
+    assert status == 1
+    assert "damaged" in err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--memory", 0.5, "--order", 2), "not both"),
+        (("--across", 2, 2), "give --memory"),
+        (("--lft", "DG", "--segments", 4), "leave out --segments"),
+    ],
+)
+def test_certify_refuses_options_that_mean_nothing_together(run, options, said):
+    status, _, err = run("certify", "--airspeeds", 6, 9, *options)
+    assert status == 1
+    assert said in err
+
+
 def test_certify_with_an_lft_test_lets_the_airspeed_jump(answer, run):
     got = answer("certify", "--lft", "DG", "--airspeeds", 5.5, 7.5, "--stability")
     assert got["verified"]

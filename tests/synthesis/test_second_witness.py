@@ -26,6 +26,7 @@ from synthesis.polynomial import pieces, regions
 from synthesis.proof import box as proof
 from synthesis.proof import claim
 from synthesis.proof import one_parameter as verify
+from synthesis.proof.drift import Drift
 
 COARSE = Spline(segments=4, degree=2, grading=1.0)
 BOX = {"form": Spline(segments=4, degree=2, grading=1.0), "impose": SumOfSquares()}
@@ -65,7 +66,7 @@ def forget_the_rate(monkeypatch):
 
     def still(model, region, P, demand, number):
         return decrease(
-            model, region, P, demand._replace(rates=tuple(0.0 for _ in demand.rates)), number
+            model, region, P, demand._replace(drift=Drift(tuple(0.0 for _ in demand.rates))), number
         )
 
     everywhere(monkeypatch, "decrease", still, program, proof)

@@ -1,0 +1,68 @@
+"""Straight lines through a box of parameters, on which one parameter alone moves; one budget for
+all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from synthesis.worst.budget import Budget
+from synthesis.worst.lower_bound import Search, growing_trajectory
+from synthesis.worst.trajectory import Trajectory
+
+Array = np.ndarray
+
+
+class Line(NamedTuple):
+    """The `model` on a line, how fast its parameter may move (per second), and the way `back` to
+    p.
+    """
+
+    model: Any
+    rate: float
+    back: Callable[[Array], Array]
+
+    def in_box(self, found: Trajectory) -> Trajectory:
+        """A trajectory on the line as one of the box."""
+        return Trajectory(found.time, self.back(found.p))
+
+
+def directions(m: int) -> list[Array]:
+    """The diagonals of a box of m parameters, and its axes where there are several."""
+    if not m:
+        return []
+    diagonals = [np.array((1.0, *signs)) for signs in product((1.0, -1.0), repeat=m - 1)]
+    return diagonals + (list(np.eye(m)) if m > 1 else [])
+
+
+def alone(p: Array) -> Array:
+    """p (k,) where there is one parameter (k, 1)."""
+    return p[:, 0] if p.shape[1] == 1 else p
+
+
+def shared(lines: Iterable[Line], search: Search | None) -> Iterator[tuple[Line, Search]]:
+    """Every line with what is left of the search for it, while there is time; none without a
+    search.
+    """
+    if search is None:
+        return
+    budget, lines = Budget(search.seconds), list(lines)
+    for k, line in enumerate(lines):
+        if budget.over:
+            return
+        budget.tell("line %d of %d", k + 1, len(lines))
+        yield line, replace(search, seconds=budget.left / (len(lines) - k))
+
+
+def growing_on(lines: Iterable[Line], search: Search | None) -> Trajectory | None:
+    """A p(t) on one of the lines along which the free state grows, None where none was found."""
+    for line, share in shared(lines, search):
+        found = growing_trajectory(line.model, line.rate, share)
+        if found is not None:
+            return line.in_box(found)
+    return None
