@@ -47,10 +47,10 @@ class Motion(NamedTuple):
         names = [s.name for s in parameters]
         ties = tuple(names.index(s.rate) if isinstance(s.rate, str) else None for s in parameters)
         rates = tuple(
-            s.limit if j is None else max(abs(parameters[j].low), abs(parameters[j].high))
+            float(s.limit if j is None else max(abs(parameters[j].low), abs(parameters[j].high)))
             for s, j in zip(parameters, ties, strict=True)
         )
-        return cls(tuple((s.low, s.high) for s in parameters), rates, ties)
+        return cls(tuple((float(s.low), float(s.high)) for s in parameters), rates, ties)
 
     @property
     def tied(self) -> tuple[tuple[int, int], ...]:
@@ -71,6 +71,8 @@ class Motion(NamedTuple):
         """Whether p can be somewhere in this box and stay in its ranges for good."""
         for i, j in self.tied:
             (a, b), (c, d), jerk = box[i], box[j], self.rates[j]
+            if math.isinf(jerk):
+                continue
             room = 2 * jerk * (1 + 1e-9)
             if d < 0 and d * d > room * (b - self.box[i][0]):
                 return False

@@ -87,11 +87,19 @@ def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> 
 def worst_frozen(model: Pieces, size: Measure) -> Worst:
     """The largest over the box."""
 
-    def at(p: Array) -> float:
-        return size(*(M[0] for M in model.at(p[None])))
+    axes = _axes(model)
+    free = [i for i, axis in enumerate(axes) if len(axis) > 1]
 
-    value, p = worst_over(at, _axes(model))
-    return Worst(value, tuple(map(float, p)))
+    def whole(q: Array) -> Array:
+        p = np.array([axis[0] for axis in axes])
+        p[free] = q
+        return p
+
+    def at(q: Array) -> float:
+        return size(*(M[0] for M in model.at(whole(q)[None])))
+
+    value, q = worst_over(at, [axes[i] for i in free])
+    return Worst(value, tuple(map(float, whole(q))))
 
 
 def unstable_at(model: Pieces, suspect: tuple[float, ...]) -> tuple[float, ...] | None:
