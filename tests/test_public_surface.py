@@ -15,10 +15,12 @@ ROOMS = ("symheli", "identification", "synthesis", "studies")
 PACKAGES = (
     "symheli",
     "symheli.equations",
+    "symheli.export",
     "symheli.lpv",
     "symheli.environment",
     "symheli.flight",
     "identification",
+    "identification.export",
     "synthesis",
 )
 SHARED = (

@@ -9,11 +9,11 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studies.files import write_bytes, write_text
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
+from symheli.values.whole_files import write_bytes, write_text
 
 if TYPE_CHECKING:
     from studies.transition.outcome import Outcome

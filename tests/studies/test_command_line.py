@@ -522,7 +522,7 @@ def test_a_full_disk_is_a_sentence_and_leaves_the_old_file(tmp_path, monkeypatch
     import errno
     import os
 
-    from studies.files import write_text
+    from symheli.values.whole_files import write_text
 
     target = write_text(tmp_path / "report.html", "old")
 
