@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import synthesis
 from studies.bracket.servo import curves_of, found_of, measure_servo, text_of
 from studies.bracket.table import bracket_table
-from studies.cover import Remainder, covered_gain
 from studies.figures.gain_curve import GainCurve, save
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
@@ -26,6 +25,7 @@ from studies.stamped_tables import DOCS, keep, parsed, processor
 from symheli import Helicopter, LPVStateSpace
 from symheli.lpv.bases import Polynomial
 from synthesis import Relaxation, Search, Solver
+from synthesis.cover import Remainder, covered_gain
 
 SLOW = Relaxation(memory=1.2, segments=(12,), grading=1.5, memory_segments=4, memory_degree=2)
 FAST = Relaxation(memory=0.6, segments=(12,), grading=1.5, memory_segments=4, memory_degree=3)

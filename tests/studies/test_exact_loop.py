@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import synthesis
-from studies.cover import Remainder, covered_gain
-from studies.loops.exact_lateral import ExactLateral, Patches
+from studies.loops.exact_lateral import ExactLateral
+from symheli.lpv import Patches
 from synthesis import Relaxation
+from synthesis.cover import Remainder, covered_gain
 
 
 @pytest.fixture(scope="module")

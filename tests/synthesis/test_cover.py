@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import synthesis
-from studies.cover import SAFETY, Remainder, covered_gain, covering
 from symheli import LPVStateSpace, Scheduling
 from synthesis import Relaxation
+from synthesis.cover import SAFETY, Remainder, covered_gain, covering
 
 PLAIN = Relaxation(degree=0)
 

@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import synthesis
-from symheli import LPVStateSpace
-from synthesis import Certificate, Relaxation
-
-Array = np.ndarray
+from symheli.lpv import LPVStateSpace
+from symheli.values.arrays import Array
+from synthesis.certificate import Certificate
+from synthesis.forms import Relaxation
+from synthesis.frozen import frozen_gain
+from synthesis.l2_gain import l2_gain
 
 SAFETY = 2.0
 """What is covered is this many times the largest difference measured."""
@@ -68,7 +69,7 @@ def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
     plain = replace(lpv, trim=None, residuals=None)
     heard = replace(plain, B=noise, D=np.zeros((len(one), ny, nx)), inputs=d)
     felt = replace(plain, C=seen[:, :, :nx], D=seen[:, :, nx:], outputs=z)
-    t = math.sqrt(gain * synthesis.frozen_gain(heard).gamma / synthesis.frozen_gain(felt).gamma)
+    t = math.sqrt(gain * frozen_gain(heard).gamma / frozen_gain(felt).gamma)
     above = np.concatenate([lpv.D / gain, heard.D / t], axis=2)
     below = np.concatenate([t * felt.D / gain, np.zeros((len(one), nx + nu, nx))], axis=2)
     return replace(
@@ -88,7 +89,7 @@ def covered_gain(
     `gain`; (inf, None) where none is.
     """
     for room in ROOMS:
-        certificate = synthesis.l2_gain(
+        certificate = l2_gain(
             covering(lpv, rest, room * gain), rate, relaxation=relaxation, search=None
         )
         if certificate.gamma <= 1:
