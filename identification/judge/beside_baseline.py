@@ -4,7 +4,7 @@ from the same samples on.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -172,14 +172,15 @@ class BesideBaseline:
     record: FlightRecord
     predictions: tuple[Prediction, ...]
 
-    def best(self, output: str, identified: bool) -> Prediction:
-        """The one of the identified models, or of the baselines, that predicts `output` best
-        `Scores.horizon` seconds ahead.
+    def best(self, output: str, names: Collection[str] | None = None) -> Prediction:
+        """The one that predicts `output` best `Scores.horizon` seconds ahead, of those called
+        `names` (default: of all).
         """
-        rivals = [p for p in self.predictions if p.identified == identified]
-        if not rivals:
-            raise InputError(f"no {'identified model' if identified else 'baseline'} was compared")
-        return max(rivals, key=lambda p: p.scores.ahead[output])
+        among = [p for p in self.predictions if names is None or p.name in names]
+        if output not in self.outputs or not among:
+            known = [*self.outputs, *(p.name for p in self.predictions)]
+            raise InputError(f"expected an output and names among {', '.join(known)}")
+        return max(among, key=lambda p: p.scores.ahead[output])
 
 
 def beside_baseline(

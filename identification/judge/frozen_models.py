@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -165,7 +166,7 @@ def frozen_models(
     for signal, there in zip(channel, (inputs, outputs), strict=True):
         if signal not in there:
             raise UnknownNameError("signal of channel", signal, there)
-    sizes = {
+    sizes: dict[str, Any] = {
         "input_scale": [scales[i] for i in inputs],
         "output_scale": [scales[y] for y in outputs],
     }

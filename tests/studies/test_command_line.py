@@ -474,7 +474,7 @@ def test_help_and_version_succeed(run):
             ["study", "--quick", "--seed", "3", "--out", "o"],
             "study",
             "run_study",
-            {"vehicle": "xcell60", "out": Path("o"), "quick": True, "seed": 3},
+            {"vehicle": "xcell60", "out": Path("o"), "quick": True, "seed": 3, "resume": False},
         ),
         (
             ["campaign", "--seeds", "4"],
