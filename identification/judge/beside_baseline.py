@@ -148,7 +148,7 @@ class BaselinePredictor:
                     np.einsum("kj,kj->k", C[:, 0], x) + np.einsum("kj,kj->k", D[:, 0], self.u)
                 )
             else:
-                raise UnknownNameError("output", y, [*states, *names])
+                raise UnknownNameError("output", y, dict.fromkeys([*states, *names]))
         return np.stack(columns, axis=1)
 
 

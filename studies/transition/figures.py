@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED, draw
+from studies.figures import gain_curve
+from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED
 from studies.transition.flights import NOISES
 from studies.transition.guarantees import curves
 
@@ -334,5 +335,5 @@ def gain_curves(curves: list[GainCurve]) -> Figure:
         1, len(curves), 7.5 if len(curves) == 1 else 11.5, 4.2, width_ratios=(1.5, 1)[: len(curves)]
     )
     for ax, curve in zip(axes[0], curves, strict=True):
-        draw(curve, ax)
+        gain_curve.plot(curve, ax)
     return figure

@@ -8,8 +8,10 @@ import re
 import shutil
 import subprocess
 from dataclasses import fields, replace
+from pathlib import Path
 
 import pytest
+from json_schema import faults
 from matplotlib.figure import Figure
 
 from studies.transition import figures, gain_tables, guarantees, report
@@ -58,6 +60,13 @@ def test_a_full_outcome_fills_every_section(full, tmp_path, unpainted):
     text = page(full, tmp_path)
     assert "Not reached" not in text
     assert text.count("data:image/png;base64,") == len(list((tmp_path / "figures").iterdir())) > 10
+
+
+def test_the_numbers_of_a_full_outcome_are_what_the_schema_says(full, tmp_path):
+    schema = Path(report.__file__).with_name("results.schema.json").read_text(encoding="utf-8")
+    found = json.loads(report.write_results(full, tmp_path).read_text())
+    assert None not in found.values()
+    assert not list(faults(found, json.loads(schema)))
 
 
 def test_an_empty_outcome_says_what_was_not_reached(tmp_path, unpainted):
