@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from symheli.values.arrays import Array
 from synthesis.certificate import Certificate
@@ -85,9 +86,53 @@ def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
 def covered_gain(
     lpv: LPVStateSpace, rest: Remainder, rate: float, relaxation: Relaxation, gain: float
 ) -> tuple[float, Certificate | None]:
-    """(gain proven for `lpv` and every remainder, the certificate of `covering`) near its own
-    `gain`; (inf, None) where none is.
+    """A gain proven for a model and for every model within a measured distance of it.
+
+    The distance enters as a disturbance of the states that states and inputs cause; see `covering`.
+
+    Parameters
+    ----------
+    lpv : LPVStateSpace
+        The model, nx states and nu inputs.
+    rest : Remainder
+        How far [A B] of the others may be from its own, as `Remainder.of` makes it of differences
+        (K, nx, nx + nu).
+    rate : float
+        Limit on the rate of the scheduling parameter, per second.
+    relaxation : Relaxation
+        Form of the Lyapunov function.
+    gain : float
+        A gain proven of `lpv` alone, near which the covered one is sought.
+
+    Returns
+    -------
+    (float, Certificate or None)
+        The gain and the certificate of the covering model; (inf, None) where nothing is proven.
+
+    Raises
+    ------
+    InputError
+        Where the remainder is of another size than the model, or the gain is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np, symheli, synthesis
+    >>> from synthesis.cover import Remainder, covered_gain
+    >>> lag = symheli.LPVStateSpace.polynomial(
+    ...     [[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], symheli.Scheduling("p", "1", 0.0, 1.0))
+    >>> rest = Remainder.of(np.array([[[0.0025, 0.0]]]))
+    >>> gain, _ = covered_gain(lag, rest, 0.0, synthesis.Relaxation(degree=0), 1.0)
+    >>> bool(1 / (1 - 0.005) <= gain < 1.02)
+    True
     """
+    nx, nu = len(lpv.states), len(lpv.inputs)
+    if rest.rows.shape != (nx,) or rest.columns.shape != (nx + nu,):
+        raise InputError(
+            f"rest: expected the remainder of {nx} states and {nu} inputs, got rows"
+            f" {rest.rows.shape} and columns {rest.columns.shape}"
+        )
+    if not 0 < gain < math.inf:
+        raise InputError(f"gain: expected one that is proven of the model alone, got {gain:g}")
     for room in ROOMS:
         certificate = l2_gain(
             covering(lpv, rest, room * gain), rate, relaxation=relaxation, search=None
