@@ -84,6 +84,7 @@ def write_estimator(
     >>> files = write_estimator(idn.RecursiveLeastSquares(arx), units, folder.name)
     >>> [file.name for file in files][2:5]
     ['estimator.h', 'estimator.c', 'estimator_check.c']
+    >>> folder.cleanup()
     """
     require_identifier(name)
     arx, folder = rls.structure, Path(folder)

@@ -81,6 +81,7 @@ def write_model(
     >>> folder = tempfile.TemporaryDirectory()
     >>> [file.name for file in write_model(idn.fit(arx, record), folder.name, "roll")]
     ['roll.h', 'roll.c', 'roll_check.c']
+    >>> folder.cleanup()
     """
     require_identifier(name)
     if precision not in TOLERANCE:

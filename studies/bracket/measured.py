@@ -109,13 +109,9 @@ def bracket(
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
     if rest and plain.verified:
-        covered, proof = covered_gain(
-            loop,
-            rest,
-            rate,
-            COVER,
-            synthesis.l2_gain(loop, rate, relaxation=COVER, search=None).gamma,
-        )
+        coarse = synthesis.l2_gain(loop, rate, relaxation=COVER, search=None)
+        if coarse.verified:
+            covered, proof = covered_gain(loop, rest, rate, COVER, coarse.gamma)
     exact = better.verify(rigorous=True) and (proof is None or proof.verify(rigorous=True))
     return Bracket(rate, memory.lower, memory.gamma, plain.gamma, exact, covered)
 

@@ -60,6 +60,7 @@ def write_c(heli: Helicopter, path: str | os.PathLike[str]) -> tuple[Path, ...]:
     >>> folder = tempfile.TemporaryDirectory()
     >>> [file.name for file in write_c(heli, f"{folder.name}/heli.c")]
     ['heli.c', 'heli.h', 'heli_check.c', 'CMakeLists.txt']
+    >>> folder.cleanup()
     """
     path = Path(path)
     if path.suffix != ".c":

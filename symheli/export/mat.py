@@ -73,6 +73,7 @@ def write_mat(
     >>> files = write_mat(heli, f"{folder.name}/family.mat", low=2.0, high=8.0, points=3)
     >>> [file.name for file in files]
     ['family.mat', 'load_symheli.m', 'symheli_at.m']
+    >>> folder.cleanup()
     """
     if not (0 <= low < high and points >= 2):
         raise InputError(
