@@ -19,10 +19,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[0] = str(ROOT)  # this folder holds scripts named like the packages they measure
+
+from studies.threads import one_thread  # noqa: E402
+
+one_thread()
+
+import numpy as np  # noqa: E402
 
 import symheli  # noqa: E402
 from benchmarks.opponents import gridded_lmi  # noqa: E402

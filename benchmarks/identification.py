@@ -9,18 +9,19 @@ Times are those of one thread at work: what else the computer does is not counte
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one core, as in flight
-
-import numpy as np
-
 # this folder holds scripts named like the packages they measure
 sys.path[0] = str(Path(__file__).resolve().parents[1])
+
+from studies.threads import one_thread  # noqa: E402
+
+one_thread()  # one core, as in flight
+
+import numpy as np  # noqa: E402
 
 from benchmarks.opponents.covariance_rls import (  # noqa: E402
     CovarianceRLS,

@@ -9,11 +9,14 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
+# this folder holds scripts named like the packages they measure
+sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-sys.path[0] = str(
-    Path(__file__).resolve().parents[1]
-)  # this folder holds scripts named like the packages they measure
+from studies.threads import one_thread  # noqa: E402
+
+one_thread()
+
+import numpy as np  # noqa: E402
 
 from benchmarks.timing import arguments  # noqa: E402
 from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402

@@ -5,7 +5,7 @@ linearizations; about 10 s.
 import numpy as np
 
 import symheli
-from studies.transition.comparison import BaselinePredictor
+from identification import BaselinePredictor
 
 OUTPUTS = {
     "u": "m/s",
@@ -31,7 +31,9 @@ inertia = (
     heli.vehicle.values("drivetrain")["inertia"],
 )  # ideal governor: the rotor yaws along
 
-lft = BaselinePredictor(family.interpolate("polynomial", degree=3), flight)
+lft = BaselinePredictor(
+    family.interpolate("polynomial", degree=3), flight, scheduling="airspeed_command"
+)
 stitched = {
     f"stitched, {s:g} s": symheli.StitchedModel.from_family(family, filter=s, inertia=inertia)
     for s in (0.0, 0.5, 5.0)

@@ -23,11 +23,20 @@ from identification.estimators.lasso import Lasso
 from identification.estimators.output_error import OutputError
 from identification.estimators.refined_instruments import Refined
 from identification.estimators.ridge import Ridge
+from identification.judge.against_constant import AgainstConstant, against_constant
+from identification.judge.beside_baseline import (
+    BaselineModel,
+    BaselinePredictor,
+    BesideBaseline,
+    beside_baseline,
+)
 from identification.judge.dependence import DependenceReport, dependence_report
 from identification.judge.frequency_response import FrequencyResponse, frequency_response
+from identification.judge.frozen_models import FrozenModels, frozen_models, pole_miss
 from identification.judge.order_scan import OrderScan, Trial, order_scan
 from identification.judge.residuals import ResidualAnalysis, Theil, residual_analysis, theil
 from identification.judge.response_band import ResponseBand
+from identification.judge.scores import Scores, scores
 from identification.judge.slow_modes import SlowMode, SlowModes, slow_modes
 from identification.judge.uncertainty import Band, Uncertainty, uncertainty
 from identification.model.coefficients import Coefficients, CoefficientValues
@@ -43,8 +52,12 @@ from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, U
 
 __all__ = [
     "LPVARX",
+    "AgainstConstant",
     "BSpline",
     "Band",
+    "BaselineModel",
+    "BaselinePredictor",
+    "BesideBaseline",
     "CoefficientValues",
     "Coefficients",
     "Constant",
@@ -55,6 +68,7 @@ __all__ = [
     "Experiment",
     "Forgetting",
     "FrequencyResponse",
+    "FrozenModels",
     "Group",
     "History",
     "Instruments",
@@ -74,6 +88,7 @@ __all__ = [
     "ResidualAnalysis",
     "ResponseBand",
     "Ridge",
+    "Scores",
     "SlowMode",
     "SlowModes",
     "Spline",
@@ -83,6 +98,8 @@ __all__ = [
     "Uncertainty",
     "UserFunctions",
     "Variable",
+    "against_constant",
+    "beside_baseline",
     "choose_experiments",
     "compare_experiments",
     "dependence_report",
@@ -90,8 +107,11 @@ __all__ = [
     "fit",
     "fit_percent",
     "frequency_response",
+    "frozen_models",
     "order_scan",
+    "pole_miss",
     "residual_analysis",
+    "scores",
     "slow_modes",
     "theil",
     "uncertainty",

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from studies.output import Output, as_json
+from studies.threads import one_thread
 from symheli.errors import SymheliError
 
 VERBS = (
@@ -37,6 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; the exit status: 0 done, 1 failed with one sentence on stderr, 2 wrong usage,
     130 interrupted.
     """
+    one_thread()
     try:
         arguments = parser().parse_args(argv)
     except SystemExit as stop:  # argparse has said what is wrong

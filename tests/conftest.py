@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import studies  # noqa: F401  first: it asks for one BLAS thread, and threads that wait for each other cost minutes on a busy machine
+from studies.threads import one_thread
 
-import pytest  # isort: skip
+one_thread()  # before NumPy is imported
 
-import symheli
+import pytest  # noqa: E402
+
+import symheli  # noqa: E402
 
 
 @pytest.fixture(scope="session", params=["ideal", "pi"])

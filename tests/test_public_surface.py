@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import os
 import re
 import subprocess
 import sys
@@ -15,10 +16,12 @@ ROOMS = ("symheli", "identification", "synthesis", "studies")
 PACKAGES = (
     "symheli",
     "symheli.equations",
+    "symheli.export",
     "symheli.lpv",
     "symheli.environment",
     "symheli.flight",
     "identification",
+    "identification.export",
     "synthesis",
 )
 SHARED = (
@@ -77,6 +80,36 @@ def test_importing_the_packages_loads_no_heavy_library():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.strip()
     assert loaded == "[]"
+
+
+def test_importing_the_studies_changes_no_environment_variable():
+    modules = ["studies", "studies.cli", "studies.threads"]
+    code = f"""
+import importlib, os
+before = dict(os.environ)
+for module in {modules}:
+    importlib.import_module(module)
+print(before == dict(os.environ))
+"""
+    said = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={}
+    ).stdout.strip()
+    assert said == "True"
+
+
+def test_a_process_that_starts_here_asks_for_one_thread_unless_told_otherwise(monkeypatch):
+    from studies.threads import BLAS, one_thread
+
+    for variable in BLAS:
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.setenv(BLAS[0], "2")
+    one_thread()
+    assert [os.environ[variable] for variable in BLAS] == ["2", "1", "1"]
+    numpy_first = "import sys, studies.threads, studies.cli; print('numpy' in sys.modules)"
+    said = subprocess.run(
+        [sys.executable, "-c", numpy_first], capture_output=True, text=True, check=True
+    ).stdout.strip()
+    assert said == "False"  # one_thread comes in time
 
 
 def test_a_script_beside_a_folder_called_symheli_imports_the_package(tmp_path):

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import synthesis
 from studies.bracket.servo import curves_of, found_of, measure_servo, text_of
 from studies.bracket.table import bracket_table
-from studies.cover import Remainder, covered_gain
 from studies.figures.gain_curve import GainCurve, save
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
@@ -26,6 +25,7 @@ from studies.stamped_tables import DOCS, keep, parsed, processor
 from symheli import Helicopter, LPVStateSpace
 from symheli.lpv.bases import Polynomial
 from synthesis import HigherOrder, Memory, Search, Solver, Spline
+from synthesis.cover import Remainder, covered_gain
 from synthesis.forms import LyapunovForm
 
 SLOW = Memory(1.2, segments=12, grading=1.5, across_segments=4, across_degree=2)
@@ -110,13 +110,9 @@ def bracket(
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
     if rest and plain.verified:
-        covered, proof = covered_gain(
-            loop,
-            rest,
-            rate,
-            COVER,
-            synthesis.l2_gain(loop, rate, form=COVER, search=None).gamma,
-        )
+        coarse = synthesis.l2_gain(loop, rate, form=COVER, search=None)
+        if coarse.verified:
+            covered, proof = covered_gain(loop, rest, rate, COVER, coarse.gamma)
     exact = better.verify(rigorous=True) and (proof is None or proof.verify(rigorous=True))
     return Bracket(rate, memory.lower, memory.gamma, plain.gamma, exact, covered)
 

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from studies.log.comparison import HORIZONS, PAYS, Comparison, compare, percent
+from identification import AgainstConstant, against_constant
+from identification.judge.against_constant import HORIZONS, PAYS
+from identification.judge.scores import percent
 from studies.transition.axes import ALL, LATERAL, LONGITUDINAL
 from studies.transition.flights import NOISE_DB, FlightPlan, autopilot_for
 from symheli import Helicopter
@@ -52,12 +54,12 @@ def where_scheduling_pays(
     heli = Helicopter.load(vehicle, governor="ideal")
     autopilot = autopilot_for(heli)
     for condition, plan in conditions.items():
-        found: dict[str, list[Comparison]] = {axis.name: [] for axis in AXES}
+        found: dict[str, list[AgainstConstant]] = {axis.name: [] for axis in AXES}
         for seed in range(seeds + 1):
             flown = replace(plan, seed=seed)
             training, test = flown.training(heli, autopilot), flown.test(heli, autopilot)
             for axis in AXES:
-                found[axis.name].append(compare(axis.structure(), training, test))
+                found[axis.name].append(against_constant(axis.structure(), training, test))
             print(f"  {condition}: seed {seed} of {seeds}", file=sys.stderr, flush=True)
         yield from (
             _line(condition, axis.name, output, found[axis.name])
@@ -66,12 +68,10 @@ def where_scheduling_pays(
         )
 
 
-def _line(condition: str, axis: str, output: str, runs: list[Comparison]) -> Line:
+def _line(condition: str, axis: str, output: str, runs: list[AgainstConstant]) -> Line:
     def over_seeds(model: int) -> dict[str, np.ndarray]:
-        return {
-            h: np.array([(run.models[model].held_out or {})[h][output] for run in runs])
-            for h in HORIZONS
-        }
+        found = [scores.by_horizon for run in runs if (scores := run.models[model].held_out)]
+        return {h: np.array([fits[h][output] for fits in found]) for h in HORIZONS}
 
     return Line(
         condition, axis, output, over_seeds(0), over_seeds(1), sum(run.pays(output) for run in runs)

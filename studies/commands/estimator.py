@@ -75,7 +75,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def write(arguments: argparse.Namespace, heli: Helicopter) -> tuple[Path, ...]:
     """Write the files into the folder --out (default: estimator)."""
     from identification import LPVARX, Constant, Directional, Polynomial, RecursiveLeastSquares
-    from studies.export_estimator import write_estimator
+    from identification.export import write_estimator
     from symheli.errors import UnknownNameError
 
     units = {str(s): s.unit for s in (*heli.states, *heli.inputs)} | {"airspeed": "m/s"}

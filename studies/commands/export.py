@@ -66,21 +66,23 @@ def run(arguments: argparse.Namespace) -> Output:
     heli = options.helicopter(arguments)
     name = Path(arguments.vehicle).stem
     if arguments.format == "c":
-        from studies.export_c import write_c
+        from symheli.export import write_c
 
         written = write_c(heli, arguments.out or Path(f"{name}_rhs.c"))
     elif arguments.format == "estimator":
         written = estimator.write(arguments, heli)
     elif arguments.format == "mat":
-        from studies.export_mat import write_mat
+        from symheli.export import write_mat
 
-        low, high = arguments.airspeeds
         written = write_mat(
-            heli, low, high, arguments.points, arguments.out or Path(f"{name}_family.mat")
+            heli,
+            arguments.out or Path(f"{name}_family.mat"),
+            *arguments.airspeeds,
+            points=arguments.points,
         )
     else:
-        from studies.files import write_text
         from symheli.equations import markdown
+        from symheli.values.whole_files import write_text
 
         content, suffix = (
             (heli.latex(standalone=True), "tex")
@@ -93,7 +95,7 @@ def run(arguments: argparse.Namespace) -> Output:
 
 def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
     from identification import LPVARXModel
-    from studies.export_model import write_model
+    from identification.export import write_model
 
     if arguments.model is None:
         raise InputError(

@@ -193,10 +193,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Output:
     """Read, prepare, fit, judge."""
-    from identification import LPVARX, Polynomial
+    from identification import LPVARX, Polynomial, against_constant
     from studies.log import report
-    from studies.log.comparison import compare, scheduling_range
-    from studies.log.reading import format_of
+    from studies.log.reading import format_of, scheduling_range
 
     kind: Any = (
         "mapped"
@@ -245,7 +244,7 @@ def run(arguments: argparse.Namespace) -> Output:
         if arguments.method != "ls":
             raise InputError("--orders compares models of least squares; leave --method out")
         return _orders(replace(structure, offset_rate=trim == "moving"), training, test, hold)
-    result = compare(
+    result = against_constant(
         structure,
         training,
         test,

@@ -38,7 +38,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="excitation and noise (default: %(default)s)",
     )
-    parser.set_defaults(kept=lambda arguments: f"what was finished is in {arguments.out}")
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help=(
+            "take the stages that an earlier run has finished from DIR/stages, where version,"
+            " vehicle, effort and seed are the same; others, and damaged ones, are computed again."
+            " They are Python pickles: resume only folders of your own"
+        ),
+    )
+    parser.set_defaults(
+        kept=lambda arguments: (
+            f"what was finished is in {arguments.out}; --resume goes on from there"
+        )
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
@@ -46,6 +59,10 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.transition.study import run_study
 
     result = run_study(
-        vehicle=arguments.vehicle, out=arguments.out, quick=arguments.quick, seed=arguments.seed
+        vehicle=arguments.vehicle,
+        out=arguments.out,
+        quick=arguments.quick,
+        seed=arguments.seed,
+        resume=arguments.resume,
     )
     return Output(result.summary(), result.to_dict())

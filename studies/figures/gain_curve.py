@@ -29,10 +29,11 @@ class GainCurve:
     """Gains of one loop, by permitted acceleration in m/s^2 (0: frozen, inf: the airspeed may
     jump).
 
-    frozen     largest gain of the frozen models flown      {acceleration: gain of a computed
-    trajectory}; inf: along it the state grows proven     {form of the proof: {acceleration: gain}},
-    the least conservative form first; inf: nothing proven jumping    {test: gain} of the proofs
-    that let the airspeed jump; inf: nothing proven
+    frozen     largest gain of the frozen models
+    flown      {acceleration: gain of a computed trajectory}; inf: along it the state grows
+    proven     {form of the proof: {acceleration: gain}}, the least conservative form first;
+               inf: nothing proven
+    jumping    {test: gain} of the proofs that let the airspeed jump; inf: nothing proven
     """
 
     title: str
@@ -101,8 +102,11 @@ class GainCurve:
         return words + "."
 
 
-def draw(
-    curve: GainCurve, ax: Axes, *, legend: Literal["upper left", "upper right"] = "upper left"
+def plot(
+    curve: GainCurve,
+    ax: Axes | None = None,
+    *,
+    legend: Literal["upper left", "upper right"] = "upper left",
 ) -> Axes:
     """Gain against acceleration on logarithmic axes: frozen at the left edge, an airspeed that
     jumps at the right.
@@ -110,6 +114,10 @@ def draw(
     Shaded: grey where neither a proof nor growth is known, red where the state grows along a flown
     airspeed.
     """
+    if ax is None:
+        import matplotlib.pyplot as plt
+
+        ax = plt.subplots(figsize=(7.0, 4.5), layout="constrained")[1]
     rates = sorted(
         {r for gains in (curve.flown, *curve.proven.values()) for r in gains if 0 < r < math.inf}
     )
@@ -194,7 +202,7 @@ def save(curves: Sequence[GainCurve], path: Path) -> None:
         1, len(curves), figsize=(2 + 6 * len(curves), 4.5), squeeze=False, layout="constrained"
     )
     for curve, ax in zip(curves, axes[0], strict=True):
-        draw(curve, ax)
+        plot(curve, ax)
     figure.savefig(path, dpi=130)
     plt.close(figure)
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.log.comparison import Comparison, Scored, ahead, percent, steps
+from identification import AgainstConstant
+from identification.judge.against_constant import Scored
+from identification.judge.scores import percent, predicted, steps
 from symheli.records.record_plot import draw, empty_figure, label, shade_missing
 from symheli.values.whole_files import write_bytes
 
@@ -21,7 +23,7 @@ CLOSE = 10.0
 """Seconds that the right-hand column shows."""
 
 
-def figure(result: Comparison) -> Figure:
+def figure(result: AgainstConstant) -> Figure:
     """A row for each output of the first model, and one for its scheduling: the whole record, and
     the first 10 s of what is held out.
 
@@ -42,7 +44,7 @@ def figure(result: Comparison) -> Figure:
     )
     shown = [*model.outputs, model.parameters[0]]
     for part in parts:
-        drawn = {h: ahead(model, part, n, result.hold_p) for h, n in steps(model.dt).items()}
+        drawn = {h: predicted(model, part, n, result.hold_p) for h, n in steps(model.dt).items()}
         for i, (row, name) in enumerate(zip(axes, shown, strict=True)):
             for ax in row:
                 draw(
@@ -103,7 +105,7 @@ def _fits(models: tuple[Scored, ...], output: str) -> str:
     """Of each model in percent, the horizons in order."""
 
     def shown(scored: Scored) -> str:
-        fits = (scored.held_out or scored.in_sample).values()
+        fits = (scored.held_out or scored.in_sample).by_horizon.values()
         return " / ".join(percent(fit[output]) for fit in fits)
 
     return ", ".join(f"{scored.label} {shown(scored)} %" for scored in models)

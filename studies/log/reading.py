@@ -6,11 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.files import existing
 from symheli.logs.separated import SEPARATORS, SeparatedTable
 from symheli.records import FlightRecord
 from symheli.values.signal import UNITS
+
+STILL = 1e-6
+"""A scheduling signal that moves by less than this part of its size stays where it is."""
 
 Format = Literal["xplane", "csv", "mat"]
 COMBINED = "speed"
@@ -91,3 +96,21 @@ def _time_column(path: Path, dt: float | None) -> str | None:
         f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample"
         f" period with --dt; found {found}"
     )
+
+
+def scheduling_range(values: np.ndarray, degree: int) -> tuple[float, float]:
+    """The range of the record the basis is declared on. Raises `InputError` where it does not move
+    and `degree` is not 0.
+    """
+    known = values[np.isfinite(values)]
+    if not len(known):
+        raise InputError("the scheduling signal has no sample that is a number")
+    low, high = float(known.min()), float(known.max())
+    if high - low > STILL * max(abs(low), abs(high)):
+        return low, high
+    if degree > 0:
+        raise InputError(
+            f"the scheduling signal stays at {low:g}: a model scheduled by it cannot be told;"
+            " --degree 0 fits an LTI model"
+        )
+    return low - 0.5, high + 0.5

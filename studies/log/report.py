@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from identification import residual_analysis, slow_modes, uncertainty
-from studies.log.comparison import HORIZONS, Comparison, coefficients, percent
+from identification import AgainstConstant, LPVARXModel, residual_analysis, slow_modes, uncertainty
+from identification.judge.against_constant import HORIZONS
+from identification.judge.scores import Scores, percent
 from studies.output import columns
 from symheli.records import FlightRecord
 
@@ -22,7 +23,7 @@ def facts(
     record: FlightRecord,
     rows: int,
     outside: int,
-    result: Comparison,
+    result: AgainstConstant,
     test_log: Path | None = None,
 ) -> dict[str, Any]:
     """What was read and used: `rows` in the file, `outside` --start and --stop, and what became of
@@ -58,7 +59,7 @@ def facts(
     }
 
 
-def text(found: dict[str, Any], result: Comparison) -> str:
+def text(found: dict[str, Any], result: AgainstConstant) -> str:
     """The whole answer for a reader."""
     fit = "fit in percent of the output's own variation (100: perfect, 0: no better than its mean)"
     parts = [
@@ -78,12 +79,15 @@ def text(found: dict[str, Any], result: Comparison) -> str:
     return "\n".join(parts).rstrip()
 
 
-def data(found: dict[str, Any], result: Comparison) -> dict[str, Any]:
+def data(found: dict[str, Any], result: AgainstConstant) -> dict[str, Any]:
     """The whole answer for a program."""
     models = {
         scored.label: {
-            "fit_percent": {"in_sample": scored.in_sample, "held_out": scored.held_out},
-            "coefficients": coefficients(scored.model),
+            "fit_percent": {
+                "in_sample": _fits(scored.in_sample),
+                "held_out": _fits(scored.held_out),
+            },
+            "coefficients": _coefficients(scored.model),
         }
         for scored in result.models
     }
@@ -109,6 +113,20 @@ def data(found: dict[str, Any], result: Comparison) -> dict[str, Any]:
     }
 
 
+def _fits(scores: Scores | None) -> dict[str, Any] | None:
+    return None if scores is None else scores.by_horizon
+
+
+def _coefficients(model: LPVARXModel) -> dict[str, Any]:
+    """Of 1, p, p^2, ... by lag, as `identification.Coefficients.monomial` arranges them."""
+    values = model.coefficients.monomial()
+    return {
+        **values._asdict(),
+        "output_lags": list(model.structure.output_lags),
+        "input_lags": list(model.structure.input_lags),
+    }
+
+
 def _read(found: dict[str, Any]) -> list[str]:
     parts = found["segments"]
     lengths = ", ".join(map(str, parts[:8])) + (", ..." if len(parts) > 8 else "")
@@ -130,7 +148,7 @@ def _read(found: dict[str, Any]) -> list[str]:
     ]
 
 
-def _structure(found: dict[str, Any], result: Comparison) -> list[str]:
+def _structure(found: dict[str, Any], result: AgainstConstant) -> list[str]:
     arx = result.scheduled.structure
     (low, high), (trained_low, trained_high) = (
         found["scheduling_range"],
@@ -170,7 +188,7 @@ def _structure(found: dict[str, Any], result: Comparison) -> list[str]:
     ]
 
 
-def _method(result: Comparison) -> str:
+def _method(result: AgainstConstant) -> str:
     model = result.scheduled
     strength = (
         f" (first-stage F {model.details['first_stage_F']:.3g})"
@@ -180,7 +198,7 @@ def _method(result: Comparison) -> str:
     return f"{model.method}{strength}"
 
 
-def _horizons(result: Comparison) -> list[str]:
+def _horizons(result: AgainstConstant) -> list[str]:
     """What the predictions know of p."""
     p = result.scheduled.structure.scheduling
     if result.scheduled.structure.basis.size == 1 and not result.scheduled.structure.offset_rate:
@@ -199,7 +217,7 @@ def _horizons(result: Comparison) -> list[str]:
     ]
 
 
-def _slow(result: Comparison) -> dict[str, Any]:
+def _slow(result: AgainstConstant) -> dict[str, Any]:
     found = slow_modes(result.scheduled, result.training)
     return {
         "lost": len(found.lost),
@@ -211,7 +229,7 @@ def _slow(result: Comparison) -> dict[str, Any]:
     }
 
 
-def _certainty(result: Comparison) -> list[str]:
+def _certainty(result: AgainstConstant) -> list[str]:
     """What the residuals of the fit say, and how certain its coefficients are."""
     model = result.scheduled
     lags = min(25, len(result.training) // 20)
@@ -235,7 +253,7 @@ def _certainty(result: Comparison) -> list[str]:
     ]
 
 
-def _table(result: Comparison) -> str:
+def _table(result: AgainstConstant) -> str:
     parts = ["in sample"] + (["held out"] if result.test is not None else [])
     rows = [
         [
@@ -246,7 +264,9 @@ def _table(result: Comparison) -> str:
     ]
     for output in map(str, result.scheduled.outputs):
         for scored in result.models:
-            halves = [scored.in_sample, *([scored.held_out] if scored.held_out else [])]
+            halves = [
+                half.by_horizon for half in (scored.in_sample, scored.held_out) if half is not None
+            ]
             rows.append(
                 [
                     output,
@@ -257,7 +277,7 @@ def _table(result: Comparison) -> str:
     return columns(rows, left=2)
 
 
-def _excitation(result: Comparison) -> dict[str, Any]:
+def _excitation(result: AgainstConstant) -> dict[str, Any]:
     report = result.scheduled.excitation
     if report is None:
         return {}

@@ -2,7 +2,7 @@
 to jump at them.
 
 The linearizations are smooth between two corners (a stall, an edge of the wake) and may jump at
-one. A polynomial through many of them on each interval misses so little that `studies.cover` can
+one. A polynomial through many of them on each interval misses so little that `synthesis.cover` can
 carry it through a proof.
 """
 
@@ -15,12 +15,11 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 import symheli
 from studies.loops.lateral import CHANNELS, STATES, close
 from symheli import Helicopter, LinearFamily, LPVStateSpace, Scheduling
-from symheli.lpv.bases.piecewise import PiecewisePolynomial
+from symheli.lpv import Patches
 
 Array = np.ndarray
 Channel = Literal["gust", "inputs"]
@@ -30,48 +29,6 @@ INPUTS = ("d_lat", "d_ped", *CHANNELS["gust"])
 DEGREE = 4
 LONGEST = 3.0
 """Longest interval, m/s: with `DEGREE` the entries are met to 1e-8 of the largest."""
-
-
-@dataclass(frozen=True)
-class Patches(PiecewisePolynomial):
-    """Powers up to `degree` on each interval between the `breaks`, zero elsewhere: nothing joins
-    them, a model may jump at a break.
-    """
-
-    degree: int
-    breaks: tuple[float, ...]
-
-    @property
-    def low(self) -> float:  # type: ignore[override]
-        """First break."""
-        return self.breaks[0]
-
-    @property
-    def high(self) -> float:  # type: ignore[override]
-        """Last break."""
-        return self.breaks[-1]
-
-    @property
-    def size(self) -> int:
-        """degree + 1 functions an interval."""
-        return (self.degree + 1) * (len(self.breaks) - 1)
-
-    @property
-    def distinct_values(self) -> int:
-        """degree + 1 in every interval."""
-        return self.size
-
-    def points(self, count: int) -> Array:
-        """`count` Chebyshev points inside every interval, in order."""
-        unit = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
-        return np.concatenate([a + (b - a) * unit for a, b in pairwise(self.breaks)])
-
-    def _piecewise(self) -> PPoly:
-        n, widths = self.degree + 1, np.diff(self.breaks)
-        c = np.zeros((n, len(widths), self.size))
-        for s, width in enumerate(widths):
-            c[:, s, s * n : (s + 1) * n] = np.diag(width ** -np.arange(n - 1.0, -1.0, -1.0))
-        return PPoly(c, np.array(self.breaks))
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,17 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 import symheli
-from identification import LPVARX, LPVARXModel, Polynomial, RecursiveLeastSquares, fit
+from identification import (
+    LPVARX,
+    LPVARXModel,
+    Polynomial,
+    RecursiveLeastSquares,
+    Scores,
+    fit,
+    pole_miss,
+    scores,
+)
 from studies.transition.flights import TOP
 from symheli import FlightRecord, Helicopter, LinearModel
 from symheli.errors import DataWarning
@@ -84,16 +91,14 @@ ALL = Axis(
 AXES = (LONGITUDINAL, LATERAL)
 
 
-@dataclass(frozen=True)
-class Scores:
-    """Fit in percent of each output one step ahead, 1 s ahead and in free run, and the miss of the
-    frozen rotor mode (percent of its magnitude) at each of `FROZEN_SPEEDS`.
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """Scores of an identified model, and the miss of the frozen rotor mode (percent of its
+    magnitude) at each of `FROZEN_SPEEDS`.
     """
 
-    one_step: dict[str, float]
-    one_second: dict[str, float]
-    free_run: dict[str, float]
-    mode_miss: dict[float, float]
+    scores: Scores
+    mode_miss: Mapping[float, float]
 
 
 def rotor_mode(model: LinearModel, name: str) -> complex:
@@ -108,23 +113,14 @@ def mode_misses(heli: Helicopter, model: LPVARXModel, mode: str) -> dict[float, 
     """Distance of the identified model's nearest eigenvalue to the exact rotor mode, percent of its
     magnitude, at frozen airspeeds.
     """
-    misses = {}
-    for speed in FROZEN_SPEEDS:
-        exact = rotor_mode(symheli.linearize(heli, symheli.trim(heli, speed)), mode)
-        z = model.at(speed).poles().astype(complex)
-        s = np.log(z[np.abs(z) > 1e-12]) / model.dt
-        misses[speed] = float(100 * np.abs(s - exact).min() / abs(exact))
-    return misses
+    exact = {v: symheli.linearize(heli, symheli.trim(heli, v)) for v in FROZEN_SPEEDS}
+    return {v: pole_miss(model.at(v), rotor_mode(exact[v], mode)) for v in FROZEN_SPEEDS}
 
 
-def scores(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord) -> Scores:
+def judged(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord) -> Judged:
     """Judge `model` on a record it has not seen."""
-
-    def named(horizon: int | None) -> dict[str, float]:
-        return {str(name): float(value) for name, value in model.score(test, horizon).items()}
-
-    return Scores(
-        named(1), named(round(HORIZON / model.dt)), named(None), mode_misses(heli, model, axis.mode)
+    return Judged(
+        scores=scores(model, test, horizon=HORIZON), mode_miss=mode_misses(heli, model, axis.mode)
     )
 
 

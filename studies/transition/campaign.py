@@ -92,7 +92,7 @@ def run_campaign(seeds: int = 20, vehicle: str = "xcell60") -> Campaign:
             plan = FlightPlan(seed, noise_db=noise_db)
             training, test = plan.training(heli, autopilot), plan.test(heli, autopilot)
             for axis in AXES:
-                result = axes.scores(heli, axis, axes.identify(axis, training, "ls"), test)
+                result = axes.judged(heli, axis, axes.identify(axis, training, "ls"), test)
                 label = "noise-free" if noise_db is None else f"{noise_db:g} dB"
                 for output, marks in axis.marks.items():
                     key = (
@@ -100,7 +100,7 @@ def run_campaign(seeds: int = 20, vehicle: str = "xcell60") -> Campaign:
                         marks[noise_db is not None],
                         False,
                     )
-                    collected.setdefault(key, []).append(result.one_second[output])
+                    collected.setdefault(key, []).append(result.scores.ahead[output])
                 if noise_db is None:
                     for speed, miss in result.mode_miss.items():
                         collected.setdefault(

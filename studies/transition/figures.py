@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED, draw
-from studies.transition.axes import LONGITUDINAL
-from studies.transition.comparison import FAST
+from studies.figures import gain_curve
+from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED
+from studies.transition.flights import NOISES
 from studies.transition.guarantees import curves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from identification import FrozenModels
     from studies.figures.gain_curve import GainCurve
+    from studies.transition.comparison import ComparedAxis
+    from studies.transition.flights import Flights
     from studies.transition.outcome import Outcome
+    from studies.transition.paper_experiment import Experiment
 
 DEGREES = 180 / math.pi
 
@@ -79,16 +83,19 @@ def figures(study: Outcome) -> Iterator[tuple[str, str, Figure]]:
         if study.baseline:
             yield "trim", CAPTION["trim"], trim(study)
             yield "interpolation", CAPTION["interpolation"], entries(study)
-        for e in study.experiments:
+        for e in study.paper_experiment.runs if study.paper_experiment else ():
             yield f"convergence-{e.loop}", CAPTION["convergence"].format(e.loop), convergence(e)
             yield f"outputs-{e.loop}", CAPTION["outputs"].format(e.loop), outputs(e)
         if study.flights:
-            yield "flights", CAPTION["flights"], flights(study)
-        for (axis, noise), c in study.comparisons.items():
-            if noise == "noise-free":
-                yield f"prediction-{axis}", CAPTION["prediction"].format(axis), prediction(c)
-        for axis, f in study.frozen.items():
-            yield f"frozen-{axis}", CAPTION["frozen"].format(axis, FAST), frozen(f)
+            yield "flights", CAPTION["flights"], flights(study.flights)
+        if study.comparison:
+            for c in study.comparison.predictions:
+                if c.noise == NOISES[0]:
+                    caption = CAPTION["prediction"].format(c.axis.name)
+                    yield f"prediction-{c.axis.name}", caption, prediction(c)
+            for f in study.comparison.frozen:
+                caption = CAPTION["frozen"].format(f.axis.name, f.found.fast)
+                yield f"frozen-{f.axis.name}", caption, frozen(f.found)
         if found := curves(study.bounds):
             yield "gain-against-rate", CAPTION["gain"], gain_curves(found)
 
@@ -152,7 +159,7 @@ def entries(study: Outcome) -> Figure:
     return figure
 
 
-def convergence(e: Any) -> Figure:
+def convergence(e: Experiment) -> Figure:
     """Parameters over time, one panel an output."""
     figure, axes = _subplots(1, 3, 11, 2.8, sharex=True)
     for ax, c in zip(axes[0], e.channels, strict=True):
@@ -178,7 +185,7 @@ def convergence(e: Any) -> Figure:
     return figure
 
 
-def outputs(e: Any) -> Figure:
+def outputs(e: Experiment) -> Figure:
     """System and one-step prediction over the fresh record, with the error below."""
     figure, axes = _subplots(2, 3, 11, 3.8, sharex=True, height_ratios=(2, 1))
     for column, c in enumerate(e.channels):
@@ -203,11 +210,11 @@ def outputs(e: Any) -> Figure:
     return figure
 
 
-def flights(study: Outcome) -> Figure:
+def flights(flown: Flights) -> Figure:
     """Airspeed, attitude and inputs of training and test."""
     figure, axes = _subplots(3, 2, 11, 4.6, sharex="col", width_ratios=(2.2, 1))
-    for column, name in enumerate(("training, noise-free", "test, noise-free")):
-        record = study.flights[name]
+    shown = {"training": flown.training[NOISES[0]], "test": flown.test[NOISES[0]]}
+    for column, (name, record) in enumerate(shown.items()):
         axes[0][column].plot(record.time, record["airspeed"], color=BLUE, label="airspeed")
         axes[0][column].plot(
             record.time,
@@ -217,7 +224,7 @@ def flights(study: Outcome) -> Figure:
             label="command",
             linewidth=1,
         )
-        axes[0][column].set_title(f"{name.split(',')[0]}: airspeed (m/s)")
+        axes[0][column].set_title(f"{name}: airspeed (m/s)")
         for signal, colour in (("theta", BLUE), ("phi", ORANGE)):
             axes[1][column].plot(
                 record.time, DEGREES * record[signal], color=colour, label=signal, linewidth=0.9
@@ -239,25 +246,26 @@ def flights(study: Outcome) -> Figure:
     return figure
 
 
-def prediction(c: Any) -> Figure:
+def prediction(compared: ComparedAxis) -> Figure:
     """1 s ahead predictions of each output."""
-    figure, axes = _subplots(len(c.axis.outputs), 1, 11, 1.55 * len(c.axis.outputs), sharex=True)
+    c = compared.found
+    figure, axes = _subplots(len(c.outputs), 1, 11, 1.55 * len(c.outputs), sharex=True)
     chosen = [
         p
-        for p in c.predictors
+        for p in c.predictions
         if p.name in ("LPV-ARX, two inputs", "LPV-ARX, other inputs measured", "baseline, cubic")
     ]
-    for k, (ax, output) in enumerate(zip(axes[:, 0], c.axis.outputs, strict=True)):
+    for k, (ax, output) in enumerate(zip(axes[:, 0], c.outputs, strict=True)):
         ax.plot(c.record.time, c.record[output], color=INK, label="flight", linewidth=1.5)
         for p, colour in zip(
             chosen, (BLUE, GREEN, ORANGE) if len(chosen) == 3 else (BLUE, ORANGE), strict=True
         ):
             ax.plot(
                 c.record.time,
-                p.one_second_series[:, k],
+                p.ahead[:, k],
                 color=colour,
                 linewidth=1,
-                label=f"{p.name}: {p.one_second[output]:.0f} %",
+                label=f"{p.name}: {p.scores.ahead[output]:.0f} %",
             )
         unit = c.record.signals[c.record.signals.index(output)].unit
         low, high = c.record[output].min(), c.record[output].max()
@@ -268,21 +276,21 @@ def prediction(c: Any) -> Figure:
     return figure
 
 
-def frozen(f: Any) -> Figure:
+def frozen(f: FrozenModels) -> Figure:
     """Poles, frequency response and nu-gap."""
     figure, axes = _subplots(1, 3, 12, 3.2)
-    shade = np.linspace(0.25, 1.0, len(f.airspeeds))
+    shade = np.linspace(0.25, 1.0, len(f.points))
     for name, stack, colour, marker in (
-        ("exact", f.exact_poles, INK, "o"),
+        ("exact", f.reference_poles, INK, "o"),
         ("baseline", f.baseline_poles, ORANGE, "+"),
         ("identified", f.identified_poles, BLUE, "x"),
     ):
         for k, poles in enumerate(stack):
-            shown = poles[(poles.imag >= 0) & (poles.real > -12) & (poles.imag < 30)]
+            shown = poles[(np.imag(poles) >= 0) & (np.real(poles) > -12) & (np.imag(poles) < 30)]
             label = name if k == len(stack) - 1 else None
             axes[0][0].plot(
-                shown.real,
-                shown.imag,
+                np.real(shown),
+                np.imag(shown),
                 marker,
                 color=colour,
                 markersize=4.5,
@@ -294,26 +302,25 @@ def frozen(f: Any) -> Figure:
     axes[0][0].set_xlabel("real (rad/s)")
     axes[0][0].set_title("poles, imaginary part (rad/s)")
     axes[0][0].legend(loc="upper left")
-    for name, colour in (("exact", INK), ("baseline", ORANGE), ("identified", BLUE)):
-        if name in f.responses:
-            axes[0][1].loglog(
-                f.omega,
-                f.responses[name],
-                color=colour,
-                label=name,
-                linestyle="--" if name == "baseline" else "-",
-                linewidth=2.4 if name == "exact" else 1.2,
-            )
-    axes[0][1].set_title(f"{'|q/d_lon|' if f.axis is LONGITUDINAL else '|p/d_lat|'} at 7 m/s (1/s)")
+    for name, colour in (("reference", INK), ("baseline", ORANGE), ("identified", BLUE)):
+        axes[0][1].loglog(
+            f.omega,
+            f.responses[name],
+            color=colour,
+            label="exact" if name == "reference" else name,
+            linestyle="--" if name == "baseline" else "-",
+            linewidth=2.4 if name == "reference" else 1.2,
+        )
+    axes[0][1].set_title(f"|{f.channel[1]}/{f.channel[0]}| at {f.responses_at:g} m/s (1/s)")
     axes[0][1].set_xlabel("frequency (rad/s)")
     axes[0][1].legend()
-    axes[0][2].plot(f.airspeeds, f.gap_baseline, "+-", color=ORANGE, label="baseline")
-    axes[0][2].plot(f.airspeeds, f.gap_identified, "x-", color=BLUE, label="identified")
+    axes[0][2].plot(f.points, f.gap_baseline, "+-", color=ORANGE, label="baseline")
+    axes[0][2].plot(f.points, f.gap_identified, "x-", color=BLUE, label="identified")
     axes[0][2].plot(
-        f.airspeeds, f.fast_baseline, "+:", color=ORANGE, label=f"baseline, above {FAST:g} rad/s"
+        f.points, f.fast_baseline, "+:", color=ORANGE, label=f"baseline, above {f.fast:g} rad/s"
     )
     axes[0][2].plot(
-        f.airspeeds, f.fast_identified, "x:", color=BLUE, label=f"identified, above {FAST:g} rad/s"
+        f.points, f.fast_identified, "x:", color=BLUE, label=f"identified, above {f.fast:g} rad/s"
     )
     axes[0][2].set_ylim(0, 1.05)
     axes[0][2].set_title("nu-gap to the exact model")
@@ -328,5 +335,5 @@ def gain_curves(curves: list[GainCurve]) -> Figure:
         1, len(curves), 7.5 if len(curves) == 1 else 11.5, 4.2, width_ratios=(1.5, 1)[: len(curves)]
     )
     for ax, curve in zip(axes[0], curves, strict=True):
-        draw(curve, ax)
+        gain_curve.plot(curve, ax)
     return figure

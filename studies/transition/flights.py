@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from symheli import AirspeedSchedule, Dryden, Excitation, FlightRecord, Helicopter, Wind, fly
@@ -17,6 +18,8 @@ ACCELERATIONS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5, 3.0, 1.5, 4.0, 3.0, 2.0, 3.5)
 """Peak accelerations of the ramps of the training flight, m/s^2."""
 
 NOISE_DB = 30.0
+NOISES = ("noise-free", f"{NOISE_DB:g} dB")
+"""What is said of the flights of a plan and of `FlightPlan.noisy`."""
 
 BREEZE, BREEZE_AT_20FT, ABOVE_GROUND = (-2.0, 1.0, 0.0), 7.7, 20.0
 """A steady wind (north, east, down, m/s) and the turbulence of a mean wind of 15 kt ("light"),
@@ -91,6 +94,36 @@ class FlightPlan:
             wind=wind,
             autopilot=autopilot,
         )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flights:
+    """What is identified, what judges, each {noise: record}, and the gentle flight."""
+
+    training: Mapping[str, FlightRecord]
+    test: Mapping[str, FlightRecord]
+    gentle: FlightRecord
+
+    def named(self) -> dict[str, FlightRecord]:
+        """Every record under a name of its own."""
+        each = {
+            f"{which}, {noise}": records[noise]
+            for noise in NOISES
+            for which, records in (("training", self.training), ("test", self.test))
+        }
+        return each | {"gentle": self.gentle}
+
+
+def fly_transitions(heli: Helicopter, seed: int, ramps: int, gentle_ramps: int) -> Flights:
+    """Training and test without and with noise, and the gentle flight."""
+    autopilot = autopilot_for(heli)
+    clean = FlightPlan(seed, ramps=ramps)
+    plans = dict(zip(NOISES, (clean, clean.noisy()), strict=True))
+    training, test = {}, {}
+    for noise, plan in plans.items():
+        training[noise] = plan.training(heli, autopilot)
+        test[noise] = plan.test(heli, autopilot)
+    return Flights(training=training, test=test, gentle=clean.gentle(heli, autopilot, gentle_ramps))
 
 
 def autopilot_for(heli: Helicopter, dt: float = 0.02) -> Autopilot:

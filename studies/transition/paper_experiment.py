@@ -69,6 +69,19 @@ class Experiment:
     excitation: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class PaperExperiments:
+    """The experiment in open loop, as in the paper, and in closed loop."""
+
+    runs: tuple[Experiment, ...]
+
+
+def run_experiments(family: LinearFamily, seed: int = 0) -> PaperExperiments:
+    """Open loop, then closed."""
+    runs = tuple(run_experiment(family, closed, seed) for closed in (False, True))
+    return PaperExperiments(runs=runs)
+
+
 def discretized_baseline(family: LinearFamily, degree: int = 2) -> LPVStateSpace:
     """Longitudinal baseline from pitch cyclic, quadratic in airspeed, discretized at the paper's
     period.

@@ -4,6 +4,7 @@ back.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,6 +31,18 @@ class Recovery:
     A_error: float
     B_error: float
     discretization_misfit: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recoveries:
+    """One recovery a sample period."""
+
+    runs: tuple[Recovery, ...]
+
+
+def recover_at(family: LinearFamily, periods: Sequence[float], seed: int = 0) -> Recoveries:
+    """At each sample period (s)."""
+    return Recoveries(runs=tuple(recover(family, period, seed=seed) for period in periods))
 
 
 def recover(

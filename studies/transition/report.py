@@ -9,13 +9,15 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studies.files import write_bytes, write_text
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
+from symheli.values.whole_files import write_bytes, write_text
 
 if TYPE_CHECKING:
+    from identification import LPVARXModel
+    from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
 
 TEMPLATE = "report.html.j2"
@@ -85,7 +87,15 @@ def _headline(study: Outcome) -> dict[str, object]:
         "hypotheses": hypotheses,
         "notes": {
             name: model.excitation
-            for name, model in study.models.items()
+            for name, model in _models(study.identification).items()
             if model.excitation is not None
         },
     }
+
+
+def _models(found: Identification | None) -> dict[str, LPVARXModel]:
+    """Every identified model by what it was identified from."""
+    if found is None:
+        return {}
+    each = {f"{one.axis.name}, {one.noise}": one.model for one in found.axes}
+    return each | {"lateral, gentle": found.gentle}

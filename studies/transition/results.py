@@ -1,219 +1,285 @@
-"""Every number of the report with its unit, as a program would read it."""
+"""Every number of the report with its unit, as a program would read it: results.schema.json says
+what is where.
+"""
 
 from __future__ import annotations
 
 import math
 import platform
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from studies.transition.axes import HORIZON
-from studies.transition.comparison import FAST
 from studies.transition.paper_experiment import PERIOD
 
 if TYPE_CHECKING:
+    from identification import FrozenModels, Scores
     from studies.transition.baseline import Baseline
-    from studies.transition.comparison import Comparison, FrozenComparison
+    from studies.transition.comparison import Comparison
+    from studies.transition.flights import Flights
     from studies.transition.guarantees import Bound
+    from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
-    from studies.transition.paper_experiment import Experiment
+    from studies.transition.paper_experiment import Channel, Experiment
+    from studies.transition.recovery import Recovery
+    from symheli import Signal
+
+SCHEMA = "symheli study 2"
+LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
+GUST_UNIT = "(rad/s, rad)/(m/s)"
 
 
 def value(number: float, unit: str) -> dict[str, Any]:
     """{"value", "unit"}; infinite and undefined numbers as the strings "inf", "-inf", "nan" (JSON
     has none).
     """
-    number = float(number)
-    return {"value": number if math.isfinite(number) else str(number), "unit": unit}
+    return {"value": _number(number), "unit": unit}
 
 
-def named(numbers: dict[Any, float], unit: str) -> dict[str, Any]:
-    """One `value` a name."""
+def values(numbers: Iterable[float], unit: str) -> dict[str, Any]:
+    """{"value", "unit"} of many."""
+    return {"value": [_number(number) for number in numbers], "unit": unit}
+
+
+def named(numbers: Mapping[Any, float], unit: str) -> dict[str, Any]:
+    """One `value` a signal."""
     return {str(name): value(number, unit) for name, number in numbers.items()}
 
 
 def to_dict(study: Outcome) -> dict[str, Any]:
-    """Nested dictionary of what the study has reached."""
-    out: dict[str, Any] = {
-        "schema": "symheli study 1",
+    """What the study has reached; null where it has not."""
+    return {
+        "schema": SCHEMA,
         "vehicle": study.vehicle,
         "quick": study.quick,
         "seed": study.seed,
         "complete": study.complete,
+        "horizon": value(HORIZON, "s"),
         "versions": (
-            {
-                name: version(name)
-                for name in ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
-            }
-            | {"python": platform.python_version()}
+            {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
         ),
-        "stage time": named(study.seconds, "s"),
+        "stage_time": named(study.seconds, "s"),
+        "baseline": study.baseline and _baseline(study.baseline),
+        "paper_experiment": (
+            study.paper_experiment and [_experiment(e) for e in study.paper_experiment.runs]
+        ),
+        "exact_recovery": (
+            study.exact_recovery and [_recovery(r) for r in study.exact_recovery.runs]
+        ),
+        "flights": study.flights and _flights(study.flights),
+        "identification": study.identification and _identification(study.identification),
+        "comparison": study.comparison and _comparison(study.comparison),
+        "guarantees": _guarantees(study),
     }
-    if study.baseline:
-        out["baseline"] = _baseline(study.baseline)
-    out["paper experiment"] = {e.loop: _experiment(e) for e in study.experiments}
-    out["exact recovery"] = [
-        {
-            "period": value(r.period, "s"),
-            "degree": r.degree,
-            "A error": value(r.A_error, "SI"),
-            "B error": value(r.B_error, "SI"),
-            "misfit of the discrete polynomial fit": value(r.discretization_misfit, "SI"),
-        }
-        for r in study.recoveries
-    ]
-    out["flights"] = {
-        name: {
-            "samples": len(record),
-            "period": value(record.dt, "s"),
-            "note": record.note,
-            "top airspeed": value(record["airspeed"].max(), "m/s"),
-        }
-        for name, record in study.flights.items()
+
+
+def _number(number: float) -> float | str:
+    number = float(number)
+    return number if math.isfinite(number) else str(number)
+
+
+def _scores(scores: Scores) -> dict[str, Any]:
+    return {
+        "one_step": named(scores.one_step, "%"),
+        "ahead": named(scores.ahead, "%"),
+        "free_run": named(scores.free_run, "%"),
     }
-    out["identification"] = {
-        f"{axis}, {noise}": {
-            "one step": named(s.one_step, "%"),
-            f"{HORIZON:g} s ahead": named(s.one_second, "%"),
-            "free run": named(s.free_run, "%"),
-            "rotor mode miss by airspeed in m/s": named(s.mode_miss, "%"),
-        }
-        for (axis, noise), s in study.scores.items()
-    }
-    out["time of one recursive update"] = named(study.update_times, "s")
-    out["rotor mode miss at 30 dB, order 2"] = {
-        f"{axis}, {method}": named(misses, "%")
-        for (axis, method), misses in study.noisy_modes.items()
-    }
-    out["first-stage F of the instruments at 30 dB, worst direction"] = named(
-        study.first_stage, "1"
-    )
-    out["comparison"] = {
-        f"{axis}, {noise}": _comparison(c) for (axis, noise), c in study.comparisons.items()
-    }
-    out["frozen comparison"] = {name: _frozen(f) for name, f in study.frozen.items()}
-    out["frozen gain of the exact models"] = {
-        k: value(v, "(rad/s, rad)/(m/s)" if k == "gust" else "1")
-        for k, v in study.exact_frozen.items()
-    }
-    out["largest frozen gain of the servo loops"] = {
-        name: {
-            "gain": value(peak.gamma, "1"),
-            "airspeed": value(peak.p, "m/s"),
-            "frequency": value(peak.omega, "rad/s"),
-        }
-        for name, peak in study.frozen_peaks.items()
-    }
-    out["guarantees"] = [bound_to_dict(b) for b in study.bounds]
-    return out
+
+
+def _over_airspeed(miss: Mapping[float, float]) -> dict[str, Any]:
+    return {"airspeed": values(miss, "m/s"), "miss": values(miss.values(), "%")}
 
 
 def _baseline(b: Baseline) -> dict[str, Any]:
     return {
-        "nodes": {"value": b.nodes.airspeeds.tolist(), "unit": "m/s"},
-        "kinks": {
-            name: {"value": list(speeds), "unit": "m/s"} for name, speeds in b.between.kinks.items()
-        },
-        "LFT order": value(b.lft.order, "1"),
-        "LFT order, reduced exactly": value(b.reduced.order, "1"),
-        "LFT error, relative": value(b.lft_error, "1"),
-        "entries": {
-            e.name: {
+        "nodes": values(b.nodes.airspeeds, "m/s"),
+        "kinks": [
+            {"name": name, "airspeed": values(speeds, "m/s")}
+            for name, speeds in b.between.kinks.items()
+        ],
+        "lft_order": value(b.lft.order, "1"),
+        "lft_order_reduced": value(b.reduced.order, "1"),
+        "lft_error": value(b.lft_error, "1"),
+        "entries": [
+            {
+                "name": e.name,
                 "range": value(e.span, "SI"),
-                "largest error in percent of the range": named(e.percent, "%"),
+                "largest_error": {
+                    kind.replace(" ", "_"): value(share, "%") for kind, share in e.percent.items()
+                },
             }
             for e in b.entries
-        },
-        "entries no polynomial fits": [e.name for e in b.unfit],
+        ],
+        "entries_no_polynomial_fits": [e.name for e in b.unfit],
         "trim": {
-            str(name): {
-                "value": [t.x[name] if name in t.x else t.u[name] for t in b.nodes.trims],
-                "unit": name.unit,
-            }
-            for name in (*b.nodes.states, *b.nodes.trims[0].u.signals)
+            str(name): _trim(b, name) for name in (*b.nodes.states, *b.nodes.trims[0].u.signals)
         },
     }
+
+
+def _trim(b: Baseline, name: Signal) -> dict[str, Any]:
+    """A state or input at the trim of every node."""
+    return values((t.x[name] if name in t.x else t.u[name] for t in b.nodes.trims), name.unit)
 
 
 def _experiment(e: Experiment) -> dict[str, Any]:
     return {
+        "loop": e.loop,
         "period": value(PERIOD, "s"),
-        "cubic basis refused because": e.cubic_refused,
-        "outputs": {
-            c.output: {
-                "fit": named(c.fits, "%"),
-                "parameters settled after": value(c.settled_after, "s"),
-                "final parameters, powers of p in m/s": dict(
-                    zip(c.parameter_names, map(float, c.parameters[-1]), strict=True)
-                ),
-                "largest one-step errors": [
-                    {"time": value(t, "s"), "standard deviations": value(size, "1")}
-                    for t, size in c.spikes
-                ],
-                "airspeed at the largest error": value(c.spike_airspeed, "m/s"),
-                "input behind the largest error, in its standard deviations": value(
-                    c.spike_input, "1"
-                ),
-            }
-            for c in e.channels
-        },
+        "cubic_basis_refused_because": e.cubic_refused,
+        "outputs": [_channel(c) for c in e.channels],
     }
 
 
-def _comparison(c: Comparison) -> dict[str, Any]:
+def _channel(c: Channel) -> dict[str, Any]:
+    one, ahead, free = c.fits.values()
     return {
-        p.name: {
-            "one step": named(p.one_step, "%"),
-            f"{HORIZON:g} s ahead": named(p.one_second, "%"),
-            "free run": named(p.free_run, "%"),
+        "output": c.output,
+        "one_step": value(one, "%"),
+        "ahead": value(ahead, "%"),
+        "free_run": value(free, "%"),
+        "settled_after": value(c.settled_after, "s"),
+        "parameters": [
+            {"name": name, "value": float(number)}
+            for name, number in zip(c.parameter_names, c.parameters[-1], strict=True)
+        ],
+        "largest_errors": [
+            {"time": value(t, "s"), "standard_deviations": value(size, "1")} for t, size in c.spikes
+        ],
+        "airspeed_at_largest_error": value(c.spike_airspeed, "m/s"),
+        "input_before_largest_error": value(c.spike_input, "1"),
+    }
+
+
+def _recovery(r: Recovery) -> dict[str, Any]:
+    return {
+        "period": value(r.period, "s"),
+        "degree": r.degree,
+        "a_error": value(r.A_error, "SI"),
+        "b_error": value(r.B_error, "SI"),
+        "discretization_misfit": value(r.discretization_misfit, "SI"),
+    }
+
+
+def _flights(flights: Flights) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": name,
+            "samples": len(record),
+            "period": value(record.dt, "s"),
+            "note": record.note,
+            "top_airspeed": value(record["airspeed"].max(), "m/s"),
         }
-        for p in c.predictors
+        for name, record in flights.named().items()
+    ]
+
+
+def _identification(found: Identification) -> dict[str, Any]:
+    return {
+        "models": [
+            {
+                "axis": one.axis.name,
+                "noise": one.noise,
+                **_scores(one.scores),
+                "rotor_mode": _over_airspeed(one.mode_miss),
+            }
+            for one in found.axes
+        ],
+        "update_time": [
+            {"axis": axis, "time": value(seconds, "s")}
+            for axis, seconds in found.update_times.items()
+        ],
+        "noisy_rotor_modes": [
+            {"axis": one.axis.name, "method": one.method, "rotor_mode": _over_airspeed(one.miss)}
+            for one in found.noisy_modes
+        ],
+        "first_stage_f": [
+            {"axis": axis, "weakest_direction": value(F, "1")}
+            for axis, F in found.first_stage.items()
+        ],
     }
 
 
-def _frozen(f: FrozenComparison) -> dict[str, Any]:
-    def poles(stack: tuple[Any, ...]) -> list[Any]:
-        return [[[float(z.real), float(z.imag)] for z in row] for row in stack]
+def _comparison(found: Comparison) -> dict[str, Any]:
+    return {
+        "predictions": [
+            {
+                "axis": one.axis.name,
+                "noise": one.noise,
+                "predictor": p.name,
+                "identified": p.identified,
+                **_scores(p.scores),
+            }
+            for one in found.predictions
+            for p in one.found.predictions
+        ],
+        "frozen": [
+            {"axis": one.axis.name, "mode": one.axis.mode, **_frozen(one.found)}
+            for one in found.frozen
+        ],
+    }
+
+
+def _frozen(f: FrozenModels) -> dict[str, Any]:
+    def poles(stack: Iterable[Any]) -> list[list[dict[str, float]]]:
+        return [[{"real": float(z.real), "imag": float(z.imag)} for z in row] for row in stack]
 
     return {
-        "airspeeds": {"value": f.airspeeds.tolist(), "unit": "m/s"},
-        "poles [real, imaginary]": {
-            "exact": poles(f.exact_poles),
+        "airspeed": values(f.points, "m/s"),
+        "poles": {
+            "exact": poles(f.reference_poles),
             "baseline": poles(f.baseline_poles),
             "identified": poles(f.identified_poles),
             "unit": "rad/s",
         },
-        f"{f.axis.mode} mode miss": {
-            "baseline": f.mode_miss_baseline.tolist(),
-            "identified": f.mode_miss_identified.tolist(),
-            "unit": "%",
+        "mode_miss": _both(f.miss_baseline, f.miss_identified, "%"),
+        "chordal_distance": {
+            "from_frequency": value(f.fast, "rad/s"),
+            **_both(f.fast_baseline, f.fast_identified, "1"),
         },
-        f"largest chordal distance to the exact model above {FAST:g} rad/s": {
-            "baseline": f.fast_baseline.tolist(),
-            "identified": f.fast_identified.tolist(),
-            "unit": "1",
-        },
-        "nu-gap to the exact model": {
-            "baseline": f.gap_baseline.tolist(),
-            "identified": f.gap_identified.tolist(),
-            "unit": "1",
-        },
+        "nu_gap": _both(f.gap_baseline, f.gap_identified, "1"),
     }
+
+
+def _both(baseline: Iterable[float], identified: Iterable[float], unit: str) -> dict[str, Any]:
+    return {"baseline": values(baseline, unit), "identified": values(identified, unit)}
+
+
+def _guarantees(study: Outcome) -> dict[str, Any]:
+    return {
+        "exact_frozen_gain": {
+            channel: value(found, _unit(channel)) for channel, found in study.exact_frozen.items()
+        },
+        "servo_frozen_peaks": [
+            {
+                "model": name,
+                "gain": value(peak.gamma, "1"),
+                "airspeed": value(peak.p, "m/s"),
+                "frequency": value(peak.omega, "rad/s"),
+            }
+            for name, peak in (study.servo.frozen_peaks.items() if study.servo else ())
+        ],
+        "bounds": [bound_to_dict(b) for b in study.bounds],
+    }
+
+
+def _unit(channel: str) -> str:
+    return "1" if channel == "servo" else GUST_UNIT
 
 
 def bound_to_dict(b: Bound) -> dict[str, Any]:
     """One certificate."""
-    c = b.certificate
-    unit = "1" if b.channel == "servo" else "(rad/s, rad)/(m/s)"
+    c, unit = b.certificate, _unit(b.channel)
     return {
         "model": b.model,
         "channel": b.channel,
         "kind": c.kind,
         "form": b.form,
-        "permitted acceleration": value(b.rate, "m/s^2"),
-        "proven gain": value(c.gamma, unit),
-        "lower bound": value(c.lower, unit),
-        "frozen gain": value(c.frozen, unit),
+        "permitted_acceleration": value(b.rate, "m/s^2"),
+        "proven_gain": value(c.gamma, unit),
+        "lower_bound": value(c.lower, unit),
+        "frozen_gain": value(c.frozen, unit),
         "status": c.status.value,
         "verified": c.verified,
         "solver": c.solver,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
+from studies.transition.flights import NOISES
 
 if TYPE_CHECKING:
     from studies.transition.outcome import Outcome
@@ -21,7 +22,7 @@ def summary(study: Outcome) -> str:
         f" polynomial family within {b.lft_error:.0e}; {len(b.unfit)} entries no polynomial fits,"
         f" worst {', '.join(e.name for e in b.unfit[:4])}"
     ]
-    for r in study.recoveries:
+    for r in study.exact_recovery.runs if study.exact_recovery else ():
         lines.append(
             f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within"
             f" {r.B_error:.0e}"
@@ -39,15 +40,16 @@ def _marks(study: Outcome) -> str:
         "Identified on one transition, judged 1 s ahead on another (fit in percent)",
         ["output", "noise-free", "mark", "30 dB", "mark"],
     )
+    found = study.identification
+    if found is None:
+        return ""
     for axis in AXES:
-        pair = [study.scores.get((axis.name, noise)) for noise in ("noise-free", "30 dB")]
-        if None in pair:
-            return ""
+        pair = [found.of(axis, noise).scores for noise in NOISES]
         for output in axis.outputs:
             marks = axis.marks.get(output)
             cells = []
             for k, score in enumerate(pair):
-                fit = score.one_second[output]  # type: ignore[union-attr]
-                cells += [tables.percent(fit), f">= {marks[k]:.0f}" if marks else ""]
+                cells.append(tables.percent(score.ahead[output]))
+                cells.append(f">= {marks[k]:.0f}" if marks else "")
             table.rows.append([f"{output} ({axis.name})", *cells])
     return table.text()

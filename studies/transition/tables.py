@@ -10,15 +10,18 @@ import numpy as np
 
 from studies.transition.axes import (
     ALL,
+    AXES,
     FROZEN_SPEEDS,
     LATERAL,
     LATERAL_WITH_COLLECTIVE,
-    LONGITUDINAL,
-    Axis,
 )
 from studies.transition.campaign import MODE_MARK
+from studies.transition.comparison import DRIFT_LEFT_OUT
+from studies.transition.flights import NOISES
 
 if TYPE_CHECKING:
+    from studies.transition.comparison import ComparedAxis
+    from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
 
 
@@ -106,7 +109,8 @@ def experiment(study: Outcome) -> Table:
             "input (std)",
         ],
     )
-    for e in study.experiments:
+    runs = study.paper_experiment.runs if study.paper_experiment else ()
+    for e in runs:
         for c in e.channels:
             time, size = c.spikes[0]
             spike = [
@@ -123,8 +127,8 @@ def experiment(study: Outcome) -> Table:
                     *spike,
                 ]
             )
-    if study.experiments:
-        table.remarks.append(f"A cubic basis is refused: {study.experiments[0].cubic_refused}.")
+    if runs:
+        table.remarks.append(f"A cubic basis is refused: {runs[0].cubic_refused}.")
     return table
 
 
@@ -135,27 +139,14 @@ def scores(study: Outcome, noise: str) -> Table:
         f" {noise}: fit in percent",
         ["model, output", "one step", "1 s ahead", "free run", "mark (1 s)"],
     )
-    for axis in (LONGITUDINAL, LATERAL, LATERAL_WITH_COLLECTIVE, ALL):
-        result = study.scores.get((axis.name, noise))
-        if result is None:
+    for one in study.identification.axes if study.identification else ():
+        if one.noise != noise:
             continue
-        for output in axis.outputs:
-            mark = axis.marks.get(output)
-            wanted = (
-                f"{mark[noise != 'noise-free']:.0f}"
-                if mark and axis in (LONGITUDINAL, LATERAL)
-                else ""
-            )
-            table.rows.append(
-                [
-                    f"{axis.name}: {output}",
-                    *(
-                        percent(fit[output])
-                        for fit in (result.one_step, result.one_second, result.free_run)
-                    ),
-                    wanted,
-                ]
-            )
+        for output in one.axis.outputs:
+            mark = one.axis.marks.get(output)
+            wanted = f"{mark[NOISES.index(noise)]:.0f}" if mark and one.axis in AXES else ""
+            fits = (percent(fit[output]) for fit in one.scores.by_horizon.values())
+            table.rows.append([f"{one.axis.name}: {output}", *fits, wanted])
     return table
 
 
@@ -166,53 +157,44 @@ def modes(study: Outcome) -> Table:
         f" {MODE_MARK:g}, noise-free)",
         ["axis, data", *(f"{v:g} m/s" for v in FROZEN_SPEEDS)],
     )
-    for (axis, noise), result in study.scores.items():
-        if axis in (LONGITUDINAL.name, LATERAL.name):
-            table.rows.append(
-                [f"{axis}, {noise}", *(f"{result.mode_miss[v]:.2f}" for v in FROZEN_SPEEDS)]
-            )
+    found = study.identification
+    if found is None:
+        return table
+    for one in found.axes:
+        if one.axis in AXES:
+            cells = (f"{one.mode_miss[v]:.2f}" for v in FROZEN_SPEEDS)
+            table.rows.append([f"{one.axis.name}, {one.noise}", *cells])
     words = {"ls": "least squares", "iv": "instrumental variables"}
-    for (axis, method), misses in study.noisy_modes.items():
-        table.rows.append(
-            [
-                f"{axis}, 30 dB, order 2, {words[method]}",
-                *(f"{misses[v]:.2f}" for v in FROZEN_SPEEDS),
-            ]
-        )
+    for one in found.noisy_modes:
+        cells = (f"{one.miss[v]:.2f}" for v in FROZEN_SPEEDS)
+        table.rows.append([f"{one.axis.name}, 30 dB, order 2, {words[one.method]}", *cells])
     table.remarks.append(
         "Noise fed back through the autopilot biases least squares; more lags hide it, the"
         " excitation as instrument removes it from the rotor modes."
     )
-    if study.first_stage:
-        weakest = ", ".join(f"{F:.2g} ({axis})" for axis, F in study.first_stage.items())
-        table.remarks.append(
-            "In the direction they explain worst, the slow motion, these instruments have a"
-            f" first-stage F of {weakest}: below 10 they are weak, and what they say there is"
-            " nearly as biased as least squares."
-        )
+    weakest = ", ".join(f"{F:.2g} ({axis})" for axis, F in found.first_stage.items())
+    table.remarks.append(
+        "In the direction they explain worst, the slow motion, these instruments have a"
+        f" first-stage F of {weakest}: below 10 they are weak, and what they say there is"
+        " nearly as biased as least squares."
+    )
     return table
 
 
-def comparison(study: Outcome, axis: Axis, noise: str) -> Table:
+def comparison(compared: ComparedAxis) -> Table:
     """Who predicts best, 1 s ahead and in free run."""
-    c = study.comparisons[axis.name, noise]
+    outputs, predictions = compared.axis.outputs, compared.found.predictions
     table = Table(
-        f"{axis.name}, {noise}: one step / 1 s ahead / free run on the unseen transition, fit in"
-        " percent (best 1 s in bold)",
-        ["predictor", *axis.outputs],
+        f"{compared.axis.name}, {compared.noise}: one step / 1 s ahead / free run on the unseen"
+        " transition, fit in percent (best 1 s in bold)",
+        ["predictor", *outputs],
     )
-    for p in c.predictors:
-        table.rows.append(
-            [
-                p.name,
-                *(
-                    " / ".join(percent(fit[y]) for fit in (p.one_step, p.one_second, p.free_run))
-                    for y in axis.outputs
-                ),
-            ]
-        )
-    for j, y in enumerate(axis.outputs):
-        ahead = [p.one_second[y] for p in c.predictors]
+    for p in predictions:
+        fits = p.scores.by_horizon.values()
+        cells = (" / ".join(percent(fit[y]) for fit in fits) for y in outputs)
+        table.rows.append([p.name, *cells])
+    for j, y in enumerate(outputs):
+        ahead = [p.scores.ahead[y] for p in predictions]
         if not np.isnan(ahead).all():
             table.bold.add((int(np.nanargmax(ahead)), j + 1))
     return table
@@ -221,62 +203,24 @@ def comparison(study: Outcome, axis: Axis, noise: str) -> Table:
 def verdicts(study: Outcome) -> list[str]:
     """One sentence an output: who wins 1 s ahead, by how much."""
     out = []
-    for (_, noise), c in study.comparisons.items():
-        identified = [p for p in c.predictors if p.name.startswith("LPV")]
-        baseline = [p for p in c.predictors if "left out" not in p.name and p not in identified]
-        sentences = []
+    for c in study.comparison.predictions if study.comparison else ():
+        predictions, sentences = c.found.predictions, []
+        identified = [p.name for p in predictions if p.identified]
+        baselines = [p.name for p in predictions if not p.identified and p.name != DRIFT_LEFT_OUT]
         for y in c.axis.outputs:
-            one, two = (
-                max(identified, key=lambda p: p.one_second[y]),
-                max(baseline, key=lambda p: p.one_second[y]),
-            )
-            difference = one.one_second[y] - two.one_second[y]
-            who = (
-                "level"
-                if abs(difference) < 1
-                else "the identified model"
-                if difference > 0
-                else "the baseline"
-            )
-            sentences.append(
-                f"{y}: {who}" + ("" if abs(difference) < 1 else f" by {abs(difference):.1f} points")
-            )
-        out.append(f"{c.axis.name}, {noise}, 1 s ahead: " + "; ".join(sentences) + ".")
+            one, two = (c.found.best(y, names).scores.ahead[y] for names in (identified, baselines))
+            who = "the identified model" if one > two else "the baseline"
+            verdict = "level" if abs(one - two) < 1 else f"{who} by {abs(one - two):.1f} points"
+            sentences.append(f"{y}: {verdict}")
+        out.append(f"{c.axis.name}, {c.noise}, 1 s ahead: " + "; ".join(sentences) + ".")
     return out
 
 
 def findings(study: Outcome) -> list[str]:
     """What the numbers of the identification and of the proofs say, in sentences."""
-    out = []
-    plain, rich = (
-        study.scores.get((LATERAL.name, "noise-free")),
-        study.scores.get((LATERAL_WITH_COLLECTIVE.name, "noise-free")),
-    )
-    if plain and rich:
-        change = {y: rich.one_second[y] - plain.one_second[y] for y in LATERAL.outputs}
-        out.append(
-            "Measuring the other inputs too (collective and pitch cyclic drive yaw through the"
-            " rotor torque) changes the 1 s fit by "
-            + ", ".join(f"{d:+.0f} points for {y}" for y, d in change.items())
-            + "."
-        )
-    if study.update_times and study.flights:
-        each = ", ".join(
-            f"{1e6 * seconds:.2g} us ({name})" for name, seconds in study.update_times.items()
-        )
-        regressors, period = ALL.structure().n_regressors, next(iter(study.flights.values())).dt
-        share = 100 * study.update_times[ALL.name] / period
-        out.append(
-            f"One recursive update took {each} of processor time; with {len(ALL.outputs)} outputs"
-            f" and {regressors} regressors each that is {share:.2g} % of the sample period: the"
-            " recursion is not too heavy for real time."
-            if share < 50
-            else (
-                f"One recursive update took {each} of processor time, {share:.0f} % of the sample"
-                " period with all outputs."
-            )
-        )
-    for name, peak in study.frozen_peaks.items():
+    found = study.identification
+    out = [] if found is None else [_other_inputs(found), _real_time(found)]
+    for name, peak in study.servo.frozen_peaks.items() if study.servo else ():
         if math.isfinite(peak.gamma):
             out.append(
                 f"Servo channel, {name}: the largest frozen gain is at {peak.p:.1f} m/s and"
@@ -299,3 +243,33 @@ def findings(study: Outcome) -> list[str]:
                 f" {verdict}."
             )
     return out
+
+
+def _other_inputs(found: Identification) -> str:
+    """What measuring all inputs is worth to the lateral axis."""
+    plain, rich = (
+        found.of(axis, NOISES[0]).scores.ahead for axis in (LATERAL, LATERAL_WITH_COLLECTIVE)
+    )
+    change = ", ".join(f"{rich[y] - plain[y]:+.0f} points for {y}" for y in LATERAL.outputs)
+    return (
+        "Measuring the other inputs too (collective and pitch cyclic drive yaw through the rotor"
+        f" torque) changes the 1 s fit by {change}."
+    )
+
+
+def _real_time(found: Identification) -> str:
+    """How much of the sample period an update takes."""
+    each = ", ".join(
+        f"{1e6 * seconds:.2g} us ({name})" for name, seconds in found.update_times.items()
+    )
+    share = 100 * found.update_times[ALL.name] / found.of(ALL, NOISES[0]).model.dt
+    if share >= 50:
+        return (
+            f"One recursive update took {each} of processor time, {share:.0f} % of the sample"
+            " period with all outputs."
+        )
+    return (
+        f"One recursive update took {each} of processor time; with {len(ALL.outputs)} outputs and"
+        f" {ALL.structure().n_regressors} regressors each that is {share:.2g} % of the sample"
+        " period: the recursion is not too heavy for real time."
+    )

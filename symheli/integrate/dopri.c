@@ -1,5 +1,6 @@
-/* One flight by the pair of Dormand and Prince, orders 5 and 4, with step control: NX states, NP parameters, NK held values.
-   The generated held(u, wind, p, kept) and rates(x, kept, xdot) come before this text, STAGES, A, B and E (b - b of order 4) too. */
+/* One flight by the pair of Dormand and Prince, orders 5 and 4, with step control: NX states, NP
+   parameters, NK held values. The generated held(u, wind, p, kept) and rates(x, kept, xdot) come
+   before this text, STAGES, A, B and E (b - b of order 4) too. */
 
 struct flight {
   const double *x0, *u, *wind; long wind_sample;         /* NX; sample, 4; sample or one, 3 */
@@ -10,8 +11,10 @@ struct flight {
   double dt, rtol, largest;
 };
 
-/* Start from x, rates k[0]: the end, normalised, in `end`; returns the error in units of the tolerance. */
-static double dormand_prince(const struct flight *f, const lane *x, const lane *kept, lane (*k)[NX], double h, lane *end)
+/* Start from x, rates k[0]: the end, normalised, in `end`; returns the error in units of the
+   tolerance. */
+static double dormand_prince(const struct flight *f, const lane *x, const lane *kept, lane (*k)[NX],
+                             double h, lane *end)
 {
   for (int s = 1; s < STAGES; ++s) {
     for (int i = 0; i < NX; ++i) {
@@ -29,7 +32,8 @@ static double dormand_prince(const struct flight *f, const lane *x, const lane *
     const double error = h * sum / (f->atol[i] + f->rtol * (before > after ? before : after));
     total += error * error;
   }
-  const double scale = 1.0 / sqrt(end[6][0] * end[6][0] + end[7][0] * end[7][0] + end[8][0] * end[8][0] + end[9][0] * end[9][0]);
+  const double scale = 1.0 / sqrt(end[6][0] * end[6][0] + end[7][0] * end[7][0] +
+                                  end[8][0] * end[8][0] + end[9][0] * end[9][0]);
   for (int i = 6; i < 10; ++i) end[i][0] *= scale;
   return sqrt(total / NX);
 }
@@ -62,12 +66,14 @@ long fly(const struct flight *f)
         rejected = 1;
         continue;
       }
-      double grow = 0.9 * pow(error > 1e-10 ? error : 1e-10, -0.17) * pow(previous, 0.04); /* proportional and integral */
+      /* proportional and integral */
+      double grow = 0.9 * pow(error > 1e-10 ? error : 1e-10, -0.17) * pow(previous, 0.04);
       grow = grow < 0.2 ? 0.2 : grow > 5 ? 5 : grow;
       if (rejected && grow > 1) grow = 1;
       previous = error > 1e-4 ? error : 1e-4;
       rejected = 0;
-      wanted = last && wanted > h * grow ? wanted : h * grow; /* a step cut at the sample's end says little about the next */
+      /* a step cut at the sample's end says little about the next */
+      wanted = last && wanted > h * grow ? wanted : h * grow;
       if (wanted > f->largest) wanted = f->largest;
       f->steps[taken++] = h;
       left = last ? 0 : left - h;

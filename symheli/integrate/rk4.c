@@ -1,13 +1,17 @@
-/* Flights by the classical Runge-Kutta method, LANES side by side: NX states, NE of them in Euler form, NP parameters, NK held values.
-   The generated held(u, wind, p, kept) and rates(x, kept, xdot) come before this text. */
+/* Flights by the classical Runge-Kutta method, LANES side by side: NX states, NE of them in Euler
+   form, NP parameters, NK held values. The generated held(u, wind, p, kept) and rates(x, kept,
+   xdot) come before this text. */
 
 struct flights {
   const double *x0;                                      /* flight, NX */
-  const double *u; long u_flight, u_sample;              /* 4; entries from one flight and sample to the next, 0 where they share it */
+  /* 4; entries from one flight and sample to the next, 0 where they share it */
+  const double *u; long u_flight, u_sample;
   const double *wind; long wind_flight, wind_sample;     /* 3 */
   const double *p; long p_flight;                        /* NP */
-  const double *gains, *reference, *travel;              /* sample, 4, NE; sample, NE; 4; gains NULL: no feedback */
-  double *states, *inputs;                               /* flight, kept sample, NX and 4; inputs may be NULL */
+  /* sample, 4, NE; sample, NE; 4; gains NULL: no feedback */
+  const double *gains, *reference, *travel;
+  /* flight, kept sample, NX and 4; inputs may be NULL */
+  double *states, *inputs;
   long samples, substeps, every, skip_start;
   double step;
   const volatile int *stop;
@@ -16,7 +20,8 @@ struct flights {
 static void normalise(lane *x)
 {
   for (int l = 0; l < LANES; ++l) {
-    const double scale = 1.0 / sqrt(x[6][l] * x[6][l] + x[7][l] * x[7][l] + x[8][l] * x[8][l] + x[9][l] * x[9][l]);
+    const double scale =
+        1.0 / sqrt(x[6][l] * x[6][l] + x[7][l] * x[7][l] + x[8][l] * x[8][l] + x[9][l] * x[9][l]);
     for (int i = 6; i < 10; ++i) x[i][l] *= scale;
   }
 }
@@ -45,7 +50,8 @@ static void feed_back(const struct flights *f, long sample, const lane *x, lane 
   const double *gains = f->gains + sample * 4 * NE, *reference = f->reference + sample * NE;
   lane e[NE];
   for (int l = 0; l < LANES; ++l) {
-    const double q0 = x[6][l], q1 = x[7][l], q2 = x[8][l], q3 = x[9][l], sine = 2 * (q0 * q2 - q3 * q1);
+    const double q0 = x[6][l], q1 = x[7][l], q2 = x[8][l], q3 = x[9][l],
+                 sine = 2 * (q0 * q2 - q3 * q1);
     for (int j = 0; j < 6; ++j) e[j][l] = x[j][l];
     e[6][l] = atan2(2 * (q0 * q1 + q2 * q3), 1 - 2 * (q1 * q1 + q2 * q2));
     e[7][l] = asin(sine < -1 ? -1 : sine > 1 ? 1 : sine);
@@ -56,14 +62,16 @@ static void feed_back(const struct flights *f, long sample, const lane *x, lane 
       for (int l = 0; l < LANES; ++l) u[i][l] -= gains[i * NE + j] * (e[j][l] - reference[j]);
   for (int i = 0; i < 4; ++i) {
     const double most = f->travel[i];
-    for (int l = 0; l < LANES; ++l) u[i][l] = u[i][l] < -most ? -most : u[i][l] > most ? most : u[i][l];
+    for (int l = 0; l < LANES; ++l)
+      u[i][l] = u[i][l] < -most ? -most : u[i][l] > most ? most : u[i][l];
   }
 }
 
 static void load(lane *to, const double *from, long flight, long lanes, long stride, int size)
 {
   for (int l = 0; l < LANES; ++l) /* the last flight fills the lanes that are left over */
-    for (int i = 0; i < size; ++i) to[i][l] = from[(flight + (l < lanes ? l : lanes - 1)) * stride + i];
+    for (int i = 0; i < size; ++i)
+      to[i][l] = from[(flight + (l < lanes ? l : lanes - 1)) * stride + i];
 }
 
 static void store(double *to, const lane *from, long flight, long lanes, long stride, int size)
@@ -90,7 +98,8 @@ int fly(const struct flights *f, long first, long last)
       load(u, f->u + k * f->u_sample, flight, lanes, f->u_flight, 4);
       load(wind, f->wind + k * f->wind_sample, flight, lanes, f->wind_flight, 3);
       if (f->gains) feed_back(f, k, (const lane *)x, u);
-      if (f->inputs && keep) store(f->inputs + slot * 4, (const lane *)u, flight, lanes, kept_samples * 4, 4);
+      if (f->inputs && keep)
+        store(f->inputs + slot * 4, (const lane *)u, flight, lanes, kept_samples * 4, 4);
       held((const lane *)u, (const lane *)wind, (const lane *)p, kept);
       for (long s = 0; s < f->substeps; ++s) runge_kutta(x, (const lane *)kept, f->step);
     }

@@ -1,15 +1,20 @@
-/* Derivatives of a flown trajectory, step by step as it was flown (any explicit tableau), LANES directions or functionals side by side.
-   The generated functions held, rates, tangent_held, tangent_rates, adjoint_held, adjoint_rates come before this text. */
+/* Derivatives of a flown trajectory, step by step as it was flown (any explicit tableau), LANES
+   directions or functionals side by side. The generated functions held, rates, tangent_held,
+   tangent_rates, adjoint_held, adjoint_rates come before this text. */
 
 struct line {
-  const double *states, *u, *wind, *p, *steps;           /* sample + 1, NX; sample, 4; sample, 3; NP; every step taken */
+  /* sample + 1, NX; sample, 4; sample, 3; NP; every step taken */
+  const double *states, *u, *wind, *p, *steps;
   const long *per_sample;
   const double *a, *b;                                   /* tableau: stages x stages, stages */
-  long samples, stages, longest, width;                  /* most steps in one sample; directions or functionals in all */
-  const double *dx0, *du, *dwind;                        /* NX, width; sample, 4, width; sample, 3, width */
+  /* most steps in one sample; directions or functionals in all */
+  long samples, stages, longest, width;
+  /* NX, width; sample, 4, width; sample, 3, width */
+  const double *dx0, *du, *dwind;
   double *dx;                                            /* sample + 1, NX, width */
   const double *weights;                                 /* sample + 1, NX, width */
-  double *x_bar, *u_bar, *wind_bar;                      /* NX, width; sample, 4, width; sample, 3, width */
+  /* NX, width; sample, 4, width; sample, 3, width */
+  double *x_bar, *u_bar, *wind_bar;
 };
 
 static void spread(lane *to, const double *from, int size)
@@ -21,20 +26,24 @@ static void spread(lane *to, const double *from, int size)
 static void load(lane *to, const double *from, const struct line *f, long first, int size)
 {
   for (int i = 0; i < size; ++i)
-    for (int l = 0; l < LANES; ++l) to[i][l] = first + l < f->width ? from[i * f->width + first + l] : 0.0;
+    for (int l = 0; l < LANES; ++l)
+      to[i][l] = first + l < f->width ? from[i * f->width + first + l] : 0.0;
 }
 
 static void store(double *to, const lane *from, const struct line *f, long first, int size)
 {
   for (int i = 0; i < size; ++i)
-    for (int l = 0; l < LANES && first + l < f->width; ++l) to[i * f->width + first + l] = from[i][l];
+    for (int l = 0; l < LANES && first + l < f->width; ++l)
+      to[i * f->width + first + l] = from[i][l];
 }
 
-/* q/|q| in x[6..9], and the derivative of that applied to `change`: symmetric, so the same for tangents and adjoints */
+/* q/|q| in x[6..9], and the derivative of that applied to `change`: symmetric, so the same for
+   tangents and adjoints */
 static void normalise(lane *x, lane *change)
 {
   for (int l = 0; l < LANES; ++l) {
-    const double scale = 1.0 / sqrt(x[6][l] * x[6][l] + x[7][l] * x[7][l] + x[8][l] * x[8][l] + x[9][l] * x[9][l]);
+    const double scale =
+        1.0 / sqrt(x[6][l] * x[6][l] + x[7][l] * x[7][l] + x[8][l] * x[8][l] + x[9][l] * x[9][l]);
     double along = 0;
     for (int i = 6; i < 10; ++i) x[i][l] *= scale;
     if (!change) continue;
@@ -44,7 +53,8 @@ static void normalise(lane *x, lane *change)
 }
 
 /* to = x + h sum_j weights[j] k[j] */
-static void combine(lane *to, const lane *x, double h, const double *weights, lane (*k)[NX], long count)
+static void combine(lane *to, const lane *x, double h, const double *weights, lane (*k)[NX],
+                    long count)
 {
   for (int i = 0; i < NX; ++i)
     for (int l = 0; l < LANES; ++l) {
@@ -71,7 +81,8 @@ int tangent(const struct line *f)
       spread(wind, f->wind + sample * 3, 3);
       load(du, f->du + sample * 4 * f->width, f, first, 4);
       load(dwind, f->dwind + sample * 3 * f->width, f, first, 3);
-      tangent_held((const lane *)u, (const lane *)wind, (const lane *)p, (const lane *)du, (const lane *)dwind, kept);
+      tangent_held((const lane *)u, (const lane *)wind, (const lane *)p, (const lane *)du,
+                   (const lane *)dwind, kept);
       for (const double *end = h + f->per_sample[sample]; h < end; ++h) {
         for (long s = 0; s < f->stages; ++s) {
           combine(y, (const lane *)x, *h, f->a + s * f->stages, k, s);
@@ -89,13 +100,16 @@ int tangent(const struct line *f)
   return 0;
 }
 
-/* Gradients of `width` functionals, given their derivatives with respect to the states at the samples; 1 where memory is short. */
+/* Gradients of `width` functionals, given their derivatives with respect to the states at the
+   samples; 1 where memory is short. */
 int adjoint(const struct line *f)
 {
   const long stages = f->stages;
-  lane(*y)[NX] = malloc((f->longest * (stages + 1) + 2 * stages) * sizeof *y); /* stages of each step, and its end before it is normalised */
+  /* stages of each step, and its end before it is normalised */
+  lane(*y)[NX] = malloc((f->longest * (stages + 1) + 2 * stages) * sizeof *y);
   lane(*k)[NX] = y + f->longest * (stages + 1), (*y_bar)[NX] = k + stages;
-  lane x[NX], x_bar[NX], k_bar[NX], u[4], u_bar[4], u_part[4], wind[3], wind_bar[3], wind_part[3], p[NP + 1], kept[NK], adjoint_kept[ADJOINT_NK];
+  lane x[NX], x_bar[NX], k_bar[NX], u[4], u_bar[4], u_part[4], wind[3], wind_bar[3], wind_part[3],
+      p[NP + 1], kept[NK], adjoint_kept[ADJOINT_NK];
   long taken = 0;
   if (!y) return 1;
   spread(p, f->p, NP);
@@ -133,7 +147,8 @@ int adjoint(const struct line *f)
               for (long j = s + 1; j < stages; ++j) sum += f->a[j * stages + s] * y_bar[j][i][l];
               k_bar[i][l] = h[step] * sum;
             }
-          adjoint_rates((const lane *)stage[s], (const lane *)k_bar, (const lane *)adjoint_kept, y_bar[s], u_part, wind_part);
+          adjoint_rates((const lane *)stage[s], (const lane *)k_bar, (const lane *)adjoint_kept,
+                        y_bar[s], u_part, wind_part);
           for (int i = 0; i < 4; ++i)
             for (int l = 0; l < LANES; ++l) u_bar[i][l] += u_part[i][l];
           for (int i = 0; i < 3; ++i)

@@ -16,6 +16,16 @@ def write_text(path: str | os.PathLike[str], content: str) -> Path:
     return write_bytes(path, content.encode("utf-8"))
 
 
+def write_own(path: str | os.PathLike[str], content: str) -> Path | None:
+    """`write_text`, unless a file is there whose first line is another: that is somebody's own, is
+    left alone, and None comes back.
+    """
+    target, first = Path(path), content.partition("\n")[0]
+    if target.exists() and not target.read_text(encoding="utf-8").startswith(first):
+        return None
+    return write_text(target, content)
+
+
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
     """Replace `path` by `content` at once, folders made as needed: a reader sees the old file or
     the new one, never half of it.

@@ -9,6 +9,7 @@ from scipy.interpolate import BPoly, CubicSpline
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import (
     BSpline,
+    Patches,
     PiecewiseLinear,
     Polynomial,
     Product,
@@ -221,3 +222,27 @@ def test_units_convert_to_si(unit, factor, si):
 def test_a_misspelt_unit_gets_the_nearest():
     with pytest.raises(UnknownNameError, match="did you mean 'deg/s'"):
         to_si("deg/sec")
+
+
+@pytest.mark.parametrize(
+    ("degree", "breaks", "message"),
+    [
+        (-1, (0.0, 1.0), "degree: expected 0 or more"),
+        (2, (0.0,), "breaks: expected two or more that increase"),
+        (2, (0.0, 2.0, 1.0), "breaks: expected two or more that increase"),
+    ],
+)
+def test_patches_without_an_interval_or_a_degree_are_refused(degree, breaks, message):
+    with pytest.raises(InputError, match=message):
+        Patches(degree, breaks)
+
+
+def test_patches_give_back_polynomials_that_jump():
+    basis = Patches(2, (0.0, 1.0, 4.0))
+    p = basis.points(5)
+    values = np.where(p < 1, 1 + p**2, 7 - p)
+    np.testing.assert_allclose(basis(p) @ basis.fit(p, values), values, atol=1e-12)
+    sides = [piece.bernstein.T @ basis.fit(p, values) for piece in basis.pieces()]
+    # Bernstein coefficients begin and end with the values at the ends: 2 on one side of the jump, 6
+    # on the other
+    assert (sides[0][-1], sides[1][0]) == pytest.approx((2.0, 6.0))

@@ -508,7 +508,7 @@ def test_help_and_version_succeed(run):
             ["study", "--quick", "--seed", "3", "--out", "o"],
             "study",
             "run_study",
-            {"vehicle": "xcell60", "out": Path("o"), "quick": True, "seed": 3},
+            {"vehicle": "xcell60", "out": Path("o"), "quick": True, "seed": 3, "resume": False},
         ),
         (
             ["campaign", "--seeds", "4"],
@@ -556,7 +556,7 @@ def test_a_full_disk_is_a_sentence_and_leaves_the_old_file(tmp_path, monkeypatch
     import errno
     import os
 
-    from studies.files import write_text
+    from symheli.values.whole_files import write_text
 
     target = write_text(tmp_path / "report.html", "old")
 

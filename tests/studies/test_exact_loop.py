@@ -4,25 +4,14 @@ import numpy as np
 import pytest
 
 import synthesis
-from studies.cover import Remainder, covered_gain
-from studies.loops.exact_lateral import ExactLateral, Patches
+from studies.loops.exact_lateral import ExactLateral
 from synthesis import Spline
+from synthesis.cover import Remainder, covered_gain
 
 
 @pytest.fixture(scope="module")
 def models(ideal):
     return ExactLateral.of(ideal)
-
-
-def test_patches_give_back_polynomials_that_jump():
-    basis = Patches(2, (0.0, 1.0, 4.0))
-    p = basis.points(5)
-    values = np.where(p < 1, 1 + p**2, 7 - p)
-    np.testing.assert_allclose(basis(p) @ basis.fit(p, values), values, atol=1e-12)
-    sides = [piece.bernstein.T @ basis.fit(p, values) for piece in basis.pieces()]
-    # Bernstein coefficients begin and end with the values at the ends: 2 on one side of the jump, 6
-    # on the other
-    assert (sides[0][-1], sides[1][0]) == pytest.approx((2.0, 6.0))
 
 
 @pytest.mark.parametrize("dt", [None, 0.02])

@@ -9,13 +9,11 @@ import warnings
 import numpy as np
 import pytest
 
-from identification import LPVARX, Polynomial, fit
+from identification import LPVARX, AgainstConstant, Polynomial, Scores, against_constant, fit
+from identification.judge.against_constant import Scored, difference
 from studies import cli
-from studies.log.comparison import Comparison, Scored, compare, difference
 from symheli.errors import DataWarning
 from symheli.records import FlightRecord
-
-NAMES = ("one step", "1 s", "free run")
 
 
 def judged(lpv, lti, *rivals, **over):
@@ -27,14 +25,17 @@ def judged(lpv, lti, *rivals, **over):
     )
     model = fit(LPVARX("y", "u", "p", 1, 1, 1, Polynomial(1, p.min(), p.max())), record)
     scores = [
-        {h: {"y": v} for h, v in zip(NAMES, (99.0, *fits), strict=True)}
-        for fits in (lpv, lti, *rivals)
+        Scores(horizon=1.0, one_step={"y": 99.0}, ahead={"y": ahead}, free_run={"y": free})
+        for ahead, free in (lpv, lti, *rivals)
     ]
     labels = ("LPV", "LTI", "LPV, moving trim", "LTI, moving trim")
-    return Comparison(
-        tuple(Scored(n, model, s, s) for n, s in zip(labels, scores, strict=False)),
-        record,
-        record,
+    return AgainstConstant(
+        models=tuple(
+            Scored(label=n, model=model, in_sample=s, held_out=s)
+            for n, s in zip(labels, scores, strict=False)
+        ),
+        training=record,
+        test=record,
         **over,
     )
 
@@ -268,6 +269,6 @@ def test_the_moving_trim_is_not_tried_where_the_data_cannot_tell_it():
         0.1 * np.arange(300), dict.fromkeys("yup", "1"), y=y, u=u, p=p
     )
     arx = LPVARX("y", "u", "p", 1, 1, 1, Polynomial(2, 1.0, 3.0), offset=True)
-    found = compare(arx, record, None, trim="auto")
+    found = against_constant(arx, record, None, trim="auto")
     assert found.trim_note.startswith("offset_rate is not tried: the regressors have rank")
     assert len(found.models) == 2

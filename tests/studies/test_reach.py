@@ -5,7 +5,7 @@ import pytest
 import synthesis
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
-from studies.reach import about, from_hover, largest, on, proven, tables
+from studies.reach.measured import about, from_hover, largest, on, proven, tables
 
 
 def test_the_largest_range_is_found_by_bisection():

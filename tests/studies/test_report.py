@@ -8,37 +8,39 @@ import re
 import shutil
 import subprocess
 from dataclasses import fields, replace
+from pathlib import Path
 
 import pytest
+from json_schema import faults
 from matplotlib.figure import Figure
 
 from studies.transition import figures, gain_tables, guarantees, report
 from studies.transition import study as stages
 from studies.transition.effort import Effort
 from studies.transition.outcome import Outcome
-from symheli import LPVStateSpace, Scheduling
+from symheli import Helicopter, LPVStateSpace, Scheduling
 from synthesis import Search
 
 GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
-COLLECTIONS = [
+STAGES = [
     f.name
     for f in fields(Outcome)
-    if f.name not in ("vehicle", "quick", "seed", "heli", "baseline", "complete")
+    if f.name not in ("vehicle", "quick", "seed", "heli", "seconds", "complete")
 ]
-DRAWN = ("experiments", "flights", "comparisons", "frozen", "bounds")
+DRAWN = ("baseline", "paper_experiment", "flights", "comparison", "gust", "longitudinal")
 """Those that a figure shows."""
 
 
 @pytest.fixture(scope="module")
 def full():
     """Every stage, as short as it gets."""
-    study = stages.Study("xcell60", True, 0)
     effort = Effort(
         6, 4, (0.0, math.inf), (2,), (0.0,), (0.0,), False, (0.0, math.inf), (2,), GLIMPSE
     )
-    for title, stage in stages._stages(study, effort):
-        with stages._shown(title, study.seconds):
-            stage()
+    heli = Helicopter.load("xcell60", governor="ideal")
+    study = stages.Study(vehicle="xcell60", quick=True, seed=0, heli=heli)
+    for stage in stages.stages(effort):
+        study = stages.with_stage(study, stage, stages.computed(stage, study, effort))
     return study
 
 
@@ -53,21 +55,28 @@ def page(outcome, folder):
 
 
 def test_a_full_outcome_fills_every_section(full, tmp_path, unpainted):
-    for name in COLLECTIONS:
+    for name in STAGES:
         assert getattr(full, name), f"{name} is empty: not a full outcome"
     text = page(full, tmp_path)
     assert "Not reached" not in text
     assert text.count("data:image/png;base64,") == len(list((tmp_path / "figures").iterdir())) > 10
 
 
+def test_the_numbers_of_a_full_outcome_are_what_the_schema_says(full, tmp_path):
+    schema = Path(report.__file__).with_name("results.schema.json").read_text(encoding="utf-8")
+    found = json.loads(report.write_results(full, tmp_path).read_text())
+    assert None not in found.values()
+    assert not list(faults(found, json.loads(schema)))
+
+
 def test_an_empty_outcome_says_what_was_not_reached(tmp_path, unpainted):
-    text = page(Outcome("xcell60", True, 0), tmp_path)
+    text = page(Outcome(vehicle="xcell60", quick=True, seed=0), tmp_path)
     assert text.count("Not reached") == 6
 
 
-def test_any_collection_of_the_outcome_may_be_empty(full, tmp_path, unpainted, monkeypatch):
-    for name in COLLECTIONS:
-        outcome = replace(full, **{name: type(getattr(full, name))()})
+def test_any_stage_of_the_outcome_may_be_missing(full, tmp_path, unpainted, monkeypatch):
+    for name in STAGES:
+        outcome = replace(full, **{name: None})
         with monkeypatch.context() as undrawn:
             if name not in DRAWN:
                 undrawn.setattr(figures, "figures", lambda _: ())
@@ -97,7 +106,8 @@ def test_a_loop_that_is_unstable_when_frozen_gets_its_report(full, tmp_path, unp
         Scheduling("airspeed", "m/s", 0.0, 2.0),
     )
     found = list(guarantees.bounds("baseline", "gust", growing, (0.0, math.inf), (2,), GLIMPSE))
-    outcome = replace(full, bounds=found, exact_frozen={"gust": math.inf})
+    gust = replace(full.gust, bounds=tuple(found), exact_frozen=math.inf)
+    outcome = replace(full, gust=gust)
     assert "unstable" in page(outcome, tmp_path)
     assert outcome.summary()
 
@@ -107,9 +117,8 @@ def test_numbers_are_on_the_disk_before_a_picture_fails(full, tmp_path, monkeypa
         raise RuntimeError("a picture failed")
 
     monkeypatch.setattr(figures, "trim", fail)
-    full.complete = True
     with pytest.raises(RuntimeError, match="a picture failed"):
-        report.write_report(full, tmp_path)
+        report.write_report(replace(full, complete=True), tmp_path)
     assert json.loads((tmp_path / "results.json").read_text())["complete"]
 
 

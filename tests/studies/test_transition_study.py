@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 import synthesis
+from identification import beside_baseline
 from studies.transition import axes, guarantees
 from studies.transition.axes import LATERAL, LONGITUDINAL
 from studies.transition.baseline import build_baseline
-from studies.transition.comparison import compare
+from studies.transition.comparison import along_the_command
 from studies.transition.flights import FlightPlan, autopilot_for
-from studies.transition.paper_experiment import OUTPUTS, run_experiment
+from studies.transition.paper_experiment import OUTPUTS, PaperExperiments, run_experiment
 from studies.transition.recovery import recover
 
 
@@ -76,9 +77,9 @@ def test_identified_models_meet_their_marks_on_a_transition_they_have_not_seen(
     ideal, flown, axis, noise
 ):
     training, test = flown[noise]
-    result = axes.scores(ideal, axis, axes.identify(axis, training, "ls"), test)
+    result = axes.judged(ideal, axis, axes.identify(axis, training, "ls"), test)
     for output, marks in axis.marks.items():
-        assert result.one_second[output] >= marks[noise != "noise-free"]
+        assert result.scores.ahead[output] >= marks[noise != "noise-free"]
     if noise == "noise-free":
         assert max(result.mode_miss.values()) < 3.0
 
@@ -104,13 +105,16 @@ def test_recursion_and_batch_give_the_same_model(flown):
     )
 
 
-def test_a_moving_trim_needs_its_drift(baseline, flown):
+def test_a_moving_trim_needs_its_drift(ideal, baseline, flown):
     """Without -x0'(p) dp/dt the full-state baseline loses forward speed within a second."""
     lpv = baseline.lpv["polynomial 3"]
     test = flown["noise-free"][1]
-    c = compare(LONGITUDINAL, {}, {"with": (lpv, True), "without": (lpv, False)}, test)
-    good, bad = c.predictors
-    assert good.one_second["u"] > 90 > 80 > bad.one_second["u"]
+    rivals = {
+        "with": along_the_command(lpv, ideal),
+        "without": along_the_command(lpv, ideal, drift=False),
+    }
+    good, bad = beside_baseline({}, rivals, test, LONGITUDINAL.outputs).predictions
+    assert good.scores.ahead["u"] > 90 > 80 > bad.scores.ahead["u"]
 
 
 def test_gust_loop_is_proven_for_slow_airspeed_and_grows_when_it_may_jump(baseline):
@@ -131,28 +135,11 @@ def test_every_row_of_the_experiments_table_fills_its_columns(baseline):
     from studies.transition import tables
     from studies.transition.outcome import Outcome
 
-    table = tables.experiment(
-        Outcome("xcell60", True, 0, experiments=[run_experiment(baseline.nodes, False)])
-    )
+    one = PaperExperiments(runs=(run_experiment(baseline.nodes, False),))
+    table = tables.experiment(Outcome(vehicle="xcell60", quick=True, seed=0, paper_experiment=one))
     assert len(table.rows) == len(OUTPUTS)
     assert {len(row) for row in table.rows} == {len(table.columns)}
     assert table.text()
-
-
-def test_an_interrupted_study_leaves_whole_results_of_its_finished_stages(tmp_path, monkeypatch):
-    from studies.transition import study
-
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(study, "_recovery", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        study.run_study(out=tmp_path, quick=True)
-    results = json.loads((tmp_path / "results.json").read_text())
-    assert not results["complete"]
-    assert results["baseline"]["LFT order"]["value"] == 45
-    assert "open" in results["paper experiment"]
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.json"]
 
 
 @pytest.mark.slow

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.judge.against_constant import HORIZONS
 from studies.campaigns import pays
-from studies.log.comparison import HORIZONS
 from studies.transition.flights import FlightPlan, autopilot_for
 
 

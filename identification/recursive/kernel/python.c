@@ -1,5 +1,6 @@
-/* The kernel for Python: one type, whose methods work on the caller's arrays. Included after rls.c, with RLS_MODULE (the module's name,
-   one for each precision and level of processor) and RLS_SOURCE (what it was built from) defined. */
+/* The kernel for Python: one type, whose methods work on the caller's arrays. Included after rls.c,
+   with RLS_MODULE (the module's name, one for each precision and level of processor) and RLS_SOURCE
+   (what it was built from) defined. */
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030b0000
 #include <Python.h>
@@ -23,19 +24,25 @@ typedef struct {
     int state_size, work_size, regressors, width; /* width: numbers in a sample */
     void *memory; /* what config points to */
     rls_real *sample; /* regressors + width numbers, converted from double */
-    Py_buffer held[2]; /* state and work of the last call: an estimator comes with the same ones again and again */
+    /* state and work of the last call: an estimator comes with the same ones again and again */
+    Py_buffer held[2];
 } Kernel;
 
 static PyObject *dtype_name, *float64; /* "dtype" and numpy.dtype("float64") */
 
-/* A contiguous buffer of `count` numbers; count < 0: any. Raises TypeError, ValueError or BufferError. */
-static int open_buffer(PyObject *from, Py_buffer *view, const char *format, Py_ssize_t count, int writable, const char *name)
+/* A contiguous buffer of `count` numbers; count < 0: any. Raises TypeError, ValueError or
+   BufferError. */
+static int open_buffer(PyObject *from, Py_buffer *view, const char *format, Py_ssize_t count,
+                       int writable, const char *name)
 {
-    if (PyObject_GetBuffer(from, view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (writable ? PyBUF_WRITABLE : 0)) < 0) return -1;
+    if (PyObject_GetBuffer(from, view,
+                           PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (writable ? PyBUF_WRITABLE : 0)) < 0)
+        return -1;
     if (!view->format || strcmp(view->format, format) != 0) {
         PyErr_Format(PyExc_TypeError, "%s: expected numbers of format %s", name, format);
     } else if (count >= 0 && view->len != count * view->itemsize) {
-        PyErr_Format(PyExc_ValueError, "%s: expected %zd numbers, got %zd", name, count, view->len / view->itemsize);
+        PyErr_Format(PyExc_ValueError, "%s: expected %zd numbers, got %zd", name, count,
+                     view->len / view->itemsize);
     } else {
         return 0;
     }
@@ -43,7 +50,8 @@ static int open_buffer(PyObject *from, Py_buffer *view, const char *format, Py_s
     return -1;
 }
 
-/* The same of `count` doubles, without asking an array for its format where its dtype says it: that takes longer than all the rest. */
+/* The same of `count` doubles, without asking an array for its format where its dtype says it: that
+   takes longer than all the rest. */
 static int open_doubles(PyObject *from, Py_buffer *view, Py_ssize_t count, const char *name)
 {
     PyObject *dtype = PyObject_GetAttr(from, dtype_name);
@@ -53,7 +61,8 @@ static int open_doubles(PyObject *from, Py_buffer *view, Py_ssize_t count, const
     if (!known) return open_buffer(from, view, "d", count, 0, name);
     if (PyObject_GetBuffer(from, view, PyBUF_C_CONTIGUOUS) < 0) return -1;
     if (view->len == count * (Py_ssize_t)sizeof(double)) return 0;
-    PyErr_Format(PyExc_ValueError, "%s: expected %zd numbers, got %zd", name, count, view->len / (Py_ssize_t)sizeof(double));
+    PyErr_Format(PyExc_ValueError, "%s: expected %zd numbers, got %zd", name, count,
+                 view->len / (Py_ssize_t)sizeof(double));
     PyBuffer_Release(view);
     return -1;
 }
@@ -82,7 +91,8 @@ static rls_real *hold(Py_buffer *held, PyObject *from, Py_ssize_t count, const c
     return held->buf;
 }
 
-static int copy_numbers(PyObject *from, const char *format, Py_ssize_t count, void *to, const char *name)
+static int copy_numbers(PyObject *from, const char *format, Py_ssize_t count, void *to,
+                        const char *name)
 {
     Py_buffer view;
     if (open_buffer(from, &view, format, count, 0, name) < 0) return -1;
@@ -99,12 +109,17 @@ static void *take(char **next, size_t bytes)
     return here;
 }
 
-/* Bytes of memory for a configuration of `factors` with so many numbers in all: an upper bound of what kernel_init takes. */
+/* Bytes of memory for a configuration of `factors` with so many numbers in all: an upper bound of
+   what kernel_init takes. */
 static size_t memory_needed(const rls_config *c, Py_ssize_t numbers)
 {
-    const size_t groups = (size_t)c->groups, factors = (size_t)c->basis.factors, entries = (size_t)c->entries;
-    return entries * sizeof(rls_entry) + groups * sizeof(rls_group) + factors * sizeof(rls_factor) + (size_t)numbers * sizeof(rls_real) +
-           ((size_t)c->basis.functions * factors + groups * ((size_t)c->outputs + entries)) * sizeof(int) + 16 * (5 + 2 * factors + 2 * groups);
+    const size_t groups = (size_t)c->groups, factors = (size_t)c->basis.factors,
+                 entries = (size_t)c->entries;
+    return entries * sizeof(rls_entry) + groups * sizeof(rls_group) + factors * sizeof(rls_factor) +
+           (size_t)numbers * sizeof(rls_real) +
+           ((size_t)c->basis.functions * factors + groups * ((size_t)c->outputs + entries)) *
+               sizeof(int) +
+           16 * (5 + 2 * factors + 2 * groups);
 }
 
 static int read_groups(rls_config *c, rls_group *group, PyObject *groups, char **next)
@@ -112,7 +127,9 @@ static int read_groups(rls_config *c, rls_group *group, PyObject *groups, char *
     for (int g = 0; g < c->groups; g++) {
         PyObject *outputs, *members;
         int *index;
-        if (!PyArg_ParseTuple(PyTuple_GetItem(groups, g), "iOiO", &group[g].outputs, &outputs, &group[g].entries, &members)) return -1;
+        if (!PyArg_ParseTuple(PyTuple_GetItem(groups, g), "iOiO", &group[g].outputs, &outputs,
+                              &group[g].entries, &members))
+            return -1;
         if (group[g].entries > c->entries || group[g].outputs > c->outputs) {
             PyErr_SetString(PyExc_ValueError, "groups: more members than there are");
             return -1;
@@ -132,8 +149,8 @@ static int read_factors(rls_config *c, rls_factor *factor, PyObject *factors, ch
         double slack;
         Py_ssize_t count;
         rls_real *number;
-        if (!PyArg_ParseTuple(PyTuple_GetItem(factors, i), "iiidOO", &factor[i].functions, &factor[i].degree, &factor[i].pieces, &slack, &knots,
-                              &bernstein))
+        if (!PyArg_ParseTuple(PyTuple_GetItem(factors, i), "iiidOO", &factor[i].functions,
+                              &factor[i].degree, &factor[i].pieces, &slack, &knots, &bernstein))
             return -1;
         factor[i].slack = (rls_real)slack;
         count = factor[i].pieces + 1;
@@ -146,8 +163,10 @@ static int read_factors(rls_config *c, rls_factor *factor, PyObject *factors, ch
     return 0;
 }
 
-/* Kernel(outputs, inputs, parameters, memory, entries (E, 4), groups, functions, factors, numbers in them and in largest, index (functions,
-   factors), largest (functions), forgetting); a group (outputs, their indices, entries, their indices), a factor (functions, degree, pieces, slack, knots, bernstein) */
+/* Kernel(outputs, inputs, parameters, memory, entries (E, 4), groups, functions, factors, numbers
+   in them and in largest, index (functions, factors), largest (functions), forgetting); a group
+   (outputs, their indices, entries, their indices), a factor (functions, degree, pieces, slack,
+   knots, bernstein) */
 static int kernel_init(PyObject *object, PyObject *args, PyObject *kwargs)
 {
     Kernel *self = (Kernel *)object;
@@ -167,14 +186,16 @@ static int kernel_init(PyObject *object, PyObject *args, PyObject *kwargs)
         PyErr_SetString(PyExc_TypeError, "a Kernel is made once, without keywords");
         return -1;
     }
-    if (!PyArg_ParseTuple(args, "iiiiiOO!iO!nOO(idddddd)", &c->outputs, &c->inputs, &c->parameters, &c->memory, &entry_count, &entries,
-                          &PyTuple_Type, &groups, &c->basis.functions, &PyTuple_Type, &factors, &numbers, &index, &sizes, &kind, f, f + 1, f + 2,
-                          f + 3, f + 4, f + 5))
+    if (!PyArg_ParseTuple(args, "iiiiiOO!iO!nOO(idddddd)", &c->outputs, &c->inputs, &c->parameters,
+                          &c->memory, &entry_count, &entries, &PyTuple_Type, &groups,
+                          &c->basis.functions, &PyTuple_Type, &factors, &numbers, &index, &sizes,
+                          &kind, f, f + 1, f + 2, f + 3, f + 4, f + 5))
         return -1;
     c->entries = entry_count;
     c->groups = (int)PyTuple_Size(groups);
     c->basis.factors = (int)PyTuple_Size(factors);
-    c->forgetting = (rls_forgetting){kind, (rls_real)f[0], (rls_real)f[1], (rls_real)f[2], (rls_real)f[3], (rls_real)f[4], (rls_real)f[5]};
+    c->forgetting = (rls_forgetting){kind,           (rls_real)f[0], (rls_real)f[1], (rls_real)f[2],
+                                     (rls_real)f[3], (rls_real)f[4], (rls_real)f[5]};
     next = self->memory = PyMem_Calloc(1, memory_needed(c, numbers));
     if (!self->memory) {
         PyErr_NoMemory();
@@ -183,16 +204,20 @@ static int kernel_init(PyObject *object, PyObject *args, PyObject *kwargs)
     c->entry = entry = take(&next, (size_t)c->entries * sizeof(rls_entry));
     c->group = group = take(&next, (size_t)c->groups * sizeof(rls_group));
     c->basis.factor = factor = take(&next, (size_t)c->basis.factors * sizeof(rls_factor));
-    c->basis.index = product = take(&next, (size_t)(c->basis.functions * c->basis.factors) * sizeof(int));
+    c->basis.index = product =
+        take(&next, (size_t)(c->basis.functions * c->basis.factors) * sizeof(int));
     c->basis.largest = largest = take(&next, (size_t)c->basis.functions * sizeof(rls_real));
     if (copy_numbers(sizes, FORMAT, c->basis.functions, largest, "largest") < 0) return -1;
     if (copy_numbers(entries, "i", 4 * c->entries, entry, "entries") < 0) return -1;
-    if (copy_numbers(index, "i", c->basis.functions * c->basis.factors, product, "index") < 0) return -1;
-    if (read_groups(c, group, groups, &next) < 0 || read_factors(c, factor, factors, &next) < 0) return -1;
+    if (copy_numbers(index, "i", c->basis.functions * c->basis.factors, product, "index") < 0)
+        return -1;
+    if (read_groups(c, group, groups, &next) < 0 || read_factors(c, factor, factors, &next) < 0)
+        return -1;
     self->state_size = rls_state_size(c);
     self->work_size = rls_work_size(c);
     self->regressors = rls_regressors(c);
-    self->width = c->outputs + c->inputs + c->parameters + (c->basis.factors ? 0 : c->basis.functions);
+    self->width =
+        c->outputs + c->inputs + c->parameters + (c->basis.factors ? 0 : c->basis.functions);
     self->sample = PyMem_Calloc((size_t)(self->regressors + self->width), sizeof(rls_real));
     if (!self->sample) {
         PyErr_NoMemory();
@@ -248,12 +273,14 @@ static PyObject *kernel_start(PyObject *object, PyObject *const *args, Py_ssize_
     Py_RETURN_NONE;
 }
 
-/* update(state, work, y, u, p) or, where the functions are the caller's, update(state, work, y, u, p, f); a single p may be a number. */
+/* update(state, work, y, u, p) or, where the functions are the caller's, update(state, work, y, u,
+   p, f); a single p may be a number. */
 static PyObject *kernel_update(PyObject *object, PyObject *const *args, Py_ssize_t count)
 {
     Kernel *self = (Kernel *)object;
     const rls_config *c = &self->config;
-    const int given = c->basis.factors == 0, sizes[] = {c->outputs, c->inputs, c->parameters, c->basis.functions};
+    const int given = c->basis.factors == 0,
+              sizes[] = {c->outputs, c->inputs, c->parameters, c->basis.functions};
     static const char *const names[] = {"y", "u", "p", "f"};
     rls_real *to = self->sample, *state, *work;
     if (arguments(count, 5 + given) < 0) return NULL;
@@ -275,13 +302,16 @@ static PyObject *kernel_absorb(PyObject *object, PyObject *const *args, Py_ssize
     const rls_config *c = &self->config;
     rls_real *phi = self->sample, *y = phi + self->regressors, *state, *work;
     if (arguments(count, 4) < 0) return NULL;
-    if (convert(args[2], self->regressors, phi, "phi") < 0 || convert(args[3], c->outputs, y, "y") < 0) return NULL;
+    if (convert(args[2], self->regressors, phi, "phi") < 0 ||
+        convert(args[3], c->outputs, y, "y") < 0)
+        return NULL;
     if (!(state = hold(&self->held[0], args[0], self->state_size, "state"))) return NULL;
     if (!(work = hold(&self->held[1], args[1], self->work_size, "work"))) return NULL;
     return PyLong_FromLong(rls_absorb(c, state, work, phi, y));
 }
 
-/* run(state, work, samples (n, width), statuses (n), innovations (n, ny) or None, coefficients (n, nr, ny) or None) */
+/* run(state, work, samples (n, width), statuses (n), innovations (n, ny) or None, coefficients (n,
+   nr, ny) or None) */
 static PyObject *kernel_run(PyObject *object, PyObject *const *args, Py_ssize_t count)
 {
     Kernel *self = (Kernel *)object;
@@ -294,10 +324,15 @@ static PyObject *kernel_run(PyObject *object, PyObject *const *args, Py_ssize_t 
     if (open_buffer(args[2], &samples, "d", -1, 0, "samples") < 0) goto close_memory;
     n = samples.len / (Py_ssize_t)sizeof(double) / width;
     if (open_buffer(args[3], &statuses, "i", n, 1, "statuses") < 0) goto close_samples;
-    if (args[4] != Py_None && open_buffer(args[4], &innovations, FORMAT, n * ny, 1, "innovations") < 0) goto close_statuses;
-    if (args[5] != Py_None && open_buffer(args[5], &coefficients, FORMAT, n * kept, 1, "coefficients") < 0) goto close_innovations;
+    if (args[4] != Py_None &&
+        open_buffer(args[4], &innovations, FORMAT, n * ny, 1, "innovations") < 0)
+        goto close_statuses;
+    if (args[5] != Py_None &&
+        open_buffer(args[5], &coefficients, FORMAT, n * kept, 1, "coefficients") < 0)
+        goto close_innovations;
     {
-        rls_real *own = PyMem_Calloc((size_t)width, sizeof(rls_real)); /* not self->sample: other threads may run */
+        /* not self->sample: other threads may run */
+        rls_real *own = PyMem_Calloc((size_t)width, sizeof(rls_real));
         if (!own) {
             PyErr_NoMemory();
             goto close_coefficients;
@@ -310,8 +345,10 @@ static PyObject *kernel_run(PyObject *object, PyObject *const *args, Py_ssize_t 
             status = update_row(c, state.buf, work.buf, own);
             ((int *)statuses.buf)[k] = status;
             if (innovations.buf && status & RLS_LEARNT)
-                memcpy((rls_real *)innovations.buf + k * ny, rls_innovation(c, work.buf), (size_t)ny * sizeof(rls_real));
-            if (coefficients.buf) rls_coefficients(c, state.buf, (rls_real *)coefficients.buf + k * kept);
+                memcpy((rls_real *)innovations.buf + k * ny, rls_innovation(c, work.buf),
+                       (size_t)ny * sizeof(rls_real));
+            if (coefficients.buf)
+                rls_coefficients(c, state.buf, (rls_real *)coefficients.buf + k * kept);
         }
         Py_END_ALLOW_THREADS
         PyMem_Free(own);
@@ -340,10 +377,14 @@ static PyObject *kernel_sizes(PyObject *object, PyObject *unused)
 
 static PyMethodDef methods[] = {
     {"sizes", kernel_sizes, METH_NOARGS, "Numbers in the state, numbers of scratch."},
-    {"start", (PyCFunction)(void (*)(void))kernel_start, METH_FASTCALL, "start(state, work): nothing is known."},
-    {"update", (PyCFunction)(void (*)(void))kernel_update, METH_FASTCALL, "update(state, work, y, u, p) -> status bits"},
-    {"absorb", (PyCFunction)(void (*)(void))kernel_absorb, METH_FASTCALL, "absorb(state, work, phi, y) -> status bits"},
-    {"run", (PyCFunction)(void (*)(void))kernel_run, METH_FASTCALL, "run(state, work, samples, statuses, innovations, coefficients)"},
+    {"start", (PyCFunction)(void (*)(void))kernel_start, METH_FASTCALL,
+     "start(state, work): nothing is known."},
+    {"update", (PyCFunction)(void (*)(void))kernel_update, METH_FASTCALL,
+     "update(state, work, y, u, p) -> status bits"},
+    {"absorb", (PyCFunction)(void (*)(void))kernel_absorb, METH_FASTCALL,
+     "absorb(state, work, phi, y) -> status bits"},
+    {"run", (PyCFunction)(void (*)(void))kernel_run, METH_FASTCALL,
+     "run(state, work, samples, statuses, innovations, coefficients)"},
     {NULL, NULL, 0, NULL},
 };
 
@@ -357,7 +398,8 @@ static PyType_Slot slots[] = {
 
 static PyType_Spec specification = {MODULE ".Kernel", sizeof(Kernel), 0, Py_TPFLAGS_DEFAULT, slots};
 
-static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, MODULE, "The compiled kernel.", -1, NULL, NULL, NULL, NULL, NULL};
+static struct PyModuleDef definition = {
+    PyModuleDef_HEAD_INIT, MODULE, "The compiled kernel.", -1, NULL, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC INITIALISE(RLS_MODULE)(void)
 {
@@ -371,7 +413,8 @@ PyMODINIT_FUNC INITIALISE(RLS_MODULE)(void)
     }
     module = PyModule_Create(&definition);
     type = module ? PyType_FromSpec(&specification) : NULL;
-    if (!type || PyModule_AddObjectRef(module, "Kernel", type) < 0 || PyModule_AddStringConstant(module, "SOURCE", RLS_SOURCE) < 0) {
+    if (!type || PyModule_AddObjectRef(module, "Kernel", type) < 0 ||
+        PyModule_AddStringConstant(module, "SOURCE", RLS_SOURCE) < 0) {
         Py_XDECREF(type);
         Py_XDECREF(module);
         return NULL;

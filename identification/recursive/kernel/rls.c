@@ -1,8 +1,11 @@
-/* See rls.h. Rotations after Gentleman (1973), Least squares computations by Givens transformations without square roots.
+/* See rls.h. Rotations after Gentleman (1973), Least squares computations by Givens transformations
+   without square roots.
 
-   All that is remembered of the data is the triangular factor [R, Z; 0, S], which nothing but data enters. The coefficients solve
-   R theta = Z. From sample to sample they move along the gain, theta += R^-1 (R^-T phi) (y - phi' theta), with far less work; they are solved anew
-   as soon as a running bound of what rounding has added since is no longer small, so that they never come apart from the factor. */
+   All that is remembered of the data is the triangular factor [R, Z; 0, S], which nothing but data
+   enters. The coefficients solve R theta = Z. From sample to sample they move along the gain,
+   theta += R^-1 (R^-T phi) (y - phi' theta), with far less work; they are solved anew as soon as a
+   running bound of what rounding has added since is no longer small, so that they never come apart
+   from the factor. */
 #include "rls.h"
 
 #include <float.h>
@@ -18,15 +21,17 @@
 #endif
 #define LANES 8
 #define REAL(number) ((rls_real)(number))
-/* Samples with a regressor at its largest that are pretended, saying "coefficient 0": what the data leave open stays small, and rounding, which
-   knows EPSILON^2, decides nothing. */
-#define PRIOR (32 * EPSILON) /* identification/determined.py has the same */
+/* Samples with a regressor at its largest that are pretended, saying "coefficient 0": what the data
+   leave open stays small, and rounding, which knows EPSILON^2, decides nothing. */
+#define PRIOR (32 * EPSILON) /* identification/design/determined.py has the same */
 #define ALONG 128 /* samples at most between two solutions of R theta = Z */
-#define TRUSTED (512 * 512) /* (rounding errors along the gain that are put up with, in units of EPSILON of the output)^2 */
-#define MILLION 1048576      /* samples are counted in two numbers, each exact in single precision */
+/* (rounding errors along the gain that are put up with, in units of EPSILON of the output)^2 */
+#define TRUSTED (512 * 512)
+#define MILLION 1048576 /* samples are counted in two numbers, each exact in single precision */
 
-/* LANES numbers side by side. `LANEWISE EACH(a) += EACH(b);` adds them all, LANE(a, i) is one of them: in one vector where the processor has
-   such long ones, else in parts of what it computes at once, and with the same result. */
+/* LANES numbers side by side. `LANEWISE EACH(a) += EACH(b);` adds them all, LANE(a, i) is one of
+   them: in one vector where the processor has such long ones, else in parts of what it computes at
+   once, and with the same result. */
 #if defined(__GNUC__) && !defined(RLS_NO_VECTORS)
 #define VECTOR(bytes) __attribute__((vector_size(bytes), aligned(sizeof(rls_real)), may_alias))
 #if defined(__AVX512F__) || (defined(__AVX__) && defined(RLS_SINGLE))
@@ -128,13 +133,16 @@ enum { COUNT, MILLIONS, FILLED, HEADER = LANES };
 /* A group: this header, then the arrays of `group` up to `usual`. */
 enum { WEIGHT, TURN, DETERMINED, STEPS, FACTOR, SINCE, GROUP_HEADER = LANES };
 
-/* n regressors, m outputs; n and m rounded up to whole LANES are tall and high, together wide. The unit triangle has `wide` rows: n of the
-   regressors and, from `tall` on, m of the outputs, the others empty; LANES of them are a block, whose rows all start at the column of its first
+/* n regressors, m outputs; n and m rounded up to whole LANES are tall and high, together wide. The
+   unit triangle has `wide` rows: n of the regressors and, from `tall` on, m of the outputs, the
+   others empty; LANES of them are a block, whose rows all start at the column of its first
    diagonal. [R, Z; 0, S] = sqrt(d) triangle. */
 typedef struct {
     int n, m, wide, tall, high;
-    rls_real *header, *triangle, *d, *theta, *peak, *energy, *fed, *recent, *usual, *power, *drift; /* state */
-    rls_real *phi, *x, *s, *gain, *solution, *innovation;                                           /* scratch */
+    /* state */
+    rls_real *header, *triangle, *d, *theta, *peak, *energy, *fed, *recent, *usual, *power, *drift;
+    /* scratch */
+    rls_real *phi, *x, *s, *gain, *solution, *innovation;
 } group;
 
 static int padded(int n) { return (n + LANES - 1) / LANES * LANES; }
@@ -144,7 +152,10 @@ static int block_start(int i) { return i / LANES * LANES; }
 /* Where the block of rows from `start` on begins in a triangle with `wide` columns. */
 static int block_offset(int start, int wide) { return start * wide - start * (start - LANES) / 2; }
 
-static int row_width(const rls_config *c) { return c->outputs + c->inputs + c->parameters + c->basis.functions; }
+static int row_width(const rls_config *c)
+{
+    return c->outputs + c->inputs + c->parameters + c->basis.functions;
+}
 
 static int past_size(const rls_config *c) { return padded((c->memory + 1) * row_width(c)); }
 
@@ -176,7 +187,10 @@ static group open_group(const rls_config *c, int g, rls_real *state, rls_real *w
     return a;
 }
 
-static rls_real *block_at(const group *a, int start) { return a->triangle + block_offset(start, a->wide); }
+static rls_real *block_at(const group *a, int start)
+{
+    return a->triangle + block_offset(start, a->wide);
+}
 
 /* Entry (i, j) of the triangle, j at or behind the start of the block of row i. */
 static rls_real *entry(const group *a, int i, int j)
@@ -191,7 +205,10 @@ static rls_real *end_of_work(const group *a) { return a->innovation + a->high; }
 
 static int groups_state(const rls_config *c) { return HEADER + past_size(c); }
 
-static int groups_work(const rls_config *c) { return padded(rls_regressors(c)) + padded(c->outputs); }
+static int groups_work(const rls_config *c)
+{
+    return padded(rls_regressors(c)) + padded(c->outputs);
+}
 
 int rls_regressors(const rls_config *c) { return c->entries * c->basis.functions; }
 
@@ -199,8 +216,10 @@ int rls_state_size(const rls_config *c)
 {
     int size = groups_state(c);
     for (int g = 0; g < c->groups; g++) {
-        const int tall = padded(c->group[g].entries * c->basis.functions), high = padded(c->group[g].outputs), wide = tall + high;
-        size += GROUP_HEADER + block_offset(wide, wide) + wide + (c->group[g].outputs + 3) * tall + 4 * high;
+        const int tall = padded(c->group[g].entries * c->basis.functions),
+                  high = padded(c->group[g].outputs), wide = tall + high;
+        size += GROUP_HEADER + block_offset(wide, wide) + wide + (c->group[g].outputs + 3) * tall +
+                4 * high;
     }
     return size;
 }
@@ -209,7 +228,8 @@ int rls_work_size(const rls_config *c)
 {
     int size = groups_work(c);
     for (int g = 0; g < c->groups; g++) {
-        const int tall = padded(c->group[g].entries * c->basis.functions), high = padded(c->group[g].outputs);
+        const int tall = padded(c->group[g].entries * c->basis.functions),
+                  high = padded(c->group[g].outputs);
         size += 2 * tall + 2 * (tall + high) + tall * high + high;
     }
     return size;
@@ -238,14 +258,18 @@ void rls_init(const rls_config *c, rls_real *state, rls_real *work)
 static inline rls_real absolute(rls_real a) { return a > -a ? a : -a; }
 
 /* For each of `count` rows a: a'b in LANES partial sums, from the last column on. */
-static inline void partial_sums(const rls_real *rows, int stride, int count, const rls_real *b, int length, lanes *sums)
+static inline void partial_sums(const rls_real *rows, int stride, int count, const rls_real *b,
+                                int length, lanes *sums)
 {
     for (int k = length - LANES; k >= 0; k -= LANES)
-        for (int i = 0; i < count; i++) LANEWISE EACH(sums[i]) += EACH(*lanes_of(b + k)) * EACH(*lanes_of(rows + i * stride + k));
+        for (int i = 0; i < count; i++)
+            LANEWISE EACH(sums[i]) +=
+                EACH(*lanes_of(b + k)) * EACH(*lanes_of(rows + i * stride + k));
 }
 
 /* a'b for each of `count` rows a of a matrix, LANES at most; 0 for the rest of LANES. */
-static inline void times(const rls_real *rows, int stride, int count, const rls_real *b, int length, rls_real *result)
+static inline void times(const rls_real *rows, int stride, int count, const rls_real *b, int length,
+                         rls_real *result)
 {
     lanes s[LANES];
     int i = 0;
@@ -262,8 +286,10 @@ static inline void times(const rls_real *rows, int stride, int count, const rls_
     *lanes_at(result) = s[0];
 }
 
-/* LANES columns of a block of rows: for each row i in turn x <- x - lead[i] row, row <- row + gain[i] x. */
-static inline void rotate(rls_real *block, int stride, rls_real *x, const rls_real *lead, const rls_real *gain)
+/* LANES columns of a block of rows: for each row i in turn x <- x - lead[i] row, row <- row +
+   gain[i] x. */
+static inline void rotate(rls_real *block, int stride, rls_real *x, const rls_real *lead,
+                          const rls_real *gain)
 {
     lanes t = *lanes_of(x);
     for (int i = 0; i < LANES; i++) {
@@ -278,11 +304,13 @@ static inline void rotate(rls_real *block, int stride, rls_real *x, const rls_re
 /* What x becomes by that, the block left as it is. */
 static inline void reduce(const rls_real *block, int stride, lanes *x, const rls_real *lead)
 {
-    for (int i = 0; i < LANES; i++) LANEWISE EACH(*x) -= lead[i] * EACH(*lanes_of(block + i * stride));
+    for (int i = 0; i < LANES; i++)
+        LANEWISE EACH(*x) -= lead[i] * EACH(*lanes_of(block + i * stride));
 }
 
 /* A row of which little is kept, where row + gain x would cancel: row <- keep row + gain x. */
-static inline void renew(rls_real *restrict row, rls_real *restrict x, int length, rls_real lead, rls_real gain, rls_real keep)
+static inline void renew(rls_real *restrict row, rls_real *restrict x, int length, rls_real lead,
+                         rls_real gain, rls_real keep)
 {
     for (int k = 0; k < length; k++) {
         const rls_real r = row[k], t = x[k];
@@ -297,7 +325,8 @@ typedef struct {
 } weight;
 
 /* The entry of x that each row of a block eliminates, 0 from row `rows` on. */
-static inline void eliminate(const rls_real *block, int stride, int rows, const lanes *x, rls_real *lead)
+static inline void eliminate(const rls_real *block, int stride, int rows, const lanes *x,
+                             rls_real *lead)
 {
     lanes t = *x;
     for (int i = 0; i < LANES; i++) {
@@ -308,8 +337,10 @@ static inline void eliminate(const rls_real *block, int stride, int rows, const 
     for (int i = rows; i < LANES; i++) lead[i] = 0;
 }
 
-/* What that does to a block of rows: d, and the gain. 0 where a row may have to be renewed: then nothing has changed. */
-static inline int weigh(const rls_real *leads, rls_real *d, rls_real kept, weight *w, rls_real *gain)
+/* What that does to a block of rows: d, and the gain. 0 where a row may have to be renewed: then
+   nothing has changed. */
+static inline int weigh(const rls_real *leads, rls_real *d, rls_real kept, weight *w,
+                        rls_real *gain)
 {
     const lanes lead = *lanes_of(leads);
     lanes old = *lanes_of(d), ratio = old, sum = old, over = old;
@@ -337,7 +368,8 @@ static void renew_rows(const group *a, int start, int rows, rls_real kept, weigh
     const int length = a->wide - start;
     rls_real *x = a->x + start, *row = block_at(a, start);
     for (int i = 0; i < rows; i++, row += length) {
-        const rls_real f = x[i], d = kept * a->d[start + i], ratio = f / d, sum = w->inverse + f * ratio;
+        const rls_real f = x[i], d = kept * a->d[start + i], ratio = f / d,
+                       sum = w->inverse + f * ratio;
         rls_real gain = 0;
         if (f == 0 || (d <= TINY && absolute(f) < TINY)) {
             a->d[start + i] = d;
@@ -355,7 +387,9 @@ static void renew_rows(const group *a, int start, int rows, rls_real kept, weigh
             row[i] = 1;
             a->d[start + i] = d + f * (f * w->value);
             w->inverse = sum;
-        } else { /* nothing is known here: all of x is explained, and what would be left of it is rounding that must teach no other row */
+        } else {
+            /* nothing is known here: all of x is explained, and what would be left of it is
+               rounding that must teach no other row */
             gain = 1 / f;
             for (int k = 0; k < length; k++) {
                 row[k] = gain * x[k];
@@ -369,9 +403,10 @@ static void renew_rows(const group *a, int start, int rows, rls_real kept, weigh
     }
 }
 
-/* Rotate x, of weight w, into rows first .. last - 1, whose information is first multiplied by `kept`; x is 0 before `first`. s gets
-   R^-T phi in the scale of the triangle. What the next block eliminates is found before this one is changed: the chain of eliminations is the
-   longest there is, and a processor does the rest beside it. */
+/* Rotate x, of weight w, into rows first .. last - 1, whose information is first multiplied by
+   `kept`; x is 0 before `first`. s gets R^-T phi in the scale of the triangle. What the next block
+   eliminates is found before this one is changed: the chain of eliminations is the longest there
+   is, and a processor does the rest beside it. */
 static inline void sweep(const group *a, int first, int last, rls_real kept, rls_real w)
 {
     int start = block_start(first);
@@ -419,35 +454,41 @@ static inline void find_gain(const group *a)
         const rls_real *block = block_at(a, start);
         rls_real right[LANES];
         lanes t;
-        times(block + LANES, length, LANES, a->gain + start + LANES, a->tall - start - LANES, right);
+        times(block + LANES, length, LANES, a->gain + start + LANES, a->tall - start - LANES,
+              right);
         LANEWISE EACH(t) = EACH(*lanes_of(a->s + start)) - EACH(*lanes_of(right));
         solve(block, length, &t);
         *lanes_at(a->gain + start) = t;
     }
 }
 
-/* Outputs `from` on, TOGETHER of them: solution (tall, high) <- R^-1 Z, products subtracted from the last column on. */
+/* Outputs `from` on, TOGETHER of them: solution (tall, high) <- R^-1 Z, products subtracted from
+   the last column on. */
 static inline void back_substitute(const group *a, int from)
 {
     for (int start = a->tall - LANES; start >= 0; start -= LANES) {
         const int length = a->wide - start;
         const rls_real *block = block_at(a, start);
         part t[LANES];
-        for (int i = 0; i < LANES; i++) t[i] = *(const part *)(block + i * length + a->tall - start + from);
+        for (int i = 0; i < LANES; i++)
+            t[i] = *(const part *)(block + i * length + a->tall - start + from);
         for (int k = a->tall - 1; k >= start + LANES; k--) {
             const part known = *(const part *)(a->solution + k * a->high + from);
             for (int i = 0; i < LANES; i++) t[i] -= block[i * length + k - start] * known;
         }
         for (int k = LANES - 1; k > 0; k--)
             for (int i = 0; i < k; i++) t[i] -= block[i * length + k] * t[k];
-        for (int i = 0; i < LANES; i++) *(part *)(a->solution + (start + i) * a->high + from) = t[i];
+        for (int i = 0; i < LANES; i++)
+            *(part *)(a->solution + (start + i) * a->high + from) = t[i];
     }
 }
 
-/* So much is known that an ordinary sample is lost to rounding: single precision that never forgets. */
+/* So much is known that an ordinary sample is lost to rounding: single precision that never
+   forgets. */
 static inline int is_full(const group *a) { return a->header[WEIGHT] * EPSILON >= 1; }
 
-/* theta <- R^-1 Z. A factor that is full has lost samples; what has moved along the gain since is better. */
+/* theta <- R^-1 Z. A factor that is full has lost samples; what has moved along the gain since is
+   better. */
 static void solve_anew(const group *a)
 {
     if (is_full(a)) return;
@@ -475,8 +516,9 @@ static inline rls_real fastest(const rls_forgetting *f)
     return f->kind == RLS_DIRECTIONAL ? 1 : f->kind == RLS_VARIABLE ? f->lowest : f->factor;
 }
 
-/* The information that coefficients are kept awake with, in samples with a regressor at its largest: enough that the floor still stands
-   when half of it and then n samples more are forgotten. */
+/* The information that coefficients are kept awake with, in samples with a regressor at its
+   largest: enough that the floor still stands when half of it and then n samples more are
+   forgotten. */
 static inline rls_real wakefulness(const rls_forgetting *f, int n)
 {
     rls_real kept, floor;
@@ -495,20 +537,23 @@ static inline rls_real loudness(const group *a)
     return loudest;
 }
 
-/* Multiply the information along phi by `factor`, and leave what is known of all other directions: R'DR - (1 - factor) v v' / phi'v with
-   v = R'DR phi. Source: Cao and Schwartz (2000), A directional forgetting algorithm based on the decomposition of the information matrix. */
+/* Multiply the information along phi by `factor`, and leave what is known of all other directions:
+   R'DR - (1 - factor) v v' / phi'v with v = R'DR phi. Source: Cao and Schwartz (2000), A
+   directional forgetting algorithm based on the decomposition of the information matrix. */
 static inline void forget_direction(const group *a, rls_real factor)
 {
     rls_real length2 = 0, share, left = factor;
     for (int start = 0; start < a->tall; start += LANES)
-        times(block_at(a, start), a->wide - start, LANES, a->phi + start, a->tall - start, a->s + start);
+        times(block_at(a, start), a->wide - start, LANES, a->phi + start, a->tall - start,
+              a->s + start);
     for (int i = 0; i < a->n; i++) length2 += a->d[i] * (a->s[i] * a->s[i]);
     if (!(length2 > TINY)) return;
     share = (1 - factor) / length2;
     for (int k = 0; k < a->wide; k++) a->x[k] = 0;
     for (int i = a->n - 1; i >= 0; i--) {
         const int start = block_start(i);
-        const rls_real more = left + share * (a->d[i] * (a->s[i] * a->s[i])), out = share * a->s[i] / left, in = a->d[i] * a->s[i];
+        const rls_real more = left + share * (a->d[i] * (a->s[i] * a->s[i])),
+                       out = share * a->s[i] / left, in = a->d[i] * a->s[i];
         rls_real *restrict row = entry(a, i, start), *restrict x = a->x + start;
         for (int k = 0; k < a->wide - start; k++) {
             const rls_real r = row[k], t = x[k];
@@ -525,11 +570,14 @@ static inline void forget_direction(const group *a, rls_real factor)
 static inline int is_settled(const rls_forgetting *f, const group *a)
 {
     const rls_real weight = a->header[WEIGHT];
-    return a->header[STEPS] > 0 || (a->header[DETERMINED] != 0 && (weight >= REAL(2 * a->n) || 2 * weight * (1 - f->factor) >= 1));
+    return a->header[STEPS] > 0 ||
+           (a->header[DETERMINED] != 0 &&
+            (weight >= REAL(2 * a->n) || 2 * weight * (1 - f->factor) >= 1));
 }
 
-/* A sample counts in the usual power no more than tenfold, and what is usual comes down with what is recent: a jump or an outlier does not
-   pass for usual. Source of the variable factor: Fortescue, Kershenbaum and Ydstie (1981), with both powers taken from the innovations. */
+/* A sample counts in the usual power no more than tenfold, and what is usual comes down with what
+   is recent: a jump or an outlier does not pass for usual. Source of the variable factor:
+   Fortescue, Kershenbaum and Ydstie (1981), with both powers taken from the innovations. */
 static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a)
 {
     rls_real steps, recent, usual, ratio = 0, factor;
@@ -543,7 +591,8 @@ static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a
         const rls_real power = a->innovation[j] * a->innovation[j];
         a->recent[j] += recent * (power - a->recent[j]);
         if (a->usual[j] == 0) a->usual[j] = power;
-        a->usual[j] += usual * ((power < 10 * a->usual[j] ? power : 10 * a->usual[j]) - a->usual[j]);
+        a->usual[j] +=
+            usual * ((power < 10 * a->usual[j] ? power : 10 * a->usual[j]) - a->usual[j]);
         if (a->usual[j] > 4 * a->recent[j]) a->usual[j] = 4 * a->recent[j];
         ratio += a->usual[j] > 0 ? a->recent[j] / a->usual[j] : 1;
     }
@@ -551,8 +600,8 @@ static inline rls_real forgetting_factor(const rls_forgetting *f, const group *a
     return factor < f->lowest ? f->lowest : factor > f->factor ? f->factor : factor;
 }
 
-/* A measurement of coefficient j that says 0, of what weight is missing to `target`, rotated into the rows up to `last`. Up to n, x ends as minus the
-   coefficients. */
+/* A measurement of coefficient j that says 0, of what weight is missing to `target`, rotated into
+   the rows up to `last`. Up to n, x ends as minus the coefficients. */
 static inline void feed(const group *a, int j, rls_real target, int last)
 {
     const rls_real more = target - a->fed[j];
@@ -563,9 +612,10 @@ static inline void feed(const group *a, int j, rls_real target, int last)
     a->fed[j] = target;
 }
 
-/* Make up for what coefficient j has lost, as soon as half of what is pretended of it is gone, n samples after its last turn at the earliest. One
-   that is kept awake gets a measurement that says "as it is now" and moves no coefficient: what outputs that leave no residual would have added to one
-   that says 0 follows. Else what is pretended goes on saying 0: little, but it moves them. */
+/* Make up for what coefficient j has lost, as soon as half of what is pretended of it is gone, n
+   samples after its last turn at the earliest. One that is kept awake gets a measurement that says
+   "as it is now" and moves no coefficient: what outputs that leave no residual would have added to
+   one that says 0 follows. Else what is pretended goes on saying 0: little, but it moves them. */
 static inline void replenish(const group *a, rls_real samples, int j, int kept_awake)
 {
     const rls_real target = samples * (a->peak[j] * a->peak[j]);
@@ -582,9 +632,11 @@ static inline void replenish(const group *a, rls_real samples, int j, int kept_a
     }
 }
 
-/* The largest regressors one has to expect: a signal as large as any so far, times its functions at their largest. The coefficients of a signal that
-   is seen for the first time are kept awake from the start, at the 0 they have, lest the first samples make them wild: nothing is in
-   their rows and columns yet. And so, at once, are those of one that has only whispered until now: by less, where little is pretended. */
+/* The largest regressors one has to expect: a signal as large as any so far, times its functions at
+   their largest. The coefficients of a signal that is seen for the first time are kept awake from
+   the start, at the 0 they have, lest the first samples make them wild: nothing is in their rows
+   and columns yet. And so, at once, are those of one that has only whispered until now: by less,
+   where little is pretended. */
 static inline void new_peaks(const rls_basis *b, const group *a, rls_real samples, int kept_awake)
 {
     const rls_real louder = REAL(kept_awake ? 100 : 4);
@@ -594,8 +646,10 @@ static inline void new_peaks(const rls_basis *b, const group *a, rls_real sample
         const int fresh = a->peak[i] == 0;
         rls_real signal = 0;
         for (int k = 0; k < b->functions; k++)
-            if (absolute(a->phi[i + k]) > signal * b->largest[k]) signal = absolute(a->phi[i + k]) / b->largest[k];
-        if (!(samples * (signal * signal) > TINY)) { /* what is pretended of it would underflow: it is not there */
+            if (absolute(a->phi[i + k]) > signal * b->largest[k])
+                signal = absolute(a->phi[i + k]) / b->largest[k];
+        /* what is pretended of it would underflow: it is not there */
+        if (!(samples * (signal * signal) > TINY)) {
             for (int k = i; k < i + b->functions; k++) a->phi[k] = 0;
             continue;
         }
@@ -626,15 +680,17 @@ static inline void drop_underflow(const group *a, int j)
     if (j < a->n && a->fed[j] < TINY) a->fed[j] = 0;
 }
 
-/* Whether column i of R stands out of the span of those before it: by more than rounding lets us see of all it has been, and by more than
-   what is pretended. identification/determined.py is the same rule for a batch. */
+/* Whether column i of R stands out of the span of those before it: by more than rounding lets us
+   see of all it has been, and by more than what is pretended.
+   identification/design/determined.py is the same rule for a batch. */
 static inline int is_known(const group *a, int i, rls_real beyond)
 {
     return (a->d[i] > EPSILON * a->energy[i]) & (a->d[i] > beyond * a->fed[i]);
 }
 
-/* Whether every coefficient is known: what is pretended decides less than a thousandth of it. Where it is kept awake with more, a third at first; and
-   what was known stays so on what takes the place of what is forgotten. */
+/* Whether every coefficient is known: what is pretended decides less than a thousandth of it. Where
+   it is kept awake with more, a third at first; and what was known stays so on what takes the place
+   of what is forgotten. */
 static inline int is_determined(const group *a, int kept_awake)
 {
     const rls_real beyond = REAL(kept_awake ? (a->header[DETERMINED] != 0 ? 0 : 2) : 1000);
@@ -653,21 +709,24 @@ static inline void predict(const group *a, const int *output, const rls_real *y)
     }
 }
 
-/* A running error analysis: an error of the gain g is backward stable, |R dg| <= EPSILON |R| |g|, and what has gone wrong before, R dtheta, grows no
-   more with what is learnt after. Where the bound, over what the outputs measure, is not small any longer, theta is solved anew. */
+/* A running error analysis: an error of the gain g is backward stable, |R dg| <= EPSILON |R| |g|,
+   and what has gone wrong before, R dtheta, grows no more with what is learnt after. Where the
+   bound, over what the outputs measure, is not small any longer, theta is solved anew. */
 static inline void correct(const group *a)
 {
     rls_real error = 0;
     int small = 1;
     lanes sum = none;
     for (int k = 0; k < a->tall; k += LANES)
-        LANEWISE EACH(sum) += EACH(*lanes_of(a->energy + k)) * (EACH(*lanes_of(a->gain + k)) * EACH(*lanes_of(a->gain + k)));
+        LANEWISE EACH(sum) += EACH(*lanes_of(a->energy + k)) *
+                              (EACH(*lanes_of(a->gain + k)) * EACH(*lanes_of(a->gain + k)));
     for (int i = 0; i < LANES; i++) error += LANE(sum, i);
     a->header[SINCE] += 1;
     for (int j = 0; j < a->m; j++) {
         rls_real *theta = a->theta + j * a->tall;
         const rls_real innovation = a->innovation[j];
-        for (int k = 0; k < a->tall; k += LANES) LANEWISE EACH(*lanes_at(theta + k)) += innovation * EACH(*lanes_of(a->gain + k));
+        for (int k = 0; k < a->tall; k += LANES)
+            LANEWISE EACH(*lanes_at(theta + k)) += innovation * EACH(*lanes_of(a->gain + k));
     }
     for (int j = 0; j < a->m; j++) {
         a->drift[j] += error * (a->innovation[j] * a->innovation[j]);
@@ -676,7 +735,8 @@ static inline void correct(const group *a)
     if (!small || a->header[SINCE] >= ALONG) solve_anew(a);
 }
 
-static void learn(const rls_forgetting *f, const rls_basis *b, const group *a, const int *output, const rls_real *y)
+static void learn(const rls_forgetting *f, const rls_basis *b, const group *a, const int *output,
+                  const rls_real *y)
 {
     const rls_real samples = wakefulness(f, a->n);
     const int turn = (int)a->header[TURN], kept_awake = samples > PRIOR;
@@ -724,9 +784,11 @@ static int status(const rls_config *c, rls_real *state, rls_real *work)
     return bits;
 }
 
-int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_real *phi, const rls_real *y)
+int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_real *phi,
+               const rls_real *y)
 {
-    rls_real *s = state + groups_state(c), *w = work + groups_work(c), *innovation = work + padded(rls_regressors(c));
+    rls_real *s = state + groups_state(c), *w = work + groups_work(c),
+             *innovation = work + padded(rls_regressors(c));
     const int functions = c->basis.functions;
     for (int g = 0; g < c->groups; g++) {
         const group a = open_group(c, g, s, w);
@@ -734,7 +796,8 @@ int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_r
             for (int i = 0; i < a.n; i++) a.phi[i] = phi[i];
         else
             for (int i = 0; i < c->group[g].entries; i++)
-                for (int k = 0; k < functions; k++) a.phi[i * functions + k] = phi[c->group[g].entry[i] * functions + k];
+                for (int k = 0; k < functions; k++)
+                    a.phi[i * functions + k] = phi[c->group[g].entry[i] * functions + k];
         learn(&c->forgetting, &c->basis, &a, c->group[g].output, y);
         for (int j = 0; j < a.m; j++) innovation[c->group[g].output[j]] = a.innovation[j];
         s = end_of_state(&a);
@@ -769,7 +832,8 @@ static void functions_at(const rls_basis *b, const rls_real *p, rls_real *f)
 {
     for (int j = 0; j < b->functions; j++) {
         f[j] = 1;
-        for (int i = 0; i < b->factors; i++) f[j] *= evaluate(&b->factor[i], b->index[j * b->factors + i], p[i]);
+        for (int i = 0; i < b->factors; i++)
+            f[j] *= evaluate(&b->factor[i], b->index[j * b->factors + i], p[i]);
     }
 }
 
@@ -777,7 +841,8 @@ static int is_outside(const rls_basis *b, const rls_real *p)
 {
     for (int i = 0; i < b->factors; i++) {
         const rls_factor *one = &b->factor[i];
-        if (p[i] < one->knot[0] - one->slack || p[i] > one->knot[one->pieces] + one->slack) return 1;
+        if (p[i] < one->knot[0] - one->slack || p[i] > one->knot[one->pieces] + one->slack)
+            return 1;
     }
     return 0;
 }
@@ -787,11 +852,12 @@ static void regressor(const rls_config *c, const rls_real *past, rls_real *phi)
     const int width = row_width(c), p = c->outputs + c->inputs;
     for (int i = 0; i < c->entries; i++) {
         const rls_entry *e = &c->entry[i];
-        const rls_real *then = past + e->lag * width, *f = past + e->p_lag * width + p + c->parameters;
+        const rls_real *then = past + e->lag * width,
+                       *f = past + e->p_lag * width + p + c->parameters;
         const rls_real signal = e->kind == RLS_OUTPUT   ? -then[e->channel]
-                                : e->kind == RLS_INPUT  ? then[c->outputs + e->channel]
-                                : e->kind == RLS_OFFSET ? 1
-                                                        : past[p + e->channel] - then[p + e->channel];
+                              : e->kind == RLS_INPUT  ? then[c->outputs + e->channel]
+                              : e->kind == RLS_OFFSET ? 1
+                              : past[p + e->channel] - then[p + e->channel];
         for (int k = 0; k < c->basis.functions; k++) *phi++ = signal * f[k];
     }
 }
@@ -807,12 +873,13 @@ static int defect(const rls_real *value, int count)
     return worst;
 }
 
-int rls_update_with(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, const rls_real *p,
-                    const rls_real *f)
+int rls_update_with(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y,
+                    const rls_real *u, const rls_real *p, const rls_real *f)
 {
     rls_real *past = state + HEADER, *next = past;
     const int width = row_width(c), outside = is_outside(&c->basis, p);
-    const int wrong = defect(y, c->outputs) | defect(u, c->inputs) | defect(p, c->parameters) | (f ? defect(f, c->basis.functions) : 0);
+    const int wrong = defect(y, c->outputs) | defect(u, c->inputs) | defect(p, c->parameters) |
+                      (f ? defect(f, c->basis.functions) : 0);
     if (wrong || outside) {
         rls_forget_past(state);
         return status(c, state, work) | (wrong >= 2 || outside ? RLS_REFUSED : 0);
@@ -831,7 +898,8 @@ int rls_update_with(const rls_config *c, rls_real *state, rls_real *work, const 
     return rls_absorb(c, state, work, work, y);
 }
 
-int rls_update(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y, const rls_real *u, const rls_real *p)
+int rls_update(const rls_config *c, rls_real *state, rls_real *work, const rls_real *y,
+               const rls_real *u, const rls_real *p)
 {
     return rls_update_with(c, state, work, y, u, p, 0);
 }
@@ -845,13 +913,18 @@ void rls_coefficients(const rls_config *c, const rls_real *state, rls_real *thet
     for (int i = rls_regressors(c) * c->outputs - 1; i >= 0; i--) theta[i] = 0;
     for (int g = 0; g < c->groups; g++) {
         const rls_group *own = &c->group[g];
-        const int n = own->entries * functions, tall = padded(n), high = padded(own->outputs), wide = tall + high;
+        const int n = own->entries * functions, tall = padded(n), high = padded(own->outputs),
+                  wide = tall + high;
         const rls_real *from = state + GROUP_HEADER + block_offset(wide, wide) + wide;
         for (int j = 0; j < own->outputs; j++)
             for (int i = 0; i < n; i++)
-                theta[(own->entry[i / functions] * functions + i % functions) * c->outputs + own->output[j]] = from[j * tall + i];
+                theta[(own->entry[i / functions] * functions + i % functions) * c->outputs +
+                      own->output[j]] = from[j * tall + i];
         state = from + (own->outputs + 3) * tall + 4 * high;
     }
 }
 
-const rls_real *rls_innovation(const rls_config *c, const rls_real *work) { return work + padded(rls_regressors(c)); }
+const rls_real *rls_innovation(const rls_config *c, const rls_real *work)
+{
+    return work + padded(rls_regressors(c));
+}

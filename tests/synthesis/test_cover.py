@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import synthesis
-from studies.cover import SAFETY, Remainder, covered_gain, covering
 from symheli import LPVStateSpace, Scheduling
+from symheli.errors import InputError
 from synthesis import Spline
+from synthesis.cover import SAFETY, Remainder, covered_gain, covering
 
 PLAIN = Spline(degree=0)
 
@@ -31,6 +32,14 @@ def test_a_pole_known_within_a_margin_has_the_gain_of_the_slowest_pole():
     # one balanced scale for disturbance and remainder costs at most the room that is tried, 1 %
     assert truth <= gain < 1.01 * truth
     assert certificate.verify(rigorous=True)
+
+
+def test_a_remainder_of_another_size_and_a_gain_that_is_not_proven_are_refused():
+    rest = Remainder.of(np.ones((2, 2, 3)))
+    with pytest.raises(InputError, match="expected the remainder of 1 states and 1 inputs"):
+        covered_gain(lag(), rest, 0.0, PLAIN, 1.0)
+    with pytest.raises(InputError, match="proven of the model alone, got inf"):
+        covered_gain(lag(), Remainder.of(left_out(0.005)), 0.0, PLAIN, math.inf)
 
 
 def test_nothing_is_proven_where_the_remainder_may_make_the_plant_unstable():

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import identification as idn
+from identification.export import write_model
 from studies.cli import main
-from studies.export_model import write_model
 from symheli.errors import InputError
 from symheli.values import Signal
 

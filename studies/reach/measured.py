@@ -228,7 +228,3 @@ def _word(value: Any) -> str:
     if isinstance(value, tuple):
         return f"[{value[0]:.3g}, {value[1]:.3g}]"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-if __name__ == "__main__":
-    main()

@@ -10,7 +10,7 @@ from scipy.io import loadmat
 
 import symheli
 from studies import cli
-from studies.export_c import write_c
+from symheli.export import write_c
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")

@@ -1,15 +1,18 @@
-"""An LPV-ARX model beside the LTI one of the same order, in sample and held out."""
+"""A scheduled model beside the constant one of the same order, in sample and held out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from identification import LPVARX, LPVARXModel, fit, fit_percent
 from identification.design.leakage import MADE_OF_OUTPUTS, share_from_outputs
+from identification.estimators.estimate import fit
+from identification.judge.scores import Scores, horizons, percent, scores
+from identification.model.lpvarx_model import LPVARXModel
+from identification.structure.lpvarx import LPVARX
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
 
@@ -18,32 +21,28 @@ PAYS = 1.0
 (one digit) is what is compared.
 """
 
-STILL = 1e-6
-"""A scheduling signal that moves by less than this part of its size stays where it is."""
-
 LEAST = -100.0
 """A fit below this counts as this, where fits are averaged: what is useless can be no worse."""
 
-HORIZONS = ("one step", "1 s", "free run")
+HORIZONS = horizons()
+"""One step, 1 s and free run; the verdict rests on the last two."""
 
 Trim = Literal["auto", "moving", "still"]
 """Whether the models have d(p) times the change of p (`offset_rate`): "auto" tries both."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Scored:
-    """A model and its fit in percent: {horizon: {output: percent}} on the samples it was fitted to
-    and on those held out.
-    """
+    """A model and its scores on the samples it was fitted to and on those held out, if any."""
 
     label: str
     model: LPVARXModel
-    in_sample: dict[str, dict[str, float]]
-    held_out: dict[str, dict[str, float]] | None
+    in_sample: Scores
+    held_out: Scores | None
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, kw_only=True)
+class AgainstConstant:
     """The models fitted to one record: the one that is judged, the LTI one it is judged against
     (where there are two), then rivals.
 
@@ -111,21 +110,28 @@ class Comparison:
         """{horizon: better, worse or no different}; free runs that are told their answer, or of no
         use either way, are no different.
         """
-        lpv, lti = (m.held_out or {} for m in self.judged)
-        out = {h: difference(lpv[h][output], lti[h][output]) for h in HORIZONS[1:]}
-        return {**out, "free run": "not counted"} if self.told else out
+        lpv, lti = self._fits(output)
+        out = {h: difference(lpv[h], lti[h]) for h in HORIZONS[1:]}
+        return {**out, HORIZONS[-1]: "not counted"} if self.told else out
 
     def _sentence(self, output: str) -> str:
-        lpv, lti = (m.held_out or {} for m in self.judged)
+        lpv, lti = self._fits(output)
         found = self._differences(output)
         verdict = "pays" if self.pays(output) else "does NOT pay"
         if {"better", "worse"} <= set(found.values()):
             verdict = "does NOT pay throughout"
         numbers = (
-            f"{percent(lpv[h][output])} against {percent(lti[h][output])} % {where} ({found[h]})"
+            f"{percent(lpv[h])} against {percent(lti[h])} % {where} ({found[h]})"
             for h, where in zip(HORIZONS[1:], ("1 s ahead", "in free run"), strict=True)
         )
         return f"{output}: scheduling {verdict} on held-out data: {', '.join(numbers)}"
+
+    def _fits(self, output: str) -> Iterator[dict[str, float]]:
+        """{horizon: held-out fit} of the model that is judged and of the LTI one."""
+        for one in self.judged:
+            if one.held_out is None:
+                raise InputError("nothing was held out: fits in sample cannot tell what pays")
+            yield {h: fits[output] for h, fits in one.held_out.by_horizon.items()}
 
 
 def difference(one: float, other: float) -> str:
@@ -146,22 +152,63 @@ def difference(one: float, other: float) -> str:
     )
 
 
-def compare(
+def against_constant(
     structure: LPVARX,
     training: FlightRecord,
     test: FlightRecord | None,
     *,
     trim: Trim = "still",
     hold_p: bool = False,
-    method: str = "ls",
+    method: Any = "ls",
     instruments: Sequence[str] = (),
-) -> Comparison:
-    """Fit `structure`, and the same with constant coefficients where it has moving ones, by
-    `method`.
+) -> AgainstConstant:
+    """Fit a scheduled model and the constant one of the same order, and say where scheduling pays.
 
-    `trim` "auto" fits both once more with `offset_rate` where p moves and is not made of the
-    outputs, and judges those that predict 1 s better in sample (as well: those that run free
-    better). `hold_p` as in `LPVARXModel.predict`.
+    Scheduling pays for an output where the scheduled model is more than one point better 1 s ahead
+    or in free run on held-out data, and worse in neither.
+
+    Parameters
+    ----------
+    structure : LPVARX
+        The scheduled structure; a constant one is fitted alone.
+    training : FlightRecord
+        What both are fitted to.
+    test : FlightRecord or None
+        What both are judged on; without it there is no verdict.
+    trim : {"still", "moving", "auto"}
+        Whether the models have d(p) times the change of p (`offset_rate`). "auto" fits both once
+        more with it where p moves and is not made of the outputs, and judges those that predict 1 s
+        better in sample, or, where that is the same, run free better.
+    hold_p : bool
+        Predictions hold p from their start, as where it is measured.
+    method : estimator
+        As `fit` takes it.
+    instruments : sequence of str
+        Of the record, for "iv".
+
+    Returns
+    -------
+    AgainstConstant
+        The models with their scores, `pays(output)` and the `verdict()` in sentences.
+
+    Raises
+    ------
+    InputError, ExcitationError
+        As `fit` does.
+
+    Examples
+    --------
+    >>> import numpy as np, identification as idn, symheli
+    >>> u = np.random.default_rng(0).standard_normal(600)
+    >>> p = np.sin(0.05 * np.arange(600))
+    >>> y = np.zeros(600)
+    >>> for k in range(1, 600):
+    ...     y[k] = (0.7 + 0.2 * p[k - 1]) * y[k - 1] + u[k - 1]
+    >>> units = dict.fromkeys("yup", "1")
+    >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(600), units, y=y, u=u, p=p)
+    >>> arx = idn.LPVARX("y", "u", "p", 1, 1, 1, idn.Polynomial(1, -1.0, 1.0))
+    >>> idn.against_constant(arx, *record.split(0.7)).pays("y")
+    True
     """
 
     def pair(moving: bool) -> list[Scored]:
@@ -171,10 +218,18 @@ def compare(
             {f"LPV, degree {arx.basis.size - 1}{suffix}": arx} if arx.basis.size > 1 else {}
         )
         structures[f"LTI{suffix}"] = arx.lti()
-        return [
-            _scored(label, s, training, test, hold_p, method, instruments)
-            for label, s in structures.items()
-        ]
+        found = []
+        for label, one in structures.items():
+            model = fit(one, training, method=method, instruments=instruments)
+            found.append(
+                Scored(
+                    label=label,
+                    model=model,
+                    in_sample=scores(model, training, hold_p=hold_p),
+                    held_out=None if test is None else scores(model, test, hold_p=hold_p),
+                )
+            )
+        return found
 
     leak = float(np.max(share_from_outputs(structure, training)))
     first, note = pair(trim == "moving"), ""
@@ -203,104 +258,22 @@ def compare(
                     f" {'with' if with_it > without else 'without'}"
                 )
                 first = [*first, *second]
-    return Comparison(tuple(first), training, test, hold_p, leak, note)
+    return AgainstConstant(
+        models=tuple(first),
+        training=training,
+        test=test,
+        hold_p=hold_p,
+        leak=leak,
+        trim_note=note,
+    )
 
 
-def _mean_fits(scores: dict[str, dict[str, float]]) -> tuple[float, float]:
+def _mean_fits(found: Scores) -> tuple[float, float]:
     """Means over the outputs of the fits 1 s ahead and in free run, as printed; the first decides,
     the second where it is the same.
     """
     one, free = (
-        round(float(np.mean([max(v, LEAST) for v in scores[h].values()])), 1) for h in HORIZONS[1:]
+        round(float(np.mean([max(v, LEAST) for v in fits.values()])), 1)
+        for fits in (found.ahead, found.free_run)
     )
     return one, free
-
-
-def scheduling_range(values: np.ndarray, degree: int) -> tuple[float, float]:
-    """The range of the record the basis is declared on. Raises `InputError` where it does not move
-    and `degree` is not 0.
-    """
-    known = values[np.isfinite(values)]
-    if not len(known):
-        raise InputError("the scheduling signal has no sample that is a number")
-    low, high = float(known.min()), float(known.max())
-    if high - low > STILL * max(abs(low), abs(high)):
-        return low, high
-    if degree > 0:
-        raise InputError(
-            f"the scheduling signal stays at {low:g}: a model scheduled by it cannot be told;"
-            " --degree 0 fits an LTI model"
-        )
-    return low - 0.5, high + 0.5
-
-
-def steps(dt: float) -> dict[str, int | None]:
-    """Each of `HORIZONS` in samples of `dt` (s); None is a free run."""
-    return dict(zip(HORIZONS, (1, max(round(1.0 / dt), 1), None), strict=True))
-
-
-def ahead(
-    model: LPVARXModel, record: FlightRecord, horizon: int | None, hold_p: bool
-) -> np.ndarray:
-    """What is scored and drawn: the prediction `horizon` samples ahead, or the free run."""
-    return (
-        model.simulate(record) if horizon is None else model.predict(record, horizon, hold_p=hold_p)
-    )
-
-
-def percent(value: float) -> str:
-    """A fit in words where it is no number."""
-    return (
-        "diverges"
-        if np.isneginf(value)
-        else "no data"
-        if np.isnan(value)
-        else f"{value:.1f}"
-        if value > -1e4
-        else f"{value:.1e}"
-    )
-
-
-def coefficients(model: LPVARXModel) -> dict[str, Any]:
-    """Coefficients of 1, p, p^2, ... by lag, as `identification.Coefficients.monomial` arranges
-    them.
-    """
-    values = model.coefficients.monomial()
-    return {
-        **values._asdict(),
-        "output_lags": list(model.structure.output_lags),
-        "input_lags": list(model.structure.input_lags),
-    }
-
-
-def _scored(
-    label: str,
-    arx: LPVARX,
-    training: FlightRecord,
-    test: FlightRecord | None,
-    hold_p: bool,
-    method: str,
-    instruments: Sequence[str],
-) -> Scored:
-    model = fit(arx, training, method=method, instruments=instruments)  # type: ignore[arg-type]
-    return Scored(
-        label,
-        model,
-        _scores(model, training, hold_p),
-        None if test is None else _scores(model, test, hold_p),
-    )
-
-
-def _scores(model: LPVARXModel, record: FlightRecord, hold_p: bool) -> dict[str, dict[str, float]]:
-    return {
-        horizon: dict(zip(model.structure.outputs, _fit(model, record, step, hold_p), strict=True))
-        for horizon, step in steps(model.dt).items()
-    }
-
-
-def _fit(
-    model: LPVARXModel, record: FlightRecord, horizon: int | None, hold_p: bool
-) -> list[float]:
-    return fit_percent(
-        record.columns(model.outputs), ahead(model, record, horizon, hold_p)
-    ).tolist()

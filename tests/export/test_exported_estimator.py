@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import identification as idn
-from studies.export_estimator import write_estimator
+from identification.export import write_estimator
 from symheli.errors import InputError
 
 CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")

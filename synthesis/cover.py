@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import synthesis
-from symheli import LPVStateSpace
-from synthesis import Certificate
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace
+from symheli.values.arrays import Array
+from synthesis.analysis.l2_gain import l2_gain
+from synthesis.certificate import Certificate
 from synthesis.forms import LyapunovForm
-
-Array = np.ndarray
+from synthesis.worst.frozen import frozen_gain
 
 SAFETY = 2.0
 """What is covered is this many times the largest difference measured."""
@@ -60,7 +61,7 @@ def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
     scale t balances d to y with u to z.
     """
     nx, nu, ny = len(lpv.states), len(lpv.inputs), len(lpv.outputs)
-    one = lpv.basis.fit(*_constant(lpv))
+    one = lpv.basis.constant()
     noise, seen = (
         np.multiply.outer(one, np.diag(rest.rows)),
         np.multiply.outer(one, np.diag(rest.columns)),
@@ -69,7 +70,7 @@ def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
     plain = replace(lpv, trim=None, residuals=None)
     heard = replace(plain, B=noise, D=np.zeros((len(one), ny, nx)), inputs=d)
     felt = replace(plain, C=seen[:, :, :nx], D=seen[:, :, nx:], outputs=z)
-    t = math.sqrt(gain * synthesis.frozen_gain(heard).gamma / synthesis.frozen_gain(felt).gamma)
+    t = math.sqrt(gain * frozen_gain(heard).gamma / frozen_gain(felt).gamma)
     above = np.concatenate([lpv.D / gain, heard.D / t], axis=2)
     below = np.concatenate([t * felt.D / gain, np.zeros((len(one), nx + nu, nx))], axis=2)
     return replace(
@@ -85,24 +86,55 @@ def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
 def covered_gain(
     lpv: LPVStateSpace, rest: Remainder, rate: float, form: LyapunovForm, gain: float
 ) -> tuple[float, Certificate | None]:
-    """(gain proven for `lpv` and every remainder, the certificate of `covering`) near its own
-    `gain`; (inf, None) where none is.
+    """A gain proven for a model and for every model within a measured distance of it.
+
+    The distance enters as a disturbance of the states that states and inputs cause; see `covering`.
+
+    Parameters
+    ----------
+    lpv : LPVStateSpace
+        The model, nx states and nu inputs.
+    rest : Remainder
+        How far [A B] of the others may be from its own, as `Remainder.of` makes it of differences
+        (K, nx, nx + nu).
+    rate : float
+        Limit on the rate of the scheduling parameter, per second.
+    form : Spline, Memory or HigherOrder
+        Of the Lyapunov function.
+    gain : float
+        A gain proven of `lpv` alone, near which the covered one is sought.
+
+    Returns
+    -------
+    (float, Certificate or None)
+        The gain and the certificate of the covering model; (inf, None) where nothing is proven.
+
+    Raises
+    ------
+    InputError
+        Where the remainder is of another size than the model, or the gain is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np, symheli, synthesis
+    >>> from synthesis.cover import Remainder, covered_gain
+    >>> lag = symheli.LPVStateSpace.polynomial(
+    ...     [[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], symheli.Scheduling("p", "1", 0.0, 1.0))
+    >>> rest = Remainder.of(np.array([[[0.0025, 0.0]]]))
+    >>> gain, _ = covered_gain(lag, rest, 0.0, synthesis.Spline(degree=0), 1.0)
+    >>> bool(1 / (1 - 0.005) <= gain < 1.02)
+    True
     """
-    for room in ROOMS:
-        certificate = synthesis.l2_gain(
-            covering(lpv, rest, room * gain), rate, form=form, search=None
+    nx, nu = len(lpv.states), len(lpv.inputs)
+    if rest.rows.shape != (nx,) or rest.columns.shape != (nx + nu,):
+        raise InputError(
+            f"rest: expected the remainder of {nx} states and {nu} inputs, got rows"
+            f" {rest.rows.shape} and columns {rest.columns.shape}"
         )
+    if not 0 < gain < math.inf:
+        raise InputError(f"gain: expected one that is proven of the model alone, got {gain:g}")
+    for room in ROOMS:
+        certificate = l2_gain(covering(lpv, rest, room * gain), rate, form=form, search=None)
         if certificate.gamma <= 1:
             return room * gain * certificate.gamma, certificate
     return math.inf, None
-
-
-def _constant(lpv: LPVStateSpace) -> tuple[Array, Array]:
-    """Points from which the coefficients of the constant 1 are fitted."""
-    p = np.concatenate(
-        [
-            q.low + (q.high - q.low) * np.linspace(0.01, 0.99, lpv.basis.size + 1)
-            for q in lpv.basis.pieces()
-        ]
-    )
-    return p, np.ones(len(p))

@@ -1,0 +1,6 @@
+"""Estimators and identified models as C99 for an autopilot or a simulator."""
+
+from identification.export.estimator import write_estimator
+from identification.export.model import write_model
+
+__all__ = ["write_estimator", "write_model"]

@@ -1,0 +1,211 @@
+"""An identified model as C99 for an autopilot or a simulator: one step ahead or in free run, with a
+check of what Python computed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from identification.export.checked import TOLERANCE, samples
+from identification.model.lpvarx_model import LPVARXModel
+from identification.recursive.forgetting import Constant
+from identification.recursive.kernel.configuration import KINDS, Configuration
+from symheli.errors import InputError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+from symheli.values.c_text import (
+    define,
+    identifier,
+    literals,
+    require_identifier,
+    rows,
+    table,
+)
+from symheli.values.template import filled
+from symheli.values.whole_files import write_text
+
+HERE = Path(__file__).parent
+"""model.c, model.h and model_check.c lie here, with marked places for one model."""
+
+
+def write_model(
+    model: LPVARXModel,
+    folder: str | os.PathLike[str],
+    name: str = "model",
+    precision: Literal["double", "single"] = "double",
+) -> tuple[Path, ...]:
+    """Write an identified model as C99 that predicts and simulates: no allocation, no library.
+
+    NAME_check.c is a program that carries a record and exits with 0 where the compiled model gives
+    the predictions and the free run computed here.
+
+    Parameters
+    ----------
+    model : LPVARXModel
+        The identified model.
+    folder : path
+        Where the files go; made as needed.
+    name : str
+        A C identifier: of the files and functions, in capitals of the macros.
+    precision : {"double", "single"}
+        Of every number in the C code.
+
+    Returns
+    -------
+    tuple of Path
+        NAME.h, NAME.c and NAME_check.c.
+
+    Raises
+    ------
+    InputError
+        For a name that is no C identifier, another precision, and functions of p that are not
+        piecewise polynomial.
+    SymheliError
+        Where a file cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np, identification as idn, symheli, tempfile
+    >>> from identification.export import write_model
+    >>> rng = np.random.default_rng(0)
+    >>> columns = {"y": rng.standard_normal(200), "u": rng.standard_normal(200),
+    ...            "p": rng.uniform(size=200)}
+    >>> units = dict.fromkeys(columns, "1")
+    >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(200), units, **columns)
+    >>> arx = idn.LPVARX("y", "u", "p", 1, 1, 1, idn.Polynomial(1, 0.0, 1.0))
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> [file.name for file in write_model(idn.fit(arx, record), folder.name, "roll")]
+    ['roll.h', 'roll.c', 'roll_check.c']
+    >>> folder.cleanup()
+    """
+    require_identifier(name)
+    if precision not in TOLERANCE:
+        raise InputError(f'precision: expected "double" or "single", got {precision!r}')
+    dtype = np.float32 if precision == "single" else np.float64
+    c = Configuration(model.structure, Constant(1.0), dtype)
+    if not c.factors:
+        raise InputError(
+            "functions brought along cannot be written in C; identify with a polynomial or spline"
+            " basis"
+        )
+    folder, up = Path(folder), f"{name.upper()}_"
+    names = {"model_": f"{name}_", "MODEL_": up}
+    own = names | {"model.": f"{name}."}
+    files = {
+        f"{name}.h": filled(HERE / "model.h", _header(model, c, name), names),
+        f"{name}.c": filled(HERE / "model.c", {"tables": _tables(model, c, up)}, own),
+        f"{name}_check.c": filled(
+            HERE / "model_check.c",
+            {"cases": _cases(model, c, name, precision)},
+            own | {"model:": f"{name}:"},
+        ),
+    }
+    return tuple(write_text(folder / file, content) for file, content in files.items())
+
+
+def _header(model: LPVARXModel, c: Configuration, name: str) -> dict[str, object]:
+    """Sizes, the index of every signal with its unit, and what the model is in words."""
+    arx, up = model.structure, f"{name.upper()}_"
+    ranges = zip(model.parameters, arx.basis.ranges, strict=True)
+    blocks = [
+        [f"typedef {'float' if c.dtype is np.float32 else 'double'} {name}_real;"],
+        [
+            define(f"{up}NY", arx.ny),
+            define(f"{up}NU", arx.nu),
+            define(f"{up}NP", len(arx.parameters)),
+            define(f"{up}NF", arx.basis.size, "functions of p"),
+            define(f"{up}MEMORY", arx.memory, "samples the model reaches back"),
+        ],
+        [define(f"{up}Y_{identifier(s)}", i, s.unit) for i, s in enumerate(model.outputs)],
+        [define(f"{up}U_{identifier(s)}", i, s.unit) for i, s in enumerate(model.inputs)],
+        [
+            define(f"{up}P_{identifier(s)}", i, f"{s.unit}, {low:g} to {high:g}")
+            for i, (s, (low, high)) in enumerate(ranges)
+        ],
+    ]
+    return {
+        "dt": f"{model.dt:.9g}",
+        "method": model.method,
+        "at": "of their lag" if arx.scheduling_at == "lag" else "now",
+        "basis": arx.basis,
+        "sizes": "\n\n".join("\n".join(b) for b in blocks if b),
+    }
+
+
+def _tables(model: LPVARXModel, c: Configuration, up: str) -> str:
+    """The coefficients and the functions of p."""
+    factors = [f.arguments for f in c.factors]
+    starts = np.cumsum([[0, 0], *([f[4].size, f[5].size] for f in factors[:-1])], axis=0)
+    sizes = {
+        "ENTRIES": len(c.entries),
+        "FACTORS": len(factors),
+        "ORDER": max(f[1] for f in factors) + 1,
+        "MOST": max(f[0] for f in factors),
+    }
+    each = [
+        _braced((functions, degree, pieces, *start))
+        for (functions, degree, pieces, *_), start in zip(factors, starts.tolist(), strict=True)
+    ]
+    knots = np.concatenate([f[4] for f in factors])
+    bernstein = np.concatenate([f[5].reshape(-1) for f in factors])
+    return "\n".join(
+        [
+            f"enum {{ {', '.join(k.upper() for k in KINDS)} }};",
+            f"enum {{ {', '.join(f'{key} = {n}' for key, n in sizes.items())} }};",
+            "typedef struct { int kind, channel, lag, p_lag; } entry;",
+            "typedef struct { int functions, degree, pieces, knot, bernstein; } factor;",
+            table("entry", "entries", map(_braced, c.entries.tolist())),
+            rows("real", "theta", f"{up}NY", model.theta, c.dtype),
+            table("factor", "factors", each),
+            table("real", "slack", literals([f[3] for f in factors], c.dtype)),
+            table("real", "knots", literals(knots, c.dtype)),
+            table("real", "bernstein", literals(bernstein, c.dtype)),
+            table("int", "products", c.index.reshape(-1).tolist()),
+        ]
+    )
+
+
+def _braced(values: Iterable[int]) -> str:
+    return f"{{{', '.join(map(str, values))}}}"
+
+
+def _cases(model: LPVARXModel, c: Configuration, name: str, precision: str) -> str:
+    """A record of a fixed seed, one sample missing, with one-step predictions, and the free run up
+    to the missing sample.
+    """
+    arx, real, outputs = model.structure, f"{name}_real", f"{name.upper()}_NY"
+    wide, count = arx.ny + arx.nu, 2 * arx.memory + 60
+    given = samples(wide, arx.basis.ranges, count).astype(c.dtype).astype(float)
+    record = FlightRecord(
+        model.dt * np.arange(count), given, (*model.outputs, *model.inputs, *model.parameters)
+    )
+    complete = np.logical_and.reduce(np.isfinite(given), axis=1)
+    there = [
+        k
+        for k in range(arx.memory, count)
+        if complete[k - arx.memory : k].all() and np.isfinite(given[k, arx.ny :]).all()
+    ]
+    return "\n".join(
+        [
+            define("SAMPLES", count),
+            define("THERE", len(there)),
+            define("HALF", count // 2),
+            define("TOLERANCE", f"{TOLERANCE[precision]:g}"),
+            rows(real, "samples", str(given.shape[1]), given, c.dtype),
+            rows(real, "predicted", outputs, model.predict(record, 1)[there], c.dtype),
+            rows(real, "simulated", outputs, _free_run(model, record, count // 2), c.dtype),
+        ]
+    )
+
+
+def _free_run(model: LPVARXModel, record: FlightRecord, stop: int) -> Array:
+    """Up to `stop`, the samples it starts from as they are."""
+    start = model.structure.memory
+    out = record.columns(model.outputs)[:stop].copy()
+    out[start:] = model.simulate(record)[start:stop]
+    return out

@@ -1,0 +1,153 @@
+"""Fits of predictions: one step, some seconds ahead, and in free run, always together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.model.lpvarx_model import LPVARXModel
+from identification.model.prediction import fit_percent
+from symheli.errors import InputError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+HORIZON = 1.0
+"""Seconds ahead at which models are judged unless said otherwise."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scores:
+    """Fit in percent of each output one step ahead, `horizon` seconds ahead and in free run.
+
+    100 is perfect, 0 no better than the mean; -inf where a prediction diverges, NaN where there is
+    nothing to compare.
+    """
+
+    horizon: float
+    one_step: Mapping[str, float]
+    ahead: Mapping[str, float]
+    free_run: Mapping[str, float]
+
+    @property
+    def by_horizon(self) -> dict[str, Mapping[str, float]]:
+        """{name of the horizon: {output: percent}}, shortest first."""
+        names = horizons(self.horizon)
+        return dict(zip(names, (self.one_step, self.ahead, self.free_run), strict=True))
+
+    @classmethod
+    def of(
+        cls,
+        measured: Array,
+        outputs: Sequence[str],
+        *,
+        one_step: Array,
+        ahead: Array,
+        free_run: Array,
+        horizon: float = HORIZON,
+    ) -> Scores:
+        """Of predictions (n, ny) beside what was `measured`, a column an output."""
+
+        def fits(guess: Array) -> dict[str, float]:
+            values = fit_percent(measured, guess)
+            return {str(y): float(v) for y, v in zip(outputs, values, strict=True)}
+
+        return cls(
+            horizon=horizon,
+            one_step=fits(one_step),
+            ahead=fits(ahead),
+            free_run=fits(free_run),
+        )
+
+
+def scores(
+    model: LPVARXModel, record: FlightRecord, *, horizon: float = HORIZON, hold_p: bool = False
+) -> Scores:
+    """Judge a model on a record: one step ahead, some seconds ahead and in free run.
+
+    One-step prediction flatters: a model that predicts the next sample at 98 % may not run free at
+    all. The three are therefore given together.
+
+    Parameters
+    ----------
+    model : LPVARXModel
+        The identified model.
+    record : FlightRecord
+        With the outputs, inputs and scheduling of the model, at its sample period; best one that
+        the model has not been fitted to.
+    horizon : float
+        Of the second prediction, s; one sample where it is shorter.
+    hold_p : bool
+        Hold the scheduling from the start of each prediction, as where it is measured; a free run
+        follows it in any case.
+
+    Returns
+    -------
+    Scores
+        Fits in percent by output.
+
+    Raises
+    ------
+    InputError
+        For a horizon that is not greater than 0 and a record the model does not fit.
+
+    Examples
+    --------
+    >>> import numpy as np, identification as idn, symheli
+    >>> u, p = np.random.default_rng(0).standard_normal((2, 300))
+    >>> y = np.zeros(300)
+    >>> for k in range(1, 300):
+    ...     y[k] = 0.8 * y[k - 1] + (1 + 0.1 * p[k - 1]) * u[k - 1]
+    >>> units = dict.fromkeys("yup", "1")
+    >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(300), units, y=y, u=u, p=p)
+    >>> arx = idn.LPVARX("y", "u", "p", 1, 1, 1, idn.Polynomial(1, p.min(), p.max()))
+    >>> found = idn.scores(idn.fit(arx, record), record, horizon=0.5)
+    >>> round(found.ahead["y"], 6), list(found.by_horizon)
+    (100.0, ['one step', '0.5 s', 'free run'])
+    """
+    one, ahead, free = (
+        predicted(model, record, n, hold_p) for n in steps(model.dt, horizon).values()
+    )
+    return Scores.of(
+        record.columns(model.outputs),
+        model.outputs,
+        one_step=one,
+        ahead=ahead,
+        free_run=free,
+        horizon=horizon,
+    )
+
+
+def horizons(horizon: float = HORIZON) -> tuple[str, str, str]:
+    """The names of the three horizons."""
+    return ("one step", f"{horizon:g} s", "free run")
+
+
+def steps(dt: float, horizon: float = HORIZON) -> dict[str, int | None]:
+    """Each of `horizons` in samples of `dt` (s), at least one; None is a free run."""
+    if not 0 < horizon < np.inf:
+        raise InputError(f"horizon: expected seconds greater than 0, got {horizon:g}")
+    return dict(zip(horizons(horizon), (1, max(round(horizon / dt), 1), None), strict=True))
+
+
+def predicted(
+    model: LPVARXModel, record: FlightRecord, horizon: int | None, hold_p: bool = False
+) -> Array:
+    """The prediction (n, ny) `horizon` samples ahead, or with None the free run."""
+    return (
+        model.simulate(record) if horizon is None else model.predict(record, horizon, hold_p=hold_p)
+    )
+
+
+def percent(value: float) -> str:
+    """A fit in words where it is no number."""
+    return (
+        "diverges"
+        if np.isneginf(value)
+        else "no data"
+        if np.isnan(value)
+        else f"{value:.1f}"
+        if value > -1e4
+        else f"{value:.1e}"
+    )

@@ -1,0 +1,1 @@
+"""How much of the airspeed range the LFT tests can prove."""

@@ -1,0 +1,108 @@
+"""Finished stages of a study on disk, each whole or not at all, for a run that goes on where
+another stopped.
+
+A stage is stored as a Python pickle below a line with the key of what it was computed from and the
+digest of its bytes. Pickles run code when they are read: only folders of one's own are resumed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import platform
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from symheli import Helicopter
+from symheli.errors import SymheliError
+from symheli.values.whole_files import write_bytes
+
+FORMAT = "symheli stage 1"
+PACKAGES = ("symheli", "identification", "synthesis", "studies")
+LIBRARIES = ("casadi", "numpy", "scipy", "cvxpy", "clarabel")
+
+
+class NotUsable(SymheliError):
+    """A stage that is stored and cannot be taken; the message says why."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stored:
+    """The result of a stage, and the seconds it took to compute."""
+
+    result: Any
+    seconds: float
+
+
+@dataclass(frozen=True)
+class StoredStages:
+    """The stages in `folder` that were computed from what `key` stands for."""
+
+    folder: Path
+    key: str
+
+    def path(self, name: str) -> Path:
+        """Where the stage is stored."""
+        return self.folder / f"{name}.stage"
+
+    def save(self, name: str, stored: Stored) -> Path:
+        """Store a stage, in place of an older one; see `whole_files.write_bytes`."""
+        content = pickle.dumps(stored)
+        return write_bytes(self.path(name), self._head(content) + content)
+
+    def load(self, name: str, kind: type) -> Stored | None:
+        """A stored stage whose result is a `kind`; None where none is stored.
+
+        Raises `NotUsable` for one that another version, vehicle, effort or seed has left, and for
+        one that is damaged.
+        """
+        path = self.path(name)
+        if not path.is_file():
+            return None
+        head, _, content = path.read_bytes().partition(b"\n")
+        words = head.decode("utf-8", "replace").rsplit(" ", 2)
+        if len(words) != 3 or words[0] != FORMAT:
+            raise NotUsable(f"{path} is damaged: it is no stored stage")
+        if words[1] != self.key:
+            raise NotUsable(f"{path} is of another version, vehicle, effort or seed")
+        if words[2] != hashlib.sha256(content).hexdigest():
+            raise NotUsable(f"{path} is damaged: its content is not what was written")
+        stored = pickle.loads(content)
+        if not (isinstance(stored, Stored) and isinstance(stored.result, kind)):
+            raise NotUsable(f"{path} is damaged: it holds another stage")
+        return stored
+
+    def _head(self, content: bytes) -> bytes:
+        return f"{FORMAT} {self.key} {hashlib.sha256(content).hexdigest()}\n".encode()
+
+
+def content_key(heli: Helicopter, effort: object, seed: int) -> str:
+    """A digest of all that decides what the stages find: the code of this project, the libraries,
+    the equations and data of the helicopter, effort and seed.
+    """
+    parts = (
+        code_digest(),
+        platform.python_version(),
+        *(version(name) for name in LIBRARIES),
+        repr((heli.vehicle.title, heli.vehicle.source, heli.vehicle.sections)),
+        heli.rhs.serialize(),
+        heli.flight_rhs.serialize(),
+        repr((heli.governor, heli.density, heli.travel.tolist())),
+        repr(effort),
+        str(seed),
+    )
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+@cache
+def code_digest() -> str:
+    """Of every source file of the four packages."""
+    root, digest = Path(__file__).resolve().parents[2], hashlib.sha256()
+    for package in PACKAGES:
+        for path in sorted((root / package).rglob("*")):
+            if path.suffix in (".py", ".c", ".h"):
+                digest.update(f"{path.relative_to(root)}\n".encode() + path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,66 @@
+"""Numbers, tables and names as C99 text."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterable
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.values.arrays import Array
+
+WIDTH = 100
+
+
+def require_identifier(name: str) -> None:
+    """Raises `InputError` for a name that is no C identifier."""
+    if not re.fullmatch(r"[a-zA-Z]\w*", name):
+        raise InputError(f"name: expected a C identifier such as estimator, got {name!r}")
+
+
+def identifier(text: str) -> str:
+    """A regressor's or signal's name as part of a macro."""
+    return re.sub(r"\W+", "_", text.replace("k-", "")).strip("_")
+
+
+def literals(values: Iterable[float], dtype: type[np.floating]) -> list[str]:
+    """Exact in that precision."""
+    suffix = "f" if dtype is np.float32 else ""
+    return ["NAN" if np.isnan(v) else float(dtype(v)).hex() + suffix for v in values]
+
+
+def table(kind: str, name: str, values: Iterable[object]) -> str:
+    """A constant array, of numbers or of structures."""
+    return f"static const {kind} {name}[] = {{\n{_wrapped(map(str, values), '    ')}\n}};"
+
+
+def rows(
+    kind: str, name: str, size: str, values: Array, dtype: type[np.floating] = np.float64
+) -> str:
+    """A constant array of the rows of `values`, each as long as `size` says."""
+    inside = ",\n".join(
+        f"    {{{_wrapped(literals(row, dtype), '     ').lstrip()}}}" for row in values
+    )
+    return f"static const {kind} {name}[{len(values)}][{size}] = {{\n{inside}\n}};"
+
+
+def define(name: str, value: object, comment: str = "") -> str:
+    """A macro, with what it is."""
+    return f"#define {name} {value}" + (f" /* {comment} */" if comment else "")
+
+
+def _wrapped(words: Iterable[str], indent: str) -> str:
+    """With commas between the words, in lines that keep each word whole; room is left for what
+    closes the last.
+    """
+    lines = textwrap.wrap(
+        ", ".join(words),
+        WIDTH - 3,
+        initial_indent=indent,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(lines)

@@ -1,0 +1,227 @@
+"""Identified models judged beside a baseline and against a constant model: an aeroplane's short
+period, whose signals are called otherwise than a helicopter's.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import identification as idn
+import symheli
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.bases import Polynomial
+from symheli.lpv.trim_schedule import TrimSchedule
+
+DT, N = 0.02, 1500
+UNITS = {
+    "alpha": "rad",
+    "pitch_rate": "rad/s",
+    "load": "1",
+    "elevator": "rad",
+    "flap": "rad",
+    "tas": "m/s",
+}
+SPEED = symheli.Scheduling("true_airspeed", "m/s", 20.0, 40.0)
+BASIS = Polynomial(1, 20.0, 40.0)
+
+
+def aeroplane(trimmed=True):
+    """alpha and pitch rate under elevator and flap; the load factor is no state."""
+    names = {
+        "states": ["alpha", "pitch_rate"],
+        "inputs": ["elevator", "flap"],
+        "outputs": ["alpha", "pitch_rate", "load"],
+    }
+    model = symheli.LPVStateSpace.polynomial(
+        A=[[[-0.5, 1.0], [-1.0, -0.6]], [[-0.05, 0.0], [-0.2, -0.04]]],
+        B=[[[0.0, -0.1], [-2.0, 0.5]], [[-0.005, 0.0], [-0.3, 0.0]]],
+        C=[[[1.0, 0.0], [0.0, 1.0], [2.0, 0.0]], [[0.0, 0.0], [0.0, 0.0], [0.1, 0.0]]],
+        D=[[[0.0, 0.0], [0.0, 0.0], [0.3, 0.0]]],
+        scheduling=SPEED,
+        **names,
+    )
+    if not trimmed:
+        return model
+    p = np.array([20.0, 40.0])
+    x0 = BASIS.fit(p, np.array([[0.15, 0.0], [0.03, 0.0]]))
+    u0 = BASIS.fit(p, np.array([[-0.05, 0.1], [-0.01, 0.0]]))
+    return replace(model, trim=TrimSchedule(BASIS, x0, u0))
+
+
+def flown(model, seed=0):
+    """The model from sample to sample, as its equations with p and u held; columns by name."""
+    rng = np.random.default_rng(seed)
+    t = DT * np.arange(N)
+    tas = 30 + 8 * np.sin(0.5 * t)
+    u = 0.03 * np.repeat(rng.standard_normal((N // 10, 2)), 10, axis=0)
+    x, speed = np.zeros((N, 2)), np.gradient(tas, t)
+    trim = model.trim
+    x0 = np.zeros((N, 2)) if trim is None else trim.state(tas)
+    u0 = np.zeros((N, 2)) if trim is None else trim.input(tas)
+    moved = np.zeros((N, 2)) if trim is None else -trim.state(tas, 1) * speed[:, None]
+    x[0], u = x0[0], u + u0
+    for k in range(N - 1):
+        A, B, *_ = (M[0] for M in model.matrices(tas[k : k + 1]))
+        grown = np.zeros((5, 5))
+        grown[:2] = np.column_stack([A, B @ (u[k] - u0[k]) + moved[k], np.zeros((2, 2))])
+        x[k + 1] = x0[k + 1] + (expm(DT * grown) @ np.array([*(x[k] - x0[k]), 1.0, 0, 0]))[:2]
+    _, _, C, D = model.matrices(tas)
+    y = np.einsum("kij,kj->ki", C, x) + np.einsum("kij,kj->ki", D, u)
+    columns = dict(zip(("alpha", "pitch_rate", "load"), y.T, strict=True))
+    columns |= {"elevator": u[:, 0], "flap": u[:, 1], "tas": tas}
+    return symheli.FlightRecord.from_arrays(t, UNITS, **columns)
+
+
+def identified(record, degree=1):
+    arx = idn.LPVARX(
+        ("alpha", "pitch_rate"),
+        ("elevator", "flap"),
+        "tas",
+        1,
+        1,
+        1,
+        idn.Polynomial(degree, 20.0, 40.0),
+        offset=True,
+        offset_rate=True,
+    )
+    return idn.fit(arx, record)
+
+
+@pytest.fixture(scope="module")
+def transition():
+    return flown(aeroplane(), seed=1)
+
+
+def test_the_model_that_flew_predicts_itself_whatever_its_signals_are_called(transition):
+    own = idn.BaselineModel(model=aeroplane(), scheduling="tas")
+    blind = idn.BaselineModel(model=aeroplane(), scheduling="tas", drift=False)
+    found = idn.beside_baseline(
+        {}, {"own": own, "blind": blind}, transition, ("load", "alpha", "pitch_rate")
+    )
+    itself, still = found.predictions
+    for fits in itself.scores.by_horizon.values():
+        assert min(fits.values()) > 100 - 1e-6
+    assert still.scores.ahead["alpha"] < itself.scores.ahead["alpha"] - 3
+    assert found.best("load").name == "own"
+
+
+def test_identified_and_baseline_are_judged_on_the_same_samples(transition):
+    model = identified(flown(aeroplane()))
+    found = idn.beside_baseline(
+        {"identified": model},
+        {"equations": idn.BaselineModel(model=aeroplane(), scheduling="tas")},
+        transition,
+        ("pitch_rate",),
+        horizon=0.5,
+    )
+    one, two = found.predictions
+    assert (one.identified, two.identified) == (True, False)
+    assert one.scores == idn.Scores(
+        horizon=0.5,
+        one_step={"pitch_rate": float(model.score(transition, 1)["pitch_rate"])},
+        ahead={"pitch_rate": float(model.score(transition, 25)["pitch_rate"])},
+        free_run={"pitch_rate": float(model.score(transition)["pitch_rate"])},
+    )
+    assert one.scores.ahead["pitch_rate"] > 90
+    assert np.isnan(two.ahead[:25]).all()
+    assert np.isfinite(two.ahead[25:]).all()
+    assert list(one.scores.by_horizon) == ["one step", "0.5 s", "free run"]
+
+
+def test_a_model_without_trim_and_a_sampled_one_predict_too():
+    lpv = aeroplane(trimmed=False)
+    record = flown(lpv)
+    sampled = lpv.discretize(DT, degree=4)
+    found = idn.beside_baseline(
+        {},
+        {
+            name: idn.BaselineModel(model=model, scheduling="tas")
+            for name, model in {"continuous": lpv, "sampled": sampled}.items()
+        },
+        record,
+        ("alpha",),
+    )
+    assert [round(p.scores.ahead["alpha"], 3) for p in found.predictions] == [100.0, 100.0]
+    late = lpv.discretize(2 * DT, degree=4)
+    with pytest.raises(InputError, match=r"sampled at 0.04 s, the record at 0.02 s"):
+        idn.BaselinePredictor(late, record, scheduling="tas")
+
+
+def test_an_input_that_the_record_does_not_hold_stays_at_its_trim(transition):
+    alone = idn.BaselinePredictor(aeroplane(), transition, scheduling="tas", inputs=("elevator",))
+    both = idn.BaselinePredictor(aeroplane(), transition, scheduling="tas")
+    assert alone.push.shape == both.push.shape
+    assert np.abs(alone.push - both.push).max() > 1e-5
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({}, UnknownNameError, "true_airspeed"),
+        ({"scheduling": "elevator"}, InputError, "is nowhere within the baseline's 20 to 40"),
+        ({"scheduling": "tas", "inputs": ("elevators",)}, UnknownNameError, "elevator"),
+    ],
+)
+def test_what_drives_a_baseline_is_asked_for_by_name(transition, options, error, message):
+    with pytest.raises(error, match=message):
+        idn.BaselinePredictor(aeroplane(), transition, **options)
+
+
+def test_an_output_no_model_has_is_named(transition):
+    own = idn.BaselineModel(model=aeroplane(), scheduling="tas")
+    with pytest.raises(UnknownNameError, match="unknown output 'flap'"):
+        idn.beside_baseline({}, {"own": own}, transition, ("flap",))
+    with pytest.raises(InputError, match="nothing to compare"):
+        idn.beside_baseline({}, {}, transition, ("alpha",))
+    found = idn.beside_baseline({}, {"own": own}, transition, ("alpha",))
+    with pytest.raises(InputError, match="among alpha, own"):
+        found.best("load")
+
+
+def test_frozen_models_of_an_aeroplane(transition):
+    lpv, model = aeroplane(), identified(flown(aeroplane()), degree=3)
+    exact = {v: lpv.at(v) for v in (25.0, 30.0, 35.0)}
+    short_period = {v: complex(m.poles()[m.poles().imag > 0][0]) for v, m in exact.items()}
+    outputs = lpv.select(outputs=["alpha", "pitch_rate"])
+    sizes = {"alpha": 0.1, "pitch_rate": 0.5, "elevator": 0.05, "flap": 0.05}
+    options = {"mode": short_period, "channel": ("elevator", "pitch_rate"), "scales": sizes}
+    found = idn.frozen_models(exact, outputs, model, **options)
+    assert found.responses_at == 30.0
+    assert found.miss_baseline.max() < 1e-6
+    assert found.gap_baseline.max() < 1e-9 < found.gap_identified.min()
+    assert found.miss_identified.max() < 0.1
+    assert set(found.responses) == {"reference", "baseline", "identified"}
+    del sizes["flap"]
+    with pytest.raises(UnknownNameError, match="flap"):
+        idn.frozen_models(exact, outputs, model, **options)
+
+
+def test_a_horizon_is_in_seconds_and_positive(transition):
+    model = identified(transition)
+    assert idn.scores(model, transition, horizon=DT / 10).ahead == (
+        idn.scores(model, transition).one_step
+    )
+    with pytest.raises(InputError, match="horizon: expected seconds greater than 0, got -1"):
+        idn.scores(model, transition, horizon=-1.0)
+
+
+def test_scheduling_pays_where_the_aeroplane_is_told_by_it():
+    record = flown(aeroplane(trimmed=False))
+    arx = idn.LPVARX(
+        ("alpha", "pitch_rate"),
+        ("elevator", "flap"),
+        "tas",
+        1,
+        1,
+        1,
+        idn.Polynomial(1, 20.0, 40.0),
+    )
+    found = idn.against_constant(arx, *record.split(0.6))
+    assert [scored.label for scored in found.models] == ["LPV, degree 1", "LTI"]
+    assert found.pays("pitch_rate")
+    alone = idn.against_constant(arx, record, None)
+    assert "nothing was held out" in alone.verdict()[0]
+    with pytest.raises(InputError, match="nothing was held out"):
+        alone.pays("pitch_rate")
