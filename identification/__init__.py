@@ -18,10 +18,14 @@ from identification.design.experiment_design import (
     compare_experiments,
 )
 from identification.estimators.estimate import fit
-from identification.estimators.instrumental_variables import Instruments
+from identification.estimators.instrumental_variables import InstrumentalVariables
+from identification.estimators.instruments import InstrumentSource, LaggedSignals
 from identification.estimators.lasso import Lasso
+from identification.estimators.least_squares import LeastSquares
+from identification.estimators.method import Estimate, Method
 from identification.estimators.output_error import OutputError
-from identification.estimators.refined_instruments import Refined
+from identification.estimators.recursion import Recursion
+from identification.estimators.refined_instruments import RefinedInstruments
 from identification.estimators.ridge import Ridge
 from identification.judge.dependence import DependenceReport, dependence_report
 from identification.judge.frequency_response import FrequencyResponse, frequency_response
@@ -51,15 +55,20 @@ __all__ = [
     "DependenceReport",
     "Directional",
     "Entry",
+    "Estimate",
     "ExcitationReport",
     "Experiment",
     "Forgetting",
     "FrequencyResponse",
     "Group",
     "History",
-    "Instruments",
+    "InstrumentSource",
+    "InstrumentalVariables",
     "LPVARXModel",
+    "LaggedSignals",
     "Lasso",
+    "LeastSquares",
+    "Method",
     "Online",
     "OrderScan",
     "OutputError",
@@ -69,8 +78,9 @@ __all__ = [
     "Product",
     "RLSInfo",
     "RLSState",
+    "Recursion",
     "RecursiveLeastSquares",
-    "Refined",
+    "RefinedInstruments",
     "ResidualAnalysis",
     "ResponseBand",
     "Ridge",

@@ -4,18 +4,21 @@ p.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import minimize_scalar
 
 from identification.design.excitation import column_scale
+from identification.estimators.method import Estimate, Method
 from identification.structure.lpvarx import LPVARX, Group
 from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FunctionSpace
+from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 GRID = np.linspace(-14.0, 4.0, 37)
@@ -23,7 +26,7 @@ GRID = np.linspace(-14.0, 4.0, 37)
 
 
 @dataclass(frozen=True)
-class Ridge:
+class Ridge(Method):
     """What is penalised, and how much.
 
     The penalty of one lagged signal with the coefficient a(p) is its mean square times the mean of
@@ -36,6 +39,8 @@ class Ridge:
 
     weight: float | None = None
     towards: Literal["constant", "zero"] = "constant"
+    shorthand: ClassVar[str] = "ridge"
+    needs_excitation: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.weight is not None and not (np.isfinite(self.weight) and self.weight >= 0):
@@ -44,6 +49,12 @@ class Ridge:
             )
         if self.towards not in ("constant", "zero"):
             raise InputError(f'towards: expected "constant" or "zero", got {self.towards!r}')
+
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """With the `weight` of each output and what it held small in the details."""
+        theta, weights = ridge(arx, data, self)
+        details = {"weight": weights.tolist(), "towards": self.towards}
+        return Estimate(theta=theta, details=details)
 
 
 def ridge(arx: LPVARX, data: Regression, options: Ridge) -> tuple[Array, Array]:

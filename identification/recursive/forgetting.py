@@ -7,6 +7,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from symheli.errors import InputError
 
 FLOOR = 1e-3
@@ -101,6 +103,24 @@ class Directional:
 
 
 Forgetting = Constant | Variable | Directional
+
+
+def forgetting_of(value: float | Forgetting, floor: float | None = None) -> Forgetting:
+    """A way of forgetting, or the `Constant` of a factor and a floor (None: the usual one).
+
+    Raises `InputError` for anything else, and for a floor beside a way of forgetting.
+    """
+    if isinstance(value, Constant | Variable | Directional):
+        if floor is not None:
+            raise InputError(
+                f"floor: belongs to a forgetting factor; give it to {type(value).__name__} instead"
+            )
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
+        raise InputError(
+            f"forgetting: expected a factor, Constant, Variable or Directional, got {value!r}"
+        )
+    return Constant(float(value), FLOOR if floor is None else floor)
 
 
 def check_floor(floor: float) -> None:

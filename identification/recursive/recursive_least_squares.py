@@ -12,14 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.recursive import kernel, saved_state
-from identification.recursive.forgetting import (
-    FLOOR,
-    Constant,
-    Directional,
-    Forgetting,
-    Variable,
-    check_floor,
-)
+from identification.recursive.forgetting import Forgetting, forgetting_of
 from identification.recursive.history import History
 from identification.recursive.kernel.configuration import Configuration
 from identification.recursive.online import Online, vector
@@ -67,27 +60,12 @@ class RecursiveLeastSquares:
         require_structure(self.structure)
         if self.precision not in PRECISIONS:
             raise InputError(f'precision: expected "double" or "single", got {self.precision!r}')
-        if isinstance(self.forgetting, Constant | Variable | Directional):
-            if self.floor is not None:
-                raise InputError(
-                    "floor: belongs to a forgetting factor; give it to"
-                    f" {type(self.forgetting).__name__} instead"
-                )
-        elif not isinstance(self.forgetting, int | float | np.floating):
-            raise InputError(
-                "forgetting: expected a factor, Constant, Variable or Directional, got"
-                f" {self.forgetting!r}"
-            )
-        else:
-            check_floor(FLOOR if self.floor is None else self.floor)
-            Constant(float(self.forgetting))
+        forgetting_of(self.forgetting, self.floor)
 
     @cached_property
     def configuration(self) -> Configuration:
         """What the kernel is told; its `sizes` are the numbers of memory the estimator takes."""
-        forgetting = self.forgetting
-        if not isinstance(forgetting, Constant | Variable | Directional):
-            forgetting = Constant(float(forgetting), FLOOR if self.floor is None else self.floor)
+        forgetting = forgetting_of(self.forgetting, self.floor)
         return Configuration(self.structure, forgetting, PRECISIONS[self.precision])
 
     def init(self) -> RLSState:

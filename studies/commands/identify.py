@@ -236,6 +236,7 @@ def run(arguments: argparse.Namespace) -> Output:
     trim: Any = {"yes": "moving", "no": "still"}.get(
         arguments.offset_rate, "still" if arguments.no_offset else "auto"
     )
+    method = _method(arguments.method, arguments.instruments)
     if arguments.orders:
         for option in ("plot", "bands", "save"):
             if getattr(arguments, option):
@@ -251,8 +252,7 @@ def run(arguments: argparse.Namespace) -> Output:
         test,
         trim=trim,
         hold_p=hold,
-        method=arguments.method,
-        instruments=arguments.instruments,
+        method=method,
     )
     facts = report.facts(
         arguments.log,
@@ -292,6 +292,18 @@ class _Prepared(NamedTuple):
     scheduling: str
     samples: int
     kept: int
+
+
+def _method(name: str, instruments: tuple[str, ...]) -> Any:
+    """The method of this name, with its instruments."""
+    from identification import InstrumentalVariables, OutputError, RefinedInstruments
+
+    if not instruments:
+        return name
+    takes = {"iv": InstrumentalVariables, "riv": RefinedInstruments, "oe": OutputError}
+    if name not in takes:
+        raise InputError(f"--instruments are for --method iv, riv or oe, not {name}")
+    return takes[name](instruments)
 
 
 def _prepared(

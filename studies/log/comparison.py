@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from identification import LPVARX, LPVARXModel, fit, fit_percent
+from identification import LPVARX, LPVARXModel, Method, fit, fit_percent
 from identification.design.leakage import MADE_OF_OUTPUTS, share_from_outputs
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
@@ -153,8 +152,7 @@ def compare(
     *,
     trim: Trim = "still",
     hold_p: bool = False,
-    method: str = "ls",
-    instruments: Sequence[str] = (),
+    method: Method | str = "ls",
 ) -> Comparison:
     """Fit `structure`, and the same with constant coefficients where it has moving ones, by
     `method`.
@@ -172,8 +170,7 @@ def compare(
         )
         structures[f"LTI{suffix}"] = arx.lti()
         return [
-            _scored(label, s, training, test, hold_p, method, instruments)
-            for label, s in structures.items()
+            _scored(label, s, training, test, hold_p, method) for label, s in structures.items()
         ]
 
     leak = float(np.max(share_from_outputs(structure, training)))
@@ -279,10 +276,9 @@ def _scored(
     training: FlightRecord,
     test: FlightRecord | None,
     hold_p: bool,
-    method: str,
-    instruments: Sequence[str],
+    method: Method | str,
 ) -> Scored:
-    model = fit(arx, training, method=method, instruments=instruments)  # type: ignore[arg-type]
+    model = fit(arx, training, method)
     return Scored(
         label,
         model,

@@ -10,7 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 import symheli
-from identification import LPVARX, LPVARXModel, Polynomial, RecursiveLeastSquares, fit
+from identification import (
+    LPVARX,
+    InstrumentalVariables,
+    LPVARXModel,
+    Polynomial,
+    RecursiveLeastSquares,
+    fit,
+)
 from studies.transition.flights import TOP
 from symheli import FlightRecord, Helicopter, LinearModel
 from symheli.errors import DataWarning
@@ -146,8 +153,7 @@ def identify(
         return fit(
             axis.structure(order, degree),
             training,
-            method=method,  # type: ignore[arg-type]
-            instruments=instruments(axis) if method == "iv" else (),
+            InstrumentalVariables(instruments(axis)) if method == "iv" else method,
         )
 
 

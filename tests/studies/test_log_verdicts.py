@@ -243,6 +243,13 @@ def test_the_estimator_is_chosen_and_named(identify, method, options):
     assert ("first-stage F" in text) == (method == "iv")
 
 
+def test_instruments_for_a_method_that_takes_none_are_refused(tmp_path, capsys):
+    log = tmp_path / "log.csv"
+    log.write_text(about_a_trim())
+    assert cli.main(["identify", str(log), *OPTIONS, "--instruments", "u"]) == 1
+    assert "--instruments are for --method iv, riv or oe, not ls" in capsys.readouterr().err
+
+
 def test_a_scheduling_signal_made_of_outputs_is_found_and_its_free_runs_are_not_counted(identify):
     rng = np.random.default_rng(0)
     u, y, p = rng.standard_normal(3000), np.zeros(3000), np.zeros(3000)
