@@ -26,7 +26,7 @@ DISTINCT_TOLERANCE = 1e-6
 BINS = 10
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ExcitationReport:
     """How well the scheduled regressors of a record determine the coefficients of a structure.
 
@@ -150,19 +150,19 @@ def _report(arx: LPVARX, data: Regression, group: Group) -> ExcitationReport:
             f" {scheduling} moves, or lower na, nb or the size of the basis"
         )
     return ExcitationReport(
-        names,
-        len(data.phi),
-        rank,
-        values,
-        values[0] / values[-1] if values[-1] > 0 else np.inf,
-        distinct,
-        needed,
-        edges,
-        occupancy,
-        weakest,
-        scheduling,
-        reason,
-        tuple(arx.outputs[y] for y in group.outputs),
+        names=names,
+        samples=len(data.phi),
+        rank=rank,
+        singular_values=values,
+        condition=values[0] / values[-1] if values[-1] > 0 else np.inf,
+        distinct=distinct,
+        needed=needed,
+        edges=edges,
+        occupancy=occupancy,
+        weakest=weakest,
+        scheduling=scheduling,
+        reason=reason,
+        outputs=tuple(arx.outputs[y] for y in group.outputs),
     )
 
 

@@ -27,7 +27,7 @@ ROUNDING = 1e-9
 """A residual below this fraction of the output is rounding: there is nothing left to explain."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DependenceReport:
     """What p at the other instants explains of the one-step residuals of `outputs`, an entry an
     output.
@@ -121,7 +121,12 @@ def dependence_report(
     size = np.sqrt(np.mean(y**2, axis=0))
     residual = np.sqrt(np.mean(error**2, axis=0)) / np.where(size > 0, size, 1.0)
     return DependenceReport(
-        arx.outputs, arx.scheduling_at, other.scheduling_at, residual, explained, probability
+        outputs=arx.outputs,
+        at=arx.scheduling_at,
+        other=other.scheduling_at,
+        residual=residual,
+        explained=explained,
+        probability=probability,
     )
 
 

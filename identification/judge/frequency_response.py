@@ -17,7 +17,7 @@ from symheli.values import Signal
 from symheli.values.arrays import Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class FrequencyResponse:
     """G (n, ny, nu), complex, at `omega` (n,) rad/s, of `outputs` to `inputs`, the other inputs
     taken off.
@@ -117,7 +117,15 @@ def frequency_response(
         random_error = np.sqrt(
             0.55 * (1 - coherence) / np.maximum(coherence, tiny) / (2 * max(_independent(count), 1))
         )
-    return FrequencyResponse(omega[keep], G, coherence, multiple, random_error, outputs, inputs)
+    return FrequencyResponse(
+        omega=omega[keep],
+        G=G,
+        coherence=coherence,
+        multiple=multiple,
+        random_error=random_error,
+        outputs=outputs,
+        inputs=inputs,
+    )
 
 
 def _independent(windows: int) -> float:

@@ -17,7 +17,7 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Trial:
     """One structure: fits in percent by output one step, `horizon` samples and a free run ahead,
     mean over validation records.
@@ -141,7 +141,14 @@ def _judge(
     try:
         model = fit(structure, train)
     except ExcitationError as error:
-        return Trial(structure, np.nan, nothing, nothing, nothing, str(error))
+        return Trial(
+            structure=structure,
+            bic=np.nan,
+            one_step=nothing,
+            ahead=nothing,
+            free_run=nothing,
+            refused=str(error),
+        )
     data = stacked(structure, train)
     error = data.y - data.phi @ model.theta
     n = len(error)
@@ -157,4 +164,7 @@ def _judge(
         )
         for h in (1, horizon, None)
     ]
-    return Trial(structure, float(bic), *steps)
+    one_step, ahead, free_run = steps
+    return Trial(
+        structure=structure, bic=float(bic), one_step=one_step, ahead=ahead, free_run=free_run
+    )

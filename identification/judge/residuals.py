@@ -33,7 +33,7 @@ class Theil(NamedTuple):
     covariance: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ResidualAnalysis:
     """One-step residuals of a model on a record, an entry an output.
 
@@ -107,13 +107,13 @@ def residual_analysis(model: LPVARXModel, record: FlightRecord, lags: int = 25) 
     weights = n - np.arange(1, lags + 1)
     statistic = n * (n + 2) * np.sum(auto[1:] ** 2 / weights[:, None], axis=0)
     return ResidualAnalysis(
-        tuple(model.outputs),
-        tuple(model.inputs),
-        auto,
-        cross,
-        float(norm.ppf(0.995) / np.sqrt(n)),
-        chi2.sf(statistic, lags),
-        tuple(theil(y[keep, i], guess[keep, i]) for i in range(y.shape[1])),
+        outputs=tuple(model.outputs),
+        inputs=tuple(model.inputs),
+        autocorrelation=auto,
+        cross_correlation=cross,
+        bound=float(norm.ppf(0.995) / np.sqrt(n)),
+        portmanteau=chi2.sf(statistic, lags),
+        theil=tuple(theil(y[keep, i], guess[keep, i]) for i in range(y.shape[1])),
     )
 
 

@@ -21,7 +21,7 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 class Band(NamedTuple):
@@ -49,7 +49,7 @@ class Band(NamedTuple):
         return self.value - half, self.value + half
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Uncertainty:
     """Covariance of the coefficients of `model`.
 
@@ -156,8 +156,8 @@ class Uncertainty:
         """
         return response_band(self.model, self.joint, p, omega)
 
-    def plot(self, level: float = 0.95) -> Figure:
-        """A figure of every coefficient function with its confidence band over p; see
+    def plot(self, level: float = 0.95) -> Array:
+        """Axes (coefficients,) with every coefficient function and its confidence band over p; see
         `identification.judge.band_plot`.
         """
         from identification.judge.band_plot import plot_bands
@@ -197,7 +197,10 @@ def uncertainty(
     if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
     error, reach = data.y - data.phi @ model.theta, int(reach)
-    return Uncertainty(model, *covariances(arx, data.phi, error, runs, reach), reach, len(error))
+    joint, white, freedom = covariances(arx, data.phi, error, runs, reach)
+    return Uncertainty(
+        model=model, joint=joint, white=white, freedom=freedom, lags=reach, samples=len(error)
+    )
 
 
 def _runs(data: Regression) -> list[slice]:

@@ -25,7 +25,7 @@ class CoefficientValues(NamedTuple):
     d: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Coefficients:
     """A_i(p) = sum_j f_j(p) A[i-1, j] and so on, f_j the functions of `basis`.
 
@@ -72,12 +72,12 @@ class Coefficients:
             row += width * n
         A, B, c, increments = blocks.values()
         return cls(
-            arx.basis,
-            tuple(arx.input_lags),
-            A,
-            B,
-            c[0, :, :, 0],
-            increments[0, :, :, 0] if d == 1 else increments[0],
+            basis=arx.basis,
+            input_lags=tuple(arx.input_lags),
+            A=A,
+            B=B,
+            c=c[0, :, :, 0],
+            d=increments[0, :, :, 0] if d == 1 else increments[0],
         )
 
     def theta(self, arx: LPVARX) -> Array:

@@ -16,14 +16,14 @@ from identification.model.coefficients import Coefficients
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import check_units
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Reduction, Scheduling
+from symheli.lpv import BalancedTruncation, FunctionSpace, LinearModel, LPVStateSpace, Scheduling
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal, signals
 from symheli.values.arrays import Array, frozen
 from symheli.values.sample_period import JITTER, same_period
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LPVARXModel:
     """A structure with its coefficients `theta` (n_regressors, ny) and the sample period `dt` (s)
     they belong to.
@@ -167,13 +167,13 @@ class LPVARXModel:
         scheduling = Scheduling(str(p), p.unit, basis.low, basis.high)
         return build(self.coefficients, scheduling, self.outputs, self.inputs, self.dt)
 
-    def reduce(
+    def truncate(
         self, order: int, *, input_scale: object = 1.0, output_scale: object = 1.0
-    ) -> Reduction[LPVStateSpace]:
-        """The exact realization, reduced to `order` states, with the frozen error it makes; see
-        `symheli.lpv.reduce`.
+    ) -> BalancedTruncation[LPVStateSpace]:
+        """The exact realization, truncated to `order` states, with the frozen error it makes; see
+        `symheli.lpv.balanced_truncation`.
         """
-        return self.to_state_space().reduce(
+        return self.to_state_space().truncate(
             order, input_scale=input_scale, output_scale=output_scale
         )
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from identification.recursive.rls_state import RLSState
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class History:
     """`time` (n,) in s, `coefficients` (n, n_regressors, ny) after each sample, `innovations` (n,
     ny), NaN where no regressor was complete.
@@ -38,14 +38,14 @@ class History:
     def model(self) -> LPVARXModel:
         """The model at the end, its coefficients solved from the triangular factor."""
         return LPVARXModel(
-            self.structure,
-            self.state.solve(),
-            self.dt,
-            self.outputs,
-            self.inputs,
-            self.scheduling,
-            self.state.residual_covariance,
-            self.state.count,
-            self.dropped,
-            "rls",
+            structure=self.structure,
+            theta=self.state.solve(),
+            dt=self.dt,
+            outputs=self.outputs,
+            inputs=self.inputs,
+            scheduling=self.scheduling,
+            residual_covariance=self.state.residual_covariance,
+            rows_used=self.state.count,
+            rows_dropped=self.dropped,
+            method="rls",
         )

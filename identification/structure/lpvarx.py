@@ -5,7 +5,7 @@ parameters.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
@@ -89,6 +89,7 @@ class LPVARX:
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
     scheduling: str | tuple[str, ...]
+    _: KW_ONLY
     na: Orders
     nb: Orders
     delay: Orders

@@ -225,10 +225,10 @@ def run(arguments: argparse.Namespace) -> Output:
         signals.outputs,
         signals.inputs,
         prepared.scheduling,
-        arguments.na,
-        nb,
-        delay,
-        basis,
+        na=arguments.na,
+        nb=nb,
+        delay=delay,
+        basis=basis,
         scheduling_at=arguments.scheduling_at,
         offset=not arguments.no_offset,
     )
@@ -345,7 +345,7 @@ def _prepared(
         list(dict.fromkeys([*signals.outputs, *signals.inputs, scheduling, *arguments.instruments]))
     )
     if cut:
-        record = conditioning.cut(record, arguments.start, arguments.stop)
+        record = record.between(arguments.start, arguments.stop)
     kept = len(record)
     if arguments.smooth_scheduling:
         record = conditioning.smooth(record, scheduling, arguments.smooth_scheduling)
@@ -361,7 +361,8 @@ def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
     if arguments.plot:
         yield figure.save(figure.figure(result), arguments.plot)
     if arguments.bands:
-        yield figure.save(uncertainty(result.scheduled, result.training).plot(), arguments.bands)
+        bands = uncertainty(result.scheduled, result.training).plot()
+        yield figure.save(bands[0].figure, arguments.bands)
     if arguments.save:
         model = result.scheduled
         if model.method in CERTAIN:

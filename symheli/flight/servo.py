@@ -14,7 +14,7 @@ from symheli.lpv.linear_model import LinearModel
 from symheli.values.signal import Signal
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Servo:
     """H(s) = (s/zero + 1)/(s/pole + 1) wn^2/(s^2 + 2 z wn s + wn^2) behind a limited, quantised
     command; output within the travel.

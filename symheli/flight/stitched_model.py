@@ -24,7 +24,7 @@ STEP = 0.005
 _TABLES = {"linear": PiecewiseLinear, "spline": Spline}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class StitchedModel:
     """dx/dt = n(x) + f0(p) + A(p) (x_a - x0(p)) + B(p) (u - u0(p)), looked up at the filtered
     airspeed p.
@@ -108,16 +108,16 @@ class StitchedModel:
         xdot = np.array([[trim.xdot[s] for s in family.states] for trim in family.trims])
         exact = _rigid_body(inertia)
         return cls(
-            _TABLES[kind](nodes),
-            x0,
-            u0,
-            xdot - exact(x0),
-            family.A - np.stack([_jacobian(exact, x) for x in x0]),
-            family.B,
-            family.states,
-            family.inputs,
-            filter,
-            inertia,
+            basis=_TABLES[kind](nodes),
+            x0=x0,
+            u0=u0,
+            f0=xdot - exact(x0),
+            A=family.A - np.stack([_jacobian(exact, x) for x in x0]),
+            B=family.B,
+            states=family.states,
+            inputs=family.inputs,
+            filter=filter,
+            inertia=inertia,
         )
 
     def airspeed(self, x: object, wind: object = (0.0, 0.0, 0.0)) -> Array:

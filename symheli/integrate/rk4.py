@@ -133,7 +133,7 @@ class Flights:
         if count == 1:  # the virtual machine is far quicker on one point
             evaluate_one = self.equations.rates
             return lambda x: evaluate_one(x[:, 0], u[:, 0], wind[:, 0], p[:, 0])[0][:, None]
-        held, rest = self.equations.split("rates")
+        held, rest = self.equations.hoisted("rates")
         kept = evaluate(held, u, wind, p)[0]
         return lambda x: np.stack([np.broadcast_to(v, count) for v in evaluate(rest, x, kept)[0]])
 

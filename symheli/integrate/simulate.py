@@ -59,15 +59,15 @@ def simulate(
     wind_flown = np.broadcast_to(problem.wind[0], (problem.samples, 3))
     times = problem.dt * np.arange(problem.samples + 1)
     return Trajectory(
-        times,
-        states,
-        inputs,
-        wind_flown,
-        heli.flight_states,
-        steps,
-        per_sample,
-        chosen,
-        heli.parameters,
+        times=times,
+        states=states,
+        inputs=inputs,
+        wind=wind_flown,
+        signals=heli.flight_states,
+        steps=steps,
+        per_sample=per_sample,
+        method=chosen,
+        parameters=heli.parameters,
     )
 
 

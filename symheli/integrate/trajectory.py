@@ -16,7 +16,7 @@ EULER = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Trajectory:
     """States (n+1, nx) of `signals` (quaternion form, SI) at `times` (n+1,) in s, under `inputs`
     (n, 4) and `wind` (n, 3), each held.

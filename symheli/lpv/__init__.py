@@ -1,5 +1,6 @@
 """Linear, LPV and LFT models: pure NumPy, no physics, no solver."""
 
+from symheli.lpv.balanced_truncation import BalancedTruncation, balanced_truncation
 from symheli.lpv.bases import (
     Basis,
     BSpline,
@@ -29,7 +30,6 @@ from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.nu_gap import chordal_distance, nu_gap
-from symheli.lpv.reduction import Reduction, reduce
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
 from symheli.lpv.trim_schedule import TrimSchedule
@@ -37,6 +37,7 @@ from symheli.lpv.trim_schedule import TrimSchedule
 __all__ = [
     "LFT",
     "BSpline",
+    "BalancedTruncation",
     "Basis",
     "Block",
     "FunctionSpace",
@@ -50,7 +51,6 @@ __all__ = [
     "PiecewiseLinear",
     "Polynomial",
     "Product",
-    "Reduction",
     "Scheduling",
     "Spline",
     "TrimSchedule",
@@ -58,13 +58,13 @@ __all__ = [
     "UserFunctions",
     "WellPosedness",
     "append",
+    "balanced_truncation",
     "chordal_distance",
     "connect",
     "feedback",
     "nu_gap",
     "pade_delay",
     "parallel",
-    "reduce",
     "series",
     "simulate",
 ]

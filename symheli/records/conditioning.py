@@ -130,18 +130,6 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
     )
 
 
-def cut(record: FlightRecord, start: float | None, stop: float | None) -> FlightRecord:
-    """The samples from `start` to `stop` (s on the record's clock)."""
-    low, high = -math.inf if start is None else start, math.inf if stop is None else stop
-    keep = (record.time >= low) & (record.time < high)
-    if keep.sum() < 2:
-        raise InputError(
-            f"nothing is left between start and stop; the record goes from {record.time[0]:g} to"
-            f" {record.time[-1]:g} s"
-        )
-    return record.rows(keep)
-
-
 def split(record: FlightRecord, fraction: float) -> tuple[FlightRecord, FlightRecord | None]:
     """The first `fraction` of the time to fit, and the rest held out (None where nothing rests)."""
     edge = record.time[0] + fraction * (record.time[-1] - record.time[0])

@@ -25,7 +25,7 @@ of gravity.
 """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TrimPoint(OperatingPoint):
     """An operating point with the flight condition it answers and how well.
 
@@ -91,12 +91,12 @@ def trim(
     """
     condition = FlightCondition(
         float(airspeed),
-        float(climb_rate),
-        float(turn_rate),
-        float(sideslip),
-        (float(wind[0]), float(wind[1]), float(wind[2])),
-        float(acceleration),
-        None if altitude is None else float(altitude),
+        climb_rate=float(climb_rate),
+        turn_rate=float(turn_rate),
+        sideslip=float(sideslip),
+        wind=(float(wind[0]), float(wind[1]), float(wind[2])),
+        acceleration=float(acceleration),
+        altitude=None if altitude is None else float(altitude),
     )
     heli = heli if altitude is None else heli.at_altitude(float(altitude))
     problem = _Problem(heli, condition)
@@ -175,12 +175,12 @@ def _continue_from_hover(
     for share in np.linspace(0.0, 1.0, steps + 1):
         stage = FlightCondition(
             share * condition.airspeed,
-            share * condition.climb_rate,
-            share * condition.turn_rate,
-            condition.sideslip,
-            (share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]),
-            share * condition.acceleration,
-            condition.altitude,
+            climb_rate=share * condition.climb_rate,
+            turn_rate=share * condition.turn_rate,
+            sideslip=condition.sideslip,
+            wind=(share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]),
+            acceleration=share * condition.acceleration,
+            altitude=condition.altitude,
         )
         problem = _Problem(heli, stage)
         point = problem.solve(problem.guess() if point is None else problem.unknowns_of(point))
@@ -322,10 +322,10 @@ class _Problem:
         xdot = heli.numeric("rhs")(x, u, wind)[0]
         switches = heli.switches(x, u, wind)
         return TrimPoint(
-            NamedVector(heli.states, x),
-            NamedVector(heli.inputs, u),
-            NamedVector(heli.states, xdot),
-            self.condition.airspeed,
+            x=NamedVector(heli.states, x),
+            u=NamedVector(heli.inputs, u),
+            xdot=NamedVector(heli.states, xdot),
+            airspeed=self.condition.airspeed,
             condition=self.condition,
             residual=NamedVector(heli.states, self.residual(z)),
             wind=NamedVector(heli.wind, wind),

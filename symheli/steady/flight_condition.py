@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
@@ -22,6 +22,7 @@ class FlightCondition:
     """
 
     airspeed: float
+    _: KW_ONLY
     climb_rate: float = 0.0
     turn_rate: float = 0.0
     sideslip: float = 0.0

@@ -19,7 +19,9 @@ from symheli.records import FlightRecord
 TRUE = np.array(
     [[-1.2, 0.4], [0.6, -0.2], [0.5, 0.3]]
 )  # monomial coefficients of a_1, a_2, b_1 on p in [0, 1]
-ARX = idn.LPVARX("y", "u", "p", 2, 1, 1, idn.Polynomial(1, 0.0, 1.0), scheduling_at="now")
+ARX = idn.LPVARX(
+    "y", "u", "p", na=2, nb=1, delay=1, basis=idn.Polynomial(1, 0.0, 1.0), scheduling_at="now"
+)
 
 
 def oscillator(n, seed, *, decibel=10.0, pole=0.0):

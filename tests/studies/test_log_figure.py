@@ -17,7 +17,9 @@ def test_the_picture_holds_the_predictions_that_were_scored():
         y[k] = (0.9 - 0.05 * np.sin(t[k - 1])) * y[k - 1] + u[k - 1] + 0.1 * rng.standard_normal()
     record = FlightRecord.from_arrays(t, {"y": "rad", "u": "1", "p": "m/s"}, y=y, u=u, p=np.sin(t))
     training, test = record.split(0.7)
-    result = compare(LPVARX("y", "u", "p", 1, 1, 1, Polynomial(1, -1.0, 1.0)), training, test)
+    result = compare(
+        LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(1, -1.0, 1.0)), training, test
+    )
     drawn, close, scheduling, _ = figure(result).axes
     lines = {}
     for line in drawn.lines:

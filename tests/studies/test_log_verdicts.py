@@ -25,7 +25,9 @@ def judged(lpv, lti, *rivals, **over):
     record = FlightRecord.from_arrays(
         0.1 * np.arange(200), dict.fromkeys("yup", "1"), y=np.cumsum(u) * 0.1, u=u, p=p
     )
-    model = fit(LPVARX("y", "u", "p", 1, 1, 1, Polynomial(1, p.min(), p.max())), record)
+    model = fit(
+        LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(1, p.min(), p.max())), record
+    )
     scores = [
         {h: {"y": v} for h, v in zip(NAMES, (99.0, *fits), strict=True)}
         for fits in (lpv, lti, *rivals)
@@ -274,7 +276,7 @@ def test_the_moving_trim_is_not_tried_where_the_data_cannot_tell_it():
     record = FlightRecord.from_arrays(
         0.1 * np.arange(300), dict.fromkeys("yup", "1"), y=y, u=u, p=p
     )
-    arx = LPVARX("y", "u", "p", 1, 1, 1, Polynomial(2, 1.0, 3.0), offset=True)
+    arx = LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(2, 1.0, 3.0), offset=True)
     found = compare(arx, record, None, trim="auto")
     assert found.trim_note.startswith("offset_rate is not tried: the regressors have rank")
     assert len(found.models) == 2

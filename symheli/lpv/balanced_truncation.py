@@ -26,14 +26,14 @@ Riccati solutions lose to rounding.
 
 
 @dataclass(frozen=True, eq=False)
-class Reduction(Generic[Model]):
-    """The reduced `model`, and what it costs with p held at each of `p` (K,), between the points
+class BalancedTruncation(Generic[Model]):
+    """The truncated `model`, and what it costs with p held at each of `p` (K,), between the points
     that were balanced.
 
     `singular_values` (nx,): importance of each balanced state, those beyond the order were left
-    out. `nu_gap` (K,) in [0, 1] between reduced and full model. `error` (K,): largest gain of their
-    difference over frequency by that of the full model, NaN where one of them is unstable. Both
-    with scaled channels, on a frequency grid. Nothing is promised for p that moves.
+    out. `nu_gap` (K,) in [0, 1] between truncated and full model. `error` (K,): largest gain of
+    their difference over frequency by that of the full model, NaN where one of them is unstable.
+    Both with scaled channels, on a frequency grid. Nothing is promised for p that moves.
     """
 
     model: Model
@@ -43,14 +43,14 @@ class Reduction(Generic[Model]):
     error: Array
 
 
-def reduce(
+def balanced_truncation(
     model: Model,
     order: int,
     *,
     nodes: int = 21,
     input_scale: object = 1.0,
     output_scale: object = 1.0,
-) -> Reduction[Model]:
+) -> BalancedTruncation[Model]:
     """Keep `order` states of a model by one constant projection, balanced for the means over p of
     its frozen Gramians.
 
@@ -82,8 +82,7 @@ def reduce(
     if values[order - 1] <= NEGLIGIBLE * values[0]:
         count = int(np.sum(values > NEGLIGIBLE * values[0]))
         raise InputError(
-            f"order: only {count} of the {nx} states can be excited and seen; reduce to {count} or"
-            " fewer"
+            f"order: only {count} of the {nx} states can be excited and seen; keep {count} or fewer"
         )
     size = np.sqrt(values[:order])
     left, right = Lx @ U[:, :order] / size, Ly @ V[:order].T / size
@@ -93,7 +92,7 @@ def reduce(
     compared = [_comparable(full, reduced) for (_, full), (_, reduced) in pairs]
     gaps = [nu_gap(*pair, input_scale=su, output_scale=sy) for pair in compared]
     errors = [_relative_error(*pair, su, sy) for pair in compared]
-    return Reduction(
+    return BalancedTruncation(
         small, values, np.array([p for (p, _), _ in pairs]), np.array(gaps), np.array(errors)
     )
 
