@@ -74,6 +74,14 @@ def fit(
     ----------
     Bamieh and Giarre (2002), Identification of linear parameter varying models, Int. J. Robust and
     Nonlinear Control 12.
+
+    Examples
+    --------
+    The coefficient of y(k-1) at p = 0 is -0.5:
+
+    >>> found = idn.fit(arx, record, method=idn.Ridge(weight=1e-6))
+    >>> print(found.coefficients.at(0.0).A.round(2))
+    [[[-0.5]]]
     """
     require_structure(structure)
     method, records = method_of(method), as_records(records)

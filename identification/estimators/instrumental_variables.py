@@ -40,10 +40,30 @@ TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True)
 class InstrumentalVariables(Method):
-    """Two-stage least squares with `instruments`: names of signals of the record, `LaggedSignals`
-    of them, or another `InstrumentSource`.
+    """Two-stage least squares: consistent whatever colours the noise, provided the instruments and
+    p are independent of it.
 
-    In closed loop name what is added to the stabilised inputs, in open loop the inputs.
+    Parameters
+    ----------
+    instruments : str, sequence of str, or InstrumentSource
+        Names of signals of the record, `LaggedSignals` of them with their window, or another
+        source. In closed loop name what is added to the stabilised inputs, in open loop the inputs.
+
+    Raises
+    ------
+    InputError
+        Neither names nor a source.
+
+    References
+    ----------
+    Soderstrom and Stoica (1989), System Identification, ch. 8; Ljung (1999), sec. 15.3. Strength:
+    Staiger and Stock, Econometrica 65 (1997).
+
+    Examples
+    --------
+    >>> found = idn.fit(arx, record, method=idn.InstrumentalVariables("u"))
+    >>> print(found.coefficients.at(0.0).A.round(2), found.details["first_stage_F"] > 10)
+    [[[-0.5]]] True
     """
 
     instruments: Instruments

@@ -25,10 +25,30 @@ from symheli.values.arrays import Array, frozen
 
 @runtime_checkable
 class InstrumentSource(Protocol):
-    """Signals independent of the noise in a record, and the lags at which they instrument.
+    """Signals independent of the noise in a record, and the lags at which they instrument: anything
+    with these two methods.
 
     `str(source)` names it in messages. The signals may be measured beside the others
     (`LaggedSignals`), or computed: a flight of the same plan in a simulator knows no noise either.
+
+    Examples
+    --------
+    The same plan, flown by another plant without noise:
+
+    >>> class Simulated:
+    ...     def instrument_signals(self, record, names):
+    ...         x = np.zeros(len(record))
+    ...         for k in range(1, len(x)):
+    ...             x[k] = 0.4 * x[k - 1] + record["u"][k - 1]
+    ...         return np.column_stack([x, record["u"]])
+    ...
+    ...     def instrument_lags(self, dt, first, memory):
+    ...         return tuple(range(first, memory + 4))
+    >>> isinstance(Simulated(), idn.InstrumentSource)
+    True
+    >>> found = idn.fit(arx, record, method=idn.InstrumentalVariables(Simulated()))
+    >>> print(found.coefficients.at(0.0).A.round(2))
+    [[[-0.5]]]
     """
 
     def instrument_signals(self, record: FlightRecord, names: tuple[str, ...]) -> Array:
@@ -52,11 +72,29 @@ Instruments = str | Sequence[str] | InstrumentSource
 
 @dataclass(frozen=True)
 class LaggedSignals:
-    """Signals of the record as instruments, over the last `window` s at no more than `lags` lags,
-    evenly spaced.
+    """Signals of the record as instruments, at lags evenly over a window.
 
     In closed loop what is added to the stabilised inputs, in open loop the inputs; the command is
     an excitation too.
+
+    Parameters
+    ----------
+    signals : str or sequence of str
+        Their names in the record.
+    window : float
+        How far back they instrument, s.
+    lags : int
+        Most of them in the window.
+
+    Raises
+    ------
+    InputError
+        No names, or an empty window.
+
+    Examples
+    --------
+    >>> idn.LaggedSignals("u", window=0.5).instrument_lags(dt=0.1, first=1, memory=1)
+    (1, 2, 3, 4, 5)
     """
 
     signals: tuple[str, ...]

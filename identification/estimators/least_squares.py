@@ -20,8 +20,13 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class LeastSquares(Method):
-    """Least squares over all samples; the residual is checked to be orthogonal to every
-    regressor.
+    """Least squares over all samples, by QR of scaled columns; the residual is checked to be
+    orthogonal to every regressor.
+
+    Examples
+    --------
+    >>> print(idn.fit(arx, record, method=idn.LeastSquares()).coefficients.at(1.0).A.round(2))
+    [[[-0.8]]]
     """
 
     shorthand: ClassVar[str] = "ls"

@@ -18,10 +18,23 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Estimate:
-    """Coefficients `theta` (n_regressors, ny) and what there is to say about them.
+    """What a method found: coefficients and what there is to say about them.
 
-    `details` are plain numbers and lists by name, `remarks` the warnings `fit` issues.
-    `residual_covariance` (ny, ny) of the one-step residuals; None: that of the batch of regressors.
+    Parameters
+    ----------
+    theta : array (n_regressors, ny)
+        In the order of `LPVARX.regressor_names`.
+    details : mapping
+        Plain numbers and lists by name.
+    remarks : tuple of Warning
+        The warnings `fit` issues.
+    residual_covariance : array (ny, ny), optional
+        Of the one-step residuals; None: that of the batch of regressors.
+
+    Examples
+    --------
+    >>> idn.Estimate(theta=np.zeros((4, 1)), details={"iterations": 3}).details["iterations"]
+    3
     """
 
     theta: Array
@@ -33,9 +46,23 @@ class Estimate:
 class Method(ABC):
     """An estimator with its options: a subclass in a file of its own, exported, is all `fit` needs.
 
-    `shorthand` is the string that stands for its defaults, and what a model says it was fitted by.
-    `needs_excitation`: the data alone must determine every coefficient, `fit` refuses them
-    otherwise. False where a penalty decides what they leave open.
+    Attributes
+    ----------
+    shorthand : str
+        Stands for the defaults, and is what a model says it was fitted by.
+    needs_excitation : bool
+        The data alone must determine every coefficient, `fit` refuses them otherwise. False where a
+        penalty decides what they leave open.
+
+    Examples
+    --------
+    >>> class Zero(idn.Method):
+    ...     shorthand, needs_excitation = "zero", False
+    ...
+    ...     def estimate(self, arx, records, data):
+    ...         return idn.Estimate(theta=np.zeros((arx.n_regressors, arx.ny)))
+    >>> print(idn.fit(arx, record, method=Zero()).theta.T)
+    [[0. 0. 0. 0.]]
     """
 
     shorthand: ClassVar[str]

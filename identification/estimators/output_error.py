@@ -26,13 +26,37 @@ ADVICE = "allow more evaluations, or fit a smaller structure"
 
 @dataclass(frozen=True)
 class OutputError(Method):
-    """The closest free run: `initial`, the outputs each stretch starts from, are "estimated" with
-    the coefficients, or taken as "measured".
+    """The closest free run: the maximum-likelihood estimate for white Gaussian noise on the
+    outputs.
 
-    `evaluations` of the simulation at most, `tolerance` on the relative change of cost and
-    coefficients. The search starts from least squares or (with `instruments`, as for
-    `InstrumentalVariables`) instrumental variables, and from their refinement; in closed loop
-    coloured noise biases it.
+    The search starts from least squares or (with `instruments`) instrumental variables, and from
+    their refinement; in closed loop coloured noise biases it.
+
+    Parameters
+    ----------
+    instruments : str, sequence of str, or InstrumentSource, optional
+        For the start, as for `InstrumentalVariables`.
+    initial : {"estimated", "measured"}
+        The outputs each stretch starts from: found with the coefficients, or taken as measured.
+    evaluations : int
+        Of the simulation, at most.
+    tolerance : float
+        In (0, 1), on the relative change of cost and coefficients.
+
+    Raises
+    ------
+    InputError
+        A number out of range, or another `initial`.
+
+    References
+    ----------
+    Ljung (1999), System Identification, sec. 4.2 and 7.4.
+
+    Examples
+    --------
+    >>> found = idn.fit(arx, record, method=idn.OutputError())
+    >>> print(found.coefficients.at(0.0).A.round(2))
+    [[[-0.5]]]
     """
 
     instruments: Instruments | None = None

@@ -20,8 +20,22 @@ class Recursion(Method):
     """Least squares sample by sample, older ones weighing less: `RecursiveLeastSquares` over whole
     records.
 
-    `forgetting` is a factor in (0, 1] (the weight of a sample is the factor to the power of its
-    age), or one of `Constant`, `Variable`, `Directional`.
+    Parameters
+    ----------
+    forgetting : float or Forgetting
+        A factor in (0, 1] (the weight of a sample is the factor to the power of its age), or one of
+        `Constant`, `Variable`, `Directional`.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+
+    Examples
+    --------
+    >>> recent = idn.fit(arx, record, method=idn.Recursion(forgetting=0.99))
+    >>> print(recent.coefficients.at(0.0).A.round(1))
+    [[[-0.5]]]
     """
 
     forgetting: float | Forgetting = 1.0

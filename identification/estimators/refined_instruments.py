@@ -45,12 +45,36 @@ ADVICE = (
 
 @dataclass(frozen=True)
 class RefinedInstruments(Method):
-    """Instrumental variables refined with the simulated response: `iterations` at most, `tolerance`
-    the relative change of the coefficients that ends them.
+    """Instrumental variables refined with the simulated response: the model found so far
+    instruments and filters, until nothing moves.
 
-    `noise_order` is that of an autoregressive model of the output noise of each output; 0 takes it
-    as white. `instruments` as for `InstrumentalVariables`; in closed loop they are needed, and then
-    the plant may be unstable.
+    Parameters
+    ----------
+    instruments : str, sequence of str, or InstrumentSource, optional
+        As for `InstrumentalVariables`; in closed loop they are needed, and then the plant may be
+        unstable.
+    iterations : int
+        At most.
+    tolerance : float
+        The relative change of the coefficients that ends them.
+    noise_order : int
+        Of an autoregressive model of the output noise of each output; 0 takes it as white.
+
+    Raises
+    ------
+    InputError
+        A number out of range.
+
+    References
+    ----------
+    Laurain, Toth, Gilson and Garnier (2010), Refined instrumental variable methods for
+    identification of LPV Box-Jenkins models, Automatica 46, 959-967.
+
+    Examples
+    --------
+    >>> found = idn.fit(arx, record, method=idn.RefinedInstruments(noise_order=1))
+    >>> print(found.coefficients.at(0.0).A.round(2), found.details["converged"])
+    [[[-0.5]]] True
     """
 
     instruments: Instruments | None = None

@@ -27,14 +27,36 @@ GRID = np.linspace(-14.0, 4.0, 37)
 
 @dataclass(frozen=True)
 class Ridge(Method):
-    """What is penalised, and how much.
+    """Least squares with a price on coefficients: those the data hardly determine are held small,
+    or held constant in p.
 
     The penalty of one lagged signal with the coefficient a(p) is its mean square times the mean of
-    a(p)^2 over the range of the basis (`towards="zero"`), or of the variation of a(p) about its
-    mean there (`towards="constant"`, the default: the more weight, the closer to the LTI model). It
-    is measured in the output squared, as the mean squared residual is, and depends neither on the
-    units nor on the functions chosen to write a(p). `weight` multiplies it; None: by generalised
-    cross-validation, for each output.
+    a(p)^2 over the range of the basis, or of the variation of a(p) about its mean there. It is
+    measured in the output squared, as the mean squared residual is, and depends neither on the
+    units nor on the functions chosen to write a(p).
+
+    Parameters
+    ----------
+    weight : float, optional
+        Multiplies the penalty; None: by generalised cross-validation, for each output.
+    towards : {"constant", "zero"}
+        What is penalised, the variation about the mean ("constant": the more weight, the closer to
+        the LTI model) or the coefficient itself.
+
+    Raises
+    ------
+    InputError
+        A negative weight, or another `towards`.
+
+    References
+    ----------
+    Golub, Heath and Wahba (1979), Technometrics 21, 215-223 (the choice of the weight).
+
+    Examples
+    --------
+    >>> flat = idn.fit(arx, record, method=idn.Ridge(weight=1e6)).coefficients
+    >>> print(np.ptp(flat.at([-1.0, 1.0]).A).round(3))
+    0.0
     """
 
     weight: float | None = None

@@ -16,11 +16,34 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class History:
-    """`time` (n,) in s, `coefficients` (n, n_regressors, ny) after each sample, `innovations` (n,
-    ny), NaN where no regressor was complete.
+    """What a recursive estimate did over a record, as `RecursiveLeastSquares.run` returns it.
 
-    `state` after the last sample (go on from it with `update`), `dropped` samples without a
-    regressor.
+    Parameters
+    ----------
+    structure : LPVARX
+        What was identified.
+    time : array (n,)
+        Of the samples, s.
+    coefficients : array (n, n_regressors, ny)
+        After each sample.
+    innovations : array (n, ny)
+        NaN where no regressor was complete.
+    state : RLSState
+        After the last sample; go on from it with `update`.
+    dt : float
+        Sample period, s.
+    outputs, inputs, scheduling : Signal or tuple of Signal
+        With the units of the record.
+    dropped : int
+        Samples without a regressor.
+
+    Examples
+    --------
+    >>> history = idn.RecursiveLeastSquares(arx).run(record)
+    >>> history.coefficients.shape, history.dropped
+    ((800, 4, 1), 1)
+    >>> print(history.model.coefficients.at(0.0).A.round(2))
+    [[[-0.5]]]
     """
 
     structure: LPVARX

@@ -42,13 +42,39 @@ class RecursiveLeastSquares:
     `Constant`). `determined` says whether anything is left open, by the rule of
     `identification.design.determined`.
 
-    `forgetting` is a factor l in (0, 1] (a sample k steps old has the weight l^k; then `floor` is
-    that of `Constant`), or one of `Constant`, `Variable`, `Directional`. `precision` "single"
-    computes as an autopilot without double precision would.
-
     The arithmetic is C where a compiler was there when symheli was installed, else NumPy, with one
-    `CompilerWarning`: the same operations in the same order. Raises `InputError` for an option out
-    of range.
+    `CompilerWarning`: the same operations in the same order.
+
+    Parameters
+    ----------
+    structure : LPVARX
+        What is identified.
+    forgetting : float or Forgetting
+        A factor l in (0, 1] (a sample k steps old has the weight l^k), or one of `Constant`,
+        `Variable`, `Directional`.
+    floor : float, optional
+        That of `Constant`, for a factor.
+    precision : {"double", "single"}
+        "single" computes as an autopilot without double precision would.
+
+    Raises
+    ------
+    InputError
+        An option out of range, or a floor beside a way of forgetting.
+
+    References
+    ----------
+    Gentleman (1973), Least squares computations by Givens transformations without square roots, J.
+    Inst. Maths Applics 12; Bjorck (1996), Numerical Methods for Least Squares Problems, ch. 3.
+
+    Examples
+    --------
+    >>> rls = idn.RecursiveLeastSquares(arx, forgetting=0.995)
+    >>> state = rls.init()
+    >>> for k in range(200):
+    ...     state, info = rls.update(state, record["y"][k], record["u"][k], record["p"][k])
+    >>> info.determined, bool(abs(info.innovation[0]) < 0.1)
+    (True, True)
     """
 
     structure: LPVARX
