@@ -2,7 +2,11 @@
 LPV models out.
 
 Everything is loaded when first used: `import symheli` brings in neither CasADi nor a plotting
-library.
+library. The examples of this package start from
+
+>>> import numpy as np
+>>> import symheli
+>>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
 """
 
 from __future__ import annotations

@@ -59,12 +59,36 @@ def identified_models() -> list[str]:
 
 
 def identified_model(name_or_path: str | os.PathLike[str]) -> IdentifiedModel:
-    """A packaged model by name ("r50_hover": Yamaha R-50 in hover), or any file of that form by its
-    path.
+    """A linear model from the literature.
 
     The file gives for each state its unit and the equation of its derivative, for each parameter
     value, unit and source. That the units fit is checked: the equations must say the same in the
-    file's units and in SI. Raises `InputError`.
+    file's units and in SI.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        A packaged model ("r50_hover": Yamaha R-50 in hover), or any file of that form.
+
+    Returns
+    -------
+    IdentifiedModel
+        A `LinearModel` with its title, source and parameters.
+
+    Raises
+    ------
+    InputError
+        No such model, or units that do not fit.
+
+    References
+    ----------
+    Each file names its own.
+
+    Examples
+    --------
+    >>> model = symheli.identified_model("r50_hover")
+    >>> model.A.shape, model.is_stable()
+    ((13, 13), False)
     """
     given = os.fspath(name_or_path)
     if given.endswith(".toml"):

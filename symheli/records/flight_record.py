@@ -36,12 +36,39 @@ FINER = 1e4
 
 @dataclass(frozen=True, eq=False)
 class FlightRecord:
-    """Samples `values` (n, m) of `signals` at `time` (n,) in s, in SI units and radians.
+    """Samples of signals over time, in SI units and radians.
 
     NaN marks a missing sample. A time step longer than 1.5 median steps is a gap: `segments()`
-    splits there, and no regressor reaches across. `note` says where the record comes from,
-    `resampled` how its samples were made of others ("means of 4 samples"; empty where each is what
-    was measured at its instant): then y(k) may depend on u(k).
+    splits there, and no regressor reaches across.
+
+    Parameters
+    ----------
+    time : array (n,)
+        Increasing, s.
+    values : array (n, m)
+        A column a signal.
+    signals : tuple of Signal
+        m names with their unit.
+    note : str
+        Where the record comes from.
+    meta : mapping
+        Anything worth keeping.
+    resampled : str
+        How its samples were made of others ("means of 4 samples"; empty where each is what was
+        measured at its instant): then y(k) may depend on u(k).
+
+    Raises
+    ------
+    InputError
+        Fewer than two samples, time that does not increase, an infinite value.
+
+    Examples
+    --------
+    >>> record = symheli.FlightRecord.from_arrays(
+    ...     0.1 * np.arange(5), {"q": "deg/s", "n": "1"}, q=np.full(5, 90.0), n=np.zeros(5)
+    ... )
+    >>> round(float(record["q"][0]), 3), record.dt, len(record.between(0.1, 0.35))
+    (1.571, 0.1, 3)
     """
 
     time: Array

@@ -29,9 +29,30 @@ of gravity.
 class TrimPoint(OperatingPoint):
     """An operating point with the flight condition it answers and how well.
 
-    residual: of every equation by state name, in the unit of its derivative. on_stops: inputs at
-    (to 0.1 %) or beyond their travel. vortex_ring: a rotor is where momentum theory promises no
-    accuracy. wind: body axes, m/s. density: of the air, kg/m^3.
+    Parameters
+    ----------
+    x, u, xdot : NamedVector
+        State, input and derivative of the state, SI and radians.
+    airspeed : float
+        m/s.
+    condition : FlightCondition
+        What was asked.
+    residual : NamedVector
+        Of every equation by state name, in the unit of its derivative.
+    wind : NamedVector
+        Body axes, m/s.
+    on_stops : tuple of str
+        Inputs at (to 0.1 %) or beyond their travel.
+    vortex_ring : bool
+        A rotor is where momentum theory promises no accuracy.
+    density : float
+        Of the air, kg/m^3.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> point.success, point.attainable, point.vortex_ring
+    (True, True, False)
     """
 
     condition: FlightCondition
@@ -80,14 +101,44 @@ def trim(
     throw: bool = True,
     continuation: bool = True,
 ) -> TrimPoint:
-    """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.
+    """Steady flight at an airspeed.
 
-    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start`
-    or a hover guess; where that fails, by `continuation` from hover and from other guesses. Success
-    is judged on the recomputed residual of every equation. A control beyond its travel is no
-    failure (the equations hold; `on_stops` names it, `attainable` is False): what would be needed,
-    and by how much, is worth knowing. Raises `TrimError` carrying the best point; with throw=False
-    that point is returned instead.
+    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls); where that
+    fails, by continuation from hover and from other guesses. Success is judged on the recomputed
+    residual of every equation. A control beyond its travel is no failure (the equations hold;
+    `on_stops` names it, `attainable` is False): what would be needed, and by how much, is worth
+    knowing.
+
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    airspeed, climb_rate, turn_rate, sideslip, wind, acceleration, altitude
+        As in `FlightCondition`.
+    start : TrimPoint, optional
+        To start from; default a hover guess.
+    throw : bool
+        False: a point that is no equilibrium is returned, not raised.
+    continuation : bool
+        Whether to go on from hover and other guesses where Newton fails.
+
+    Returns
+    -------
+    TrimPoint
+        State, inputs and the residual of every equation.
+
+    Raises
+    ------
+    TrimError
+        No equilibrium was found; its `result` is the best point.
+    InputError
+        A flight condition that is none.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> round(float(np.degrees(point.x["theta"])), 1), round(float(point.u["d_col"]), 3)
+    (-1.2, 0.088)
     """
     condition = FlightCondition(
         float(airspeed),
