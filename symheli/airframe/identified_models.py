@@ -35,11 +35,23 @@ _OPERATIONS: dict[type, Callable[..., Any]] = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiedModel(LinearModel):
-    """A `LinearModel` from the literature, with C = I: `title`, `source`, and its `parameters` in
-    SI by the source's names.
+    """A `LinearModel` from the literature, with C = I.
 
-    Parameters that are disputed or were not at hand have `assumed` set, and their source says why
-    they are what they are.
+    Parameters
+    ----------
+    A, B, C, D, states, inputs, outputs, dt, point
+        As in `LinearModel`.
+    title, source : str
+        What it is of, and where from.
+    parameters : mapping of str to Quantity
+        In SI by the source's names. Those that are disputed or were not at hand have `assumed` set,
+        and their source says why they are what they are.
+
+    Examples
+    --------
+    >>> model = symheli.identified_model("r50_hover")
+    >>> [str(s) for s in model.inputs], len(model.parameters) > 20
+    (['lat', 'lon', 'ped', 'col'], True)
     """
 
     title: str = ""
@@ -53,7 +65,18 @@ class IdentifiedModel(LinearModel):
 
 
 def identified_models() -> list[str]:
-    """Names of the identified linear models that come with the package."""
+    """Names of the identified linear models that come with the package.
+
+    Returns
+    -------
+    list of str
+        What `identified_model` takes, beside a path.
+
+    Examples
+    --------
+    >>> symheli.identified_models()
+    ['r50_hover']
+    """
     names = (p.name for p in resources.files("symheli.airframe.vehicles").iterdir())
     return sorted(name.removesuffix(ENDING) for name in names if name.endswith(ENDING))
 

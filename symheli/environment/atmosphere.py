@@ -16,7 +16,24 @@ LAPSE_RATE, TROPOPAUSE, CEILING = -0.0065, 11_000.0, 20_000.0  # K/m, geopotenti
 
 
 class Air(NamedTuple):
-    """Air at rest: temperature (K), pressure (Pa), density (kg/m^3), speed of sound (m/s)."""
+    """Air at rest.
+
+    Parameters
+    ----------
+    temperature : float
+        K.
+    pressure : float
+        Pa.
+    density : float
+        kg/m^3.
+    speed_of_sound : float
+        m/s.
+
+    Examples
+    --------
+    >>> round(symheli.standard_atmosphere(0.0).speed_of_sound, 1)
+    340.3
+    """
 
     temperature: float
     pressure: float

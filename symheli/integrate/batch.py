@@ -33,8 +33,27 @@ cache.
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """States (N, kept, nx) of `signals` at `times` (kept,) in s of N flights; with feedback,
-    `inputs` (N, kept, 4) used then.
+    """N flights; found["q"] is one state of all (N, kept).
+
+    Parameters
+    ----------
+    times : array (kept,)
+        s.
+    states : array (N, kept, nx)
+        Quaternion form, SI.
+    signals : tuple of Signal
+        nx names.
+    inputs : array (N, kept, 4), optional
+        Used then, with feedback, rad.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> x0 = np.tile(point.x.array, (2, 1))
+    >>> inputs = np.tile(point.u.array, (20, 1))
+    >>> found = symheli.simulate_batch(heli, x0, inputs, dt=0.02, keep=5)
+    >>> found.states.shape, len(found)
+    ((2, 5, 15), 2)
     """
 
     times: Array

@@ -1,4 +1,17 @@
-"""Linear, LPV and LFT models: pure NumPy, no physics, no solver."""
+"""Linear, LPV and LFT models: pure NumPy, no physics, no solver.
+
+The examples of this package start from a spring that stiffens with p:
+
+>>> import numpy as np
+>>> from symheli import lpv
+>>> spring = lpv.LPVStateSpace.polynomial(
+...     A=[[[0.0, 1.0], [-2.0, -1.0]], [[0.0, 0.0], [-0.5, 0.0]]],
+...     B=[[[0.0], [1.0]]],
+...     C=[[[1.0, 0.0]]],
+...     D=[[[0.0]]],
+...     scheduling=lpv.Scheduling("p", "1", low=0.0, high=1.0),
+... )
+"""
 
 from symheli.lpv.balanced_truncation import BalancedTruncation, balanced_truncation
 from symheli.lpv.bases import (

@@ -51,20 +51,48 @@ def balanced_truncation(
     input_scale: object = 1.0,
     output_scale: object = 1.0,
 ) -> BalancedTruncation[Model]:
-    """Keep `order` states of a model by one constant projection, balanced for the means over p of
-    its frozen Gramians.
+    """Fewer states by one constant projection, balanced for the means over p of the frozen
+    Gramians.
 
     The Gramians are those of the normalised coprime factors, solutions of the Riccati equations of
     u'u + y'y: they exist for unstable models and belong to the nu-gap. One projection for all p
-    keeps the dependence on p in its basis and adds no terms where p moves. Inputs are divided by
-    `input_scale`, outputs by `output_scale` (one a channel, in their units); what counts as
-    important depends on them. Poles on the stability boundary (a heading) are refused by the
-    nu-gap: leave such states out first.
+    keeps the dependence on p in its basis and adds no terms where p moves. Poles on the stability
+    boundary (a heading) are refused by the nu-gap: leave such states out first.
 
-    Raises `InputError` for an order that is not below the number of states that matter, or a frozen
-    model that is not stabilisable and detectable. Source: Jonckheere and Silverman (1983), IEEE
-    Trans. Automatic Control 28; Meyer (1990), 35; means of frozen Gramians after Wood, Goddard and
-    Glover (1996), CDC.
+    Parameters
+    ----------
+    model : LPVStateSpace or LinearModel
+        With nx states.
+    order : int
+        States to keep.
+    nodes : int
+        Values of p over which the Gramians are averaged.
+    input_scale, output_scale : float or array
+        Inputs and outputs are divided by it (one a channel, in their units); what counts as
+        important depends on it.
+
+    Returns
+    -------
+    BalancedTruncation
+        The model and the frozen error it makes.
+
+    Raises
+    ------
+    InputError
+        An order that is not below the number of states that matter, or a frozen model that is not
+        stabilisable and detectable.
+
+    References
+    ----------
+    Jonckheere and Silverman (1983), IEEE Trans. Automatic Control 28; Meyer (1990), 35; means of
+    frozen Gramians after Wood, Goddard and Glover (1996), CDC.
+
+    Examples
+    --------
+    >>> sampled = spring.discretize(0.1)
+    >>> small = lpv.balanced_truncation(sampled, 1)
+    >>> small.model.at(0.5).A.shape, bool(small.nu_gap.max() < 1)
+    ((1, 1), True)
     """
     nx = len(model.states)
     if not isinstance(order, int) or isinstance(order, bool) or not 0 < order < nx:
