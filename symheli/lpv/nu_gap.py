@@ -68,10 +68,7 @@ def nu_gap(
             f"nu_gap compares discrete models with one sample period, got {first.dt} and"
             f" {second.dt} s; discretize them"
         )
-    if first.inputs != second.inputs or first.outputs != second.outputs:
-        raise InputError(
-            "nu_gap compares models with the same inputs and outputs in the same order"
-        )
+    _require_same_signals(first, second)
     su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
     sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
     unstable, poles = [], []
@@ -137,7 +134,7 @@ def chordal_distance(
     Raises
     ------
     InputError
-        Other signals or sample periods.
+        Other signals.
 
     References
     ----------
@@ -148,6 +145,7 @@ def chordal_distance(
     >>> lpv.chordal_distance(spring.at(0.0), spring.at(1.0), [0.1, 1.0]).round(2)
     array([0.08, 0.14])
     """
+    _require_same_signals(first, second)
     su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
     sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
     return _chordal(
@@ -156,6 +154,14 @@ def chordal_distance(
             for m in (first, second)
         )
     )
+
+
+def _require_same_signals(first: LinearModel, second: LinearModel) -> None:
+    if first.inputs != second.inputs or first.outputs != second.outputs:
+        raise InputError(
+            "nu-gap: expected models with the same inputs and outputs in the same order, got"
+            f" {first.inputs} to {first.outputs} and {second.inputs} to {second.outputs}"
+        )
 
 
 def angles(poles: np.ndarray, points: int) -> np.ndarray:

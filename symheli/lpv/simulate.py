@@ -8,6 +8,7 @@ from symheli.errors import InputError
 from symheli.lpv.exponential import expm
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array, frozen
+from symheli.values.sample_period import same_period
 
 
 def simulate(
@@ -50,7 +51,7 @@ def simulate(
     Raises
     ------
     InputError
-        Shapes that do not fit, p outside its range, or a missing or needless `dt`.
+        Shapes that do not fit, p outside its range, a missing `dt`, or one that is not the model's.
 
     Examples
     --------
@@ -77,6 +78,8 @@ def simulate(
         step = expm(stacked * dt)
         A, B, E = step[:, :nx, :nx], step[:, :nx, nx : nx + nu], step[:, :nx, nx + nu :]
         w = np.einsum("kij,kj->ki", E, w)
+    elif dt is not None and not same_period(dt, lpv.dt):
+        raise InputError(f"the model is discrete at {lpv.dt:g} s; leave dt = {dt!r} out")
     x = np.empty((n, nx))
     for k in range(n):
         x[k] = state

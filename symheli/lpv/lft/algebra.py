@@ -186,7 +186,8 @@ def parallel(first: System, second: System) -> LFT:
     Examples
     --------
     >>> twice = lpv.parallel(spring, spring).at(0.0)
-    >>> print((twice.frequency_response([0.0])[0] / spring.at(0.0).frequency_response([0.0])[0]).real)
+    >>> gains = [m.frequency_response([0.0])[0].real for m in (twice, spring.at(0.0))]
+    >>> print((gains[0] / gains[1]).round(6))
     [[2.]]
     """
     first, second = as_lft(first), as_lft(second)
