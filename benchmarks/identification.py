@@ -35,8 +35,10 @@ from identification.recursive.kernel import compiled_kernel  # noqa: E402
 
 BASIS = Polynomial(2, 0.0, 13.0)
 CASES = {
-    "TIMO": LPVARX(("a", "b", "c", "d"), ("u", "v"), "p", 3, 3, 1, BASIS),
-    "MIMO": LPVARX(tuple("abcdefghijkl"), ("s", "t", "u", "v"), "p", 2, 2, 1, BASIS),
+    "TIMO": LPVARX(("a", "b", "c", "d"), ("u", "v"), "p", na=3, nb=3, delay=1, basis=BASIS),
+    "MIMO": LPVARX(
+        tuple("abcdefghijkl"), ("s", "t", "u", "v"), "p", na=2, nb=2, delay=1, basis=BASIS
+    ),
 }
 GOALS = {
     "TIMO: covariance RLS (NumPy) / ours": 10.0,
@@ -185,7 +187,9 @@ def costs(seconds: float) -> dict[tuple[int, int], float]:
     rng = np.random.default_rng(0)
     for outputs, n in found:
         names = tuple(f"y{j}" for j in range(outputs))
-        arx = LPVARX(names, tuple(f"u{i}" for i in range(n // 3)), "p", 0, 1, 1, BASIS)
+        arx = LPVARX(
+            names, tuple(f"u{i}" for i in range(n // 3)), "p", na=0, nb=1, delay=1, basis=BASIS
+        )
         online = RecursiveLeastSquares(arx).online()
         rows = np.column_stack(
             [rng.standard_normal((300, outputs + arx.nu)), rng.uniform(0.0, 13.0, 300)]
@@ -226,7 +230,7 @@ def analysis() -> dict[str, float]:
     except (subprocess.SubprocessError, OSError):
         return {}
     told = json.loads(done.stdout)
-    arx = LPVARX(tuple("abcde"), ("u", "v"), "p", 1, 1, 1, BASIS)
+    arx = LPVARX(tuple("abcde"), ("u", "v"), "p", na=1, nb=1, delay=1, basis=BASIS)
     rls = RecursiveLeastSquares(arx)
     rng = np.random.default_rng(0)
     rows = np.column_stack([rng.standard_normal((3000, 7)), rng.uniform(0.0, 13.0, 3000)])

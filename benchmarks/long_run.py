@@ -47,7 +47,7 @@ def main() -> None:
     options = arguments(__doc__)
     total = 2_000_000 if options.quick else 100_000_000
     rows, truth = flight()
-    arx = LPVARX("y", "u", "p", 1, 1, 1, Polynomial(1, 0.0, 10.0))
+    arx = LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(1, 0.0, 10.0))
     found: dict[str, float] = {}
     for precision in ("double", "single"):
         for name, way in WAYS.items():

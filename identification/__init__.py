@@ -1,13 +1,31 @@
 """Flight records in, LPV models out: recursive, batch and instrumental-variable estimates of
 input-output models with moving coefficients.
 
-    arx = LPVARX(outputs=("q", "theta"), inputs=("d_lon",), scheduling="airspeed", na=2, nb=1,
-                 delay=1, basis=Polynomial(2, 0.0, 13.0))
-    model = fit(arx, record, method="ls")
-    # one step flatters: report one step, a horizon and the free run
-    model.score(record, horizon=1), model.score(record, horizon=50), model.score(record)
+Units are those of the record: SI and radians. The examples of this package start from
 
-Units are those of the record: SI and radians.
+>>> import numpy as np
+>>> import identification as idn
+>>> from symheli import FlightRecord
+>>> rng, n = np.random.default_rng(0), 800
+>>> p, u, noise = np.sin(0.05 * np.arange(n)), rng.uniform(-1, 1, n), 0.01 * rng.normal(size=n)
+>>> y = np.zeros(n)
+>>> for k in range(1, n):
+...     y[k] = (0.5 + 0.3 * p[k - 1]) * y[k - 1] + u[k - 1] + noise[k]
+>>> record = FlightRecord.from_arrays(
+...     0.1 * np.arange(n), dict.fromkeys("yup", "1"), y=y, u=u, p=p
+... )
+>>> arx = idn.LPVARX(
+...     "y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, low=-1.0, high=1.0)
+... )
+>>> model = idn.fit(arx, record)
+
+One step flatters: report one step, a horizon and the free run.
+
+>>> for horizon in (1, 10, None):
+...     print(round(float(model.score(record, horizon)["y"])))
+99
+98
+98
 """
 
 from identification.design.excitation import ExcitationReport, excitation_report
@@ -18,10 +36,14 @@ from identification.design.experiment_design import (
     compare_experiments,
 )
 from identification.estimators.estimate import fit
-from identification.estimators.instrumental_variables import Instruments
+from identification.estimators.instrumental_variables import InstrumentalVariables
+from identification.estimators.instruments import InstrumentSource, LaggedSignals
 from identification.estimators.lasso import Lasso
+from identification.estimators.least_squares import LeastSquares
+from identification.estimators.method import Estimate, Method
 from identification.estimators.output_error import OutputError
-from identification.estimators.refined_instruments import Refined
+from identification.estimators.recursion import Recursion
+from identification.estimators.refined_instruments import RefinedInstruments
 from identification.estimators.ridge import Ridge
 from identification.judge.against_constant import AgainstConstant, against_constant
 from identification.judge.beside_baseline import (
@@ -64,6 +86,7 @@ __all__ = [
     "DependenceReport",
     "Directional",
     "Entry",
+    "Estimate",
     "ExcitationReport",
     "Experiment",
     "Forgetting",
@@ -71,9 +94,13 @@ __all__ = [
     "FrozenModels",
     "Group",
     "History",
-    "Instruments",
+    "InstrumentSource",
+    "InstrumentalVariables",
     "LPVARXModel",
+    "LaggedSignals",
     "Lasso",
+    "LeastSquares",
+    "Method",
     "Online",
     "OrderScan",
     "OutputError",
@@ -83,8 +110,9 @@ __all__ = [
     "Product",
     "RLSInfo",
     "RLSState",
+    "Recursion",
     "RecursiveLeastSquares",
-    "Refined",
+    "RefinedInstruments",
     "ResidualAnalysis",
     "ResponseBand",
     "Ridge",

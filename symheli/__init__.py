@@ -2,7 +2,11 @@
 LPV models out.
 
 Everything is loaded when first used: `import symheli` brings in neither CasADi nor a plotting
-library.
+library. The examples of this package start from
+
+>>> import numpy as np
+>>> import symheli
+>>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
 """
 
 from __future__ import annotations
@@ -11,9 +15,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from symheli.airframe.identified_models import identified_model
+    from symheli.airframe.identified_models import (
+        IdentifiedModel,
+        identified_model,
+        identified_models,
+    )
     from symheli.airframe.vehicle import vehicles
-    from symheli.environment import Dryden, Gust, Wind, standard_atmosphere
+    from symheli.environment import Air, Dryden, Gust, Wind, standard_atmosphere
     from symheli.errors import (
         AccuracyError,
         CertificateError,
@@ -28,10 +36,27 @@ if TYPE_CHECKING:
         TrimError,
         UnknownNameError,
     )
-    from symheli.flight import AirspeedSchedule, Excitation, Sensor, Servo, fly
+    from symheli.flight import (
+        AirspeedSchedule,
+        Autopilot,
+        Excitation,
+        Sensor,
+        Servo,
+        fly,
+        gain_scheduled_lqr,
+    )
     from symheli.flight.stitched_model import StitchedModel
     from symheli.helicopter import Helicopter
-    from symheli.integrate import Trajectory, simulate, simulate_batch
+    from symheli.integrate import (
+        Batch,
+        DormandPrince,
+        Feedback,
+        Radau,
+        RungeKutta4,
+        Trajectory,
+        simulate,
+        simulate_batch,
+    )
     from symheli.lpv import LFT, LinearFamily, LinearGrid, LinearModel, LPVStateSpace, Scheduling
     from symheli.records import FlightRecord
     from symheli.steady.airspeed_sweep import sweep
@@ -41,12 +66,12 @@ if TYPE_CHECKING:
     from symheli.steady.grid_sweep import sweep_grid
     from symheli.steady.linearization import linearize
     from symheli.steady.trim_map import TrimMap, trim_map
-    from symheli.values import Signal
+    from symheli.values import NamedVector, Signal
 
 _ROOMS = {
     "symheli.helicopter": "Helicopter",
     "symheli.airframe.vehicle": "vehicles",
-    "symheli.airframe.identified_models": "identified_model",
+    "symheli.airframe.identified_models": "IdentifiedModel identified_model identified_models",
     "symheli.steady.flight_condition": "FlightCondition",
     "symheli.steady.equilibrium": "TrimPoint trim",
     "symheli.steady.linearization": "linearize",
@@ -54,11 +79,13 @@ _ROOMS = {
     "symheli.steady.grid_sweep": "sweep_grid",
     "symheli.steady.trim_map": "TrimMap trim_map",
     "symheli.steady.derivative_table": "DerivativeTable derivatives",
-    "symheli.integrate": "Trajectory simulate simulate_batch",
-    "symheli.flight": "AirspeedSchedule Excitation Sensor Servo fly",
+    "symheli.integrate": (
+        "Batch DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
+    ),
+    "symheli.flight": "AirspeedSchedule Autopilot Excitation Sensor Servo fly gain_scheduled_lqr",
     "symheli.flight.stitched_model": "StitchedModel",
-    "symheli.environment": "Dryden Gust Wind standard_atmosphere",
-    "symheli.values": "Signal",
+    "symheli.environment": "Air Dryden Gust Wind standard_atmosphere",
+    "symheli.values": "NamedVector Signal",
     "symheli.records": "FlightRecord",
     "symheli.lpv": "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling",
     "symheli.errors": (
@@ -72,25 +99,34 @@ _HOME = {name: module for module, names in _ROOMS.items() for name in names.spli
 __all__ = [
     "LFT",
     "AccuracyError",
+    "Air",
     "AirspeedSchedule",
+    "Autopilot",
+    "Batch",
     "CertificateError",
     "CompilerWarning",
     "ConvergenceWarning",
     "DataWarning",
     "DerivativeTable",
+    "DormandPrince",
     "Dryden",
     "Excitation",
     "ExcitationError",
+    "Feedback",
     "FlightCondition",
     "FlightRecord",
     "Gust",
     "Helicopter",
+    "IdentifiedModel",
     "InputError",
     "LPVStateSpace",
     "LinearFamily",
     "LinearGrid",
     "LinearModel",
+    "NamedVector",
     "PrecisionWarning",
+    "Radau",
+    "RungeKutta4",
     "Scheduling",
     "Sensor",
     "Servo",
@@ -106,7 +142,9 @@ __all__ = [
     "Wind",
     "derivatives",
     "fly",
+    "gain_scheduled_lqr",
     "identified_model",
+    "identified_models",
     "linearize",
     "simulate",
     "simulate_batch",

@@ -6,6 +6,9 @@ import difflib
 from collections.abc import Iterable
 from typing import Any
 
+FEW = 8
+"""So many names are all listed, beside the nearest."""
+
 
 class SymheliError(Exception):
     """Root of every error this project raises on purpose."""
@@ -21,11 +24,10 @@ class UnknownNameError(InputError):
     def __init__(self, kind: str, name: object, known: Iterable[str]):
         known = [str(k) for k in known]
         near = difflib.get_close_matches(str(name), known, n=3, cutoff=0.4)
-        hint = (
-            f"did you mean {' or '.join(repr(str(n)) for n in near)}?"
-            if near
-            else "known: " + ", ".join(known)
-        )
+        every = "known: " + ", ".join(known)
+        hint = f"did you mean {' or '.join(repr(str(n)) for n in near)}?" if near else every
+        if near and len(known) <= FEW:
+            hint += f" ({every})"
         super().__init__(f"unknown {kind} {str(name)!r}; {hint}")
 
 

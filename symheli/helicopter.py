@@ -39,9 +39,35 @@ class Helicopter:
     `governor` is "pi"), `inputs` (d_lon d_lat d_col d_ped) and `wind` (u_w v_w w_w, body axes) are
     `Signal`s that carry their unit; SI and radians.
 
-    governor: "pi" (engine and governor dynamics, 12 states) or "ideal" (rotor speed held exactly,
-    10 states). density: air density, kg/m^3. printed: names from `PRINTED`. smoothing: rounds wake
-    edges and force limits (0: as printed).
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The numbers, with units and sources; `load` reads them from a packaged or another file.
+    governor : {"pi", "ideal"}
+        Engine and governor dynamics (12 states), or rotor speed held exactly (10 states).
+    density : float
+        Of the air, kg/m^3.
+    printed : frozenset of str
+        Names from `PRINTED`: equations as they were printed, where the code corrects them.
+    smoothing : float
+        Rounds wake edges and force limits; 0: as printed.
+
+    Raises
+    ------
+    InputError
+        An unknown governor, a density that is not positive, a vehicle that lacks a number.
+
+    References
+    ----------
+    Gavrilets (2015), Dynamic model for a miniature aerobatic helicopter, Handbook of Unmanned
+    Aerial Vehicles, Springer.
+
+    Examples
+    --------
+    >>> [str(s) for s in heli.states]
+    ['u', 'v', 'w', 'p', 'q', 'r', 'phi', 'theta', 'a1', 'b1']
+    >>> heli.inputs[0].unit, round(float(heli.nominal_speed))
+    ('rad', 167)
     """
 
     vehicle: Vehicle

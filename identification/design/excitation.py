@@ -26,17 +26,43 @@ DISTINCT_TOLERANCE = 1e-6
 BINS = 10
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ExcitationReport:
     """How well the scheduled regressors of a record determine the coefficients of a structure.
 
-    `singular_values` (n,) of the regressor matrix with columns scaled to length 1, largest first;
-    `condition` their ratio; `rank` how many regressors are determined
-    (`identification.design.determined`); `distinct` scheduling values found against `needed`;
-    `occupancy` samples in each of the bins with `edges` (unit of p) over the range of the basis, a
-    row for each of several parameters; `weakest` the direction (n,) the data determine worst, in
-    scaled regressors. `reason` is empty where the data suffice. Where the equations differ in their
-    regressors, this is the report on the worst of them, those of `outputs`.
+    Where the equations differ in their regressors, this is the report on the worst of them.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The n regressors.
+    samples : int
+        Complete rows.
+    rank : int
+        How many regressors are determined (`identification.design.determined`).
+    singular_values : array (n,)
+        Of the regressor matrix with columns scaled to length 1, largest first.
+    condition : float
+        Their ratio.
+    distinct, needed : int
+        Scheduling values found, and needed by the basis.
+    edges, occupancy : array
+        Samples in each of the bins with these edges (unit of p) over the range of the basis, a row
+        for each of several parameters.
+    weakest : array (n,)
+        The direction the data determine worst, in scaled regressors.
+    scheduling : str
+        The parameters, by name.
+    reason : str
+        Why the data do not suffice; empty where they do.
+    outputs : tuple of str
+        Whose equations these are.
+
+    Examples
+    --------
+    >>> report = idn.excitation_report(arx, record)
+    >>> report.sufficient, report.rank, report.needed
+    (True, 4, 2)
     """
 
     names: tuple[str, ...]
@@ -105,6 +131,35 @@ def excitation_report(
 ) -> ExcitationReport:
     """Can these records determine this structure? A value with the answer; nothing is raised for
     poor data.
+
+    Parameters
+    ----------
+    arx : LPVARX
+        What is to be identified.
+    records : FlightRecord or iterable of FlightRecord
+        Of one sample period.
+
+    Returns
+    -------
+    ExcitationReport
+        `str()` of it is a page with the occupancy of the range of p.
+
+    Raises
+    ------
+    UnknownNameError
+        A signal the records lack.
+    InputError
+        The scheduling parameter leaves the range of the basis.
+
+    Examples
+    --------
+    Two values of p do not determine a cubic:
+
+    >>> two = record.with_signals({"p": "1"}, p=np.sign(record["p"]))
+    >>> cubic = idn.LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(3, -1.0, 1.0))
+    >>> report = idn.excitation_report(cubic, two.rows(record["p"] != 0))
+    >>> report.sufficient, report.distinct, report.needed
+    (False, 2, 4)
     """
     return excitation_of(arx, stacked(arx, as_records(records)))
 
@@ -150,19 +205,19 @@ def _report(arx: LPVARX, data: Regression, group: Group) -> ExcitationReport:
             f" {scheduling} moves, or lower na, nb or the size of the basis"
         )
     return ExcitationReport(
-        names,
-        len(data.phi),
-        rank,
-        values,
-        values[0] / values[-1] if values[-1] > 0 else np.inf,
-        distinct,
-        needed,
-        edges,
-        occupancy,
-        weakest,
-        scheduling,
-        reason,
-        tuple(arx.outputs[y] for y in group.outputs),
+        names=names,
+        samples=len(data.phi),
+        rank=rank,
+        singular_values=values,
+        condition=values[0] / values[-1] if values[-1] > 0 else np.inf,
+        distinct=distinct,
+        needed=needed,
+        edges=edges,
+        occupancy=occupancy,
+        weakest=weakest,
+        scheduling=scheduling,
+        reason=reason,
+        outputs=tuple(arx.outputs[y] for y in group.outputs),
     )
 
 

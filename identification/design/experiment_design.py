@@ -21,10 +21,25 @@ from symheli.values.arrays import Array
 class Experiment:
     """A candidate with its information.
 
-    `factor` (n, n), upper triangular, with R' R = phi' phi, the information of the regressors
-    (never squared: it would lose half its digits); `bounds` (n,): standard errors it allows for
-    residuals of unit variance (infinite where it leaves a coefficient open). `exceeded`: {signal:
-    largest value} beyond its limit.
+    Parameters
+    ----------
+    name : str
+        Of the candidate.
+    duration : float
+        s.
+    factor : array (n, n)
+        Upper triangular, with R' R = phi' phi, the information of the regressors (never squared: it
+        would lose half its digits).
+    exceeded : mapping
+        {signal: largest value} beyond its limit.
+
+    Examples
+    --------
+    >>> whole, half = idn.compare_experiments(
+    ...     arx, {"whole": record, "half": record.split(0.5)[0]}, limits={"y": 10.0}
+    ... )
+    >>> whole.name, whole.allowed, bool(np.all(whole.bounds < half.bounds))
+    ('whole', True, True)
     """
 
     name: str
@@ -45,10 +60,22 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The chosen experiments in order, and the standard errors (n,) they allow together for
-    residuals of unit variance.
+    """The chosen experiments in order.
 
-    `gains`: the growth of log det of the information with each, per regressor, from the second on.
+    Parameters
+    ----------
+    experiments : tuple of Experiment
+        The first is the best alone.
+    gains : tuple of float
+        The growth of log det of the information with each, per regressor, from the second on.
+
+    Examples
+    --------
+    >>> early, late = record.split(0.5)
+    >>> found = idn.compare_experiments(arx, {"early": early, "late": late}, limits={})
+    >>> plan = idn.choose_experiments(found, 2)
+    >>> len(plan.experiments), len(plan.gains), plan.bounds.shape
+    (2, 1, (4,))
     """
 
     experiments: tuple[Experiment, ...]
@@ -66,8 +93,34 @@ def compare_experiments(
     """The information in each candidate's record (simulated, or flown), for a structure whose
     equations share their regressors.
 
-    `limits` {signal: largest absolute value} in the units of the record. A record that leaves the
-    range of the basis is refused (`InputError`). Order as given.
+    Parameters
+    ----------
+    structure : LPVARX
+        What is to be identified.
+    candidates : mapping of str to FlightRecord
+        By name.
+    limits : mapping of str to float
+        {signal: largest absolute value} in the units of the record.
+
+    Returns
+    -------
+    tuple of Experiment
+        Order as given.
+
+    Raises
+    ------
+    InputError
+        A record leaves the range of the basis.
+
+    References
+    ----------
+    Morelli (2012), Flight test maneuvers for efficient aerodynamic modeling, J. Aircraft 49.
+
+    Examples
+    --------
+    >>> (one,) = idn.compare_experiments(arx, {"flown": record}, limits={"u": 0.5})
+    >>> one.allowed, list(one.exceeded)
+    (False, ['u'])
     """
     if len(structure.groups) > 1:
         raise InputError(
@@ -90,12 +143,38 @@ def compare_experiments(
 
 
 def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
-    """At most `count` allowed experiments, one after the other, each the one that most increases
-    log det of the information per second.
+    """The allowed experiments that teach most, one after the other: each the one that most
+    increases log det of the information per second.
 
-    (A sequential D-optimal design: independent of the units of the coefficients.) Raises
-    `ExcitationError` where none is allowed. Source: Fedorov (1972), Theory of Optimal Experiments;
-    for flight tests Morelli (2012).
+    A sequential D-optimal design: independent of the units of the coefficients.
+
+    Parameters
+    ----------
+    experiments : tuple of Experiment
+        The candidates.
+    count : int
+        At most so many.
+
+    Returns
+    -------
+    Plan
+        The chosen ones in order.
+
+    Raises
+    ------
+    ExcitationError
+        None is allowed.
+
+    References
+    ----------
+    Fedorov (1972), Theory of Optimal Experiments; for flight tests Morelli (2012).
+
+    Examples
+    --------
+    >>> quiet = record.with_signals({"u": "1", "y": "1"}, u=0.1 * record["u"], y=0.1 * record["y"])
+    >>> found = idn.compare_experiments(arx, {"quiet": quiet, "loud": record}, limits={})
+    >>> [e.name for e in idn.choose_experiments(found, 1).experiments]
+    ['loud']
     """
     if count < 1:
         raise InputError(f"count: expected at least one experiment, got {count}")

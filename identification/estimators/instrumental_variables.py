@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,64 +16,111 @@ from identification.design.excitation import (
     direction_in_words,
     spectrum,
 )
-from identification.estimators.first_stage import FirstStage, first_stage
-from identification.estimators.least_squares import least_squares
-from identification.structure.lpvarx import LPVARX
-from identification.structure.regressors import (
-    Regression,
-    basis_values,
-    regressor_rows,
-    scheduling_values,
-    units_of,
+from identification.estimators.first_stage import WEAK, FirstStage, first_stage
+from identification.estimators.instruments import (
+    Instruments,
+    InstrumentSource,
+    column_space,
+    instrument_rows,
+    source_of,
 )
-from symheli.errors import ExcitationError, InputError
+from identification.estimators.least_squares import least_squares, least_squares_by_group
+from identification.estimators.method import Estimate, Method
+from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import Regression
+from symheli.errors import DataWarning, ExcitationError, InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
+NOISE_FREE = 1e-6
+"""A residual below this part of every output biases no estimate."""
+
+TINY = np.finfo(float).tiny
+
 
 @dataclass(frozen=True)
-class Instruments:
-    """External excitation `signals`, over the last `window` s at no more than `lags` lags each."""
+class InstrumentalVariables(Method):
+    """Two-stage least squares: consistent whatever colours the noise, provided the instruments and
+    p are independent of it.
 
-    signals: tuple[str, ...]
-    window: float = 1.0
-    lags: int = 24
+    Parameters
+    ----------
+    instruments : str, sequence of str, or InstrumentSource
+        Names of signals of the record, `LaggedSignals` of them with their window, or another
+        source. In closed loop name what is added to the stabilised inputs, in open loop the inputs.
+
+    Raises
+    ------
+    InputError
+        Neither names nor a source.
+
+    References
+    ----------
+    Soderstrom and Stoica (1989), System Identification, ch. 8; Ljung (1999), sec. 15.3. Strength:
+    Staiger and Stock, Econometrica 65 (1997).
+
+    Examples
+    --------
+    >>> found = idn.fit(arx, record, method=idn.InstrumentalVariables("u"))
+    >>> print(found.coefficients.at(0.0).A.round(2), found.details["first_stage_F"] > 10)
+    [[[-0.5]]] True
+    """
+
+    instruments: Instruments
+    shorthand: ClassVar[str] = "iv"
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self,
-            "signals",
-            (self.signals,) if isinstance(self.signals, str) else tuple(self.signals),
-        )
-        if not self.signals:
-            raise InputError(
-                'method="iv" needs instruments=("name", ...): the external excitation added to the'
-                " stabilised inputs"
-            )
-        if not (np.isfinite(self.window) and self.window > 0) or self.lags < 1:
-            raise InputError(
-                f"instruments need a window > 0 s and at least one lag, got {self.window} s and"
-                f" {self.lags}"
-            )
+        source_of(self.instruments)
 
     @classmethod
-    def of(cls, value: Sequence[str] | Instruments) -> Instruments:
-        """Names, or the options themselves."""
-        return value if isinstance(value, Instruments) else cls(value)  # type: ignore[arg-type]
-
-    def at(self, dt: float, first: int) -> tuple[int, ...]:
-        """The lags in samples, from `first` (the delay of the inputs) on, evenly over the
-        window.
-        """
-        last = max(first + 1, round(self.window / dt))
-        return tuple(
-            int(i)
-            for i in np.unique(np.round(np.linspace(first, last, min(self.lags, last - first + 1))))
+    def default(cls) -> Method:
+        """There is none: only the flight knows its external excitation. Raises `InputError`."""
+        raise InputError(
+            'method "iv" needs its instruments: InstrumentalVariables(("name", ...)), the external'
+            " excitation added to the stabilised inputs"
         )
+
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """With the strength of the instruments in the details, and a remark where they are weak."""
+        source = source_of(self.instruments)
+        theta, weakest = instrumental_variables(arx, records, data, source)
+        error = np.mean((data.y - data.phi @ theta) ** 2, axis=0)
+        residual = np.sqrt(error / np.mean(data.y**2, axis=0).clip(TINY))
+        return Estimate(
+            theta=theta,
+            details={"first_stage_F": weakest.F, "weakest": weakest.direction},
+            remarks=_weakness(weakest) if np.any(residual > NOISE_FREE) else (),
+        )
+
+
+def _weakness(weakest: FirstStage) -> tuple[Warning, ...]:
+    if weakest.F >= WEAK:
+        return ()
+    return (
+        DataWarning(
+            f"the instruments are weak (first-stage F {weakest.F:.2g}, usual least {WEAK:g}): along"
+            f" {weakest.direction} the estimate is nearly as biased as least squares; excite more,"
+            " name more instruments, widen their window, or lower the order or the degree"
+        ),
+    )
+
+
+def starting_point(
+    arx: LPVARX,
+    records: Sequence[FlightRecord],
+    data: Regression,
+    source: InstrumentSource | None,
+) -> Array:
+    """theta (n, ny) from which an iteration starts: by instruments, or without them by least
+    squares.
+    """
+    if source is None:
+        return least_squares_by_group(arx, data.phi, data.y)
+    return instrumental_variables(arx, records, data, source)[0]
 
 
 def instrumental_variables(
-    arx: LPVARX, records: Sequence[FlightRecord], data: Regression, instruments: Instruments
+    arx: LPVARX, records: Sequence[FlightRecord], data: Regression, source: InstrumentSource
 ) -> tuple[Array, FirstStage]:
     """theta (n, ny) by two-stage least squares with more instruments than unknowns, and how strong
     they are where they are weakest.
@@ -85,32 +133,30 @@ def instrumental_variables(
     Raises `ExcitationError` where the instruments do not determine every coefficient.
     Source: Soderstrom and Stoica (1989), System Identification, ch. 8; Ljung (1999), sec. 15.3.
     """
-    W = np.vstack(
-        [_instrument_rows(arx, record, instruments, arx.input_lags.start) for record in records]
-    )[data.rows]
+    W = instrument_rows(arx, records, source, arx.input_lags.start)[data.rows]
     known = np.isfinite(W).all(axis=1)
     W = W[known]
-    Q = _range(W) if len(W) else W
+    Q = column_space(W) if len(W) else W
     theta, strengths = np.zeros((arx.n_regressors, arx.ny)), []
     own = np.repeat([e.kind in ("offset", "increment") for e in arx.entries], arx.basis.size)
     for group in arx.groups:
         regressors, outputs = arx.regressors(group), np.array(group.outputs)
         names = tuple(arx.regressor_names[i] for i in regressors)
         phi, y = data.phi[known][:, regressors], data.y[known][:, outputs]
-        theta[regressors[:, None], outputs] = _two_stages(phi, y, W, Q, names, instruments)
+        theta[regressors[:, None], outputs] = _two_stages(phi, y, W, Q, names, source)
         strengths.append(first_stage(phi, Q, names, own[regressors]))
     return theta, min(strengths)
 
 
 def _two_stages(
-    phi: Array, y: Array, W: Array, Q: Array, names: tuple[str, ...], instruments: Instruments
+    phi: Array, y: Array, W: Array, Q: Array, names: tuple[str, ...], source: InstrumentSource
 ) -> Array:
     n = phi.shape[1]
     if W.shape[1] < n or len(W) < W.shape[1]:
         raise ExcitationError(
             f"{W.shape[1]} instruments on {len(W)} samples cannot determine {n} coefficients an"
             " output: there must be at least as many instruments as coefficients and more samples"
-            " than both; name more signals, or change the window or lags of Instruments"
+            " than both; name more signals, or change the window or lags of LaggedSignals"
         )
     scale = column_scale(phi)
     first_stage = Q.T @ (phi / scale)
@@ -118,79 +164,7 @@ def _two_stages(
     if values[-1] <= RANK_TOLERANCE * values[0]:
         missing = direction_in_words(directions[-1], names)
         raise ExcitationError(
-            f"the instruments {', '.join(instruments.signals)} leave undetermined: {missing}; "
+            f"the instruments {source} leave undetermined: {missing}; "
             "excite more inputs, name more instruments or widen their window"
         )
     return least_squares(first_stage, Q.T @ y) / scale[:, None]
-
-
-def explained(
-    arx: LPVARX, records: Sequence[FlightRecord], instruments: Instruments
-) -> tuple[list[FlightRecord], list[FlightRecord]]:
-    """The records, and the same with inputs and outputs replaced by what the instruments explain of
-    them (least squares, lags from 0 on).
-
-    What is explained does not know the noise that feedback carries round. Both are NaN where an
-    instrument is missing, so that both break at the same samples.
-    """
-    names = (*arx.inputs, *arx.outputs)
-    tables = [_instrument_rows(arx, record, instruments, 0) for record in records]
-    W, measured = np.vstack(tables), np.vstack([record.columns(names) for record in records])
-    known = np.logical_and(np.isfinite(W).all(axis=1), np.isfinite(measured).all(axis=1))
-    if known.sum() <= W.shape[1]:
-        raise ExcitationError(
-            f"{W.shape[1]} instruments on {known.sum()} samples explain anything; record longer, or"
-            " use fewer lags"
-        )
-    Q = _range(W[known])
-    found = np.full_like(measured, np.nan)
-    found[known] = Q @ (Q.T @ measured[known])
-    units = {str(s): s.unit for s in units_of(names, records)}
-    ends = np.cumsum([len(r) for r in records])[:-1]
-
-    def replaced(table: Array) -> list[FlightRecord]:
-        parts = zip(records, np.split(table, ends), strict=True)
-        return [
-            record.with_signals(units, **dict(zip(names, part.T, strict=True)))
-            for record, part in parts
-        ]
-
-    return replaced(np.where(known[:, None], measured, np.nan)), replaced(found)
-
-
-def _instrument_rows(
-    arx: LPVARX, record: FlightRecord, instruments: Instruments, first: int
-) -> Array:
-    """Instruments (n, m) of every sample of a record, from lag `first` on, NaN where one is
-    missing.
-    """
-    r, p = record.columns(instruments.signals), scheduling_values(arx, record)
-    f, y, u = basis_values(arx, p), record.columns(arx.outputs), record.columns(arx.inputs)
-    at_lag = arx.scheduling_at == "lag"
-    n, parts = len(record), []
-    for lag in instruments.at(record.dt, first):
-        block = np.full((n, r.shape[1] * f.shape[1]), np.nan)
-        for part in record.segments():
-            here, then = (
-                slice(min(part.start + lag, part.stop), part.stop),
-                slice(part.start, max(part.stop - lag, part.start)),
-            )
-            functions = f[then] if at_lag else f[here]
-            block[here] = (r[then][:, :, None] * functions[:, None, :]).reshape(len(functions), -1)
-        parts.append(block)
-    offsets = np.full(
-        (n, (arx.offset + arx.offset_rate * len(arx.parameters)) * f.shape[1]), np.nan
-    )
-    for part in record.segments():
-        if part.stop - part.start > arx.memory:
-            offsets[part.start + arx.memory : part.stop] = regressor_rows(
-                arx, y[part], u[part], p[part], f[part], kinds=("offset", "increment")
-            )
-    return np.hstack([*parts, offsets])
-
-
-def _range(W: Array) -> Array:
-    """Orthonormal basis of the columns of W, dependent ones dropped."""
-    Q, R = np.linalg.qr(W / column_scale(W))
-    U, values, _ = np.linalg.svd(R)
-    return Q @ U[:, values > RANK_TOLERANCE * values[0]]

@@ -2,33 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
+from typing import ClassVar
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from identification.design.excitation import RANK_TOLERANCE, column_scale
 from identification.estimators.least_squares import least_squares
+from identification.estimators.method import Estimate, Method
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression
 from symheli.errors import InputError
+from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True)
-class Lasso:
-    """How many coefficients are kept.
+class Lasso(Method):
+    """Least squares with a price on the absolute value of every coefficient, so that some become
+    exactly zero.
 
-    `weight` in [0, 1] is the price on the absolute value of a coefficient (in columns of mean
-    square 1) as a fraction of the smallest price at which all are zero; None: the point of the path
-    with the smallest extended Bayesian information criterion, for each output, less the
-    coefficients without which the criterion is smaller still. `refit` replaces the shrunk
-    coefficients by least squares on those kept.
+    Parameters
+    ----------
+    weight : float, optional
+        The price (in columns of mean square 1) as a fraction, in [0, 1], of the smallest at which
+        all coefficients are zero; None: the point of the path with the smallest extended Bayesian
+        information criterion, for each output, less the coefficients without which the criterion is
+        smaller still.
+    refit : bool
+        Replace the shrunk coefficients by least squares on those kept.
+
+    Raises
+    ------
+    InputError
+        A weight outside [0, 1].
+
+    References
+    ----------
+    Efron, Hastie, Johnstone and Tibshirani (2004), Least angle regression, Annals of Statistics 32.
+
+    Examples
+    --------
+    Of B(p) = 1 the part that moves with p is left out:
+
+    >>> idn.fit(arx, record, method=idn.Lasso()).details["kept"]
+    [3]
     """
 
     weight: float | None = None
     refit: bool = True
+    shorthand: ClassVar[str] = "lasso"
+    needs_excitation: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.weight is not None and not 0 <= self.weight <= 1:
@@ -36,6 +63,12 @@ class Lasso:
                 "weight: expected a fraction in [0, 1], or None for the information criterion, got"
                 f" {self.weight!r}"
             )
+
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """With the `weight` of each output and how many coefficients it `kept` in the details."""
+        theta, weights = lasso(arx, data, self)
+        kept = np.count_nonzero(theta, axis=0).tolist()
+        return Estimate(theta=theta, details={"weight": weights.tolist(), "kept": kept})
 
 
 def lasso(arx: LPVARX, data: Regression, options: Lasso) -> tuple[Array, Array]:

@@ -2,12 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from identification.design.excitation import column_scale
+from identification.estimators.method import Estimate, Method
+from identification.estimators.self_check import check_least_squares
 from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import Regression
+from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+
+
+@dataclass(frozen=True)
+class LeastSquares(Method):
+    """Least squares over all samples, by QR of scaled columns; the residual is checked to be
+    orthogonal to every regressor.
+
+    Examples
+    --------
+    >>> print(idn.fit(arx, record, method=idn.LeastSquares()).coefficients.at(1.0).A.round(2))
+    [[[-0.8]]]
+    """
+
+    shorthand: ClassVar[str] = "ls"
+
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """By an orthogonal factor for each group of equations with the same regressors."""
+        theta = least_squares_by_group(arx, data.phi, data.y)
+        check_least_squares(arx, data.phi, data.y, theta, self.shorthand)
+        return Estimate(theta=theta)
 
 
 def least_squares(phi: Array, y: Array) -> Array:

@@ -3,33 +3,71 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from identification.estimators.instrumental_variables import starting_point
+from identification.estimators.instruments import Instruments, source_of
+from identification.estimators.method import Estimate, Method, not_settled
+from identification.estimators.refined_instruments import RefinedInstruments
 from identification.model.stretches import Stretch, contracted, free_of, stretches
 from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
+ADVICE = "allow more evaluations, or fit a smaller structure"
+"""What to try where the search stops early."""
+
 
 @dataclass(frozen=True)
-class OutputError:
-    """`initial`: the outputs each stretch starts from are "estimated" with the coefficients, or
-    taken as "measured".
+class OutputError(Method):
+    """The closest free run: the maximum-likelihood estimate for white Gaussian noise on the
+    outputs.
 
-    `evaluations` of the simulation at most, `tolerance` on the relative change of cost and
-    coefficients.
+    The search starts from least squares or (with `instruments`) instrumental variables, and from
+    their refinement; in closed loop coloured noise biases it.
+
+    Parameters
+    ----------
+    instruments : str, sequence of str, or InstrumentSource, optional
+        For the start, as for `InstrumentalVariables`.
+    initial : {"estimated", "measured"}
+        The outputs each stretch starts from: found with the coefficients, or taken as measured.
+    evaluations : int
+        Of the simulation, at most.
+    tolerance : float
+        In (0, 1), on the relative change of cost and coefficients.
+
+    Raises
+    ------
+    InputError
+        A number out of range, or another `initial`.
+
+    References
+    ----------
+    Ljung (1999), System Identification, sec. 4.2 and 7.4.
+
+    Examples
+    --------
+    >>> found = idn.fit(arx, record, method=idn.OutputError())
+    >>> print(found.coefficients.at(0.0).A.round(2))
+    [[[-0.5]]]
     """
 
-    initial: Literal["estimated", "measured"] = "estimated"
-    evaluations: int = 100
-    tolerance: float = 1e-10
+    instruments: Instruments | None = None
+    initial: Literal["estimated", "measured"] = field(default="estimated", kw_only=True)
+    evaluations: int = field(default=100, kw_only=True)
+    tolerance: float = field(default=1e-10, kw_only=True)
+    shorthand: ClassVar[str] = "oe"
 
     def __post_init__(self) -> None:
+        if self.instruments is not None:
+            source_of(self.instruments)
         if self.initial not in ("estimated", "measured"):
             raise InputError(f'initial: expected "estimated" or "measured", got {self.initial!r}')
         if self.evaluations < 1 or not 0 < self.tolerance < 1:
@@ -37,6 +75,29 @@ class OutputError:
                 f"expected evaluations >= 1 and a tolerance in (0, 1), got {self.evaluations} and"
                 f" {self.tolerance}"
             )
+
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """With `evaluations`, whether the search `converged` and its `message`, and the
+        `simulation_covariance` in the details.
+        """
+        source = None if self.instruments is None else source_of(self.instruments)
+        starts = [starting_point(arx, records, data, source)]
+        try:
+            refined = RefinedInstruments(source, iterations=10, tolerance=1e-3)
+            starts.append(refined.estimate(arx, records, data).theta)
+        except ExcitationError:  # a refinement that fails leaves the first start
+            pass
+        found = output_error(arx, records, starts, self)
+        return Estimate(
+            theta=found.theta,
+            details={
+                "evaluations": found.evaluations,
+                "converged": found.converged,
+                "message": found.message,
+                "simulation_covariance": found.simulation_covariance.tolist(),
+            },
+            remarks=() if found.converged else (not_settled(self, ADVICE),),
+        )
 
 
 @dataclass(frozen=True, eq=False)

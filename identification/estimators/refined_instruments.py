@@ -5,7 +5,8 @@ next estimate.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,7 +16,10 @@ from identification.design.excitation import (
     direction_in_words,
     spectrum,
 )
+from identification.estimators.instrumental_variables import starting_point
+from identification.estimators.instruments import Instruments, explained, source_of
 from identification.estimators.least_squares import least_squares
+from identification.estimators.method import Estimate, Method, not_settled
 from identification.estimators.observer import Observer
 from identification.model.stretches import (
     Stretch,
@@ -25,32 +29,85 @@ from identification.model.stretches import (
     stretches,
 )
 from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 Filter = Callable[[Array], Array]
 
+ADVICE = (
+    'a plant that is unstable in open loop needs instruments=("name", ...), the external'
+    ' excitation; where the model is simpler than the plant, method "iv" is the better one'
+)
+"""What to try where the iteration stops early."""
+
 
 @dataclass(frozen=True)
-class Refined:
-    """Iterations at most, the relative change of the coefficients that ends them, and the order of
-    the noise model.
+class RefinedInstruments(Method):
+    """Instrumental variables refined with the simulated response: the model found so far
+    instruments and filters, until nothing moves.
 
-    `noise_order` is that of an autoregressive model of the output noise of each output; 0 takes it
-    as white.
+    Parameters
+    ----------
+    instruments : str, sequence of str, or InstrumentSource, optional
+        As for `InstrumentalVariables`; in closed loop they are needed, and then the plant may be
+        unstable.
+    iterations : int
+        At most.
+    tolerance : float
+        The relative change of the coefficients that ends them.
+    noise_order : int
+        Of an autoregressive model of the output noise of each output; 0 takes it as white.
+
+    Raises
+    ------
+    InputError
+        A number out of range.
+
+    References
+    ----------
+    Laurain, Toth, Gilson and Garnier (2010), Refined instrumental variable methods for
+    identification of LPV Box-Jenkins models, Automatica 46, 959-967.
+
+    Examples
+    --------
+    >>> found = idn.fit(arx, record, method=idn.RefinedInstruments(noise_order=1))
+    >>> print(found.coefficients.at(0.0).A.round(2), found.details["converged"])
+    [[[-0.5]]] True
     """
 
-    iterations: int = 40
-    tolerance: float = 1e-6
-    noise_order: int = 0
+    instruments: Instruments | None = None
+    iterations: int = field(default=40, kw_only=True)
+    tolerance: float = field(default=1e-6, kw_only=True)
+    noise_order: int = field(default=0, kw_only=True)
+    shorthand: ClassVar[str] = "riv"
 
     def __post_init__(self) -> None:
+        if self.instruments is not None:
+            source_of(self.instruments)
         if self.iterations < 1 or self.noise_order < 0 or not self.tolerance > 0:
             given = f"{self.iterations}, {self.noise_order}, {self.tolerance}"
             raise InputError(
                 f"expected iterations >= 1, noise_order >= 0 and a tolerance > 0, got {given}"
             )
+
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """With `iterations`, whether they `converged` and the `noise` model in the details."""
+        source = None if self.instruments is None else source_of(self.instruments)
+        start, exogenous = starting_point(arx, records, data, source), None
+        if source is not None:
+            records, exogenous = explained(arx, records, source)
+        found = refined_instruments(arx, records, exogenous, start, self)
+        return Estimate(
+            theta=found.theta,
+            details={
+                "iterations": found.iterations,
+                "converged": found.converged,
+                "noise": found.noise.tolist(),
+            },
+            remarks=() if found.converged else (not_settled(self, ADVICE),),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +127,7 @@ def refined_instruments(
     records: Sequence[FlightRecord],
     exogenous: Sequence[FlightRecord] | None,
     start: Array,
-    options: Refined,
+    options: RefinedInstruments,
 ) -> Refinement:
     """Iterate from theta `start`: simulate, instrument and filter by the model found so far, solve,
     until nothing moves.

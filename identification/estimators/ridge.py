@@ -4,18 +4,21 @@ p.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import minimize_scalar
 
 from identification.design.excitation import column_scale
+from identification.estimators.method import Estimate, Method
 from identification.structure.lpvarx import LPVARX, Group
 from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FunctionSpace
+from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 GRID = np.linspace(-14.0, 4.0, 37)
@@ -23,19 +26,43 @@ GRID = np.linspace(-14.0, 4.0, 37)
 
 
 @dataclass(frozen=True)
-class Ridge:
-    """What is penalised, and how much.
+class Ridge(Method):
+    """Least squares with a price on coefficients: those the data hardly determine are held small,
+    or held constant in p.
 
     The penalty of one lagged signal with the coefficient a(p) is its mean square times the mean of
-    a(p)^2 over the range of the basis (`towards="zero"`), or of the variation of a(p) about its
-    mean there (`towards="constant"`, the default: the more weight, the closer to the LTI model). It
-    is measured in the output squared, as the mean squared residual is, and depends neither on the
-    units nor on the functions chosen to write a(p). `weight` multiplies it; None: by generalised
-    cross-validation, for each output.
+    a(p)^2 over the range of the basis, or of the variation of a(p) about its mean there. It is
+    measured in the output squared, as the mean squared residual is, and depends neither on the
+    units nor on the functions chosen to write a(p).
+
+    Parameters
+    ----------
+    weight : float, optional
+        Multiplies the penalty; None: by generalised cross-validation, for each output.
+    towards : {"constant", "zero"}
+        What is penalised, the variation about the mean ("constant": the more weight, the closer to
+        the LTI model) or the coefficient itself.
+
+    Raises
+    ------
+    InputError
+        A negative weight, or another `towards`.
+
+    References
+    ----------
+    Golub, Heath and Wahba (1979), Technometrics 21, 215-223 (the choice of the weight).
+
+    Examples
+    --------
+    >>> flat = idn.fit(arx, record, method=idn.Ridge(weight=1e6)).coefficients
+    >>> print(np.ptp(flat.at([-1.0, 1.0]).A).round(3))
+    0.0
     """
 
     weight: float | None = None
     towards: Literal["constant", "zero"] = "constant"
+    shorthand: ClassVar[str] = "ridge"
+    needs_excitation: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.weight is not None and not (np.isfinite(self.weight) and self.weight >= 0):
@@ -44,6 +71,12 @@ class Ridge:
             )
         if self.towards not in ("constant", "zero"):
             raise InputError(f'towards: expected "constant" or "zero", got {self.towards!r}')
+
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """With the `weight` of each output and what it held small in the details."""
+        theta, weights = ridge(arx, data, self)
+        details = {"weight": weights.tolist(), "towards": self.towards}
+        return Estimate(theta=theta, details=details)
 
 
 def ridge(arx: LPVARX, data: Regression, options: Ridge) -> tuple[Array, Array]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from identification.design.leakage import MADE_OF_OUTPUTS, share_from_outputs
 from identification.estimators.estimate import fit
+from identification.estimators.method import Method
 from identification.judge.scores import Scores, horizons, percent, scores
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
@@ -159,8 +160,7 @@ def against_constant(
     *,
     trim: Trim = "still",
     hold_p: bool = False,
-    method: Any = "ls",
-    instruments: Sequence[str] = (),
+    method: Method | str = "ls",
 ) -> AgainstConstant:
     """Fit a scheduled model and the constant one of the same order, and say where scheduling pays.
 
@@ -181,10 +181,8 @@ def against_constant(
         better in sample, or, where that is the same, run free better.
     hold_p : bool
         Predictions hold p from their start, as where it is measured.
-    method : estimator
+    method : Method or str
         As `fit` takes it.
-    instruments : sequence of str
-        Of the record, for "iv".
 
     Returns
     -------
@@ -206,7 +204,8 @@ def against_constant(
     ...     y[k] = (0.7 + 0.2 * p[k - 1]) * y[k - 1] + u[k - 1]
     >>> units = dict.fromkeys("yup", "1")
     >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(600), units, y=y, u=u, p=p)
-    >>> arx = idn.LPVARX("y", "u", "p", 1, 1, 1, idn.Polynomial(1, -1.0, 1.0))
+    >>> arx = idn.LPVARX(
+    ...     "y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
     >>> idn.against_constant(arx, *record.split(0.7)).pays("y")
     True
     """
@@ -220,7 +219,7 @@ def against_constant(
         structures[f"LTI{suffix}"] = arx.lti()
         found = []
         for label, one in structures.items():
-            model = fit(one, training, method=method, instruments=instruments)
+            model = fit(one, training, method)
             found.append(
                 Scored(
                     label=label,

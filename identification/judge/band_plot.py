@@ -10,18 +10,17 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.records.record_plot import GRID, LINE, empty_figure, label
+from symheli.values.arrays import Array
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from identification.judge.uncertainty import Uncertainty
 
 COLUMNS = 4
 
 
-def plot_bands(known: Uncertainty, level: float = 0.95) -> Figure:
-    """A matplotlib figure with one panel a coefficient function: its value over p and the normal
-    confidence interval at each p.
+def plot_bands(known: Uncertainty, level: float = 0.95) -> Array:
+    """One panel a coefficient function, its value over p and the normal confidence interval at each
+    p: an array (coefficients,) of matplotlib's Axes, in a figure that belongs to no window.
 
     Raises `InputError` for several scheduling parameters and a level outside (0, 1).
     """
@@ -51,4 +50,4 @@ def plot_bands(known: Uncertainty, level: float = 0.95) -> Figure:
         ax.tick_params(labelbottom=True)
         ax.set_xlabel(label(model.parameters[0]), fontsize=8)
     figure.suptitle(f"coefficients with their {100 * level:g} % confidence bands", fontsize=9)
-    return figure
+    return axes[: len(shown)]

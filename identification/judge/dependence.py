@@ -27,14 +27,28 @@ ROUNDING = 1e-9
 """A residual below this fraction of the output is rounding: there is nothing left to explain."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DependenceReport:
-    """What p at the other instants explains of the one-step residuals of `outputs`, an entry an
-    output.
+    """What p at the other instants explains of the one-step residuals, an entry an output.
 
-    `at`, `other`: the instants of the model and those tried. `residual`: root mean square as a
-    fraction of that of the output; `explained`: share of the squared residual in [0, 1];
-    `probability` that chance explains as much (F test, white residuals assumed).
+    Parameters
+    ----------
+    outputs : tuple of str
+        ny names.
+    at, other : str
+        The instants of the model and those tried.
+    residual : array (ny,)
+        Root mean square as a fraction of that of the output.
+    explained : array (ny,)
+        Share of the squared residual in [0, 1].
+    probability : array (ny,)
+        That chance explains as much (F test, white residuals assumed).
+
+    Examples
+    --------
+    >>> report = idn.dependence_report(model, record)
+    >>> report.at, report.other, bool(report.explained[0] < 0.05)
+    ('lag', 'now', True)
     """
 
     outputs: tuple[str, ...]
@@ -85,12 +99,34 @@ class DependenceReport:
 def dependence_report(
     model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord]
 ) -> DependenceReport:
-    """Regress the one-step residuals on the same signals with the basis at the other instants: p(k)
-    for "lag", p(k - lag) for "now".
+    """Whether p at other instants explains what a model leaves: its one-step residuals regressed on
+    the same signals with the basis at p(k) for "lag", at p(k - lag) for "now".
 
     What a static dependence cannot express stays in the residual; where p moves slowly from sample
     to sample the two hardly differ and little can be seen. Only what the regressors of the model do
     not explain themselves counts.
+
+    Parameters
+    ----------
+    model : LPVARXModel
+        Fitted by any method.
+    records : FlightRecord or iterable of FlightRecord
+        Of its sample period and units.
+
+    Returns
+    -------
+    DependenceReport
+        `str()` of it says it in a line an output.
+
+    Raises
+    ------
+    InputError
+        Another sample period or unit.
+
+    Examples
+    --------
+    >>> print(idn.dependence_report(model, record).dynamic)
+    (False,)
     """
     arx, records = model.structure, as_records(records)
     for record in records:
@@ -121,7 +157,12 @@ def dependence_report(
     size = np.sqrt(np.mean(y**2, axis=0))
     residual = np.sqrt(np.mean(error**2, axis=0)) / np.where(size > 0, size, 1.0)
     return DependenceReport(
-        arx.outputs, arx.scheduling_at, other.scheduling_at, residual, explained, probability
+        outputs=arx.outputs,
+        at=arx.scheduling_at,
+        other=other.scheduling_at,
+        residual=residual,
+        explained=explained,
+        probability=probability,
     )
 
 

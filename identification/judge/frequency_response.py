@@ -17,14 +17,32 @@ from symheli.values import Signal
 from symheli.values.arrays import Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class FrequencyResponse:
-    """G (n, ny, nu), complex, at `omega` (n,) rad/s, of `outputs` to `inputs`, the other inputs
-    taken off.
+    """Response of outputs to inputs at n frequencies, the other inputs taken off.
 
-    `coherence` (n, ny, nu): partial coherence in [0, 1], the share of what is left of an output
-    that goes with what is left of an input. `multiple` (n, ny): share of each output that all
-    inputs explain. `random_error` (n, ny, nu): normalised standard deviation of |G|.
+    Parameters
+    ----------
+    omega : array (n,)
+        rad/s.
+    G : complex array (n, ny, nu)
+        Output per input.
+    coherence : array (n, ny, nu)
+        Partial coherence in [0, 1], the share of what is left of an output that goes with what is
+        left of an input.
+    multiple : array (n, ny)
+        Share of each output that all inputs explain.
+    random_error : array (n, ny, nu)
+        Normalised standard deviation of |G|.
+    outputs, inputs : tuple of Signal
+        ny and nu of them.
+
+    Examples
+    --------
+    >>> still = record.with_signals({"y": "1"}, y=np.r_[0.0, 2.0 * record["u"][:-1]])
+    >>> found = idn.frequency_response(still, ["y"], ["u"], window=10.0, band=(1.0, 5.0))
+    >>> print(np.abs(found.G[0]).round(1), bool(found.coherence.min() > 0.9))
+    [[2.]] True
     """
 
     omega: Array
@@ -63,15 +81,44 @@ def frequency_response(
     window: float,
     band: tuple[float, float] | None = None,
 ) -> FrequencyResponse:
-    """Spectral estimate from one record or several: Hann windows of `window` s, half overlapping,
-    averaged; G = Gyu Guu^-1.
+    """Spectral estimate G = Gyu Guu^-1 from one record or several: Hann windows, half overlapping,
+    averaged.
 
     A long window resolves low frequencies, a short one averages more: about five windows a record
-    are the least. `band` (rad/s) defaults to 2 pi/`window` .. half the sampling frequency. Windows
-    that a gap or a missing sample touches are left out. Feedback biases G where noise is fed back:
-    excite well. Raises `ExcitationError` where the inputs move together or too few windows remain.
-    Source: Bendat and Piersol (2010), Random Data, ch. 7 and 9; Tischler and Remple (2012), ch. 7
-    to 9.
+    are the least. Windows that a gap or a missing sample touches are left out. Feedback biases G
+    where noise is fed back: excite well.
+
+    Parameters
+    ----------
+    records : FlightRecord or iterable of FlightRecord
+        Of one sample period.
+    outputs, inputs : sequence of str
+        ny and nu signals.
+    window : float
+        Length of a window, s.
+    band : (float, float), optional
+        rad/s; default 2 pi/`window` .. half the sampling frequency.
+
+    Returns
+    -------
+    FrequencyResponse
+        With coherences and random errors.
+
+    Raises
+    ------
+    ExcitationError
+        The inputs move together, or too few windows remain.
+
+    References
+    ----------
+    Bendat and Piersol (2010), Random Data, ch. 7 and 9; Tischler and Remple (2012), Aircraft and
+    Rotorcraft System Identification, ch. 7 to 9.
+
+    Examples
+    --------
+    >>> found = idn.frequency_response(record, ["y"], ["u"], window=10.0, band=(1.0, 5.0))
+    >>> found.G.shape == (len(found.omega), 1, 1)
+    True
     """
     records = as_records(records)
     outputs, inputs = units_of(outputs, records), units_of(inputs, records)
@@ -117,7 +164,15 @@ def frequency_response(
         random_error = np.sqrt(
             0.55 * (1 - coherence) / np.maximum(coherence, tiny) / (2 * max(_independent(count), 1))
         )
-    return FrequencyResponse(omega[keep], G, coherence, multiple, random_error, outputs, inputs)
+    return FrequencyResponse(
+        omega=omega[keep],
+        G=G,
+        coherence=coherence,
+        multiple=multiple,
+        random_error=random_error,
+        outputs=outputs,
+        inputs=inputs,
+    )
 
 
 def _independent(windows: int) -> float:

@@ -17,13 +17,28 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Trial:
-    """One structure: fits in percent by output one step, `horizon` samples and a free run ahead,
-    mean over validation records.
+    """One structure of a scan: fits in percent by output, mean over validation records.
 
-    `bic` (Bayesian information criterion of the training residuals, smaller is better; NaN where
-    refused); `refused`: why the data do not determine it, empty where they do.
+    Parameters
+    ----------
+    structure : LPVARX
+        The one tried.
+    bic : float
+        Bayesian information criterion of the training residuals, smaller is better; NaN where
+        refused.
+    one_step, ahead, free_run : array (ny,)
+        Fits one step, `OrderScan.horizon` samples and a free run ahead, %.
+    refused : str
+        Why the data do not determine it, empty where they do.
+
+    Examples
+    --------
+    >>> scan = idn.order_scan(arx, *record.split(0.6), orders=(1, 2), degrees=(0, 1), horizon=5)
+    >>> trial = scan.trials[0]
+    >>> trial.na, trial.degree, trial.one_step.shape
+    (1, 0, (1,))
     """
 
     structure: LPVARX
@@ -46,7 +61,21 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class OrderScan:
-    """Every trial of a scan over `horizon` samples; `str()` is a table."""
+    """Every trial of a scan; `str()` is a table.
+
+    Parameters
+    ----------
+    trials : tuple of Trial
+        Order by order, degree by degree.
+    horizon : int
+        Samples ahead of the middle fit.
+
+    Examples
+    --------
+    >>> scan = idn.order_scan(arx, *record.split(0.6), orders=(1, 2), degrees=(0, 1), horizon=5)
+    >>> scan.best().na, scan.best().degree
+    (1, 1)
+    """
 
     trials: tuple[Trial, ...]
     horizon: int
@@ -104,11 +133,42 @@ def order_scan(
     horizon: int = 50,
     hold_p: bool = False,
 ) -> OrderScan:
-    """Fit `structure` with every na = nb of `orders` and every polynomial degree, by least squares,
-    and judge it on other records.
+    """Fit a structure with every order na = nb and every polynomial degree, by least squares, and
+    score it on other records.
 
-    Degree 0 is the LTI model; nb follows na. `hold_p` as in `LPVARXModel.predict`: for a measured
-    p. Raises `InputError` where the basis is no polynomial of one parameter.
+    Parameters
+    ----------
+    structure : LPVARX
+        Its basis a polynomial of one parameter; nb follows na.
+    training, validation : FlightRecord or iterable of FlightRecord
+        To fit and to score.
+    orders, degrees : sequence of int
+        Degree 0 is the LTI model.
+    horizon : int
+        Samples ahead of the middle fit.
+    hold_p : bool
+        As in `LPVARXModel.predict`: for a measured p.
+
+    Returns
+    -------
+    OrderScan
+        `best()` of it, or `str()` for a table.
+
+    Raises
+    ------
+    InputError
+        The basis is no polynomial of one parameter.
+
+    References
+    ----------
+    Schwarz (1978), Estimating the dimension of a model, Annals of Statistics 6 (the criterion).
+
+    Examples
+    --------
+    >>> training, validation = record.split(0.6)
+    >>> scan = idn.order_scan(arx, training, validation, orders=(1,), degrees=(0, 1), horizon=5)
+    >>> [trial.degree for trial in scan.trials], scan.best().degree
+    ([0, 1], 1)
     """
     basis = structure.basis
     if not isinstance(basis, Polynomial):
@@ -141,7 +201,14 @@ def _judge(
     try:
         model = fit(structure, train)
     except ExcitationError as error:
-        return Trial(structure, np.nan, nothing, nothing, nothing, str(error))
+        return Trial(
+            structure=structure,
+            bic=np.nan,
+            one_step=nothing,
+            ahead=nothing,
+            free_run=nothing,
+            refused=str(error),
+        )
     data = stacked(structure, train)
     error = data.y - data.phi @ model.theta
     n = len(error)
@@ -157,4 +224,7 @@ def _judge(
         )
         for h in (1, horizon, None)
     ]
-    return Trial(structure, float(bic), *steps)
+    one_step, ahead, free_run = steps
+    return Trial(
+        structure=structure, bic=float(bic), one_step=one_step, ahead=ahead, free_run=free_run
+    )

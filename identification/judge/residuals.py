@@ -20,11 +20,26 @@ ROUNDING = 1e-14
 
 
 class Theil(NamedTuple):
-    """Theil's inequality coefficient in [0, 1] (0: perfect) and the shares of the mean squared
-    error, which sum to 1.
+    """Theil's inequality coefficient and the shares of the mean squared error, which sum to 1.
 
-    All are 0 where the error is rounding. bias: a wrong mean; variance: a wrong size; covariance:
-    the rest, noise and wrong phase. A good model errs by covariance.
+    All are 0 where the error is rounding. A good model errs by covariance.
+
+    Parameters
+    ----------
+    coefficient : float
+        In [0, 1], 0: perfect.
+    bias : float
+        Share of a wrong mean.
+    variance : float
+        Share of a wrong size.
+    covariance : float
+        The rest: noise and wrong phase.
+
+    Examples
+    --------
+    >>> found = idn.theil(record["y"], record["y"] + 0.5)
+    >>> round(found.bias, 3), round(found.variance, 3), round(found.covariance, 3)
+    (1.0, 0.0, 0.0)
     """
 
     coefficient: float
@@ -33,15 +48,30 @@ class Theil(NamedTuple):
     covariance: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ResidualAnalysis:
     """One-step residuals of a model on a record, an entry an output.
 
-    `autocorrelation` (lags + 1, ny), `cross_correlation` (lags + 1, ny, nu) of the residuals with
-    past inputs, both normalised; beyond `bound` in size they are significant at 99 %. `portmanteau`
-    (ny,): Ljung and Box's probability that white residuals look like this or worse. `outside`
-    (ny,): share of the autocorrelation beyond the bound (0.01 expected). `theil`: of the one-step
-    prediction.
+    Parameters
+    ----------
+    outputs, inputs : tuple of str
+        ny and nu names.
+    autocorrelation : array (lags + 1, ny)
+        Normalised.
+    cross_correlation : array (lags + 1, ny, nu)
+        Of the residuals with past inputs, normalised.
+    bound : float
+        Beyond it in size a correlation is significant at 99 %.
+    portmanteau : array (ny,)
+        Ljung and Box's probability that white residuals look like this or worse.
+    theil : tuple of Theil
+        Of the one-step prediction.
+
+    Examples
+    --------
+    >>> found = idn.residual_analysis(model, record)
+    >>> found.autocorrelation.shape, bool(found.portmanteau[0] > 0.01)
+    ((26, 1), True)
     """
 
     outputs: tuple[str, ...]
@@ -84,12 +114,42 @@ class ResidualAnalysis:
 
 def residual_analysis(model: LPVARXModel, record: FlightRecord, lags: int = 25) -> ResidualAnalysis:
     """Whiteness, cross-correlation with the inputs, and Theil's coefficients of the one-step
-    residuals on `record`.
+    residuals.
 
     Rows with a missing neighbour are left out. Cross-correlation with inputs in closed loop may be
-    feedback, at positive lags only it is unmodelled dynamics. Raises `InputError` where fewer than
-    10 `lags` residuals remain. Source: Ljung (1999), System Identification, ch. 16.6; Ljung and
-    Box, Biometrika 65 (1978).
+    feedback, at positive lags only it is unmodelled dynamics.
+
+    Parameters
+    ----------
+    model : LPVARXModel
+        Any.
+    record : FlightRecord
+        Of its sample period and units.
+    lags : int
+        Of the correlations, samples.
+
+    Returns
+    -------
+    ResidualAnalysis
+        `str()` of it says it in a line an output.
+
+    Raises
+    ------
+    InputError
+        Fewer than 10 `lags` residuals remain.
+
+    References
+    ----------
+    Ljung (1999), System Identification, ch. 16.6; Ljung and Box, Biometrika 65 (1978).
+
+    Examples
+    --------
+    A model that takes p for constant leaves what moves with it in the residuals:
+
+    >>> lti = idn.residual_analysis(idn.fit(arx.lti(), record), record)
+    >>> lpv = idn.residual_analysis(model, record)
+    >>> bool(lti.portmanteau[0] < 0.01 < lpv.portmanteau[0])
+    True
     """
     guess = model.predict(record, 1)
     y, u = record.columns(model.outputs), record.columns(model.inputs)
@@ -107,19 +167,42 @@ def residual_analysis(model: LPVARXModel, record: FlightRecord, lags: int = 25) 
     weights = n - np.arange(1, lags + 1)
     statistic = n * (n + 2) * np.sum(auto[1:] ** 2 / weights[:, None], axis=0)
     return ResidualAnalysis(
-        tuple(model.outputs),
-        tuple(model.inputs),
-        auto,
-        cross,
-        float(norm.ppf(0.995) / np.sqrt(n)),
-        chi2.sf(statistic, lags),
-        tuple(theil(y[keep, i], guess[keep, i]) for i in range(y.shape[1])),
+        outputs=tuple(model.outputs),
+        inputs=tuple(model.inputs),
+        autocorrelation=auto,
+        cross_correlation=cross,
+        bound=float(norm.ppf(0.995) / np.sqrt(n)),
+        portmanteau=chi2.sf(statistic, lags),
+        theil=tuple(theil(y[keep, i], guess[keep, i]) for i in range(y.shape[1])),
     )
 
 
 def theil(measured: Array, predicted: Array) -> Theil:
-    """Theil's coefficients of a prediction (n,) of a measured signal (n,). Source: Theil (1970),
-    Economic Forecasts and Policy.
+    """Theil's coefficients of a prediction of a measured signal.
+
+    Parameters
+    ----------
+    measured, predicted : array (n,)
+        In one unit, finite.
+
+    Returns
+    -------
+    Theil
+        Coefficient and shares, dimensionless.
+
+    Raises
+    ------
+    InputError
+        The shapes differ, or an entry is not finite.
+
+    References
+    ----------
+    Theil (1970), Economic Forecasts and Policy.
+
+    Examples
+    --------
+    >>> round(idn.theil([1.0, 2.0, 3.0], [1.1, 1.9, 3.2]).coefficient, 3)
+    0.032
     """
     measured, predicted = np.asarray(measured, float), np.asarray(predicted, float)
     if (

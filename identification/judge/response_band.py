@@ -12,11 +12,23 @@ from symheli.values.arrays import Array, frozen
 
 
 class ResponseBand(NamedTuple):
-    """Frozen response `G` (k, ny, nu), complex, at `omega` (k,) in rad/s, and its `standard_error`
-    (k, ny, nu), in the units of G.
+    """A frozen response and its standard error: the root mean square of |G - truth|, to first order
+    in the errors of the coefficients.
 
-    The standard error is the root mean square of |G - truth|, to first order in the errors of the
-    coefficients.
+    Parameters
+    ----------
+    omega : array (k,)
+        rad/s.
+    G : complex array (k, ny, nu)
+        Output per input.
+    standard_error : array (k, ny, nu)
+        In the units of G.
+
+    Examples
+    --------
+    >>> band = idn.uncertainty(model, record).frequency_response(0.0, [0.1, 1.0])
+    >>> print(np.abs(band.G[:, 0, 0]).round(1), bool(band.standard_error.max() < 0.05))
+    [2. 2.] True
     """
 
     omega: Array

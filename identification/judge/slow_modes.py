@@ -32,10 +32,25 @@ chance.
 
 @dataclass(frozen=True)
 class SlowMode:
-    """A slow pole `s` (complex, 1/s) of the model at the scheduling `p` (one number a parameter).
+    """A slow pole of a model, and what noise leaves of it.
 
-    `standard_error` (1/s) of the pole, from that of the coefficients; `shift` (1/s): how far it
-    moves when least squares is told that the residuals are noise of the sensors.
+    Parameters
+    ----------
+    p : tuple of float
+        The scheduling it is at, one number a parameter.
+    s : complex
+        The pole, 1/s.
+    standard_error : float
+        Of the pole, from that of the coefficients, 1/s.
+    shift : float
+        How far it moves when least squares is told that the residuals are noise of the sensors,
+        1/s.
+
+    Examples
+    --------
+    >>> mode = idn.SlowMode(p=(5.0,), s=-0.2 + 0.5j, standard_error=0.02, shift=0.05)
+    >>> mode.lost, round(mode.error, 3)
+    (False, 0.05)
     """
 
     p: tuple[float, ...]
@@ -63,7 +78,20 @@ class SlowMode:
 
 @dataclass(frozen=True)
 class SlowModes:
-    """The slow `modes` of a model of sample period `dt` (s)."""
+    """The slow modes of a model.
+
+    Parameters
+    ----------
+    modes : tuple of SlowMode
+        Those with |log z| < 0.1.
+    dt : float
+        Sample period of the model, s.
+
+    Examples
+    --------
+    >>> print(idn.SlowModes(modes=(), dt=0.02))
+    slow modes: none
+    """
 
     modes: tuple[SlowMode, ...]
     dt: float
@@ -94,16 +122,43 @@ class SlowModes:
 def slow_modes(
     model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord], points: int = 5
 ) -> SlowModes:
-    """The poles with |log z| < 0.1 of a least-squares model at `points` quantiles of p, and what
-    noise leaves of them.
+    """The poles with |log z| < 0.1 of a least-squares model at quantiles of p, and what noise
+    leaves of them.
 
     Noise of variance s_j^2 on output j adds N, blocks s_j^2 sum f f' at its lags, to the
     information Phi' Phi, and draws slow poles away from 1 or the unit circle; s_j^2 is what leaves
     residuals of the size there are. The shift is the largest that (Phi' Phi - c N)^-1 Phi' y makes
     with c = 0.5, 0.8, 0.9. Standard errors follow the poles to first order. Where the residuals are
-    gusts, not sensors, the shift is too large. Raises `InputError` for models that are not of least
-    squares. Source: Soderstrom (2007), Errors-in-variables methods in system identification,
-    Automatica 43, sec. 5 (bias compensation).
+    gusts, not sensors, the shift is too large.
+
+    Parameters
+    ----------
+    model : LPVARXModel
+        Fitted by "ls" or "rls".
+    records : FlightRecord or iterable of FlightRecord
+        Those it was fitted to.
+    points : int
+        Quantiles of p.
+
+    Returns
+    -------
+    SlowModes
+        `str()` of it says what to do where one is lost.
+
+    Raises
+    ------
+    InputError
+        A model that is not of least squares.
+
+    References
+    ----------
+    Soderstrom (2007), Errors-in-variables methods in system identification, Automatica 43, sec. 5
+    (bias compensation).
+
+    Examples
+    --------
+    >>> print(idn.slow_modes(model, record))
+    slow modes: none
     """
     records = as_records(records)
     joint, data = uncertainty(model, records).joint, stacked(model.structure, records)

@@ -21,15 +21,30 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 class Band(NamedTuple):
-    """One coefficient function of the equation of `output`: what it multiplies, its `value` (n,)
-    and `standard_error` (n,) at each p.
+    """One coefficient function with its standard error at each p.
 
-    `freedom` and `stretch` are those of `Uncertainty`: they make intervals of short or coloured
-    records wider than the normal ones.
+    Parameters
+    ----------
+    output : str
+        Whose equation it is in.
+    regressor : str
+        What it multiplies.
+    value, standard_error : array (n,)
+        At each p, units of the output per that of the regressor.
+    freedom, stretch : float
+        Those of `Uncertainty`: they make intervals of short or coloured records wider than the
+        normal ones.
+
+    Examples
+    --------
+    >>> band = idn.uncertainty(model, record).bands([0.0])[0]
+    >>> low, high = band.interval(0.95)
+    >>> band.regressor, bool(low[0] < -0.5 < high[0])
+    ('y(k-1)', True)
     """
 
     output: str
@@ -49,17 +64,34 @@ class Band(NamedTuple):
         return self.value - half, self.value + half
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Uncertainty:
-    """Covariance of the coefficients of `model`.
+    """Covariance of the coefficients of a model.
 
-    `joint` (ny, n, ny, n): of theta[i, y] with theta[j, z], zero for coefficients an equation does
-    not have. `white` (ny, n, n): of each equation by the formula for white residuals. `colour`
-    (ny,): by how much the standard errors grow on average where residuals are coloured (1: white).
-    `lags` of the correlation, `samples` of the fit; `freedom` (ny,) of the standard errors,
-    `stretch` of intervals: see `identification.judge.coefficient_covariance`. Where a record holds
-    fewer than about 15 independent residuals intervals hold the truth less often than they say
-    still (docs/identification.md).
+    Where a record holds fewer than about 15 independent residuals intervals hold the truth less
+    often than they say still (docs/identification.md).
+
+    Parameters
+    ----------
+    model : LPVARXModel
+        With n regressors and ny outputs.
+    joint : array (ny, n, ny, n)
+        Of theta[i, y] with theta[j, z], zero for coefficients an equation does not have.
+    white : array (ny, n, n)
+        Of each equation by the formula for white residuals.
+    freedom : array (ny,)
+        Degrees of freedom of the standard errors; for `stretch` of intervals see
+        `identification.judge.coefficient_covariance`.
+    lags : int
+        Of the correlation, samples.
+    samples : int
+        Of the fit.
+
+    Examples
+    --------
+    >>> known = idn.uncertainty(model, record)
+    >>> known.standard_errors.shape, bool(known.standard_errors.max() < 0.01)
+    ((4, 1), True)
     """
 
     model: LPVARXModel
@@ -156,8 +188,8 @@ class Uncertainty:
         """
         return response_band(self.model, self.joint, p, omega)
 
-    def plot(self, level: float = 0.95) -> Figure:
-        """A figure of every coefficient function with its confidence band over p; see
+    def plot(self, level: float = 0.95) -> Array:
+        """Axes (coefficients,) with every coefficient function and its confidence band over p; see
         `identification.judge.band_plot`.
         """
         from identification.judge.band_plot import plot_bands
@@ -168,14 +200,42 @@ class Uncertainty:
 def uncertainty(
     model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord], *, lags: int | None = None
 ) -> Uncertainty:
-    """Covariance of the least-squares coefficients of `model` over the records it was fitted to.
+    """Covariance of the least-squares coefficients of a model over the records it was fitted to.
 
     With D = (Phi' Phi)^-1 and R(l) the correlation of the residuals, D [sum_k sum_l phi(k) R(k - l)
     phi(l)'] D instead of sigma^2 D: modelling errors colour residuals, and the white formula is
-    then too optimistic, often by 5 to 10 times. R is tapered (Bartlett) over `lags` samples,
-    default a fifth of the longest run, as in the source. Instrumental-variable estimates are less
-    certain than this says: `InputError`. Source: Morelli and Klein, "Accuracy of aerodynamic model
-    parameters estimated from flight test data", J. Guidance, Control, and Dynamics 20 (1997).
+    then too optimistic, often by 5 to 10 times. R is tapered (Bartlett).
+
+    Parameters
+    ----------
+    model : LPVARXModel
+        Fitted by "ls" or "rls".
+    records : FlightRecord or iterable of FlightRecord
+        Those it was fitted to.
+    lags : int, optional
+        Of R, samples; default a fifth of the longest run, as in the source.
+
+    Returns
+    -------
+    Uncertainty
+        Standard errors, bands over p, draws.
+
+    Raises
+    ------
+    InputError
+        A model that is not of least squares (instrumental-variable estimates are less certain than
+        this says), or lags beyond the longest run.
+
+    References
+    ----------
+    Morelli and Klein, Accuracy of aerodynamic model parameters estimated from flight test data, J.
+    Guidance, Control, and Dynamics 20 (1997).
+
+    Examples
+    --------
+    >>> bands = idn.uncertainty(model, record).bands([-1.0, 1.0])
+    >>> bands[0].value.round(1).tolist()
+    [-0.2, -0.8]
     """
     records = as_records(records)
     arx = model.structure
@@ -197,7 +257,10 @@ def uncertainty(
     if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
     error, reach = data.y - data.phi @ model.theta, int(reach)
-    return Uncertainty(model, *covariances(arx, data.phi, error, runs, reach), reach, len(error))
+    joint, white, freedom = covariances(arx, data.phi, error, runs, reach)
+    return Uncertainty(
+        model=model, joint=joint, white=white, freedom=freedom, lags=reach, samples=len(error)
+    )
 
 
 def _runs(data: Regression) -> list[slice]:

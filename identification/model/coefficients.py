@@ -13,10 +13,24 @@ from symheli.values.arrays import Array, frozen
 
 
 class CoefficientValues(NamedTuple):
-    """Coefficients at given p: A (..., na, ny, ny), B (..., nb, ny, nu), c (..., ny), d (..., ny);
-    the axes of p come first.
+    """Coefficients at given p; the axes of p come first.
 
-    With several parameters d is (..., ny, parameters).
+    Parameters
+    ----------
+    A : array (..., na, ny, ny)
+        Of the outputs.
+    B : array (..., nb, ny, nu)
+        Of the inputs.
+    c : array (..., ny)
+        The offset.
+    d : array (..., ny) or (..., ny, parameters)
+        Of the increment of p.
+
+    Examples
+    --------
+    >>> values = model.coefficients.at([-1.0, 0.0, 1.0])
+    >>> print(values.A[:, 0, 0, 0].round(1))
+    [-0.2 -0.5 -0.8]
     """
 
     A: Array
@@ -25,13 +39,34 @@ class CoefficientValues(NamedTuple):
     d: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Coefficients:
-    """A_i(p) = sum_j f_j(p) A[i-1, j] and so on, f_j the functions of `basis`.
+    """A_i(p) = sum_j f_j(p) A[i-1, j] and so on, f_j the n functions of a basis.
 
-    A (na, n, ny, ny) for output lags 1 .. na, B (nb, n, ny, nu) for the lags `input_lags`, c (n,
-    ny) and d (n, ny) for the offset and the increment of p, d (n, ny, parameters) with several
-    (zero where the structure has none). Units: those of y per those of what they multiply.
+    Units are those of y per those of what they multiply; c and d are zero where the structure has
+    none.
+
+    Parameters
+    ----------
+    basis : FunctionSpace
+        The functions f_j.
+    input_lags : tuple of int
+        The lags of B, samples.
+    A : array (na, n, ny, ny)
+        For the output lags 1 .. na.
+    B : array (nb, n, ny, nu)
+        For `input_lags`.
+    c : array (n, ny)
+        The offset.
+    d : array (n, ny) or (n, ny, parameters)
+        Of the increment of p.
+
+    Examples
+    --------
+    In powers of p, A(p) = -0.5 - 0.3 p:
+
+    >>> print(model.coefficients.monomial().A[0, :, 0, 0].round(1))
+    [-0.5 -0.3]
     """
 
     basis: FunctionSpace
@@ -72,12 +107,12 @@ class Coefficients:
             row += width * n
         A, B, c, increments = blocks.values()
         return cls(
-            arx.basis,
-            tuple(arx.input_lags),
-            A,
-            B,
-            c[0, :, :, 0],
-            increments[0, :, :, 0] if d == 1 else increments[0],
+            basis=arx.basis,
+            input_lags=tuple(arx.input_lags),
+            A=A,
+            B=B,
+            c=c[0, :, :, 0],
+            d=increments[0, :, :, 0] if d == 1 else increments[0],
         )
 
     def theta(self, arx: LPVARX) -> Array:

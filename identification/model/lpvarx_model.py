@@ -16,24 +16,54 @@ from identification.model.coefficients import Coefficients
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import check_units
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Reduction, Scheduling
+from symheli.lpv import BalancedTruncation, FunctionSpace, LinearModel, LPVStateSpace, Scheduling
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal, signals
 from symheli.values.arrays import Array, frozen
 from symheli.values.sample_period import JITTER, same_period
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LPVARXModel:
-    """A structure with its coefficients `theta` (n_regressors, ny) and the sample period `dt` (s)
-    they belong to.
+    """A structure with its coefficients and the sample period they belong to, as `fit` returns it.
 
-    `outputs`, `inputs`, `scheduling` (several where the structure has) carry the units of the
-    record. `residual_covariance` (ny, ny) of the one-step residuals, `rows_used` and `rows_dropped`
-    samples of the fit, `method` how it was fitted, `excitation` the report on the data, `details`
-    what the method chose (weights, iterations, ...): plain numbers and lists by name. `covariance`
-    (ny, n_regressors, n_regressors) of the coefficients, an equation at a time as
-    `Uncertainty.covariance`, where somebody put it there; it is carried along, saved and loaded.
+    Parameters
+    ----------
+    structure : LPVARX
+        Signals, orders, basis.
+    theta : array (n_regressors, ny)
+        The coefficients; zero where an equation lacks a regressor.
+    dt : float
+        Sample period, s.
+    outputs, inputs : tuple of Signal
+        With the units of the record.
+    scheduling : Signal or tuple of Signal
+        Several where the structure has.
+    residual_covariance : array (ny, ny)
+        Of the one-step residuals, in the units of the outputs.
+    rows_used, rows_dropped : int
+        Samples of the fit.
+    method : str
+        How it was fitted.
+    excitation : ExcitationReport, optional
+        On the data.
+    details : mapping
+        What the method chose (weights, iterations, ...): plain numbers and lists by name.
+    covariance : array (ny, n_regressors, n_regressors), optional
+        Of the coefficients, an equation at a time as `Uncertainty.covariance`, where somebody put
+        it there; it is carried along, saved and loaded.
+
+    Raises
+    ------
+    InputError
+        Shapes or signals that are not those of the structure, a period that is not positive.
+
+    Examples
+    --------
+    >>> model.rows_used, model.method, model.predict(record, horizon=5).shape
+    (799, 'ls', (800, 1))
+    >>> print(model.at(0.0).poles().round(1), model.to_state_space().dt)
+    [0.5] 0.1
     """
 
     structure: LPVARX
@@ -168,13 +198,13 @@ class LPVARXModel:
         )
         return build(self.coefficients, parameters, self.outputs, self.inputs, self.dt)
 
-    def reduce(
+    def truncate(
         self, order: int, *, input_scale: object = 1.0, output_scale: object = 1.0
-    ) -> Reduction[LPVStateSpace]:
-        """The exact realization, reduced to `order` states, with the frozen error it makes; see
-        `symheli.lpv.reduce`.
+    ) -> BalancedTruncation[LPVStateSpace]:
+        """The exact realization, truncated to `order` states, with the frozen error it makes; see
+        `symheli.lpv.balanced_truncation`.
         """
-        return self.to_state_space().reduce(
+        return self.to_state_space().truncate(
             order, input_scale=input_scale, output_scale=output_scale
         )
 

@@ -189,11 +189,31 @@ def _flagged(y: Array) -> Array:
 
 
 def fit_percent(y: object, yhat: object) -> Array:
-    """100 (1 - |y - yhat| / |y - mean y|) per output (ny,), dimensionless: 100 is perfect, 0 no
-    better than the mean.
+    """100 (1 - |y - yhat| / |y - mean y|) per output: 100 is perfect, 0 no better than the mean.
 
-    y and yhat (n, ny) or (n,). Rows where either is NaN are left out, output by output; -inf where
-    yhat diverged, NaN where no row is left. Raises `InputError` where the shapes differ.
+    Parameters
+    ----------
+    y, yhat : array (n, ny) or (n,)
+        Measured and predicted. Rows where either is NaN are left out, output by output.
+
+    Returns
+    -------
+    array (ny,)
+        Dimensionless; -inf where yhat diverged, NaN where no row is left.
+
+    Raises
+    ------
+    InputError
+        The shapes differ.
+
+    References
+    ----------
+    Ljung (1999), System Identification (the normalised fit of the MATLAB toolbox).
+
+    Examples
+    --------
+    >>> print(idn.fit_percent([1.0, 2.0, 3.0], [1.0, 2.0, 2.5]).round(1))
+    [64.6]
     """
     y, yhat = np.asarray(y, float), np.asarray(yhat, float)
     if y.shape != yhat.shape or y.ndim not in (1, 2):

@@ -189,7 +189,12 @@ def _doubled(coefficients: Coefficients) -> tuple[FunctionSpace, Coefficients]:
         return out
 
     return new, Coefficients(
-        new, c.input_lags, padded(c.A, 1), padded(c.B, 1), padded(c.c, 0), padded(c.d, 0)
+        basis=new,
+        input_lags=c.input_lags,
+        A=padded(c.A, 1),
+        B=padded(c.B, 1),
+        c=padded(c.c, 0),
+        d=padded(c.d, 0),
     )
 
 

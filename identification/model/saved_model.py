@@ -80,19 +80,19 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> LP
         )
         units = content["units"]
         return LPVARXModel(
-            structure,
-            np.array(content["theta"], float).reshape(-1, structure.ny),
-            content["dt"],
-            _signals(structure.outputs, units),
-            _signals(structure.inputs, units),
-            _signals(structure.parameters, units),
-            content["residual_covariance"],
-            content["rows_used"],
-            content["rows_dropped"],
-            content["method"],
-            None,
-            content["details"],
-            content["covariance"],
+            structure=structure,
+            theta=np.array(content["theta"], float).reshape(-1, structure.ny),
+            dt=content["dt"],
+            outputs=_signals(structure.outputs, units),
+            inputs=_signals(structure.inputs, units),
+            scheduling=_signals(structure.parameters, units),
+            residual_covariance=content["residual_covariance"],
+            rows_used=content["rows_used"],
+            rows_dropped=content["rows_dropped"],
+            method=content["method"],
+            excitation=None,
+            details=content["details"],
+            covariance=content["covariance"],
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise InputError(

@@ -7,6 +7,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from symheli.errors import InputError
 
 FLOOR = 1e-3
@@ -15,15 +17,31 @@ FLOOR = 1e-3
 
 @dataclass(frozen=True)
 class Constant:
-    """A sample k steps old has the weight factor^k; `factor` in (0, 1], 1 forgets nothing.
+    """A sample k steps old has the weight factor^k.
 
-    `floor` keeps the filter awake when excitation stops: the information on a coefficient never
-    falls below that of `floor` samples with its regressor at its largest. It is fed in coefficient
-    by coefficient, as a measurement saying "as it is now", which moves no coefficient, and from the
-    first sample on, so that a cold start makes none wild; 0 turns it off. With factor 1 there is
-    nothing to make up for, and the floor is that of rounding, 32 eps samples. At the floor the gain
-    is large: noise of a fraction r of the largest regressors moves the coefficients within floor /
-    r^2 samples. Raises `InputError` out of range.
+    Parameters
+    ----------
+    factor : float
+        In (0, 1]; 1 forgets nothing.
+    floor : float
+        Keeps the filter awake when excitation stops: the information on a coefficient never falls
+        below that of `floor` samples with its regressor at its largest. It is fed in coefficient by
+        coefficient, as a measurement saying "as it is now", which moves no coefficient, and from
+        the first sample on, so that a cold start makes none wild; 0 turns it off. With factor 1
+        there is nothing to make up for, and the floor is that of rounding, 32 eps samples. At the
+        floor the gain is large: noise of a fraction r of the largest regressors moves the
+        coefficients within floor / r^2 samples.
+
+    Raises
+    ------
+    InputError
+        A number out of range.
+
+    Examples
+    --------
+    >>> rls = idn.RecursiveLeastSquares(arx, idn.Constant(0.99, floor=0.01))
+    >>> print(rls.run(record).model.coefficients.at(0.0).A.round(1))
+    [[[-0.5]]]
     """
 
     factor: float = 1.0
@@ -40,8 +58,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class Variable:
-    """Memory between `longest` and `shortest` samples, shorter when the innovations outgrow what
-    they usually are.
+    """Memory between two lengths, shorter when the innovations outgrow what they usually are.
 
     The factor is 1 - q / longest, q the power of the innovations over the last `recent` samples
     against that over the last `usual` (mean over the outputs of a group), held between the two
@@ -49,11 +66,34 @@ class Variable:
     within longest / q samples, and no faster than `shortest`. In steady noise it is as steady as
     the longest memory (7 % worse at most over 21 plants and noises); a jump hardly seen above the
     noise is followed hardly faster than by it. Louder noise and outliers shorten the memory as a
-    jump does. `floor` as for `Constant`. Windows and memories in samples, at least 1. Raises
-    `InputError` out of range. Source: Fortescue, Kershenbaum and Ydstie (1981), Implementation of
-    self-tuning regulators with variable forgetting factors; powers estimated from the innovations
-    as in Paleologu, Benesty and Ciochina (2008), A robust variable forgetting factor recursive
-    least-squares algorithm for system identification.
+    jump does.
+
+    Parameters
+    ----------
+    longest, shortest : float
+        The memories, samples.
+    recent, usual : float
+        The windows over which innovations are compared, samples.
+    floor : float
+        As for `Constant`.
+
+    Raises
+    ------
+    InputError
+        A number out of range.
+
+    References
+    ----------
+    Fortescue, Kershenbaum and Ydstie (1981), Implementation of self-tuning regulators with variable
+    forgetting factors, Automatica 17; powers estimated from the innovations as in Paleologu,
+    Benesty and Ciochina (2008), A robust variable forgetting factor recursive least-squares
+    algorithm for system identification, IEEE Signal Processing Letters 15.
+
+    Examples
+    --------
+    >>> rls = idn.RecursiveLeastSquares(arx, idn.Variable(longest=500, shortest=50))
+    >>> print(rls.run(record).model.coefficients.at(0.0).A.round(1))
+    [[[-0.5]]]
     """
 
     longest: float = 1000.0
@@ -77,17 +117,38 @@ class Variable:
 
 @dataclass(frozen=True)
 class Directional:
-    """The information along each new regressor is multiplied by `factor` before it is taken in; all
+    """The information along each new regressor is multiplied by a factor before it is taken in; all
     other directions keep theirs.
 
     What is not excited is not forgotten, so that nothing winds up. With n regressors about n / (1 -
     factor) samples are remembered in directions that are excited alike, more in weaker ones: a jump
-    of the plant is followed more slowly there. A sample whose regressors all stay below `quiet` of
-    their largest so far forgets nothing: noise does not wash out what flight has taught (a constant
-    regressor, such as an offset, is never quiet). Raises `InputError` out of range. Source: Cao and
-    Schwartz (2000), A directional forgetting algorithm based on the decomposition of the
-    information matrix; the threshold as in Lai and Bernstein (2024), SIFt-RLS: subspace of
-    information forgetting recursive least squares.
+    of the plant is followed more slowly there.
+
+    Parameters
+    ----------
+    factor : float
+        In (0, 1].
+    quiet : float
+        In [0, 1): a sample whose regressors all stay below this fraction of their largest so far
+        forgets nothing: noise does not wash out what flight has taught (a constant regressor, such
+        as an offset, is never quiet).
+
+    Raises
+    ------
+    InputError
+        A number out of range.
+
+    References
+    ----------
+    Cao and Schwartz (2000), A directional forgetting algorithm based on the decomposition of the
+    information matrix, Automatica 36; the threshold as in Lai and Bernstein (2024), SIFt-RLS:
+    subspace of information forgetting recursive least squares.
+
+    Examples
+    --------
+    >>> rls = idn.RecursiveLeastSquares(arx, idn.Directional(0.98))
+    >>> print(rls.run(record).model.coefficients.at(0.0).A.round(1))
+    [[[-0.5]]]
     """
 
     factor: float = 0.95
@@ -101,6 +162,24 @@ class Directional:
 
 
 Forgetting = Constant | Variable | Directional
+
+
+def forgetting_of(value: float | Forgetting, floor: float | None = None) -> Forgetting:
+    """A way of forgetting, or the `Constant` of a factor and a floor (None: the usual one).
+
+    Raises `InputError` for anything else, and for a floor beside a way of forgetting.
+    """
+    if isinstance(value, Constant | Variable | Directional):
+        if floor is not None:
+            raise InputError(
+                f"floor: belongs to a forgetting factor; give it to {type(value).__name__} instead"
+            )
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
+        raise InputError(
+            f"forgetting: expected a factor, Constant, Variable or Directional, got {value!r}"
+        )
+    return Constant(float(value), FLOOR if floor is None else floor)
 
 
 def check_floor(floor: float) -> None:

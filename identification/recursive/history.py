@@ -14,13 +14,36 @@ if TYPE_CHECKING:
     from identification.recursive.rls_state import RLSState
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class History:
-    """`time` (n,) in s, `coefficients` (n, n_regressors, ny) after each sample, `innovations` (n,
-    ny), NaN where no regressor was complete.
+    """What a recursive estimate did over a record, as `RecursiveLeastSquares.run` returns it.
 
-    `state` after the last sample (go on from it with `update`), `dropped` samples without a
-    regressor.
+    Parameters
+    ----------
+    structure : LPVARX
+        What was identified.
+    time : array (n,)
+        Of the samples, s.
+    coefficients : array (n, n_regressors, ny)
+        After each sample.
+    innovations : array (n, ny)
+        NaN where no regressor was complete.
+    state : RLSState
+        After the last sample; go on from it with `update`.
+    dt : float
+        Sample period, s.
+    outputs, inputs, scheduling : Signal or tuple of Signal
+        With the units of the record.
+    dropped : int
+        Samples without a regressor.
+
+    Examples
+    --------
+    >>> history = idn.RecursiveLeastSquares(arx).run(record)
+    >>> history.coefficients.shape, history.dropped
+    ((800, 4, 1), 1)
+    >>> print(history.model.coefficients.at(0.0).A.round(2))
+    [[[-0.5]]]
     """
 
     structure: LPVARX
@@ -38,14 +61,14 @@ class History:
     def model(self) -> LPVARXModel:
         """The model at the end, its coefficients solved from the triangular factor."""
         return LPVARXModel(
-            self.structure,
-            self.state.solve(),
-            self.dt,
-            self.outputs,
-            self.inputs,
-            self.scheduling,
-            self.state.residual_covariance,
-            self.state.count,
-            self.dropped,
-            "rls",
+            structure=self.structure,
+            theta=self.state.solve(),
+            dt=self.dt,
+            outputs=self.outputs,
+            inputs=self.inputs,
+            scheduling=self.scheduling,
+            residual_covariance=self.state.residual_covariance,
+            rows_used=self.state.count,
+            rows_dropped=self.dropped,
+            method="rls",
         )

@@ -22,6 +22,14 @@ class Online:
     Made by `RecursiveLeastSquares.online`. The first update with float64 arrays of the right shape
     costs microseconds where the kernel is compiled; anything else that is a number works, more
     slowly.
+
+    Examples
+    --------
+    >>> online = idn.RecursiveLeastSquares(arx).online()
+    >>> for k in range(100):
+    ...     learnt = online.update(record["y"][k], record["u"][k], record["p"][k])
+    >>> learnt, online.determined, online.coefficients.shape
+    (True, True, (4, 1))
     """
 
     def __init__(self, configuration: Configuration, kernel: Any, state: RLSState):

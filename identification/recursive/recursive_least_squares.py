@@ -12,14 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.recursive import kernel, saved_state
-from identification.recursive.forgetting import (
-    FLOOR,
-    Constant,
-    Directional,
-    Forgetting,
-    Variable,
-    check_floor,
-)
+from identification.recursive.forgetting import Forgetting, forgetting_of
 from identification.recursive.history import History
 from identification.recursive.kernel.configuration import Configuration
 from identification.recursive.online import Online, vector
@@ -49,13 +42,39 @@ class RecursiveLeastSquares:
     `Constant`). `determined` says whether anything is left open, by the rule of
     `identification.design.determined`.
 
-    `forgetting` is a factor l in (0, 1] (a sample k steps old has the weight l^k; then `floor` is
-    that of `Constant`), or one of `Constant`, `Variable`, `Directional`. `precision` "single"
-    computes as an autopilot without double precision would.
-
     The arithmetic is C where a compiler was there when symheli was installed, else NumPy, with one
-    `CompilerWarning`: the same operations in the same order. Raises `InputError` for an option out
-    of range.
+    `CompilerWarning`: the same operations in the same order.
+
+    Parameters
+    ----------
+    structure : LPVARX
+        What is identified.
+    forgetting : float or Forgetting
+        A factor l in (0, 1] (a sample k steps old has the weight l^k), or one of `Constant`,
+        `Variable`, `Directional`.
+    floor : float, optional
+        That of `Constant`, for a factor.
+    precision : {"double", "single"}
+        "single" computes as an autopilot without double precision would.
+
+    Raises
+    ------
+    InputError
+        An option out of range, or a floor beside a way of forgetting.
+
+    References
+    ----------
+    Gentleman (1973), Least squares computations by Givens transformations without square roots, J.
+    Inst. Maths Applics 12; Bjorck (1996), Numerical Methods for Least Squares Problems, ch. 3.
+
+    Examples
+    --------
+    >>> rls = idn.RecursiveLeastSquares(arx, forgetting=0.995)
+    >>> state = rls.init()
+    >>> for k in range(200):
+    ...     state, info = rls.update(state, record["y"][k], record["u"][k], record["p"][k])
+    >>> info.determined, bool(abs(info.innovation[0]) < 0.1)
+    (True, True)
     """
 
     structure: LPVARX
@@ -67,27 +86,12 @@ class RecursiveLeastSquares:
         require_structure(self.structure)
         if self.precision not in PRECISIONS:
             raise InputError(f'precision: expected "double" or "single", got {self.precision!r}')
-        if isinstance(self.forgetting, Constant | Variable | Directional):
-            if self.floor is not None:
-                raise InputError(
-                    "floor: belongs to a forgetting factor; give it to"
-                    f" {type(self.forgetting).__name__} instead"
-                )
-        elif not isinstance(self.forgetting, int | float | np.floating):
-            raise InputError(
-                "forgetting: expected a factor, Constant, Variable or Directional, got"
-                f" {self.forgetting!r}"
-            )
-        else:
-            check_floor(FLOOR if self.floor is None else self.floor)
-            Constant(float(self.forgetting))
+        forgetting_of(self.forgetting, self.floor)
 
     @cached_property
     def configuration(self) -> Configuration:
         """What the kernel is told; its `sizes` are the numbers of memory the estimator takes."""
-        forgetting = self.forgetting
-        if not isinstance(forgetting, Constant | Variable | Directional):
-            forgetting = Constant(float(forgetting), FLOOR if self.floor is None else self.floor)
+        forgetting = forgetting_of(self.forgetting, self.floor)
         return Configuration(self.structure, forgetting, PRECISIONS[self.precision])
 
     def init(self) -> RLSState:

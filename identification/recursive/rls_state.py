@@ -17,8 +17,20 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class RLSState:
-    """All the estimator remembers; every update returns a new one. `memory` is the kernel's, the
-    properties are what it means.
+    """All the estimator remembers; every update returns a new one.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Of the estimator it belongs to.
+    memory : array
+        The kernel's; the properties are what it means.
+
+    Examples
+    --------
+    >>> state = idn.RecursiveLeastSquares(arx).run(record).state
+    >>> state.count, state.determined, state.theta.shape
+    (799, True, (4, 1))
     """
 
     configuration: Configuration
@@ -157,12 +169,29 @@ class RLSState:
 
 
 class RLSInfo(NamedTuple):
-    """What one sample did: `innovation` (ny,) y minus its prediction before the update, `gain`,
-    `coefficients` (n, ny).
+    """What one sample did.
 
-    `gain` (n,) is how the coefficients of an output move per unit of its innovation; (n, ny) where
-    outputs have different regressors. Without a complete regressor (`available` False) innovation
-    and gain are NaN and nothing was learnt.
+    Parameters
+    ----------
+    available : bool
+        Whether the sample had a complete regressor. Without one innovation and gain are NaN and
+        nothing was learnt.
+    innovation : array (ny,)
+        y minus its prediction before the update.
+    gain : array (n,) or (n, ny)
+        How the coefficients of an output move per unit of its innovation; (n, ny) where outputs
+        have different regressors.
+    coefficients : array (n, ny)
+        After the update.
+    determined : bool
+        Whether the data so far leave no coefficient open.
+
+    Examples
+    --------
+    >>> rls = idn.RecursiveLeastSquares(arx)
+    >>> state, info = rls.update(rls.init(), y=[0.1], u=[1.0], p=0.5)
+    >>> info.available, info.determined
+    (False, False)
     """
 
     available: bool

@@ -5,7 +5,7 @@ parameters.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
@@ -18,10 +18,22 @@ from symheli.values.arrays import Array
 
 
 class Term(NamedTuple):
-    """One block of regressors: signals of one kind at one lag (samples), each times the basis at
-    p(k - p_lag).
+    """One block of regressors: signals of one kind at one lag, each times the basis at p(k -
+    p_lag).
 
-    `signals` are positions among the outputs, the inputs or the scheduling parameters.
+    Parameters
+    ----------
+    kind : {"output", "input", "offset", "increment"}
+        What is multiplied; "increment" is the change of p.
+    lag, p_lag : int
+        Of the signals and of p, in samples.
+    signals : tuple of int
+        Positions among the outputs, the inputs or the scheduling parameters.
+
+    Examples
+    --------
+    >>> arx.terms[0]
+    Term(kind='output', lag=1, p_lag=1, signals=(0,))
     """
 
     kind: Literal["output", "input", "offset", "increment"]
@@ -31,8 +43,21 @@ class Term(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """One signal of a term, by its position `channel` among those of its kind; it takes one
-    regressor for each function of the basis.
+    """One signal of a term; it takes one regressor for each function of the basis.
+
+    Parameters
+    ----------
+    kind : {"output", "input", "offset", "increment"}
+        As in `Term`.
+    channel : int
+        Position of the signal among those of its kind.
+    lag, p_lag : int
+        Of the signal and of p, in samples.
+
+    Examples
+    --------
+    >>> arx.entries[-1]
+    Entry(kind='input', channel=0, lag=1, p_lag=1)
     """
 
     kind: Literal["output", "input", "offset", "increment"]
@@ -42,8 +67,17 @@ class Entry(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Outputs whose equations have the same regressors: positions in `LPVARX.outputs` and in
-    `LPVARX.entries`, ascending.
+    """Outputs whose equations have the same regressors.
+
+    Parameters
+    ----------
+    outputs, entries : tuple of int
+        Positions in `LPVARX.outputs` and in `LPVARX.entries`, ascending.
+
+    Examples
+    --------
+    >>> arx.groups
+    (Group(outputs=(0,), entries=(0, 1)),)
     """
 
     outputs: tuple[int, ...]
@@ -60,35 +94,67 @@ class LPVARX:
 
     y (ny,) are the signals `outputs`, u (nu,) the signals `inputs`, in their own units; A_i (ny,
     ny), B_j (ny, nu), c (ny,) and d (ny, parameters) are combinations of the functions of `basis`.
-    `delay` 0 is direct feedthrough. One formulation covers one or many inputs and outputs.
+    One formulation covers one or many inputs and outputs.
 
-    `na`, `nb` and `delay` are numbers for all signals, or tables: {output: number} says it for the
-    equation of each output, {input: number} (nb, delay) for each input in all equations, {output:
-    {signal: number}} for each signal in each equation; rows of numbers, one an output, say the
-    same. Order 0 leaves a signal out of an equation.
+    Parameters
+    ----------
+    outputs, inputs : str or sequence of str
+        Signals of the record, no name twice; inputs may be none.
+    scheduling : str or sequence of str
+        One parameter, or several: then `basis` is a `Product`. A scheduling parameter may be an
+        output or an input too. For an output only "lag" without `offset_rate` is causal then, and
+        the offset's functions of p repeat some of the output's.
+    na, nb, delay : int or tables
+        Numbers for all signals, or tables: {output: number} says it for the equation of each
+        output, {input: number} (nb, delay) for each input in all equations, {output: {signal:
+        number}} for each signal in each equation; rows of numbers, one an output, say the same.
+        Order 0 leaves a signal out of an equation; delay 0 is direct feedthrough.
+    basis : FunctionSpace
+        The functions of p, on the range they are declared on.
+    scheduling_at : {"lag", "now"}
+        "lag": each coefficient is taken at p(k - lag of its term), c and d at p(k-1): the form that
+        has a minimal state-space realization with static dependence. "now": every coefficient at
+        p(k), as in Budiyono and Sutarto, eqs 9-14.
+    offset : bool
+        Adds c(p), the moving trim.
+    offset_rate : bool
+        Adds d(p) times the change of p over the step that leads to y(k): causal, so that batch and
+        recursive estimates see the same number, and free of the sample period. For whole outputs
+        that move about a trim x0(p), d(p) is x0'(p) to first order in the step; d(p) dt multiplies
+        dp/dt.
 
-    `scheduling` names one parameter, or several: then `basis` is a `Product`.
+    Raises
+    ------
+    InputError
+        Repeated or missing names, negative orders, a basis of another number of parameters, an
+        unknown `scheduling_at`, or an output that would predict itself.
 
-    A scheduling parameter may be an output or an input too. For an output only "lag" without
-    `offset_rate` is causal then, and the offset's functions of p repeat some of the output's.
+    References
+    ----------
+    Bamieh and Giarre (2002), Identification of linear parameter varying models, Int. J. Robust and
+    Nonlinear Control 12.
 
-    `scheduling_at="lag"` (default): each coefficient is taken at p(k - lag of its term), c and d at
-    p(k-1): the form that has a minimal state-space realization with static dependence. "now": every
-    coefficient at p(k), as in Budiyono and Sutarto, eqs 9-14.
-
-    `offset` adds c(p), the moving trim. `offset_rate` adds d(p) times the change of p over the step
-    that leads to y(k): causal, so that batch and recursive estimates see the same number, and free
-    of the sample period. For whole outputs that move about a trim x0(p), d(p) is x0'(p) to first
-    order in the step; d(p) dt multiplies dp/dt.
-
-    Raises `InputError` for repeated or missing names, negative orders, a basis of another number of
-    parameters, an unknown `scheduling_at` or an output that would predict itself. Source: Bamieh
-    and Giarre (2002), Identification of linear parameter varying models.
+    Examples
+    --------
+    >>> arx = idn.LPVARX(
+    ...     outputs=("q", "theta"),
+    ...     inputs="d_lon",
+    ...     scheduling="airspeed",
+    ...     na=2,
+    ...     nb={"d_lon": 1},
+    ...     delay=1,
+    ...     basis=idn.Polynomial(1, low=0.0, high=13.0),
+    ... )
+    >>> arx.n_regressors, arx.memory
+    (10, 2)
+    >>> arx.regressor_names[0]
+    'q(k-1) f0(airspeed(k-1))'
     """
 
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
     scheduling: str | tuple[str, ...]
+    _: KW_ONLY
     na: Orders
     nb: Orders
     delay: Orders

@@ -86,10 +86,10 @@ def write(arguments: argparse.Namespace, heli: Helicopter) -> tuple[Path, ...]:
         arguments.outputs,
         arguments.inputs,
         "airspeed",
-        arguments.na,
-        arguments.nb,
-        arguments.delay,
-        Polynomial(arguments.degree, *arguments.airspeeds),
+        na=arguments.na,
+        nb=arguments.nb,
+        delay=arguments.delay,
+        basis=Polynomial(arguments.degree, *arguments.airspeeds),
         offset=arguments.offset,
     )
     way = (

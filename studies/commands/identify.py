@@ -224,10 +224,10 @@ def run(arguments: argparse.Namespace) -> Output:
         signals.outputs,
         signals.inputs,
         prepared.scheduling,
-        arguments.na,
-        nb,
-        delay,
-        basis,
+        na=arguments.na,
+        nb=nb,
+        delay=delay,
+        basis=basis,
         scheduling_at=arguments.scheduling_at,
         offset=not arguments.no_offset,
     )
@@ -235,6 +235,7 @@ def run(arguments: argparse.Namespace) -> Output:
     trim: Any = {"yes": "moving", "no": "still"}.get(
         arguments.offset_rate, "still" if arguments.no_offset else "auto"
     )
+    method = _method(arguments.method, arguments.instruments)
     if arguments.orders:
         for option in ("plot", "bands", "save"):
             if getattr(arguments, option):
@@ -250,8 +251,7 @@ def run(arguments: argparse.Namespace) -> Output:
         test,
         trim=trim,
         hold_p=hold,
-        method=arguments.method,
-        instruments=arguments.instruments,
+        method=method,
     )
     facts = report.facts(
         arguments.log,
@@ -293,6 +293,18 @@ class _Prepared(NamedTuple):
     kept: int
 
 
+def _method(name: str, instruments: tuple[str, ...]) -> Any:
+    """The method of this name, with its instruments."""
+    from identification import InstrumentalVariables, OutputError, RefinedInstruments
+
+    if not instruments:
+        return name
+    takes = {"iv": InstrumentalVariables, "riv": RefinedInstruments, "oe": OutputError}
+    if name not in takes:
+        raise InputError(f"--instruments are for --method iv, riv or oe, not {name}")
+    return takes[name](instruments)
+
+
 def _prepared(
     arguments: argparse.Namespace, log: Path, signals: _Signals, *, cut: bool
 ) -> _Prepared:
@@ -332,7 +344,7 @@ def _prepared(
         list(dict.fromkeys([*signals.outputs, *signals.inputs, scheduling, *arguments.instruments]))
     )
     if cut:
-        record = conditioning.cut(record, arguments.start, arguments.stop)
+        record = record.between(arguments.start, arguments.stop)
     kept = len(record)
     if arguments.smooth_scheduling:
         record = conditioning.smooth(record, scheduling, arguments.smooth_scheduling)
@@ -348,7 +360,8 @@ def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
     if arguments.plot:
         yield figure.save(figure.figure(result), arguments.plot)
     if arguments.bands:
-        yield figure.save(uncertainty(result.scheduled, result.training).plot(), arguments.bands)
+        bands = uncertainty(result.scheduled, result.training).plot()
+        yield figure.save(bands[0].figure, arguments.bands)
     if arguments.save:
         model = result.scheduled
         if model.method in CERTAIN:

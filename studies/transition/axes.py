@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import symheli
 from identification import (
     LPVARX,
+    InstrumentalVariables,
     LPVARXModel,
     Polynomial,
     RecursiveLeastSquares,
@@ -51,10 +52,10 @@ class Axis:
             self.outputs,
             self.inputs,
             SCHEDULING,
-            order,
-            order,
-            1,
-            basis,
+            na=order,
+            nb=order,
+            delay=1,
+            basis=basis,
             offset=offset,
             offset_rate=offset,
         )
@@ -142,8 +143,7 @@ def identify(
         return fit(
             axis.structure(order, degree),
             training,
-            method=method,  # type: ignore[arg-type]
-            instruments=instruments(axis) if method == "iv" else (),
+            InstrumentalVariables(instruments(axis)) if method == "iv" else method,
         )
 
 

@@ -132,10 +132,10 @@ def structure(output: str, degree: int = 2) -> LPVARX:
         (output,),
         ("d_lon",),
         "airspeed",
-        3,
-        1,
-        2,
-        Polynomial(degree, 0.0, TOP),
+        na=3,
+        nb=1,
+        delay=2,
+        basis=Polynomial(degree, 0.0, TOP),
         scheduling_at="now",
     )
 

@@ -66,7 +66,14 @@ def recover(
         period * np.arange(samples), {n: UNITS[n] for n in columns}, **columns
     )
     arx = LPVARX(
-        STATES, INPUTS, "airspeed", 1, 1, 1, Polynomial(degree, 0.0, TOP), scheduling_at="lag"
+        STATES,
+        INPUTS,
+        "airspeed",
+        na=1,
+        nb=1,
+        delay=1,
+        basis=Polynomial(degree, 0.0, TOP),
+        scheduling_at="lag",
     )
     found = fit(arx, record, method="rls").to_state_space()
     speeds = np.linspace(0.0, TOP, 50)

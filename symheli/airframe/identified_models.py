@@ -35,11 +35,23 @@ _OPERATIONS: dict[type, Callable[..., Any]] = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiedModel(LinearModel):
-    """A `LinearModel` from the literature, with C = I: `title`, `source`, and its `parameters` in
-    SI by the source's names.
+    """A `LinearModel` from the literature, with C = I.
 
-    Parameters that are disputed or were not at hand have `assumed` set, and their source says why
-    they are what they are.
+    Parameters
+    ----------
+    A, B, C, D, states, inputs, outputs, dt, point
+        As in `LinearModel`.
+    title, source : str
+        What it is of, and where from.
+    parameters : mapping of str to Quantity
+        In SI by the source's names. Those that are disputed or were not at hand have `assumed` set,
+        and their source says why they are what they are.
+
+    Examples
+    --------
+    >>> model = symheli.identified_model("r50_hover")
+    >>> [str(s) for s in model.inputs], len(model.parameters) > 20
+    (['lat', 'lon', 'ped', 'col'], True)
     """
 
     title: str = ""
@@ -53,18 +65,53 @@ class IdentifiedModel(LinearModel):
 
 
 def identified_models() -> list[str]:
-    """Names of the identified linear models that come with the package."""
+    """Names of the identified linear models that come with the package.
+
+    Returns
+    -------
+    list of str
+        What `identified_model` takes, beside a path.
+
+    Examples
+    --------
+    >>> symheli.identified_models()
+    ['r50_hover']
+    """
     names = (p.name for p in resources.files("symheli.airframe.vehicles").iterdir())
     return sorted(name.removesuffix(ENDING) for name in names if name.endswith(ENDING))
 
 
 def identified_model(name_or_path: str | os.PathLike[str]) -> IdentifiedModel:
-    """A packaged model by name ("r50_hover": Yamaha R-50 in hover), or any file of that form by its
-    path.
+    """A linear model from the literature.
 
     The file gives for each state its unit and the equation of its derivative, for each parameter
     value, unit and source. That the units fit is checked: the equations must say the same in the
-    file's units and in SI. Raises `InputError`.
+    file's units and in SI.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        A packaged model ("r50_hover": Yamaha R-50 in hover), or any file of that form.
+
+    Returns
+    -------
+    IdentifiedModel
+        A `LinearModel` with its title, source and parameters.
+
+    Raises
+    ------
+    InputError
+        No such model, or units that do not fit.
+
+    References
+    ----------
+    Each file names its own.
+
+    Examples
+    --------
+    >>> model = symheli.identified_model("r50_hover")
+    >>> model.A.shape, model.is_stable()
+    ((13, 13), False)
     """
     given = os.fspath(name_or_path)
     if given.endswith(".toml"):

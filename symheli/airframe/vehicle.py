@@ -104,7 +104,18 @@ class Vehicle:
 
 
 def vehicles() -> list[str]:
-    """Names of the airframes that come with the package."""
+    """Names of the airframes that come with the package.
+
+    Returns
+    -------
+    list of str
+        What `Helicopter.load` takes, beside a path.
+
+    Examples
+    --------
+    >>> symheli.vehicles()
+    ['xcell60', 'xcell_kahn_hudson']
+    """
     files = [p.name for p in resources.files("symheli.airframe.vehicles").iterdir()]
     return sorted(
         name.removesuffix(".toml")

@@ -66,7 +66,7 @@ class Program:
             )
         return out
 
-    def split(self, varying: Sequence[int]) -> tuple[Program, Program]:
+    def hoist(self, varying: Sequence[int]) -> tuple[Program, Program]:
         """(held, rest): what does not depend on the `varying` inputs, and the rest given it, so
         that held work is done once.
 
@@ -125,7 +125,7 @@ def program(function: casadi.Function, varying: Sequence[int] | None = None) -> 
     | |, comparisons and branches.
 
     Two sides of a branch become one selection; a divisor that is constant, used more than once, or
-    independent of the `varying` inputs (default: all vary; see `Program.split`) is inverted once:
+    independent of the `varying` inputs (default: all vary; see `Program.hoist`) is inverted once:
     values differ from CasADi's by rounding. Raises `InputError` where an operation has no such form
     (sin, exp, ...).
     """

@@ -16,7 +16,24 @@ LAPSE_RATE, TROPOPAUSE, CEILING = -0.0065, 11_000.0, 20_000.0  # K/m, geopotenti
 
 
 class Air(NamedTuple):
-    """Air at rest: temperature (K), pressure (Pa), density (kg/m^3), speed of sound (m/s)."""
+    """Air at rest.
+
+    Parameters
+    ----------
+    temperature : float
+        K.
+    pressure : float
+        Pa.
+    density : float
+        kg/m^3.
+    speed_of_sound : float
+        m/s.
+
+    Examples
+    --------
+    >>> round(symheli.standard_atmosphere(0.0).speed_of_sound, 1)
+    340.3
+    """
 
     temperature: float
     pressure: float
@@ -25,11 +42,36 @@ class Air(NamedTuple):
 
 
 def standard_atmosphere(altitude: float, warmer: float = 0.0) -> Air:
-    """The air at a geometric `altitude` above sea level (m, -2000 .. 20000); `warmer` (K) than
-    standard at the same pressure.
+    """The air at an altitude of the standard atmosphere, or warmer at the same pressure.
 
-    Hydrostatic equation with -6.5 K/km up to 11 km, constant temperature above. Raises `InputError`
-    outside that range. Source: U.S. Standard Atmosphere 1976 (the same as ISO 2533 up to there).
+    Hydrostatic equation with -6.5 K/km up to 11 km, constant temperature above.
+
+    Parameters
+    ----------
+    altitude : float
+        Geometric, above sea level, m, -2000 .. 20000.
+    warmer : float
+        Than standard, K.
+
+    Returns
+    -------
+    Air
+        temperature (K), pressure (Pa), density (kg/m^3), speed_of_sound (m/s).
+
+    Raises
+    ------
+    InputError
+        An altitude outside that range.
+
+    References
+    ----------
+    U.S. Standard Atmosphere 1976 (the same as ISO 2533 up to there).
+
+    Examples
+    --------
+    >>> air = symheli.standard_atmosphere(2000.0)
+    >>> round(air.density, 3), round(air.temperature, 2)
+    (1.007, 275.15)
     """
     if not (math.isfinite(altitude) and -2000.0 <= altitude <= CEILING):
         raise InputError(

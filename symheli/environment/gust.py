@@ -15,9 +15,29 @@ class Gust:
     """A 1-cosine gust: velocity `peak`/2 (1 - cos(2 pi (t - start)/duration)), zero before and
     after.
 
-    peak: north, east, down (m/s); start and duration in s. `Gust.over` takes the gradient distance
-    instead. Raises `InputError`. Source: EASA CS-25.341 (a full cosine); MIL-F-8785C, 3.7.1.3 is
-    its first half.
+    Parameters
+    ----------
+    peak : (float, float, float)
+        North, east, down, m/s.
+    start, duration : float
+        s; `Gust.over` takes the gradient distance instead.
+
+    Raises
+    ------
+    InputError
+        A duration that is not positive, or numbers that are not finite.
+
+    References
+    ----------
+    EASA CS-25.341 (a full cosine); MIL-F-8785C, 3.7.1.3 is its first half.
+
+    Examples
+    --------
+    >>> gust = symheli.Gust(peak=(0.0, 3.0, 0.0), start=1.0, duration=2.0)
+    >>> gust([0.0, 1.5, 2.0]).round(2)
+    array([[0. , 0. , 0. ],
+           [0. , 1.5, 0. ],
+           [0. , 3. , 0. ]])
     """
 
     peak: tuple[float, float, float]

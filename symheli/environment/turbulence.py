@@ -15,15 +15,37 @@ LOWEST, HIGHEST = 10 * FOOT, 1000 * FOOT  # m above ground, range of the low-alt
 
 @dataclass(frozen=True)
 class Dryden:
-    """Dryden turbulence below 1000 ft: `wind` (m/s) is the mean wind 20 ft above ground, `altitude`
-    (m) that of flight above ground.
+    """Dryden turbulence below 1000 ft.
 
     With h in feet and c = 0.177 + 0.000823 h: sigma_w = 0.1 wind, sigma_u = sigma_v =
-    sigma_w/c^0.4; L_w = h/2, L_u = h/c^1.2, L_v = L_u/2. A wind of 15, 30, 45 kt (7.7, 15.4, 23.2
-    m/s) is called light, moderate, severe. The field is frozen in the air: it changes with the
-    distance flown through it, not with time. Raises `InputError` outside 10 .. 1000 ft. Source:
+    sigma_w/c^0.4; L_w = h/2, L_u = h/c^1.2, L_v = L_u/2. The field is frozen in the air: it changes
+    with the distance flown through it, not with time.
+
+    Parameters
+    ----------
+    wind : float
+        Mean wind 20 ft above ground, m/s; 15, 30, 45 kt (7.7, 15.4, 23.2 m/s) are called light,
+        moderate, severe.
+    altitude : float
+        Of flight above ground, m.
+
+    Raises
+    ------
+    InputError
+        An altitude outside 10 .. 1000 ft.
+
+    References
+    ----------
     MIL-HDBK-1797 (1997), appendix A, 4.9.2; MIL-F-8785C defines the same processes with lengths L_v
     and L_w twice as large and the factors 2 left out of its spectra.
+
+    Examples
+    --------
+    >>> light = symheli.Dryden(wind=7.7, altitude=30.0)
+    >>> light.intensities.round(2)
+    array([1.32, 1.32, 0.77])
+    >>> light.history(np.arange(0.0, 10.0, 0.02), airspeed=8.0, seed=1).shape
+    (500, 3)
     """
 
     wind: float

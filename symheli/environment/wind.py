@@ -14,11 +14,32 @@ from symheli.errors import InputError
 
 @dataclass(frozen=True)
 class Wind:
-    """`steady` wind (north, east, down, m/s) plus `gusts` plus `turbulence` drawn from `seed`.
+    """Steady wind plus gusts plus turbulence.
 
     Turbulence is laid along north, the heading flights keep: its first component is along the path.
-    The mean wind inside `turbulence` sets its strength only; give it in `steady` too where it shall
-    blow.
+
+    Parameters
+    ----------
+    steady : (float, float, float)
+        North, east, down, m/s.
+    gusts : tuple of Gust
+        Added.
+    turbulence : Dryden, optional
+        The mean wind inside it sets its strength only; give it in `steady` too where it shall blow.
+    seed : int
+        Of the turbulence.
+
+    Raises
+    ------
+    InputError
+        Numbers that are not finite.
+
+    Examples
+    --------
+    >>> gust = symheli.Gust(peak=(0.0, 2.0, 0.0), start=1.0, duration=2.0)
+    >>> wind = symheli.Wind(steady=(-3.0, 0.0, 0.0), gusts=(gust,))
+    >>> wind.is_steady, wind.history([0.0, 2.0], [5.0, 5.0]).round(1).tolist()
+    (False, [[-3.0, 0.0, 0.0], [-3.0, 2.0, 0.0]])
     """
 
     steady: tuple[float, float, float] = (0.0, 0.0, 0.0)

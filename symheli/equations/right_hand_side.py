@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from symheli.helicopter import Helicopter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RightHandSide:
     """xdot = f(states, inputs, wind, inflow) with balance(...) = 0 for the inflow ratios, one a
     rotor, in order of the components.
@@ -48,4 +48,12 @@ def right_hand_side(heli: Helicopter) -> RightHandSide:
         return inflow[-1]
 
     xdot, balance = heli.with_inflow(states, inputs, wind, unknown, list(parameters))
-    return RightHandSide(states, inputs, wind, tuple(inflow), xdot, balance, parameters)
+    return RightHandSide(
+        states=states,
+        inputs=inputs,
+        wind=wind,
+        inflow=tuple(inflow),
+        xdot=xdot,
+        balance=balance,
+        parameters=parameters,
+    )

@@ -34,11 +34,27 @@ INPUT_SCALE = 0.01
 
 @dataclass(frozen=True)
 class Autopilot:
-    """u = u0 - K(V)(x - x0) on the measured `states`, at sample period `dt` (s), gains (K, 4, nx)
-    at `airspeeds` (m/s).
+    """u = u0 - K(V)(x - x0) on the measured states.
 
-    `radius`: largest closed-loop eigenvalue magnitude (one sample of delay included) over the
-    design points, < 1.
+    Parameters
+    ----------
+    airspeeds : array (K,)
+        m/s.
+    gains : array (K, 4, nx)
+        rad per unit of the state.
+    states : tuple of Signal
+        Those measured.
+    dt : float
+        Sample period, s.
+    radius : float
+        Largest closed-loop eigenvalue magnitude (one sample of delay included) over the design
+        points, < 1.
+
+    Examples
+    --------
+    >>> autopilot = symheli.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
+    >>> autopilot.gains.shape, autopilot.radius < 1
+    ((5, 4, 8), True)
     """
 
     airspeeds: np.ndarray
@@ -68,11 +84,45 @@ def gain_scheduled_lqr(
     points: int = 14,
     servos: Mapping[str, Servo] | None = None,
 ) -> Autopilot:
-    """LQR at `points` airspeeds from `low` to `high` (m/s) on the model with quasi-steady flapping,
-    sampled at `dt` (s).
+    """LQR at several airspeeds on the model with quasi-steady flapping.
 
-    Each gain is checked on the full model (flapping states, `servos` where given, one sample of
-    delay) and softened until stable there; raises `InputError` where it never is.
+    Each gain is checked on the full model (flapping states, servos where given, one sample of
+    delay) and softened until stable there.
+
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    low, high : float
+        The range, m/s.
+    dt : float
+        Sample period, s.
+    points : int
+        Airspeeds, evenly from `low` to `high`.
+    servos : mapping of str to Servo, optional
+        By input.
+
+    Returns
+    -------
+    Autopilot
+        For `fly`.
+
+    Raises
+    ------
+    InputError
+        No softening makes it stable.
+
+    References
+    ----------
+    Franklin, Powell and Workman (1998), Digital Control of Dynamic Systems, ch. 9.
+
+    Examples
+    --------
+    >>> autopilot = symheli.gain_scheduled_lqr(heli, 4.0, 6.0, dt=0.02, points=3)
+    >>> slow = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
+    >>> record = symheli.fly(heli, slow, autopilot=autopilot)
+    >>> bool(np.abs(record["phi"]).max() < 0.2)
+    True
     """
     family = sweep(heli, np.linspace(low, high, points))  # type: ignore[arg-type]
     design = family.residualize([s for s in UNMEASURED if s in family.states])

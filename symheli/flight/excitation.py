@@ -16,12 +16,39 @@ Kind = Literal["multisine", "prbs", "chirp"]
 
 @dataclass(frozen=True)
 class Excitation:
-    """A signal for each input named in `amplitude` {input: rad}, in the band (low, high) Hz.
+    """A signal added to each of the named inputs.
 
-    "multisine": harmonics of the record length with random phases, interleaved between inputs
-    (orthogonal over the record), root mean square = amplitude/sqrt(2); "prbs": +-amplitude,
-    switched at random multiples of 1/(2 high) s; "chirp": linear frequency sweeps of `period` s
-    over the band, shifted in time between inputs. `seed` fixes the phases.
+    Parameters
+    ----------
+    amplitude : mapping of str to float
+        {input: rad}.
+    kind : {"multisine", "prbs", "chirp"}
+        "multisine": harmonics of the record length with random phases, interleaved between inputs
+        (orthogonal over the record), root mean square = amplitude/sqrt(2); "prbs": +-amplitude,
+        switched at random multiples of 1/(2 high) s; "chirp": linear frequency sweeps over the
+        band, shifted in time between inputs.
+    band : (float, float)
+        Low and high, Hz.
+    seed : int
+        Fixes the phases.
+    period : float
+        Of a chirp, s.
+
+    Raises
+    ------
+    InputError
+        Another kind, an empty band, an amplitude that is not positive.
+
+    References
+    ----------
+    Morelli (2012), Flight test maneuvers for efficient aerodynamic modeling, J. Aircraft 49
+    (multisines); Tischler and Remple (2012), ch. 5 (sweeps).
+
+    Examples
+    --------
+    >>> signals = symheli.Excitation({"d_lon": 0.01, "d_col": 0.02})(np.arange(0.0, 20.0, 0.02))
+    >>> {name: round(float(np.std(signal)), 4) for name, signal in signals.items()}
+    {'d_lon': 0.0071, 'd_col': 0.0141}
     """
 
     amplitude: Mapping[str, float]

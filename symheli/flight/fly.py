@@ -45,21 +45,56 @@ def fly(
     sensors: Mapping[str, Sensor] | None = None,
     autopilot: Autopilot | None = None,
 ) -> FlightRecord:
-    """Fly `schedule` in the nonlinear model, stabilised by a gain-scheduled LQR, and record every
-    `dt` seconds.
+    """Fly a schedule in the nonlinear model, stabilised by a gain-scheduled LQR, and record it.
 
     The reference at each moment is the quasi-steady trim of the commanded airspeed and acceleration
-    in the steady wind. `excitation` is added to the inputs. `wind`: a `Wind` or a steady one (north
-    east down, m/s), from the start. `servos`: one by input, between command and blade pitch. The
-    autopilot sees what is recorded of u v w p q r phi theta, through `sensors` by signal, or
-    through `noise_db`: white noise this many dB below each signal's own variation (the noise-free
-    flight is flown first to know it).
+    in the steady wind. The autopilot sees what is recorded of u v w p q r phi theta.
 
-    The record holds the measured states, the flapping angles a1 b1 and rotor states (true), the
-    four total inputs, the excitation as e_d_lon .., `airspeed` (true, of the air) and
-    `airspeed_command`; with servos the inputs are the deflections reached, and d_lon_command ..
-    what was asked; with a changing wind also wind_n, wind_e, wind_d. Raises `SymheliError` where
-    the flight is lost.
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    schedule : AirspeedSchedule
+        What is commanded.
+    dt : float
+        Of the control and the record, s.
+    excitation : Excitation, optional
+        Added to the inputs.
+    noise_db : float, optional
+        White noise this many dB below each signal's own variation (the noise-free flight is flown
+        first to know it).
+    seed : int
+        Of the noise.
+    wind : Wind or (float, float, float)
+        Or a steady one, north east down, m/s, from the start.
+    servos : mapping of str to Servo, optional
+        One by input, between command and blade pitch.
+    sensors : mapping of str to Sensor, optional
+        By signal.
+    autopilot : Autopilot, optional
+        Default: an LQR designed at several airspeeds.
+
+    Returns
+    -------
+    FlightRecord
+        The measured states, the flapping angles a1 b1 and rotor states (true), the four total
+        inputs, the excitation as e_d_lon .., `airspeed` (true, of the air) and `airspeed_command`;
+        with servos the inputs are the deflections reached, and d_lon_command .. what was asked;
+        with a changing wind also wind_n, wind_e, wind_d.
+
+    Raises
+    ------
+    SymheliError
+        The flight is lost.
+    InputError
+        Something does not fit.
+
+    Examples
+    --------
+    >>> transition = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=1.0)
+    >>> record = symheli.fly(heli, transition, excitation=symheli.Excitation({"d_lon": 0.01}))
+    >>> round(record.dt, 3), bool(np.abs(record["airspeed"] - record["airspeed_command"]).max() < 1)
+    (0.02, True)
     """
     if not dt > 0:
         raise InputError(f"dt must be a positive number of seconds, got {dt}")

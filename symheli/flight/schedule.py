@@ -13,9 +13,32 @@ from symheli.errors import InputError
 
 @dataclass(frozen=True)
 class AirspeedSchedule:
-    """Airspeed commands joined by half-cosine ramps: targets[i] (m/s) is reached with peak |dV/dt|
-    = accelerations[i] (m/s^2) and held for holds[i] (s); the flight starts at `start` (m/s), held
-    for `lead` (s).
+    """Airspeed commands joined by half-cosine ramps.
+
+    Parameters
+    ----------
+    targets : tuple of float
+        m/s, one a ramp.
+    accelerations : tuple of float
+        Peak |dV/dt| with which each is reached, m/s^2.
+    holds : tuple of float
+        How long each is held, s.
+    start : float
+        Airspeed at the start, m/s.
+    lead : float
+        How long that is held, s.
+
+    Raises
+    ------
+    InputError
+        Lists of different lengths, an acceleration that is not positive, a negative speed or time.
+
+    Examples
+    --------
+    >>> there_and_back = symheli.AirspeedSchedule((8.0, 0.0), (2.0, 2.0), (3.0, 3.0))
+    >>> airspeed, acceleration = there_and_back([0.0, 10.0])
+    >>> airspeed.round(1), round(there_and_back.duration, 1)
+    (array([0., 8.]), 20.6)
     """
 
     targets: tuple[float, ...]

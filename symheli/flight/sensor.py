@@ -13,12 +13,35 @@ from symheli.errors import InputError, UnknownNameError
 
 @dataclass(frozen=True)
 class Sensor:
-    """Measured = true value `delay` s ago, sampled every `period` s and held, plus `bias` plus
-    white `noise`, rounded to `quantum`.
+    """Measured = true value some time ago, sampled and held, plus bias plus white noise, rounded.
 
-    noise (standard deviation), bias and quantum in the signal's own unit (SI, rad); period 0: every
-    control sample. Delay and period act in whole control samples, rounded up. Before the first
-    sample the value at the start is read. Raises `InputError`.
+    Delay and period act in whole control samples, rounded up. Before the first sample the value at
+    the start is read.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation, in the signal's own unit (SI, rad).
+    bias : float
+        In that unit.
+    period : float
+        s; 0: every control sample.
+    delay : float
+        s.
+    quantum : float
+        In the signal's unit; 0: not rounded.
+
+    Raises
+    ------
+    InputError
+        A negative or infinite number.
+
+    Examples
+    --------
+    >>> gyro = symheli.Sensor(noise=0.002, delay=0.02, quantum=1e-4)
+    >>> slow = symheli.AirspeedSchedule.transition(4.0, 5.0, acceleration=1.0, hold=0.5)
+    >>> len(symheli.fly(heli, slow, sensors={"q": gyro}))
+    307
     """
 
     noise: float = 0.0

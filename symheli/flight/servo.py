@@ -14,14 +14,40 @@ from symheli.lpv.linear_model import LinearModel
 from symheli.values.signal import Signal
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Servo:
     """H(s) = (s/zero + 1)/(s/pole + 1) wn^2/(s^2 + 2 z wn s + wn^2) behind a limited, quantised
     command; output within the travel.
 
-    natural_frequency wn, zero and pole in rad/s (both None: second order); damping z dimensionless;
-    `rate`: fastest change of the command it follows (rad/s of blade pitch, inf: no limit); `steps`:
-    positions from stop to stop it resolves (None: all). Raises `InputError`.
+    Parameters
+    ----------
+    natural_frequency : float
+        wn, rad/s.
+    damping : float
+        z, dimensionless.
+    zero, pole : float, optional
+        rad/s; both None: second order.
+    rate : float
+        Fastest change of the command it follows, rad/s of blade pitch; inf: no limit.
+    steps : int, optional
+        Positions from stop to stop it resolves; None: all.
+
+    Raises
+    ------
+    InputError
+        A number that is not positive, or a zero without a pole.
+
+    References
+    ----------
+    Gavrilets (2015), Handbook of Unmanned Aerial Vehicles (the servos of the X-Cell).
+
+    Examples
+    --------
+    >>> cyclic = symheli.Servo(natural_frequency=36.0, damping=0.5, zero=104.0, pole=33.0)
+    >>> slow = symheli.AirspeedSchedule.transition(4.0, 5.0, acceleration=1.0, hold=0.5)
+    >>> record = symheli.fly(heli, slow, servos=dict.fromkeys(map(str, heli.inputs), cyclic))
+    >>> "d_lon_command" in record.signals
+    True
     """
 
     natural_frequency: float

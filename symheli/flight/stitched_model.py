@@ -24,21 +24,48 @@ STEP = 0.005
 _TABLES = {"linear": PiecewiseLinear, "spline": Spline}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class StitchedModel:
     """dx/dt = n(x) + f0(p) + A(p) (x_a - x0(p)) + B(p) (u - u0(p)), looked up at the filtered
     airspeed p.
 
-    n(x) is exact: omega x V, gravity, attitude kinematics and, where `inertia` (Ixx, Iyy, Izz, held
-    rotor inertia added in yaw; kg m^2) is given, the gyroscopic moments. The tables over `basis`
-    hold what is left of each point model: the trim values x0 (K, nx), u0 (K, nu), f0 (K, nx) and
-    the aerodynamic and control derivatives A (K, nx, nx), B (K, nx, nu) per unit of mass and
-    inertia. x_a is x with the velocity through the air. `filter` (s) is the time constant of dp/dt
-    = (V - p)/filter with V the true airspeed (0: looked up at V itself; math.inf: at the start's
-    airspeed for good). Beyond the first and the last anchor the tables keep their end values.
+    n(x) is exact: omega x V, gravity, attitude kinematics and, where `inertia` is given, the
+    gyroscopic moments. The tables hold what is left of each point model. x_a is x with the velocity
+    through the air. Beyond the first and the last anchor the tables keep their end values.
 
-    Sources: Zivan & Tischler (2010), J. American Helicopter Society 55; Tobias & Tischler (2016),
+    Parameters
+    ----------
+    basis : PiecewiseLinear or Spline
+        Of the tables, over K airspeeds.
+    x0, u0, f0 : array (K, nx), (K, nu), (K, nx)
+        The trim values, and what is left of the derivative there.
+    A, B : array (K, nx, nx), (K, nx, nu)
+        The aerodynamic and control derivatives, per unit of mass and inertia.
+    states, inputs : tuple of Signal
+        SI and radians.
+    filter : float
+        Time constant of dp/dt = (V - p)/filter with V the true airspeed, s; 0: looked up at V
+        itself; math.inf: at the start's airspeed for good.
+    inertia : (float, float, float, float), optional
+        Ixx, Iyy, Izz, held rotor inertia added in yaw, kg m^2.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, or an unknown table.
+
+    References
+    ----------
+    Zivan & Tischler (2010), J. American Helicopter Society 55; Tobias & Tischler (2016),
     RDMR-AF-16-01.
+
+    Examples
+    --------
+    >>> stitched = symheli.StitchedModel.from_family(symheli.sweep(heli, [2.0, 5.0, 8.0]))
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> rate = stitched.rhs([point.x[s] for s in stitched.states], [*point.u.values()])
+    >>> bool(np.abs(rate).max() < 1e-9)
+    True
     """
 
     basis: PiecewiseLinear | Spline
@@ -108,16 +135,16 @@ class StitchedModel:
         xdot = np.array([[trim.xdot[s] for s in family.states] for trim in family.trims])
         exact = _rigid_body(inertia)
         return cls(
-            _TABLES[kind](nodes),
-            x0,
-            u0,
-            xdot - exact(x0),
-            family.A - np.stack([_jacobian(exact, x) for x in x0]),
-            family.B,
-            family.states,
-            family.inputs,
-            filter,
-            inertia,
+            basis=_TABLES[kind](nodes),
+            x0=x0,
+            u0=u0,
+            f0=xdot - exact(x0),
+            A=family.A - np.stack([_jacobian(exact, x) for x in x0]),
+            B=family.B,
+            states=family.states,
+            inputs=family.inputs,
+            filter=filter,
+            inertia=inertia,
         )
 
     def airspeed(self, x: object, wind: object = (0.0, 0.0, 0.0)) -> Array:

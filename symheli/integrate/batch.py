@@ -33,8 +33,27 @@ cache.
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """States (N, kept, nx) of `signals` at `times` (kept,) in s of N flights; with feedback,
-    `inputs` (N, kept, 4) used then.
+    """N flights; found["q"] is one state of all (N, kept).
+
+    Parameters
+    ----------
+    times : array (kept,)
+        s.
+    states : array (N, kept, nx)
+        Quaternion form, SI.
+    signals : tuple of Signal
+        nx names.
+    inputs : array (N, kept, 4), optional
+        Used then, with feedback, rad.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> x0 = np.tile(point.x.array, (2, 1))
+    >>> inputs = np.tile(point.u.array, (20, 1))
+    >>> found = symheli.simulate_batch(heli, x0, inputs, dt=0.02, keep=5)
+    >>> found.states.shape, len(found)
+    ((2, 5, 15), 2)
     """
 
     times: Array
@@ -78,16 +97,52 @@ def simulate_batch(
     """N flights by the classical Runge-Kutta method, side by side in vector registers and over the
     cores.
 
-    x0: (N, nx) or one (nx,) for all, in quaternion or Euler form (then heading north from the
-    origin). u: (n, 4) or (N, n, 4), rad, held for `dt` seconds each. wind: (3,), (n, 3), (N, n, 3)
-    or (N, 1, 3), north east down, m/s. parameters: {"body.mass": (N,), "density": ...} or a number
-    for all, SI, in place of those of the helicopter. feedback: added at every sample, shared by all
-    flights. keep: only the "final" state, or every k-th sample from the start on.
+    A flight comes out the same to the bit whatever its neighbours, the number of workers and the
+    compiler or its absence. Memory: the arrays given and the result, (N, kept, nx) doubles. Ctrl-C
+    stops within a sample and raises `KeyboardInterrupt`.
 
-    A flight comes out the same to the bit whatever its neighbours, the number of `workers`
-    (threads, default: the cores this process may use) and the compiler or its absence. Memory: the
-    arrays given and the result, (N, kept, nx) doubles. Ctrl-C stops within a sample and raises
-    `KeyboardInterrupt`. Raises `InputError` where something does not fit.
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    x0 : array (N, nx) or (nx,)
+        One for all, in quaternion or Euler form (then heading north from the origin).
+    u : array (n, 4) or (N, n, 4)
+        rad, each held for `dt`.
+    wind : array (3,), (n, 3), (N, n, 3) or (N, 1, 3)
+        North east down, m/s.
+    dt : float
+        s.
+    method : RungeKutta4, optional
+        With its step.
+    parameters : mapping, optional
+        {"body.mass": (N,), "density": ...} or a number for all, SI, in place of those of the
+        helicopter.
+    feedback : Feedback, optional
+        Added at every sample, shared by all flights.
+    keep : "final" or int
+        Only the last state, or every k-th sample from the start on.
+    workers : int, optional
+        Threads; default the cores this process may use.
+
+    Returns
+    -------
+    Batch
+        States (N, kept, nx), and which flights were lost.
+
+    Raises
+    ------
+    InputError
+        Something does not fit.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> x0 = np.tile(point.x.array, (3, 1))
+    >>> x0[:, 6] += [0.0, 0.1, 0.2]  # phi
+    >>> found = symheli.simulate_batch(heli, x0, np.tile(point.u.array, (25, 1)), dt=0.02)
+    >>> found.final.shape, bool(found.lost.any())
+    ((3, 15), False)
     """
     problem = many_flights(heli, x0, u, wind, dt, parameters or {})
     if keep != "final" and not (isinstance(keep, int) and 1 <= keep <= problem.samples):

@@ -23,11 +23,40 @@ SCALE = {"m/s": 1.0, "rad/s": 1.0, "1": 0.1, "m": 1.0, "rad": 0.1}
 
 @dataclass(frozen=True)
 class DormandPrince:
-    """Steps whose estimated error stays below `absolute` times the usual size of a state (`SCALE`)
-    plus `relative` times its value.
+    """Steps of order 5 whose estimated error stays below a tolerance.
 
-    A step ends where a sample does, for inputs and wind jump there. `largest`: longest step, s.
-    `most`: steps before it gives up. The quaternion is brought back to unit length after each step.
+    A step ends where a sample does, for inputs and wind jump there. The quaternion is brought back
+    to unit length after each step.
+
+    Parameters
+    ----------
+    relative : float
+        Of the value of a state.
+    absolute : float
+        Of the usual size of a state (`SCALE`); the two are added.
+    largest : float
+        Longest step, s.
+    most : int
+        Steps before it gives up.
+
+    Raises
+    ------
+    InputError
+        A number that is not positive.
+
+    References
+    ----------
+    Dormand and Prince (1980), A family of embedded Runge-Kutta formulae, J. Computational and
+    Applied Mathematics 6.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> inputs = np.tile(point.u.array, (10, 1))
+    >>> exact = symheli.DormandPrince(relative=1e-10, absolute=1e-10)
+    >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=exact)
+    >>> bool(np.abs(flown["q"]).max() < 1e-6)
+    True
     """
 
     relative: float = 1e-8

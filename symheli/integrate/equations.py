@@ -34,14 +34,14 @@ class Equations:
         self.parameters = dynamics.parameters
         self._functions = _functions(dynamics)
         self._programs: dict[str, Program] = {}
-        self._split: dict[str, tuple[Program, Program]] = {}
+        self._hoisted: dict[str, tuple[Program, Program]] = {}
         self._libraries: dict[tuple[str, Layout], ctypes.CDLL | None] = {}
 
-    def split(self, which: Which) -> tuple[Program, Program]:
-        """(held, rest) of one of the functions; see `Program.split`."""
-        if which not in self._split:
-            self._split[which] = self._program(which).split(VARYING[which])
-        return self._split[which]
+    def hoisted(self, which: Which) -> tuple[Program, Program]:
+        """(held, rest) of one of the functions; see `Program.hoist`."""
+        if which not in self._hoisted:
+            self._hoisted[which] = self._program(which).hoist(VARYING[which])
+        return self._hoisted[which]
 
     def _program(self, which: Which) -> Program:
         if which not in self._programs:
@@ -85,7 +85,7 @@ class Equations:
                 head,
             ]
             for name in which:
-                held, rest = self.split(name)
+                held, rest = self.hoisted(name)
                 prefix = name.removesuffix("rates")
                 parts.append(f"#define {prefix.upper()}NK {max(len(held.outputs[0]), 1)}\n")
                 parts += [c_function(held, layout, f"{prefix}held"), c_function(rest, layout, name)]

@@ -11,11 +11,34 @@ from symheli.values.arrays import Array, frozen
 
 @dataclass(frozen=True, eq=False)
 class Feedback:
-    """u(k) - K(k) (x - reference(k)), limited to `travel`: K (n, 4, nx), reference (n, nx) in Euler
-    form, travel (4,) in rad.
+    """u(k) - K(k) (x - reference(k)), limited to the travel.
 
     u is what the flight is given: nominal inputs and excitation together. Every flight of a batch
     shares K and the reference.
+
+    Parameters
+    ----------
+    gains : array (n, 4, nx)
+        K, rad per unit of the state.
+    reference : array (n, nx)
+        Euler form.
+    travel : array (4,)
+        rad.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> K = np.zeros((50, 4, len(heli.states)))
+    >>> K[:, 1, heli.states.index("phi")] = 0.02  # d_lat on bank
+    >>> hold = symheli.Feedback(K, np.tile(point.x.array, (50, 1)), heli.travel)
+    >>> inputs = np.tile(point.u.array, (50, 1))
+    >>> len(symheli.simulate(heli, point, inputs, dt=0.02, feedback=hold).times)
+    51
     """
 
     gains: Array

@@ -16,10 +16,33 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class Radau:
-    """Equal implicit steps of at most `step` seconds with `stages` collocation points (order 2
-    stages - 1), stable however stiff.
+    """Equal implicit steps with collocation points, stable however stiff.
 
     The quaternion is brought back to unit length after each sample.
+
+    Parameters
+    ----------
+    step : float
+        At most, s.
+    stages : int
+        Of order 2 stages - 1.
+
+    Raises
+    ------
+    InputError
+        A step that is not positive, or a number of stages that is not offered.
+
+    References
+    ----------
+    Hairer and Wanner (1996), Solving Ordinary Differential Equations II, IV.5 and IV.8.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> inputs = np.tile(point.u.array, (5, 1))
+    >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=symheli.Radau(step=0.02))
+    >>> bool(np.abs(flown["q"]).max() < 1e-6)
+    True
     """
 
     step: float = 0.01

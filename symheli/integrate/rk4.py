@@ -21,8 +21,30 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class RungeKutta4:
-    """Equal steps of at most `step` seconds, dt divided evenly; the quaternion is brought back to
-    unit length after each.
+    """Equal steps of the classical method of order 4, dt divided evenly; the quaternion is brought
+    back to unit length after each.
+
+    Parameters
+    ----------
+    step : float
+        At most, s.
+
+    Raises
+    ------
+    InputError
+        A step that is not positive.
+
+    References
+    ----------
+    Hairer, Norsett and Wanner (1993), Solving Ordinary Differential Equations I, II.1.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> inputs = np.tile(point.u.array, (10, 1))
+    >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=symheli.RungeKutta4(0.002))
+    >>> len(flown.steps), int(flown.per_sample[0])
+    (100, 10)
     """
 
     step: float = 0.005
@@ -133,7 +155,7 @@ class Flights:
         if count == 1:  # the virtual machine is far quicker on one point
             evaluate_one = self.equations.rates
             return lambda x: evaluate_one(x[:, 0], u[:, 0], wind[:, 0], p[:, 0])[0][:, None]
-        held, rest = self.equations.split("rates")
+        held, rest = self.equations.hoisted("rates")
         kept = evaluate(held, u, wind, p)[0]
         return lambda x: np.stack([np.broadcast_to(v, count) for v in evaluate(rest, x, kept)[0]])
 

@@ -32,17 +32,52 @@ def simulate(
     method: str | Method = "rk4",
     feedback: Feedback | None = None,
 ) -> Trajectory:
-    """Fly from `x0` with each row of `u` (n, 4), rad, held for `dt` seconds; the whole flight is
-    one call into machine code.
+    """Fly with given inputs, each held for a sample; the whole flight is one call into machine
+    code.
 
-    x0: a `TrimPoint`, or (nx,) in quaternion form, or in Euler form (then heading north from the
-    origin). wind: (3,) or (n, 3), north east down, m/s. feedback: with "rk4" only. For other
-    numbers of the vehicle see `Helicopter.with_parameters`: nothing is compiled anew.
+    For other numbers of the vehicle see `Helicopter.with_parameters`: nothing is compiled anew.
 
-    method: "rk4" (equal steps), "dopri" (steps by a tolerance), "radau" (implicit, for stiff
-    equations) or one of `RungeKutta4`, `DormandPrince`, `Radau` with options. Raises `InputError`
-    where something does not fit, `SymheliError` where the flight leaves the range of numbers or the
-    method gives up.
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    x0 : TrimPoint or array (nx,)
+        In quaternion form, or in Euler form (then heading north from the origin).
+    u : array (n, 4)
+        rad.
+    wind : array (3,) or (n, 3)
+        North east down, m/s.
+    dt : float
+        How long each row of u is held, s.
+    method : {"rk4", "dopri", "radau"}, RungeKutta4, DormandPrince or Radau
+        Equal steps, steps by a tolerance, implicit (for stiff equations), or one of these with
+        options.
+    feedback : Feedback, optional
+        With "rk4" only.
+
+    Returns
+    -------
+    Trajectory
+        States at n + 1 times.
+
+    Raises
+    ------
+    InputError
+        Something does not fit.
+    SymheliError
+        The flight leaves the range of numbers, or the method gives up.
+
+    References
+    ----------
+    Hairer, Norsett and Wanner (1993), Solving Ordinary Differential Equations I, II.4; Hairer and
+    Wanner (1996), II, IV.8.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> flown = symheli.simulate(heli, point, np.tile(point.u.array, (50, 1)), dt=0.02)
+    >>> bool(np.abs(flown["q"]).max() < 1e-6)
+    True
     """
     made, problem, chosen = equations(heli), one_flight(heli, x0, u, wind, dt), _chosen(method)
     if feedback is not None:
@@ -59,15 +94,15 @@ def simulate(
     wind_flown = np.broadcast_to(problem.wind[0], (problem.samples, 3))
     times = problem.dt * np.arange(problem.samples + 1)
     return Trajectory(
-        times,
-        states,
-        inputs,
-        wind_flown,
-        heli.flight_states,
-        steps,
-        per_sample,
-        chosen,
-        heli.parameters,
+        times=times,
+        states=states,
+        inputs=inputs,
+        wind=wind_flown,
+        signals=heli.flight_states,
+        steps=steps,
+        per_sample=per_sample,
+        method=chosen,
+        parameters=heli.parameters,
     )
 
 

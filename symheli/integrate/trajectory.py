@@ -16,13 +16,35 @@ EULER = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Trajectory:
-    """States (n+1, nx) of `signals` (quaternion form, SI) at `times` (n+1,) in s, under `inputs`
-    (n, 4) and `wind` (n, 3), each held.
+    """What `simulate` returns; flown["q"] is one state, `to_record()` a `FlightRecord`.
 
-    `wind` is north east down, m/s; `parameters` are those of the helicopter. `method` took `steps`
-    (m,), in s, `per_sample` (n,) of them in each sample: derivatives follow the same steps.
+    Parameters
+    ----------
+    times : array (n+1,)
+        s.
+    states : array (n+1, nx)
+        Quaternion form, SI.
+    inputs, wind : array (n, 4), (n, 3)
+        Each row held; wind north east down, m/s.
+    signals : tuple of Signal
+        nx names.
+    steps : array (m,)
+        Those the method took, s.
+    per_sample : array (n,)
+        How many of them in each sample: derivatives follow the same steps.
+    method : RungeKutta4, DormandPrince or Radau
+        With its options.
+    parameters : NamedVector
+        Of the helicopter.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> flown = symheli.simulate(heli, point, np.tile(point.u.array, (50, 1)), dt=0.02)
+    >>> flown.states.shape, round(float(flown.times[-1]), 2), len(flown.to_record())
+    ((51, 15), 1.0, 51)
     """
 
     times: Array

@@ -1,5 +1,19 @@
-"""Linear, LPV and LFT models: pure NumPy, no physics, no solver."""
+"""Linear, LPV and LFT models: pure NumPy, no physics, no solver.
 
+The examples of this package start from a spring that stiffens with p:
+
+>>> import numpy as np
+>>> from symheli import lpv
+>>> spring = lpv.LPVStateSpace.polynomial(
+...     A=[[[0.0, 1.0], [-2.0, -1.0]], [[0.0, 0.0], [-0.5, 0.0]]],
+...     B=[[[0.0], [1.0]]],
+...     C=[[[1.0, 0.0]]],
+...     D=[[[0.0]]],
+...     scheduling=lpv.Scheduling("p", "1", low=0.0, high=1.0),
+... )
+"""
+
+from symheli.lpv.balanced_truncation import BalancedTruncation, balanced_truncation
 from symheli.lpv.bases import (
     Basis,
     BSpline,
@@ -30,7 +44,6 @@ from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.nu_gap import chordal_distance, nu_gap
-from symheli.lpv.reduction import Reduction, reduce
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
 from symheli.lpv.trim_schedule import TrimSchedule
@@ -38,6 +51,7 @@ from symheli.lpv.trim_schedule import TrimSchedule
 __all__ = [
     "LFT",
     "BSpline",
+    "BalancedTruncation",
     "Basis",
     "Block",
     "FunctionSpace",
@@ -52,7 +66,6 @@ __all__ = [
     "PiecewiseLinear",
     "Polynomial",
     "Product",
-    "Reduction",
     "Scheduling",
     "Spline",
     "TrimSchedule",
@@ -60,13 +73,13 @@ __all__ = [
     "UserFunctions",
     "WellPosedness",
     "append",
+    "balanced_truncation",
     "chordal_distance",
     "connect",
     "feedback",
     "nu_gap",
     "pade_delay",
     "parallel",
-    "reduce",
     "series",
     "simulate",
 ]

@@ -12,11 +12,38 @@ from symheli.values.signal import Signal
 
 
 def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:
-    """exp(-s T) for T = `seconds` from `<name>_command` to `name`: Pade's all-pass of `order`, in
-    observer form.
+    """exp(-s T) from `<name>_command` to `name`: Pade's all-pass, in observer form.
 
     The phase is right to 1e-3 rad up to omega T of about `order` (4: up to 200 rad/s for 20 ms).
-    Raises `InputError`.
+
+    Parameters
+    ----------
+    name : str
+        Of the delayed signal.
+    seconds : float
+        T.
+    order : int
+        Number of states.
+
+    Returns
+    -------
+    LinearModel
+        One input, one output.
+
+    Raises
+    ------
+    InputError
+        A delay or an order that is not positive.
+
+    References
+    ----------
+    Golub and Van Loan (2013), Matrix Computations, sec. 9.3 (Pade's approximation of exp).
+
+    Examples
+    --------
+    >>> delay = lpv.pade_delay("d_lat", 0.02)
+    >>> round(float(np.angle(delay.frequency_response([50.0])[0, 0, 0])), 6)
+    -1.0
     """
     if not (math.isfinite(seconds) and seconds > 0) or not 1 <= order <= 10:
         raise InputError(

@@ -21,12 +21,38 @@ AIRSPEED = Signal("airspeed", "m/s")
 
 @dataclass(frozen=True, eq=False)
 class LinearFamily:
-    """K linear models at increasing `airspeeds` (m/s): A (K, nx, nx), B (K, nx, nu), C (K, ny, nx),
-    D (K, ny, nu).
+    """K linear models at increasing airspeeds.
 
-    `trims` holds the operating point of each; empty where the matrices come from elsewhere and none
-    is known. `kinks` maps a name of the physics (a saturation, an edge of a wake) to the airspeeds
-    at which the models change with a corner.
+    Parameters
+    ----------
+    airspeeds : array_like
+        (K,), m/s, increasing.
+    A, B, C, D : array_like
+        (K, nx, nx), (K, nx, nu), (K, ny, nx), (K, ny, nu), in SI units and radians.
+    states, inputs, outputs : sequence of str
+        Names, with units where they are `Signal`s.
+    trims : sequence of OperatingPoint
+        The operating point of each model; empty where the matrices come from elsewhere and none is
+        known.
+    dt : float, optional
+        Sample period, s; None in continuous time.
+    kinks : mapping
+        From a name of the physics (a saturation, an edge of a wake) to the airspeeds at which the
+        models change with a corner.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, airspeeds that do not increase, another number of trims.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> family = symheli.sweep(heli, [2.0, 5.0, 8.0, 11.0])
+    >>> roll = family.select(["v", "p", "r", "phi", "b1"], ["d_lat", "d_ped"])
+    >>> roll.interpolate("polynomial", degree=2).at(4.0).A.shape
+    (5, 5)
     """
 
     airspeeds: Array

@@ -20,11 +20,29 @@ from symheli.values.signal import Signal, indices, signals
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """dx/dt = A x + B u, y = C x + D u (dt None) or x(k+1) = A x + B u (dt in s), in deviations
-    from `point`.
+    """dx/dt = A x + B u, y = C x + D u, or x(k+1) = A x(k) + B u(k), in deviations from `point`.
 
-    A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) in SI units and radians; `states`, `inputs`,
-    `outputs` are `Signal`s: strings that carry their unit.
+    Parameters
+    ----------
+    A, B, C, D : array (nx, nx), (nx, nu), (ny, nx), (ny, nu)
+        SI units and radians.
+    states, inputs, outputs : tuple of Signal
+        Strings that carry their unit.
+    dt : float, optional
+        Sample period, s; None: continuous.
+    point : OperatingPoint, optional
+        What x and u are measured from.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit the names, or a period that is not positive.
+
+    Examples
+    --------
+    >>> lag = symheli.LinearModel([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("x",), ("u",), ("y",))
+    >>> print(lag.poles(), lag.frequency_response([0.0]).round(3))
+    [-2.] [[[1.+0.j]]]
     """
 
     A: Array

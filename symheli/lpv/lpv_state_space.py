@@ -21,9 +21,9 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
 
 if TYPE_CHECKING:
+    from symheli.lpv.balanced_truncation import BalancedTruncation
     from symheli.lpv.lft import LFT
     from symheli.lpv.prediction import Prediction
-    from symheli.lpv.reduction import Reduction
 
 
 class Matrices(NamedTuple):
@@ -345,15 +345,17 @@ class LPVStateSpace:
         ]
         return Matrices(*(np.stack([getattr(model, name) for model in frozen]) for name in "ABCD"))
 
-    def reduce(
+    def truncate(
         self, order: int, *, nodes: int = 21, input_scale: object = 1.0, output_scale: object = 1.0
-    ) -> Reduction[LPVStateSpace]:
+    ) -> BalancedTruncation[LPVStateSpace]:
         """`order` states by one projection balanced over p, with the error it makes; see
-        `symheli.lpv.reduce`.
+        `symheli.lpv.balanced_truncation`.
         """
-        from symheli.lpv.reduction import reduce
+        from symheli.lpv.balanced_truncation import balanced_truncation
 
-        return reduce(self, order, nodes=nodes, input_scale=input_scale, output_scale=output_scale)
+        return balanced_truncation(
+            self, order, nodes=nodes, input_scale=input_scale, output_scale=output_scale
+        )
 
     def simulate(
         self,

@@ -24,9 +24,29 @@ Rates = Limit | Sequence[Limit] | Mapping[str, Limit]
 class Scheduling:
     """A scheduling parameter p in [low, high] with |dp/dt| <= rate, or dp/dt another parameter.
 
-    `low`, `high` in `unit`, `rate` in `unit` per second (math.inf: as fast as it likes) or the name
-    of another parameter of the same model, which then is dp/dt: an airspeed with
-    rate="acceleration" changes as the acceleration says, no faster and no slower.
+    Parameters
+    ----------
+    name, unit : str
+        What it is called and measured in.
+    low, high : float
+        Its range, in `unit`.
+    rate : float or str
+        In `unit` per second (math.inf: as fast as it likes), or the name of another parameter of
+        the same model, which then is dp/dt: an airspeed with rate="acceleration" changes as the
+        acceleration says, no faster and no slower.
+
+    Raises
+    ------
+    InputError
+        A range that is empty or not finite, a rate that is not >= 0.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> airspeed = symheli.Scheduling("airspeed", "m/s", low=0.0, high=13.0, rate="acceleration")
+    >>> acceleration = symheli.Scheduling("acceleration", "m/s^2", low=-3.0, high=3.0, rate=5.0)
+    >>> airspeed.middle, airspeed.radius
+    (6.5, 6.5)
     """
 
     name: str

@@ -11,6 +11,7 @@ from symheli.lpv.exponential import expm
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import check_all
 from symheli.values.arrays import Array, frozen
+from symheli.values.sample_period import same_period
 
 
 class Steps(NamedTuple):
@@ -30,13 +31,45 @@ def simulate(
     dt: float | None = None,
     drift: object | None = None,
 ) -> tuple[Array, Array]:
-    """States (n, nx) and outputs (n, ny) for scheduling p (n,), or (n, d) with several parameters,
-    and inputs u (n, nu) held between samples.
+    """Response of an LPV model along a scheduling history, deviations in, deviations out.
 
-    Continuous models are advanced by the exact exponential of each sample's A(p(k)), B(p(k)) over
-    `dt` (s), p held; discrete ones by their own matrices. `drift` (n, nx) is added to dx/dt
-    (continuous) or to x(k+1) (discrete): a moving trim contributes `lpv.trim.drift(p, rate)`.
-    Deviations in, deviations out.
+    Continuous models are advanced by the exact exponential of each sample's A(p(k)), B(p(k)), p
+    held; discrete ones by their own matrices.
+
+    Parameters
+    ----------
+    lpv : LPVStateSpace
+        The model.
+    p : array (n,), or (n, d) with d parameters
+        In the units of the parameters.
+    u : array (n, nu)
+        Held between samples.
+    x0 : array (nx,), optional
+        Default zero.
+    dt : float, optional
+        s; for continuous models.
+    drift : array (n, nx), optional
+        Added to dx/dt (continuous) or to x(k+1) (discrete): a moving trim x0(p) contributes
+        `lpv.trim.drift(p, rate)`.
+
+    Returns
+    -------
+    states : array (n, nx)
+        At each sample.
+    outputs : array (n, ny)
+        At each sample.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, p outside its range, a missing `dt`, or one that is not the model's.
+
+    Examples
+    --------
+    >>> p, u = np.linspace(0.0, 1.0, 400), np.ones((400, 1))
+    >>> states, outputs = lpv.simulate(spring, p, u, dt=0.1)
+    >>> round(float(outputs[-1, 0]), 2)
+    0.4
     """
     p = check_all(lpv.parameters, p)
     n, nx, nu = len(p), len(lpv.states), len(lpv.inputs)
@@ -58,6 +91,8 @@ def steps(lpv: LPVStateSpace, p: Array, dt: float | None) -> Steps:
     A, B, *_ = lpv.matrices(p)
     n, nx, nu = B.shape
     if lpv.dt is not None:
+        if dt is not None and not same_period(dt, lpv.dt):
+            raise InputError(f"the model is discrete at {lpv.dt:g} s; leave dt = {dt!r} out")
         return Steps(A, B, np.broadcast_to(np.eye(nx), (n, nx, nx)))
     if dt is None or not dt > 0:
         raise InputError("a continuous model needs the sample period dt (s)")

@@ -1,6 +1,16 @@
-"""Flight records: what was measured, and what is done to it before it is fitted."""
+"""Flight records: samples with names and units, and what is done to them before identification.
 
-from symheli.records.conditioning import cut, decimate, low_pass, smooth, split, with_norm
+The examples of this package start from
+
+>>> import numpy as np
+>>> from symheli import records
+>>> time = 0.02 * np.arange(500)
+>>> record = records.FlightRecord.from_arrays(
+...     time, {"u": "m/s", "v": "m/s"}, u=3.0 + 0.0 * time, v=4.0 + np.sin(2 * np.pi * 20 * time)
+... )
+"""
+
+from symheli.records.conditioning import decimate, low_pass, smooth, split, with_norm
 from symheli.records.flight_record import FlightRecord
 
-__all__ = ["FlightRecord", "cut", "decimate", "low_pass", "smooth", "split", "with_norm"]
+__all__ = ["FlightRecord", "decimate", "low_pass", "smooth", "split", "with_norm"]

@@ -15,7 +15,32 @@ from symheli.values.arrays import Array
 
 
 def with_norm(record: FlightRecord, parts: Sequence[str], name: str = "speed") -> FlightRecord:
-    """With the signal `name`: the Euclidean length of `parts`, which must share one unit."""
+    """A record with one more signal: the Euclidean length of others.
+
+    Parameters
+    ----------
+    record : FlightRecord
+        Any.
+    parts : sequence of str
+        Signals of one unit.
+    name : str
+        Of the new one.
+
+    Returns
+    -------
+    FlightRecord
+        A new one.
+
+    Raises
+    ------
+    InputError
+        Parts of different units.
+
+    Examples
+    --------
+    >>> round(float(records.with_norm(record, ["u", "v"])["speed"][0]), 3)
+    5.0
+    """
     found = {record.signals[record.signals.index(part)].unit for part in parts}  # type: ignore[arg-type]
     if len(found) > 1:
         raise InputError(
@@ -27,8 +52,32 @@ def with_norm(record: FlightRecord, parts: Sequence[str], name: str = "speed") -
 
 
 def smooth(record: FlightRecord, name: str, seconds: float) -> FlightRecord:
-    """`name` after a causal first-order low-pass with this time constant (s), started anew in each
-    segment and behind missing samples.
+    """One signal after a causal first-order low-pass, started anew in each segment and behind
+    missing samples.
+
+    Parameters
+    ----------
+    record : FlightRecord
+        Any.
+    name : str
+        Of the signal.
+    seconds : float
+        Time constant.
+
+    Returns
+    -------
+    FlightRecord
+        A new one.
+
+    Raises
+    ------
+    InputError
+        A time constant that is not positive.
+
+    Examples
+    --------
+    >>> bool(np.std(records.smooth(record, "v", 0.5)["v"][250:]) < 0.1)
+    True
     """
     if not 0 < seconds < math.inf:
         raise InputError(f"seconds: expected a positive time constant, got {seconds}")
@@ -55,14 +104,45 @@ def low_pass(
     zero_phase: bool = False,
     leave: Sequence[str] = (),
 ) -> FlightRecord:
-    """All signals but those of `leave` through one Butterworth filter of `order` with its corner at
-    `cutoff` (Hz).
+    """Signals through one Butterworth filter.
 
     One filter for all keeps a linear relation between inputs and outputs; coefficients that move
     with p keep it while p moves slowly against the filter, so the scheduling signal is best left as
-    it is. Causal, settled at the first sample of each stretch; `zero_phase` runs it forwards and
-    backwards (not for real time). Each unbroken stretch between missing samples is filtered by
-    itself, signal by signal. Raises `InputError` for a corner beyond half the sampling frequency.
+    it is. Causal, settled at the first sample of each stretch. Each unbroken stretch between
+    missing samples is filtered by itself, signal by signal.
+
+    Parameters
+    ----------
+    record : FlightRecord
+        Uniformly sampled.
+    cutoff : float
+        The corner, Hz.
+    order : int
+        Of the filter.
+    zero_phase : bool
+        Run it forwards and backwards (not for real time).
+    leave : sequence of str
+        Signals that stay as they are.
+
+    Returns
+    -------
+    FlightRecord
+        A new one.
+
+    Raises
+    ------
+    InputError
+        A corner beyond half the sampling frequency.
+
+    References
+    ----------
+    Oppenheim and Schafer (2010), Discrete-Time Signal Processing, ch. 7.
+
+    Examples
+    --------
+    >>> smooth = records.low_pass(record, 2.0, leave=["u"])
+    >>> bool(np.abs(smooth["v"][100:] - 4.0).max() < 0.01)
+    True
     """
     rate = 1 / record.dt
     if not 0 < cutoff < rate / 2 or order < 1:
@@ -99,12 +179,35 @@ def _filtered(sos: Array, x: Array, zero_phase: bool) -> Array:
 
 
 def decimate(record: FlightRecord, n: int) -> FlightRecord:
-    """Means of `n` samples in a row, all signals alike: a linear relation between them is kept,
+    """Means of several samples in a row, all signals alike: a linear relation between them is kept,
     noise and dt change.
 
     Within a mean the output has heard the input already: y(k) depends on u(k), whatever it did
     before. Identify with delay 0; the record remembers (`resampled`), and `fit` warns. No other
     filter avoids it: between slow samples what is band-limited is known from both sides.
+
+    Parameters
+    ----------
+    record : FlightRecord
+        Any.
+    n : int
+        Samples a mean.
+
+    Returns
+    -------
+    FlightRecord
+        A new one.
+
+    Raises
+    ------
+    InputError
+        Another n, or fewer than two means.
+
+    Examples
+    --------
+    >>> slow = records.decimate(record, 5)
+    >>> len(slow), round(slow.dt, 3), slow.resampled
+    (100, 0.1, 'means of 5 samples')
     """
     if not isinstance(n, int | np.integer) or n < 1:
         raise InputError(f"expected a whole number of samples >= 1 to take together, got {n!r}")
@@ -130,20 +233,34 @@ def decimate(record: FlightRecord, n: int) -> FlightRecord:
     )
 
 
-def cut(record: FlightRecord, start: float | None, stop: float | None) -> FlightRecord:
-    """The samples from `start` to `stop` (s on the record's clock)."""
-    low, high = -math.inf if start is None else start, math.inf if stop is None else stop
-    keep = (record.time >= low) & (record.time < high)
-    if keep.sum() < 2:
-        raise InputError(
-            f"nothing is left between start and stop; the record goes from {record.time[0]:g} to"
-            f" {record.time[-1]:g} s"
-        )
-    return record.rows(keep)
-
-
 def split(record: FlightRecord, fraction: float) -> tuple[FlightRecord, FlightRecord | None]:
-    """The first `fraction` of the time to fit, and the rest held out (None where nothing rests)."""
+    """The first part of a record to fit, and the rest held out.
+
+    Parameters
+    ----------
+    record : FlightRecord
+        Any.
+    fraction : float
+        Of its time.
+
+    Returns
+    -------
+    FlightRecord
+        To fit.
+    FlightRecord or None
+        To score on; None where nothing rests.
+
+    Raises
+    ------
+    InputError
+        A part of fewer than two samples.
+
+    Examples
+    --------
+    >>> training, test = records.split(record, 0.7)
+    >>> len(training), len(test)
+    (350, 150)
+    """
     edge = record.time[0] + fraction * (record.time[-1] - record.time[0])
     early = record.time <= edge
     if fraction >= 1 or early.all():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,6 @@ from symheli.values.units import to_si
 
 if TYPE_CHECKING:
     import pandas
-    from matplotlib.figure import Figure
 
 GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""
@@ -37,17 +36,45 @@ FINER = 1e4
 
 @dataclass(frozen=True, eq=False)
 class FlightRecord:
-    """Samples `values` (n, m) of `signals` at `time` (n,) in s, in SI units and radians.
+    """Samples of signals over time, in SI units and radians.
 
     NaN marks a missing sample. A time step longer than 1.5 median steps is a gap: `segments()`
-    splits there, and no regressor reaches across. `note` says where the record comes from,
-    `resampled` how its samples were made of others ("means of 4 samples"; empty where each is what
-    was measured at its instant): then y(k) may depend on u(k).
+    splits there, and no regressor reaches across.
+
+    Parameters
+    ----------
+    time : array (n,)
+        Increasing, s.
+    values : array (n, m)
+        A column a signal.
+    signals : tuple of Signal
+        m names with their unit.
+    note : str
+        Where the record comes from.
+    meta : mapping
+        Anything worth keeping.
+    resampled : str
+        How its samples were made of others ("means of 4 samples"; empty where each is what was
+        measured at its instant): then y(k) may depend on u(k).
+
+    Raises
+    ------
+    InputError
+        Fewer than two samples, time that does not increase, an infinite value.
+
+    Examples
+    --------
+    >>> record = symheli.FlightRecord.from_arrays(
+    ...     0.1 * np.arange(5), {"q": "deg/s", "n": "1"}, q=np.full(5, 90.0), n=np.zeros(5)
+    ... )
+    >>> round(float(record["q"][0]), 3), record.dt, len(record.between(0.1, 0.35))
+    (1.571, 0.1, 3)
     """
 
     time: Array
     values: Array
     signals: tuple[Signal, ...]
+    _: KW_ONLY
     note: str = ""
     meta: Mapping[str, Any] = field(default_factory=dict)
     resampled: str = ""
@@ -107,7 +134,7 @@ class FlightRecord:
             values.append(factor * frozen(column, name, (length,), finite=False))
             names.append(Signal(name, unit))
         table = np.column_stack(values) if values else np.zeros((length, 0))
-        return cls(time, table, tuple(names), note)  # type: ignore[arg-type]
+        return cls(time, table, tuple(names), note=note)  # type: ignore[arg-type]
 
     @classmethod
     def from_frame(
@@ -252,8 +279,8 @@ class FlightRecord:
                 out[part] = np.gradient(values[part], self.time[part])
         return out
 
-    def plot(self, names: Sequence[str] | None = None) -> Figure:
-        """A figure of these signals (default: all) against time, with units; gaps stay empty. See
+    def plot(self, names: Sequence[str] | None = None) -> Array:
+        """Axes (signals,) of these signals (default: all) against time; gaps stay empty. See
         `symheli.records.record_plot`.
         """
         from symheli.records.record_plot import plot_record
@@ -262,9 +289,18 @@ class FlightRecord:
 
     # --- changing (a new record each time) -------------------------------------------------------
 
-    def between(self, start: float, stop: float) -> FlightRecord:
-        """The samples with start <= time < stop (s)."""
-        return self.rows((self.time >= start) & (self.time < stop))
+    def between(self, start: float | None, stop: float | None) -> FlightRecord:
+        """The samples with start <= time < stop (s on the record's clock; None: from the first, to
+        the last). Raises `InputError` where fewer than two are left.
+        """
+        low, high = -np.inf if start is None else start, np.inf if stop is None else stop
+        keep = (self.time >= low) & (self.time < high)
+        if keep.sum() < 2:
+            raise InputError(
+                f"nothing is left between start and stop; the record goes from {self.time[0]:g} to"
+                f" {self.time[-1]:g} s"
+            )
+        return self.rows(keep)
 
     def rows(self, keep: object) -> FlightRecord:
         """The samples at these indices (slice, index array or mask)."""

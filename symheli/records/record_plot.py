@@ -23,12 +23,13 @@ PANELS = 6
 """More signals than this stand in two columns."""
 
 
-def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Figure:
-    """A matplotlib figure of the signals `names` (default: all) against time (s), with their units.
+def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Array:
+    """The signals `names` (default: all) against time (s), with their units: an array (signals,) of
+    matplotlib's Axes.
 
     Shaded: gaps, and where a sample of that signal is missing; no line crosses them. A sample
-    between two missing ones is a dot. The figure belongs to no window:
-    `figure.savefig("record.png")`, or its display in a notebook. Raises `InputError` for no
+    between two missing ones is a dot. Their figure belongs to no window:
+    `axes[0].figure.savefig("record.png")`. Raises `InputError` for no
     signals, `UnknownNameError` for those the record lacks.
     """
     shown = record.select(
@@ -51,7 +52,7 @@ def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Fig
         ax.set_xlabel("time (s)")
     if record.note:
         figure.suptitle(record.note, fontsize=9)
-    return figure
+    return axes[: len(shown.signals)]
 
 
 def empty_figure(width: float, height: float) -> Figure:

@@ -27,14 +27,41 @@ def sweep(
     inputs: Sequence[str] | None = None,
     start: LinearFamily | None = None,
 ) -> LinearFamily:
-    """Trim and linearize at each of `airspeeds` (m/s, increasing), each trim started from the one
-    before.
+    """Trim and linearize at each of several airspeeds, each trim started from the one before.
 
-    `acceleration` (m/s^2, horizontal, along the nose): quasi-steady points of an accelerating
-    flight, linearized there. `inputs` as in `linearize`. `start`: a family at the same airspeeds
-    whose trims are near, to start from instead. `.kinks` of the result lists, by cause, the
-    airspeeds between the first and the last at which the linear models have a corner (a wake edge,
-    a limit, a flow reversal). Raises `TrimError`, `InputError`.
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    airspeeds : sequence of float
+        Increasing, m/s.
+    climb_rate : float
+        m/s, up.
+    acceleration : float
+        m/s^2, horizontal, along the nose: quasi-steady points of an accelerating flight.
+    inputs : sequence of str, optional
+        As in `linearize`.
+    start : LinearFamily, optional
+        A family at the same airspeeds whose trims are near, to start from instead.
+
+    Returns
+    -------
+    LinearFamily
+        Its `kinks` list, by cause, the airspeeds between the first and the last at which the linear
+        models have a corner (a wake edge, a limit, a flow reversal).
+
+    Raises
+    ------
+    TrimError
+        No equilibrium at one of them.
+    InputError
+        Airspeeds that do not increase.
+
+    Examples
+    --------
+    >>> family = symheli.sweep(heli, [2.0, 5.0, 8.0])
+    >>> family.A.shape, len(family.trims)
+    ((3, 10, 10), 3)
     """
     models = models_along(
         heli,

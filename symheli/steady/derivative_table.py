@@ -36,12 +36,26 @@ A[u, q] = X_q - w0.
 
 @dataclass(frozen=True, eq=False)
 class DerivativeTable:
-    """Derivatives (K, n) at K `airspeeds` (m/s): `names` are `Signal`s with units, table["M_q"] is
-    (K,).
+    """Stability and control derivatives at K airspeeds; table["M_q"] is (K,).
 
     Forces by mass and moments by moment of inertia: X_u = d(X/m)/du in 1/s, N_ped = d(N/Izz)/d
     d_ped in 1/s^2. With the governor "ideal" the yaw inertia includes the rotor, whose speed it
     holds.
+
+    Parameters
+    ----------
+    airspeeds : array (K,)
+        m/s.
+    names : tuple of Signal
+        n of them, with their unit.
+    values : array (K, n)
+        In that unit.
+
+    Examples
+    --------
+    >>> table = symheli.derivatives(symheli.sweep(heli, [2.0, 8.0]))
+    >>> table.values.shape == (2, len(table.names)), table.names[0].unit
+    (True, '1/s')
     """
 
     airspeeds: Array
@@ -92,10 +106,29 @@ class DerivativeTable:
 
 
 def derivatives(family: LinearFamily) -> DerivativeTable:
-    """The derivatives of a `sweep` in straight flight: entries of A and B without gravity and the
+    """The derivatives of a sweep in straight flight: entries of A and B without gravity and the
     kinematic terms w0, v0, u0.
 
-    Raises `InputError` for discrete models and for trims that turn.
+    Parameters
+    ----------
+    family : LinearFamily
+        As `sweep` returns it.
+
+    Returns
+    -------
+    DerivativeTable
+        By name; `str()` and `csv()` of it are tables.
+
+    Raises
+    ------
+    InputError
+        A discrete family, or trims that turn.
+
+    Examples
+    --------
+    >>> table = symheli.derivatives(symheli.sweep(heli, [2.0, 8.0]))
+    >>> bool((table["M_q"] < 0).all())
+    True
     """
     if family.dt is not None:
         raise InputError(

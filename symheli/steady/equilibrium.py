@@ -25,13 +25,34 @@ of gravity.
 """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TrimPoint(OperatingPoint):
     """An operating point with the flight condition it answers and how well.
 
-    residual: of every equation by state name, in the unit of its derivative. on_stops: inputs at
-    (to 0.1 %) or beyond their travel. vortex_ring: a rotor is where momentum theory promises no
-    accuracy. wind: body axes, m/s. density: of the air, kg/m^3.
+    Parameters
+    ----------
+    x, u, xdot : NamedVector
+        State, input and derivative of the state, SI and radians.
+    airspeed : float
+        m/s.
+    condition : FlightCondition
+        What was asked.
+    residual : NamedVector
+        Of every equation by state name, in the unit of its derivative.
+    wind : NamedVector
+        Body axes, m/s.
+    on_stops : tuple of str
+        Inputs at (to 0.1 %) or beyond their travel.
+    vortex_ring : bool
+        A rotor is where momentum theory promises no accuracy.
+    density : float
+        Of the air, kg/m^3.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> point.success, point.attainable, point.vortex_ring
+    (True, True, False)
     """
 
     condition: FlightCondition
@@ -80,23 +101,53 @@ def trim(
     throw: bool = True,
     continuation: bool = True,
 ) -> TrimPoint:
-    """Steady flight at `airspeed` (m/s); see `FlightCondition` for the other arguments and units.
+    """Steady flight at an airspeed.
 
-    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls) from `start`
-    or a hover guess; where that fails, by `continuation` from hover and from other guesses. Success
-    is judged on the recomputed residual of every equation. A control beyond its travel is no
-    failure (the equations hold; `on_stops` names it, `attainable` is False): what would be needed,
-    and by how much, is worth knowing. Raises `TrimError` carrying the best point; with throw=False
-    that point is returned instead.
+    Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls); where that
+    fails, by continuation from hover and from other guesses. Success is judged on the recomputed
+    residual of every equation. A control beyond its travel is no failure (the equations hold;
+    `on_stops` names it, `attainable` is False): what would be needed, and by how much, is worth
+    knowing.
+
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    airspeed, climb_rate, turn_rate, sideslip, wind, acceleration, altitude
+        As in `FlightCondition`.
+    start : TrimPoint, optional
+        To start from; default a hover guess.
+    throw : bool
+        False: a point that is no equilibrium is returned, not raised.
+    continuation : bool
+        Whether to go on from hover and other guesses where Newton fails.
+
+    Returns
+    -------
+    TrimPoint
+        State, inputs and the residual of every equation.
+
+    Raises
+    ------
+    TrimError
+        No equilibrium was found; its `result` is the best point.
+    InputError
+        A flight condition that is none.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> round(float(np.degrees(point.x["theta"])), 1), round(float(point.u["d_col"]), 3)
+    (-1.2, 0.088)
     """
     condition = FlightCondition(
         float(airspeed),
-        float(climb_rate),
-        float(turn_rate),
-        float(sideslip),
-        (float(wind[0]), float(wind[1]), float(wind[2])),
-        float(acceleration),
-        None if altitude is None else float(altitude),
+        climb_rate=float(climb_rate),
+        turn_rate=float(turn_rate),
+        sideslip=float(sideslip),
+        wind=(float(wind[0]), float(wind[1]), float(wind[2])),
+        acceleration=float(acceleration),
+        altitude=None if altitude is None else float(altitude),
     )
     heli = heli if altitude is None else heli.at_altitude(float(altitude))
     problem = _Problem(heli, condition)
@@ -175,12 +226,12 @@ def _continue_from_hover(
     for share in np.linspace(0.0, 1.0, steps + 1):
         stage = FlightCondition(
             share * condition.airspeed,
-            share * condition.climb_rate,
-            share * condition.turn_rate,
-            condition.sideslip,
-            (share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]),
-            share * condition.acceleration,
-            condition.altitude,
+            climb_rate=share * condition.climb_rate,
+            turn_rate=share * condition.turn_rate,
+            sideslip=condition.sideslip,
+            wind=(share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]),
+            acceleration=share * condition.acceleration,
+            altitude=condition.altitude,
         )
         problem = _Problem(heli, stage)
         point = problem.solve(problem.guess() if point is None else problem.unknowns_of(point))
@@ -322,10 +373,10 @@ class _Problem:
         xdot = heli.numeric("rhs")(x, u, wind)[0]
         switches = heli.switches(x, u, wind)
         return TrimPoint(
-            NamedVector(heli.states, x),
-            NamedVector(heli.inputs, u),
-            NamedVector(heli.states, xdot),
-            self.condition.airspeed,
+            x=NamedVector(heli.states, x),
+            u=NamedVector(heli.inputs, u),
+            xdot=NamedVector(heli.states, xdot),
+            airspeed=self.condition.airspeed,
             condition=self.condition,
             residual=NamedVector(heli.states, self.residual(z)),
             wind=NamedVector(heli.wind, wind),

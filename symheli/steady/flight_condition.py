@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
@@ -14,14 +14,37 @@ from symheli.errors import InputError
 class FlightCondition:
     """What is asked of a trim.
 
-    airspeed (m/s, of the whole motion through the air, climb included), climb_rate (m/s, up),
-    turn_rate (rad/s, to the right), sideslip (rad, of the horizontal airspeed, from the right),
-    wind (north, east, down as seen by a nose pointing north, m/s), acceleration (m/s^2, horizontal,
-    along the nose's heading: a quasi-steady point of an accelerating flight, 0 for an equilibrium),
-    altitude (m in the standard atmosphere, None: in the air of the helicopter).
+    Parameters
+    ----------
+    airspeed : float
+        Of the whole motion through the air, climb included, m/s.
+    climb_rate : float
+        m/s, up.
+    turn_rate : float
+        rad/s, to the right.
+    sideslip : float
+        Of the horizontal airspeed, from the right, rad.
+    wind : (float, float, float)
+        North, east, down as seen by a nose pointing north, m/s.
+    acceleration : float
+        m/s^2, horizontal, along the nose's heading: a quasi-steady point of an accelerating flight,
+        0 for an equilibrium.
+    altitude : float, optional
+        m in the standard atmosphere; None: in the air of the helicopter.
+
+    Raises
+    ------
+    InputError
+        A negative airspeed, a climb rate beyond it, a turn in wind.
+
+    Examples
+    --------
+    >>> print(symheli.FlightCondition(5.0, climb_rate=3.0).air_velocity)
+    [ 4.  0. -3.]
     """
 
     airspeed: float
+    _: KW_ONLY
     climb_rate: float = 0.0
     turn_rate: float = 0.0
     sideslip: float = 0.0

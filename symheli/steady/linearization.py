@@ -20,12 +20,37 @@ def linearize(
     inputs: Sequence[str] | None = None,
     allow_accelerating: bool = False,
 ) -> LinearModel:
-    """A, B of the Euler form about `point` by algorithmic differentiation through the implicit
+    """A, B of the Euler form about a trim by algorithmic differentiation through the implicit
     inflow; C = I, D = 0.
 
-    The air is that of the point. `inputs` defaults to the four controls; gust velocities u_w v_w
-    w_w (body axes, m/s) may be named too. A point that is not an equilibrium is refused with
-    `InputError` unless `allow_accelerating`.
+    The air is that of the point.
+
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    point : TrimPoint
+        Of that model.
+    inputs : sequence of str, optional
+        Default the four controls; gust velocities u_w v_w w_w (body axes, m/s) may be named too.
+    allow_accelerating : bool
+        Whether a point that is no equilibrium will do.
+
+    Returns
+    -------
+    LinearModel
+        In deviations from the point, SI and radians.
+
+    Raises
+    ------
+    InputError
+        A point that is no equilibrium, unless `allow_accelerating`.
+
+    Examples
+    --------
+    >>> model = symheli.linearize(heli, symheli.trim(heli, airspeed=5.0))
+    >>> model.A.shape, model.B.shape, model.is_stable()
+    ((10, 10), (10, 4), True)
     """
     if not allow_accelerating and not np.all(np.abs(point.xdot.array) < TOLERANCE):
         raise InputError(

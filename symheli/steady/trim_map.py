@@ -19,11 +19,25 @@ POWER = Signal("power", "W")
 
 @dataclass(frozen=True, eq=False)
 class TrimMap:
-    """Trims at n `airspeeds` (of the whole motion, m/s) and m `climb_rates` (m/s, up).
+    """Trims at n airspeeds and m climb rates; map["theta"] is any state, input or "power" over the
+    grid (n, m).
 
-    points: (n, m) of `TrimPoint`, None where the climb rate exceeds the airspeed. power: engine
-    torque times rotor speed (n, m), W, NaN where there is no point. map["theta"] is any state,
-    input or "power" over the grid (n, m).
+    Parameters
+    ----------
+    airspeeds : array (n,)
+        Of the whole motion, m/s.
+    climb_rates : array (m,)
+        m/s, up.
+    points : tuple of tuple of TrimPoint
+        (n, m); None where the climb rate exceeds the airspeed.
+    power : array (n, m)
+        Engine torque times rotor speed, W; NaN where there is no point.
+
+    Examples
+    --------
+    >>> found = symheli.trim_map(heli, [4.0, 8.0], [0.0, 2.0])
+    >>> found["theta"].shape, bool((found.power[:, 1] > found.power[:, 0]).all())
+    ((2, 2), True)
     """
 
     airspeeds: Array
@@ -114,11 +128,34 @@ class TrimMap:
 def trim_map(
     heli: Helicopter, airspeeds: Sequence[float] | Array, climb_rates: Sequence[float] | Array
 ) -> TrimMap:
-    """Trim at every pair of `airspeeds` and `climb_rates` (m/s, both increasing), each from the
-    neighbours already found.
+    """Trim at every pair of airspeed and climb rate, each from the neighbours already found.
 
-    The airspeed is that of the whole motion: straight down is climb_rate = -airspeed. Failures are
-    kept, not raised: see `success`, `attainable` and `vortex_ring` of the result.
+    Failures are kept, not raised: see `success`, `attainable` and `vortex_ring` of the result.
+
+    Parameters
+    ----------
+    heli : Helicopter
+        The model.
+    airspeeds : sequence of float
+        Of the whole motion, increasing, m/s: straight down is climb_rate = -airspeed.
+    climb_rates : sequence of float
+        Increasing, m/s, up.
+
+    Returns
+    -------
+    TrimMap
+        With the power at each pair.
+
+    Raises
+    ------
+    InputError
+        Values that do not increase.
+
+    Examples
+    --------
+    >>> found = symheli.trim_map(heli, [4.0, 8.0], [-2.0, 0.0])
+    >>> bool(found.success.all()), int(found.vortex_ring.sum())
+    (True, 0)
     """
     speeds, rates = _increasing(airspeeds, "airspeeds"), _increasing(climb_rates, "climb_rates")
     if not np.any(np.abs(rates) <= speeds[-1]):

@@ -15,8 +15,26 @@ from symheli.values.signal import Signal, signals
 
 @dataclass(frozen=True, eq=False)
 class NamedVector(Mapping[str, float]):
-    """Values (n,) with a `Signal` each: `x["theta"]` is a float, `x.array` (or `np.asarray(x)`) the
+    """Values with a `Signal` each: `x["theta"]` is a float, `x.array` (or `np.asarray(x)`) the
     vector, `x.signals` names and units.
+
+    Parameters
+    ----------
+    signals : tuple of Signal
+        n names.
+    array : array (n,)
+        In their units.
+
+    Raises
+    ------
+    InputError
+        Another number of values than names.
+
+    Examples
+    --------
+    >>> x = symheli.trim(heli, airspeed=5.0).x
+    >>> x["theta"] == float(x.array[7]), x.signals[7].unit
+    (True, 'rad')
     """
 
     signals: tuple[Signal, ...]

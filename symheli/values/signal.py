@@ -21,7 +21,18 @@ UNITS = {
 class Signal(str):
     """A signal name (it compares, hashes and prints as that string) with its `unit`.
 
-    Without `unit` the unit of a well-known name is used, "1" for any other name.
+    Parameters
+    ----------
+    name : str
+        As in equations and records.
+    unit : str, optional
+        Default that of a well-known name, "1" for any other.
+
+    Examples
+    --------
+    >>> theta = symheli.Signal("theta")
+    >>> theta == "theta", theta.unit, symheli.Signal("altitude", "m").unit
+    (True, 'rad', 'm')
     """
 
     unit: str

@@ -52,6 +52,16 @@ class Motion(NamedTuple):
         )
         return cls(tuple((float(s.low), float(s.high)) for s in parameters), rates, ties)
 
+    def suits(self, parameters: Sequence[Scheduling]) -> bool:
+        """Whether these parameters move so, but for the limits of those that no other ties."""
+        own = Motion.of(parameters)
+        if len(self.rates) != len(own.rates) or not all(r >= 0 for r in self.rates):
+            return False
+        tied = (
+            a == b for a, b, j in zip(self.rates, own.rates, own.ties, strict=True) if j is not None
+        )
+        return (self.box, self.ties) == (own.box, own.ties) and all(tied)
+
     @property
     def tied(self) -> tuple[tuple[int, int], ...]:
         """(i, j) for every p_i whose rate is p_j."""

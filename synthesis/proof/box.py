@@ -22,7 +22,6 @@ from synthesis.polynomial import structure
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
 from synthesis.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.polynomial.matrix import PolynomialMatrix
-from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import convert, regions
 from synthesis.polynomial.symmetric import symmetrized
@@ -99,7 +98,7 @@ class Evidence(NamedTuple):
             or rates != self.demand.rates
         ):
             return f"the proof is for rates {self.demand.rates}, the claim for {rates}"
-        if self.demand.motion != Motion.of(self.model.parameters) or self.demand.time != 1.0:
+        if not self.demand.motion.suits(self.model.parameters) or self.demand.time != 1.0:
             return "the parameters of the model do not move as those of the proof"
         if not self.model.original:
             return "the pieces are not those of the model"

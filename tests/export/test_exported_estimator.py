@@ -27,30 +27,30 @@ LONGITUDINAL = idn.LPVARX(
     ("theta", "w", "u"),
     ("d_lon",),
     "airspeed",
-    3,
-    1,
-    2,
-    idn.Polynomial(2, 0.0, 13.0),
+    na=3,
+    nb=1,
+    delay=2,
+    basis=idn.Polynomial(2, 0.0, 13.0),
     scheduling_at="now",
 )
 GROUPS = idn.LPVARX(
     ("a", "b"),
     ("c", "d"),
     "p",
-    {"a": 1, "b": {"a": 0, "b": 2}},
-    2,
-    0,
-    idn.Spline((0.0, 1.0, 4.0, 9.0)),
+    na={"a": 1, "b": {"a": 0, "b": 2}},
+    nb=2,
+    delay=0,
+    basis=idn.Spline((0.0, 1.0, 4.0, 9.0)),
     offset_rate=True,
 )
 BESIDE = idn.LPVARX(
     "y",
     (),
     ("v", "s"),
-    2,
-    0,
-    0,
-    idn.Product((idn.Polynomial(1, 0.0, 9.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0)))),
+    na=2,
+    nb=0,
+    delay=0,
+    basis=idn.Product((idn.Polynomial(1, 0.0, 9.0), idn.PiecewiseLinear((-1.0, 0.0, 1.0)))),
     offset=True,
 )
 CASES = {
@@ -155,7 +155,15 @@ def test_the_header_says_what_every_number_is(tmp_path):
 
 
 def test_what_cannot_be_written_is_refused(tmp_path):
-    own = idn.LPVARX("y", "u", "p", 1, 1, 1, idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0))
+    own = idn.LPVARX(
+        "y",
+        "u",
+        "p",
+        na=1,
+        nb=1,
+        delay=1,
+        basis=idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0),
+    )
     with pytest.raises(InputError, match="functions brought along"):
         write_estimator(idn.RecursiveLeastSquares(own), Everything(), tmp_path)
     with pytest.raises(InputError, match="C identifier"):

@@ -21,22 +21,28 @@ BOX = idn.Product(
     (idn.BSpline(2, (0.0, 6.0, 13.0)), idn.Polynomial(1, 0.9, 1.3)), total_degree=None
 )
 STRUCTURES = {
-    "lag": idn.LPVARX(("a", "b"), ("c", "d"), "p", 2, 2, 1, CUBIC, offset=True, offset_rate=True),
-    "now, feedthrough": idn.LPVARX(("a", "b"), ("c",), "p", 3, 2, 0, CUBIC, scheduling_at="now"),
+    "lag": idn.LPVARX(
+        ("a", "b"), ("c", "d"), "p", na=2, nb=2, delay=1, basis=CUBIC, offset=True, offset_rate=True
+    ),
+    "now, feedthrough": idn.LPVARX(
+        ("a", "b"), ("c",), "p", na=3, nb=2, delay=0, basis=CUBIC, scheduling_at="now"
+    ),
     "orders by signal": idn.LPVARX(
         ("a", "b"),
         ("c",),
         "p",
-        {"a": 1, "b": {"a": 0, "b": 2}},
-        1,
-        3,
-        idn.Spline((0.0, 1.0, 4.0, 9.0)),
+        na={"a": 1, "b": {"a": 0, "b": 2}},
+        nb=1,
+        delay=3,
+        basis=idn.Spline((0.0, 1.0, 4.0, 9.0)),
     ),
     "no inputs": idn.LPVARX(
-        "a", (), "p", 2, 0, 0, idn.PiecewiseLinear((0.0, 3.0, 9.0)), offset=True
+        "a", (), "p", na=2, nb=0, delay=0, basis=idn.PiecewiseLinear((0.0, 3.0, 9.0)), offset=True
     ),
-    "no past": idn.LPVARX("a", "c", "p", 0, 1, 0, CUBIC, scheduling_at="now"),
-    "two parameters": idn.LPVARX("a", "c", ("p", "s"), 2, 1, 1, BOX, offset_rate=True),
+    "no past": idn.LPVARX("a", "c", "p", na=0, nb=1, delay=0, basis=CUBIC, scheduling_at="now"),
+    "two parameters": idn.LPVARX(
+        "a", "c", ("p", "s"), na=2, nb=1, delay=1, basis=BOX, offset_rate=True
+    ),
 }
 
 
@@ -47,11 +53,20 @@ def model_of(arx, seed=0):
         / arx.basis.size
         * arx.free
     )
-    own = [
+    outputs, inputs, scheduling = (
         tuple(Signal(str(s), "rad") for s in group)
         for group in (arx.outputs, arx.inputs, arx.parameters)
-    ]
-    return idn.LPVARXModel(arx, theta, 0.02, *own, np.eye(arx.ny), 100)
+    )
+    return idn.LPVARXModel(
+        structure=arx,
+        theta=theta,
+        dt=0.02,
+        outputs=outputs,
+        inputs=inputs,
+        scheduling=scheduling,
+        residual_covariance=np.eye(arx.ny),
+        rows_used=100,
+    )
 
 
 def built(folder, name="model"):
@@ -122,7 +137,15 @@ int main(void)
 
 
 def test_what_cannot_be_written_is_refused(tmp_path):
-    own = idn.LPVARX("y", "u", "p", 1, 1, 1, idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0))
+    own = idn.LPVARX(
+        "y",
+        "u",
+        "p",
+        na=1,
+        nb=1,
+        delay=1,
+        basis=idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0),
+    )
     with pytest.raises(InputError, match="functions brought along"):
         write_model(model_of(own), tmp_path)
     with pytest.raises(InputError, match="C identifier"):

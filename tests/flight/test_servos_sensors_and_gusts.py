@@ -37,7 +37,9 @@ def test_a_servo_has_the_printed_transfer_function(servo):
 
 def test_small_steps_follow_the_linear_servo():
     fine = {
-        name: Servo(s.natural_frequency, s.damping, s.zero, s.pole)
+        name: Servo(
+            natural_frequency=s.natural_frequency, damping=s.damping, zero=s.zero, pole=s.pole
+        )
         for name, s in XCELL_SERVOS.items()
     }
     bank, dt, command = (
@@ -57,7 +59,7 @@ def test_small_steps_follow_the_linear_servo():
 
 
 def test_a_servo_keeps_its_travel_its_rate_and_its_steps():
-    slow = dict.fromkeys(INPUTS, Servo(200.0, 1.0, rate=0.5, steps=10))
+    slow = dict.fromkeys(INPUTS, Servo(natural_frequency=200.0, damping=1.0, rate=0.5, steps=10))
     bank = ServoBank(slow, INPUTS, TRAVEL, 0.005)
     state, deflections = bank.init(np.zeros(4)), []
     for _ in range(400):
@@ -78,7 +80,12 @@ def test_a_servo_keeps_its_travel_its_rate_and_its_steps():
 
 
 def test_a_bank_starts_at_rest():
-    bank = ServoBank({n: Servo(36.0, 0.5, 104.0, 33.0) for n in INPUTS}, INPUTS, TRAVEL, 0.005)
+    bank = ServoBank(
+        {n: Servo(natural_frequency=36.0, damping=0.5, zero=104.0, pole=33.0) for n in INPUTS},
+        INPUTS,
+        TRAVEL,
+        0.005,
+    )
     _, reached = bank.step(bank.init(0.3 * TRAVEL), 0.3 * TRAVEL)
     np.testing.assert_allclose(reached, 0.3 * TRAVEL, atol=1e-14)
 
@@ -119,7 +126,9 @@ def test_a_flight_behind_servos_stays_in_trim_and_records_both_sides(ideal, behi
 
 def test_without_limits_the_deflection_is_the_command_through_the_servo(ideal, behind_servos):
     fine = {
-        name: Servo(s.natural_frequency, s.damping, s.zero, s.pole)
+        name: Servo(
+            natural_frequency=s.natural_frequency, damping=s.damping, zero=s.zero, pole=s.pole
+        )
         for name, s in XCELL_SERVOS.items()
     }
     record = fly(ideal, HOVER, servos=fine, autopilot=behind_servos)
@@ -154,11 +163,23 @@ def test_the_gains_are_softened_until_slow_servos_allow_them(ideal, behind_servo
     np.testing.assert_array_equal(
         behind_servos.gains, stiff.gains
     )  # those of the X-Cell are fast enough
-    slow = gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02, servos=dict.fromkeys(INPUTS, Servo(3.0, 0.5)))
+    slow = gain_scheduled_lqr(
+        ideal,
+        0.0,
+        8.0,
+        0.02,
+        servos=dict.fromkeys(INPUTS, Servo(natural_frequency=3.0, damping=0.5)),
+    )
     assert slow.radius < 1
     assert np.linalg.norm(slow.gains) < 0.8 * np.linalg.norm(stiff.gains)
     with pytest.raises(InputError, match="unstable on the full model"):
-        gain_scheduled_lqr(ideal, 0.0, 8.0, 0.02, servos=dict.fromkeys(INPUTS, Servo(0.3, 0.05)))
+        gain_scheduled_lqr(
+            ideal,
+            0.0,
+            8.0,
+            0.02,
+            servos=dict.fromkeys(INPUTS, Servo(natural_frequency=0.3, damping=0.05)),
+        )
 
 
 def test_what_cannot_be_flown_is_refused(ideal):
@@ -169,7 +190,7 @@ def test_what_cannot_be_flown_is_refused(ideal):
     with pytest.raises(InputError, match="none given for d_lat"):
         ServoBank({"d_lon": TAIL}, ("d_lon", "d_lat"), TRAVEL[:2], 0.005)
     with pytest.raises(InputError, match="both given"):
-        Servo(36.0, 0.5, zero=104.0)
+        Servo(natural_frequency=36.0, damping=0.5, zero=104.0)
     with pytest.raises(InputError, match="expected a Wind or"):
         fly(ideal, HOVER, wind=(1.0, 2.0))
     with pytest.raises(InputError, match="noise"):

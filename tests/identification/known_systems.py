@@ -47,9 +47,9 @@ class Truth:
         B = rng.uniform(-1, 1, (len(arx.input_lags), n, ny, nu))
         c = rng.uniform(-1, 1, (n, ny)) * arx.offset
         d = rng.uniform(-1, 1, d_shape) * arx.offset_rate
-        self.theta = Coefficients(arx.basis, tuple(arx.input_lags), A, B, c, d).theta(
-            arx
-        )  # zero where an equation lacks a regressor
+        self.theta = Coefficients(
+            basis=arx.basis, input_lags=tuple(arx.input_lags), A=A, B=B, c=c, d=d
+        ).theta(arx)  # zero where an equation lacks a regressor
         self.coefficients = Coefficients.of(arx, self.theta)
 
     @classmethod

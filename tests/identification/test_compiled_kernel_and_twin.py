@@ -79,7 +79,9 @@ def test_c_and_numpy_agree_to_the_last_bit(name, way, precision):
 def split():
     """Output a knows its own past and u; b everything: two factors."""
     orders = {"a": {"a": 2, "b": 0}, "b": 2}
-    return idn.LPVARX(("a", "b"), ("u",), "p", orders, 1, 1, idn.Polynomial(1, 0.0, 13.0))
+    return idn.LPVARX(
+        ("a", "b"), ("u",), "p", na=orders, nb=1, delay=1, basis=idn.Polynomial(1, 0.0, 13.0)
+    )
 
 
 def test_c_and_numpy_agree_where_outputs_have_different_regressors():

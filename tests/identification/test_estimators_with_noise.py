@@ -19,7 +19,9 @@ from symheli.records import FlightRecord
 TRUE = np.array(
     [[-1.2, 0.4], [0.6, -0.2], [0.5, 0.3]]
 )  # monomial coefficients of a_1, a_2, b_1 on p in [0, 1]
-ARX = idn.LPVARX("y", "u", "p", 2, 1, 1, idn.Polynomial(1, 0.0, 1.0), scheduling_at="now")
+ARX = idn.LPVARX(
+    "y", "u", "p", na=2, nb=1, delay=1, basis=idn.Polynomial(1, 0.0, 1.0), scheduling_at="now"
+)
 
 
 def oscillator(n, seed, *, decibel=10.0, pole=0.0):
@@ -38,11 +40,11 @@ def oscillator(n, seed, *, decibel=10.0, pole=0.0):
     return FlightRecord.from_arrays(0.1 * k, dict.fromkeys("yup", "1"), y=y, u=u, p=p)
 
 
-def errors(method, seeds=(0, 1, 2), pole=0.0, **options):
+def errors(method, seeds=(0, 1, 2), pole=0.0):
     out = []
     for seed in seeds:
         found = idn.fit(
-            ARX, oscillator(1500, seed, pole=pole), method=method, **options
+            ARX, oscillator(1500, seed, pole=pole), method=method
         ).coefficients.monomial()
         out.append(np.vstack([found.A[:, :, 0, 0], found.B[:, :, 0, 0]]) - TRUE)
     return np.array(out)
@@ -56,19 +58,17 @@ def test_noise_at_10_db_biases_least_squares_with_or_without_a_penalty(method):
     assert np.abs(biased.mean(axis=0)).max() > 10 * biased.std(axis=0).max()
 
 
-@pytest.mark.parametrize(
-    ("method", "options"), [("iv", {"instruments": ("u",)}), ("riv", {}), ("oe", {})]
-)
-def test_noise_at_10_db_does_not_bias_instruments_nor_output_error(method, options):
+@pytest.mark.parametrize("method", [idn.InstrumentalVariables("u"), "riv", "oe"])
+def test_noise_at_10_db_does_not_bias_instruments_nor_output_error(method):
     # what is left is scatter: up to 0.02 a realization (iv), so the mean of three stays within
     # 0.04; the bias of "ls" is 0.3
-    assert np.abs(errors(method, **options).mean(axis=0)).max() < 0.04
+    assert np.abs(errors(method).mean(axis=0)).max() < 0.04
 
 
 def test_refined_instruments_with_white_noise_are_the_output_error_estimate():
     record = oscillator(800, 5)
-    refined = idn.fit(ARX, record, method="riv", options=idn.Refined(tolerance=1e-9))
-    closest = idn.fit(ARX, record, method="oe", options=idn.OutputError(initial="measured"))
+    refined = idn.fit(ARX, record, method=idn.RefinedInstruments(tolerance=1e-9))
+    closest = idn.fit(ARX, record, method=idn.OutputError(initial="measured"))
     assert refined.details["converged"]
     assert closest.details["converged"]
     # both solve (d response / d theta)' (y - response) = 0; they differ in the filter at the first
@@ -79,10 +79,10 @@ def test_refined_instruments_with_white_noise_are_the_output_error_estimate():
 def test_a_noise_model_finds_the_colour_and_narrows_the_scatter():
     white, coloured = (
         errors("riv", (0, 1, 2), 0.9),
-        errors("riv", (0, 1, 2), 0.9, options=idn.Refined(noise_order=1)),
+        errors(idn.RefinedInstruments(noise_order=1), (0, 1, 2), 0.9),
     )
     model = idn.fit(
-        ARX, oscillator(1500, 0, pole=0.9), method="riv", options=idn.Refined(noise_order=1)
+        ARX, oscillator(1500, 0, pole=0.9), method=idn.RefinedInstruments(noise_order=1)
     )
     assert model.details["noise"][0][0] == pytest.approx(
         -0.9, abs=0.03
@@ -101,16 +101,15 @@ def test_closed_loop_noise_is_kept_out_of_the_refinement_by_the_external_excitat
     true = np.stack([-(a[0] + 0.01 * nodes), a[1] + 0.004 * nodes], axis=1)
     record = closed_loop(2500, noise=0.5, seed=2, a=a)
     worst = {
-        method: (
+        name: (
             np.abs(
-                idn.fit(arx, record, method=method, **options).coefficients.at(nodes).A[:, :, 0, 0]
-                - true
+                idn.fit(arx, record, method=method).coefficients.at(nodes).A[:, :, 0, 0] - true
             ).max()
         )
-        for method, options in (
-            ("ls", {}),
-            ("iv", {"instruments": ("r",)}),
-            ("riv", {"instruments": ("r",)}),
+        for name, method in (
+            ("ls", "ls"),
+            ("iv", idn.InstrumentalVariables("r")),
+            ("riv", idn.RefinedInstruments("r")),
         )
     }
     # measured 0.39, 0.028 and 0.005 on this record; over three records iv 0.007 to 0.028, riv 0.001
@@ -131,17 +130,18 @@ def test_refined_instruments_identify_a_plant_that_is_unstable_in_open_loop(at):
     )
     true = np.stack([-(1.75 + 0.01 * nodes), 0.80 + 0.004 * nodes], axis=1)
     assert np.abs(np.roots([1.0, -(1.75 + 0.01 * 12.5), 0.80 + 0.004 * 12.5])).max() > 1.01
-    found = {"iv": [], "riv": []}
+    found = {idn.InstrumentalVariables("r"): [], idn.RefinedInstruments("r"): []}
     for seed in range(1, 6):
         record = closed_loop(3000, noise=0.5, seed=seed, at=at)
         for method, errors in found.items():
-            model = idn.fit(arx, record, method=method, instruments=("r",))
+            model = idn.fit(arx, record, method=method)
             errors.append(np.abs(model.coefficients.at(nodes).A[:, :, 0, 0] - true).max())
             assert model.details.get("converged", True)
     # measured over eight records: iv 0.005 to 0.018, riv 0.0006 to 0.0036; least squares is off by
     # 0.28
-    assert np.max(found["riv"]) < 0.008
-    assert np.median(found["riv"]) < 0.5 * np.median(found["iv"])
+    iv, riv = found.values()
+    assert np.max(riv) < 0.008
+    assert np.median(riv) < 0.5 * np.median(iv)
 
 
 def test_the_poles_of_the_observer_are_those_of_the_plant_mirrored_at_the_unit_circle():
@@ -177,14 +177,14 @@ def test_while_the_plant_is_stable_the_observer_is_the_simulation():
 
 def test_a_refinement_that_does_not_settle_says_so():
     with pytest.warns(ConvergenceWarning, match="'riv' did not settle: .* needs instruments"):
-        model = idn.fit(ARX, oscillator(300, 0), method="riv", options=idn.Refined(iterations=1))
+        model = idn.fit(ARX, oscillator(300, 0), method=idn.RefinedInstruments(iterations=1))
     assert not model.details["converged"]
 
 
 def test_without_noise_refined_instruments_in_closed_loop_are_exact():
     arx = structure(nb=1, basis=idn.Polynomial(1, 0.0, 13.0))
     record = closed_loop(1500, noise=0.0, seed=4)
-    found = idn.fit(arx, record, method="riv", instruments=("r",))
+    found = idn.fit(arx, record, method=idn.RefinedInstruments("r"))
     np.testing.assert_allclose(found.theta, idn.fit(arx, record).theta, atol=1e-8)
 
 
@@ -200,14 +200,13 @@ MIMO = dict(
 
 
 @pytest.mark.parametrize("at", ["lag", "now"])
-@pytest.mark.parametrize("method", ["riv", "oe", "iv"])
+@pytest.mark.parametrize("method", ["riv", "oe", idn.InstrumentalVariables(("u", "v"))])
 def test_without_noise_every_method_gives_the_coefficients_of_a_coupled_structure_back(method, at):
     truth = Truth(structure(**MIMO, basis=idn.BSpline(2, (0.0, 6.0, 13.0)), scheduling_at=at))
     records = [truth.record(moving(350), seed=1), truth.record(moving(250)[::-1].copy(), seed=2)]
-    options = {"instruments": truth.arx.inputs} if method == "iv" else {}
     # 1e-8: instruments and trust regions lose a few digits of a condition of 1e3 to 1e4
     np.testing.assert_allclose(
-        idn.fit(truth.arx, records, method=method, **options).theta, truth.theta, atol=1e-8
+        idn.fit(truth.arx, records, method=method).theta, truth.theta, atol=1e-8
     )
 
 
@@ -219,7 +218,7 @@ def test_refinement_comes_back_from_a_start_that_diverges():
     (run,) = stretches(truth.arx, [record], outputs=True)
     assert not np.isfinite(run.free_run(astray)).all()
     assert np.isfinite(run.free_run(contracted(truth.arx, astray, [run]))).all()
-    found = refined_instruments(truth.arx, [record], None, astray, idn.Refined())
+    found = refined_instruments(truth.arx, [record], None, astray, idn.RefinedInstruments())
     assert found.converged
     np.testing.assert_allclose(found.theta, truth.theta, atol=1e-9)
 
@@ -264,24 +263,47 @@ def test_output_error_bridges_missing_outputs_and_finds_where_each_stretch_start
     np.testing.assert_allclose(model.details["simulation_covariance"], [[0.0]], atol=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (
-            dict(method="ls", options=idn.Ridge()),
-            "options of method 'ls': expected none, got Ridge",
-        ),
-        (dict(method="ridge", options=idn.Lasso()), r"expected Ridge\(...\), got Lasso"),
-        (
-            dict(method="ridge", instruments=("u",)),
-            'instruments are for method="iv", "riv" and "oe"',
-        ),
-        (dict(method="oe", forgetting=0.9), "forgetting is for"),
-    ],
-)
-def test_an_option_of_another_method_is_refused(options, message):
-    with pytest.raises(InputError, match=message):
-        idn.fit(ARX, oscillator(100, 0), **options)
+@pytest.mark.parametrize("option", ["forgetting", "instruments", "options"])
+def test_an_option_beside_the_method_is_refused(option):
+    with pytest.raises(TypeError, match=f"unexpected keyword argument '{option}'"):
+        idn.fit(ARX, oscillator(100, 0), "ridge", **{option: 0.9})
+
+
+def test_a_new_estimator_is_a_subclass_and_nothing_else():
+    class Nothing(idn.Method):
+        """Every coefficient zero."""
+
+        shorthand = "nothing"
+        needs_excitation = False
+
+        def estimate(self, arx, records, data):
+            return idn.Estimate(
+                theta=np.zeros((arx.n_regressors, arx.ny)),
+                details={"rows": len(data.phi)},
+                remarks=(ConvergenceWarning("nothing to settle"),),
+            )
+
+    record = oscillator(100, 0)
+    for method in ("nothing", Nothing()):
+        with pytest.warns(ConvergenceWarning, match="nothing to settle") as said:
+            model = idn.fit(ARX, record, method)
+        assert said[0].filename == __file__
+        assert model.method == "nothing"
+        assert model.details["rows"] == model.rows_used
+        # the residuals of a model of zeros are the outputs
+        y = stacked(ARX, [record]).y
+        np.testing.assert_allclose(model.residual_covariance * (len(y) - ARX.n_regressors), y.T @ y)
+
+
+def test_forgetting_is_an_option_of_the_recursion():
+    record = oscillator(600, 0)
+    batch = idn.fit(ARX, record)
+    np.testing.assert_allclose(idn.fit(ARX, record, idn.Recursion()).theta, batch.theta, atol=1e-9)
+    for forgetting in (0.98, idn.Constant(0.98), idn.Variable(), idn.Directional(0.9)):
+        found = idn.fit(ARX, record, idn.Recursion(forgetting))
+        history = idn.RecursiveLeastSquares(ARX, forgetting).run(record)
+        assert np.abs(found.theta - batch.theta).max() > 1e-3
+        np.testing.assert_allclose(found.theta, history.model.theta, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -290,7 +312,7 @@ def test_an_option_of_another_method_is_refused(options, message):
         lambda: idn.Ridge(weight=-1.0),
         lambda: idn.Ridge(towards="one"),
         lambda: idn.Lasso(weight=1.5),
-        lambda: idn.Refined(iterations=0),
+        lambda: idn.RefinedInstruments(iterations=0),
         lambda: idn.OutputError(initial="guessed"),
         lambda: idn.OutputError(tolerance=0.0),
     ],

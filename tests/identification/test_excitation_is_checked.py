@@ -10,14 +10,14 @@ from symheli.errors import ExcitationError, InputError, UnknownNameError
 P_OF_THE_PAPER = 6.5 * (1 + np.sin(np.pi * np.arange(400) / 3))
 
 
-@pytest.mark.parametrize("method", ["ls", "rls", "iv"])
+@pytest.mark.parametrize("method", ["ls", "rls", idn.InstrumentalVariables("u")])
 def test_three_scheduling_values_never_determine_a_cubic(method):
     arx = structure(basis=idn.Polynomial(3, 0.0, 13.0))
     record = Truth(arx).record(P_OF_THE_PAPER)
     with pytest.raises(
         ExcitationError, match=r"p takes 3 distinct values and .* needs 4.*degree 2 at most"
     ) as caught:
-        idn.fit(arx, record, method=method, **({"instruments": ("u",)} if method == "iv" else {}))
+        idn.fit(arx, record, method=method)
     assert caught.value.report.distinct == 3
     assert caught.value.report.needed == 4
 
@@ -63,16 +63,20 @@ def test_report_of_a_good_record_says_so():
 def test_wrong_requests_get_the_promised_sentence():
     arx = structure()
     record = Truth(arx).record(moving(100))
-    with pytest.raises(UnknownNameError, match="did you mean 'rls'"):
+    with pytest.raises(UnknownNameError, match=r"did you mean 'rls'.*known: ls.*riv"):
         idn.fit(arx, record, method="rsl")
     with pytest.raises(UnknownNameError, match="unknown signal 'yy'"):
         idn.fit(structure(outputs=("yy",)), record)
     with pytest.raises(InputError, match="basis is declared on"):
         idn.fit(structure(basis=idn.Polynomial(2, 0.0, 5.0)), record)
-    with pytest.raises(InputError, match="instruments"):
+    with pytest.raises(InputError, match="needs its instruments"):
         idn.fit(arx, record, method="iv")
-    with pytest.raises(InputError, match="forgetting is for"):
+    with pytest.raises(TypeError, match="forgetting"):
         idn.fit(arx, record, method="ls", forgetting=0.9)
+    with pytest.raises(InputError, match="or a method with its options"):
+        idn.fit(arx, record, method=idn.Ridge)
+    with pytest.raises(InputError, match="expected a factor in"):
+        idn.Recursion(1.1)
     with pytest.raises(InputError, match="expected a FlightRecord"):
         idn.fit(arx, [])
     with pytest.raises(InputError, match="either an output or an input"):

@@ -97,13 +97,13 @@ def test_the_mismatch_weighs_by_the_coherence_as_published(coherence, weight):
     """
     shape = (5, 1, 1)
     measured = FrequencyResponse(
-        np.arange(1.0, 6.0),
-        np.full(shape, 0.5 + 0j),
-        np.full(shape, coherence),
-        np.ones((5, 1)),
-        np.zeros(shape),
-        ("y",),
-        ("u",),
+        omega=np.arange(1.0, 6.0),
+        G=np.full(shape, 0.5 + 0j),
+        coherence=np.full(shape, coherence),
+        multiple=np.ones((5, 1)),
+        random_error=np.zeros(shape),
+        outputs=("y",),
+        inputs=("u",),
     )
     model = LinearModel(
         np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]], (), ("u",), ("y",), DT

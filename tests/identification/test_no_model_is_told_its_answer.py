@@ -83,7 +83,7 @@ def wandering(n=4000, seed=0):
 def test_a_filtered_output_as_p_predicts_everything_until_p_is_held():
     record = wandering()
     basis = idn.Polynomial(1, *np.quantile(record["p"], [0, 1]))
-    arx = idn.LPVARX("y", "u", "p", 1, 1, 1, basis, offset=True, offset_rate=True)
+    arx = idn.LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=basis, offset=True, offset_rate=True)
     with pytest.warns(
         DataWarning, match=r"p is made of the outputs \(100 % of what is new .* with offset_rate"
     ):
@@ -96,9 +96,9 @@ def test_a_filtered_output_as_p_predicts_everything_until_p_is_held():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert (
-            idn.fit(idn.LPVARX("y", "u", "p", 1, 1, 1, basis, offset=True), record).score(
-                record, 20
-            )["y"]
+            idn.fit(
+                idn.LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=basis, offset=True), record
+            ).score(record, 20)["y"]
             < 60
         )
 
@@ -114,7 +114,7 @@ def test_a_command_is_not_taken_for_a_measurement():
 @pytest.mark.parametrize("flag", [dict(offset_rate=True), dict(scheduling_at="now")])
 def test_an_output_that_would_predict_itself_is_refused(flag):
     with pytest.raises(InputError, match="its own value at k would predict it"):
-        idn.LPVARX("y", "u", "y", 1, 1, 1, idn.Polynomial(1, -1.0, 1.0), **flag)
+        idn.LPVARX("y", "u", "y", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0), **flag)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_an_output_that_would_predict_itself_is_refused(flag):
 def test_an_output_or_input_that_schedules_itself_is_told_that_excitation_cannot_help(basis, twice):
     """theta(k-1) f0 is f1: by algebra, on whatever record."""
     record = wandering()
-    arx = idn.LPVARX("y", "u", twice, 1, 1, 1, basis, offset=True)
+    arx = idn.LPVARX("y", "u", twice, na=1, nb=1, delay=1, basis=basis, offset=True)
     with pytest.raises(
         ExcitationError,
         match=(
@@ -138,14 +138,19 @@ def test_an_output_or_input_that_schedules_itself_is_told_that_excitation_cannot
         ),
     ):
         idn.fit(arx, record)
-    idn.fit(idn.LPVARX("y", "u", twice, 1, 1, 1, basis), record)  # the cure that is named
+    idn.fit(
+        idn.LPVARX("y", "u", twice, na=1, nb=1, delay=1, basis=basis), record
+    )  # the cure that is named
 
 
 def test_poor_excitation_of_a_model_that_schedules_itself_is_still_called_so():
     record = wandering()
     still = record.with_signals({"u": "1"}, u=np.zeros(len(record)))
     with pytest.raises(ExcitationError, match="excite the inputs more richly"):
-        idn.fit(idn.LPVARX("y", "u", "y", 1, 1, 1, idn.Polynomial(1, -9.0, 9.0)), still)
+        idn.fit(
+            idn.LPVARX("y", "u", "y", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -9.0, 9.0)),
+            still,
+        )
 
 
 def delayed(n=8000, seed=0):
@@ -175,7 +180,7 @@ def test_samples_made_of_others_hear_their_input_at_once_and_the_record_remember
     record = slower(delayed())
     fits = {}
     for delay in (0, 1):
-        arx = idn.LPVARX("y", "u", "p", 1, 2, delay, idn.Polynomial(0, -1.0, 1.0))
+        arx = idn.LPVARX("y", "u", "p", na=1, nb=2, delay=delay, basis=idn.Polynomial(0, -1.0, 1.0))
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             fits[delay] = idn.fit(arx, record).score(record, 1)["y"]

@@ -1,6 +1,7 @@
 """h steps ahead and free runs, against the recursion written out."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,9 +90,7 @@ def test_divergence_is_flagged_as_infinite_without_warnings():
     p, u = moving(3000), np.random.default_rng(0).normal(size=(3000, 1))
     stable = flown(arx, [lambda q: np.array([[-0.5]])], [lambda q: np.array([[1.0]])], p, u)
     model = idn.fit(arx, stable)
-    explosive = type(model)(
-        arx, 4.0 * model.theta, model.dt, model.outputs, model.inputs, model.scheduling, [[1.0]], 1
-    )
+    explosive = replace(model, theta=4.0 * model.theta)
     free = explosive.simulate(stable)
     assert np.isnan(free[0])
     assert np.isinf(free[-1])

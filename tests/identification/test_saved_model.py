@@ -142,7 +142,7 @@ def test_the_matlab_file_predicts_what_the_model_predicts(tmp_path):
 
 def test_a_model_is_reduced_through_its_exact_realization():
     model, _ = fitted("orders by signal")
-    found = model.reduce(3)
+    found = model.truncate(3)
     assert len(found.model.states) == 3
     assert found.model.dt == model.dt
     assert 0 < found.nu_gap.max() <= 1

@@ -35,7 +35,10 @@ def phugoid(db, omega=0.4, damping=0.1, n=6000, seed=0):
 def found(record, delay):
     """The slow mode of a second-order model, and what is said."""
     model = idn.fit(
-        idn.LPVARX(("y", "v"), "u", "p", 2, 2, delay, idn.Polynomial(0, -1.0, 1.0)), record
+        idn.LPVARX(
+            ("y", "v"), "u", "p", na=2, nb=2, delay=delay, basis=idn.Polynomial(0, -1.0, 1.0)
+        ),
+        record,
     )
     report = idn.slow_modes(model, record, points=1)
     return min(report.modes, key=lambda m: abs(m.s)), report
@@ -89,7 +92,7 @@ def test_the_standard_error_of_a_pole_is_its_scatter():
     """Noise in the equations, white: least squares is unbiased, and its poles scatter as the
     covariance says.
     """
-    arx = idn.LPVARX(("y",), ("u",), "p", 2, 1, 1, idn.Polynomial(1, 0.0, 13.0))
+    arx = idn.LPVARX(("y",), ("u",), "p", na=2, nb=1, delay=1, basis=idn.Polynomial(1, 0.0, 13.0))
     poles, errors = [], []
     for seed in range(40):
         rng, p = np.random.default_rng(seed), moving(2000)

@@ -85,7 +85,16 @@ def test_the_covariance_is_its_double_sum():
 
 def test_response_errors_are_the_scatter_of_repeated_experiments():
     truth = Truth(TWO, size=1.2)
-    exact = idn.LPVARXModel(TWO, truth.theta, 0.1, TWO.outputs, TWO.inputs, "p", np.eye(2), 1)
+    exact = idn.LPVARXModel(
+        structure=TWO,
+        theta=truth.theta,
+        dt=0.1,
+        outputs=TWO.outputs,
+        inputs=TWO.inputs,
+        scheduling="p",
+        residual_covariance=np.eye(2),
+        rows_used=1,
+    )
     G = exact.at(6.0).frequency_response(OMEGA)
     errors, claimed = [], []
     for seed in range(150):
@@ -145,8 +154,8 @@ def test_bands_become_a_picture_with_a_panel_a_coefficient():
     pytest.importorskip("matplotlib")
     model, record = noisy(Truth(TWO), 1)
     known = idn.uncertainty(model, record)
-    figure = known.plot(0.9)
-    panels = [ax for ax in figure.axes if ax.get_visible()]
+    panels = known.plot(0.9)
+    assert set(panels) == {ax for ax in panels[0].figure.axes if ax.get_visible()}
     assert [ax.get_title(loc="left") for ax in panels] == [
         f"{b.regressor} in {b.output}" for b in known.bands([1.0])
     ]

@@ -24,7 +24,7 @@ def with_columns(dt=0.1, units=None, **over):
     )
 
 
-@pytest.mark.parametrize("method", ["ls", "rls", "ridge", "iv"])
+@pytest.mark.parametrize("method", ["ls", "rls", "ridge", idn.InstrumentalVariables("u")])
 @pytest.mark.parametrize(
     "over",
     [dict(y=np.full(300, np.nan)), dict(y=np.zeros(2)), dict(p=np.full(300, np.nan))],
@@ -32,12 +32,7 @@ def with_columns(dt=0.1, units=None, **over):
 )
 def test_a_record_without_a_single_regressor_is_refused_with_the_count(over, method):
     with pytest.raises(ExcitationError, match="0 usable samples cannot determine 12 coefficients"):
-        idn.fit(
-            TRUTH.arx,
-            with_columns(**over),
-            method=method,
-            instruments=("u",) if method == "iv" else (),
-        )
+        idn.fit(TRUTH.arx, with_columns(**over), method=method)
 
 
 def test_a_memory_longer_than_the_record_is_refused():
@@ -52,7 +47,14 @@ def test_sizes_whose_squares_no_float_holds_are_refused(size, method):
         idn.fit(TRUTH.arx, with_columns(y=size * RECORD["y"]), method=method)
 
 
-@pytest.mark.parametrize("method", ["ls", "rls", "ridge", "lasso", "iv", "riv", "oe"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        *("ls", "rls", "ridge", "lasso", "oe"),
+        idn.InstrumentalVariables("u"),
+        idn.RefinedInstruments("u"),
+    ],
+)
 def test_sizes_of_signals_do_not_matter_to_any_method(method):
     """An altitude of 1e5 m beside a rate of 1e-3 rad/s: predictions are those of the scaled
     record.
@@ -60,9 +62,7 @@ def test_sizes_of_signals_do_not_matter_to_any_method(method):
     truth = Truth(structure(outputs=("h", "q"), offset=True))
     record, sizes = truth.record(moving(400)), np.array([1e5, 1e-3, 1e-2, 1.0])
     scaled = FlightRecord(record.time, record.values * sizes, record.signals)
-    model = idn.fit(
-        truth.arx, scaled, method=method, instruments=("u",) if method in ("iv", "riv") else ()
-    )
+    model = idn.fit(truth.arx, scaled, method=method)
     # 1e-9: as exact as without scales (test_exact_recovery); ridge and lasso keep no weight on
     # noise-free data
     np.testing.assert_allclose(

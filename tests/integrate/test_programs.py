@@ -92,7 +92,7 @@ def test_a_side_holds_what_it_alone_needs(ideal):
 def test_held_work_done_once_changes_no_bit(heli):
     x, u, wind = points(heli, 500)
     made = program(heli.flight_rhs)
-    held, rest = made.split([0])
+    held, rest = made.hoist([0])
     kept = evaluate(held, u, wind)[0]
     np.testing.assert_array_equal(
         np.array(evaluate(rest, x, kept)[0]), np.array(evaluate(made, x, u, wind)[0])
@@ -115,7 +115,7 @@ def test_conditions_and_signs_keep_their_meaning():
     grid = np.array(np.meshgrid(*[[-2.0, 0.0, 0.5, 3.0]] * 3, [-2.0, 0.5, 4.0])).reshape(4, -1)
     x, p = grid[:3], grid[3:]
     whole = program(function)
-    held, rest = whole.split([0])
+    held, rest = whole.hoist([0])
     expected = np.array(function.map(grid.shape[1])(x, p))
     for made in (evaluate(whole, x, p)[0], evaluate(rest, x, evaluate(held, p)[0])[0]):
         np.testing.assert_allclose(np.array(made), expected, rtol=1e-15)

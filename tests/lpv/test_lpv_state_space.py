@@ -130,6 +130,8 @@ def test_simulation_with_constant_p_is_exact_and_a_drift_is_added_as_a_rate():
     np.testing.assert_allclose(pushed, forced, atol=1e-12)
     with pytest.raises(InputError, match="sample period dt"):
         simulate(lpv, np.full(n, 4.0), u)
+    with pytest.raises(InputError, match=r"discrete at 0\.1 s; leave dt"):
+        simulate(lpv.discretize(0.1), np.full(n, 4.0), u, dt=0.2)
 
 
 def test_matrices_of_unequal_shape_are_refused():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,6 +60,14 @@ def test_chordal_distance_never_exceeds_the_gap():
     omega = np.geomspace(0.01, 30, 50)
     one, two = pole(0.9, 0.3), pole(0.8, 0.5)
     assert chordal_distance(one, two, omega).max() <= nu_gap(one, two) * (1 + 1e-6)
+
+
+def test_models_of_other_signals_have_no_distance():
+    one = pole(0.5)
+    other = replace(one, inputs=signals(["another"]))
+    for distance in (nu_gap, lambda a, b: chordal_distance(a, b, [1.0])):
+        with pytest.raises(InputError, match="same inputs and outputs in the same order"):
+            distance(one, other)
 
 
 def test_models_that_cannot_be_compared_are_refused():

@@ -3,7 +3,7 @@
 import pytest
 
 import symheli
-from identification import fit
+from identification import InstrumentalVariables, fit
 from studies.transition.axes import LONGITUDINAL
 from studies.transition.flights import FlightPlan, autopilot_for
 from symheli.errors import DataWarning
@@ -20,7 +20,7 @@ def test_instruments_beat_least_squares_in_flight_once_the_command_is_among_them
     biased = fit(arx, training)
     with pytest.warns(DataWarning, match="the instruments are weak"):
         added, commanded = (
-            fit(arx, training, method="iv", instruments=names)
+            fit(arx, training, InstrumentalVariables(names))
             for names in (ADDED, (*ADDED, "airspeed_command"))
         )
     # measured 1 s ahead: q 78 by least squares, 93 by instruments; free run of u 93, 89 and without

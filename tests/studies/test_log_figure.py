@@ -17,7 +17,7 @@ def test_the_picture_holds_the_predictions_that_were_scored():
     record = FlightRecord.from_arrays(t, {"y": "rad", "u": "1", "p": "m/s"}, y=y, u=u, p=np.sin(t))
     training, test = record.split(0.7)
     result = against_constant(
-        LPVARX("y", "u", "p", 1, 1, 1, Polynomial(1, -1.0, 1.0)), training, test
+        LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(1, -1.0, 1.0)), training, test
     )
     drawn, close, scheduling, _ = figure(result).axes
     lines = {}

@@ -23,7 +23,9 @@ def judged(lpv, lti, *rivals, **over):
     record = FlightRecord.from_arrays(
         0.1 * np.arange(200), dict.fromkeys("yup", "1"), y=np.cumsum(u) * 0.1, u=u, p=p
     )
-    model = fit(LPVARX("y", "u", "p", 1, 1, 1, Polynomial(1, p.min(), p.max())), record)
+    model = fit(
+        LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(1, p.min(), p.max())), record
+    )
     scores = [
         Scores(horizon=1.0, one_step={"y": 99.0}, ahead={"y": ahead}, free_run={"y": free})
         for ahead, free in (lpv, lti, *rivals)
@@ -244,6 +246,13 @@ def test_the_estimator_is_chosen_and_named(identify, method, options):
     assert ("first-stage F" in text) == (method == "iv")
 
 
+def test_instruments_for_a_method_that_takes_none_are_refused(tmp_path, capsys):
+    log = tmp_path / "log.csv"
+    log.write_text(about_a_trim())
+    assert cli.main(["identify", str(log), *OPTIONS, "--instruments", "u"]) == 1
+    assert "--instruments are for --method iv, riv or oe, not ls" in capsys.readouterr().err
+
+
 def test_a_scheduling_signal_made_of_outputs_is_found_and_its_free_runs_are_not_counted(identify):
     rng = np.random.default_rng(0)
     u, y, p = rng.standard_normal(3000), np.zeros(3000), np.zeros(3000)
@@ -268,7 +277,7 @@ def test_the_moving_trim_is_not_tried_where_the_data_cannot_tell_it():
     record = FlightRecord.from_arrays(
         0.1 * np.arange(300), dict.fromkeys("yup", "1"), y=y, u=u, p=p
     )
-    arx = LPVARX("y", "u", "p", 1, 1, 1, Polynomial(2, 1.0, 3.0), offset=True)
+    arx = LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=Polynomial(2, 1.0, 3.0), offset=True)
     found = against_constant(arx, record, None, trim="auto")
     assert found.trim_note.startswith("offset_rate is not tried: the regressors have rank")
     assert len(found.models) == 2

@@ -71,7 +71,7 @@ def test_model_pieces_give_back_the_model():
 @pytest.mark.parametrize("step", [0.01, 0.07, 0.4, 5.0])
 def test_strips_cover_every_p_and_next_p_inside_the_right_segment(step):
     knots = graded_knots(0.0, 1.0, 6, 2.0)
-    regions = strips(model_pieces(lag()), knots, step)
+    regions = strips(model_pieces(lag()), knots, (-step, step))
     rng = np.random.default_rng(3)
     for p, d in zip(rng.uniform(0, 1, 400), rng.uniform(-1, 1, 400), strict=True):
         after = float(np.clip(p + d * step, 0, 1))
@@ -115,7 +115,7 @@ def test_lmi_polynomials_are_the_lmi_at_every_point(dt):
     else:
         M, corner = np.hstack([A, B]), np.zeros((5, 5))
         corner[:3, :3] = P.at(p)
-        regions = strips(model_pieces(lpv), P.knots, 0.07)
+        regions = strips(model_pieces(lpv), P.knots, (-0.07, 0.07))
         k = next(i for i, s in enumerate(regions) if s.cell.low < p < s.cell.high)
         cell = regions[k].cell
         x, s = (p - cell.low) / (cell.high - cell.low), 0.8

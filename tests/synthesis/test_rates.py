@@ -21,11 +21,13 @@ def test_one_for_all_one_for_each_or_by_name():
     assert rates((SPEED, MASS), 2) == (2.0, 2.0)
     assert rates((SPEED, MASS), [1.0, math.inf]) == (1.0, math.inf)
     assert rates((SPEED, MASS), {"airspeed": 1.0}) == (1.0, 0.0)
-    for wrong in (-1.0, math.nan, [1.0], "1 m/s", {"mass": -1.0}, {"mass": None}):
+    for wrong in (-1.0, math.nan, [1.0], {"mass": -1.0}, {"mass": None}):
         with pytest.raises(
             InputError, match=r"rate must be >= 0 .* airspeed \(m/s/s\), mass \(kg/s\)"
         ):
             rates((SPEED, MASS), wrong)
+    with pytest.raises(UnknownNameError, match="1 m/s"):  # a text is the name of a parameter
+        rates((SPEED, MASS), "1 m/s")
 
 
 def test_the_rate_of_the_one_parameter_may_be_given_by_name():

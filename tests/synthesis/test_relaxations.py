@@ -327,17 +327,16 @@ def test_a_next_value_that_may_be_anywhere_costs_no_degree_in_p():
     and not two more.
     """
     from synthesis.assemble.box import Shape, _pair
+    from synthesis.polynomial.motion import Motion
     from synthesis.polynomial.regions import regions
-    from synthesis.proof.drift import Drift
     from synthesis.proof.inequalities import decrease
 
     model, shape = pieces(mass_spring(dt=0.1)), Shape((np.array([-1.0, 1]),) * 2, (2, 2))
     degrees = {}
     for rate in (math.inf, 1.0):
-        demand = Demand("stability", Drift((rate, rate)))
-        region = next(
-            iter(regions(model, shape.knots, demand.drift.steps(model.dt, shape.degrees)))
-        )
+        motion = Motion.of(model.parameters)._replace(rates=(rate, rate))
+        demand = Demand("stability", motion)
+        region = next(regions(model, shape.knots, motion, demand.moving(shape.degrees)))
         degrees[rate] = [
             F.degrees for F in decrease(model, region, _pair(shape, region, 2)[1], demand, float)
         ]

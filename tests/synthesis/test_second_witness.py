@@ -26,7 +26,6 @@ from synthesis.polynomial import pieces, regions
 from synthesis.proof import box as proof
 from synthesis.proof import claim
 from synthesis.proof import one_parameter as verify
-from synthesis.proof.drift import Drift
 
 COARSE = Spline(segments=4, degree=2, grading=1.0)
 BOX = {"form": Spline(segments=4, degree=2, grading=1.0), "impose": SumOfSquares()}
@@ -65,9 +64,8 @@ def forget_the_rate(monkeypatch):
     )
 
     def still(model, region, P, demand, number):
-        return decrease(
-            model, region, P, demand._replace(drift=Drift(tuple(0.0 for _ in demand.rates))), number
-        )
+        resting = demand.motion._replace(rates=tuple(0.0 for _ in demand.rates))
+        return decrease(model, region, P, demand._replace(motion=resting), number)
 
     everywhere(monkeypatch, "decrease", still, program, proof)
 
@@ -85,8 +83,10 @@ def drop_strips(monkeypatch):
     """p(k+1) stays on its segment."""
     strips = regions.strips
 
-    def fewer(pieces, knots, step):
-        return tuple(s for s in strips(pieces, knots, step) if s.next_segment == s.cell.segment)
+    def fewer(pieces, knots, span, cuts=()):
+        return tuple(
+            s for s in strips(pieces, knots, span, cuts) if s.next_segment == s.cell.segment
+        )
 
     everywhere(monkeypatch, "strips", fewer, forms, claim, regions)
 

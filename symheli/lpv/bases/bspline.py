@@ -15,12 +15,36 @@ from symheli.values.arrays import frozen
 
 @dataclass(frozen=True)
 class BSpline(PiecewisePolynomial):
-    """B-splines of `degree` between the `breakpoints`, degree - 1 times continuously
-    differentiable; they add up to 1.
+    """B-splines between breakpoints, degree - 1 times continuously differentiable; they add up to
+    1.
 
     Each differs from zero over at most degree + 1 intervals: what the data say of one speed stays
     there. Degree 1 is `PiecewiseLinear`; the end knots are repeated, so that the first and last
     coefficient are the values at the ends.
+
+    Parameters
+    ----------
+    degree : int
+        At least 1.
+    breakpoints : tuple of float
+        Increasing, in the unit of p.
+
+    Raises
+    ------
+    InputError
+        Another degree, or breakpoints that do not increase.
+
+    References
+    ----------
+    de Boor (2001), A Practical Guide to Splines, ch. 9.
+
+    Examples
+    --------
+    >>> from symheli.lpv import BSpline
+    >>> BSpline(2, (0.0, 6.0, 13.0))([0.0, 6.0, 13.0]).round(2)
+    array([[1.  , 0.  , 0.  , 0.  ],
+           [0.  , 0.54, 0.46, 0.  ],
+           [0.  , 0.  , 0.  , 1.  ]])
     """
 
     degree: int

@@ -54,7 +54,25 @@ class Cardinal(PiecewisePolynomial):
 
 @dataclass(frozen=True)
 class PiecewiseLinear(Cardinal):
-    """Hat functions: straight lines between the nodes."""
+    """Hat functions: straight lines between the nodes.
+
+    Parameters
+    ----------
+    nodes : tuple of float
+        At least two, increasing, in the unit of p.
+
+    Raises
+    ------
+    InputError
+        Fewer nodes, or nodes that do not increase.
+
+    Examples
+    --------
+    >>> from symheli.lpv import PiecewiseLinear
+    >>> PiecewiseLinear((0.0, 5.0, 13.0))([2.5, 5.0])
+    array([[0.5, 0.5, 0. ],
+           [0. , 1. , 0. ]])
+    """
 
     def _piecewise(self) -> PPoly:
         values = np.eye(self.size)
@@ -64,7 +82,29 @@ class PiecewiseLinear(Cardinal):
 
 @dataclass(frozen=True)
 class Spline(Cardinal):
-    """Cubic splines through the nodes with not-a-knot ends (twice continuously differentiable)."""
+    """Cubic splines through the nodes with not-a-knot ends (twice continuously differentiable).
+
+    Parameters
+    ----------
+    nodes : tuple of float
+        At least four, increasing, in the unit of p.
+
+    Raises
+    ------
+    InputError
+        Fewer nodes, or nodes that do not increase.
+
+    References
+    ----------
+    de Boor (2001), A Practical Guide to Splines, ch. 4.
+
+    Examples
+    --------
+    >>> from symheli.lpv import Spline
+    >>> cubic = Spline((0.0, 3.0, 8.0, 13.0))
+    >>> print((cubic([5.0]) @ np.array([0.0, 3.0, 8.0, 13.0]) ** 3).round(6))
+    [125.]
+    """
 
     minimum_nodes = 4
 

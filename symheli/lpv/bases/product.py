@@ -19,12 +19,29 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class Product(FunctionSpace):
-    """f_j(p) = f_{j1}(p_1) f_{j2}(p_2) ...: every product of functions of `factors`, the last
+    """f_j(p) = f_{j1}(p_1) f_{j2}(p_2) ...: every product of functions of the factors, the last
     factor running fastest.
 
-    With `total_degree` (polynomial factors only) just the products whose degrees add up to that at
-    most. Products of bases orthonormal over their ranges are orthonormal over the box. Raises
-    `InputError` for fewer than two factors or a total degree that does not suit them.
+    Products of bases orthonormal over their ranges are orthonormal over the box.
+
+    Parameters
+    ----------
+    factors : tuple of Basis
+        One a parameter, at least two.
+    total_degree : int, optional
+        Polynomial factors only: just the products whose degrees add up to that at most.
+
+    Raises
+    ------
+    InputError
+        Fewer than two factors, or a total degree that does not suit them.
+
+    Examples
+    --------
+    >>> from symheli.lpv import Polynomial, Product
+    >>> speed, acceleration = Polynomial(2, 0.0, 13.0), Polynomial(2, -3.0, 3.0)
+    >>> Product((speed, acceleration)).size, Product((speed, acceleration), total_degree=2).size
+    (9, 6)
     """
 
     factors: tuple[Basis, ...]

@@ -16,12 +16,33 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class UserFunctions(Basis):
-    """f_j(p) = functions[j](p) on [low, high]: callables that take an array of p and return one of
-    the same shape.
+    """f_j(p) = functions[j](p): any callables that take an array of p and return one of the same
+    shape.
 
-    `names` label them (default f0, f1, ...). Columns are scaled where they are fitted, so the size
-    of the functions does not matter; their independence does. Raises `InputError` where a function
-    does not return finite numbers over the range.
+    Columns are scaled where they are fitted, so the size of the functions does not matter; their
+    independence does.
+
+    Parameters
+    ----------
+    functions : tuple of callable
+        Independent on the range.
+    low, high : float
+        The range, in the unit of p.
+    names : tuple of str
+        Label them (default f0, f1, ...).
+
+    Raises
+    ------
+    InputError
+        A function does not return finite numbers over the range.
+
+    Examples
+    --------
+    >>> from symheli.lpv import UserFunctions
+    >>> basis = UserFunctions((np.ones_like, np.sqrt), low=0.0, high=13.0, names=("1", "root"))
+    >>> basis([4.0, 9.0])
+    array([[1., 2.],
+           [1., 3.]])
     """
 
     functions: tuple[Callable[[Array], Array], ...]

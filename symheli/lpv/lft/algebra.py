@@ -24,7 +24,26 @@ def append(*systems: System) -> LFT:
     """Side by side: states, inputs and outputs one after the other, a parameter of several systems
     in one block.
 
-    A name that comes again gets the number of its system: phi, phi_2.
+    Parameters
+    ----------
+    *systems : LFT, LPVStateSpace, LinearModel or a system of python-control
+        A name that comes again gets the number of its system: phi, phi_2.
+
+    Returns
+    -------
+    LFT
+        Of all.
+
+    Raises
+    ------
+    InputError
+        Sample periods that differ.
+
+    Examples
+    --------
+    >>> two = lpv.append(spring, spring)
+    >>> [str(s) for s in two.outputs], two.sizes
+    (['y1', 'y1_2'], (6,))
     """
     lfts = [as_lft(s) for s in systems]
     if not lfts:
@@ -110,7 +129,29 @@ def close(
 
 
 def series(first: System, second: System) -> LFT:
-    """y = second(first(u)): the outputs of `first` feed the inputs of `second` in their order."""
+    """y = second(first(u)): the outputs of `first` feed the inputs of `second` in their order.
+
+    Parameters
+    ----------
+    first, second : LFT, LPVStateSpace, LinearModel or a system of python-control
+        With as many outputs as inputs between them.
+
+    Returns
+    -------
+    LFT
+        From the inputs of `first` to the outputs of `second`.
+
+    Raises
+    ------
+    InputError
+        Numbers of signals or sample periods that differ.
+
+    Examples
+    --------
+    >>> delayed = lpv.series(lpv.pade_delay("u1", 0.02, order=2), spring)
+    >>> len(delayed.states), [str(s) for s in delayed.inputs]
+    (4, ['u1_command'])
+    """
     first, second = as_lft(first), as_lft(second)
     ny, nu = len(first.outputs), len(first.inputs)
     if len(second.inputs) != ny:
@@ -125,7 +166,30 @@ def series(first: System, second: System) -> LFT:
 
 
 def parallel(first: System, second: System) -> LFT:
-    """y = first(u) + second(u); the signals keep the names of `first`."""
+    """y = first(u) + second(u); the signals keep the names of `first`.
+
+    Parameters
+    ----------
+    first, second : LFT, LPVStateSpace, LinearModel or a system of python-control
+        With as many inputs and outputs.
+
+    Returns
+    -------
+    LFT
+        The sum.
+
+    Raises
+    ------
+    InputError
+        Numbers of signals or sample periods that differ.
+
+    Examples
+    --------
+    >>> twice = lpv.parallel(spring, spring).at(0.0)
+    >>> gains = [m.frequency_response([0.0])[0].real for m in (twice, spring.at(0.0))]
+    >>> print((gains[0] / gains[1]).round(6))
+    [[2.]]
+    """
     first, second = as_lft(first), as_lft(second)
     nu, ny = len(first.inputs), len(first.outputs)
     if (len(second.inputs), len(second.outputs)) != (nu, ny):
@@ -139,7 +203,38 @@ def parallel(first: System, second: System) -> LFT:
 
 
 def feedback(plant: System, controller: System, sign: float = -1.0) -> LFT:
-    """y = plant(u + sign controller(y)), all outputs into all inputs, in their order."""
+    """y = plant(u + sign controller(y)), all outputs into all inputs, in their order.
+
+    Parameters
+    ----------
+    plant, controller : LFT, LPVStateSpace, LinearModel or a system of python-control
+        The outputs of each as many as the inputs of the other.
+    sign : float
+        -1: negative feedback.
+
+    Returns
+    -------
+    LFT
+        From the inputs of the plant to its outputs.
+
+    Raises
+    ------
+    InputError
+        Numbers of signals or sample periods that differ, or a singular loop.
+
+    Examples
+    --------
+    A gain of 2 stiffens the spring:
+
+    >>> gain = lpv.LFT.constant(
+    ...     lpv.LinearModel(
+    ...         np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[2.0]], (), ("e",), ("v",)
+    ...     )
+    ... )
+    >>> lpv.feedback(spring, gain).at(0.0).A.round(6) + 0.0
+    array([[ 0.,  1.],
+           [-4., -1.]])
+    """
     plant, controller = as_lft(plant), as_lft(controller)
     nu, ny = len(plant.inputs), len(plant.outputs)
     if (len(controller.inputs), len(controller.outputs)) != (ny, nu):

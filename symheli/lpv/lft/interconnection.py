@@ -22,10 +22,36 @@ def connect(
 ) -> LFT:
     """One system of several: an input takes the output, or the external input, that has its name.
 
-    `sums` gives an input another source, {input: {signal: gain, ...}} with outputs and external
-    `inputs` as signals. `outputs` are outputs of the systems: LFTs, linear models, polynomial LPV
-    models, systems of python-control. Units of connected signals must agree. Raises `InputError`
-    where an input is left open, an output name is used twice, or a loop is singular.
+    Parameters
+    ----------
+    *systems : LFT, LPVStateSpace, LinearModel or a system of python-control
+        Units of connected signals must agree.
+    inputs : sequence of str
+        The external ones.
+    outputs : sequence of str
+        Outputs of the systems.
+    sums : mapping, optional
+        Gives an input another source, {input: {signal: gain, ...}} with outputs and external
+        inputs as signals.
+
+    Returns
+    -------
+    LFT
+        From `inputs` to `outputs`.
+
+    Raises
+    ------
+    InputError
+        An input is left open, an output name is used twice, or a loop is singular.
+
+    Examples
+    --------
+    >>> loop = lpv.connect(
+    ...     spring, inputs=["r"], outputs=["y1"], sums={"u1": {"r": 1.0, "y1": -2.0}}
+    ... )
+    >>> loop.at(0.0).A.round(6) + 0.0
+    array([[ 0.,  1.],
+           [-4., -1.]])
     """
     lfts = [as_lft(s, by_name=True) for s in systems]
     whole = append(*lfts)

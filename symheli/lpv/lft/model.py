@@ -39,12 +39,42 @@ def parts(sizes: Sequence[int]) -> list[slice]:
 @dataclass(frozen=True, eq=False)
 class LFT:
     """M(delta) = M22 + M21 Delta (I - M11 Delta)^-1 M12 = [A B; C D], Delta = diag(delta_i I_ni),
-    |delta_i| <= 1.
+    |delta_i| <= 1: the upper loop of a constant matrix with normalised scheduling parameters.
 
-    The upper loop of a constant matrix with normalised scheduling parameters: `M11` (n, n), `M12`
-    (n, nx + nu), `M21` (nx + ny, n), `M22` (nx + ny, nx + nu) with n = `order` = sum of the block
-    sizes, one block a parameter. dx/dt = A x + B u, y = C x + D u (dt None), or x(k+1) = A x + B u
-    (dt in s).
+    dx/dt = A x + B u, y = C x + D u, or x(k+1) = A x(k) + B u(k).
+
+    Parameters
+    ----------
+    M11, M12, M21, M22 : array (n, n), (n, nx + nu), (nx + ny, n), (nx + ny, nx + nu)
+        n = `order` = sum of the block sizes.
+    blocks : tuple of Block
+        One a parameter, with its `Scheduling` and its size.
+    states, inputs, outputs : tuple of Signal
+        nx, nu, ny names.
+    dt : float, optional
+        Sample period, s; None: continuous.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, a parameter in two blocks, a period that is not positive.
+
+    References
+    ----------
+    Zhou, Doyle and Glover (1996), Robust and Optimal Control, ch. 10.
+
+    Examples
+    --------
+    >>> p = symheli.Scheduling("p", "1", low=0.0, high=1.0)
+    >>> spring = symheli.LFT.polynomial(
+    ...     A={(0,): [[0.0, 1.0], [-2.0, -1.0]], (1,): [[0.0, 0.0], [-0.5, 0.0]]},
+    ...     B={(0,): [[0.0], [1.0]]},
+    ...     C={(0,): [[1.0, 0.0]]},
+    ...     D={(0,): [[0.0]]},
+    ...     parameters=[p],
+    ... )
+    >>> spring.reduce().order, spring.at(0.5).A[1].round(6).tolist()
+    (1, [-2.25, -1.0])
     """
 
     M11: Array

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace, Scheduling, nu_gap, reduce
+from symheli.lpv import LinearModel, LPVStateSpace, Scheduling, balanced_truncation, nu_gap
 
 P = Scheduling("p", "1", 0.0, 1.0)
 
@@ -39,7 +39,7 @@ def test_nu_gap_stays_below_twice_the_tail_of_the_coprime_factors(order, shift):
     """
     full = lti(shift=shift)
     assert full.is_stable() == (shift == 0.0)
-    found = reduce(full, order)
+    found = balanced_truncation(full, order)
     v = found.singular_values[order:]
     assert found.nu_gap[0] <= 2 * np.sum(v / np.sqrt(1 + v**2)) + 1e-6
     assert found.nu_gap[0] > 1e-3
@@ -48,7 +48,7 @@ def test_nu_gap_stays_below_twice_the_tail_of_the_coprime_factors(order, shift):
 
 def test_the_reported_gap_is_that_of_the_frozen_models():
     full = lti(dt=0.1)
-    found = reduce(full, 4, input_scale=[0.5, 2.0])
+    found = balanced_truncation(full, 4, input_scale=[0.5, 2.0])
     assert found.nu_gap[0] == pytest.approx(nu_gap(full, found.model, input_scale=[0.5, 2.0]))
     omega = np.linspace(0, np.pi / 0.1, 4001)
     G, R = (m.frequency_response(omega) * [0.5, 2.0] for m in (full, found.model))
@@ -77,7 +77,7 @@ def lpv(dt, unseen=2):
 @pytest.mark.parametrize("dt", [None, 0.05])
 def test_states_that_no_input_reaches_cost_nothing(dt):
     full = lpv(dt)
-    found = full.reduce(3)
+    found = full.truncate(3)
     assert found.nu_gap.max() < 1e-6  # the square root of the rounding of Riccati solutions
     assert np.isnan(found.error).any() == (not all(full.at(p).is_stable() for p in found.p))
     assert found.model.basis == full.basis
@@ -90,7 +90,7 @@ def test_states_that_no_input_reaches_cost_nothing(dt):
             atol=1e-8,
         )
     with pytest.raises(InputError, match="only 3 of the 5 states can be excited and seen"):
-        full.reduce(4)
+        full.truncate(4)
 
 
 def test_reduction_does_not_depend_on_units_once_channels_are_scaled():
@@ -107,7 +107,7 @@ def test_reduction_does_not_depend_on_units_once_channels_are_scaled():
         full.outputs,
         0.05,
     )
-    first, second = full.reduce(2), other.reduce(2, input_scale=1e3, output_scale=50.0)
+    first, second = full.truncate(2), other.truncate(2, input_scale=1e3, output_scale=50.0)
     np.testing.assert_allclose(second.nu_gap, first.nu_gap, atol=1e-7)
     assert first.nu_gap.max() > 1e-3
 
@@ -116,7 +116,7 @@ def test_what_cannot_be_reduced_is_refused_in_words():
     full = lpv(0.05)
     for order in (0, 5, 2.0):
         with pytest.raises(InputError, match="order: expected an integer from 1 to 4"):
-            full.reduce(order)  # type: ignore[arg-type]
+            full.truncate(order)  # type: ignore[arg-type]
     hidden = LinearModel(
         np.diag([0.5, 1.5, 0.3]),
         [[1.0], [0.0], [1.0]],
@@ -128,4 +128,4 @@ def test_what_cannot_be_reduced_is_refused_in_words():
         dt=0.1,
     )  # type: ignore[arg-type]
     with pytest.raises(InputError, match="not stabilisable and detectable"):
-        reduce(hidden, 1)
+        balanced_truncation(hidden, 1)

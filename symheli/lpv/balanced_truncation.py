@@ -27,15 +27,15 @@ Riccati solutions lose to rounding.
 
 
 @dataclass(frozen=True, eq=False)
-class Reduction(Generic[Model]):
-    """The reduced `model`, and what it costs with p held at each of `p` (K,), between the points
+class BalancedTruncation(Generic[Model]):
+    """The truncated `model`, and what it costs with p held at each of `p` (K,), between the points
     that were balanced.
 
     `singular_values` (nx,): importance of each balanced state, those beyond the order were left
-    out. `nu_gap` (K,) in [0, 1] between reduced and full model. `error` (K,): largest gain of their
-    difference over frequency by that of the full model, NaN where one of them is unstable. Both
-    with scaled channels, on a frequency grid. With d scheduling parameters `p` is (K, d). Nothing
-    is promised for p that moves.
+    out. `nu_gap` (K,) in [0, 1] between truncated and full model. `error` (K,): largest gain of
+    their difference over frequency by that of the full model, NaN where one of them is unstable.
+    Both with scaled channels, on a frequency grid. With d scheduling parameters `p` is (K, d).
+    Nothing is promised for p that moves.
     """
 
     model: Model
@@ -45,28 +45,56 @@ class Reduction(Generic[Model]):
     error: Array
 
 
-def reduce(
+def balanced_truncation(
     model: Model,
     order: int,
     *,
     nodes: int = 21,
     input_scale: object = 1.0,
     output_scale: object = 1.0,
-) -> Reduction[Model]:
-    """Keep `order` states of a model by one constant projection, balanced for the means over p of
-    its frozen Gramians.
+) -> BalancedTruncation[Model]:
+    """Fewer states by one constant projection, balanced for the means over p of the frozen
+    Gramians.
 
     The Gramians are those of the normalised coprime factors, solutions of the Riccati equations of
     u'u + y'y: they exist for unstable models and belong to the nu-gap. One projection for all p
-    keeps the dependence on p in its basis and adds no terms where p moves. Inputs are divided by
-    `input_scale`, outputs by `output_scale` (one a channel, in their units); what counts as
-    important depends on them. Poles on the stability boundary (a heading) are refused by the
-    nu-gap: leave such states out first.
+    keeps the dependence on p in its basis and adds no terms where p moves. Poles on the stability
+    boundary (a heading) are refused by the nu-gap: leave such states out first.
 
-    Raises `InputError` for an order that is not below the number of states that matter, or a frozen
-    model that is not stabilisable and detectable. Source: Jonckheere and Silverman (1983), IEEE
-    Trans. Automatic Control 28; Meyer (1990), 35; means of frozen Gramians after Wood, Goddard and
-    Glover (1996), CDC.
+    Parameters
+    ----------
+    model : LPVStateSpace or LinearModel
+        With nx states.
+    order : int
+        States to keep.
+    nodes : int
+        Values of p over which the Gramians are averaged.
+    input_scale, output_scale : float or array
+        Inputs and outputs are divided by it (one a channel, in their units); what counts as
+        important depends on it.
+
+    Returns
+    -------
+    BalancedTruncation
+        The model and the frozen error it makes.
+
+    Raises
+    ------
+    InputError
+        An order that is not below the number of states that matter, or a frozen model that is not
+        stabilisable and detectable.
+
+    References
+    ----------
+    Jonckheere and Silverman (1983), IEEE Trans. Automatic Control 28; Meyer (1990), 35; means of
+    frozen Gramians after Wood, Goddard and Glover (1996), CDC.
+
+    Examples
+    --------
+    >>> sampled = spring.discretize(0.1)
+    >>> small = lpv.balanced_truncation(sampled, 1)
+    >>> small.model.at(0.5).A.shape, bool(small.nu_gap.max() < 1)
+    ((1, 1), True)
     """
     nx = len(model.states)
     if not isinstance(order, int) or isinstance(order, bool) or not 0 < order < nx:
@@ -84,8 +112,7 @@ def reduce(
     if values[order - 1] <= NEGLIGIBLE * values[0]:
         count = int(np.sum(values > NEGLIGIBLE * values[0]))
         raise InputError(
-            f"order: only {count} of the {nx} states can be excited and seen; reduce to {count} or"
-            " fewer"
+            f"order: only {count} of the {nx} states can be excited and seen; keep {count} or fewer"
         )
     size = np.sqrt(values[:order])
     left, right = Lx @ U[:, :order] / size, Ly @ V[:order].T / size
@@ -95,7 +122,7 @@ def reduce(
     gaps = [nu_gap(*pair, input_scale=su, output_scale=sy) for pair in compared]
     errors = [_relative_error(*pair, su, sy) for pair in compared]
     p = np.array([np.squeeze(p) for (p, _), _ in pairs])
-    return Reduction(small, values, p, np.array(gaps), np.array(errors))
+    return BalancedTruncation(small, values, p, np.array(gaps), np.array(errors))
 
 
 def _nodes(model: LPVStateSpace | LinearModel, count: int) -> list[tuple[Array, LinearModel]]:

@@ -1,0 +1,226 @@
+"""Where instruments come from, and the rows they make: signals that know nothing of the noise, at
+several lags, times the functions of the scheduling parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from identification.design.excitation import RANK_TOLERANCE, column_scale
+from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import (
+    basis_values,
+    regressor_rows,
+    scheduling_values,
+    units_of,
+)
+from symheli.errors import ExcitationError, InputError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array, frozen
+
+
+@runtime_checkable
+class InstrumentSource(Protocol):
+    """Signals independent of the noise in a record, and the lags at which they instrument: anything
+    with these two methods.
+
+    `str(source)` names it in messages. The signals may be measured beside the others
+    (`LaggedSignals`), or computed: a flight of the same plan in a simulator knows no noise either.
+
+    Examples
+    --------
+    The same plan, flown by another plant without noise:
+
+    >>> class Simulated:
+    ...     def instrument_signals(self, record, names):
+    ...         x = np.zeros(len(record))
+    ...         for k in range(1, len(x)):
+    ...             x[k] = 0.4 * x[k - 1] + record["u"][k - 1]
+    ...         return np.column_stack([x, record["u"]])
+    ...
+    ...     def instrument_lags(self, dt, first, memory):
+    ...         return tuple(range(first, memory + 4))
+    >>> isinstance(Simulated(), idn.InstrumentSource)
+    True
+    >>> found = idn.fit(arx, record, method=idn.InstrumentalVariables(Simulated()))
+    >>> print(found.coefficients.at(0.0).A.round(2))
+    [[[-0.5]]]
+    """
+
+    def instrument_signals(self, record: FlightRecord, names: tuple[str, ...]) -> Array:
+        """(n, k), a row a sample of `record`, NaN where unknown; `names` are the outputs and inputs
+        of the structure.
+        """
+        ...
+
+    def instrument_lags(self, dt: float, first: int, memory: int) -> tuple[int, ...]:
+        """Lags (samples of `dt` s) from `first`, the least that may instrument; `memory` is the
+        longest lag of the structure.
+        """
+        ...
+
+
+Instruments = str | Sequence[str] | InstrumentSource
+"""A source of instruments, or the names of signals of the record with the defaults of
+`LaggedSignals`.
+"""
+
+
+@dataclass(frozen=True)
+class LaggedSignals:
+    """Signals of the record as instruments, at lags evenly over a window.
+
+    In closed loop what is added to the stabilised inputs, in open loop the inputs; the command is
+    an excitation too.
+
+    Parameters
+    ----------
+    signals : str or sequence of str
+        Their names in the record.
+    window : float
+        How far back they instrument, s.
+    lags : int
+        Most of them in the window.
+
+    Raises
+    ------
+    InputError
+        No names, or an empty window.
+
+    Examples
+    --------
+    >>> idn.LaggedSignals("u", window=0.5).instrument_lags(dt=0.1, first=1, memory=1)
+    (1, 2, 3, 4, 5)
+    """
+
+    signals: tuple[str, ...]
+    window: float = 1.0
+    lags: int = 24
+
+    def __post_init__(self) -> None:
+        given = (self.signals,) if isinstance(self.signals, str) else tuple(self.signals)
+        object.__setattr__(self, "signals", given)
+        if not given or not all(isinstance(name, str) for name in given):
+            raise InputError(
+                "instruments: expected names of signals, the external excitation added to the"
+                f" stabilised inputs, got {given!r:.80}"
+            )
+        if not (np.isfinite(self.window) and self.window > 0) or self.lags < 1:
+            raise InputError(
+                f"instruments need a window > 0 s and at least one lag, got {self.window} s and"
+                f" {self.lags}"
+            )
+
+    def __str__(self) -> str:
+        return ", ".join(self.signals)
+
+    def instrument_signals(self, record: FlightRecord, names: tuple[str, ...]) -> Array:
+        """The columns (n, k) of the record; `UnknownNameError` for a signal it lacks."""
+        return record.columns(self.signals)
+
+    def instrument_lags(self, dt: float, first: int, memory: int) -> tuple[int, ...]:
+        """Evenly over the window, whatever the memory of the structure."""
+        last = max(first + 1, round(self.window / dt))
+        count = min(self.lags, last - first + 1)
+        return tuple(int(i) for i in np.unique(np.round(np.linspace(first, last, count))))
+
+
+def source_of(instruments: Instruments) -> InstrumentSource:
+    """A source itself, or names of signals at the default lags; raises `InputError` for anything
+    else.
+    """
+    if isinstance(instruments, InstrumentSource):
+        return instruments
+    if isinstance(instruments, str | list | tuple):
+        return LaggedSignals(instruments)  # type: ignore[arg-type]
+    raise InputError(
+        "instruments: expected names of signals of the record, LaggedSignals(...) or another source"
+        f" with instrument_signals and instrument_lags, got {instruments!r:.80}"
+    )
+
+
+def instrument_rows(
+    arx: LPVARX, records: Sequence[FlightRecord], source: InstrumentSource, first: int
+) -> Array:
+    """Instruments (n, m) of every sample of the records, from lag `first` on, NaN where one is
+    missing.
+
+    Offsets and the increment of p instrument themselves.
+    """
+    return np.vstack([_rows(arx, record, source, first) for record in records])
+
+
+def _rows(arx: LPVARX, record: FlightRecord, source: InstrumentSource, first: int) -> Array:
+    r, p = _signals(arx, record, source), scheduling_values(arx, record)
+    f, y, u = basis_values(arx, p), record.columns(arx.outputs), record.columns(arx.inputs)
+    at_lag = arx.scheduling_at == "lag"
+    n, parts = len(record), []
+    for lag in source.instrument_lags(record.dt, first, arx.memory):
+        block = np.full((n, r.shape[1] * f.shape[1]), np.nan)
+        for part in record.segments():
+            here, then = (
+                slice(min(part.start + lag, part.stop), part.stop),
+                slice(part.start, max(part.stop - lag, part.start)),
+            )
+            functions = f[then] if at_lag else f[here]
+            block[here] = (r[then][:, :, None] * functions[:, None, :]).reshape(len(functions), -1)
+        parts.append(block)
+    offsets = np.full(
+        (n, (arx.offset + arx.offset_rate * len(arx.parameters)) * f.shape[1]), np.nan
+    )
+    for part in record.segments():
+        if part.stop - part.start > arx.memory:
+            offsets[part.start + arx.memory : part.stop] = regressor_rows(
+                arx, y[part], u[part], p[part], f[part], kinds=("offset", "increment")
+            )
+    return np.hstack([*parts, offsets])
+
+
+def _signals(arx: LPVARX, record: FlightRecord, source: InstrumentSource) -> Array:
+    found = source.instrument_signals(record, (*arx.outputs, *arx.inputs))
+    return frozen(found, f"instruments {source}", (len(record), None), finite=False)
+
+
+def column_space(W: Array) -> Array:
+    """Orthonormal basis of the columns of W, dependent ones dropped."""
+    Q, R = np.linalg.qr(W / column_scale(W))
+    U, values, _ = np.linalg.svd(R)
+    return Q @ U[:, values > RANK_TOLERANCE * values[0]]
+
+
+def explained(
+    arx: LPVARX, records: Sequence[FlightRecord], source: InstrumentSource
+) -> tuple[list[FlightRecord], list[FlightRecord]]:
+    """The records, and the same with inputs and outputs replaced by what the instruments explain of
+    them (least squares, lags from 0 on).
+
+    What is explained does not know the noise that feedback carries round. Both are NaN where an
+    instrument is missing, so that both break at the same samples.
+    """
+    names = (*arx.inputs, *arx.outputs)
+    W = instrument_rows(arx, records, source, 0)
+    measured = np.vstack([record.columns(names) for record in records])
+    known = np.logical_and(np.isfinite(W).all(axis=1), np.isfinite(measured).all(axis=1))
+    if known.sum() <= W.shape[1]:
+        raise ExcitationError(
+            f"{W.shape[1]} instruments on {known.sum()} samples explain anything; record longer, or"
+            " use fewer lags"
+        )
+    Q = column_space(W[known])
+    found = np.full_like(measured, np.nan)
+    found[known] = Q @ (Q.T @ measured[known])
+    units = {str(s): s.unit for s in units_of(names, records)}
+    ends = np.cumsum([len(r) for r in records])[:-1]
+
+    def replaced(table: Array) -> list[FlightRecord]:
+        parts = zip(records, np.split(table, ends), strict=True)
+        return [
+            record.with_signals(units, **dict(zip(names, part.T, strict=True)))
+            for record, part in parts
+        ]
+
+    return replaced(np.where(known[:, None], measured, np.nan)), replaced(found)

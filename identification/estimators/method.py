@@ -1,0 +1,107 @@
+"""What an estimator is to `fit`: options that hold together, and one way from regressors to
+coefficients.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import Regression
+from symheli.errors import ConvergenceWarning, InputError, UnknownNameError
+from symheli.records import FlightRecord
+from symheli.values.arrays import Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Estimate:
+    """What a method found: coefficients and what there is to say about them.
+
+    Parameters
+    ----------
+    theta : array (n_regressors, ny)
+        In the order of `LPVARX.regressor_names`.
+    details : mapping
+        Plain numbers and lists by name.
+    remarks : tuple of Warning
+        The warnings `fit` issues.
+    residual_covariance : array (ny, ny), optional
+        Of the one-step residuals; None: that of the batch of regressors.
+
+    Examples
+    --------
+    >>> idn.Estimate(theta=np.zeros((4, 1)), details={"iterations": 3}).details["iterations"]
+    3
+    """
+
+    theta: Array
+    details: Mapping[str, Any] = field(default_factory=dict)
+    remarks: tuple[Warning, ...] = ()
+    residual_covariance: Array | None = None
+
+
+class Method(ABC):
+    """An estimator with its options: a subclass in a file of its own, exported, is all `fit` needs.
+
+    Attributes
+    ----------
+    shorthand : str
+        Stands for the defaults, and is what a model says it was fitted by.
+    needs_excitation : bool
+        The data alone must determine every coefficient, `fit` refuses them otherwise. False where a
+        penalty decides what they leave open.
+
+    Examples
+    --------
+    >>> class Zero(idn.Method):
+    ...     shorthand, needs_excitation = "zero", False
+    ...
+    ...     def estimate(self, arx, records, data):
+    ...         return idn.Estimate(theta=np.zeros((arx.n_regressors, arx.ny)))
+    >>> print(idn.fit(arx, record, method=Zero()).theta.T)
+    [[0. 0. 0. 0.]]
+    """
+
+    shorthand: ClassVar[str]
+    needs_excitation: ClassVar[bool] = True
+
+    @abstractmethod
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """The coefficients of a structure; `data` are the regressors of `records` as measured."""
+
+    @classmethod
+    def default(cls) -> Method:
+        """What the shorthand stands for."""
+        return cls()
+
+
+def method_of(value: Method | str) -> Method:
+    """A method, or the defaults of the one a shorthand names.
+
+    Raises `UnknownNameError` for any other string, `InputError` for anything else.
+    """
+    if isinstance(value, Method):
+        return value
+    known = {method.shorthand: method for method in _subclasses(Method)}
+    if not isinstance(value, str):
+        raise InputError(
+            f"method: expected one of {', '.join(known)}, or a method with its options such as"
+            f" Ridge(weight=0.1), got {value!r:.80}"
+        )
+    if value not in known:
+        raise UnknownNameError("method", value, tuple(known))
+    return known[value].default()
+
+
+def not_settled(method: Method, advice: str) -> ConvergenceWarning:
+    """The remark of an iteration that stops early, with what to try."""
+    return ConvergenceWarning(f"{method.shorthand!r} did not settle: {advice}")
+
+
+def _subclasses(parent: type[Method]) -> Iterator[type[Method]]:
+    for child in parent.__subclasses__():
+        yield child
+        yield from _subclasses(child)

@@ -1,0 +1,58 @@
+"""Recursive least squares as a method of `fit`: the coefficients at the end of the records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from identification.estimators.method import Estimate, Method
+from identification.estimators.self_check import check_least_squares, check_recursion
+from identification.recursive.forgetting import Constant, Forgetting, forgetting_of
+from identification.recursive.recursive_least_squares import RecursiveLeastSquares
+from identification.structure.lpvarx import LPVARX
+from identification.structure.regressors import Regression
+from symheli.records import FlightRecord
+
+
+@dataclass(frozen=True)
+class Recursion(Method):
+    """Least squares sample by sample, older ones weighing less: `RecursiveLeastSquares` over whole
+    records.
+
+    Parameters
+    ----------
+    forgetting : float or Forgetting
+        A factor in (0, 1] (the weight of a sample is the factor to the power of its age), or one of
+        `Constant`, `Variable`, `Directional`.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+
+    Examples
+    --------
+    >>> recent = idn.fit(arx, record, method=idn.Recursion(forgetting=0.99))
+    >>> print(recent.coefficients.at(0.0).A.round(1))
+    [[[-0.5]]]
+    """
+
+    forgetting: float | Forgetting = 1.0
+    shorthand: ClassVar[str] = "rls"
+
+    def __post_init__(self) -> None:
+        forgetting_of(self.forgetting)
+
+    def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
+        """The coefficients after the last sample."""
+        forgetting = forgetting_of(self.forgetting)
+        online = RecursiveLeastSquares(arx, forgetting).online()
+        for phi, y in zip(data.phi, data.y, strict=True):
+            online.absorb(phi, y)
+        state = online.state
+        check_recursion(state, data.phi, data.y)
+        theta = state.solve()
+        if forgetting == Constant(1.0):
+            check_least_squares(arx, data.phi, data.y, theta, self.shorthand)
+        return Estimate(theta=theta, residual_covariance=state.residual_covariance)
