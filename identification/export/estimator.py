@@ -78,7 +78,8 @@ def write_estimator(
     --------
     >>> import identification as idn, tempfile
     >>> from identification.export import write_estimator
-    >>> arx = idn.LPVARX("q", "d_lon", "airspeed", 2, 2, 1, idn.Polynomial(2, 0.0, 13.0))
+    >>> arx = idn.LPVARX(
+    ...     "q", "d_lon", "airspeed", na=2, nb=2, delay=1, basis=idn.Polynomial(2, 0.0, 13.0))
     >>> folder = tempfile.TemporaryDirectory()
     >>> units = {"q": "rad/s", "d_lon": "rad", "airspeed": "m/s"}
     >>> files = write_estimator(idn.RecursiveLeastSquares(arx), units, folder.name)

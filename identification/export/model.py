@@ -77,7 +77,8 @@ def write_model(
     ...            "p": rng.uniform(size=200)}
     >>> units = dict.fromkeys(columns, "1")
     >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(200), units, **columns)
-    >>> arx = idn.LPVARX("y", "u", "p", 1, 1, 1, idn.Polynomial(1, 0.0, 1.0))
+    >>> arx = idn.LPVARX(
+    ...     "y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, 0.0, 1.0))
     >>> folder = tempfile.TemporaryDirectory()
     >>> [file.name for file in write_model(idn.fit(arx, record), folder.name, "roll")]
     ['roll.h', 'roll.c', 'roll_check.c']

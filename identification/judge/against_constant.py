@@ -51,6 +51,21 @@ class AgainstConstant:
     `leak`: share of what is new in p that the outputs of the same instant explain; beyond a half
     free runs, which follow p, are told what they predict. `trim_note`: why the trim moves in the
     model that is judged, or not.
+
+    Examples
+    --------
+    >>> import numpy as np, identification as idn, symheli
+    >>> u = np.random.default_rng(0).standard_normal(600)
+    >>> p = np.sin(0.05 * np.arange(600))
+    >>> y = np.zeros(600)
+    >>> for k in range(1, 600):
+    ...     y[k] = (0.7 + 0.2 * p[k - 1]) * y[k - 1] + u[k - 1]
+    >>> units = dict.fromkeys("yup", "1")
+    >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(600), units, y=y, u=u, p=p)
+    >>> arx = idn.LPVARX(
+    ...     "y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
+    >>> [one.label for one in idn.against_constant(arx, record, None).models]
+    ['LPV, degree 1', 'LTI']
     """
 
     models: tuple[Scored, ...]

@@ -12,8 +12,7 @@ import numpy as np
 from identification.judge.scores import HORIZON, Scores, steps
 from identification.model.lpvarx_model import LPVARXModel
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv import LPVStateSpace
-from symheli.lpv.exponential import expm
+from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
@@ -23,13 +22,31 @@ from symheli.values.sample_period import same_period
 class BaselineModel:
     """An LPV model that predicts from the full state of a record, and what of the record drives it.
 
-    `scheduling` names the signal that p is (default: the model's own name for it), `inputs` those
-    of the model's inputs that the record holds (default: all; the others stay at their trim).
-    Without `drift` the motion of the trim, -x0'(p) dp/dt, is left out.
+    Parameters
+    ----------
+    model : LPVStateSpace
+        Continuous or sampled, of any number of scheduling parameters.
+    scheduling : str or sequence of str, optional
+        The signals that the parameters are, in their order (default: their own names). A parameter
+        that is the rate of another and that the record lacks is that one's derivative.
+    inputs : sequence of str, optional
+        Those of the model's inputs that the record holds (default: all); the others stay at their
+        trim.
+    drift : bool
+        Without it what the motion of the trim adds, -x0'(p) dp/dt, is left out.
+
+    Examples
+    --------
+    >>> import identification as idn, symheli
+    >>> lag = symheli.LPVStateSpace.polynomial(
+    ...     A=[[[-2.0]]], B=[[[1.0]]], C=[[[1.0]]], D=[[[0.0]]],
+    ...     scheduling=symheli.Scheduling("speed", "m/s", 0.0, 1.0))
+    >>> idn.BaselineModel(model=lag, scheduling="airspeed").drift
+    True
     """
 
     model: LPVStateSpace
-    scheduling: str | None = None
+    scheduling: str | Sequence[str] | None = None
     inputs: tuple[str, ...] | None = None
     drift: bool = True
 
@@ -48,12 +65,37 @@ class BaselinePredictor:
     """Predictions of a record by an LPV model from its full state, about its moving trim.
 
     dx/dt = A(p) (x - x0(p)) + B(p) (u - u0(p)) - x0'(p) dp/dt in deviations, every sample's p and u
-    held until the next; a sampled model goes from sample to sample as it is. A model without trim
-    has x0 = 0 and u0 = 0. Signals are those of the record, SI; the arguments are those of
-    `BaselineModel`.
+    held until the next; a sampled model goes from sample to sample: see `symheli.lpv.prediction`.
+    A model without trim has x0 = 0 and u0 = 0.
 
-    Raises `UnknownNameError` for a state, input or scheduling that is not in the record, and
-    `InputError` for a sampled model with another sample period and a range that p never enters.
+    Parameters
+    ----------
+    lpv : LPVStateSpace
+        The model.
+    record : FlightRecord
+        Signals in SI.
+    scheduling, inputs, drift
+        As of `BaselineModel`.
+
+    Raises
+    ------
+    UnknownNameError
+        A state, input or scheduling that is not in the record.
+    InputError
+        A sampled model with another sample period, a range that p never enters.
+
+    Examples
+    --------
+    >>> import numpy as np, identification as idn, symheli
+    >>> lag = symheli.LPVStateSpace.polynomial(
+    ...     A=[[[-2.0]]], B=[[[1.0]]], C=[[[1.0]]], D=[[[0.0]]], states=["x"], inputs=["u"],
+    ...     outputs=["x"], scheduling=symheli.Scheduling("p", "1", 0.0, 1.0))
+    >>> zero, t = np.zeros(50), 0.1 * np.arange(50)
+    >>> record = symheli.FlightRecord.from_arrays(
+    ...     t, dict.fromkeys("xup", "1"), x=np.exp(-2 * t), u=zero, p=zero)
+    >>> along = idn.BaselinePredictor(lag, record)
+    >>> bool(np.allclose(along.predict(["x"], 10)[10:, 0], record["x"][10:]))
+    True
     """
 
     def __init__(
@@ -61,13 +103,12 @@ class BaselinePredictor:
         lpv: LPVStateSpace,
         record: FlightRecord,
         *,
-        scheduling: str | None = None,
+        scheduling: str | Sequence[str] | None = None,
         inputs: Sequence[str] | None = None,
         drift: bool = True,
     ):
         driven = tuple(map(str, lpv.inputs if inputs is None else inputs))
-        name = str(lpv.scheduling.name if scheduling is None else scheduling)
-        for signal in (name, *driven, *map(str, lpv.states)):
+        for signal in (*driven, *map(str, lpv.states)):
             if signal not in record.signals:
                 raise UnknownNameError("signal of the record", signal, map(str, record.signals))
         if lpv.dt is not None and not same_period(lpv.dt, record.dt):
@@ -76,64 +117,22 @@ class BaselinePredictor:
                 " one of them"
             )
         self.lpv = lpv.select(inputs=driven)
-        low, high = self.lpv.scheduling.low, self.lpv.scheduling.high
-        self.p = np.clip(record[name], low, high)
-        if not np.any(self.p == record[name]):
-            raise InputError(
-                f"{name} is nowhere within the baseline's {low:g} to {high:g}; name the signal that"
-                " schedules it: scheduling=..."
-            )
-        self.x, self.u = record.columns(self.lpv.states), record.columns(driven)
-        trim = self.lpv.trim
-        self.x0 = np.zeros_like(self.x) if trim is None else trim.state(self.p)
-        u0 = np.zeros_like(self.u) if trim is None else trim.input(self.p)
-        step = self._sampled(record) if self.lpv.dt is None else self._given()
-        self.A, B, moved = step
-        self.push = np.einsum("kij,kj->ki", B, self.u - u0)
-        if drift and trim is not None:
-            self.push += moved
-
-    def _sampled(self, record: FlightRecord) -> tuple[Array, Array, Array]:
-        """A and B over one sample, and what the drift of the trim adds to the deviations in it."""
-        A, B, *_ = self.lpv.matrices(self.p)
-        n, nx, nu = *B.shape[:2], B.shape[2]
-        stacked = np.zeros((n, 2 * nx + nu, 2 * nx + nu))
-        stacked[:, :nx, :nx], stacked[:, :nx, nx : nx + nu] = A, B
-        stacked[:, :nx, nx + nu :] = np.eye(nx)
-        step = expm(stacked * record.dt)
-        drift = np.zeros((n, nx))
-        if self.lpv.trim is not None:
-            speed = np.gradient(self.p, record.time)
-            drift = -self.lpv.trim.state(self.p, 1) * speed[:, None]
-        moved = np.einsum("kij,kj->ki", step[:, :nx, nx + nu :], drift)
-        return step[:, :nx, :nx], step[:, :nx, nx : nx + nu], moved
-
-    def _given(self) -> tuple[Array, Array, Array]:
-        """The same of a sampled model, whose trim moves by what it is at the next sample."""
-        A, B, *_ = self.lpv.matrices(self.p)
-        return A, B, -np.diff(self.x0, axis=0, append=self.x0[-1:])
+        self.p = _scheduled(lpv.parameters, record, scheduling)
+        self.u = record.columns(driven)
+        x = record.columns(self.lpv.states)
+        self._flight = self.lpv.predict(
+            self.p, self.u, x, dt=record.dt, rate=None if drift else 0.0
+        )
 
     def predict(self, outputs: Sequence[str], horizon: int) -> Array:
         """Outputs (n, ny) `horizon` samples ahead from every sample, NaN for the first
         `horizon`.
         """
-        n = len(self.x)
-        z = (self.x - self.x0)[: n - horizon]
-        for h in range(horizon):
-            window = slice(h, n - horizon + h)
-            z = np.einsum("kij,kj->ki", self.A[window], z) + self.push[window]
-        x = np.full_like(self.x, np.nan)
-        x[horizon:] = z + self.x0[horizon:]
-        return self._seen(outputs, x)
+        return self._seen(outputs, self._flight.ahead(horizon))
 
     def simulate(self, outputs: Sequence[str], start: int = 0) -> Array:
         """Free run (n, ny) from the state at sample `start`, NaN up to it."""
-        z, x = (self.x - self.x0)[start], np.full_like(self.x, np.nan)
-        for k in range(start, len(self.x)):
-            if k > start:
-                x[k] = z + self.x0[k]
-            z = self.A[k] @ z + self.push[k]
-        return self._seen(outputs, x)
+        return self._seen(outputs, self._flight.free_run(start))
 
     def _seen(self, outputs: Sequence[str], x: Array) -> Array:
         """Columns of the states (n, nx), and y = C(p) x + D(p) u of outputs that are no states."""
@@ -152,6 +151,34 @@ class BaselinePredictor:
         return np.stack(columns, axis=1)
 
 
+def _scheduled(
+    parameters: Sequence[Scheduling], record: FlightRecord, scheduling: str | Sequence[str] | None
+) -> Array:
+    """p (n,) or (n, d) along the record, within the ranges of the model."""
+    own = [s.name for s in parameters]
+    given = [scheduling] if isinstance(scheduling, str) else list(scheduling or own)
+    if len(given) > len(own):
+        raise InputError(f"scheduling: expected a signal for each of {', '.join(own)}, got {given}")
+    names = [*given, *own[len(given) :]]
+    columns = []
+    for s, name in zip(parameters, names, strict=True):
+        faster = next((i for i, other in enumerate(parameters) if other.rate == s.name), None)
+        if name in record.signals:
+            values = record[name]
+        elif faster is not None and names[faster] in record.signals:
+            values = record.derivative(names[faster])
+        else:
+            raise UnknownNameError("signal of the record", name, map(str, record.signals))
+        inside = np.clip(values, s.low, s.high)
+        if not np.any(inside == values):
+            raise InputError(
+                f"{name} is nowhere within the baseline's {s.low:g} to {s.high:g}; name the signal"
+                " that schedules it: scheduling=..."
+            )
+        columns.append(inside)
+    return columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prediction:
     """What one model achieved on the unseen flight: its scores, and its prediction `Scores.horizon`
@@ -166,7 +193,21 @@ class Prediction:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BesideBaseline:
-    """All models on the same unseen flight."""
+    """All models on the same unseen flight: what `beside_baseline` returns.
+
+    Examples
+    --------
+    >>> import numpy as np, identification as idn, symheli
+    >>> lag = symheli.LPVStateSpace.polynomial(
+    ...     A=[[[-2.0]]], B=[[[1.0]]], C=[[[1.0]]], D=[[[0.0]]], states=["x"], inputs=["u"],
+    ...     outputs=["x"], scheduling=symheli.Scheduling("p", "1", 0.0, 1.0))
+    >>> zero, t = np.zeros(50), 0.1 * np.arange(50)
+    >>> record = symheli.FlightRecord.from_arrays(
+    ...     t, dict.fromkeys("xup", "1"), x=np.exp(-2 * t), u=zero, p=zero)
+    >>> found = idn.beside_baseline({}, {"lag": idn.BaselineModel(model=lag)}, record, ["x"])
+    >>> found.best("x").name
+    'lag'
+    """
 
     outputs: tuple[str, ...]
     record: FlightRecord
@@ -238,7 +279,8 @@ def beside_baseline(
     >>> record = symheli.FlightRecord.from_arrays(
     ...     0.02 * np.arange(n), {"p": "rad/s", "aileron": "rad", "speed": "m/s"},
     ...     p=p, aileron=aileron, speed=speed)
-    >>> arx = idn.LPVARX("p", "aileron", "speed", 1, 1, 1, idn.Polynomial(1, 0.0, 10.0))
+    >>> arx = idn.LPVARX(
+    ...     "p", "aileron", "speed", na=1, nb=1, delay=1, basis=idn.Polynomial(1, 0.0, 10.0))
     >>> found = idn.beside_baseline(
     ...     {"identified": idn.fit(arx, record)},
     ...     {"equations": idn.BaselineModel(model=roll)}, record, ["p"])

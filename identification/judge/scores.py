@@ -23,6 +23,13 @@ class Scores:
 
     100 is perfect, 0 no better than the mean; -inf where a prediction diverges, NaN where there is
     nothing to compare.
+
+    Examples
+    --------
+    >>> import numpy as np, identification as idn
+    >>> y = np.sin(np.arange(20.0))[:, None]
+    >>> idn.Scores.of(y, ["y"], one_step=y, ahead=y, free_run=0.9 * y).one_step
+    {'y': 100.0}
     """
 
     horizon: float
@@ -101,7 +108,8 @@ def scores(
     ...     y[k] = 0.8 * y[k - 1] + (1 + 0.1 * p[k - 1]) * u[k - 1]
     >>> units = dict.fromkeys("yup", "1")
     >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(300), units, y=y, u=u, p=p)
-    >>> arx = idn.LPVARX("y", "u", "p", 1, 1, 1, idn.Polynomial(1, p.min(), p.max()))
+    >>> arx = idn.LPVARX(
+    ...     "y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, p.min(), p.max()))
     >>> found = idn.scores(idn.fit(arx, record), record, horizon=0.5)
     >>> round(found.ahead["y"], 6), list(found.by_horizon)
     (100.0, ['one step', '0.5 s', 'free run'])

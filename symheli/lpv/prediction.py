@@ -78,7 +78,12 @@ def predict(
     period = lpv.dt if dt is None else dt
     x0, u0 = lpv.trim.state(p), lpv.trim.input(p)
     speed = np.gradient(p, period, axis=0) if rate is None else np.broadcast_to(rate, p.shape)  # type: ignore[arg-type]
-    # a sampled model takes a step of the drift, a continuous one its integral
-    drift = lpv.trim.drift(p, speed) * (1.0 if lpv.dt is None else lpv.dt)
-    push = np.einsum("kij,kj->ki", B, u - u0) + np.einsum("kij,kj->ki", E, drift)
-    return Prediction(A, push, x, x0)
+    push = np.einsum("kij,kj->ki", B, u - u0)
+    if lpv.dt is None:
+        return Prediction(A, push + np.einsum("kij,kj->ki", E, lpv.trim.drift(p, speed)), x, x0)
+    # the trim of a sampled model moves by what it is at the next sample
+    moved = lpv.dt * lpv.trim.drift(p, 0 * speed)
+    moved -= np.diff(x0, axis=0, append=x0[-1:]) if rate is None else 0.0
+    if rate is not None:
+        moved += lpv.dt * (lpv.trim.drift(p, speed) - lpv.trim.drift(p, 0 * speed))
+    return Prediction(A, push + moved, x, x0)

@@ -79,10 +79,10 @@ def identified(record, degree=1):
         ("alpha", "pitch_rate"),
         ("elevator", "flap"),
         "tas",
-        1,
-        1,
-        1,
-        idn.Polynomial(degree, 20.0, 40.0),
+        na=1,
+        nb=1,
+        delay=1,
+        basis=idn.Polynomial(degree, 20.0, 40.0),
         offset=True,
         offset_rate=True,
     )
@@ -152,8 +152,9 @@ def test_a_model_without_trim_and_a_sampled_one_predict_too():
 def test_an_input_that_the_record_does_not_hold_stays_at_its_trim(transition):
     alone = idn.BaselinePredictor(aeroplane(), transition, scheduling="tas", inputs=("elevator",))
     both = idn.BaselinePredictor(aeroplane(), transition, scheduling="tas")
-    assert alone.push.shape == both.push.shape
-    assert np.abs(alone.push - both.push).max() > 1e-5
+    one, two = (along.predict(["alpha"], 5)[5:] for along in (alone, both))
+    assert one.shape == two.shape
+    assert np.abs(one - two).max() > 1e-5
 
 
 @pytest.mark.parametrize(
@@ -213,10 +214,10 @@ def test_scheduling_pays_where_the_aeroplane_is_told_by_it():
         ("alpha", "pitch_rate"),
         ("elevator", "flap"),
         "tas",
-        1,
-        1,
-        1,
-        idn.Polynomial(1, 20.0, 40.0),
+        na=1,
+        nb=1,
+        delay=1,
+        basis=idn.Polynomial(1, 20.0, 40.0),
     )
     found = idn.against_constant(arx, *record.split(0.6))
     assert [scored.label for scored in found.models] == ["LPV, degree 1", "LTI"]

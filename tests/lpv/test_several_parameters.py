@@ -143,7 +143,7 @@ def test_reduction_keeps_the_response_over_the_box():
     padded = LPVStateSpace(
         whole.basis, A, B, C, whole.D, (V, A_X), ("a", "b", "c", "d"), ("u1", "u2"), ("y1", "y2")
     )
-    found = padded.reduce(3, nodes=5)
+    found = padded.truncate(3, nodes=5)
     assert found.p.shape == (16, 2)
     assert found.nu_gap.max() < 1e-6
     here = found.model.at(5.0, 1.0).discretize(0.05), padded.at(5.0, 1.0).discretize(0.05)
