@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ def test_the_gain_does_not_increase_as_the_jerk_falls(gains):
     found = [cert.gamma for cert in gains]
     assert all(cert.verified for cert in gains)
     # the bounds are loosened by 1e-6 of gamma^2 until they are verified
-    assert all(less <= more * (1 + 2e-6) for more, less in zip(found, found[1:], strict=False))
+    assert all(less <= more * (1 + 2e-6) for more, less in pairwise(found))
     assert found[-1] < 0.7 * found[0]
 
 
@@ -77,13 +78,12 @@ def test_what_is_found_from_below_keeps_to_rate_and_jerk_and_does_not_beat_the_p
             assert cert.lower > 1.01 * cert.frozen
 
 
-def test_the_worst_trajectory_replayed_has_the_gain():
+def test_no_random_input_along_the_worst_trajectory_beats_the_proof():
     cert = l2_gain(tied(1.0, slope=0.3), form=BOTH, search=QUICK)
     time, p = cert.worst
     h = np.diff(time)
     assert np.ptp(h) < 1e-9
     lpv = tied(1.0, slope=0.3)
-    # the gain of random inputs is below the proven one, and the frozen one is passed
     rng = np.random.default_rng(0)
     n = min(len(p), 20_000)
     u = np.repeat(rng.standard_normal((n // 40 + 1, 1)), 40, axis=0)[:n]
@@ -163,10 +163,8 @@ def replace_fault(cert, evidence):
     return str(evidence.fault(cert.proof.lyapunov, cert.kind, cert.rates))
 
 
-def test_stability_and_what_grows():
+def test_stability_and_what_is_refused():
     assert stability(tied(0.1), form=BOTH).verified
-    wild = tied(0.1, slope=8.0)  # frozen at a = 0 it is the same spring
-    assert stability(wild.with_rate({"a": 0.01}), form=BOTH, search=None).status is not None
     with pytest.raises(InputError, match="a range with 0 inside"):
         l2_gain(
             replace(
