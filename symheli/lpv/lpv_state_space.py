@@ -387,6 +387,19 @@ class LPVStateSpace:
 
         return predict(self, p, u, x, dt=dt, rate=rate)
 
+    def with_trim_drift(self) -> LPVStateSpace:
+        """The model with what the motion of its trim adds to dx/dt as further inputs, last.
+
+        "drift_airspeed" (m/s^2) is the rate of the airspeed and enters by -dx0/dp; where that rate
+        is another parameter, the input is 1 while the flight goes on and enters by xdot0(p) -
+        dx0/dV a, and "drift_acceleration" (m/s^3) is the jerk. So a certificate bounds what the
+        drift does. The columns are fitted by the basis of the model; the misfit is in `.residuals`.
+        Raises `InputError` for a model without trim: declare the drift before closing loops.
+        """
+        from symheli.lpv.trim_drift import with_trim_drift
+
+        return with_trim_drift(self)
+
     def to_control(self, *p: float) -> Any:
         """A python-control `StateSpace` with the same names, p held: one value a parameter."""
         return self.at(*p).to_control()

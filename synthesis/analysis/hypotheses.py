@@ -11,6 +11,7 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.lpv.bases.function_space import tensor_grid
+from symheli.lpv.trim_drift import PREFIX
 from synthesis.certificate import Kind
 
 Array = np.ndarray
@@ -75,7 +76,11 @@ def motion(s: Scheduling, rate: float) -> str:
 
 def drifting(model: object) -> tuple[str, ...]:
     """What is left out where the model is one about a moving trim."""
-    if not isinstance(model, LPVStateSpace) or model.trim is None:
+    if not isinstance(model, LPVStateSpace):
+        return ()
+    if declared := [str(u) for u in model.inputs if u.startswith(PREFIX)]:
+        return (f"the drift of the moving trim is a declared disturbance: {', '.join(declared)}",)
+    if model.trim is None:
         return ()
     return (
         "the drift of a moving trim, -x0'(p) dp/dt, is left out: it acts as a further disturbance",

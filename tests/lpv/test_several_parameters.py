@@ -202,6 +202,30 @@ def test_a_moving_trim_drifts_by_its_slopes_and_by_its_own_rates():
     assert level.trim.xdot is None
 
 
+def test_a_declared_drift_does_what_the_moving_trim_does():
+    heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    grid = symheli.sweep_grid(heli, [4.0, 5.0, 6.0, 7.0], acceleration=[-2.0, -1.0, 0.0, 1.0, 2.0])
+    t = 0.02 * np.arange(100)
+    p = np.column_stack([5 + t, np.sin(t)])
+    rate = np.column_stack([p[:, 1], np.cos(t)])
+    both, alone = grid.interpolate("spline"), grid.family(acceleration=0.0).interpolate("spline")
+    for lpv, along, moving, size in (
+        (both, p, rate, [1.0, rate[:, 1]]),
+        (alone, p[:, 0], rate[:, 0], [rate[:, 0]]),
+    ):
+        declared = lpv.with_trim_drift()
+        assert [str(u) for u in declared.inputs[4:]] == [f"drift_{s.name}" for s in lpv.parameters]
+        w = np.column_stack([np.broadcast_to(v, len(t)) for v in size])
+        u = np.hstack([np.zeros((len(t), 4)), w])
+        x, _ = simulate(declared, along, u, dt=0.02)
+        drift = lpv.trim.drift(along, moving)
+        expected, _ = simulate(lpv, along, u[:, :4], dt=0.02, drift=drift)
+        off = np.abs(declared.residuals.B).max()
+        np.testing.assert_allclose(x, expected, atol=1e-9 + 20 * off)
+    with pytest.raises(InputError, match="has no trim"):
+        model().with_trim_drift()
+
+
 def test_prediction_of_a_linear_truth_is_exact_and_knows_its_horizon():
     lpv = model().discretize(0.02, degree=(3, 2))
     n, rng = 300, np.random.default_rng(0)
