@@ -1,5 +1,6 @@
-/* X-Cell .60 with the rotor speed held, written by hand from Gavrilets (2015); the same equations as equations.py.
-   States u v w p q r q0 q1 q2 q3 x_n x_e x_d a1 b1; inputs d_lon d_lat d_col d_ped; wind north east down. SI and radians. */
+/* X-Cell .60 with the rotor speed held, written by hand from Gavrilets (2015); the same equations
+   as equations.py. States u v w p q r q0 q1 q2 q3 x_n x_e x_d a1 b1; inputs d_lon d_lat d_col
+   d_ped; wind north east down. SI and radians. */
 #include <math.h>
 #include <string.h>
 
@@ -11,7 +12,8 @@ static const double MASS = 8.2, IXX = 0.18, IYY = 0.34, IZZ = 0.28, I_ROTOR = 0.
 static const double H_MR = 0.235, K_BETA = 54.0, K_MU = 0.2, A_NOM = 4.2, B_NOM = 4.2, ETA_W = 0.9;
 static const double L_TR = 0.91, H_TR = 0.08, N_TR = 4.66;
 static const double S_X = 0.1, S_Y = 0.22, S_Z = 0.15;
-static const double S_VF = 0.012, CLA_VF = 2.0, EPS_VF = 0.2, S_HT = 0.01, CLA_HT = 3.0, L_HT = 0.71;
+static const double S_VF = 0.012, CLA_VF = 2.0, EPS_VF = 0.2, S_HT = 0.01, CLA_HT = 3.0,
+                    L_HT = 0.71;
 
 #define OMEGA 167.0
 #define R_MR 0.775
@@ -29,12 +31,18 @@ static const double S_VF = 0.012, CLA_VF = 2.0, EPS_VF = 0.2, S_HT = 0.01, CLA_H
 #define G_I ((0.91 - R_MR - R_TR) / 0.08)
 #define G_F ((0.91 - R_MR + R_TR) / 0.08)
 
-static const double CONVERGED = 1e-9; /* Newton squares the error: after such a step the next would be rounding */
+static const double CONVERGED =
+    1e-9; /* Newton squares the error: after such a step the next would be rounding */
 
-static inline double limited(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+static inline double limited(double x, double low, double high)
+{
+    return x < low ? low : x > high ? high : x;
+}
 
-/* lam0 and *ct of 2 eta lam0 sqrt(mu^2 + (lam0 - mu_z)^2) = C_T = c0 - c1 lam0, or +-ct_max where the blades stall */
-static inline double inflow(double c0, double c1, double ct_max, double mu2, double mu_z, double *restrict ct)
+/* lam0 and *ct of 2 eta lam0 sqrt(mu^2 + (lam0 - mu_z)^2) = C_T = c0 - c1 lam0, or +-ct_max where
+ * the blades stall */
+static inline double inflow(double c0, double c1, double ct_max, double mu2, double mu_z,
+                            double *restrict ct)
 {
     const double sign = c0 < 0 ? -1 : 1;
     double lam = 0;
@@ -52,8 +60,8 @@ static inline double inflow(double c0, double c1, double ct_max, double mu2, dou
         for (int i = 0; i < 50; i++) {
             const double axial = lam - mu_z, root = sqrt(mu2 + axial * axial);
             /* numerator and denominator times root: one division a step */
-            const double step = (2 * ETA_W * lam * root - c0 + c1 * lam) * root
-                / (2 * ETA_W * (root * root + lam * axial) + c1 * root + 1e-300);
+            const double step = (2 * ETA_W * lam * root - c0 + c1 * lam) * root /
+                                (2 * ETA_W * (root * root + lam * axial) + c1 * root + 1e-300);
             lam -= step;
             if (fabs(step) < CONVERGED) break;
         }
@@ -65,16 +73,20 @@ static inline double inflow(double c0, double c1, double ct_max, double mu2, dou
     return sign * lam;
 }
 
-void rates(const double *restrict x, const double *restrict in, const double *restrict wind, double *restrict dx)
+void rates(const double *restrict x, const double *restrict in, const double *restrict wind,
+           double *restrict dx)
 {
     const double u = x[0], v = x[1], w = x[2], p = x[3], q = x[4], r = x[5];
     const double q0 = x[6], q1 = x[7], q2 = x[8], q3 = x[9], a1 = x[13], b1 = x[14];
     const double d_lon = in[0], d_lat = in[1], d_col = in[2], d_ped = in[3];
 
     /* body to earth, and the velocity through the air */
-    const double r00 = q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, r01 = 2 * (q1 * q2 - q0 * q3), r02 = 2 * (q1 * q3 + q0 * q2);
-    const double r10 = 2 * (q1 * q2 + q0 * q3), r11 = q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, r12 = 2 * (q2 * q3 - q0 * q1);
-    const double r20 = 2 * (q1 * q3 - q0 * q2), r21 = 2 * (q2 * q3 + q0 * q1), r22 = q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3;
+    const double r00 = q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, r01 = 2 * (q1 * q2 - q0 * q3),
+                 r02 = 2 * (q1 * q3 + q0 * q2);
+    const double r10 = 2 * (q1 * q2 + q0 * q3), r11 = q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3,
+                 r12 = 2 * (q2 * q3 - q0 * q1);
+    const double r20 = 2 * (q1 * q3 - q0 * q2), r21 = 2 * (q2 * q3 + q0 * q1),
+                 r22 = q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3;
     const double ua = u - (r00 * wind[0] + r10 * wind[1] + r20 * wind[2]);
     const double va = v - (r01 * wind[0] + r11 * wind[1] + r21 * wind[2]);
     const double wa = w - (r02 * wind[0] + r12 * wind[1] + r22 * wind[2]);
@@ -83,7 +95,8 @@ void rates(const double *restrict x, const double *restrict in, const double *re
     const double mu_x = ua / TIP_MR, mu_y = va / TIP_MR, mu_z = wa / TIP_MR;
     const double mu2 = mu_x * mu_x + mu_y * mu_y, mu = sqrt(mu2);
     double ct, ct_tr;
-    const double lam0 = inflow(0.5 * A_SIGMA_MR * (d_col * (1.0 / 3 + 0.5 * mu2) + 0.5 * mu_z), 0.25 * A_SIGMA_MR, 0.0055, mu2, mu_z, &ct);
+    const double lam0 = inflow(0.5 * A_SIGMA_MR * (d_col * (1.0 / 3 + 0.5 * mu2) + 0.5 * mu_z),
+                               0.25 * A_SIGMA_MR, 0.0055, mu2, mu_z, &ct);
     const double T = ct * FORCE_MR;
     const double Q = (ct * (lam0 - mu_z) + PROFILE_MR * (1 + 7.0 / 3 * mu2)) * (FORCE_MR * R_MR);
     const double v_i = lam0 * TIP_MR;
@@ -102,19 +115,25 @@ void rates(const double *restrict x, const double *restrict in, const double *re
 
     /* tail rotor */
     const double w_tr = wa + L_TR * q - wake, v_tr = va - L_TR * r + H_TR * p;
-    const double flow2 = ua * ua + w_tr * w_tr, mu2_tr = flow2 / (TIP_TR * TIP_TR), muz_tr = v_tr / TIP_TR;
-    const double lam_tr
-        = inflow(0.5 * A_SIGMA_TR * (d_ped * (1.0 / 3 + 0.5 * mu2_tr) + 0.5 * muz_tr), 0.25 * A_SIGMA_TR, 0.05, mu2_tr, muz_tr, &ct_tr);
-    const double Q_tr = (ct_tr * (lam_tr - muz_tr) + PROFILE_TR * (1 + 7.0 / 3 * mu2_tr)) * (FORCE_TR * R_TR);
+    const double flow2 = ua * ua + w_tr * w_tr, mu2_tr = flow2 / (TIP_TR * TIP_TR),
+                 muz_tr = v_tr / TIP_TR;
+    const double lam_tr =
+        inflow(0.5 * A_SIGMA_TR * (d_ped * (1.0 / 3 + 0.5 * mu2_tr) + 0.5 * muz_tr),
+               0.25 * A_SIGMA_TR, 0.05, mu2_tr, muz_tr, &ct_tr);
+    const double Q_tr =
+        (ct_tr * (lam_tr - muz_tr) + PROFILE_TR * (1 + 7.0 / 3 * mu2_tr)) * (FORCE_TR * R_TR);
 
     /* vertical fin */
-    const double v_vf = va - EPS_VF * lam_tr * TIP_TR - L_TR * r, most_vf = 0.5 * RHO * S_VF * (flow2 + v_vf * v_vf);
-    const double Y_tail = -BLOCKAGE * ct_tr * FORCE_TR
-        + limited(-0.5 * RHO * S_VF * (CLA_VF * sqrt(flow2) + fabs(v_vf)) * v_vf, -most_vf, most_vf);
+    const double v_vf = va - EPS_VF * lam_tr * TIP_TR - L_TR * r,
+                 most_vf = 0.5 * RHO * S_VF * (flow2 + v_vf * v_vf);
+    const double Y_tail =
+        -BLOCKAGE * ct_tr * FORCE_TR +
+        limited(-0.5 * RHO * S_VF * (CLA_VF * sqrt(flow2) + fabs(v_vf)) * v_vf, -most_vf, most_vf);
 
     /* horizontal tail */
     const double w_ht = wa + L_HT * q - wake, most_ht = 0.5 * RHO * S_HT * (ua * ua + w_ht * w_ht);
-    const double Z_ht = limited(-0.5 * RHO * S_HT * (CLA_HT * fabs(ua) + fabs(w_ht)) * w_ht, -most_ht, most_ht);
+    const double Z_ht =
+        limited(-0.5 * RHO * S_HT * (CLA_HT * fabs(ua) + fabs(w_ht)) * w_ht, -most_ht, most_ht);
 
     const double hub = K_BETA + T * H_MR;
     dx[0] = v * r - w * q + r20 * G + (-T * a1 + drag * S_X * ua) / MASS;
@@ -134,8 +153,10 @@ void rates(const double *restrict x, const double *restrict in, const double *re
     dx[14] = -p + (-b1 - a1_mu * mu_y + B_NOM * d_lat) / TAU_E;
 }
 
-/* n inputs held for dt each, `steps` classical Runge-Kutta steps an input; states[(n + 1) * NX], the first row given */
-void fly(int n, int steps, double dt, const double *restrict inputs, const double *restrict wind, double *restrict states)
+/* n inputs held for dt each, `steps` classical Runge-Kutta steps an input; states[(n + 1) * NX],
+ * the first row given */
+void fly(int n, int steps, double dt, const double *restrict inputs, const double *restrict wind,
+         double *restrict states)
 {
     const double h = dt / steps;
     double x[NX], z[NX], k1[NX], k2[NX], k3[NX], k4[NX];
