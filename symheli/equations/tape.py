@@ -51,9 +51,8 @@ class Tape:
         """Read the instructions of `function`; one that is not made of SX is expanded first. Raises
         `InputError` where it cannot be.
         """
-        not_scalar = (
-            f"{function.name()} calls what is no scalar operation (compiled code, a table, a solver)"
-        )
+        name = function.name()
+        not_scalar = f"{name} calls what is no scalar operation (compiled code, a table, a solver)"
         if not function.is_a("SXFunction"):
             try:
                 function = function.expand()
@@ -88,7 +87,7 @@ class Tape:
                 (function.size_out, function.n_out()),
             )
         )
-        return cls(function.name(), function.sz_w(), sizes_in, sizes_out, tuple(steps))
+        return cls(name, function.sz_w(), sizes_in, sizes_out, tuple(steps))
 
     def run(
         self, arguments: Sequence[Sequence[Sequence[Any]]], arithmetic: Arithmetic
