@@ -176,6 +176,7 @@ def test_without_pandas_a_data_frame_says_what_to_install(monkeypatch):
         record().to_frame()
 
 
+@pytest.mark.usefixtures("pd")
 def test_no_method_changes_the_record_it_is_called_on():
     got = holed().rows(slice(5, None)).select(["n"]).with_signals({"a": "1"}, a=np.arange(6.0))
     before = got.time.copy(), got.values.copy(), got.signals
