@@ -1,4 +1,5 @@
 # make study : set up .venv and run the main job     make test : set up .venv and run the default tests
+# make test-all : lint, slow tests, the lowest versions of pyproject.toml, no compiler, no extras (.ci/gates)
 # Python >= 3.11 as python3; PYTHON=... for another one.
 
 PYTHON ?= python3
@@ -6,7 +7,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: study quick test test-all lint bench clean
+.PHONY: study quick test test-all slow lint lowest no-compiler no-extras bench clean
+.NOTPARALLEL: # test-all stops at the first that fails, and make names it
 
 $(STAMP): pyproject.toml constraints.txt setup.py $(wildcard identification/recursive/kernel/*.[ch])
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "Python 3.11 or newer is needed, this is " + sys.version.split()[0] + ": make PYTHON=python3.12")'
@@ -23,15 +25,19 @@ quick: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4
 
-test-all: $(STAMP)
+test-all: lint slow lowest no-compiler no-extras
+
+slow: $(STAMP)
+	@echo "== slow: all tests, the slow ones too"
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 -m 'slow or not slow'
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/pyright
+
+lowest no-compiler no-extras:
+	@$(PYTHON) .ci/gates $@
 
 lint: $(STAMP)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+	@echo "== lint: what is read without running"
+	$(BIN)/ruff check . .ci/gates
+	$(BIN)/ruff format --check . .ci/gates
 	$(BIN)/pyright
 
 bench: $(STAMP)

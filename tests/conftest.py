@@ -24,3 +24,8 @@ def ideal():
 @pytest.fixture(scope="session")
 def pi():
     return symheli.Helicopter.load("xcell60", governor="pi")
+
+
+@pytest.fixture
+def pd():
+    return pytest.importorskip("pandas", reason="needs pandas: pip install 'symheli[logs]'")

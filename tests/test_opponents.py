@@ -94,7 +94,7 @@ def test_the_c_by_hand_flies_the_same_flight(ideal, flight, ours):
 
 @pytest.mark.slow  # compiles for half a minute
 def test_numba_flies_the_same_flight(flight, ours):
-    pytest.importorskip("numba")
+    pytest.importorskip("numba", reason="needs numba: pip install 'symheli[benchmark]'")
     from benchmarks.opponents import numba_flight
 
     x0, inputs, wind = flight

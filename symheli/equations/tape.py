@@ -51,8 +51,13 @@ class Tape:
         """Read the instructions of `function`; one that is not made of SX is expanded first. Raises
         `InputError` where it cannot be.
         """
+        name = function.name()
+        not_scalar = f"{name} calls what is no scalar operation (compiled code, a table, a solver)"
         if not function.is_a("SXFunction"):
-            function = function.expand()
+            try:
+                function = function.expand()
+            except RuntimeError as error:
+                raise InputError(not_scalar) from error
         outputs = [
             list(zip(*function.sparsity_out(i).get_triplet(), strict=True))
             for i in range(function.n_out())
@@ -65,10 +70,7 @@ class Tape:
         for k in range(function.n_instructions()):
             operation = function.instruction_id(k)
             if operation == casadi.OP_CALL:
-                raise InputError(
-                    f"{function.name()} calls what is no scalar operation (compiled code, a table,"
-                    " a solver)"
-                )
+                raise InputError(not_scalar)
             into, operands = function.instruction_output(k), function.instruction_input(k)
             if operation == casadi.OP_INPUT:
                 steps.append(_Read(into[0], operands[0], *entries_in[operands[0]][operands[1]]))
@@ -85,7 +87,7 @@ class Tape:
                 (function.size_out, function.n_out()),
             )
         )
-        return cls(function.name(), function.sz_w(), sizes_in, sizes_out, tuple(steps))
+        return cls(name, function.sz_w(), sizes_in, sizes_out, tuple(steps))
 
     def run(
         self, arguments: Sequence[Sequence[Sequence[Any]]], arithmetic: Arithmetic

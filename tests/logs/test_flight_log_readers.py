@@ -5,7 +5,6 @@ import types
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
@@ -195,7 +194,7 @@ def test_a_table_is_read_however_it_is_written_and_without_pandas(tmp_path, monk
 @pytest.mark.parametrize(
     ("separator", "decimal"), [(",", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", ".")]
 )
-def test_what_pandas_writes_is_read_to_the_last_bit(tmp_path, numbers, separator, decimal):
+def test_what_pandas_writes_is_read_to_the_last_bit(pd, tmp_path, numbers, separator, decimal):
     frame = pd.DataFrame({"t": [0.0, 0.1, 0.2], "q": numbers})
     frame.to_csv(tmp_path / "log.csv", sep=separator, decimal=decimal, index=False)
     np.testing.assert_array_equal(
@@ -233,7 +232,9 @@ def test_a_table_that_can_be_read_in_two_ways_is_not_guessed_at(tmp_path, lines,
 
 
 @pytest.mark.parametrize("unit", ["ms", "us", "ns"])
-def test_a_clock_that_counts_in_another_unit_is_read_by_its_name_in_every_format(tmp_path, unit):
+def test_a_clock_that_counts_in_another_unit_is_read_by_its_name_in_every_format(
+    pd, tmp_path, unit
+):
     ticks = 20 * np.arange(5.0) / {"ms": 1, "us": 1e-3, "ns": 1e-6}[unit]
     write(tmp_path, "t,q", *(f"{t:.0f},1" for t in ticks), name="log.csv")
     savemat(tmp_path / "log.mat", {"t": ticks, "q": np.ones(5)})
@@ -270,7 +271,7 @@ def test_a_spoilt_csv_says_what_is_wrong(tmp_path, lines, options, message):
         FlightRecord.from_csv(path, units={"q": "rad/s"}, **options)
 
 
-def test_a_frame_of_dates_or_words_is_refused_in_words():
+def test_a_frame_of_dates_or_words_is_refused_in_words(pd):
     """Dates as numbers are nano- or microseconds, by the version of pandas."""
     frame = pd.DataFrame(
         {

@@ -4,7 +4,6 @@ import io
 import sys
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from symheli.errors import InputError, UnknownNameError
@@ -17,7 +16,7 @@ def record(time=None, **columns):
     return FlightRecord.from_arrays(time, dict.fromkeys(columns, "rad/s"), **columns)
 
 
-def test_units_are_converted_at_the_door_and_kept_in_the_signal():
+def test_units_are_converted_at_the_door_and_kept_in_the_signal(pd):
     frame = pd.DataFrame(
         {
             "t": [0.0, 10.0, 20.0],
@@ -63,7 +62,7 @@ def test_a_record_that_cannot_be_used_says_why(make, message):
         make()
 
 
-def test_a_misspelt_column_gets_the_nearest():
+def test_a_misspelt_column_gets_the_nearest(pd):
     with pytest.raises(UnknownNameError, match="did you mean 'theta'"):
         FlightRecord.from_frame(
             pd.DataFrame({"t": [0, 1], "theta": [0, 1]}), time="t", units={"tetha": "rad"}
@@ -176,6 +175,7 @@ def test_without_pandas_a_data_frame_says_what_to_install(monkeypatch):
         record().to_frame()
 
 
+@pytest.mark.usefixtures("pd")
 def test_no_method_changes_the_record_it_is_called_on():
     got = holed().rows(slice(5, None)).select(["n"]).with_signals({"a": "1"}, a=np.arange(6.0))
     before = got.time.copy(), got.values.copy(), got.signals
