@@ -108,7 +108,7 @@ class Ladder(ABC):
             return best, best.bound, scale
 
         best = min(in_its_own_scale(found, limit), key=lambda tried: tried.bound)
-        if best.proof is None and best.answer is not Answer.INFEASIBLE:
+        if best.proof is None and best.answer not in (Answer.INFEASIBLE, Answer.UNTRIED):
             best = best._replace(answer=self._whether_any(best.answer))
         return best
 
