@@ -51,6 +51,19 @@ class Loop(NamedTuple):
     cells: list[Cell]
 
 
+def carried_over(cells: Sequence[Cell]) -> list[Cell]:
+    """The same cells, each with the best of all: what is proven for more acceleration and jerk
+    holds for less, and a flight that keeps to less keeps to more.
+    """
+    out = []
+    for c in cells:
+        above = [o for o in cells if o.acceleration >= c.acceleration and o.jerk >= c.jerk]
+        below = [o for o in cells if o.acceleration <= c.acceleration and o.jerk <= c.jerk]
+        proven, flown = min(o.proven for o in above), max(o.flown for o in below)
+        out.append(c._replace(proven=proven, flown=flown))
+    return out
+
+
 def with_jerk(loop: LPVStateSpace, acceleration: float, jerk: float) -> LPVStateSpace:
     """The loop over airspeed and its rate: |dV/dt| <= acceleration (m/s^2), |d2V/dt2| <= jerk
     (m/s^3).

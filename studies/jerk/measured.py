@@ -13,7 +13,7 @@ from typing import Any
 
 from studies.jerk.figure import save
 from studies.jerk.flown import WINDOW, Fastest, fastest
-from studies.jerk.gains import Knots, Loop, measure
+from studies.jerk.gains import Knots, Loop, carried_over, measure
 from studies.jerk.table import jerk_table
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
@@ -96,7 +96,7 @@ def _found(name: str, loop: LPVStateSpace, quick: bool) -> Loop:
         progress(f"{name}: {what}: {result}")
         found[what] = result
     summary = {key: found.pop(key) for key in ("frozen", "same_knots", "chosen_knots")}
-    return Loop(**summary, cells=list(found.values()))
+    return Loop(**summary, cells=carried_over(list(found.values())))
 
 
 def _said(flown: dict[str, Fastest]) -> str:

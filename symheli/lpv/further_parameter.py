@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from symheli.errors import InputError
-from symheli.lpv.bases.basis import Basis
 from symheli.lpv.bases.function_space import FunctionSpace
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.product import Product
@@ -18,8 +16,7 @@ from symheli.lpv.scheduling import Scheduling
 def with_parameter(lpv: LPVStateSpace, scheduling: Scheduling) -> LPVStateSpace:
     """The same matrices and trim over (parameters of `lpv`, `scheduling`): f_j(p) 1.
 
-    Raises `InputError` for a name that repeats, and where the basis of several parameters is no
-    product.
+    Raises `InputError` for a name that repeats, and a basis that cannot be a factor of a product.
     """
     one = Polynomial(0, scheduling.low, scheduling.high)
     trim, residuals = lpv.trim, lpv.residuals
@@ -36,12 +33,7 @@ def _times(basis: FunctionSpace, one: Polynomial) -> Product:
     """Every function times 1, in the same order."""
     if isinstance(basis, Product):
         return replace(basis, factors=(*basis.factors, one))
-    if isinstance(basis, Basis):
-        return Product((basis, one))
-    raise InputError(
-        f"with_parameter: a basis of {basis.dimension} parameters must be a Product of"
-        f" one-parameter bases, got {type(basis).__name__}"
-    )
+    return Product((basis, one))  # type: ignore[arg-type]  # a Product refuses what is no factor
 
 
 def _at_the_ends(residuals: Residuals, s: Scheduling) -> Residuals:

@@ -224,8 +224,8 @@ class LPVStateSpace:
 
         With it a parameter may get a rate that is bounded in its own rate:
         `with_parameter(Scheduling("acceleration", "m/s^2", -3, 3, rate=5)).with_rate({"airspeed":
-        "acceleration"})`. Raises `InputError` for a name that repeats, and where the basis of
-        several parameters is no `Product`.
+        "acceleration"})`. Raises `InputError` for a name that repeats, and a basis that cannot
+        be a factor of a `Product`.
         """
         from symheli.lpv.further_parameter import with_parameter
 
