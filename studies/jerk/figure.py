@@ -22,12 +22,14 @@ def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes | None
 
     The flights stand at their largest acceleration, with their largest jerk.
     """
+    from matplotlib.ticker import LogLocator, NullLocator
+
     if ax is None:
         import matplotlib.pyplot as plt
 
         ax = plt.subplots(figsize=(7.0, 4.5), layout="constrained")[1]
     for k, jerk in enumerate(sorted({c.jerk for c in loop.cells})):
-        cells = [c for c in loop.cells if c.jerk == jerk]
+        cells = sorted(c for c in loop.cells if c.jerk == jerk)
         colour = COLOURS[k % len(COLOURS)]
         label = f"jerk up to {jerk:g} m/s³" if math.isfinite(jerk) else "any jerk"
         rates = [c.acceleration for c in cells]
@@ -42,9 +44,14 @@ def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes | None
         label="P(V), acceleration may jump",
     )
     ax.axhline(loop.frozen, color=GREY, linestyle=":", label=f"frozen, {loop.frozen:.3g}")
-    low, high = ax.get_ylim()
-    ax.set_ylim(0.5 * min(low, loop.frozen), max(high, 2.0 * loop.frozen))
-    ax.set(yscale="log", title=title)
+    shown = [g for c in loop.cells for g in (c.proven, c.flown)] + list(loop.chosen_knots.values())
+    largest = max(g for g in (loop.frozen, *shown) if math.isfinite(g))
+    fastest = max(a for a in (*loop.chosen_knots, *(f.acceleration for f in flights.values())))
+    ax.set(yscale="log", title=title, ylim=(0.2 * loop.frozen, 2.0 * largest))
+    ax.set_xlim(0.0, 1.12 * fastest)
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_locator(NullLocator())
     for name, flight in flights.items():
         ax.plot(flight.acceleration, 0.06, "D", color=INK, ms=6, transform=ax.get_xaxis_transform())
         ax.annotate(
