@@ -51,17 +51,17 @@ def own_command() -> str:
     return " ".join(["python", script, *sys.argv[1:]])
 
 
-def parsed(parser: argparse.ArgumentParser, page: str) -> argparse.Namespace:
+def parsed(parser: argparse.ArgumentParser, page: str, *, timed: bool = True) -> argparse.Namespace:
     """The arguments, with --write for tables of docs/`page`: refused, with the load, where other
-    programs are at work.
+    programs are at work, unless nothing in them depends on time (`timed` False).
     """
     parser.add_argument(
         "--write",
         action="store_true",
-        help=f"keep the tables in docs/{page}; refused on a busy machine",
+        help=f"keep the tables in docs/{page}" + ("; refused on a busy machine" if timed else ""),
     )
     options = parser.parse_args()
-    if options.write:
+    if options.write and timed:
         try:
             refuse_on_a_busy_machine()
         except InputError as error:

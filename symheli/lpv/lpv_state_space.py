@@ -219,6 +219,18 @@ class LPVStateSpace:
         """
         return replace(self, parameters=with_rates(self.parameters, rate))
 
+    def with_parameter(self, scheduling: Scheduling) -> LPVStateSpace:
+        """The same model over one more parameter, the last, on which nothing depends.
+
+        With it a parameter may get a rate that is bounded in its own rate:
+        `with_parameter(Scheduling("acceleration", "m/s^2", -3, 3, rate=5)).with_rate({"airspeed":
+        "acceleration"})`. Raises `InputError` for a name that repeats, and a basis that cannot
+        be a factor of a `Product`.
+        """
+        from symheli.lpv.further_parameter import with_parameter
+
+        return with_parameter(self, scheduling)
+
     def along(self, start: Sequence[float], end: Sequence[float]) -> LPVStateSpace:
         """The model on the straight line from `start` (s = -1) to `end` (s = 1), one parameter s.
 

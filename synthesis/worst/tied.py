@@ -143,7 +143,10 @@ def _flown(lpv: LPVStateSpace, tie: tuple[int, int], path: Smooth, search: Searc
     found = along_cycle(along, Trajectory(np.array([0.0, period]), np.array([0.0, period])), search)
     if found.trajectory is None:
         return found
-    shown = Trajectory(found.trajectory.time, along.points(np.mod(found.trajectory.p, period)))
+    time, phase = found.trajectory.time, np.mod(found.trajectory.p, period)
+    if math.isinf(found.gamma):  # one cycle, known by its ends alone
+        time = phase = np.linspace(0.0, period, search.steps + 1)
+    shown = Trajectory(time, along.points(phase))
     return found._replace(trajectory=shown)
 
 

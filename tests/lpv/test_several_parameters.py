@@ -264,6 +264,34 @@ def test_the_rate_of_a_parameter_may_be_another():
 MASS = Scheduling("mass", "kg", 7.0, 9.0)
 
 
+def test_a_further_parameter_changes_nothing(ideal):
+    """Matrices, trim and what is known of the misfit."""
+    family = symheli.sweep(ideal, [4.0, 5.0, 6.0, 7.0])
+    alone = family.interpolate(degree=2)
+    both = alone.with_parameter(A_X).with_rate({"airspeed": "acceleration"})
+    assert [s.name for s in both.parameters] == ["airspeed", "acceleration"]
+    for v, a in ((4.0, -4.0), (5.3, 0.7), (7.0, 4.0)):
+        for one, two in zip(both.matrices((v, a)), alone.matrices(v), strict=True):
+            np.testing.assert_array_equal(one, two)
+        np.testing.assert_array_equal(both.trim.state((v, a)), alone.trim.state(v))
+        np.testing.assert_allclose(
+            both.trim.drift((v, a), (a, 9.0)), alone.trim.drift(v, a), atol=1e-13
+        )
+    np.testing.assert_array_equal(both.fitted_to.nodes[::2, 0], alone.fitted_to.nodes)
+    np.testing.assert_array_equal(both.fitted_to.nodes[:2, 1], [-4.0, 4.0])
+    np.testing.assert_allclose(both.fitted_to.A[1::2], alone.fitted_to.A, atol=1e-12)
+
+
+def test_a_third_parameter_and_one_beside_a_line():
+    third = model().with_parameter(MASS)
+    for v, a in POINTS:
+        np.testing.assert_array_equal(third.at(v, a, 8.0).A, model().at(v, a).A)
+    with pytest.raises(InputError, match="names of their own"):
+        model().with_parameter(V)
+    line = model().along((0.0, -4.0), (13.0, 4.0)).with_parameter(MASS)
+    np.testing.assert_allclose(line.at(0.0, 8.0).A, by_hand("A", 6.5, 0.0), atol=1e-13)
+
+
 def test_wrong_use_gets_a_sentence():
     with pytest.raises(InputError, match=r"2 scheduling parameters \(airspeed, acceleration\)"):
         _ = model().scheduling

@@ -78,6 +78,21 @@ def test_what_is_found_from_below_keeps_to_rate_and_jerk_and_does_not_beat_the_p
             assert cert.lower > 1.01 * cert.frozen
 
 
+def test_a_cycle_along_which_the_state_grows_is_shown_as_it_moves():
+    """Unstable while V moves, stable at rest."""
+    V = Scheduling("V", "1", 0.0, 1.0, rate="a")
+    a = Scheduling("a", "1/s", -0.3, 0.3, rate=3.0)
+    A = {(0, 0): [[-0.01]], (0, 2): [[10.0]]}
+    B, C, D = {(0, 0): [[1.0]]}, {(0, 0): [[1.0]]}, {(0, 0): [[0.0]]}
+    cert = l2_gain(LPVStateSpace.polynomial(A, B, C, D, [V, a]), form=BOTH, search=QUICK)
+    assert cert.status is Status.GROWING
+    time, p = cert.worst
+    assert np.ptp(p[:, 0]) > 0.05
+    moved = np.concatenate([[0.0], np.cumsum(np.diff(time) * 0.5 * (p[1:, 1] + p[:-1, 1]))])
+    # the trapezoid rule over steps in which a bends
+    np.testing.assert_allclose(p[:, 0] - p[0, 0], moved, atol=0.02)
+
+
 def test_no_random_input_along_the_worst_trajectory_beats_the_proof():
     cert = l2_gain(tied(1.0, slope=0.3), form=BOTH, search=QUICK)
     time, p = cert.worst
