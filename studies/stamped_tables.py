@@ -44,7 +44,7 @@ def own_command() -> str:
     """What started this process, as one would type it in a clone."""
     specification = getattr(sys.modules["__main__"], "__spec__", None)
     script = (
-        f"-m {specification.name}"
+        f"-m {specification.name.removesuffix('.__main__')}"
         if specification
         else f"{Path(sys.argv[0]).parent.name}/{Path(sys.argv[0]).name}"
     )

@@ -6,6 +6,7 @@ import argparse
 import math
 import re
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -34,6 +35,14 @@ def test_a_table_is_kept_between_its_marks_with_command_date_and_machine(tmp_pat
     assert "first" not in kept
     with pytest.raises(InputError, match="lacks the marks"):
         stamped_tables.keep(page, "growth", "x", "m")
+
+
+@pytest.mark.parametrize("name", ["studies.jerk", "studies.jerk.__main__"])
+def test_a_package_is_stamped_by_its_own_name(name, monkeypatch):
+    main = SimpleNamespace(__spec__=SimpleNamespace(name=name))
+    monkeypatch.setitem(sys.modules, "__main__", main)
+    monkeypatch.setattr(sys, "argv", ["__main__.py", "--write"])
+    assert stamped_tables.own_command() == "python -m studies.jerk --write"
 
 
 @pytest.mark.parametrize(("load", "refused"), [(0.0, False), (0.15, False), (1.3, True)])
