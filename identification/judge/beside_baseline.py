@@ -120,8 +120,10 @@ class BaselinePredictor:
         self.p = _scheduled(lpv.parameters, record, scheduling)
         self.u = record.columns(driven)
         x = record.columns(self.lpv.states)
+        # p moves within a segment, not across a gap
+        moving = record.slope(self.p) if self.lpv.dt is None else None
         self._flight = self.lpv.predict(
-            self.p, self.u, x, dt=record.dt, rate=None if drift else 0.0
+            self.p, self.u, x, dt=record.dt, rate=moving if drift else 0.0
         )
 
     def predict(self, outputs: Sequence[str], horizon: int) -> Array:

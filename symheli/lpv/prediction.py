@@ -82,8 +82,7 @@ def predict(
     if lpv.dt is None:
         return Prediction(A, push + np.einsum("kij,kj->ki", E, lpv.trim.drift(p, speed)), x, x0)
     # the trim of a sampled model moves by what it is at the next sample
-    moved = lpv.dt * lpv.trim.drift(p, 0 * speed)
-    moved -= np.diff(x0, axis=0, append=x0[-1:]) if rate is None else 0.0
-    if rate is not None:
-        moved += lpv.dt * (lpv.trim.drift(p, speed) - lpv.trim.drift(p, 0 * speed))
+    moved = lpv.dt * lpv.trim.drift(p, speed if rate is not None else np.zeros(p.shape))
+    if rate is None:
+        moved -= np.diff(x0, axis=0, append=x0[-1:])
     return Prediction(A, push + moved, x, x0)

@@ -273,10 +273,14 @@ class FlightRecord:
         """Central-difference time derivative (n,) of a signal, one-sided at the ends of each
         segment.
         """
-        values, out = self[name], np.full(len(self), np.nan)
+        return self.slope(self[name])
+
+    def slope(self, values: Array) -> Array:
+        """The same of `values` (n, ...), one a sample; NaN in a segment of one sample."""
+        out = np.full(values.shape, np.nan)
         for part in self.segments():
             if part.stop - part.start > 1:
-                out[part] = np.gradient(values[part], self.time[part])
+                out[part] = np.gradient(values[part], self.time[part], axis=0)
         return out
 
     def plot(self, names: Sequence[str] | None = None) -> Array:

@@ -57,10 +57,8 @@ class Motion(NamedTuple):
         own = Motion.of(parameters)
         if len(self.rates) != len(own.rates) or not all(r >= 0 for r in self.rates):
             return False
-        tied = (
-            a == b for a, b, j in zip(self.rates, own.rates, own.ties, strict=True) if j is not None
-        )
-        return (self.box, self.ties) == (own.box, own.ties) and all(tied)
+        same = all(self.rates[i] == own.rates[i] for i, _ in own.tied)
+        return same and (self.box, self.ties) == (own.box, own.ties)
 
     @property
     def tied(self) -> tuple[tuple[int, int], ...]:

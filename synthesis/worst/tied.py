@@ -98,8 +98,10 @@ def tied_lower_bound(lpv: LPVStateSpace, motion: Motion, search: Search) -> Lowe
             f" this model has {len(lpv.parameters)}: leave it out with search=None"
         )
     ((i, j),) = motion.tied
-    jerk, top = motion.rates[j], motion.rates[i]
-    if jerk == 0 or top == 0:
+    low, high = motion.box[j]
+    # a trapezoid ramps as fast down as up
+    jerk, top = motion.rates[j], min(-low, high)
+    if jerk == 0 or top <= 0:
         return None
     window = 0.0 if math.isinf(jerk) else 2 * top / jerk
     budget = Budget(search.seconds)
@@ -169,7 +171,8 @@ def _moved(
         speed = top / (1 + abs(x[4]))
         ramp = max((above - bottom) / speed, 1e-9 * unit)
         rests = 1e-4 * unit + unit * np.abs(x[2:4])
-        return Wave(float(bottom), float(above), float(rests[0]), float(rests[1]), ramp)
+        wave = Wave(float(bottom), float(above), float(rests[0]), float(rests[1]), ramp)
+        return wave.in_samples(lpv.dt)
 
     def cost(x: Array) -> float:
         nonlocal best

@@ -84,15 +84,9 @@ class WaveFamily:
         """The wave with ramps as steep as allowed, but of `ramp` s at least; None where it lasts
         over `longest` s (`longest_period`).
         """
-        dt = self.lpv.dt
         longest = self.longest_period if longest is None else longest
         ramp = max(ramp, 0.0 if math.isinf(self.rate) else (top - bottom) / self.rate)
-        if dt is not None:
-            ramp = math.ceil(ramp / dt - 1e-9) * dt
-            dwell_bottom, dwell_top = (
-                max(1.0, round(d / dt)) * dt for d in (dwell_bottom, dwell_top)
-            )
-        wave = Wave(bottom, top, dwell_bottom, dwell_top, ramp)
+        wave = Wave(bottom, top, dwell_bottom, dwell_top, ramp).in_samples(self.lpv.dt)
         return wave if 0 < wave.period <= longest else None
 
     def coarse(self) -> list[Wave]:

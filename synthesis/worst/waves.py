@@ -35,6 +35,14 @@ class Wave(NamedTuple):
         """Length of one cycle, s."""
         return self.dwell_bottom + self.dwell_top + 2.0 * self.ramp
 
+    def in_samples(self, dt: float | None) -> Wave:
+        """The wave in whole samples, of one at least, with ramps no steeper; as it is without."""
+        if dt is None:
+            return self
+        bottom, top = (max(1.0, round(d / dt)) * dt for d in (self.dwell_bottom, self.dwell_top))
+        ramp = math.ceil(self.ramp / dt - 1e-9) * dt
+        return self._replace(dwell_bottom=bottom, dwell_top=top, ramp=ramp)
+
     def cycle(self) -> Trajectory:
         """One cycle; where p jumps a time stands twice."""
         return Trajectory(*self.vertices())

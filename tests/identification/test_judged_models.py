@@ -157,6 +157,16 @@ def test_an_input_that_the_record_does_not_hold_stays_at_its_trim(transition):
     assert np.abs(one - two).max() > 1e-5
 
 
+def test_a_gap_in_the_record_is_no_fast_trim(transition):
+    """The first samples behind a gap are predicted as if the record began there."""
+    cut = np.arange(len(transition)) < 100
+    late = np.arange(len(transition)) >= 260
+    predictor = lambda record: idn.BaselinePredictor(aeroplane(), record, scheduling="tas")  # noqa: E731
+    gap = predictor(transition.rows(cut | late)).predict(["alpha"], 5)[100:]
+    alone = predictor(transition.rows(late)).predict(["alpha"], 5)
+    np.testing.assert_allclose(gap[5:], alone[5:], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [

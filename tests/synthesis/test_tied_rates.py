@@ -37,7 +37,7 @@ def tied(jerk, dt=None, slope=0.0):
     A[0, 1] = [[0.0, 0.0], [-slope, 0.0]]
     B, C, D = {(0, 0): [[0.0], [1.0]]}, {(0, 0): [[1.0, 0.0]]}, {(0, 0): [[0.0]]}
     lpv = LPVStateSpace.polynomial(A, B, C, D, [V, a])
-    return lpv if dt is None else lpv.discretize(dt, degree=(2, 0))
+    return lpv if dt is None else lpv.discretize(dt, degree=(2, 2 if slope else 0))
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +91,39 @@ def test_a_cycle_along_which_the_state_grows_is_shown_as_it_moves():
     moved = np.concatenate([[0.0], np.cumsum(np.diff(time) * 0.5 * (p[1:, 1] + p[:-1, 1]))])
     # the trapezoid rule over steps in which a bends
     np.testing.assert_allclose(p[:, 0] - p[0, 0], moved, atol=0.02)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+def test_a_helicopter_that_brakes_less_than_it_accelerates_is_searched_as_hard_as_it_brakes(flip):
+    V = Scheduling("V", "m/s", 0.0, 1.0, rate="a")
+    a = Scheduling("a", "m/s^2", -0.05, 0.6, rate=2.0)
+    given = {
+        "A": {(0, 0): [[0, 1], [-1, -0.2]], (1, 0): [[0, 0], [-1, 0]], (0, 1): [[0, 0], [-0.3, 0]]},
+        "B": {(0, 0): [[0], [1]]},
+        "C": {(0, 0): [[1, 0]]},
+        "D": {(0, 0): [[0]]},
+    }
+    order, form = [V, a], Spline(degree=(3, 2), segments=((6, 1),))
+    if flip:
+        given = {name: {e[::-1]: M for e, M in terms.items()} for name, terms in given.items()}
+        order, form = [a, V], Spline(degree=(2, 3), segments=((1, 6),))
+    cert = l2_gain(LPVStateSpace.polynomial(**given, scheduling=order), form=form, search=QUICK)
+    assert cert.frozen < cert.lower <= cert.gamma
+    p = cert.worst.p[:, order.index(V)]
+    assert np.abs(np.diff(p) / np.diff(cert.worst.time)).max() <= 0.05 * (1 + 1e-6)
+
+
+def test_sampled_the_worst_trajectory_is_one_that_a_flight_can_have():
+    cert = l2_gain(
+        tied(1.0, 0.1, slope=0.3),
+        form=Spline(degree=(2, 1), segments=((4, 1),)),
+        search=QUICK,
+    )
+    assert cert.frozen < cert.lower <= cert.gamma
+    V, a = cert.worst.p.T
+    # every step, also from one cycle to the next
+    assert np.abs(np.diff(V) - 0.1 * a[:-1]).max() <= 1.0 * 0.1**2 / 2 * (1 + 1e-6)
+    assert np.abs(np.diff(a)).max() <= 1.0 * 0.1 * (1 + 1e-6)
 
 
 def test_no_random_input_along_the_worst_trajectory_beats_the_proof():
