@@ -78,7 +78,7 @@ class PrecisionWarning(UserWarning):
 
 
 class CompilerWarning(UserWarning):
-    """Compiled code is not available; the same numbers come out more slowly."""
+    """Compiled code is not available; the same numbers, to rounding, come out more slowly."""
 
 
 class DataWarning(UserWarning):

@@ -55,12 +55,12 @@ def run(arguments: argparse.Namespace) -> Output:
     elif os.environ.get("SYMHELI_COMPILE") == "0":
         compiling = (
             "C compiler: switched off by SYMHELI_COMPILE=0; models run in the CasADi virtual"
-            " machine, several times slower, same numbers"
+            " machine, several times slower, same numbers to rounding"
         )
     else:
         compiling = (
             "C compiler: none found; models run in the CasADi virtual machine, several times"
-            " slower, same numbers (install gcc or set CC)"
+            " slower, same numbers to rounding (install gcc or set CC)"
         )
     level = next(iter(compiled_kernels("double"))) if compiled_kernel("double") else None
     said = (

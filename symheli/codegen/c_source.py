@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import resources
 
 from symheli.codegen.branches import Side, branches
-from symheli.codegen.program import COMPARISONS, Operation, Program
+from symheli.codegen.program import COMPARISONS, ELEMENTARY, Operation, Program
 
 _INFIX = {
     "add": "+",
@@ -37,8 +38,8 @@ class Layout:
 
     @property
     def prelude(self) -> str:
-        """What every generated source begins with: headers and the type of a scalar for all
-        lanes.
+        """What every generated source begins with: headers, the elementary functions and the type
+        of a scalar for all lanes.
         """
         return f"""#include <math.h>
 #include <stdlib.h>
@@ -46,6 +47,7 @@ class Layout:
 #if defined(__AVX512F__) && defined(__GNUC__) && !defined(__clang__)
 #pragma GCC target("prefer-vector-width=512")
 #endif
+{resources.files("symheli.codegen").joinpath("elementary.c").read_text(encoding="utf-8")}
 #define LANES {self.lanes}
 typedef double lane[LANES];
 """
@@ -150,8 +152,16 @@ def _expression(program: Program, o: Operation, group: int, width: int) -> str:
             return f"{a[0]} ? {a[1]} : {a[2]}"
         case "number":
             return f"{a[0]} ? 1.0 : 0.0"
+        case "fma":
+            return f"FUSED({a[0]}, {a[1]}, {a[2]})"
+        case "fms":
+            return f"FUSED({a[0]}, {a[1]}, -{a[2]})"
+        case "fnma":
+            return f"FUSED(-{a[0]}, {a[1]}, {a[2]})"
         case "min":
             return f"{a[1]} < {a[0]} ? {a[1]} : {a[0]}"
         case "max":
             return f"{a[0]} < {a[1]} ? {a[1]} : {a[0]}"
+    if o.name in ELEMENTARY:
+        return f"elementary_{o.name}({', '.join(a)})"
     return f"{o.name}({a[0]})"  # sqrt, fabs

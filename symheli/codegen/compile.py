@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import hashlib
 import os
@@ -26,9 +27,9 @@ FLAGS = (
     "-fPIC",
     "-shared",
 )
-"""Flags given to the compiler; none changes a number: no contraction, only errno and exception
-flags are given up. Pairs of scalars are not packed into vectors: one flight takes 1.3 times as long
-with that.
+"""Flags given to the compiler; none changes a number: nothing is fused but what the source fuses,
+only errno and exception flags are given up. Pairs of scalars are not packed into vectors:
+one flight takes 1.3 times as long with that.
 """
 
 
@@ -59,11 +60,13 @@ def compiler() -> str | None:
 
 @functools.cache
 def _warn_once(reason: str) -> None:
-    warnings.warn(
+    warnings.warn(reason, CompilerWarning, stacklevel=5)
+
+
+def _not_compiled(reason: str) -> None:
+    _warn_once(
         f"{reason}: CasADi's virtual machine and NumPy are used, several times slower, with the"
-        " same numbers",
-        CompilerWarning,
-        stacklevel=4,
+        " same numbers to rounding"
     )
 
 
@@ -79,7 +82,7 @@ def compiled(function: casadi.Function) -> casadi.Function:
     try:
         return casadi.external(function.name(), str(path))
     except RuntimeError as error:
-        _warn_once(f"loading the compiled {function.name()} failed ({str(error).strip()})")
+        _not_compiled(f"loading the compiled {function.name()} failed ({str(error).strip()})")
         return function
 
 
@@ -92,7 +95,7 @@ def library(source: str, name: str) -> Path | None:
     """
     cc = compiler()
     if cc is None:
-        _warn_once(
+        _not_compiled(
             "no C compiler is used (install gcc or clang, or set CC)"
             if os.environ.get("SYMHELI_COMPILE") != "0"
             else "SYMHELI_COMPILE=0"
@@ -124,8 +127,21 @@ def library(source: str, name: str) -> Path | None:
             if isinstance(error, subprocess.CalledProcessError)
             else str(error)
         )
-        _warn_once(f"compiling {name} failed ({detail.strip()})")
+        _not_compiled(f"compiling {name} failed ({detail.strip()})")
         return None
+
+
+def loaded(path: Path) -> ctypes.CDLL:
+    """A library that begins with `Layout.prelude`, with one `CompilerWarning` where this processor
+    has no fused multiply-add.
+    """
+    code = ctypes.CDLL(str(path))
+    if not code.has_fma():
+        _warn_once(
+            "this processor, or the compiler for it, has no fused multiply-add: flights are a"
+            " little slower, with the same numbers to rounding"
+        )
+    return code
 
 
 @functools.cache

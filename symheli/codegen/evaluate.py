@@ -12,7 +12,17 @@ import casadi
 import numpy as np
 
 from symheli.codegen.program import Operation, Program
-from symheli.codegen.symbolic import absolute, dense, sqrt, where
+from symheli.codegen.symbolic import (
+    absolute,
+    arcsin,
+    arctan2,
+    cos,
+    dense,
+    exp,
+    sin,
+    sqrt,
+    where,
+)
 
 _OPERATIONS: dict[str, Callable[..., Any]] = {
     **{
@@ -23,7 +33,11 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
         "neg": operator.neg,
     },
     **{"lt": operator.lt, "le": operator.le, "eq": operator.eq, "ne": operator.ne},
+    "fma": lambda a, b, c: a * b + c,
+    "fms": lambda a, b, c: a * b - c,
+    "fnma": lambda a, b, c: c - a * b,
     **{"sqrt": sqrt, "fabs": absolute, "select": where},
+    **{"sin": sin, "cos": cos, "asin": arcsin, "atan2": arctan2, "exp": exp},
     "min": lambda a, b: where(b < a, b, a),
     "max": lambda a, b: where(a < b, b, a),
     "not": lambda a: a == 0,
@@ -37,8 +51,9 @@ def evaluate(program: Program, *inputs: Any) -> list[list[Any]]:
     """The elements of each output; `inputs[i][j]` is entry j of input i: a float, an (N,) array or
     a CasADi symbol.
 
-    On arrays the bits are those of the generated C. A side of a branch that is not taken may
-    overflow silently.
+    A fused operation is a product and a sum, each rounded, and sin, cos, ... are the library's
+    own: where C fuses, its bits are others. A side of a branch that is not taken may overflow
+    silently.
     """
     last_use = {a: k for k, o in enumerate(program.operations) for a in o.arguments}
     last_use |= {a: len(program.operations) for output in program.outputs for a in output}
@@ -63,8 +78,8 @@ def _value(o: Operation, values: Sequence[Any], inputs: Sequence[Any]) -> Any:
 
 
 def as_casadi(program: Program) -> casadi.Function:
-    """The program as a CasADi function for its virtual machine: the same bits as the generated C,
-    but for the sign of a zero.
+    """The program as a CasADi function for its virtual machine: the same bits as `evaluate` on
+    arrays, but for the sign of a zero, as long as it needs no sin, cos, ...
     """
     symbols = [casadi.SX.sym(f"in{i}", size) for i, size in enumerate(program.sizes)]
     simplified = casadi.GlobalOptions.getSimplificationOnTheFly()

@@ -19,10 +19,13 @@ __all__ = [
     "Function",
     "absolute",
     "adjoint_product",
+    "arcsin",
+    "arctan2",
     "clip",
     "column",
     "cos",
     "dense",
+    "exp",
     "jacobian",
     "maximum",
     "minimum",
@@ -65,6 +68,23 @@ def cos(x: Any) -> Any:
 def tan(x: Any) -> Any:
     """Tangent, x in rad."""
     return _library(x).tan(x)
+
+
+def arcsin(x: Any) -> Any:
+    """Arc sine, rad."""
+    library = _library(x)
+    return library.asin(x) if _is_sympy(library) else library.arcsin(x)
+
+
+def arctan2(y: Any, x: Any) -> Any:
+    """Angle of the point (x, y), rad."""
+    library = _library(y, x)
+    return library.atan2(y, x) if _is_sympy(library) else library.arctan2(y, x)
+
+
+def exp(x: Any) -> Any:
+    """Exponential."""
+    return _library(x).exp(x)
 
 
 def sqrt(x: Any) -> Any:

@@ -97,9 +97,12 @@ def simulate_batch(
     """N flights by the classical Runge-Kutta method, side by side in vector registers and over the
     cores.
 
-    A flight comes out the same to the bit whatever its neighbours, the number of workers and the
-    compiler or its absence. Memory: the arrays given and the result, (N, kept, nx) doubles. Ctrl-C
-    stops within a sample and raises `KeyboardInterrupt`.
+    A flight comes out the same to the bit whatever its neighbours, the number of workers and, where
+    there are fused multiply-adds, the processor. Without a compiler or without them it differs by
+    rounding: below 1e-9 of its size after 40 s of a stable flight.
+
+    Memory: the arrays given and the result, (N, kept, nx) doubles. Ctrl-C stops within a sample and
+    raises `KeyboardInterrupt`.
 
     Parameters
     ----------

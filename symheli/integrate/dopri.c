@@ -19,18 +19,18 @@ static double dormand_prince(const struct flight *f, const lane *x, const lane *
   for (int s = 1; s < STAGES; ++s) {
     for (int i = 0; i < NX; ++i) {
       double sum = 0;
-      for (int j = 0; j < s; ++j) sum += A[s][j] * k[j][i][0];
-      end[i][0] = x[i][0] + h * sum;
+      for (int j = 0; j < s; ++j) sum = FUSED(A[s][j], k[j][i][0], sum);
+      end[i][0] = FUSED(h, sum, x[i][0]);
     }
     rates((const lane *)end, kept, k[s]); /* the last stage is the end itself: its row of A is B */
   }
   double total = 0;
   for (int i = 0; i < NX; ++i) {
     double sum = 0;
-    for (int j = 0; j < STAGES; ++j) sum += E[j] * k[j][i][0];
+    for (int j = 0; j < STAGES; ++j) sum = FUSED(E[j], k[j][i][0], sum);
     const double before = fabs(x[i][0]), after = fabs(end[i][0]);
     const double error = h * sum / (f->atol[i] + f->rtol * (before > after ? before : after));
-    total += error * error;
+    total = FUSED(error, error, total);
   }
   const double scale = 1.0 / sqrt(end[6][0] * end[6][0] + end[7][0] * end[7][0] +
                                   end[8][0] * end[8][0] + end[9][0] * end[9][0]);

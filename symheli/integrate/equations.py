@@ -11,7 +11,7 @@ from importlib import resources
 from typing import Any, Literal
 
 from symheli.codegen import Layout, Program, as_casadi, c_function, program
-from symheli.codegen.compile import library
+from symheli.codegen.compile import library, loaded
 from symheli.codegen.numeric import Numeric
 from symheli.codegen.symbolic import SX, Function, adjoint_product, tangent_product
 from symheli.dynamics import Dynamics
@@ -49,8 +49,8 @@ class Equations:
         return self._programs[which]
 
     def virtual_machine(self, which: Which, columns: int = 1) -> Numeric:
-        """One of the functions in CasADi's virtual machine, with the bits of the machine code, on
-        `columns` points at once.
+        """One of the functions in CasADi's virtual machine, on `columns` points at once: the
+        numbers of the machine code to rounding.
         """
         function = as_casadi(self._program(which))
         return Numeric(function if columns == 1 else function.map(columns))
@@ -93,7 +93,7 @@ class Equations:
                 (resources.files("symheli.integrate") / kernel).read_text(encoding="utf-8")
             )
             path = library("\n".join(parts), f"{kernel.removesuffix('.c')}-{layout.lanes}")
-            self._libraries[key] = None if path is None else ctypes.CDLL(str(path))
+            self._libraries[key] = None if path is None else loaded(path)
         return self._libraries[key]
 
 

@@ -20,8 +20,9 @@ struct flights {
 static void normalise(lane *x)
 {
   for (int l = 0; l < LANES; ++l) {
-    const double scale =
-        1.0 / sqrt(x[6][l] * x[6][l] + x[7][l] * x[7][l] + x[8][l] * x[8][l] + x[9][l] * x[9][l]);
+    const double first = FUSED(x[7][l], x[7][l], x[6][l] * x[6][l]),
+                 second = FUSED(x[9][l], x[9][l], x[8][l] * x[8][l]);
+    const double scale = 1.0 / sqrt(first + second);
     for (int i = 6; i < 10; ++i) x[i][l] *= scale;
   }
 }
@@ -31,16 +32,17 @@ static void runge_kutta(lane *x, const lane *kept, double h)
   lane k[NX], y[NX], sum[NX];
   rates((const lane *)x, kept, k);
   for (int i = 0; i < NX; ++i)
-    for (int l = 0; l < LANES; ++l) sum[i][l] = k[i][l], y[i][l] = x[i][l] + h / 2 * k[i][l];
+    for (int l = 0; l < LANES; ++l) sum[i][l] = k[i][l], y[i][l] = FUSED(h / 2, k[i][l], x[i][l]);
   for (int stage = 2; stage < 4; ++stage) {
     const double next = stage == 2 ? h / 2 : h;
     rates((const lane *)y, kept, k);
     for (int i = 0; i < NX; ++i)
-      for (int l = 0; l < LANES; ++l) sum[i][l] += 2 * k[i][l], y[i][l] = x[i][l] + next * k[i][l];
+      for (int l = 0; l < LANES; ++l)
+        sum[i][l] = FUSED(2.0, k[i][l], sum[i][l]), y[i][l] = FUSED(next, k[i][l], x[i][l]);
   }
   rates((const lane *)y, kept, k);
   for (int i = 0; i < NX; ++i)
-    for (int l = 0; l < LANES; ++l) x[i][l] += h / 6 * (sum[i][l] + k[i][l]);
+    for (int l = 0; l < LANES; ++l) x[i][l] = FUSED(h / 6, sum[i][l] + k[i][l], x[i][l]);
   normalise(x);
 }
 
@@ -51,15 +53,17 @@ static void feed_back(const struct flights *f, long sample, const lane *x, lane 
   lane e[NE];
   for (int l = 0; l < LANES; ++l) {
     const double q0 = x[6][l], q1 = x[7][l], q2 = x[8][l], q3 = x[9][l],
-                 sine = 2 * (q0 * q2 - q3 * q1);
+                 sine = 2 * FUSED(q0, q2, -q3 * q1);
     for (int j = 0; j < 6; ++j) e[j][l] = x[j][l];
-    e[6][l] = atan2(2 * (q0 * q1 + q2 * q3), 1 - 2 * (q1 * q1 + q2 * q2));
-    e[7][l] = asin(sine < -1 ? -1 : sine > 1 ? 1 : sine);
+    e[6][l] = elementary_atan2(2 * FUSED(q0, q1, q2 * q3),
+                               FUSED(-2.0, FUSED(q1, q1, q2 * q2), 1.0));
+    e[7][l] = elementary_asin(sine < -1 ? -1 : sine > 1 ? 1 : sine);
     for (int j = 8; j < NE; ++j) e[j][l] = x[j + 5][l];
   }
   for (int j = 0; j < NE; ++j)
     for (int i = 0; i < 4; ++i)
-      for (int l = 0; l < LANES; ++l) u[i][l] -= gains[i * NE + j] * (e[j][l] - reference[j]);
+      for (int l = 0; l < LANES; ++l)
+        u[i][l] = FUSED(-gains[i * NE + j], e[j][l] - reference[j], u[i][l]);
   for (int i = 0; i < 4; ++i) {
     const double most = f->travel[i];
     for (int l = 0; l < LANES; ++l)

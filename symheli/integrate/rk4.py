@@ -64,8 +64,8 @@ class Flights:
     used (N, kept, 4).
 
     Every `every`-th sample is kept, the first one not where `skip_start`. The bits of a flight
-    depend neither on the layout nor on its neighbours, and are the same in machine code and in
-    NumPy.
+    depend neither on the layout nor on its neighbours; machine code with fused multiply-adds and
+    NumPy differ by rounding.
     """
 
     def __init__(
@@ -172,7 +172,7 @@ def _step(rates: Callable[[Array], Array], x: Array, h: float) -> Array:
 
 
 def _fed_back(feedback: Feedback, k: int, x: Array, u: Array) -> Array:
-    """As `feed_back` in rk4.c, with its order of operations and the same mathematical library."""
+    """As `feed_back` in rk4.c."""
     q0, q1, q2, q3 = x[6:10]
     sine, over, under = (
         2 * (q0 * q2 - q3 * q1),

@@ -47,8 +47,8 @@ static void normalise(lane *x, lane *change)
     double along = 0;
     for (int i = 6; i < 10; ++i) x[i][l] *= scale;
     if (!change) continue;
-    for (int i = 6; i < 10; ++i) along += x[i][l] * change[i][l];
-    for (int i = 6; i < 10; ++i) change[i][l] = (change[i][l] - x[i][l] * along) * scale;
+    for (int i = 6; i < 10; ++i) along = FUSED(x[i][l], change[i][l], along);
+    for (int i = 6; i < 10; ++i) change[i][l] = FUSED(-x[i][l], along, change[i][l]) * scale;
   }
 }
 
@@ -59,8 +59,8 @@ static void combine(lane *to, const lane *x, double h, const double *weights, la
   for (int i = 0; i < NX; ++i)
     for (int l = 0; l < LANES; ++l) {
       double sum = 0;
-      for (long j = 0; j < count; ++j) sum += weights[j] * k[j][i][l];
-      to[i][l] = x[i][l] + h * sum;
+      for (long j = 0; j < count; ++j) sum = FUSED(weights[j], k[j][i][l], sum);
+      to[i][l] = FUSED(h, sum, x[i][l]);
     }
 }
 
@@ -144,7 +144,8 @@ int adjoint(const struct line *f)
           for (int i = 0; i < NX; ++i)
             for (int l = 0; l < LANES; ++l) {
               double sum = f->b[s] * x_bar[i][l];
-              for (long j = s + 1; j < stages; ++j) sum += f->a[j * stages + s] * y_bar[j][i][l];
+              for (long j = s + 1; j < stages; ++j) 
+                sum = FUSED(f->a[j * stages + s], y_bar[j][i][l], sum);
               k_bar[i][l] = h[step] * sum;
             }
           adjoint_rates((const lane *)stage[s], (const lane *)k_bar, (const lane *)adjoint_kept,

@@ -17,6 +17,20 @@ def manoeuvre(heli, airspeed=6.0, n=20, size=0.01, dt=0.02):
     )
 
 
+def held(heli, seconds, airspeed=6.0, dt=0.02):
+    """Smooth motion of the inputs about an airspeed that feedback holds: start, inputs (n, 4) and
+    feedback.
+    """
+    n = round(seconds / dt)
+    autopilot = symheli.gain_scheduled_lqr(heli, airspeed - 1, airspeed + 1, dt, points=3)
+    gain = np.zeros((4, len(heli.states)))
+    for name, column in zip(autopilot.states, autopilot.gain(airspeed).T, strict=True):
+        gain[:, heli.states.index(name)] = column
+    x0, u = manoeuvre(heli, airspeed, n, dt=dt)
+    reference = np.tile(symheli.trim(heli, airspeed).x.array, (n, 1))
+    return x0, u, symheli.Feedback(np.tile(gain, (n, 1, 1)), reference, heli.travel)
+
+
 def without_compiler(monkeypatch, heli):
     """The same helicopter, its equations never compiled."""
     monkeypatch.setattr("symheli.integrate.equations.library", lambda source, name: None)

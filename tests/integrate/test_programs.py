@@ -1,8 +1,9 @@
-"""Programs: the same bits from NumPy, CasADi's virtual machine and C, whatever lies side by
-side.
+"""Programs: the same bits from NumPy and CasADi's virtual machine, the same from C whatever lies
+side by side, and both to rounding.
 """
 
 import ctypes
+import platform
 
 import casadi
 import numpy as np
@@ -12,6 +13,7 @@ from symheli import InputError
 from symheli.codegen import Layout, as_casadi, c_function, compile, evaluate, program
 from symheli.codegen.branches import branches
 from symheli.codegen.compile import compiler, library
+from symheli.errors import CompilerWarning
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
@@ -46,24 +48,87 @@ def test_the_virtual_machine_gives_the_bits_of_numpy(heli):
     )
 
 
+def in_machine_code(made, layout, inputs):
+    """The only output of a program at many points, so many at a time as the layout has lanes."""
+    names = [f"in{i}" for i in range(len(made.sizes))]
+    given = "".join(f"const lane *{name}, " for name in names)
+    call = f"void call({given}lane *out) {{ f({', '.join(names)}, out); }}\n"
+    source = layout.prelude + c_function(made, layout, "f") + call
+    code = ctypes.CDLL(str(library(source, f"test-{layout.lanes}")))
+    out = np.empty((len(made.outputs[0]), inputs[0].shape[1]))
+    for first in range(0, out.shape[1], layout.lanes):
+        part = slice(first, first + layout.lanes)
+        arrays = [np.ascontiguousarray(a[:, part]) for a in (*inputs, out)]
+        code.call(*(ctypes.c_void_p(a.ctypes.data) for a in arrays))
+        out[:, part] = arrays[-1]
+    return out
+
+
 @needs_compiler
-@pytest.mark.parametrize("layout", [Layout(), Layout(8), Layout(8, 2)])
-def test_machine_code_gives_the_bits_of_numpy_in_every_layout(ideal, layout):
-    made, lanes = program(ideal.flight_rhs), layout.lanes
-    call = (
-        "void call(const lane *x, const lane *u, const lane *wind, lane *xdot) { rhs(x, u, wind,"
-        " xdot); }\n"
+def test_machine_code_gives_the_same_bits_in_every_layout(ideal):
+    made, everywhere = program(ideal.flight_rhs), points(ideal, 640)
+    alone = in_machine_code(made, Layout(), everywhere)
+    for layout in (Layout(8), Layout(8, 2), Layout(3, 2)):
+        # 642 points: a multiple of six lanes too
+        padded = [np.concatenate([a, a[:, : -640 % layout.lanes]], axis=1) for a in everywhere]
+        np.testing.assert_array_equal(in_machine_code(made, layout, padded)[:, :640], alone)
+    # each of a few hundred operations rounded otherwise
+    np.testing.assert_allclose(alone, evaluate(made, *everywhere)[0], rtol=1e-12, atol=1e-11)
+
+
+@needs_compiler
+def test_elementary_functions_and_fused_operations_are_those_of_numpy_to_rounding():
+    a, b = casadi.SX.sym("a", 2), casadi.SX.sym("b")
+    x, y = a[0], a[1]
+    whole = casadi.Function(
+        "whole",
+        [a, b],
+        [
+            casadi.densify(
+                casadi.vertcat(
+                    *(casadi.sin(x), casadi.cos(3 * x), casadi.tan(y), casadi.exp(x)),
+                    *(casadi.asin(casadi.sin(y)), casadi.atan2(x, y)),
+                    *(x * y + b, x * y - b, b - x * y, x * y + y * b, x * x - y * y),
+                )
+            )
+        ],
     )
-    code = ctypes.CDLL(
-        str(library(layout.prelude + c_function(made, layout, "rhs") + call, f"test-{lanes}"))
+    made = program(whole)
+    names = [o.name for o in made.operations]
+    assert [names.count(name) for name in ("fma", "fms", "fnma", "add", "sub")] == [2, 2, 1, 0, 0]
+    rng = np.random.default_rng(0)
+    inputs = rng.uniform(-1.5, 1.5, (2, 64)), rng.normal(size=(1, 64))
+    expected = np.array(whole.map(64)(*inputs))
+    # 2 units of each function, times up to 15 where the tangent is steep, and of a few more sums
+    for value in (
+        evaluate(made, *inputs)[0],
+        *(in_machine_code(made, Layout(k), inputs) for k in (1, 8)),
+    ):
+        np.testing.assert_allclose(value, expected, rtol=1e-14, atol=1e-15)
+    np.testing.assert_array_equal(
+        in_machine_code(made, Layout(), inputs), in_machine_code(made, Layout(8), inputs)
     )
-    everywhere = points(ideal, 640)
-    expected = np.array(evaluate(made, *everywhere)[0])
-    for first in range(0, 640, lanes):
-        x, u, wind = (np.ascontiguousarray(a[:, first : first + lanes]) for a in everywhere)
-        xdot = np.empty_like(x)
-        code.call(*(ctypes.c_void_p(a.ctypes.data) for a in (x, u, wind, xdot)))
-        np.testing.assert_array_equal(xdot, expected[:, first : first + lanes])
+
+
+def test_a_product_that_is_needed_by_itself_is_not_fused():
+    a = casadi.SX.sym("a", 3)
+    product = a[0] * a[1]
+    outputs = casadi.vertcat(product + a[2], casadi.sqrt(product))
+    names = [o.name for o in program(casadi.Function("f", [a], [outputs])).operations]
+    assert names.count("mul") == names.count("add") == 1
+    assert "fma" not in names
+
+
+@needs_compiler
+def test_without_fused_multiply_adds_one_is_told_so(monkeypatch):
+    """Code for the oldest 64-bit processors of this kind."""
+    if platform.machine() != "x86_64":
+        pytest.skip("levels of x86-64")
+    flags = tuple(f for f in compile.FLAGS if not f.startswith("-march"))
+    monkeypatch.setattr(compile, "FLAGS", (*flags, "-march=x86-64"))
+    compile._warn_once.cache_clear()
+    with pytest.warns(CompilerWarning, match="no fused multiply-add"):
+        assert not compile.loaded(library(Layout().prelude, "unfused")).has_fma()
 
 
 def test_a_side_holds_what_it_alone_needs(ideal):
@@ -121,10 +186,10 @@ def test_conditions_and_signs_keep_their_meaning():
         np.testing.assert_allclose(np.array(made), expected, rtol=1e-15)
 
 
-def test_a_function_of_the_mathematical_library_is_refused():
+def test_a_function_without_a_form_is_refused():
     a = casadi.SX.sym("a")
-    with pytest.raises(InputError, match=r"wave: CasADi operation \d+ cannot be written"):
-        program(casadi.Function("wave", [a], [casadi.sin(a)]))
+    with pytest.raises(InputError, match=r"wave: CasADi operation \d+ has no form"):
+        program(casadi.Function("wave", [a], [casadi.log(a)]))
 
 
 def test_the_right_hand_side_stays_cheap(ideal):
