@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         ConvergenceWarning,
         DataWarning,
         ExcitationError,
+        FlightLostError,
         InputError,
         PrecisionWarning,
         SolverError,
@@ -39,7 +40,10 @@ if TYPE_CHECKING:
     from symheli.flight import (
         AirspeedSchedule,
         Autopilot,
+        Controller,
         Excitation,
+        FlightPlan,
+        ScheduledController,
         Sensor,
         Servo,
         fly,
@@ -82,7 +86,10 @@ _ROOMS = {
     "symheli.integrate": (
         "Batch DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
     ),
-    "symheli.flight": "AirspeedSchedule Autopilot Excitation Sensor Servo fly gain_scheduled_lqr",
+    "symheli.flight": (
+        "AirspeedSchedule Autopilot Controller Excitation FlightPlan ScheduledController Sensor"
+        " Servo fly gain_scheduled_lqr"
+    ),
     "symheli.flight.stitched_model": "StitchedModel",
     "symheli.environment": "Air Dryden Gust Wind standard_atmosphere",
     "symheli.values": "NamedVector Signal",
@@ -90,8 +97,8 @@ _ROOMS = {
     "symheli.lpv": "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling",
     "symheli.errors": (
         "AccuracyError CertificateError CompilerWarning ConvergenceWarning DataWarning"
-        " ExcitationError InputError PrecisionWarning SolverError SymheliError TrimError"
-        " UnknownNameError"
+        " ExcitationError FlightLostError InputError PrecisionWarning SolverError SymheliError"
+        " TrimError UnknownNameError"
     ),
 }
 _HOME = {name: module for module, names in _ROOMS.items() for name in names.split()}
@@ -105,6 +112,7 @@ __all__ = [
     "Batch",
     "CertificateError",
     "CompilerWarning",
+    "Controller",
     "ConvergenceWarning",
     "DataWarning",
     "DerivativeTable",
@@ -114,6 +122,8 @@ __all__ = [
     "ExcitationError",
     "Feedback",
     "FlightCondition",
+    "FlightLostError",
+    "FlightPlan",
     "FlightRecord",
     "Gust",
     "Helicopter",
@@ -127,6 +137,7 @@ __all__ = [
     "PrecisionWarning",
     "Radau",
     "RungeKutta4",
+    "ScheduledController",
     "Scheduling",
     "Sensor",
     "Servo",

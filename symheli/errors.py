@@ -41,6 +41,16 @@ class TrimError(SymheliError):
         self.result = result
 
 
+class FlightLostError(SymheliError):
+    """A flight ended upside down or out of the range of numbers; `record` is what was recorded
+    until then (None where that is less than two samples).
+    """
+
+    def __init__(self, message: str, record: Any = None):
+        super().__init__(message)
+        self.record = record
+
+
 class ExcitationError(SymheliError):
     """The data cannot determine what was asked of them; `report` says which direction is
     missing.

@@ -51,7 +51,7 @@ class Candidate:
             heli,
             AirspeedSchedule.transition(0.0, TOP, self.acceleration, hold=2.0),
             excitation=excitation,
-            autopilot=autopilot,
+            controller=autopilot,
         )
 
 

@@ -92,7 +92,7 @@ class FlightPlan:
             noise_db=self.noise_db,
             seed=seed,
             wind=wind,
-            autopilot=autopilot,
+            controller=autopilot,
         )
 
 

@@ -1,8 +1,10 @@
 """Closed-loop flights of the nonlinear model."""
 
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
+from symheli.flight.controller import Controller, ScheduledController
 from symheli.flight.excitation import Excitation
 from symheli.flight.fly import fly
+from symheli.flight.plan import FlightPlan
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import XCELL_SERVOS, Servo, ServoBank
@@ -11,7 +13,10 @@ __all__ = [
     "XCELL_SERVOS",
     "AirspeedSchedule",
     "Autopilot",
+    "Controller",
     "Excitation",
+    "FlightPlan",
+    "ScheduledController",
     "Sensor",
     "Servo",
     "ServoBank",

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
+from symheli.dynamics import INPUTS
 from symheli.errors import InputError
+from symheli.flight.controller import ScheduledController
 from symheli.flight.servo import Servo
 from symheli.helicopter import Helicopter
+from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.scheduling import Scheduling
 from symheli.steady.airspeed_sweep import sweep
-from symheli.values.signal import Signal
+from symheli.values.arrays import frozen
+from symheli.values.signal import Signal, signals
 
 UNMEASURED = ("a1", "b1")
 SCALE = {
@@ -32,23 +39,28 @@ SCALE = {
 INPUT_SCALE = 0.01
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Autopilot:
-    """u = u0 - K(V)(x - x0) on the measured states.
+    """u = u0 - K(V)(x - x0) on the measured states, K straight between the airspeeds of a table.
 
     Parameters
     ----------
     airspeeds : array (K,)
-        m/s.
+        Increasing, m/s; K >= 2.
     gains : array (K, 4, nx)
-        rad per unit of the state.
-    states : tuple of Signal
+        rad per unit of the state, rows d_lon d_lat d_col d_ped.
+    states : sequence of str
         Those measured.
     dt : float
         Sample period, s.
-    radius : float
+    radius : float, optional
         Largest closed-loop eigenvalue magnitude (one sample of delay included) over the design
-        points, < 1.
+        points, < 1, where it is known.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, airspeeds that do not increase, states that no sensor measures.
 
     Examples
     --------
@@ -61,13 +73,39 @@ class Autopilot:
     gains: np.ndarray
     states: tuple[Signal, ...]
     dt: float
-    radius: float
+    radius: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "states", signals(self.states))
+        object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
+        shape = (len(self.airspeeds), len(INPUTS), len(self.states))
+        object.__setattr__(self, "gains", frozen(self.gains, "gains", shape))
 
     def gain(self, airspeed: float) -> np.ndarray:
         """K (4, nx), linearly interpolated over airspeed."""
-        position = np.interp(airspeed, self.airspeeds, np.arange(len(self.airspeeds)))
-        k = min(int(position), len(self.airspeeds) - 2)
-        return (1 - (position - k)) * self.gains[k] + (position - k) * self.gains[k + 1]
+        return -self.scheduled_controller.model.matrices(
+            np.clip(airspeed, self.airspeeds[0], self.airspeeds[-1])
+        ).D
+
+    @cached_property
+    def scheduled_controller(self) -> ScheduledController:
+        """The same gains as a controller scheduled by the commanded airspeed."""
+        K = self.gains
+        low, high = float(self.airspeeds[0]), float(self.airspeeds[-1])
+        return ScheduledController(
+            LPVStateSpace(
+                PiecewiseLinear(tuple(self.airspeeds.tolist())),
+                np.zeros((len(K), 0, 0)),
+                np.zeros((len(K), 0, len(self.states))),
+                np.zeros((len(K), len(INPUTS), 0)),
+                -K,
+                (Scheduling("airspeed", "m/s", low, high),),
+                (),
+                self.states,
+                INPUTS,
+                self.dt,
+            )
+        )
 
 
 SOFTER = (1.0, 0.5, 0.25, 0.125)
@@ -120,7 +158,7 @@ def gain_scheduled_lqr(
     --------
     >>> autopilot = symheli.gain_scheduled_lqr(heli, 4.0, 6.0, dt=0.02, points=3)
     >>> slow = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
-    >>> record = symheli.fly(heli, slow, autopilot=autopilot)
+    >>> record = symheli.fly(heli, slow, controller=autopilot)
     >>> bool(np.abs(record["phi"]).max() < 0.2)
     True
     """

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -58,45 +55,3 @@ class Sensor:
                 )
         if not math.isfinite(self.bias):
             raise InputError(f"bias: expected a finite number, got {self.bias}")
-
-    def sources(self, samples: int, dt: float) -> np.ndarray:
-        """Index (samples,) of the sample read at each instant, `dt` s apart."""
-        delay, period = (math.ceil(seconds / dt - 1e-9) for seconds in (self.delay, self.period))
-        read = np.maximum(np.arange(samples) - delay, 0)
-        return read - read % max(period, 1)
-
-
-class SensorBank:
-    """The sensors of several signals over a flight of `samples` instants `dt` s apart, with noise
-    drawn from `seed`.
-    """
-
-    def __init__(
-        self,
-        sensors: Mapping[str, Sensor],
-        signals: Sequence[str],
-        samples: int,
-        dt: float,
-        seed: int,
-    ):
-        """A signal without a sensor is read as it is."""
-        for name in sensors:
-            if name not in signals:
-                raise UnknownNameError("measured signal", name, signals)
-        bank = [sensors.get(name, Sensor()) for name in signals]
-        white = np.random.default_rng(seed).standard_normal((samples, len(bank)))
-        self._sources = np.column_stack([s.sources(samples, dt) for s in bank])
-        self._columns = np.arange(len(bank))
-        # one reading is one draw, held as long as the reading is
-        drawn = white[self._sources, self._columns]
-        self._offsets = np.array([s.bias for s in bank]) + np.array([s.noise for s in bank]) * drawn
-        self._quanta = np.array([s.quantum for s in bank])
-
-    def read(self, k: int, history: np.ndarray) -> np.ndarray:
-        """Readings (n,) at instant k from the true values (samples, n), of which those after k are
-        not looked at.
-        """
-        reading = history[self._sources[k], self._columns] + self._offsets[k]
-        coarse = self._quanta > 0
-        reading[coarse] = np.round(reading[coarse] / self._quanta[coarse]) * self._quanta[coarse]
-        return reading

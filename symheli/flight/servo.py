@@ -113,15 +113,25 @@ XCELL_SERVOS: Mapping[str, Servo] = {
 """The servos of the X-Cell .60 by input."""
 
 
-class ServoState(NamedTuple):
-    """States of the linear parts (servo by servo) and the commands they follow (n,), rad."""
+ORDER = 3
+"""Most states a servo has."""
 
-    x: tuple[np.ndarray, ...]
+
+class ServoState(NamedTuple):
+    """States of the linear parts (n, 3), zeros where a servo has two, and the commands they follow
+    (n,), rad.
+    """
+
+    x: np.ndarray
     followed: np.ndarray
 
 
 class ServoBank:
-    """Several servos stepped together: `init` at rest, then `step` every `dt` seconds."""
+    """Several servos stepped together: `init` at rest, then `step` every `dt` seconds.
+
+    A (n, 3, 3), B, C and `settled`, the state that holds 1 rad (n, 3), `change` in a step and
+    `resolution` (n,; 0: none), `travel` (n,): numbers of every servo, in rad.
+    """
 
     def __init__(
         self, servos: Mapping[str, Servo], inputs: Sequence[str], travel: np.ndarray, dt: float
@@ -133,42 +143,39 @@ class ServoBank:
         missing = [name for name in inputs if name not in servos]
         if missing:
             raise InputError(f"servos: none given for {', '.join(missing)}")
-        self._servos = [servos[name] for name in inputs]
-        self._models = [
-            servo.linear(name).discretize(dt)
-            for servo, name in zip(self._servos, inputs, strict=True)
-        ]
-        self._travel = np.asarray(travel, float)
-        self._change = np.array([servo.rate * dt for servo in self._servos])
-        self._quantum = np.array(
-            [
-                2 * t / s.steps if s.steps else 0.0
-                for s, t in zip(self._servos, self._travel, strict=True)
-            ]
+        bank, count = [servos[name] for name in inputs], len(inputs)
+        self.A, self.B, self.C, self.settled = (
+            np.zeros((count, ORDER, ORDER)),
+            *(np.zeros((count, ORDER)) for _ in range(3)),
+        )
+        for i, (servo, name) in enumerate(zip(bank, inputs, strict=True)):
+            m = servo.linear(name).discretize(dt)
+            n = len(m.A)
+            self.A[i, :n, :n], self.B[i, :n], self.C[i, :n] = m.A, m.B[:, 0], m.C[0]
+            self.settled[i, :n] = np.linalg.solve(np.eye(n) - m.A, m.B[:, 0])
+        self.travel = np.array(travel, float)
+        self.change = np.array([servo.rate * dt for servo in bank])
+        self.resolution = np.array(
+            [2 * t / s.steps if s.steps else 0.0 for s, t in zip(bank, self.travel, strict=True)]
         )
 
     def init(self, deflection: np.ndarray) -> ServoState:
         """Everything at rest at `deflection` (n,), rad."""
-        x = tuple(
-            d * np.linalg.solve(np.eye(len(m.A)) - m.A, m.B[:, 0])
-            for m, d in zip(self._models, deflection, strict=True)
-        )
-        return ServoState(x, np.array(deflection, float))
+        return ServoState(self.settled * deflection[:, None], np.array(deflection, float))
 
     def step(self, state: ServoState, command: np.ndarray) -> tuple[ServoState, np.ndarray]:
         """The state after `dt` and the deflections (n,), rad, reached then, limited to the
         travel.
         """
-        wanted = np.clip(command, -self._travel, self._travel)
-        coarse = self._quantum > 0
-        wanted[coarse] = np.round(wanted[coarse] / self._quantum[coarse]) * self._quantum[coarse]
-        followed = state.followed + np.clip(wanted - state.followed, -self._change, self._change)
-        x = tuple(
-            m.A @ z + m.B[:, 0] * c for m, z, c in zip(self._models, state.x, followed, strict=True)
-        )
-        return ServoState(x, followed), self.deflection(ServoState(x, followed))
+        wanted = np.clip(command, -self.travel, self.travel)
+        coarse = self.resolution > 0
+        grain = self.resolution[coarse]
+        wanted[coarse] = np.round(wanted[coarse] / grain) * grain
+        followed = state.followed + np.clip(wanted - state.followed, -self.change, self.change)
+        x = np.einsum("nij,nj->ni", self.A, state.x) + self.B * followed[:, None]
+        moved = ServoState(x, followed)
+        return moved, self.deflection(moved)
 
     def deflection(self, state: ServoState) -> np.ndarray:
         """Deflections (n,), rad."""
-        out = np.array([m.C[0] @ z for m, z in zip(self._models, state.x, strict=True)])
-        return np.clip(out, -self._travel, self._travel)
+        return np.clip((self.C * state.x).sum(axis=1), -self.travel, self.travel)

@@ -67,13 +67,13 @@ class Equations:
 
     def machine_code(
         self,
-        kernel: str,
+        kernel: str | tuple[str, ...],
         which: Sequence[Which] = ("rates",),
         layout: Layout | None = None,
         head: str = "",
     ) -> ctypes.CDLL | None:
-        """The C file `kernel` of this folder compiled behind these functions, None where there is
-        no compiler.
+        """The C file `kernel` of this folder (or several, from the package's folder: "flight/x.c")
+        compiled behind these functions, None where there is no compiler.
         """
         layout = layout or Layout()
         key = (kernel, layout)
@@ -89,10 +89,11 @@ class Equations:
                 prefix = name.removesuffix("rates")
                 parts.append(f"#define {prefix.upper()}NK {max(len(held.outputs[0]), 1)}\n")
                 parts += [c_function(held, layout, f"{prefix}held"), c_function(rest, layout, name)]
-            parts.append(
-                (resources.files("symheli.integrate") / kernel).read_text(encoding="utf-8")
-            )
-            path = library("\n".join(parts), f"{kernel.removesuffix('.c')}-{layout.lanes}")
+            files = (f"integrate/{kernel}",) if isinstance(kernel, str) else kernel
+            package = resources.files("symheli")
+            parts += [(package / file).read_text(encoding="utf-8") for file in files]
+            name = files[-1].rpartition("/")[2].removesuffix(".c")
+            path = library("\n".join(parts), f"{name}-{layout.lanes}")
             self._libraries[key] = None if path is None else loaded(path)
         return self._libraries[key]
 

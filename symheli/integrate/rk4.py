@@ -149,7 +149,7 @@ class Flights:
             rates = self._rates(u, wind, parameters.T, x.shape[1])
             with np.errstate(all="ignore"):  # a lost flight ends in numbers that are none
                 for _ in range(self.substeps):
-                    x = _step(rates, x, self.step)
+                    x = runge_kutta_step(rates, x, self.step)
 
     def _rates(self, u: Array, wind: Array, p: Array, count: int) -> Callable[[Array], Array]:
         if count == 1:  # the virtual machine is far quicker on one point
@@ -160,7 +160,8 @@ class Flights:
         return lambda x: np.stack([np.broadcast_to(v, count) for v in evaluate(rest, x, kept)[0]])
 
 
-def _step(rates: Callable[[Array], Array], x: Array, h: float) -> Array:
+def runge_kutta_step(rates: Callable[[Array], Array], x: Array, h: float) -> Array:
+    """x after one step of h seconds, in quaternion form; the operations of rk4.c."""
     k = rates(x)
     total, y = k, x + h / 2 * k
     for following in (h / 2, h):

@@ -25,12 +25,12 @@ def short(pilot):
         symheli.Helicopter.load("xcell60", governor="ideal"),
         SHORT,
         excitation=SMALL,
-        autopilot=pilot,
+        controller=pilot,
     )
 
 
 def test_a_transition_reaches_its_airspeed_and_returns_to_hover(ideal, pilot):
-    record = fly(ideal, AirspeedSchedule.transition(0.0, 13.0, 3.0, hold=3.0), autopilot=pilot)
+    record = fly(ideal, AirspeedSchedule.transition(0.0, 13.0, 3.0, hold=3.0), controller=pilot)
     assert record.dt == 0.02  # as asked for, not what differences of its stamps leave of it
     assert record["airspeed"].max() == pytest.approx(13.0, abs=1.5)
     np.testing.assert_allclose(record["airspeed"][-1], 0.0, atol=1.0)
@@ -40,7 +40,7 @@ def test_a_transition_reaches_its_airspeed_and_returns_to_hover(ideal, pilot):
 
 
 def test_a_flight_that_starts_in_trim_stays_there(ideal, pilot):
-    record = fly(ideal, AirspeedSchedule((5.0,), (1.0,), (2.0,), start=5.0), autopilot=pilot)
+    record = fly(ideal, AirspeedSchedule((5.0,), (1.0,), (2.0,), start=5.0), controller=pilot)
     point = symheli.trim(ideal, 5.0)
     for name in ("u", "w", "phi", "theta"):
         np.testing.assert_allclose(record[name], point.x[name], atol=1e-8)
@@ -80,7 +80,7 @@ def test_integration_error_of_a_flight_stays_below_its_promise(ideal, pilot, sho
     import sys
 
     monkeypatch.setattr(sys.modules["symheli.flight.fly"], "INTEGRATION_STEP", 0.0025)
-    finer = fly(ideal, SHORT, excitation=SMALL, autopilot=pilot)
+    finer = fly(ideal, SHORT, excitation=SMALL, controller=pilot)
     states = [str(s) for s in ideal.states]
     size = np.abs(short.columns(states)).max(axis=0)
     assert np.all(np.abs(finer.columns(states) - short.columns(states)).max(axis=0) < 1e-5 * size)
@@ -88,7 +88,7 @@ def test_integration_error_of_a_flight_stays_below_its_promise(ideal, pilot, sho
 
 def test_noise_has_the_asked_size_and_follows_its_seed(ideal, pilot, short):
     first, again, other = (
-        fly(ideal, SHORT, excitation=SMALL, autopilot=pilot, noise_db=30.0, seed=s)
+        fly(ideal, SHORT, excitation=SMALL, controller=pilot, noise_db=30.0, seed=s)
         for s in (1, 1, 2)
     )
     np.testing.assert_array_equal(first.values, again.values)
@@ -125,7 +125,7 @@ def test_airspeed_is_that_of_the_air(ideal, pilot):
     windy = fly(
         ideal,
         AirspeedSchedule((4.0,), (2.0,), (2.0,), start=4.0),
-        autopilot=pilot,
+        controller=pilot,
         wind=(-2.0, 0.0, 0.0),
     )
     np.testing.assert_allclose(windy["airspeed"], 4.0, atol=0.1)
@@ -137,11 +137,11 @@ def test_a_lost_flight_says_when_and_what_to_change(ideal, pilot):
     with pytest.raises(
         SymheliError, match=r"the flight was lost at .* s near .* m/s: less excitation"
     ):
-        fly(ideal, AirspeedSchedule.transition(0.0, 6.0, 2.0), excitation=wild, autopilot=pilot)
+        fly(ideal, AirspeedSchedule.transition(0.0, 6.0, 2.0), excitation=wild, controller=pilot)
 
 
 def test_an_autopilot_of_another_period_and_an_impossible_step_are_refused(ideal, pilot):
     with pytest.raises(SymheliError, match=r"was designed for 0\.02 s"):
-        fly(ideal, SHORT, dt=0.01, autopilot=pilot)
+        fly(ideal, SHORT, dt=0.01, controller=pilot)
     with pytest.raises(SymheliError, match="dt must be a positive"):
         fly(ideal, SHORT, dt=0.0)

@@ -112,7 +112,7 @@ def test_a_flight_behind_servos_stays_in_trim_and_records_both_sides(ideal, behi
         ideal,
         AirspeedSchedule((4.0,), (1.0,), (2.0,), start=4.0),
         servos=XCELL_SERVOS,
-        autopilot=behind_servos,
+        controller=behind_servos,
     )
     point = symheli.trim(ideal, 4.0)
     for name in INPUTS:
@@ -131,7 +131,7 @@ def test_without_limits_the_deflection_is_the_command_through_the_servo(ideal, b
         )
         for name, s in XCELL_SERVOS.items()
     }
-    record = fly(ideal, HOVER, servos=fine, autopilot=behind_servos)
+    record = fly(ideal, HOVER, servos=fine, controller=behind_servos)
     model = fine["d_lon"].linear("d_lon").discretize(0.02)
     x = record["d_lon"][0] * np.linalg.solve(np.eye(3) - model.A, model.B[:, 0])
     for k in range(len(record)):
@@ -141,7 +141,7 @@ def test_without_limits_the_deflection_is_the_command_through_the_servo(ideal, b
 
 def test_gusts_move_the_helicopter_and_stand_in_the_record(ideal, behind_servos):
     wind = Wind((2.0, 0.0, 0.0), (Gust((0.0, 3.0, 0.0), 1.5, 1.0),), Dryden(5.0, 15.0), seed=2)
-    record = fly(ideal, HOVER, wind=wind, autopilot=None)
+    record = fly(ideal, HOVER, wind=wind, controller=None)
     calm = fly(ideal, HOVER, wind=(2.0, 0.0, 0.0))
     np.testing.assert_allclose(
         record.columns(("wind_n", "wind_e", "wind_d")),
@@ -152,8 +152,8 @@ def test_gusts_move_the_helicopter_and_stand_in_the_record(ideal, behind_servos)
 
 
 def test_sensors_reach_the_autopilot_and_the_record(ideal, behind_servos):
-    biased = fly(ideal, HOVER, sensors={"phi": Sensor(bias=0.02)}, autopilot=behind_servos)
-    clean = fly(ideal, HOVER, autopilot=behind_servos)
+    biased = fly(ideal, HOVER, sensors={"phi": Sensor(bias=0.02)}, controller=behind_servos)
+    clean = fly(ideal, HOVER, controller=behind_servos)
     assert biased["phi"][0] == pytest.approx(clean["phi"][0] + 0.02, abs=1e-12)
     assert biased["d_lat"][0] != clean["d_lat"][0]
 

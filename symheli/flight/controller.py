@@ -1,0 +1,278 @@
+"""What flies the helicopter: anything that answers a measurement with a command, and linear
+controllers scheduled by airspeed and acceleration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import comb
+from typing import Literal, NamedTuple, Protocol, get_args, runtime_checkable
+
+import numpy as np
+
+from symheli.dynamics import INPUTS
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv.linear_model import LinearModel, is_control_system
+from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.scheduling import Scheduling
+from symheli.values.arrays import Array
+from symheli.values.named_vector import NamedVector
+from symheli.values.signal import Signal, indices, signals
+
+MEASURED = signals(("u", "v", "w", "p", "q", "r", "phi", "theta"))
+"""States with a sensor, which a controller sees as that reads them."""
+ROTOR = signals(("Om", "om_i"))
+"""What else it sees, as it is, where a governor holds the rotor speed."""
+TOLD = (*MEASURED, *ROTOR)
+SCHEDULING = (Signal("airspeed", "m/s"), Signal("acceleration", "m/s^2"))
+"""What a controller can be scheduled by."""
+Follow = Literal["command", "reading"]
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """What `fly` asks of a controller: a sample period, a start, and an answer at every sample.
+
+    Examples
+    --------
+    >>> class Hold:
+    ...     "Keeps the wings level, and leaves the rest at its trim."
+    ...     dt = 0.02
+    ...
+    ...     def reset(self):
+    ...         pass
+    ...
+    ...     def step(self, measured, reference, p):
+    ...         u = np.array([reference[name] for name in ("d_lon", "d_lat", "d_col", "d_ped")])
+    ...         u[1] -= 0.03 * (measured["phi"] - reference["phi"])
+    ...         return u
+    >>> hover = symheli.AirspeedSchedule((0.0,), (1.0,), (0.0,), lead=0.2)
+    >>> bool(np.abs(symheli.fly(heli, hover, controller=Hold())["phi"]).max() < 0.2)
+    True
+    """
+
+    dt: float
+    """Sample period, s."""
+
+    def reset(self) -> None:
+        """Called once, before the first sample of a flight."""
+
+    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> object:
+        """Blade pitch commands (4,), rad, d_lon d_lat d_col d_ped in all, at one sample.
+
+        `measured`: u v w p q r phi theta and airspeed as the sensors read them, and with governor
+        "pi" Om om_i. `reference`: states and inputs of the trim that the flight is held to. `p`:
+        commanded airspeed and acceleration. SI and radians.
+        """
+        ...
+
+
+class Pieces(NamedTuple):
+    """Matrices as polynomials of p - break: breaks (pieces + 1,), coefficients (pieces, degree + 1,
+    rows, columns) from the highest power.
+    """
+
+    breaks: Array
+    coefficients: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ScheduledController:
+    """x(k+1) = A(p) x + B(p) e, u = u0 + C(p) x + D(p) e with e = measured - reference.
+
+    u0 is the trim of the flight at each moment; inputs the model does not name stay there. p is
+    held at the ends of the model's range where it leaves it.
+
+    Parameters
+    ----------
+    model : LPVStateSpace
+        Sampled; its inputs are measured states (u v w p q r phi theta; Om om_i), its outputs
+        helicopter inputs (d_lon d_lat d_col d_ped), both as deviations, its parameters `airspeed`,
+        `acceleration` or both.
+    follow : {"command", "reading"}
+        Whether p is what is commanded, or the airspeed as its sensor reads it.
+
+    Raises
+    ------
+    InputError
+        A continuous model, signals or parameters of another name, a reading of anything but
+        airspeed.
+
+    Examples
+    --------
+    >>> speed = symheli.Scheduling("airspeed", "m/s", low=0.0, high=13.0)
+    >>> D = [[[0.03, 0.01]], [[0.001, 0.0]]]  # rad per rad and rad/s, and their change per m/s
+    >>> basis = symheli.lpv.Polynomial(1, 0.0, 13.0)
+    >>> empty = np.zeros((2, 0, 0)), np.zeros((2, 0, 2)), np.zeros((2, 1, 0))
+    >>> gains = symheli.LPVStateSpace(
+    ...     basis, *empty, -np.array(D), speed, (), ("phi", "p"), ("d_lat",), dt=0.02
+    ... )
+    >>> symheli.ScheduledController(gains).dt
+    0.02
+    """
+
+    model: LPVStateSpace
+    follow: Follow = "command"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.model, LPVStateSpace):
+            raise InputError(
+                f"a scheduled controller is an LPVStateSpace, got {type(self.model).__name__}"
+            )
+        if self.model.dt is None:
+            raise InputError("the controller is continuous: sample it with .discretize(dt)")
+        if self.follow not in get_args(Follow):
+            raise UnknownNameError("way to schedule", self.follow, get_args(Follow))
+        _named("measured signal", self.model.inputs, TOLD)
+        _named("helicopter input", self.model.outputs, INPUTS)
+        names = tuple(s.name for s in self.model.parameters)
+        indices(names, SCHEDULING, "scheduling parameter of a controller")
+        if self.follow == "reading" and (names != ("airspeed",) or self.pieces is None):
+            raise InputError(
+                "only a controller over airspeed alone, polynomial or piecewise polynomial in it,"
+                f" can follow its reading; this one is scheduled by {', '.join(names)}"
+            )
+        object.__setattr__(self, "_state", np.zeros(self.order))
+
+    @property
+    def dt(self) -> float:
+        """Sample period, s."""
+        assert self.model.dt is not None  # noqa: S101
+        return self.model.dt
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return len(self.model.states)
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """(n, order + 4, order + 10): [A B; C D] of each function of the basis, with a column for
+        every measured state and a row for every input of the helicopter.
+        """
+        m, n = self.model, self.order
+        out = np.zeros((m.basis.size, n + len(INPUTS), n + len(TOLD)))
+        rows = [n + i for i in indices(m.outputs, INPUTS, "output")]
+        columns = [n + i for i in indices(m.inputs, TOLD, "input")]
+        out[:, :n, :n] = m.A
+        out[:, :n, columns] = m.B
+        out[:, rows, :n] = m.C
+        out[np.ix_(range(m.basis.size), rows, columns)] = m.D
+        return out
+
+    @cached_property
+    def pieces(self) -> Pieces | None:
+        """The same as polynomials between breaks; None with several parameters or functions that
+        are no polynomials there.
+        """
+        if len(self.model.parameters) > 1:
+            return None
+        try:
+            parts = self.model.basis.pieces()
+        except InputError:
+            return None
+        powers = np.stack([_powers(part.bernstein, part.high - part.low) for part in parts])
+        return Pieces(
+            np.array([parts[0].low, *(part.high for part in parts)]),
+            np.einsum("kdj,jrc->kdrc", powers, self.coefficients),
+        )
+
+    def matrices(self, p: Array) -> Array:
+        """[A B; C D] (n, order + 4, order + 10) at p (n, 2), airspeed and acceleration."""
+        own = np.stack(
+            [np.clip(p[:, i], *s) for i, s in zip(self.scheduled, self.box, strict=True)]
+        )
+        at = own[0] if len(own) == 1 else own.T
+        return np.tensordot(self.model.basis(at), self.coefficients, axes=1)
+
+    @property
+    def box(self) -> tuple[tuple[float, float], ...]:
+        """Range of each parameter."""
+        return self.model.basis.ranges
+
+    @property
+    def scheduled(self) -> list[int]:
+        """Position of each parameter among airspeed and acceleration."""
+        return indices([s.name for s in self.model.parameters], SCHEDULING, "scheduling parameter")
+
+    def reset(self) -> None:
+        """States to zero."""
+        self._own[:] = 0.0
+
+    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> Array:
+        """Commands (4,), rad; see `Controller`."""
+        error = np.array([measured[s] - reference[s] if s in measured else 0.0 for s in TOLD])
+        at = [measured["airspeed"], 0.0] if self.follow == "reading" else list(p.array)
+        M, n = self.matrices(np.array([at]))[0], self.order
+        answer = M @ np.concatenate([self._own, error])
+        self._own[:] = answer[:n]
+        return np.array([reference[s] for s in INPUTS]) + answer[n:]
+
+    @property
+    def _own(self) -> Array:
+        return vars(self)["_state"]
+
+
+def _named(kind: str, given: tuple[Signal, ...], known: tuple[Signal, ...]) -> None:
+    try:
+        indices(given, known, kind)
+    except UnknownNameError as error:
+        raise InputError(
+            f"the controller's signals must bear their names: {error}; name them, and say what is"
+            " deviation from what: inputs measured minus reference, outputs added to the trim"
+        ) from error
+
+
+def _powers(bernstein: Array, width: float) -> Array:
+    """Coefficients (degree + 1, n), highest power of p - low first, of Bernstein ones (n, degree +
+    1).
+    """
+    d = bernstein.shape[1] - 1
+    powers = [
+        comb(d, k)
+        * sum((-1) ** (k - i) * comb(k, i) * bernstein[:, i] for i in range(k + 1))
+        / width**k
+        for k in range(d + 1)
+    ]
+    return np.stack(powers[::-1])
+
+
+def controller_of(given: object, dt: float) -> ScheduledController | Controller:
+    """A controller from what a user gives: LTI models, python-control systems and LPV models (where
+    continuous, sampled every `dt` seconds) become scheduled ones, the rest must answer by itself.
+    """
+    if hasattr(given, "scheduled_controller"):
+        return given.scheduled_controller  # type: ignore[attr-defined]
+    if isinstance(given, ScheduledController):
+        return given
+    if is_control_system(given):
+        given = LinearModel.from_control(given)
+    if isinstance(given, LinearModel | LPVStateSpace):
+        sampled = given.discretize(dt) if given.dt is None else given
+        return ScheduledController(
+            _constant(sampled) if isinstance(sampled, LinearModel) else sampled
+        )
+    if isinstance(given, Controller) and not isinstance(given, type):
+        return given
+    raise InputError(
+        f"controller: expected gains over airspeed (Autopilot), a LinearModel, an LPVStateSpace, a"
+        " system of python-control, or an object with dt, reset() and step(measured, reference, p);"
+        f" got {type(given).__name__}"
+    )
+
+
+def _constant(model: LinearModel) -> LPVStateSpace:
+    """The same matrices at every airspeed."""
+    airspeed = Scheduling("airspeed", "m/s", 0.0, 1.0)
+    return LPVStateSpace.polynomial(
+        [model.A],
+        [model.B],
+        [model.C],
+        [model.D],
+        airspeed,
+        states=model.states,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        dt=model.dt,
+    )

@@ -1,0 +1,81 @@
+"""What is built into a helicopter for its flights: controller, sensors, servos and the delay before
+them, as numbers for a clock.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.dynamics import INPUTS
+from symheli.flight.controller import Controller, ScheduledController
+from symheli.flight.course import Clock
+from symheli.flight.plan import READ
+from symheli.flight.sensor import Sensor
+from symheli.flight.servo import Servo, ServoBank
+from symheli.helicopter import Helicopter
+from symheli.values.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Sensors of the measured states and the airspeed: noise, bias, quantum (9,) in the unit of
+    each, delay and period (9,) in samples.
+    """
+
+    noise: Array
+    bias: Array
+    quantum: Array
+    delay: Array
+    period: Array
+
+    @classmethod
+    def of(cls, sensors: Mapping[str, Sensor], dt: float) -> Readings:
+        """A signal without a sensor is read as it is."""
+        bank = [sensors.get(name, Sensor()) for name in READ]
+        noise, bias, quantum = (
+            np.array([getattr(s, name) for s in bank]) for name in ("noise", "bias", "quantum")
+        )
+        delay, period = (
+            np.array([math.ceil(getattr(s, name) / dt - 1e-9) for s in bank], dtype=np.int_)
+            for name in ("delay", "period")
+        )
+        return cls(noise, bias, quantum, delay, np.maximum(period, 1))
+
+    @property
+    def late(self) -> int:
+        """How many samples back a reading can reach."""
+        return int((self.delay + self.period).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Equipment:
+    """All that flights of one campaign have in common; `late` counts integration steps."""
+
+    controller: ScheduledController | Controller
+    readings: Readings
+    servos: ServoBank | None
+    late: int
+    travel: Array
+
+    @classmethod
+    def of(
+        cls,
+        heli: Helicopter,
+        clock: Clock,
+        controller: ScheduledController | Controller,
+        sensors: Mapping[str, Sensor] | None,
+        servos: Mapping[str, Servo] | None,
+        delay: float,
+    ) -> Equipment:
+        """From the parts of a plan."""
+        return cls(
+            controller,
+            Readings.of(sensors or {}, clock.dt),
+            servos and ServoBank(servos, INPUTS, heli.travel, clock.step),
+            math.ceil(delay / clock.step - 1e-9),
+            np.ascontiguousarray(heli.travel, float),
+        )

@@ -1,0 +1,123 @@
+"""From plans to flights: what plans share is made once, chance is drawn flight by flight."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from symheli.codegen import Layout
+from symheli.flight.autopilot import gain_scheduled_lqr
+from symheli.flight.controller import Controller, ScheduledController, controller_of
+from symheli.flight.course import Clock, Course
+from symheli.flight.disturbance import Disturbance
+from symheli.flight.equipment import Equipment
+from symheli.flight.flight_data import FlightData
+from symheli.flight.loops import Flown, Loops
+from symheli.flight.plan import FlightPlan
+from symheli.helicopter import Helicopter
+from symheli.values.arrays import Array
+
+
+@dataclass
+class Flights:
+    """Flights of one helicopter; keeps controllers, courses and equipment that plans share."""
+
+    heli: Helicopter
+    _controllers: dict[Hashable, ScheduledController | Controller] = field(default_factory=dict)
+    _courses: dict[Hashable, Course] = field(default_factory=dict)
+    _equipment: dict[Hashable, Equipment] = field(default_factory=dict)
+
+    def controller(self, plan: FlightPlan) -> ScheduledController | Controller:
+        """That of a plan, sampled; an LQR over the commanded airspeeds where it names none."""
+        dt = getattr(plan.controller, "dt", None)
+        clock = Clock.of(plan, dt if isinstance(dt, float | int) and dt > 0 else None)
+        if plan.controller is not None:
+            key: Hashable = (id(plan.controller), clock.dt)
+        else:
+            speeds = plan.schedule(clock.dt * np.arange(clock.samples(plan)))[0]
+            low, high = float(speeds.min()), float(speeds.max())
+            key = (low, high, clock.dt, id(plan.servos))
+        if key not in self._controllers:
+            self._controllers[key] = (
+                controller_of(plan.controller, clock.dt)
+                if plan.controller is not None
+                else gain_scheduled_lqr(
+                    self.heli, low, max(high, low + 1.0), clock.dt, servos=plan.servos
+                ).scheduled_controller
+            )
+        return self._controllers[key]
+
+    def clock(self, plan: FlightPlan) -> Clock:
+        """Raises `InputError` where the controller's period does not divide that of the record."""
+        return Clock.of(plan, self.controller(plan).dt)
+
+    def course(self, plan: FlightPlan) -> Course:
+        """What a plan is held to."""
+        key = (plan.schedule, plan.dt, self.clock(plan), plan.wind.steady, plan.trims)
+        if key not in self._courses:
+            self._courses[key] = Course.of(self.heli, plan, self.clock(plan))
+        return self._courses[key]
+
+    def equipment(self, plan: FlightPlan) -> Equipment:
+        """What is built in; the same object for plans that can fly side by side."""
+        key = (id(self.controller(plan)), id(plan.sensors), id(plan.servos), plan.delay, plan.dt)
+        if key not in self._equipment:
+            self._equipment[key] = Equipment.of(
+                self.heli,
+                self.clock(plan),
+                self.controller(plan),
+                plan.sensors,
+                plan.servos,
+                plan.delay,
+            )
+        return self._equipment[key]
+
+    def loops(self, plans: Sequence[FlightPlan], noise: Array | None = None) -> Loops:
+        """Plans with the same equipment, ready to fly; `noise` (N, 9) in place of the sensors'."""
+        equipment = self.equipment(plans[0])
+        courses = {id(c): c for c in map(self.course, plans)}
+        position = {key: i for i, key in enumerate(courses)}
+        readings = equipment.readings
+        if noise is not None:
+            readings = replace(readings, noise=noise.max(axis=0))
+        return Loops(
+            self.heli,
+            self.clock(plans[0]),
+            equipment,
+            list(courses.values()),
+            [position[id(self.course(plan))] for plan in plans],
+            [Disturbance.of(plan, self.course(plan), readings) for plan in plans],
+            noise,
+        )
+
+    def fly(self, plans: Sequence[FlightPlan], layout: Layout) -> list[FlightData]:
+        """Fly plans with the same equipment; where a plan gives its noise in decibels, without
+        noise first.
+        """
+        quiet = self.loops(plans)
+        flown = quiet.fly(layout)
+        if any(plan.noise_db is not None for plan in plans):
+            noise = np.stack([self._noise(plan, i, flown) for i, plan in enumerate(plans)])
+            flown = self.loops(plans, noise).fly(layout)
+        clock = self.clock(plans[0])
+        return [
+            FlightData(self.heli, plan, clock, self.course(plan), out, int(lost))
+            for plan, out, lost in zip(plans, flown.out, flown.lost, strict=True)
+        ]
+
+    def _noise(self, plan: FlightPlan, i: int, flown: Flown) -> Array:
+        """Standard deviations (9,) so many decibels below those of the flight without noise."""
+        out = np.zeros(9)
+        if plan.noise_db is not None:
+            data = FlightData(
+                self.heli,
+                plan,
+                self.clock(plan),
+                self.course(plan),
+                flown.out[i],
+                int(flown.lost[i]),
+            )
+            out[:8] = data.out[: data.kept, :8].std(axis=0) * 10 ** (-plan.noise_db / 20)
+        return out

@@ -1,0 +1,377 @@
+"""Flights under feedback: in machine code, side by side or alone, or in NumPy one at a time."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.codegen import Layout
+from symheli.errors import InputError
+from symheli.flight.controller import ROTOR, SCHEDULING, ScheduledController
+from symheli.flight.course import Clock, Course
+from symheli.flight.disturbance import Disturbance
+from symheli.flight.equipment import Equipment
+from symheli.flight.plan import READ
+from symheli.helicopter import Helicopter
+from symheli.integrate.equations import Equations, equations
+from symheli.integrate.kernel import structure
+from symheli.integrate.rk4 import runge_kutta_step
+from symheli.physics.attitude import flight_state
+from symheli.physics.rigid_body import body_to_earth
+from symheli.values.arrays import Array
+from symheli.values.named_vector import NamedVector
+from symheli.values.signal import signals
+
+KERNEL = ("integrate/rk4.c", "flight/closed_loop.c")
+READINGS = (*signals(READ), *ROTOR)
+LEVEL = 1.4
+"""Bank or pitch (rad) beyond which a flight is lost."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flown:
+    """What came of N flights: `out` (N, kept, nx + 9) with the states as read, inputs, commands and
+    airspeed at the record's samples; `lost` (N,) the control sample at which a flight was, or -1.
+    """
+
+    out: Array
+    lost: Array
+
+
+class Loops:
+    """N flights with one equipment and clock, along the courses they choose."""
+
+    def __init__(
+        self,
+        heli: Helicopter,
+        clock: Clock,
+        equipment: Equipment,
+        courses: Sequence[Course],
+        chosen: Sequence[int],
+        disturbances: Sequence[Disturbance],
+        noise: Array | None = None,
+    ):
+        """Flight i flies courses[chosen[i]] under disturbances[i]; `noise` (N, 9) stands in place
+        of the sensors' own.
+        """
+        self.heli, self.clock, self.equipment = heli, clock, equipment
+        self.courses, self.chosen, self.disturbances = courses, list(chosen), disturbances
+        self.noise = np.ascontiguousarray(
+            equipment.readings.noise[None] if noise is None else noise, float
+        )
+        self.samples = np.array([len(courses[i].time) for i in self.chosen], np.int_)
+        self._stop = np.zeros(1, np.intc)
+
+    def stop(self) -> None:
+        """Ask every flight under way to end at its next sample."""
+        self._stop[0] = 1
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the whole flight runs in machine code."""
+        return (
+            isinstance(self.equipment.controller, ScheduledController)
+            and library(self.heli, Layout()) is not None
+        )
+
+    def fly(self, layout: Layout) -> Flown:
+        """Fly them all; the bits are the same in every layout. Raises `KeyboardInterrupt` where it
+        was stopped.
+        """
+        code = library(self.heli, layout)
+        if code is None or not isinstance(self.equipment.controller, ScheduledController):
+            return self._one_by_one(code if layout.lanes == 1 else library(self.heli, Layout()))
+        found = self._empty()
+        done = code.fly_loops(
+            ctypes.byref(self._arguments(found)),
+            ctypes.c_long(0),
+            ctypes.c_long(len(self.chosen)),
+        )
+        if done < 0:
+            raise MemoryError("no memory for the flights")
+        if done:
+            raise KeyboardInterrupt
+        return found
+
+    def _empty(self) -> Flown:
+        kept = -(-int(self.samples.max()) // self.clock.every)
+        count = len(self.chosen)
+        return Flown(
+            np.full((count, kept, len(self.heli.states) + 9), np.nan), np.full(count, -1, np.int_)
+        )
+
+    # --- machine code ----------------------------------------------------------------------------
+
+    def _arguments(self, found: Flown) -> ctypes.Structure:
+        longest = int(self.samples.max())
+        d, e, controller = self.disturbances, self.equipment, self.equipment.controller
+        wind, wind_flight, wind_sample = _by_flight([x.wind for x in d], longest)
+        added, added_flight, added_sample = _by_flight([x.added for x in d], longest)
+        scheduled = controller if isinstance(controller, ScheduledController) else None
+        pieces = scheduled and scheduled.pieces
+        tabled = scheduled is not None and pieces is None
+        own = scheduled.order if scheduled else 0
+        which = scheduled.scheduled[0] if scheduled else 0
+        servos = e.servos
+        members: dict[str, object] = {
+            "reference": _courses([c.reference for c in self.courses], longest),
+            "scheduling": _courses([c.p[:, [which]] for c in self.courses], longest),
+            "matrices": (
+                _courses([scheduled.matrices(c.p) for c in self.courses], longest)
+                if scheduled and tabled
+                else None
+            ),
+            "start": np.stack([flight_state(self._x0(c)) for c in self.courses]),
+            "longest": longest,
+            "course": np.array(self.chosen, np.int_),
+            "samples": self.samples,
+            "wind": wind,
+            "wind_flight": wind_flight,
+            "wind_sample": wind_sample,
+            "added": added,
+            "added_flight": added_flight,
+            "added_sample": added_sample,
+            "white": _padded([x.white for x in d], longest),
+            "white_air": _padded([x.white_air for x in d], longest),
+            "p": self.heli.parameters.array[None].copy(),
+            "p_flight": 0,
+            "noise": self.noise,
+            "noise_flight": self.noise.shape[1] if len(self.noise) > 1 else 0,
+            "bias": e.readings.bias,
+            "quantum": e.readings.quantum,
+            "delay": e.readings.delay,
+            "period": e.readings.period,
+            "own": own,
+            "pieces": len(pieces.coefficients) if pieces else 0,
+            "degree": pieces.coefficients.shape[1] - 1 if pieces else 0,
+            "by_reading": int(scheduled is not None and scheduled.follow == "reading"),
+            "governed": int(governed(self.heli)),
+            "breaks": pieces and np.ascontiguousarray(pieces.breaks),
+            "coefficients": pieces and np.ascontiguousarray(pieces.coefficients),
+            **{
+                name: servos and np.ascontiguousarray(getattr(servos, name))
+                for name in ("A", "B", "C", "settled", "change", "resolution")
+            },
+            "travel": e.travel,
+            "late": e.late,
+            "out": found.out,
+            "lost": found.lost,
+            "slots": found.out.shape[1],
+            "every": self.clock.every,
+            "substeps": self.clock.substeps,
+            "step": self.clock.step,
+            "stop": self._stop,
+        }
+        return structure(members)
+
+    def _x0(self, course: Course) -> Array:
+        return course.reference[0, : len(self.heli.states)]
+
+    # --- a controller in Python, or no machine code ----------------------------------------------
+
+    def _one_by_one(self, code: ctypes.CDLL | None) -> Flown:
+        found = self._empty()
+        arguments = self._arguments(found) if code is not None else None
+        for i in range(len(self.chosen)):
+            plant = (
+                _InNumpy(self, i, found)
+                if code is None
+                else _InSteps(code, arguments, i, self.heli)
+            )
+            self._answered(plant, self.courses[self.chosen[i]])
+        return found
+
+    def _answered(self, plant: _InSteps | _InNumpy, course: Course) -> None:
+        """Read, ask the controller, advance, to the end of a course or until the flight is lost."""
+        controller = self.equipment.controller
+        names = signals((*self.heli.states, *self.heli.inputs))
+        told = READINGS if governed(self.heli) else READINGS[: len(READ)]
+        controller.reset()
+        try:
+            for k in range(len(course.time)):
+                reading = plant.read(k)
+                if reading is None:
+                    break
+                if self._stop[0]:
+                    raise KeyboardInterrupt
+                command = controller.step(
+                    NamedVector(told, reading[: len(told)]),
+                    NamedVector(names, course.reference[k]),
+                    NamedVector(SCHEDULING, course.p[k]),
+                )
+                plant.command(k, _four(command, float(course.time[k])))
+        finally:
+            plant.end()
+
+
+def governed(heli: Helicopter) -> bool:
+    """Whether the rotor speed is a state, with its integral the last two."""
+    return heli.governor == "pi"
+
+
+def library(heli: Helicopter, layout: Layout) -> ctypes.CDLL | None:
+    """The compiled loop, None without a compiler."""
+    code = equations(heli).machine_code(KERNEL, layout=layout)
+    if code is not None:
+        code.begin_loops.restype = ctypes.c_void_p
+    return code
+
+
+def _four(command: object, time: float) -> Array:
+    try:
+        u = np.array(command, float)
+    except (TypeError, ValueError):
+        u = np.zeros(0)
+    if u.shape != (4,) or not np.isfinite(u).all():
+        raise InputError(
+            f"the controller answered {command!r:.80} at {time:g} s: expected d_lon d_lat d_col"
+            " d_ped, four finite numbers in rad"
+        )
+    return u
+
+
+class _InSteps:
+    """A flight in machine code that waits for its command at every sample."""
+
+    def __init__(self, code: ctypes.CDLL, arguments: object, i: int, heli: Helicopter):
+        self._code, self._arguments = code, ctypes.byref(arguments)  # type: ignore[arg-type]
+        self._block = ctypes.c_void_p(
+            code.begin_loops(self._arguments, ctypes.c_long(i), ctypes.c_long(i + 1))
+        )
+        if not self._block:
+            raise MemoryError("no memory for the flight")
+        self._readings = np.zeros(len(READINGS))
+        self._out = ctypes.c_void_p(self._readings.ctypes.data)
+
+    def read(self, k: int) -> Array | None:
+        flying = self._code.read_loops(self._arguments, self._block, ctypes.c_long(k), self._out)
+        return self._readings if flying else None
+
+    def command(self, k: int, u: Array) -> None:
+        self._code.command_loops(
+            self._arguments, self._block, ctypes.c_long(k), ctypes.c_void_p(u.ctypes.data)
+        )
+
+    def end(self) -> None:
+        self._code.end_loops(self._arguments, self._block)
+
+
+class _InNumpy:
+    """The same flight without a compiler, after closed_loop.c line by line."""
+
+    def __init__(self, loops: Loops, i: int, found: Flown):
+        self._loops, self._i, self._found = loops, i, found
+        self._made: Equations = equations(loops.heli)
+        self._course, self._disturbance = loops.courses[loops.chosen[i]], loops.disturbances[i]
+        n, servos = len(self._course.time), loops.equipment.servos
+        x0, u0 = np.split(self._course.reference[0], [len(loops.heli.states)])
+        self._x, self._start = flight_state(x0), u0
+        self._truth = np.empty((n, len(READ)))
+        self._commands = np.empty((n, 4))
+        self._servo = servos.init(u0) if servos else None
+        self._reached = (
+            u0 if servos is None or self._servo is None else servos.deflection(self._servo)
+        )
+        self._noise = loops.noise[min(i, len(loops.noise) - 1)]
+        self._p = loops.heli.parameters.array
+
+    def read(self, k: int) -> Array | None:
+        euler, air = _seen(self._x, self._wind(k))
+        self._truth[k] = *euler[:8], air
+        if not (np.isfinite(self._x).all() and np.abs(euler[6:8]).max() <= LEVEL):
+            self._found.lost[self._i] = k
+            return None
+        r, d = self._loops.equipment.readings, self._disturbance
+        before = np.maximum(k - r.delay, 0)
+        source = before - before % r.period
+        drawn = np.zeros(len(READ))
+        if d.white is not None:
+            drawn[:8] = d.white[source[:8], np.arange(8)]
+        if d.white_air is not None:
+            drawn[8] = d.white_air[source[8]]
+        reading = self._truth[source, np.arange(len(READ))] + (self._noise * drawn + r.bias)
+        coarse = r.quantum > 0
+        reading[coarse] = np.round(reading[coarse] / r.quantum[coarse]) * r.quantum[coarse]
+        self._euler, self._reading, self._air = euler, reading, air
+        return np.concatenate([reading, euler[-2:]])
+
+    def command(self, k: int, u: Array) -> None:
+        loops, d = self._loops, self._disturbance
+        clock, servos, late = loops.clock, loops.equipment.servos, loops.equipment.late
+        u = np.clip(u + d.added[min(k, len(d.added) - 1)], -loops.heli.travel, loops.heli.travel)
+        self._commands[k] = u
+        for s in range(clock.substeps):
+            at = k * clock.substeps + s - late
+            effective = self._start if at < 0 else self._commands[at // clock.substeps]
+            if s == 0:
+                self._keep(k, self._reached if servos else effective)
+            if servos and self._servo is not None:
+                before = self._reached
+                self._servo, self._reached = servos.step(self._servo, effective.copy())
+                effective = 0.5 * (before + self._reached)
+            self._x = self._stepped(effective, self._wind(k))
+
+    def _stepped(self, u: Array, wind: Array) -> Array:
+        rates = self._made.rates
+        with np.errstate(all="ignore"):  # a lost flight ends in numbers that are none
+            return runge_kutta_step(
+                lambda x: rates(x, u, wind, self._p)[0], self._x, self._loops.clock.step
+            )
+
+    def end(self) -> None:
+        """Nothing is left to be freed."""
+
+    def _wind(self, k: int) -> Array:
+        wind = self._disturbance.wind
+        return wind[min(k, len(wind) - 1)]
+
+    def _keep(self, k: int, inputs: Array) -> None:
+        if k % self._loops.clock.every == 0:
+            row = self._found.out[self._i, k // self._loops.clock.every]
+            row[:] = *self._reading[:8], *self._euler[8:], *inputs, *self._commands[k], self._air
+
+
+def _seen(flight: Array, wind: Array) -> tuple[Array, float]:
+    """Euler-form state and true airspeed (m/s) from the quaternion form; wind in earth axes."""
+    q0, q1, q2, q3 = flight[6:10]
+    phi = np.arctan2(2 * (q0 * q1 + q2 * q3), 1 - 2 * (q1**2 + q2**2))
+    theta = np.arcsin(np.clip(2 * (q0 * q2 - q3 * q1), -1.0, 1.0))
+    velocity = flight[:3] - np.array(body_to_earth(q0, q1, q2, q3)).T @ wind
+    euler = np.concatenate([flight[:6], [phi, theta], flight[13:]])
+    return euler, float(np.linalg.norm(velocity))
+
+
+def _courses(arrays: Sequence[Array], longest: int) -> Array:
+    """(courses, longest, ...) with the last sample of each repeated."""
+    return np.ascontiguousarray(
+        np.stack([a[np.minimum(np.arange(longest), len(a) - 1)] for a in arrays]), float
+    )
+
+
+def _by_flight(arrays: Sequence[Array], longest: int) -> tuple[Array, int, int]:
+    """(N, longest or 1, m) or one for all, with the steps from flight to flight and sample to
+    sample.
+    """
+    width = arrays[0].shape[1]
+    if all(len(a) == 1 for a in arrays):
+        if all(np.array_equal(a, arrays[0]) for a in arrays):
+            return np.ascontiguousarray(arrays[0], float), 0, 0
+        return np.concatenate(arrays), width, 0
+    return _courses(arrays, longest), longest * width, width
+
+
+def _padded(arrays: Sequence[Array | None], longest: int) -> Array | None:
+    """(N, longest, ...) with zeros after the end of each, None where there is nothing."""
+    some = [a for a in arrays if a is not None]
+    if not some:
+        return None
+    if len(arrays) == 1 and len(some[0]) == longest:
+        return some[0]
+    out = np.zeros((len(arrays), longest, *some[0].shape[1:]))
+    for row, a in zip(out, arrays, strict=True):
+        if a is not None:
+            row[: len(a)] = a
+    return out

@@ -1,0 +1,204 @@
+"""Everything that makes a flight: what is commanded, what disturbs it, and what is built in."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
+from typing import Any, Literal, TypedDict, get_args
+
+import numpy as np
+
+from symheli.dynamics import INPUTS
+from symheli.environment import Wind
+from symheli.errors import InputError, UnknownNameError
+from symheli.flight.controller import MEASURED
+from symheli.flight.excitation import Excitation
+from symheli.flight.schedule import AirspeedSchedule
+from symheli.flight.sensor import Sensor
+from symheli.flight.servo import Servo
+
+READ = (*map(str, MEASURED), "airspeed")
+"""Signals that have a sensor."""
+Trims = Literal["quasi-steady", "level"]
+
+
+class Options(TypedDict, total=False):
+    """What `fly` and `fly_batch` take beside the schedule; see `FlightPlan`."""
+
+    dt: float
+    controller: object
+    excitation: Excitation | None
+    noise_db: float | None
+    seed: int
+    wind: Wind | Sequence[float]
+    servos: Mapping[str, Servo] | None
+    sensors: Mapping[str, Sensor] | None
+    delay: float
+    trims: Trims
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """A flight before it is flown; `record.meta["plan"]` of every flight, to be flown again.
+
+    Parameters
+    ----------
+    schedule : AirspeedSchedule
+        What is commanded.
+    dt : float
+        Sample period of the record, s; a whole multiple of the controller's.
+    controller : object, optional
+        An `Autopilot` (gains over airspeed), a LinearModel, an LPVStateSpace or a python-control
+        system (see `ScheduledController` for what their signals mean), or anything with dt, reset()
+        and step(measured, reference, p) (see `Controller`). Default: an LQR designed at several
+        airspeeds.
+    excitation : Excitation, optional
+        Added to the commands.
+    noise_db : float, optional
+        White noise this many dB below each measured signal's own variation (the noise-free flight
+        is flown first to know it).
+    seed : int
+        Of the sensors' noise.
+    wind : Wind or (float, float, float)
+        Or a steady one, north east down, m/s, from the start.
+    servos : mapping of str to Servo, optional
+        One by input, between command and blade pitch.
+    sensors : mapping of str to Sensor, optional
+        By signal: u v w p q r phi theta, airspeed.
+    delay : float
+        From a command to the servo, s; rounded up to whole integration steps (of at most 5 ms).
+    trims : {"quasi-steady", "level"}
+        What the flight is held to: the trims of the commanded airspeed and acceleration, or those
+        of the commanded airspeed alone, whose drift the controller has to answer. Both in the
+        steady wind.
+
+    Raises
+    ------
+    InputError
+        Something that does not fit.
+
+    Examples
+    --------
+    >>> climb = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
+    >>> plan = symheli.FlightPlan(climb, wind=(-2.0, 0.0, 0.0), delay=0.02)
+    >>> symheli.fly(heli, plan).meta["plan"] == plan
+    True
+    """
+
+    schedule: AirspeedSchedule
+    _: KW_ONLY
+    dt: float = 0.02
+    controller: object = None
+    excitation: Excitation | None = None
+    noise_db: float | None = None
+    seed: int = 0
+    wind: Wind = field(default_factory=Wind)
+    servos: Mapping[str, Servo] | None = None
+    sensors: Mapping[str, Sensor] | None = None
+    delay: float = 0.0
+    trims: Trims = "quasi-steady"
+
+    def __post_init__(self) -> None:
+        _expect("schedule", self.schedule, AirspeedSchedule)
+        dt = _number("dt", self.dt, "a positive number of seconds")
+        if not dt > 0:
+            raise InputError(f"dt must be a positive number of seconds, got {self.dt}")
+        if math.floor(self.schedule.duration / dt + 1e-9) < 2:
+            raise InputError(
+                f"the schedule lasts {self.schedule.duration:g} s, less than two samples of"
+                f" {dt:g} s: hold longer, or sample faster"
+            )
+        if self.excitation is not None:
+            _expect("excitation", self.excitation, Excitation)
+            for name in self.excitation.amplitude:
+                if name not in INPUTS:
+                    raise UnknownNameError("input of the excitation", name, INPUTS)
+        if self.noise_db is not None and self.sensors is not None:
+            raise InputError("give either noise_db or sensors: each says what the measurements are")
+        if self.noise_db is not None:
+            _number("noise_db", self.noise_db, "a number of decibels, as 30")
+        object.__setattr__(self, "seed", _seed(self.seed))
+        object.__setattr__(self, "wind", _wind(self.wind))
+        _each("servos", self.servos, Servo, INPUTS)
+        _each("sensors", self.sensors, Sensor, READ)
+        if self.servos is not None and (missing := [n for n in INPUTS if n not in self.servos]):
+            raise InputError(f"servos: none given for {', '.join(missing)}")
+        if not _number("delay", self.delay, "a number of seconds >= 0") >= 0:
+            raise InputError(f"delay: expected a number of seconds >= 0, got {self.delay}")
+        if self.trims not in get_args(Trims):
+            raise UnknownNameError("kind of trims", self.trims, get_args(Trims))
+
+    def seeded(self, seed: int) -> FlightPlan:
+        """The same flight with other random numbers: sensors' noise from `seed`, turbulence and
+        excitation from their own seed plus `seed`.
+        """
+        seed = _seed(seed)
+        stirred = self.excitation and replace(self.excitation, seed=self.excitation.seed + seed)
+        wind = replace(self.wind, seed=self.wind.seed + seed)
+        return replace(self, seed=seed, wind=wind, excitation=stirred)
+
+
+def plan_of(given: AirspeedSchedule | FlightPlan, options: Options) -> FlightPlan:
+    """The plan of a schedule and options, or the given one with these options in place of its
+    own.
+    """
+    if isinstance(given, FlightPlan):
+        return replace(given, **options) if options else given
+    known = [f.name for f in fields(FlightPlan) if f.name not in ("schedule", "_")]
+    for name in options:
+        if name not in known:
+            raise UnknownNameError("option of a flight", name, known)
+    return FlightPlan(given, **options)  # type: ignore[arg-type]
+
+
+def _expect(name: str, value: object, kind: type) -> None:
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AE" else "a"
+        raise InputError(f"{name}: expected {article} {kind.__name__}, got {value!r:.80}")
+
+
+def _number(name: str, value: Any, wanted: str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number) or isinstance(value, bool):
+        raise InputError(f"{name}: expected {wanted}, got {value!r:.80}")
+    return number
+
+
+def _seed(value: Any) -> int:
+    try:
+        seed = operator.index(value)
+    except TypeError:
+        seed = -1
+    if seed < 0 or isinstance(value, bool):
+        raise InputError(f"seed: expected a whole number >= 0, got {value!r:.80}")
+    return seed
+
+
+def _wind(wind: Any) -> Wind:
+    if isinstance(wind, Wind):
+        return wind
+    try:
+        north, east, down = (float(v) for v in np.asarray(wind, float))
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"wind: expected a Wind or (north, east, down) in m/s, got {wind!r:.80}"
+        ) from error
+    return Wind((north, east, down))
+
+
+def _each(name: str, given: Any, kind: type, known: Sequence[str]) -> None:
+    """Raises where this is no mapping from known names to things of one kind."""
+    if given is None:
+        return
+    if not isinstance(given, Mapping):
+        raise InputError(f"{name}: expected {{signal: {kind.__name__}}}, got {given!r:.80}")
+    for key, value in given.items():
+        if key not in known:
+            what = "measured signal" if kind is Sensor else "input"
+            raise UnknownNameError(what, key, known)
+        _expect(f"{name}[{key!r}]", value, kind)
