@@ -42,11 +42,13 @@ if TYPE_CHECKING:
         Autopilot,
         Controller,
         Excitation,
+        FlightBatch,
         FlightPlan,
         ScheduledController,
         Sensor,
         Servo,
         fly,
+        fly_batch,
         gain_scheduled_lqr,
     )
     from symheli.flight.stitched_model import StitchedModel
@@ -87,8 +89,8 @@ _ROOMS = {
         "Batch DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
     ),
     "symheli.flight": (
-        "AirspeedSchedule Autopilot Controller Excitation FlightPlan ScheduledController Sensor"
-        " Servo fly gain_scheduled_lqr"
+        "AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightPlan"
+        " ScheduledController Sensor Servo fly fly_batch gain_scheduled_lqr"
     ),
     "symheli.flight.stitched_model": "StitchedModel",
     "symheli.environment": "Air Dryden Gust Wind standard_atmosphere",
@@ -121,6 +123,7 @@ __all__ = [
     "Excitation",
     "ExcitationError",
     "Feedback",
+    "FlightBatch",
     "FlightCondition",
     "FlightLostError",
     "FlightPlan",
@@ -153,6 +156,7 @@ __all__ = [
     "Wind",
     "derivatives",
     "fly",
+    "fly_batch",
     "gain_scheduled_lqr",
     "identified_model",
     "identified_models",

@@ -1,6 +1,7 @@
 """Closed-loop flights of the nonlinear model."""
 
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
+from symheli.flight.batch import FlightBatch, fly_batch
 from symheli.flight.controller import Controller, ScheduledController
 from symheli.flight.excitation import Excitation
 from symheli.flight.fly import fly
@@ -15,11 +16,13 @@ __all__ = [
     "Autopilot",
     "Controller",
     "Excitation",
+    "FlightBatch",
     "FlightPlan",
     "ScheduledController",
     "Sensor",
     "Servo",
     "ServoBank",
     "fly",
+    "fly_batch",
     "gain_scheduled_lqr",
 ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from symheli.errors import UnknownNameError
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import excitation_of
 from symheli.flight.loops import LEVEL
@@ -56,6 +57,13 @@ class FlightData:
         held = self.course.reference[own]
         names = (*map(str, heli.states), *inputs)
         return columns | {f"{s}_reference": held[:, i] for i, s in enumerate(names)}
+
+    def column(self, name: str) -> Array:
+        """One signal (kept,) of the record."""
+        columns = self.columns()
+        if name not in columns:
+            raise UnknownNameError("signal", name, columns)
+        return columns[name]
 
     def record(self) -> FlightRecord | None:
         """Everything until the end, or until it was lost; None where that is less than two

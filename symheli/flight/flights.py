@@ -28,6 +28,8 @@ class Flights:
     _controllers: dict[Hashable, ScheduledController | Controller] = field(default_factory=dict)
     _courses: dict[Hashable, Course] = field(default_factory=dict)
     _equipment: dict[Hashable, Equipment] = field(default_factory=dict)
+    _under_way: set[Loops] = field(default_factory=set)
+    _stopped: bool = False
 
     def controller(self, plan: FlightPlan) -> ScheduledController | Controller:
         """That of a plan, sampled; an LQR over the commanded airspeeds where it names none."""
@@ -92,15 +94,29 @@ class Flights:
             noise,
         )
 
+    def stop(self) -> None:
+        """Ask every flight under way to end at its next sample, and let none start."""
+        self._stopped = True
+        for loops in list(self._under_way):
+            loops.stop()
+
+    def _run(self, loops: Loops, layout: Layout) -> Flown:
+        self._under_way.add(loops)
+        try:
+            if self._stopped:
+                raise KeyboardInterrupt
+            return loops.fly(layout)
+        finally:
+            self._under_way.discard(loops)
+
     def fly(self, plans: Sequence[FlightPlan], layout: Layout) -> list[FlightData]:
         """Fly plans with the same equipment; where a plan gives its noise in decibels, without
         noise first.
         """
-        quiet = self.loops(plans)
-        flown = quiet.fly(layout)
+        flown = self._run(self.loops(plans), layout)
         if any(plan.noise_db is not None for plan in plans):
             noise = np.stack([self._noise(plan, i, flown) for i, plan in enumerate(plans)])
-            flown = self.loops(plans, noise).fly(layout)
+            flown = self._run(self.loops(plans, noise), layout)
         clock = self.clock(plans[0])
         return [
             FlightData(self.heli, plan, clock, self.course(plan), out, int(lost))

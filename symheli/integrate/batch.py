@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from symheli.codegen import Layout
 from symheli.codegen.compile import compiler
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
@@ -18,13 +15,10 @@ from symheli.integrate.equations import equations
 from symheli.integrate.feedback import Feedback
 from symheli.integrate.problem import many_flights
 from symheli.integrate.rk4 import Flights, RungeKutta4
+from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers_of
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 
-SIDE_BY_SIDE = Layout(width=8, groups=2)
-"""Flights in vector registers at a time: eight doubles fill the widest, two groups hide the latency
-of roots and quotients.
-"""
 CHUNK, CHUNK_IN_NUMPY = 64, 512
 """Flights a worker takes at a time; in NumPy so many that the arrays of one stage still fit the
 cache.
@@ -152,8 +146,7 @@ def simulate_batch(
         raise InputError(
             f'keep must be "final" or a number of samples from 1 to {problem.samples}, got {keep!r}'
         )
-    if workers is not None and workers < 1:
-        raise InputError(f"workers must be at least 1, got {workers}")
+    threads = workers_of(workers)
     if feedback is not None:
         feedback.check(heli, problem.samples)
     every = problem.samples if keep == "final" else keep
@@ -166,32 +159,9 @@ def simulate_batch(
         keep == "final",
         SIDE_BY_SIDE,
     )
-    _run(
-        flights,
-        (
-            workers or len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else workers or os.cpu_count() or 1
-        ),
-    )
+    chunk, count = CHUNK if compiler() else CHUNK_IN_NUMPY, problem.count
+    chunks = [(first, min(first + chunk, count)) for first in range(0, count, chunk)]
+    for _ in over_the_cores(lambda c: flights.run(*c), chunks, threads, flights.stop):
+        pass
     slots = np.arange(flights.states.shape[1]) + flights.skip_start
     return Batch(dt * every * slots, flights.states, heli.flight_states, flights.inputs)
-
-
-def _run(flights: Flights, workers: int) -> None:
-    chunk, count = CHUNK if compiler() else CHUNK_IN_NUMPY, flights.problem.count
-    with ThreadPoolExecutor(workers) as pool:
-        running = [
-            pool.submit(flights.run, first, min(first + chunk, count))
-            for first in range(0, count, chunk)
-        ]
-        try:
-            wait(running, return_when=FIRST_EXCEPTION)
-        except BaseException:
-            flights.stop()
-            raise
-        finally:
-            for future in running:
-                future.cancel()
-        for future in running:
-            future.result()
