@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
+import functools
 import math
 from dataclasses import dataclass
+from importlib import resources
 
 import numpy as np
 
+from symheli.codegen.compile import library
 from symheli.errors import InputError
 
 FOOT = 0.3048
@@ -123,34 +127,63 @@ class Dryden:
         )
 
 
+STATIONARY = np.array([[1.0, 0.5], [0.5, 0.5]])
+"""Covariance of the states z1 = 1/(1+s), z2 = z1/(1+s) of white noise of intensity 2."""
+OUTPUT = np.array([math.sqrt(3.0), 1 - math.sqrt(3.0)]) / math.sqrt(2.0)
+"""sqrt(3) z1 + (1 - sqrt(3)) z2 has the variance 2."""
+
+
+@functools.cache
+def _machine_code() -> ctypes.CDLL | None:
+    source = (resources.files("symheli.environment") / "dryden.c").read_text(encoding="utf-8")
+    path = library(source, "dryden")
+    return None if path is None else ctypes.CDLL(str(path))
+
+
 def _first_order(steps: np.ndarray, white: np.ndarray) -> np.ndarray:
     """Samples (n,) of unit variance of 1/(1 + s) driven by white noise, `steps` (n - 1,) apart."""
     out, keep = np.empty(len(white)), np.exp(-steps)
-    fresh = np.sqrt(-np.expm1(-2 * steps))
-    out[0] = white[0]
+    fresh, white = np.sqrt(-np.expm1(-2 * steps)), np.ascontiguousarray(white)
+    if (code := _machine_code()) is not None:
+        code.first_order(_long(len(out)), *map(_at, (keep, fresh, white)), _long(1), _at(out))
+        return out
+    x = out[0] = white[0]
     for k in range(len(steps)):
-        out[k + 1] = keep[k] * out[k] + fresh[k] * white[k + 1]
+        x = out[k + 1] = keep[k] * x + fresh[k] * white[k + 1]
     return out
 
 
 def _second_order(steps: np.ndarray, white: np.ndarray) -> np.ndarray:
-    """Samples (n,) of unit variance of (1 + sqrt(3) s)/(1 + s)^2 driven by white noise, `steps` (n
-    - 1,) apart.
+    """Samples (n,) of unit variance of (1 + sqrt(3) s)/(1 + s)^2 driven by white noise (n, 2),
+    `steps` (n - 1,) apart.
 
-    States z1 = 1/(1+s), z2 = z1/(1+s) of white noise of intensity 2: stationary covariance [[1,
-    1/2], [1/2, 1/2]], and the output sqrt(3) z1 + (1 - sqrt(3)) z2 has the variance 2.
+    A step keeps exp(-d) [[1, 0], [d, 1]] of the states and adds noise of the covariance that is
+    missing; both in closed form.
     """
-    stationary = np.array([[1.0, 0.5], [0.5, 0.5]])
-    output = np.array([math.sqrt(3.0), 1 - math.sqrt(3.0)]) / math.sqrt(2.0)
-    keep = np.exp(-steps)[:, None, None] * (
-        np.eye(2) + steps[:, None, None] * np.array([[0.0, 0.0], [1.0, 0.0]])
-    )
-    fresh = stationary - keep @ stationary @ np.swapaxes(keep, 1, 2)
-    z = np.empty((len(white), 2))
-    z[0] = np.linalg.cholesky(stationary) @ white[0]
-    for k in range(len(steps)):
-        a = math.sqrt(max(fresh[k, 0, 0], 0.0))
-        b = fresh[k, 1, 0] / a if a > 0 else 0.0
-        c = math.sqrt(max(fresh[k, 1, 1] - b * b, 0.0))
-        z[k + 1] = keep[k] @ z[k] + (a * white[k + 1, 0], b * white[k + 1, 0] + c * white[k + 1, 1])
-    return z @ output
+    keep = np.exp(-steps)
+    left = keep**2
+    first, both = -np.expm1(-2 * steps), 0.5 - left * (steps + 0.5)
+    second = 0.5 - left * (steps**2 + steps + 0.5)
+    a = np.sqrt(first)
+    b = np.divide(both, a, out=np.zeros_like(a), where=a > 0)
+    fresh = np.column_stack([a, b, np.sqrt(np.maximum(second - b * b, 0.0))])
+    out, white = np.empty(len(white)), np.ascontiguousarray(white)
+    start = np.linalg.cholesky(STATIONARY) @ white[0]
+    if (code := _machine_code()) is not None:
+        given, then = map(_at, (keep, steps, fresh, white)), map(_at, (start, OUTPUT, out))
+        code.second_order(_long(len(out)), *given, _long(2), *then)
+        return out
+    x, y = start
+    out[0] = OUTPUT[0] * x + OUTPUT[1] * y
+    for k, (d, e) in enumerate(zip(steps, keep, strict=True)):
+        noise = fresh[k, 1] * white[k + 1, 0] + fresh[k, 2] * white[k + 1, 1]
+        x, y = e * x + fresh[k, 0] * white[k + 1, 0], e * (d * x + y) + noise
+        out[k + 1] = OUTPUT[0] * x + OUTPUT[1] * y
+    return out
+
+
+def _at(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+_long = ctypes.c_long

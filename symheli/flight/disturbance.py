@@ -1,7 +1,8 @@
-"""What chance and the plan bring into one flight: noise of the sensors, wind, excitation."""
+"""What chance and the plans bring into flights: noise of the sensors, wind, excitation."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +15,13 @@ from symheli.values.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Disturbance:
-    """Over n control samples: wind (n, 3) north east down, m/s, one row where it is steady;
-    `added` to the inputs (n, 4), rad, or one row of zeros; standard normal numbers of the measured
-    states `white` (n, 8) and the airspeed `white_air` (n,), None where nothing is noisy.
+class Disturbances:
+    """Of N flights over n control samples, zeros after the end of each; an axis of length 1 is
+    shared.
+
+    wind (N or 1, n or 1, 3) north east down, m/s; `added` to the inputs (N or 1, n or 1, 4), rad;
+    standard normal numbers for the measured states `white` (N, n, 8) and for the airspeed
+    `white_air` (N, n), None where nothing is noisy.
     """
 
     wind: Array
@@ -26,19 +30,42 @@ class Disturbance:
     white_air: Array | None
 
     @classmethod
-    def of(cls, plan: FlightPlan, course: Course, readings: Readings) -> Disturbance:
+    def of(
+        cls, plans: Sequence[FlightPlan], courses: Sequence[Course], readings: Readings
+    ) -> Disturbances:
         """The same for the same seeds, whatever else flies."""
-        n = len(course.time)
-        wind = (
-            np.array([plan.wind.steady], float)
-            if plan.wind.is_steady
-            else plan.wind.history(course.time, course.p[:, 0])
-        )
-        rng = np.random.default_rng(plan.seed)
-        white = rng.standard_normal((n, 8)) if readings.noise[:8].any() else None
-        apart = np.random.default_rng((plan.seed, 1))
-        white_air = apart.standard_normal(n) if readings.noise[8] else None
-        return cls(wind, excitation_of(plan, course), white, white_air)
+        longest = max(len(course.time) for course in courses)
+        count = len(plans)
+        white = np.empty((count, longest, 8)) if readings.noise[:8].any() else None
+        white_air = np.zeros((count, longest)) if readings.noise[8] else None
+        for i, (plan, course) in enumerate(zip(plans, courses, strict=True)):
+            n = len(course.time)
+            if white is not None:
+                np.random.default_rng(plan.seed).standard_normal(out=white[i, :n])
+                white[i, n:] = 0.0
+            if white_air is not None:
+                np.random.default_rng((plan.seed, 1)).standard_normal(out=white_air[i, :n])
+        return cls(_winds(plans, courses, longest), _excitations(plans, courses), white, white_air)
+
+
+def _winds(plans: Sequence[FlightPlan], courses: Sequence[Course], longest: int) -> Array:
+    if all(plan.wind.is_steady for plan in plans):
+        steady = np.array([[plan.wind.steady] for plan in plans], float)
+        return steady[:1] if (steady == steady[0]).all() else steady
+    out = np.zeros((len(plans), longest, 3))
+    for row, plan, course in zip(out, plans, courses, strict=True):
+        row[: len(course.time)] = plan.wind.history(course.time, course.p[:, 0])
+    return out
+
+
+def _excitations(plans: Sequence[FlightPlan], courses: Sequence[Course]) -> Array:
+    first = plans[0].excitation
+    if all(p.excitation == first and c is courses[0] for p, c in zip(plans, courses, strict=True)):
+        return excitation_of(plans[0], courses[0])[None]
+    out = np.zeros((len(plans), max(len(course.time) for course in courses), len(INPUTS)))
+    for row, plan, course in zip(out, plans, courses, strict=True):
+        row[: len(course.time)] = excitation_of(plan, course)
+    return out
 
 
 def excitation_of(plan: FlightPlan, course: Course) -> Array:

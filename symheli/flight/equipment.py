@@ -75,7 +75,7 @@ class Equipment:
         return cls(
             controller,
             Readings.of(sensors or {}, clock.dt),
-            servos and ServoBank(servos, INPUTS, heli.travel, clock.step),
+            None if servos is None else ServoBank(servos, INPUTS, heli.travel, clock.step),
             math.ceil(delay / clock.step - 1e-9),
             np.ascontiguousarray(heli.travel, float),
         )

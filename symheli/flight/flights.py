@@ -11,7 +11,7 @@ from symheli.codegen import Layout
 from symheli.flight.autopilot import gain_scheduled_lqr
 from symheli.flight.controller import Controller, ScheduledController, controller_of
 from symheli.flight.course import Clock, Course
-from symheli.flight.disturbance import Disturbance
+from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
 from symheli.flight.flight_data import FlightData
 from symheli.flight.loops import Flown, Loops
@@ -79,7 +79,8 @@ class Flights:
     def loops(self, plans: Sequence[FlightPlan], noise: Array | None = None) -> Loops:
         """Plans with the same equipment, ready to fly; `noise` (N, 9) in place of the sensors'."""
         equipment = self.equipment(plans[0])
-        courses = {id(c): c for c in map(self.course, plans)}
+        flown = [self.course(plan) for plan in plans]
+        courses = {id(c): c for c in flown}
         position = {key: i for i, key in enumerate(courses)}
         readings = equipment.readings
         if noise is not None:
@@ -89,8 +90,8 @@ class Flights:
             self.clock(plans[0]),
             equipment,
             list(courses.values()),
-            [position[id(self.course(plan))] for plan in plans],
-            [Disturbance.of(plan, self.course(plan), readings) for plan in plans],
+            [position[id(course)] for course in flown],
+            Disturbances.of(plans, flown, readings),
             noise,
         )
 

@@ -12,7 +12,7 @@ from symheli.codegen import Layout
 from symheli.errors import InputError
 from symheli.flight.controller import ROTOR, SCHEDULING, ScheduledController
 from symheli.flight.course import Clock, Course
-from symheli.flight.disturbance import Disturbance
+from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
 from symheli.flight.plan import READ
 from symheli.helicopter import Helicopter
@@ -34,7 +34,8 @@ LEVEL = 1.4
 @dataclass(frozen=True, eq=False)
 class Flown:
     """What came of N flights: `out` (N, kept, nx + 9) with the states as read, inputs, commands and
-    airspeed at the record's samples; `lost` (N,) the control sample at which a flight was, or -1.
+    airspeed at the record's samples, anything after the end of a flight; `lost` (N,) the control
+    sample at which a flight was, or -1.
     """
 
     out: Array
@@ -51,10 +52,10 @@ class Loops:
         equipment: Equipment,
         courses: Sequence[Course],
         chosen: Sequence[int],
-        disturbances: Sequence[Disturbance],
+        disturbances: Disturbances,
         noise: Array | None = None,
     ):
-        """Flight i flies courses[chosen[i]] under disturbances[i]; `noise` (N, 9) stands in place
+        """Flight i flies courses[chosen[i]] under its disturbances; `noise` (N, 9) stands in place
         of the sensors' own.
         """
         self.heli, self.clock, self.equipment = heli, clock, equipment
@@ -100,7 +101,7 @@ class Loops:
         kept = -(-int(self.samples.max()) // self.clock.every)
         count = len(self.chosen)
         return Flown(
-            np.full((count, kept, len(self.heli.states) + 9), np.nan), np.full(count, -1, np.int_)
+            np.empty((count, kept, len(self.heli.states) + 9)), np.full(count, -1, np.int_)
         )
 
     # --- machine code ----------------------------------------------------------------------------
@@ -108,8 +109,6 @@ class Loops:
     def _arguments(self, found: Flown) -> ctypes.Structure:
         longest = int(self.samples.max())
         d, e, controller = self.disturbances, self.equipment, self.equipment.controller
-        wind, wind_flight, wind_sample = _by_flight([x.wind for x in d], longest)
-        added, added_flight, added_sample = _by_flight([x.added for x in d], longest)
         scheduled = controller if isinstance(controller, ScheduledController) else None
         pieces = scheduled and scheduled.pieces
         tabled = scheduled is not None and pieces is None
@@ -128,14 +127,12 @@ class Loops:
             "longest": longest,
             "course": np.array(self.chosen, np.int_),
             "samples": self.samples,
-            "wind": wind,
-            "wind_flight": wind_flight,
-            "wind_sample": wind_sample,
-            "added": added,
-            "added_flight": added_flight,
-            "added_sample": added_sample,
-            "white": _padded([x.white for x in d], longest),
-            "white_air": _padded([x.white_air for x in d], longest),
+            "wind": d.wind,
+            **dict(zip(("wind_flight", "wind_sample"), _strides(d.wind), strict=True)),
+            "added": d.added,
+            **dict(zip(("added_flight", "added_sample"), _strides(d.added), strict=True)),
+            "white": d.white,
+            "white_air": d.white_air,
             "p": self.heli.parameters.array[None].copy(),
             "p_flight": 0,
             "noise": self.noise,
@@ -265,7 +262,8 @@ class _InNumpy:
     def __init__(self, loops: Loops, i: int, found: Flown):
         self._loops, self._i, self._found = loops, i, found
         self._made: Equations = equations(loops.heli)
-        self._course, self._disturbance = loops.courses[loops.chosen[i]], loops.disturbances[i]
+        self._course, d = loops.courses[loops.chosen[i]], loops.disturbances
+        self._winds, self._added = (a[min(i, len(a) - 1)] for a in (d.wind, d.added))
         n, servos = len(self._course.time), loops.equipment.servos
         x0, u0 = np.split(self._course.reference[0], [len(loops.heli.states)])
         self._x, self._start = flight_state(x0), u0
@@ -284,14 +282,14 @@ class _InNumpy:
         if not (np.isfinite(self._x).all() and np.abs(euler[6:8]).max() <= LEVEL):
             self._found.lost[self._i] = k
             return None
-        r, d = self._loops.equipment.readings, self._disturbance
+        r, d = self._loops.equipment.readings, self._loops.disturbances
         before = np.maximum(k - r.delay, 0)
         source = before - before % r.period
         drawn = np.zeros(len(READ))
         if d.white is not None:
-            drawn[:8] = d.white[source[:8], np.arange(8)]
+            drawn[:8] = d.white[self._i, source[:8], np.arange(8)]
         if d.white_air is not None:
-            drawn[8] = d.white_air[source[8]]
+            drawn[8] = d.white_air[self._i, source[8]]
         reading = self._truth[source, np.arange(len(READ))] + (self._noise * drawn + r.bias)
         coarse = r.quantum > 0
         reading[coarse] = np.round(reading[coarse] / r.quantum[coarse]) * r.quantum[coarse]
@@ -299,9 +297,11 @@ class _InNumpy:
         return np.concatenate([reading, euler[-2:]])
 
     def command(self, k: int, u: Array) -> None:
-        loops, d = self._loops, self._disturbance
+        loops = self._loops
         clock, servos, late = loops.clock, loops.equipment.servos, loops.equipment.late
-        u = np.clip(u + d.added[min(k, len(d.added) - 1)], -loops.heli.travel, loops.heli.travel)
+        u = np.clip(
+            u + self._added[min(k, len(self._added) - 1)], -loops.heli.travel, loops.heli.travel
+        )
         self._commands[k] = u
         for s in range(clock.substeps):
             at = k * clock.substeps + s - late
@@ -325,8 +325,7 @@ class _InNumpy:
         """Nothing is left to be freed."""
 
     def _wind(self, k: int) -> Array:
-        wind = self._disturbance.wind
-        return wind[min(k, len(wind) - 1)]
+        return self._winds[min(k, len(self._winds) - 1)]
 
     def _keep(self, k: int, inputs: Array) -> None:
         if k % self._loops.clock.every == 0:
@@ -351,27 +350,7 @@ def _courses(arrays: Sequence[Array], longest: int) -> Array:
     )
 
 
-def _by_flight(arrays: Sequence[Array], longest: int) -> tuple[Array, int, int]:
-    """(N, longest or 1, m) or one for all, with the steps from flight to flight and sample to
-    sample.
-    """
-    width = arrays[0].shape[1]
-    if all(len(a) == 1 for a in arrays):
-        if all(np.array_equal(a, arrays[0]) for a in arrays):
-            return np.ascontiguousarray(arrays[0], float), 0, 0
-        return np.concatenate(arrays), width, 0
-    return _courses(arrays, longest), longest * width, width
-
-
-def _padded(arrays: Sequence[Array | None], longest: int) -> Array | None:
-    """(N, longest, ...) with zeros after the end of each, None where there is nothing."""
-    some = [a for a in arrays if a is not None]
-    if not some:
-        return None
-    if len(arrays) == 1 and len(some[0]) == longest:
-        return some[0]
-    out = np.zeros((len(arrays), longest, *some[0].shape[1:]))
-    for row, a in zip(out, arrays, strict=True):
-        if a is not None:
-            row[: len(a)] = a
-    return out
+def _strides(array: Array) -> tuple[int, int]:
+    """Entries of (N, n, m) from flight to flight and sample to sample, 0 along a shared axis."""
+    flights, samples, width = array.shape
+    return samples * width if flights > 1 else 0, width if samples > 1 else 0

@@ -35,7 +35,7 @@ class Equations:
         self._functions = _functions(dynamics)
         self._programs: dict[str, Program] = {}
         self._hoisted: dict[str, tuple[Program, Program]] = {}
-        self._libraries: dict[tuple[str, Layout], ctypes.CDLL | None] = {}
+        self._libraries: dict[tuple[str | tuple[str, ...], Layout], ctypes.CDLL | None] = {}
 
     def hoisted(self, which: Which) -> tuple[Program, Program]:
         """(held, rest) of one of the functions; see `Program.hoist`."""
