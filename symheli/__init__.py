@@ -43,12 +43,14 @@ if TYPE_CHECKING:
         Controller,
         Excitation,
         FlightBatch,
+        FlightDataset,
         FlightPlan,
         ScheduledController,
         Sensor,
         Servo,
         fly,
         fly_batch,
+        fly_campaign,
         gain_scheduled_lqr,
     )
     from symheli.flight.stitched_model import StitchedModel
@@ -89,8 +91,9 @@ _ROOMS = {
         "Batch DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
     ),
     "symheli.flight": (
-        "AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightPlan"
-        " ScheduledController Sensor Servo fly fly_batch gain_scheduled_lqr"
+        "AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightDataset"
+        " FlightPlan ScheduledController Sensor Servo fly fly_batch fly_campaign"
+        " gain_scheduled_lqr"
     ),
     "symheli.flight.stitched_model": "StitchedModel",
     "symheli.environment": "Air Dryden Gust Wind standard_atmosphere",
@@ -125,6 +128,7 @@ __all__ = [
     "Feedback",
     "FlightBatch",
     "FlightCondition",
+    "FlightDataset",
     "FlightLostError",
     "FlightPlan",
     "FlightRecord",
@@ -157,6 +161,7 @@ __all__ = [
     "derivatives",
     "fly",
     "fly_batch",
+    "fly_campaign",
     "gain_scheduled_lqr",
     "identified_model",
     "identified_models",

@@ -2,8 +2,10 @@
 
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
 from symheli.flight.batch import FlightBatch, fly_batch
+from symheli.flight.campaign import fly_campaign
 from symheli.flight.controller import Controller, ScheduledController
 from symheli.flight.excitation import Excitation
+from symheli.flight.flight_dataset import FlightDataset
 from symheli.flight.fly import fly
 from symheli.flight.plan import FlightPlan
 from symheli.flight.schedule import AirspeedSchedule
@@ -17,6 +19,7 @@ __all__ = [
     "Controller",
     "Excitation",
     "FlightBatch",
+    "FlightDataset",
     "FlightPlan",
     "ScheduledController",
     "Sensor",
@@ -24,5 +27,6 @@ __all__ = [
     "ServoBank",
     "fly",
     "fly_batch",
+    "fly_campaign",
     "gain_scheduled_lqr",
 ]

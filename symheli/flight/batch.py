@@ -173,15 +173,17 @@ def fly_in_chunks(
     heli: Helicopter,
     plans: Sequence[FlightPlan],
     workers: int | None,
+    chunks: Sequence[Sequence[int]] | None = None,
 ) -> Iterator[tuple[Sequence[int], list[FlightData]]]:
-    """Positions of plans that flew together, with what came of them, as they are done."""
+    """Positions of plans that were flown together, with what came of them, as they are done;
+    `chunks` says which belong together.
+    """
     if not isinstance(heli, Helicopter):
         raise InputError(f"expected a Helicopter, got {heli!r:.80}; try Helicopter.load('xcell60')")
-    flights, threads = Flights(heli), workers_of(workers)
-    groups: dict[int, list[int]] = {}
-    for i, plan in enumerate(plans):
-        flights.course(plan)  # what they share is made before the threads start
-        groups.setdefault(id(flights.equipment(plan)), []).append(i)
+    flights, threads, every = Flights(heli), workers_of(workers), range(len(plans))
+    for plan in plans:  # what they share is made before the threads start
+        flights.course(plan)
+        flights.equipment(plan)
     if any(not isinstance(flights.controller(p), ScheduledController) for p in plans):
         threads = 1  # one object, asked by one flight at a time
         warnings.warn(
@@ -191,10 +193,16 @@ def fly_in_chunks(
             CompilerWarning,
             stacklevel=3,
         )
-    chunks = [g[k : k + CHUNK] for g in groups.values() for k in range(0, len(g), CHUNK)]
 
     def run(chunk: Sequence[int]) -> list[FlightData]:
-        layout = SIDE_BY_SIDE if len(chunk) > ALONE else Layout()
-        return flights.fly([plans[i] for i in chunk], layout)
+        alike: dict[int, list[int]] = {}
+        for i in chunk:
+            alike.setdefault(id(flights.equipment(plans[i])), []).append(i)
+        flown: dict[int, FlightData] = {}
+        for group in alike.values():
+            layout = SIDE_BY_SIDE if len(group) > ALONE else Layout()
+            flown |= zip(group, flights.fly([plans[i] for i in group], layout), strict=True)
+        return [flown[i] for i in chunk]
 
-    yield from over_the_cores(run, chunks, threads, flights.stop)
+    cut = chunks or [every[k : k + CHUNK] for k in range(0, len(plans), CHUNK)]
+    yield from over_the_cores(run, cut, threads, flights.stop)

@@ -14,7 +14,7 @@ from symheli.flight.plan import FlightPlan
 from symheli.helicopter import Helicopter
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
-from symheli.values.signal import UNITS
+from symheli.values.signal import Signal
 
 WIND = ("wind_n", "wind_e", "wind_d")
 
@@ -39,24 +39,19 @@ class FlightData:
         return -(-flown // self.clock.every)
 
     def columns(self) -> dict[str, Array]:
-        """Every signal of the record by name."""
-        heli, plan, clock, n = self.heli, self.plan, self.clock, self.kept
-        nx, own = len(heli.states), slice(0, n * clock.every, clock.every)
-        inputs = tuple(map(str, heli.inputs))
-        out = self.out[:n]
-        columns = {str(s): out[:, i] for i, s in enumerate(heli.states)}
-        columns |= {s: out[:, nx + i] for i, s in enumerate(inputs)}
-        added = np.broadcast_to(excitation_of(plan, self.course), (len(self.course.time), 4))[own]
-        columns |= {f"e_{s}": added[:, i] for i, s in enumerate(inputs)}
-        if plan.servos is not None or plan.delay:
-            columns |= {f"{s}_command": out[:, nx + 4 + i] for i, s in enumerate(inputs)}
-        if not plan.wind.is_steady:
-            wind = plan.wind.history(self.course.time, self.course.p[:, 0])[own]
-            columns |= {name: wind[:, i] for i, name in enumerate(WIND)}
-        columns |= {"airspeed": out[:, nx + 8], "airspeed_command": self.course.p[own, 0]}
-        held = self.course.reference[own]
-        names = (*map(str, heli.states), *inputs)
-        return columns | {f"{s}_reference": held[:, i] for i, s in enumerate(names)}
+        """Every signal of the record (kept,) by name."""
+        flown = slice(0, self.kept * self.clock.every, self.clock.every)
+        added = excitation_of(self.plan, self.course)
+        blocks = {
+            "out": self.out[: self.kept],
+            "added": np.broadcast_to(added, (len(self.course.time), 4))[flown],
+            "command": self.course.p[flown],
+            "reference": self.course.reference[flown],
+        }
+        if not self.plan.wind.is_steady:
+            blocks["wind"] = self.plan.wind.history(self.course.time, self.course.p[:, 0])[flown]
+        table = _table(self.heli, self.plan)
+        return {str(signal): blocks[block][:, i] for signal, block, i in table}
 
     def column(self, name: str) -> Array:
         """One signal (kept,) of the record."""
@@ -71,13 +66,15 @@ class FlightData:
         """
         if self.kept < 2:
             return None
-        columns = self.columns()
-        known = UNITS | {str(s): s.unit for s in self.heli.states}
-        units = {name: known[_plain(name, known)] for name in columns}
         time = self.course.time[:: self.clock.every][: self.kept]
-        record = FlightRecord.from_arrays(time, units, self._note(), **columns)
-        object.__setattr__(record, "meta", {"plan": self.plan})
-        return record
+        values = np.column_stack(list(self.columns().values()))
+        return FlightRecord(
+            time,
+            values,
+            signals_of(self.heli, self.plan),
+            note=self._note(),
+            meta={"plan": self.plan},
+        )
 
     def _note(self) -> str:
         note = (
@@ -119,7 +116,21 @@ class FlightData:
 ADVICE = "less excitation, noise, gusts, delay or acceleration, or another controller, please"
 
 
-def _plain(name: str, known: dict[str, str]) -> str:
-    if name in known:
-        return name
-    return name.removeprefix("e_").removesuffix("_command").removesuffix("_reference")
+def signals_of(heli: Helicopter, plan: FlightPlan) -> tuple[Signal, ...]:
+    """What the record of a plan holds, in order."""
+    return tuple(signal for signal, _, _ in _table(heli, plan))
+
+
+def _table(heli: Helicopter, plan: FlightPlan) -> list[tuple[Signal, str, int]]:
+    """Each signal of a record with the block it stands in and its column there."""
+    nx = len(heli.states)
+    table = [(s, "out", i) for i, s in enumerate((*heli.states, *heli.inputs))]
+    table += [(Signal(f"e_{s}", s.unit), "added", i) for i, s in enumerate(heli.inputs)]
+    if plan.servos is not None or plan.delay:
+        asked = (Signal(f"{s}_command", s.unit) for s in heli.inputs)
+        table += [(s, "out", nx + 4 + i) for i, s in enumerate(asked)]
+    if not plan.wind.is_steady:
+        table += [(Signal(name), "wind", i) for i, name in enumerate(WIND)]
+    table += [(Signal("airspeed"), "out", nx + 8), (Signal("airspeed_command"), "command", 0)]
+    held = (Signal(f"{s}_reference", s.unit) for s in (*heli.states, *heli.inputs))
+    return table + [(s, "reference", i) for i, s in enumerate(held)]
