@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from symheli.steady.flight_condition import FlightCondition
     from symheli.steady.grid_sweep import sweep_grid
     from symheli.steady.linearization import linearize
+    from symheli.steady.trim_batch import TrimBatch, trim_batch
     from symheli.steady.trim_map import TrimMap, trim_map
     from symheli.values import NamedVector, Signal
 
@@ -85,6 +86,7 @@ _ROOMS = {
     "symheli.steady.linearization": "linearize",
     "symheli.steady.airspeed_sweep": "sweep",
     "symheli.steady.grid_sweep": "sweep_grid",
+    "symheli.steady.trim_batch": "TrimBatch trim_batch",
     "symheli.steady.trim_map": "TrimMap trim_map",
     "symheli.steady.derivative_table": "DerivativeTable derivatives",
     "symheli.integrate": (
@@ -153,6 +155,7 @@ __all__ = [
     "StitchedModel",
     "SymheliError",
     "Trajectory",
+    "TrimBatch",
     "TrimError",
     "TrimMap",
     "TrimPoint",
@@ -172,6 +175,7 @@ __all__ = [
     "sweep",
     "sweep_grid",
     "trim",
+    "trim_batch",
     "trim_map",
     "vehicles",
 ]

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from symheli.airframe.quantity import Quantity, read_quantity
+from symheli.airframe.vehicle_file import LINEAR
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
 from symheli.values.signal import Signal
 from symheli.values.units import to_si
 
-ENDING = ".linear.toml"
 _TABLES = ("states", "inputs", "equations", "parameters")
 _OPERATIONS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
@@ -78,7 +78,7 @@ def identified_models() -> list[str]:
     ['r50_hover']
     """
     names = (p.name for p in resources.files("symheli.airframe.vehicles").iterdir())
-    return sorted(name.removesuffix(ENDING) for name in names if name.endswith(ENDING))
+    return sorted(name.removesuffix(LINEAR) for name in names if name.endswith(LINEAR))
 
 
 def identified_model(name_or_path: str | os.PathLike[str]) -> IdentifiedModel:
@@ -121,7 +121,7 @@ def identified_model(name_or_path: str | os.PathLike[str]) -> IdentifiedModel:
             )
         text = Path(given).read_text(encoding="utf-8")
     elif given in identified_models():
-        text = (resources.files("symheli.airframe.vehicles") / f"{given}{ENDING}").read_text(
+        text = (resources.files("symheli.airframe.vehicles") / f"{given}{LINEAR}").read_text(
             encoding="utf-8"
         )
     else:

@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
-from symheli.airframe.identified_models import ENDING
 from symheli.airframe.part import Part
 from symheli.airframe.plausibility import impossibilities
 from symheli.airframe.quantity import Quantity
-from symheli.airframe.vehicle_file import VehicleFile
+from symheli.airframe.vehicle_file import LINEAR, VehicleFile
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.units import dimension
 
@@ -120,7 +119,7 @@ def vehicles() -> list[str]:
     return sorted(
         name.removesuffix(".toml")
         for name in files
-        if name.endswith(".toml") and not name.endswith(ENDING)
+        if name.endswith(".toml") and not name.endswith(LINEAR)
     )
 
 

@@ -30,6 +30,9 @@ FIXED = {"body": BODY, "drivetrain": DRIVETRAIN, "controls": CONTROLS}
 WIRING = ("component", "controls", "flow")
 """Keys of a component's section that are no quantities."""
 
+LINEAR = ".linear.toml"
+"""How a file ends that holds an identified linear model in place of an airframe."""
+
 
 class VehicleFile:
     """The text of a vehicle file, its tables, and where in the text each entry stands."""

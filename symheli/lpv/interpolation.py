@@ -16,12 +16,11 @@ from symheli.lpv.bases.function_space import FunctionSpace, tensor_grid
 from symheli.lpv.bases.interpolating import PiecewiseLinear, Spline
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.product import Product
-from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.scheduling import Rates, Scheduling, with_rates
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values.arrays import Array
-from symheli.values.operating_point import OperatingPoint
 from symheli.values.signal import Signal
 
 Kind = Literal["polynomial", "spline", "linear"]
@@ -31,7 +30,7 @@ AT_REST = 1e-8
 
 
 def interpolated(
-    models: Sequence[LinearModel],
+    models: LinearModels,
     axes: Sequence[Signal],
     values: Sequence[Array],
     kind: Kind,
@@ -44,11 +43,10 @@ def interpolated(
     if any(len(nodes) < 2 for nodes in values):
         few = next(axis for axis, nodes in zip(axes, values, strict=True) if len(nodes) < 2)
         raise InputError(f"interpolation needs at least two values of {few}")
-    first = models[0]
     degrees = np.broadcast_to(degree, len(axes)).tolist()
     basis = _product([_factor(kind, nodes, d) for nodes, d in zip(values, degrees, strict=True)])
     points = values[0] if len(axes) == 1 else tensor_grid(values)
-    exact = Matrices(*(np.stack([getattr(m, name) for m in models]) for name in "ABCD"))
+    exact = Matrices(models.A, models.B, models.C, models.D)
     fitted = Matrices(*(basis.fit(points, M) for M in exact))
     parameters = [
         Scheduling(str(axis), axis.unit, float(nodes[0]), float(nodes[-1]))
@@ -58,11 +56,11 @@ def interpolated(
         basis,
         *fitted,
         with_rates(parameters, _usual(axes) if rate is None else rate),
-        first.states,
-        first.inputs,
-        first.outputs,
-        dt=first.dt,
-        trim=_schedule([m.point for m in models], first, values, points),
+        models.states,
+        models.inputs,
+        models.outputs,
+        dt=models.dt,
+        trim=_schedule(models, values, points),
     )
     return model.with_residuals(points, exact)
 
@@ -87,19 +85,14 @@ def _factor(kind: Kind, nodes: Array, degree: int) -> Basis:
     return bases[kind](tuple(nodes.tolist()))
 
 
-def _schedule(
-    trims: Sequence[OperatingPoint | None],
-    model: LinearModel,
-    values: Sequence[Array],
-    points: Array,
-) -> TrimSchedule | None:
+def _schedule(models: LinearModels, values: Sequence[Array], points: Array) -> TrimSchedule | None:
     """Cubic splines through the trims, straight lines below four values; None without trims."""
-    known = [trim for trim in trims if trim is not None]
-    if len(known) < len(trims):
+    known = models.points
+    if not len(known):
         return None
-    x0 = np.array([[trim.x[s] for s in model.states] for trim in known])
-    u0 = np.array([[trim.u[i] if i in trim.u else 0.0 for i in model.inputs] for trim in known])
-    xdot = np.array([[trim.xdot[s] for s in model.states] for trim in known])
+    x0 = np.array([[trim.x[s] for s in models.states] for trim in known])
+    u0 = np.array([[trim.u[i] if i in trim.u else 0.0 for i in models.inputs] for trim in known])
+    xdot = np.array([[trim.xdot[s] for s in models.states] for trim in known])
     basis = _product([_factor("spline" if len(n) >= 4 else "linear", n, 0) for n in values])
     rates = basis.fit(points, xdot) if np.abs(xdot).max(initial=0.0) > AT_REST else None
     return TrimSchedule(basis, basis.fit(points, x0), basis.fit(points, u0), rates)

@@ -10,11 +10,12 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.interpolation import Kind, interpolated
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
-from symheli.values.signal import Signal, signals
+from symheli.values.signal import Signal
 
 AIRSPEED = Signal("airspeed", "m/s")
 
@@ -63,28 +64,34 @@ class LinearFamily:
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
-    trims: tuple[OperatingPoint, ...] = ()
+    trims: Sequence[OperatingPoint] = ()
     dt: float | None = None
     kinks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    models: LinearModels = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for group in ("states", "inputs", "outputs"):
-            object.__setattr__(self, group, signals(getattr(self, group)))
         object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
         if np.any(np.diff(self.airspeeds) <= 0):
             raise InputError("airspeeds must increase strictly")
-        K, nx, nu, ny = len(self.airspeeds), len(self.states), len(self.inputs), len(self.outputs)
-        for name, shape in (
-            ("A", (K, nx, nx)),
-            ("B", (K, nx, nu)),
-            ("C", (K, ny, nx)),
-            ("D", (K, ny, nu)),
-        ):
-            object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
-        if len(self.trims) not in (0, K):
+        models = LinearModels(
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            self.states,
+            self.inputs,
+            self.outputs,
+            self.dt,
+            self.trims,
+        )
+        if len(models) != len(self.airspeeds):
             raise InputError(
-                f"expected {K} trims, one an airspeed, or none at all, got {len(self.trims)}"
+                f"expected one model an airspeed, got {len(models)} models for"
+                f" {len(self.airspeeds)} airspeeds"
             )
+        for name in ("A", "B", "C", "D", "states", "inputs", "outputs"):
+            object.__setattr__(self, name, getattr(models, name))
+        object.__setattr__(self, "models", models)
 
     @classmethod
     def from_models(
@@ -98,29 +105,13 @@ class LinearFamily:
         """
         if not len(models) or len(models) != len(np.atleast_1d(np.asarray(airspeeds))):
             raise InputError(f"expected one model an airspeed, got {len(models)} models")
-        first = models[0]
-        for k, model in enumerate(models):
-            if (model.states, model.inputs, model.outputs, model.dt) != (
-                first.states,
-                first.inputs,
-                first.outputs,
-                first.dt,
-            ):
-                raise InputError(
-                    f"models[{k}]: expected states, inputs, outputs and dt of models[0]; select or"
-                    " discretize first"
-                )
+        models = LinearModels.of(models)
         return cls(
             np.asarray(airspeeds, float),
-            np.stack([m.A for m in models]),
-            np.stack([m.B for m in models]),
-            np.stack([m.C for m in models]),
-            np.stack([m.D for m in models]),
-            first.states,
-            first.inputs,
-            first.outputs,
-            tuple(m.point for m in models if m.point),
-            first.dt,
+            *(models.A, models.B, models.C, models.D),
+            *(models.states, models.inputs, models.outputs),
+            models.points,
+            models.dt,
             kinks or {},
         )
 
@@ -128,19 +119,9 @@ class LinearFamily:
         return len(self.airspeeds)
 
     def __getitem__(self, k: int) -> LinearModel:
-        return LinearModel(
-            self.A[k],
-            self.B[k],
-            self.C[k],
-            self.D[k],
-            self.states,
-            self.inputs,
-            self.outputs,
-            self.dt,
-            self._trim(k),
-        )
+        return self.models[k]
 
-    def known_trims(self, purpose: str) -> tuple[OperatingPoint, ...]:
+    def known_trims(self, purpose: str) -> Sequence[OperatingPoint]:
         """The trims; raises `InputError` where there are none, which `purpose` needs."""
         if not self.trims:
             raise InputError(
@@ -148,9 +129,6 @@ class LinearFamily:
                 " models a point, or sweep"
             )
         return self.trims
-
-    def _trim(self, k: int) -> OperatingPoint | None:
-        return self.trims[k] if self.trims else None
 
     def select(
         self,
@@ -161,17 +139,17 @@ class LinearFamily:
         """Keep these states (rows and columns of the others are deleted), inputs and outputs, in
         this order.
         """
-        return self._map(lambda model: model.select(states, inputs, outputs))
+        return self._of(self.models.select(states, inputs, outputs))
 
     def residualize(self, states: Sequence[str]) -> LinearFamily:
         """Remove these states by setting their derivatives to zero (quasi-steady), continuous time
         only.
         """
-        return self._map(lambda model: model.residualize(states))
+        return self._of(self.models.each(lambda model: model.residualize(states)))
 
     def discretize(self, dt: float) -> LinearFamily:
         """Zero-order-hold equivalent of each model at sample period `dt` (s)."""
-        return self._map(lambda model: model.discretize(dt))
+        return self._of(self.models.each(lambda model: model.discretize(dt)))
 
     def interpolate(
         self, kind: Kind = "polynomial", degree: int = 3, *, rate: Rates | None = None
@@ -183,10 +161,7 @@ class LinearFamily:
         always the cubic spline (linear below four nodes), none without trims: its slope is the
         drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2 (None: as fast as it likes).
         """
-        models = [self[k] for k in range(len(self))]
-        return interpolated(models, (AIRSPEED,), (self.airspeeds,), kind, degree, rate)
+        return interpolated(self.models, (AIRSPEED,), (self.airspeeds,), kind, degree, rate)
 
-    def _map(self, change) -> LinearFamily:
-        return LinearFamily.from_models(
-            self.airspeeds, [change(self[k]) for k in range(len(self))], self.kinks
-        )
+    def _of(self, models: LinearModels) -> LinearFamily:
+        return LinearFamily.from_models(self.airspeeds, models, self.kinks)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.interpolation import Kind, interpolated
 from symheli.lpv.linear_family import AIRSPEED, LinearFamily
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
@@ -52,7 +53,7 @@ class LinearGrid:
 
     axes: tuple[Signal, ...]
     values: tuple[Array, ...]
-    models: tuple[LinearModel, ...]
+    models: LinearModels
 
     def __post_init__(self) -> None:
         axes = tuple(a if isinstance(a, Signal) else Signal(a) for a in self.axes)
@@ -67,21 +68,12 @@ class LinearGrid:
         for axis, nodes in zip(axes, values, strict=True):
             if not len(nodes) or np.any(np.diff(nodes) <= 0):
                 raise InputError(f"{axis}: expected increasing values, got {nodes.tolist()}")
-        object.__setattr__(self, "models", tuple(self.models))
         if len(self.models) != math.prod(self.shape):
             raise InputError(
                 f"expected {math.prod(self.shape)} models, one a combination of the values, got"
                 f" {len(self.models)}"
             )
-        first = self.models[0]
-        for model in self.models:
-            if (model.states, model.inputs, model.outputs, model.dt) != (
-                first.states,
-                first.inputs,
-                first.outputs,
-                first.dt,
-            ):
-                raise InputError("a grid needs models with equal names and sample period")
+        object.__setattr__(self, "models", LinearModels.of(self.models))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -96,17 +88,17 @@ class LinearGrid:
     @property
     def states(self) -> tuple[Signal, ...]:
         """States with units."""
-        return self.models[0].states
+        return self.models.states
 
     @property
     def inputs(self) -> tuple[Signal, ...]:
         """Inputs with units."""
-        return self.models[0].inputs
+        return self.models.inputs
 
     @property
     def outputs(self) -> tuple[Signal, ...]:
         """Outputs with units."""
-        return self.models[0].outputs
+        return self.models.outputs
 
     @property
     def A(self) -> Array:
@@ -147,7 +139,7 @@ class LinearGrid:
         for name, value in fixed.items():
             index[self._axis(name)] = self._position(name, value)
         chosen = np.arange(len(self.models)).reshape(self.shape)[tuple(index)]
-        return LinearFamily.from_models(self.airspeeds, [self.models[k] for k in chosen])
+        return LinearFamily.from_models(self.airspeeds, self.models.at(chosen))
 
     def select(
         self,
@@ -156,15 +148,15 @@ class LinearGrid:
         outputs: Sequence[str] | None = None,
     ) -> LinearGrid:
         """Keep these states (rows and columns of the others are deleted), inputs and outputs."""
-        return self._map(lambda model: model.select(states, inputs, outputs))
+        return replace(self, models=self.models.select(states, inputs, outputs))
 
     def residualize(self, states: Sequence[str]) -> LinearGrid:
         """Remove these states by setting their derivatives to zero, continuous time only."""
-        return self._map(lambda model: model.residualize(states))
+        return replace(self, models=self.models.each(lambda model: model.residualize(states)))
 
     def discretize(self, dt: float) -> LinearGrid:
         """Zero-order-hold equivalent of each model at sample period `dt` (s)."""
-        return self._map(lambda model: model.discretize(dt))
+        return replace(self, models=self.models.each(lambda model: model.discretize(dt)))
 
     def interpolate(
         self,
@@ -183,7 +175,7 @@ class LinearGrid:
         return interpolated(self.models, self.axes, self.values, kind, degree, rate)
 
     def _stacked(self, name: str) -> Array:
-        every = np.stack([getattr(model, name) for model in self.models])
+        every = getattr(self.models, name)
         return every.reshape(*self.shape, *every.shape[1:])
 
     def _axis(self, name: str) -> int:
@@ -201,6 +193,3 @@ class LinearGrid:
                 f"{name} = {wanted} {unit} is not on the grid: {', '.join(f'{v:g}' for v in nodes)}"
             )
         return int(miss.argmin())
-
-    def _map(self, change: Callable[[LinearModel], LinearModel]) -> LinearGrid:
-        return replace(self, models=tuple(change(model) for model in self.models))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.signal import cont2discrete
 
 from symheli.errors import InputError
 from symheli.lpv.equilibration import is_singular, loop_inverse
@@ -16,6 +15,9 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices, signals
+
+if TYPE_CHECKING:
+    from symheli.lpv.linear_models import LinearModels
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,23 +84,7 @@ class LinearModel:
         """Keep these states (rows and columns of the others are deleted), inputs and outputs, in
         this order.
         """
-        ix = indices(self.states if states is None else states, self.states, "state")
-        iu = indices(self.inputs if inputs is None else inputs, self.inputs, "input")
-        if outputs is None:
-            outputs = [
-                y for y in self.outputs if y not in self.states or self.states.index(y) in ix
-            ]
-        iy = indices(outputs, self.outputs, "output")
-        return replace(
-            self,
-            A=self.A[np.ix_(ix, ix)],
-            B=self.B[np.ix_(ix, iu)],
-            C=self.C[np.ix_(iy, ix)],
-            D=self.D[np.ix_(iy, iu)],
-            states=tuple(self.states[i] for i in ix),
-            inputs=tuple(self.inputs[i] for i in iu),
-            outputs=tuple(self.outputs[i] for i in iy),
-        )
+        return selected(self, states, inputs, outputs)
 
     def residualize(self, states: Sequence[str]) -> LinearModel:
         """Remove these states by setting their derivatives to zero (quasi-steady), continuous time
@@ -130,6 +116,8 @@ class LinearModel:
         """Zero-order-hold equivalent at sample period `dt` (s); exact at the samples."""
         if self.dt is not None:
             raise InputError(f"the model is already discrete (dt = {self.dt} s)")
+        from scipy.signal import cont2discrete
+
         A, B, C, D = cont2discrete((self.A, self.B, self.C, self.D), dt)[:4]  # type: ignore[index]
         return replace(self, A=A, B=B, C=C, D=D, dt=dt)
 
@@ -263,6 +251,35 @@ class LinearModel:
             *(signals(group, units) for group in groups),
             dt=float(system.dt) if system.dt else None,
         )
+
+
+Models = TypeVar("Models", bound="LinearModel | LinearModels")
+
+
+def selected(
+    models: Models,
+    states: Sequence[str] | None,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+) -> Models:
+    """One model or many with these states, inputs and outputs; see `LinearModel.select`."""
+    ix = indices(models.states if states is None else states, models.states, "state")
+    iu = indices(models.inputs if inputs is None else inputs, models.inputs, "input")
+    if outputs is None:
+        outputs = [
+            y for y in models.outputs if y not in models.states or models.states.index(y) in ix
+        ]
+    iy = indices(outputs, models.outputs, "output")
+    return replace(
+        models,
+        A=models.A[..., ix, :][..., ix],
+        B=models.B[..., ix, :][..., iu],
+        C=models.C[..., iy, :][..., ix],
+        D=models.D[..., iy, :][..., iu],
+        states=tuple(models.states[i] for i in ix),
+        inputs=tuple(models.inputs[i] for i in iu),
+        outputs=tuple(models.outputs[i] for i in iy),
+    )
 
 
 def is_control_system(system: object) -> bool:

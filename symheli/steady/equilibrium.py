@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares, root
 
+from symheli.codegen.numeric import Numeric
 from symheli.errors import TrimError
 from symheli.helicopter import Helicopter
+from symheli.steady.equations import numeric, steady_equations
 from symheli.steady.flight_condition import FlightCondition
+from symheli.steady.newton import TOLERANCE, newton
+from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.signal import Signal
 from symheli.values.units import quotient
-
-TOLERANCE = 1e-9
-"""Largest residual of any equation at a trim, in its SI unit."""
-ROUNDING = 1e-13
-"""Residual below which another Newton step would only move roundings of accelerations of the size
-of gravity.
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,23 +145,32 @@ def trim(
         acceleration=float(acceleration),
         altitude=None if altitude is None else float(altitude),
     )
-    heli = heli if altitude is None else heli.at_altitude(float(altitude))
-    problem = _Problem(heli, condition)
-    best = problem.solve(problem.guess() if start is None else problem.unknowns_of(start))
-    if continuation and not best.success:
-        best = min((best, _continue_from_hover(heli, condition)), key=_miss)
-    if continuation and not best.success:
-        best = min((best, *map(problem.solve, problem.other_guesses())), key=_miss)
-    if continuation and not best.success and np.any(np.abs(best.u.array) > 2 * heli.travel):
-        best = problem.within_travel()  # nobody learns from a blade pitch of several turns
+    problem = Equilibrium(
+        heli if altitude is None else heli.at_altitude(float(altitude)), condition
+    )
+    z = problem.search(
+        problem.guess() if start is None else problem.unknowns_of(start), continuation
+    )
+    best = problem.point(z)
     if throw and not best.success:
-        raise TrimError(_failure(heli, best), best)
+        raise failure(problem.heli, best)
     return best
 
 
-def _miss(point: TrimPoint) -> float:
-    """Largest residual; infinite where one is no number."""
-    return float(np.nan_to_num(np.abs(point.residual.array), nan=np.inf).max())
+def on_stops(u: Array, travel: Array) -> Array:
+    """Whether each input (..., 4) is at (to 0.1 %) or beyond its travel (4,)."""
+    return np.abs(u) >= 0.999 * travel
+
+
+def stops(inputs: Sequence[Signal], on: Array) -> tuple[str, ...]:
+    """Names of the inputs that are on their stops."""
+    return tuple(str(s) for s, at in zip(inputs, on, strict=True) if at)
+
+
+def in_vortex_ring(switches: Array, names: Sequence[str]) -> Array:
+    """Whether a switching function (..., ns) says that a rotor is in one."""
+    rings = [k for k, name in enumerate(names) if name.endswith("vortex ring")]
+    return np.any(switches[..., rings] > 0, axis=-1)
 
 
 def _stops(point: TrimPoint) -> str:
@@ -174,13 +179,13 @@ def _stops(point: TrimPoint) -> str:
     )
 
 
-def _failure(heli: Helicopter, best: TrimPoint) -> str:
+def failure(heli: Helicopter, best: TrimPoint) -> TrimError:
     """What the best point misses, equation by equation, the worst first."""
     misses = sorted(
         zip(best.residual.array, best.residual.signals, strict=True), key=lambda miss: -abs(miss[0])
     )
     table = ", ".join(f"d{s}/dt = {r:.2e} {quotient(s.unit, 's')}" for r, s in misses)
-    return "; ".join(
+    said = "; ".join(
         [
             f"no trim at {best.condition}: the best point leaves {table}",
             *([_stops(best)] if best.on_stops else []),
@@ -190,6 +195,7 @@ def _failure(heli: Helicopter, best: TrimPoint) -> str:
             "try a nearer condition as `start`, or throw=False for the best point",
         ]
     )
+    return TrimError(said, best)
 
 
 def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
@@ -219,53 +225,30 @@ def _jumps(heli: Helicopter, point: TrimPoint) -> list[str]:
     return [f"the equations jump here, {name}: there may be no equilibrium" for name in near]
 
 
-def _continue_from_hover(
-    heli: Helicopter, condition: FlightCondition, steps: int = 12
-) -> TrimPoint:
-    point: TrimPoint | None = None
-    for share in np.linspace(0.0, 1.0, steps + 1):
-        stage = FlightCondition(
-            share * condition.airspeed,
-            climb_rate=share * condition.climb_rate,
-            turn_rate=share * condition.turn_rate,
-            sideslip=condition.sideslip,
-            wind=(share * condition.wind[0], share * condition.wind[1], share * condition.wind[2]),
-            acceleration=share * condition.acceleration,
-            altitude=condition.altitude,
-        )
-        problem = _Problem(heli, stage)
-        point = problem.solve(problem.guess() if point is None else problem.unknowns_of(point))
-    assert point is not None  # noqa: S101
-    return point
-
-
-class _Problem:
-    """Unknowns phi theta a1 b1 (om_i) and the four inputs against the equations of motion."""
+class Equilibrium:
+    """The search for one: unknowns z = phi theta a1 b1 (om_i) and the four inputs against the
+    equations of motion.
+    """
 
     def __init__(self, heli: Helicopter, condition: FlightCondition):
         self.heli, self.condition = heli, condition
-        self.air, self.turn = condition.air_velocity, np.array([0.0, 0.0, condition.turn_rate])
-        self.wind, self.push = (
-            np.array(condition.wind),
-            np.array([condition.acceleration, 0.0, 0.0]),
-        )
-        self.own = [s for s in heli.states[8:] if s != "Om"]
-        self.equations = [i for i, s in enumerate(heli.states) if s not in ("phi", "theta", "om_i")]
-        self.free = [heli.states.index(Signal(s)) for s in ("phi", "theta", *self.own)]
+        self.equations = steady_equations(heli)
+        self.demand = condition.demand
 
-    def guess(self) -> np.ndarray:
+    def guess(self) -> Array:
+        """A hover, level but for the push of the tail rotor."""
         mass = self.heli.vehicle.sections["body"]["mass"].value
-        start = dict.fromkeys((str(s) for s in self.own), 0.0)
-        if "om_i" in start:
+        start = {"phi": 0.07, "d_col": 0.1, "d_ped": 0.25}
+        if "om_i" in self.heli.states:
             drivetrain = self.heli.vehicle.values("drivetrain")
             # throttle that holds about 130 W/kg of rotor and profile power, typical of a small
             # helicopter in hover
             start["om_i"] = (
                 min(130.0 * mass / drivetrain["max_power"], 0.9) / drivetrain["governor_ki"]
             )
-        return np.array([0.07, 0.0, *start.values(), 0.0, 0.0, 0.1, 0.25])
+        return np.array([start.get(name, 0.0) for name in self.equations.unknowns])
 
-    def other_guesses(self) -> list[np.ndarray]:
+    def other_guesses(self) -> list[Array]:
         """Starts away from hover: nose and bank to either side, the rotor working hard or
         windmilling.
         """
@@ -282,123 +265,104 @@ class _Problem:
             guesses.append(guess)
         return guesses
 
-    def unknowns_of(self, point: TrimPoint) -> np.ndarray:
-        return np.concatenate([point.x.array[self.free], point.u.array])
+    def unknowns_of(self, point: OperatingPoint) -> Array:
+        """Those of a point of this helicopter."""
+        return np.concatenate([point.x.array[self.equations.free], point.u.array])
 
-    def state(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Full state, input, and wind in body axes."""
-        x = np.zeros(len(self.heli.states))
-        x[self.free] = z[: len(self.free)]
-        if "Om" in self.heli.states:
-            x[self.heli.states.index(Signal("Om"))] = self.heli.nominal_speed
-        R = _heading_to_body(z[0], z[1])
-        wind = R @ self.wind
-        x[:3] = R @ self.air + wind
-        x[3:6] = R @ self.turn
-        return x, z[len(self.free) :], wind
+    def search(self, start: Array, continuation: bool = True) -> Array:
+        """The unknowns of least residual that `trim` finds from `start`."""
+        best = self.solve(start)
+        if continuation and not self._found(best):
+            best = min(best, self._continue_from_hover(), key=self.miss)
+        if continuation and not self._found(best):
+            best = min((best, *map(self.solve, self.other_guesses())), key=self.miss)
+        if continuation and not self._found(best):
+            inputs = best[len(self.equations.free) :]
+            if np.any(np.abs(inputs) > 2 * self.heli.travel):
+                best = self._within_travel()  # nobody learns from a blade pitch of several turns
+        return best
 
-    def residual(self, z: np.ndarray) -> np.ndarray:
-        xdot = self.heli.numeric("rhs")(*self.state(z))[0]
-        xdot[:3] -= _heading_to_body(z[0], z[1]) @ self.push
-        return xdot
-
-    def jacobian(self, z: np.ndarray) -> np.ndarray:
-        A, B, E = self.heli.numeric("jacobian")(*self.state(z))
-        J = np.concatenate([A[:, self.free], B], axis=1)
-        # the attitude also turns velocity, rates, wind and the demanded acceleration into body axes
-        for column in (0, 1):
-            dR = _heading_to_body(z[0], z[1], derivative=column)
-            dwind = dR @ self.wind
-            J[:, column] += (
-                A[:, :3] @ (dR @ self.air + dwind) + A[:, 3:6] @ (dR @ self.turn) + E @ dwind
-            )
-            J[:3, column] -= dR @ self.push
-        return J[self.equations]
-
-    def solve(self, start: np.ndarray) -> TrimPoint:
+    def solve(self, start: Array) -> Array:
         """Newton's method from `start`; MINPACK's hybrid method where it stops descending, then
         Newton again.
         """
-        z = self.newton(start)
-        if np.abs(self.residual(z)).max() >= TOLERANCE:
+        z, miss = self.newton(start)
+        if not miss < TOLERANCE:
+            from scipy.optimize import root
+
             found = root(
-                lambda z: self.residual(z)[self.equations],
+                lambda z: self._system(z)[0][self.equations.balanced],
                 start,
-                jac=self.jacobian,
+                jac=lambda z: self._system(z)[1],
                 method="hybr",
                 options={"xtol": 1e-14},
             )
-            z = min((z, self.newton(found.x)), key=lambda z: float(np.abs(self.residual(z)).max()))
-        return self.point(z)
-
-    def within_travel(self) -> TrimPoint:
-        """The point of least residual with controls in their travel and the attitude short of +-80
-        deg, from the hover guess.
-        """
-        start, n = self.guess(), len(self.free)
-        bound = np.concatenate([np.full(2, 1.4), np.full(n - 2, np.inf), self.heli.travel])
-        start = np.clip(start, -0.9 * bound, 0.9 * bound)
-        found = least_squares(
-            lambda z: self.residual(z)[self.equations],
-            start,
-            self.jacobian,  # type: ignore[arg-type]
-            bounds=(-bound, bound),
-            max_nfev=200,
-        )
-        return self.point(found.x)
-
-    def newton(self, z: np.ndarray, steps: int = 12) -> np.ndarray:
-        """Full Newton steps while the largest residual falls."""
-        residual = self.residual(z)
-        for _ in range(steps):
-            try:
-                better = z - np.linalg.solve(self.jacobian(z), residual[self.equations])
-            except np.linalg.LinAlgError:
-                break
-            left = (
-                self.residual(better)
-                if np.all(np.isfinite(better))
-                else np.full_like(residual, np.inf)
-            )
-            if not np.abs(left).max() < np.abs(residual).max():
-                break
-            z, residual = better, left
-            if np.abs(residual).max() < ROUNDING:
-                break
+            z = min((z, self.newton(found.x)[0]), key=self.miss)
         return z
 
-    def point(self, z: np.ndarray) -> TrimPoint:
-        heli = self.heli
-        x, u, wind = self.state(z)
-        xdot = heli.numeric("rhs")(x, u, wind)[0]
-        switches = heli.switches(x, u, wind)
+    def newton(self, start: Array) -> tuple[Array, float]:
+        """Newton's method alone: where it ends, and the largest residual there."""
+        return newton(self._system, self.equations.balanced, start)
+
+    def point(self, z: Array) -> TrimPoint:
+        """All that is known at these unknowns."""
+        heli, u = self.heli, z[len(self.equations.free) :]
+        x, wind, xdot, residual, switches, _ = numeric(heli, "point")(z, self.demand)
         return TrimPoint(
             x=NamedVector(heli.states, x),
             u=NamedVector(heli.inputs, u),
             xdot=NamedVector(heli.states, xdot),
             airspeed=self.condition.airspeed,
             condition=self.condition,
-            residual=NamedVector(heli.states, self.residual(z)),
+            residual=NamedVector(heli.states, residual),
             wind=NamedVector(heli.wind, wind),
-            on_stops=tuple(
-                str(s)
-                for s, value, limit in zip(heli.inputs, u, heli.travel, strict=True)
-                if abs(value) >= 0.999 * limit
-            ),
-            vortex_ring=any(
-                value > 0 for name, value in switches.items() if name.endswith("vortex ring")
-            ),
+            on_stops=stops(heli.inputs, on_stops(u, heli.travel)),
+            vortex_ring=bool(in_vortex_ring(switches, self.equations.switches)),
             density=heli.density,
         )
 
+    def _system(self, z: Array) -> tuple[Array, Array]:
+        residual, slopes = self._evaluate(z, self.demand)
+        return residual, slopes.reshape(len(z), len(z))
 
-def _heading_to_body(phi: float, theta: float, derivative: int | None = None) -> np.ndarray:
-    """Rotation (3, 3) from forward-right-down axes of the heading to body axes; derivative 0: by
-    phi, 1: by theta.
-    """
-    cp, sp, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
-    if derivative == 0:
-        return np.array([[0.0, 0.0, 0.0], [cp * st, -sp, cp * ct], [-sp * st, -cp, -sp * ct]])
-    if derivative == 1:
-        return np.array([[-st, 0.0, -ct], [sp * ct, 0.0, -sp * st], [cp * ct, 0.0, -cp * st]])
-    return np.array([[ct, 0.0, -st], [sp * st, cp, sp * ct], [cp * st, -sp, cp * ct]])
+    @cached_property
+    def _evaluate(self) -> Numeric:
+        return numeric(self.heli, "system")
+
+    def miss(self, z: Array) -> float:
+        """Largest residual; infinite where one is no number."""
+        return float(np.nan_to_num(np.abs(self._system(z)[0]), nan=np.inf).max())
+
+    def _found(self, z: Array) -> bool:
+        return self.miss(z) < TOLERANCE
+
+    def _continue_from_hover(self, steps: int = 12) -> Array:
+        asked, z = self.condition, self.guess()
+        for share in np.linspace(0.0, 1.0, steps + 1).tolist():
+            stage = replace(
+                asked,
+                airspeed=share * asked.airspeed,
+                climb_rate=share * asked.climb_rate,
+                turn_rate=share * asked.turn_rate,
+                wind=(share * asked.wind[0], share * asked.wind[1], share * asked.wind[2]),
+                acceleration=share * asked.acceleration,
+            )
+            z = Equilibrium(self.heli, stage).solve(z)
+        return z
+
+    def _within_travel(self) -> Array:
+        """The unknowns of least residual with controls in their travel and the attitude short of
+        +-80 deg, from the hover guess.
+        """
+        from scipy.optimize import least_squares
+
+        start, n = self.guess(), len(self.equations.free)
+        bound = np.concatenate([np.full(2, 1.4), np.full(n - 2, np.inf), self.heli.travel])
+        start = np.clip(start, -0.9 * bound, 0.9 * bound)
+        return least_squares(
+            lambda z: self._system(z)[0][self.equations.balanced],
+            start,
+            lambda z: self._system(z)[1],  # type: ignore[arg-type]
+            bounds=(-bound, bound),
+            max_nfev=200,
+        ).x

@@ -4,10 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import KW_ONLY, dataclass
+from typing import Any
 
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.signal import signals
+
+DEMAND = signals(
+    ("forward", "right", "down", "turn_rate", "wind_n", "wind_e", "wind_d", "acceleration"),
+    {"forward": "m/s", "right": "m/s", "down": "m/s", "turn_rate": "rad/s"}
+    | {"acceleration": "m/s^2"},
+)
+"""Velocity through the air, turn rate, wind and acceleration a steady flight is to have, by the
+axes of the heading.
+"""
 
 
 @dataclass(frozen=True)
@@ -79,10 +90,12 @@ class FlightCondition:
     @property
     def air_velocity(self) -> np.ndarray:
         """Velocity through the air, forward right down with respect to the heading (3,), m/s."""
-        level = math.sqrt(max(self.airspeed**2 - self.climb_rate**2, 0.0))
-        return np.array(
-            [level * math.cos(self.sideslip), level * math.sin(self.sideslip), -self.climb_rate]
-        )
+        return air_velocity(self.airspeed, self.climb_rate, self.sideslip)
+
+    @property
+    def demand(self) -> np.ndarray:
+        """What the equations of steady flight are given (8,), by `DEMAND`."""
+        return np.array([*self.air_velocity, self.turn_rate, *self.wind, self.acceleration])
 
     def __str__(self) -> str:
         words = [f"{self.airspeed:g} m/s"]
@@ -100,3 +113,13 @@ class FlightCondition:
         words += [f"accelerating at {self.acceleration:g} m/s^2"] if self.acceleration else []
         words += [f"{self.altitude:g} m above sea level"] if self.altitude is not None else []
         return ", ".join(words)
+
+
+def air_velocity(airspeed: Any, climb_rate: Any, sideslip: Any) -> np.ndarray:
+    """Velocity through the air (..., 3), forward right down with respect to the heading, m/s, of
+    one flight condition or of arrays of them (m/s, m/s, rad).
+    """
+    level = np.sqrt(np.maximum(np.square(airspeed) - np.square(climb_rate), 0.0))
+    return np.stack(
+        [level * np.cos(sideslip), level * np.sin(sideslip), np.negative(climb_rate)], axis=-1
+    )

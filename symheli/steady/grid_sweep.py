@@ -11,9 +11,14 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
-from symheli.lpv.linear_family import AIRSPEED, LinearFamily
+from symheli.lpv.linear_family import AIRSPEED
 from symheli.lpv.linear_grid import LinearGrid
-from symheli.steady.airspeed_sweep import models_along
+from symheli.steady.airspeed_sweep import increasing
+from symheli.steady.flight_conditions import FlightConditions
+from symheli.steady.linearization import linear_models
+from symheli.steady.steady_flights import SteadyFlights
+from symheli.steady.trim_batch import hover, one_after_another, trimmed
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 
 AXES = {
@@ -26,7 +31,7 @@ AXES = {
 }
 PARAMETER = {"density": "density", "mass": "body.mass", "rotor_speed": "drivetrain.nominal_speed"}
 """Which of the helicopter's parameters an axis changes; the inertias stay when the mass changes."""
-CONDITION = ("acceleration", "climb_rate")
+CONDITION = {"acceleration", "climb_rate"}
 """Axes that are part of the flight condition."""
 
 
@@ -94,27 +99,36 @@ def sweep_grid(
         raise InputError(f"sweep_grid needs one of {', '.join(AXES)}; for airspeed alone use sweep")
     if "density" in given and "altitude" in given:
         raise InputError("density and altitude are one axis: give one of them")
-    families: list[LinearFamily] = []
-    for point in product(*given.values()):
-        values = dict(zip(given, point, strict=True))
-        condition = {name: values[name] for name in CONDITION if name in values}
-        near = families[-1] if families else None
-        heli_there = _variant(heli, values)
-        models = models_along(
-            heli_there,
-            airspeeds,
-            climb_rate=condition.get("climb_rate", 0.0),
-            acceleration=condition.get("acceleration", 0.0),
-            inputs=inputs,
-            start=near,
-        )
-        families.append(LinearFamily.from_models(airspeeds, models))
-    speeds = families[0].airspeeds
+    speeds = increasing(airspeeds)
+    points = [dict(zip(given, point, strict=True)) for point in product(*given.values())]
+    helis = [_variant(heli, values) for values in points]
+    each = np.repeat(np.arange(len(points)), len(speeds))
+    asked = {
+        name: np.array([values[name] for values in points])[each]
+        for name in CONDITION & given.keys()
+    }
+    flights = SteadyFlights(helis, each, FlightConditions(np.tile(speeds, len(points)), **asked))
+    shape = [len(values) for values in given.values()]
+    trims = trimmed(flights, hover(flights), _after_neighbours(shape, len(speeds)))
+    airspeed_first = np.arange(len(flights)).reshape(len(points), -1).T.ravel()
     return LinearGrid(
         (AIRSPEED, *(AXES[name] for name in given)),
         (speeds, *map(np.asarray, given.values())),
-        tuple(family[k] for k in range(len(speeds)) for family in families),
+        linear_models(flights.at(airspeed_first), trims.at(airspeed_first), inputs),
     )
+
+
+def _after_neighbours(shape: Sequence[int], speeds: int) -> Array:
+    """Which trim each of a grid is started from, airspeed running fastest: the first values of the
+    other axes one after another, the others from the neighbouring value.
+    """
+    after = [one_after_another(speeds)]
+    for k, position in enumerate(np.ndindex(*shape)):
+        if k:
+            moved = max(axis for axis, i in enumerate(position) if i)  # one back along this axis
+            neighbour = [i - (axis == moved) for axis, i in enumerate(position)]
+            after.append(np.ravel_multi_index(neighbour, shape) * speeds + np.arange(speeds))
+    return np.concatenate(after)
 
 
 def _variant(heli: Helicopter, values: dict[str, float]) -> Helicopter:

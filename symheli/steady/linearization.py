@@ -9,7 +9,13 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
 from symheli.lpv.linear_model import LinearModel
-from symheli.steady.equilibrium import TOLERANCE, TrimPoint
+from symheli.lpv.linear_models import LinearModels
+from symheli.steady.equations import numeric
+from symheli.steady.equilibrium import TrimPoint
+from symheli.steady.newton import TOLERANCE
+from symheli.steady.steady_flights import SteadyFlights
+from symheli.steady.trim_batch import TrimBatch
+from symheli.values.arrays import Array
 from symheli.values.signal import indices
 
 
@@ -63,18 +69,37 @@ def linearize(
             f" {', '.join(heli.states)}: trim this helicopter"
         )
     heli = heli.in_air(point.density)
-    A, B, E = heli.numeric("jacobian")(point.x.array, point.u.array, point.wind.array)
+    found = numeric(heli, "slopes")(point.x.array, point.u.array, point.wind.array)
+    A, B, E = (matrix.reshape(1, len(heli.states), -1) for matrix in found)
+    return _models(heli, A, B, E, inputs, [point])[0]
+
+
+def linear_models(
+    flights: SteadyFlights, trims: TrimBatch, inputs: Sequence[str] | None
+) -> LinearModels:
+    """`linearize` at the trims of these flights, in machine code."""
+    A, B, E = flights.slopes(trims.x, trims.u, trims.wind)
+    return _models(flights.helis[0], A, B, E, inputs, trims)
+
+
+def _models(
+    heli: Helicopter,
+    A: Array,
+    B: Array,
+    E: Array,
+    inputs: Sequence[str] | None,
+    points: Sequence[TrimPoint],
+) -> LinearModels:
     names = (*heli.inputs, *heli.wind)
     columns = indices(heli.inputs if inputs is None else inputs, names, "input")
-    B = np.hstack([B, E])[:, columns]
-    n = len(heli.states)
-    return LinearModel(
+    K, n = A.shape[:2]
+    return LinearModels(
         A,
-        B,
-        np.eye(n),
-        np.zeros((n, len(columns))),
+        np.concatenate([B, E], axis=2)[:, :, columns],
+        np.broadcast_to(np.eye(n), (K, n, n)),
+        np.zeros((K, n, len(columns))),
         heli.states,
         tuple(names[i] for i in columns),
         heli.states,
-        point=point,
+        points=points,
     )

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.helicopter import Helicopter
-from symheli.steady.equilibrium import TrimPoint, trim
+from symheli.steady.equilibrium import TrimPoint
+from symheli.steady.flight_conditions import FlightConditions
+from symheli.steady.steady_flights import SteadyFlights
+from symheli.steady.trim_batch import hover, one_after_another, trimmed
 from symheli.values.arrays import Array, frozen
 from symheli.values.comma_separated import comma_separated
 from symheli.values.signal import Signal
 
 POWER = Signal("power", "W")
+OMEGA = Signal("Om")
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,43 +164,32 @@ def trim_map(
     speeds, rates = _increasing(airspeeds, "airspeeds"), _increasing(climb_rates, "climb_rates")
     if not np.any(np.abs(rates) <= speeds[-1]):
         raise InputError("every climb rate exceeds the largest airspeed, which includes it")
+    outwards = np.argsort(np.abs(rates), kind="stable")  # level flight first, the easiest to trim
+    i, j = np.array(
+        [(i, j) for j in outwards for i, speed in enumerate(speeds) if abs(rates[j]) <= speed]
+    ).T
+    conditions = FlightConditions(speeds[i], climb_rate=rates[j])
+    flights = SteadyFlights([heli], np.zeros(len(i), int), conditions)
+    found = trimmed(flights, hover(flights), _after_inner(i, j, outwards[0]), throw=False)
     points: list[list[TrimPoint | None]] = [[None] * len(rates) for _ in speeds]
+    for point, *at in zip(found, i, j, strict=True):
+        points[at[0]][at[1]] = point
     power = np.full((len(speeds), len(rates)), np.nan)
-    outwards = np.argsort(
-        np.abs(rates), kind="stable"
-    )  # level flight first: the easiest trims start the others
-    for i, speed in enumerate(speeds):
-        for j in outwards:
-            if abs(rates[j]) <= speed:
-                point = points[i][j] = _from_neighbours(
-                    heli, float(speed), float(rates[j]), _neighbours(points, i, int(j))
-                )
-                power[i, j] = _power(heli, point)
+    power[i, j] = found.torque * (
+        found.x[:, heli.states.index(OMEGA)] if OMEGA in heli.states else heli.nominal_speed
+    )
     return TrimMap(speeds, rates, tuple(map(tuple, points)), power)
 
 
-def _neighbours(points: list[list[TrimPoint | None]], i: int, j: int) -> Iterator[TrimPoint]:
-    for k, m in ((i, j - 1), (i, j + 1), (i - 1, j), (i - 1, j - 1), (i - 1, j + 1)):
-        if 0 <= k and 0 <= m < len(points[0]):
-            point = points[k][m]
-            if point is not None and point.success:
-                yield point
-
-
-def _from_neighbours(
-    heli: Helicopter, speed: float, rate: float, neighbours: Iterator[TrimPoint]
-) -> TrimPoint:
-    for start in neighbours:
-        point = trim(heli, speed, climb_rate=rate, start=start, throw=False, continuation=False)
-        if point.success:
-            return point
-    return trim(heli, speed, climb_rate=rate, throw=False)
-
-
-def _power(heli: Helicopter, point: TrimPoint) -> float:
-    values = heli.numeric("diagnostics")(point.x.array, point.u.array, point.wind.array)
-    torque = values[heli.diagnostics.name_out().index("Q_e")][0]
-    return float(torque) * (point.x["Om"] if "Om" in point.x else heli.nominal_speed)
+def _after_inner(i: Array, j: Array, inner: int) -> Array:
+    """Which trim each is started from: those of the innermost climb rate one after another, the
+    others from the next climb rate inwards.
+    """
+    at = {place: k for k, place in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
+    first = int(np.count_nonzero(j == inner))
+    inwards = j + np.sign(inner - j)
+    others = [at[place] for place in zip(i[first:].tolist(), inwards[first:].tolist(), strict=True)]
+    return np.concatenate([one_after_another(first), others]).astype(int)
 
 
 def _increasing(values: Sequence[float] | Array, name: str) -> Array:

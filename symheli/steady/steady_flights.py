@@ -1,0 +1,149 @@
+"""Many steady flights at once: solved, described and linearized in machine code, or one by one in
+CasADi's virtual machine where there is no compiler.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from symheli.helicopter import Helicopter
+from symheli.steady.equations import SteadyEquations, numeric, steady_equations
+from symheli.steady.equilibrium import Equilibrium
+from symheli.steady.flight_conditions import FlightConditions
+from symheli.steady.newton import ROUNDING, STEPS, TOLERANCE
+from symheli.values.arrays import Array
+
+ALONE = -1
+"""In place of the flight before: from its own start."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """What is known at N points: state and its derivative (N, nx), wind in body axes (N, 3),
+    residuals (N, nx), switching functions (N, ns) and the torque of the engine (N, 1), SI.
+    """
+
+    x: Array
+    wind: Array
+    xdot: Array
+    residual: Array
+    switches: Array
+    torque: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyFlights:
+    """N flight conditions, each of one of a few helicopters that share their equations; `which`
+    (N,) counts them.
+    """
+
+    helis: Sequence[Helicopter]
+    which: Array
+    conditions: FlightConditions
+
+    @cached_property
+    def equations(self) -> SteadyEquations:
+        """Those they share."""
+        return steady_equations(self.helis[0])
+
+    @cached_property
+    def _demand(self) -> Array:
+        return np.ascontiguousarray(self.conditions.demand)
+
+    @cached_property
+    def _parameters(self) -> Array:
+        """A row for each flight, or one for all."""
+        rows = np.stack([heli.parameters.array for heli in self.helis])
+        return rows if len(rows) == 1 else rows[self.which]
+
+    def __len__(self) -> int:
+        return len(self.conditions)
+
+    def heli(self, k: int) -> Helicopter:
+        """The helicopter of flight k."""
+        return self.helis[self.which[k]]
+
+    def at(self, which: Array) -> SteadyFlights:
+        """Those of these positions."""
+        return SteadyFlights(self.helis, self.which[which], self.conditions.at(which))
+
+    def solved(self, starts: Array, after: Array | int) -> tuple[Array, Array]:
+        """Newton's method in each flight: unknowns (N, nz) and largest residuals (N,).
+
+        after (N,): an earlier flight whose solution is the start (where that was not found, the
+        nearest found before it), or `ALONE`: the flight's own row of `starts` (N, nz).
+        """
+        z, miss = np.array(starts, float), np.full(len(self), np.nan)
+        after = np.array(np.broadcast_to(after, len(self)), ctypes.c_long)
+        code = self.equations.machine_code
+        if code is None:
+            for k in range(len(self)):
+                alone = Equilibrium(self.heli(k), self.conditions[k])
+                z[k], miss[k] = alone.newton(z[nearest(miss, int(after[k]), k)])
+            return z, miss
+        code.trims(
+            ctypes.c_long(len(self)),
+            _at(after),
+            _at(self._demand),
+            *self._shared(),
+            _at(z),
+            _at(miss),
+            ctypes.c_long(STEPS),
+            ctypes.c_double(ROUNDING),
+            ctypes.c_double(TOLERANCE),
+        )
+        return z, miss
+
+    def points(self, z: Array) -> Points:
+        """The points at these unknowns (N, nz)."""
+        nx, ns = len(self.equations.dynamics.states), len(self.equations.switches)
+        made = Points(*(np.empty((len(self), size)) for size in (nx, 3, nx, nx, ns, 1)))
+        code, rows = self.equations.machine_code, list(vars(made).values())
+        if code is None:
+            for k in range(len(self)):
+                found = numeric(self.heli(k), "point")(z[k], self._demand[k])
+                for row, value in zip(rows, found, strict=True):
+                    row[k] = value
+            return made
+        z = np.ascontiguousarray(z, float)
+        code.points(
+            ctypes.c_long(len(self)), _at(z), _at(self._demand), *self._shared(), *map(_at, rows)
+        )
+        return made
+
+    def slopes(self, x: Array, u: Array, wind: Array) -> tuple[Array, Array, Array]:
+        """A (N, nx, nx), B (N, nx, 4), E (N, nx, 3) of the Euler form at these points."""
+        n, nx = len(self), x.shape[1]
+        made = (np.empty((n, nx, nx)), np.empty((n, nx, 4)), np.empty((n, nx, 3)))
+        code = self.equations.machine_code
+        if code is None:
+            for k in range(n):
+                found = numeric(self.heli(k), "slopes")(x[k], u[k], wind[k])
+                for row, value in zip(made, found, strict=True):
+                    row[k] = value.reshape(row.shape[1:])
+            return made
+        given = [np.ascontiguousarray(a, float) for a in (x, u, wind)]
+        code.slopes(ctypes.c_long(n), *map(_at, given), *self._shared(), *map(_at, made))
+        return made
+
+    def _shared(self) -> tuple[ctypes.c_void_p, ctypes.c_long]:
+        stride = self._parameters.shape[1] if len(self._parameters) > 1 else 0
+        return _at(self._parameters), ctypes.c_long(stride)
+
+
+def nearest(miss: Array, after: int, own: int) -> int:
+    """The flight whose unknowns are the start: `after`, or the nearest found before it, else its
+    own.
+    """
+    while after >= 0 and not miss[after] < TOLERANCE:
+        after -= 1
+    return after if after >= 0 else own
+
+
+def _at(array: Array) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
