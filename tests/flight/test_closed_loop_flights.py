@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli import AirspeedSchedule, Excitation, SymheliError, fly
+from symheli import AirspeedSchedule, Excitation, FlightLostError, SymheliError, fly
 from symheli.codegen.numeric import Numeric
 from symheli.flight import gain_scheduled_lqr
-from symheli.flight.fly import MEASURED
+from symheli.flight.controller import MEASURED
 from symheli.integrate import runge_kutta
 
 SMALL = Excitation({"d_lon": 0.006, "d_lat": 0.006, "d_col": 0.005, "d_ped": 0.01})
@@ -77,9 +77,7 @@ def test_runge_kutta_is_of_order_four(ideal):
 
 
 def test_integration_error_of_a_flight_stays_below_its_promise(ideal, pilot, short, monkeypatch):
-    import sys
-
-    monkeypatch.setattr(sys.modules["symheli.flight.fly"], "INTEGRATION_STEP", 0.0025)
+    monkeypatch.setattr("symheli.flight.course.INTEGRATION_STEP", 0.0025)
     finer = fly(ideal, SHORT, excitation=SMALL, controller=pilot)
     states = [str(s) for s in ideal.states]
     size = np.abs(short.columns(states)).max(axis=0)
@@ -112,6 +110,7 @@ def test_the_record_holds_what_its_documentation_says(ideal, short):
         *(f"e_{i}" for i in ideal.inputs),
         "airspeed",
         "airspeed_command",
+        *(f"{s}_reference" for s in (*ideal.states, *ideal.inputs)),
     }
     assert set(short.signals) == wanted
     assert set(MEASURED) <= wanted
@@ -135,9 +134,17 @@ def test_airspeed_is_that_of_the_air(ideal, pilot):
 def test_a_lost_flight_says_when_and_what_to_change(ideal, pilot):
     wild = Excitation({"d_lon": 0.5, "d_lat": 0.5}, band=(0.1, 0.5))
     with pytest.raises(
-        SymheliError, match=r"the flight was lost at .* s near .* m/s: less excitation"
-    ):
+        FlightLostError, match=r"the flight was lost at .* s near .* m/s \(.*\): less excitation"
+    ) as lost:
         fly(ideal, AirspeedSchedule.transition(0.0, 6.0, 2.0), excitation=wild, controller=pilot)
+    record = lost.value.record
+    assert "was lost" in record.note
+    assert np.abs(record.columns(("phi", "theta"))).max() <= 1.4  # until then it was not lost
+    last = np.abs(record.columns(("phi", "theta"))[-1]).max()
+    rate = np.abs(record.columns(("p", "q"))[-1]).max()
+    assert last + 2 * record.dt * rate > 1.4  # and the record reaches to the moment it was
+    assert "d_lon at its stop" in str(lost.value)
+    assert "d_lat at its stop" in str(lost.value)
 
 
 def test_an_autopilot_of_another_period_and_an_impossible_step_are_refused(ideal, pilot):

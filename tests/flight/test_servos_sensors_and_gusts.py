@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli import AirspeedSchedule, fly
+from symheli import AirspeedSchedule, fly, fly_batch
 from symheli.environment import Dryden, Gust, Wind
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight import XCELL_SERVOS, Sensor, Servo, ServoBank, gain_scheduled_lqr
-from symheli.flight.sensor import SensorBank
 from symheli.flight.servo import CYCLIC, TAIL
 
 HOVER = AirspeedSchedule((0.5,), (0.5,), (3.0,), lead=0.5)
@@ -90,21 +89,51 @@ def test_a_bank_starts_at_rest():
     np.testing.assert_allclose(reached, 0.3 * TRAVEL, atol=1e-14)
 
 
-def test_a_sensor_delays_holds_biases_and_rounds():
-    truth = np.arange(20.0)[:, None]
-    bank = SensorBank(
-        {"q": Sensor(bias=0.4, period=0.06, delay=0.03, quantum=0.5)}, ("q",), 20, 0.02, seed=0
+class HandsOff:
+    """The trim at the start, whatever is measured: the flight is the same with any sensor."""
+
+    dt = 0.02
+
+    def reset(self):
+        self.u = None
+
+    def step(self, measured, reference, p):
+        if self.u is None:
+            self.u = [reference[name] for name in INPUTS]
+        return self.u
+
+
+def test_a_sensor_delays_holds_biases_and_rounds(ideal):
+    start = AirspeedSchedule((5.0,), (1.0,), (0.5,), start=4.9, lead=0.5)
+    coarse = Sensor(bias=0.4, period=0.06, delay=0.03, quantum=0.5)
+    truth = fly(ideal, start, controller=HandsOff())
+    read = fly(ideal, start, controller=HandsOff(), sensors={"u": coarse, "v": Sensor(delay=0.04)})
+    k = np.arange(len(truth))
+    # two samples late, a new value every third sample, rounded to halves with 0.4 on top
+    late = np.maximum(k - 2, 0)
+    expected = np.round((truth["u"][late - late % 3] + 0.4) / 0.5) * 0.5
+    np.testing.assert_allclose(read["u"], expected, atol=1e-12)
+    np.testing.assert_array_equal(read["v"], truth["v"][late])
+    np.testing.assert_array_equal(read["w"], truth["w"])
+
+
+def test_sensor_noise_has_its_size_and_is_held_with_the_reading(ideal):
+    start = AirspeedSchedule((5.0,), (1.0,), (0.4,), start=4.9, lead=0.5)
+    noisy, truth = (
+        fly_batch(ideal, start, controller=steady(), seeds=range(400), sensors=sensors)
+        for sensors in ({"q": Sensor(noise=2.0, period=0.1)}, None)
     )
-    read = [bank.read(k, truth)[0] for k in range(20)]
-    # two samples late, a new value every third sample, 0.4 rounded to 0.5 on top
-    assert read == [(max(k - 2, 0) // 3) * 3 + 0.5 for k in range(20)]
+    source = np.arange(len(noisy[0])) // 5 * 5
+    noise = noisy.column("q") - truth.column("q")[:, source]
+    np.testing.assert_allclose(noise, noise[:, source], atol=1e-12)
+    drawn = noise[:, ::5]
+    assert drawn.std() == pytest.approx(2.0, rel=4 / np.sqrt(2 * drawn.size))  # 4 standard errors
+    assert np.corrcoef(drawn[:, 0], drawn[:, 1])[0, 1] == pytest.approx(0.0, abs=0.2)  # 4 of them
 
 
-def test_sensor_noise_has_its_size_and_is_held_with_the_reading():
-    bank = SensorBank({"q": Sensor(noise=2.0, period=0.1)}, ("q",), 50_000, 0.02, seed=1)
-    read = np.array([bank.read(k, np.zeros((50_000, 1)))[0] for k in range(50_000)])
-    assert np.all(read.reshape(-1, 5) == read[::5, None])
-    assert read.std() == pytest.approx(2.0, rel=0.03)  # 4 standard errors of 10 000 draws
+def steady():
+    """No feedback at all, in machine code."""
+    return symheli.LinearModel.gain(np.zeros((4, 1)), ["q"], INPUTS).discretize(0.02)
 
 
 def test_a_flight_behind_servos_stays_in_trim_and_records_both_sides(ideal, behind_servos):
@@ -187,6 +216,8 @@ def test_what_cannot_be_flown_is_refused(ideal):
         fly(ideal, HOVER, noise_db=30.0, sensors={})
     with pytest.raises(UnknownNameError, match="measured signal"):
         fly(ideal, HOVER, sensors={"thta": Sensor()})
+    with pytest.raises(InputError, match="none given for d_lat, d_col, d_ped"):
+        fly(ideal, HOVER, servos={"d_lon": TAIL})
     with pytest.raises(InputError, match="none given for d_lat"):
         ServoBank({"d_lon": TAIL}, ("d_lon", "d_lat"), TRAVEL[:2], 0.005)
     with pytest.raises(InputError, match="both given"):
