@@ -36,6 +36,8 @@ class Trajectory:
         Those the method took, s.
     per_sample : array (n,)
         How many of them in each sample: derivatives follow the same steps.
+    evaluations : int or None
+        How often the right-hand side was evaluated; None where the method does not count.
     method : RungeKutta4, DormandPrince or Radau
         With its options.
     parameters : NamedVector
@@ -56,6 +58,7 @@ class Trajectory:
     signals: tuple[Signal, ...]
     steps: Array
     per_sample: Array
+    evaluations: int | None
     method: Any
     parameters: NamedVector
 
