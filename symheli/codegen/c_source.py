@@ -37,6 +37,20 @@ class Layout:
         return self.width * self.groups
 
     @property
+    def _advice(self) -> str:
+        """What GCC does not choose by itself.
+
+        A point alone waits for roots and quotients, one after the other: a selection made by a
+        branch does not wait for the side that is not taken, nor for the condition. Four fifths of
+        the time of conditional moves.
+        """
+        if self.lanes == 1:
+            return '#pragma GCC optimize("no-if-conversion")'
+        return """#ifdef __AVX512F__
+#pragma GCC target("prefer-vector-width=512")
+#endif"""
+
+    @property
     def prelude(self) -> str:
         """What every generated source begins with: headers, the elementary functions and the type
         of a scalar for all lanes.
@@ -44,8 +58,8 @@ class Layout:
         return f"""#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#if defined(__AVX512F__) && defined(__GNUC__) && !defined(__clang__)
-#pragma GCC target("prefer-vector-width=512")
+#if defined(__GNUC__) && !defined(__clang__)
+{self._advice}
 #endif
 {resources.files("symheli.codegen").joinpath("elementary.c").read_text(encoding="utf-8")}
 #define LANES {self.lanes}

@@ -8,7 +8,7 @@ import ctypes
 from collections.abc import Callable
 from functools import cached_property
 from importlib import resources
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import casadi
 
@@ -16,7 +16,7 @@ from symheli.codegen import Layout, Program, c_function, program
 from symheli.codegen.compile import library, loaded
 from symheli.codegen.numeric import Numeric
 from symheli.codegen.symbolic import SX, Function, column, cos, dense, jacobian, sin
-from symheli.dynamics import INPUTS, Dynamics
+from symheli.dynamics import INPUTS, Dynamics, Sum
 from symheli.helicopter import Helicopter
 from symheli.steady.flight_condition import DEMAND
 from symheli.values.signal import Signal, signals
@@ -25,6 +25,20 @@ SIDE_BY_SIDE = Layout(width=8)
 """Trims in vector registers at a time."""
 
 Name = Literal["system", "point", "slopes"]
+
+
+class Flight(NamedTuple):
+    """A steady flight in symbols: its unknowns, what it is to have and the parameters; state, input
+    and wind in body axes; the rates asked for, and those there are with the sum of the parts.
+    """
+
+    arguments: list[SX]
+    x: SX
+    u: SX
+    wind: SX
+    asked: SX
+    xdot: SX
+    total: Sum
 
 
 class SteadyEquations:
@@ -55,71 +69,65 @@ class SteadyEquations:
             self._functions[name] = made
         return self._functions[name]
 
-    def _symbols(self) -> tuple[SX, SX, SX]:
+    @cached_property
+    def _flight(self) -> Flight:
         sizes = {
             "z": len(self.unknowns),
             "demand": len(DEMAND),
             "par": len(self.dynamics.parameters),
         }
         z, demand, par = (SX.sym(name, size) for name, size in sizes.items())
-        return z, demand, par
-
-    def _flight(self, z: SX, demand: SX, par: SX) -> tuple[Any, Any, Any, Any]:
-        """State, input, wind in body axes, and the rates asked for."""
-        states = self.dynamics.states
         turned = _heading_to_body(z[0], z[1])
         air, wind, push = (
             turned(demand[0], demand[1], demand[2]),
             turned(demand[4], demand[5], demand[6]),
             turned(demand[7], 0.0, 0.0),
         )
-        velocity = [a + b for a, b in zip(air, wind, strict=True)]
-        values = dict(zip(states, (*velocity, *turned(0.0, 0.0, demand[3])), strict=False))
-        values |= dict(zip(self.unknowns[: len(self.free)], casadi.vertsplit(z), strict=False))
-        if "Om" in states:
-            nominal = self.dynamics.entries["drivetrain"]["nominal_speed"]
-            values[Signal("Om")] = par[self.dynamics.parameters.index(Signal(nominal))]
-        asked = [*push, *[0.0] * (len(states) - 3)]
-        return column([values[s] for s in states]), z[len(self.free) :], column(wind), column(asked)
+        values = {
+            **dict(zip("uvw", (a + b for a, b in zip(air, wind, strict=True)), strict=True)),
+            **dict(zip("pqr", turned(0.0, 0.0, demand[3]), strict=True)),
+            **{str(name): z[k] for k, name in enumerate(self.unknowns)},
+        }
+        if self.dynamics.governor == "pi":
+            nominal = Signal(self.dynamics.entries["drivetrain"]["nominal_speed"])
+            values["Om"] = par[self.dynamics.parameters.index(nominal)]
+        x, u = (column([values[s] for s in of]) for of in (self.dynamics.states, INPUTS))
+        asked = column([*push, *[0.0] * (len(self.dynamics.states) - 3)])
+        xdot, total = self.dynamics.euler(x, u, column(wind), par, self.dynamics.inflow_solver)
+        return Flight([z, demand, par], x, u, column(wind), asked, xdot, total)
+
+    @property
+    def switches(self) -> tuple[str, ...]:
+        """Names of the switching functions."""
+        return tuple(name.replace("_", " ") for name in self._flight.total.switches)
 
     def _system(self) -> Function:
-        z, demand, par = self._symbols()
-        x, u, wind, asked = self._flight(z, demand, par)
+        flight = self._flight
+        par = flight.arguments[2]
 
         def form(solver: Callable[..., Any]) -> Any:
-            return self.dynamics.euler(x, u, wind, par, solver)
+            return self.dynamics.euler(flight.x, flight.u, flight.wind, par, solver)
 
-        residual = form(self.dynamics.inflow_solver)[0] - asked
-        slopes = self.dynamics.derived(
-            form, lambda xdot: [jacobian((xdot - asked)[self.balanced], z)]
-        )
-        return Function("system", [z, demand, par], [residual, _by_rows(slopes[0])])
+        def derive(xdot: SX) -> list[SX]:
+            return [jacobian((xdot - flight.asked)[self.balanced], flight.arguments[0])]
+
+        slopes = self.dynamics.derived(form, derive)[0]
+        residual = dense(flight.xdot - flight.asked)
+        return Function("system", flight.arguments, [residual, _by_rows(slopes)])
 
     def _point(self) -> Function:
-        z, demand, par = self._symbols()
-        x, u, wind, asked = self._flight(z, demand, par)
-        xdot, total = self.dynamics.euler(x, u, wind, par, self.dynamics.inflow_solver)
+        flight, total = self._flight, self._flight.total
         # a rotor held at constant speed is turned with the body, and the engine turns it
-        torque = total.flow["Q_e"] + total.added_inertia * xdot[5]
-        switches = column([*total.switches.values(), 0.0])[: len(total.switches)]
-        return Function(
-            "point",
-            [z, demand, par],
-            [x, wind, xdot, dense(xdot - asked), dense(switches), dense(torque)],
-        )
+        torque = total.flow["Q_e"] + total.added_inertia * flight.xdot[5]
+        residual = dense(flight.xdot - flight.asked)
+        switches = column([*total.switches.values()])
+        outputs = [flight.x, flight.wind, flight.xdot, residual, switches, dense(torque)]
+        return Function("point", flight.arguments, outputs)
 
     def _slopes(self) -> Function:
         given = self.dynamics.function("jacobian")
         arguments = [SX.sym(given.name_in(i), *given.size_in(i)) for i in range(given.n_in())]
         return Function("slopes", arguments, [_by_rows(m) for m in given.call(arguments)])
-
-    @cached_property
-    def switches(self) -> tuple[str, ...]:
-        """Names of the switching functions."""
-        z, demand, par = self._symbols()
-        x, u, wind, _ = self._flight(z, demand, par)
-        total = self.dynamics.euler(x, u, wind, par, self.dynamics.inflow_solver)[1]
-        return tuple(name.replace("_", " ") for name in total.switches)
 
     # --- as machine code -------------------------------------------------------------------------
 

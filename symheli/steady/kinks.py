@@ -8,8 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from symheli.helicopter import Helicopter
+from symheli.steady.equilibrium import Equilibrium
+from symheli.steady.flight_conditions import FlightConditions
+from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import ALONE, SteadyFlights
-from symheli.steady.trim_batch import TrimBatch, trimmed, unknowns
+from symheli.steady.trim_batch import TrimBatch, unknowns
 from symheli.values.arrays import Array
 
 ACCURACY = 1e-6
@@ -21,7 +24,8 @@ CUTS = len(_QUARTERS) + 3
 
 def kink_speeds(heli: Helicopter, trims: TrimBatch) -> Mapping[str, tuple[float, ...]]:
     """Airspeeds (m/s) between neighbouring trims at which a switching function changes sign, to
-    `ACCURACY`, by cause.
+    `ACCURACY`, by cause. Where the equations jump there may be none: then the end of the trims
+    before the jump.
     """
     names = [name for name in trims.switches if not name.endswith("vortex ring")]  # no corner
     values = np.array([trims.switches[name] for name in names]).reshape(len(names), -1)
@@ -36,34 +40,58 @@ def kink_speeds(heli: Helicopter, trims: TrimBatch) -> Mapping[str, tuple[float,
 
 def _crossings(heli: Helicopter, trims: TrimBatch, names: list[str], between: Array) -> Array:
     """Where each of the named functions changes sign after the trim `between`: every bracket is cut
-    at its quarters and about the root of its secant, all cuts side by side, until it is short.
+    at its quarters and about the root of its secant, all side by side, until it is short.
     """
-    conditions = trims.conditions
-    ends = conditions.airspeed[np.stack([between, between + 1], axis=1)]
-    values = _values(trims, names, np.stack([between, between + 1], axis=1))
-    start = np.repeat(between, CUTS)
+    at = np.stack([between, between + 1], axis=1)
+    ends = trims.conditions.airspeed[at]
+    values = np.array([trims.switches[name][k] for name, k in zip(names, at, strict=True)])
+    asked, start = trims.conditions.at(between), unknowns(heli, trims.at(between))
     while np.any(np.ptp(ends, axis=1) > ACCURACY):
         cuts = _cuts(ends, values)
-        # where the equations jump there may be no trim: the nearest point says which side it is
-        flights = SteadyFlights(
-            [heli],
-            np.zeros(cuts.size, int),
-            replace(conditions.at(start), airspeed=cuts.ravel()),
-        )
-        found = trimmed(flights, unknowns(flights, trims.at(start)), ALONE, throw=False)
-        at = np.arange(cuts.size).reshape(cuts.shape)
+        found, heights = _heights(heli, asked, names, cuts, start)
         edges = np.column_stack([ends[:, 0], cuts, ends[:, 1]])
-        heights = np.column_stack([values[:, 0], _values(found, names, at), values[:, 1]])
-        beyond = (np.sign(heights) != np.sign(heights[:, :1])).argmax(axis=1)
-        pair = np.stack([beyond - 1, beyond], axis=1)
+        # where there is no trim, as beyond the change
+        heights = np.where(found, heights, -values[:, :1])
+        heights = np.column_stack([values[:, 0], heights, values[:, 1]])
+        pair = _changing(heights, found)
         ends = np.take_along_axis(edges, pair, axis=1)
         values = np.take_along_axis(heights, pair, axis=1)
     return _root(ends, values)
 
 
-def _values(trims: TrimBatch, names: list[str], at: Array) -> Array:
-    """The named function of each row at the trims `at` (n, m) of that row."""
-    return np.array([trims.switches[name][k] for name, k in zip(names, at, strict=True)])
+def _heights(
+    heli: Helicopter, asked: FlightConditions, names: list[str], cuts: Array, start: Array
+) -> tuple[Array, Array]:
+    """Whether there is a trim at each cut (n, CUTS), and the function of its row there."""
+    n, count = cuts.shape
+    # in each bracket one cut after the other, the brackets side by side
+    conditions = replace(asked.at(np.tile(np.arange(n), count)), airspeed=cuts.T.ravel())
+    flights = SteadyFlights([heli], np.zeros(n * count, int), conditions)
+    after = np.maximum(np.arange(n * count) - n, ALONE)
+    z, miss = flights.solved(np.tile(start, (count, 1)), after)
+    found = (miss < TOLERANCE).reshape(count, n)
+    for bracket in np.flatnonzero(~found.all(axis=0)).tolist():
+        first = int(found[:, bracket].argmin())  # the others are beyond it
+        k = first * n + bracket
+        alone = Equilibrium(heli, conditions[k])
+        z[k] = alone.solve(z[k - n] if first else start[bracket])
+        found[first, bracket] = alone.miss(z[k]) < TOLERANCE
+    switches = flights.points(z).switches.reshape(count, n, -1)
+    columns = [flights.equations.switches.index(name) for name in names]
+    return found.T, switches[:, np.arange(n), columns].T
+
+
+def _changing(heights: Array, found: Array) -> Array:
+    """Positions (n, 2) of the neighbours between which the sign of each row changes; where there is
+    no trim on the way, the last before that and the first without one.
+    """
+    n = len(heights)
+    known = np.column_stack([np.ones(n, bool), found, np.ones(n, bool)])
+    changed = known & (np.sign(heights) != np.sign(heights[:, :1]))
+    first = changed.argmax(axis=1)[:, None]
+    positions = np.arange(heights.shape[1])
+    last = np.where(known & (positions < first), positions, 0).max(axis=1)
+    return np.stack([last, last + 1], axis=1)
 
 
 def _cuts(ends: Array, values: Array) -> Array:

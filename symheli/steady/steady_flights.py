@@ -75,8 +75,8 @@ class SteadyFlights:
     def solved(self, starts: Array, after: Array | int) -> tuple[Array, Array]:
         """Newton's method in each flight: unknowns (N, nz) and largest residuals (N,).
 
-        after (N,): an earlier flight whose solution is the start (where that was not found, the
-        nearest found before it), or `ALONE`: the flight's own row of `starts` (N, nz).
+        after (N,): an earlier flight whose solution is the start (where that was not found, the one
+        which that was after), or `ALONE`: the flight's own row of `starts` (N, nz).
         """
         z, miss = np.array(starts, float), np.full(len(self), np.nan)
         after = np.array(np.broadcast_to(after, len(self)), ctypes.c_long)
@@ -84,7 +84,10 @@ class SteadyFlights:
         if code is None:
             for k in range(len(self)):
                 alone = Equilibrium(self.heli(k), self.conditions[k])
-                z[k], miss[k] = alone.newton(z[nearest(miss, int(after[k]), k)])
+                start = after[k]
+                while start != ALONE and not miss[start] < TOLERANCE:
+                    start = after[start]
+                z[k], miss[k] = alone.newton(z[k if start == ALONE else start])
             return z, miss
         code.trims(
             ctypes.c_long(len(self)),
@@ -134,15 +137,6 @@ class SteadyFlights:
     def _shared(self) -> tuple[ctypes.c_void_p, ctypes.c_long]:
         stride = self._parameters.shape[1] if len(self._parameters) > 1 else 0
         return _at(self._parameters), ctypes.c_long(stride)
-
-
-def nearest(miss: Array, after: int, own: int) -> int:
-    """The flight whose unknowns are the start: `after`, or the nearest found before it, else its
-    own.
-    """
-    while after >= 0 and not miss[after] < TOLERANCE:
-        after -= 1
-    return after if after >= 0 else own
 
 
 def _at(array: Array) -> ctypes.c_void_p:

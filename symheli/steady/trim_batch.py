@@ -10,7 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
-from symheli.steady.equations import SIDE_BY_SIDE
+from symheli.steady.equations import SIDE_BY_SIDE, steady_equations
 from symheli.steady.equilibrium import (
     Equilibrium,
     TrimPoint,
@@ -73,6 +73,11 @@ class TrimBatch(Sequence[TrimPoint]):
     switches: Mapping[str, Array]
     torque: Array
     _made: dict[int, TrimPoint] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for array in (*vars(self).values(), *self.switches.values()):
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
 
     @property
     def success(self) -> Array:
@@ -183,7 +188,9 @@ def trim_batch(
     )
     heli = heli if altitude is None else heli.at_altitude(altitude)
     flights = SteadyFlights([heli], np.zeros(len(conditions), int), conditions)
-    z = hover(flights) if start is None else unknowns(flights, start)
+    z = hover(flights) if start is None else unknowns(heli, start)
+    if z.ndim == 2 and len(z) != len(flights):
+        raise InputError(f"expected a start for each of {len(flights)} conditions, got {len(z)}")
     after = ALONE if isinstance(start, TrimBatch) else one_after_another(len(flights))
     return trimmed(flights, z, after, throw, continuation)
 
@@ -203,20 +210,17 @@ def hover(flights: SteadyFlights) -> Array:
     return np.stack(guesses)[flights.which]
 
 
-def unknowns(flights: SteadyFlights, start: TrimPoint | TrimBatch) -> Array:
-    """Those of a point for each, or of as many as there are (N, nz)."""
-    free, states = flights.equations.free, flights.equations.dynamics.states
-    x, u = (start.x, start.u) if isinstance(start, TrimBatch) else (start.x.array, start.u.array)
-    given = start.states if isinstance(start, TrimBatch) else start.x.signals
-    if given != states:
+def unknowns(heli: Helicopter, start: TrimPoint | TrimBatch) -> Array:
+    """Those of a point of this helicopter (nz,), or of many (N, nz)."""
+    many = isinstance(start, TrimBatch)
+    given = start.states if many else start.x.signals
+    if given != heli.states:
         raise InputError(
-            f"the start has states {', '.join(given)}, the helicopter {', '.join(states)}: trim"
-            " this helicopter"
+            f"the start has states {', '.join(given)}, the helicopter {', '.join(heli.states)}:"
+            " trim this helicopter"
         )
-    z = np.concatenate([x[..., free], u], axis=-1)
-    if z.ndim == 2 and len(z) != len(flights):
-        raise InputError(f"expected a start for each of {len(flights)} conditions, got {len(z)}")
-    return np.broadcast_to(z, (len(flights), z.shape[-1]))
+    x, u = (start.x, start.u) if many else (start.x.array, start.u.array)
+    return np.concatenate([x[..., steady_equations(heli).free], u], axis=-1)
 
 
 def trimmed(
@@ -226,10 +230,10 @@ def trimmed(
     throw: bool = True,
     continuation: bool = True,
 ) -> TrimBatch:
-    """The trims of these flights, from starts z (N, nz) in the order that `after` says (see
-    `SteadyFlights.solved`).
+    """The trims of these flights from starts z (N, nz) or (nz,), each after another as
+    `SteadyFlights.solved` has it.
     """
-    z, miss = flights.solved(z, after)
+    z, miss = flights.solved(np.broadcast_to(z, (len(flights), z.shape[-1])), after)
     demand = flights.conditions.demand
     for k in np.flatnonzero(~(miss < TOLERANCE)).tolist():
         alone = Equilibrium(flights.heli(k), flights.conditions[k])
