@@ -80,7 +80,7 @@ class FlightDataset:
         arrays: dict[str, tuple[tuple[str, ...], tuple[int, ...], tuple[int, ...], Any, Any]] = {
             "values": (("flight", "time", "signal"), (flights, n, m), (chunk, n, m), "<f8", "NaN"),
             "duration": (("flight",), (flights,), (chunk,), "<f8", "NaN"),
-            "lost": (("flight",), (flights,), (chunk,), "|b1", False),
+            "lost": (("flight",), (flights,), (chunk,), "|b1", None),
         }
         metadata: dict[str, Any] = {".zgroup": {"zarr_format": FORMAT}, ".zattrs": dict(attributes)}
         whole = {
@@ -194,11 +194,11 @@ class FlightDataset:
         time = self.time
         count = int(np.sum(time <= flown + 1e-9))
         values = block[i % self._chunk_size, :count]
-        kept = np.isfinite(values).any(axis=0)
+        kept = np.flatnonzero(np.isfinite(values).any(axis=0)).tolist()
         return FlightRecord(
             time[:count],
             values[:, kept],
-            tuple(s for s, there in zip(self.signals, kept, strict=True) if there),
+            tuple(self.signals[i] for i in kept),
             note=f"{self.path.name}, flight {i}",
         )
 
