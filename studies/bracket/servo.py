@@ -41,9 +41,10 @@ def measure_servo(heli: Helicopter, quick: bool = False) -> list[Bound]:
     for name, loop in guarantees.servo_loops(heli, family, gentle, aggressive).items():
         progress(name)
         rates = (0.0, 3.0, math.inf) if quick else RATES
-        found += guarantees.bounds(name, "servo", loop, rates, SEGMENTS, Effort().search)
+        asked = guarantees.bounds(name, "servo", loop, rates, SEGMENTS, Effort().search)
         if guarantees.has_lft(loop):
-            found += guarantees.lft_bounds(name, "servo", loop)
+            asked += guarantees.lft_bounds(name, "servo", loop)
+        found += guarantees.answered(asked)
     return found
 
 

@@ -5,8 +5,9 @@ identified model.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -155,6 +156,10 @@ def exact_frozen_gain(family: LinearFamily, sampled: bool) -> float:
     return max(norm(*loop.matrices(0.0), loop.dt)[0] for loop in loops)
 
 
+Proof = Callable[[], list[Bound]]
+"""One question about one loop, to be answered where there is room: a `functools.partial`."""
+
+
 def bounds(
     name: str,
     channel: str,
@@ -162,49 +167,59 @@ def bounds(
     rates: Sequence[float],
     segments: tuple[int, ...],
     search: Search,
-) -> Iterator[Bound]:
-    """One gain a rate (m/s^2), computed when asked for, and stability where no gain is proven and
-    no growth was found.
+) -> list[Proof]:
+    """One gain a rate (m/s^2), and stability where no gain is proven and no growth was found.
 
     `search` sets how hard the lower bound is looked for; among airspeeds that jump, a search that
     spares nothing is quick.
     """
-    spline = Spline(segments=segments)
-    for rate in rates:
-        form = CONSTANT if math.isinf(rate) else PLAIN
-        certificate = synthesis.l2_gain(
-            lpv,
-            rate,
-            form=spline,
-            search=Search(seconds=math.inf) if math.isinf(rate) else search,
-        )
-        yield Bound(name, channel, rate, form, certificate)
-        if not certificate.verified and math.isfinite(certificate.lower):
-            yield Bound(
-                name,
-                channel,
-                rate,
-                form,
-                synthesis.stability(lpv, rate, form=spline, search=None),
-            )
+    form = Spline(segments=segments)
+    return [partial(_bound, name, channel, lpv, rate, form, search) for rate in rates]
+
+
+def _bound(
+    name: str, channel: str, lpv: LPVStateSpace, rate: float, spline: Spline, search: Search
+) -> list[Bound]:
+    form = CONSTANT if math.isinf(rate) else PLAIN
+    thorough = Search(seconds=math.inf) if math.isinf(rate) else search
+    certificate = synthesis.l2_gain(lpv, rate, form=spline, search=thorough)
+    found = [Bound(name, channel, rate, form, certificate)]
+    if not certificate.verified and math.isfinite(certificate.lower):
+        stable = synthesis.stability(lpv, rate, form=spline, search=None)
+        found.append(Bound(name, channel, rate, form, stable))
+    return found
+
+
+def answered(asked: Sequence[Proof]) -> list[Bound]:
+    """All answers, here and one after the other."""
+    return [bound for proof in asked for bound in proof()]
 
 
 def memory_bounds(
     name: str, channel: str, lpv: LPVStateSpace, known: Sequence[float], search: Search
-) -> Iterator[Bound]:
+) -> list[Proof]:
     """Gains by a P with a memory; the lower bound is looked for where it is not `known`."""
-    for rate, form in MEMORIES.items():
-        certificate = synthesis.l2_gain(
-            lpv, rate, form=form, search=None if rate in known else search
-        )
-        yield Bound(name, channel, rate, MEMORY, certificate)
+    return [
+        partial(_memory_bound, name, channel, lpv, rate, None if rate in known else search)
+        for rate in MEMORIES
+    ]
 
 
-def lft_bounds(name: str, channel: str, lpv: LPVStateSpace) -> Iterator[Bound]:
+def _memory_bound(
+    name: str, channel: str, lpv: LPVStateSpace, rate: float, search: Search | None
+) -> list[Bound]:
+    certificate = synthesis.l2_gain(lpv, rate, form=MEMORIES[rate], search=search)
+    return [Bound(name, channel, rate, MEMORY, certificate)]
+
+
+def lft_bounds(name: str, channel: str, lpv: LPVStateSpace) -> list[Proof]:
     """Gains by the LFT tests, which let the airspeed jump; the lower bound is that of `bounds`."""
-    lft = lpv.to_lft().reduce()
-    for form, scaling in LFT_TESTS.items():
-        yield Bound(name, channel, math.inf, form, synthesis.lft_gain(lft, scaling, search=None))
+    return [partial(_lft_bound, name, channel, lpv, form) for form in LFT_TESTS]
+
+
+def _lft_bound(name: str, channel: str, lpv: LPVStateSpace, form: str) -> list[Bound]:
+    gain = synthesis.lft_gain(lpv.to_lft().reduce(), LFT_TESTS[form], search=None)
+    return [Bound(name, channel, math.inf, form, gain)]
 
 
 LOOPS = {

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.longitudinal import longitudinal_loop
+from studies.processes import Processes
 from studies.transition import guarantees
 from studies.transition.axes import LATERAL
 from studies.transition.baseline import Baseline
 from studies.transition.effort import GLANCE, Effort
 from studies.transition.flights import NOISES
-from studies.transition.guarantees import Bound
+from studies.transition.guarantees import Bound, Proof
 from studies.transition.identified import Identification
 from symheli import Helicopter
 from synthesis import FrozenGain, frozen_gain
@@ -44,59 +49,82 @@ class ServoProofs:
     frozen_peaks: Mapping[str, FrozenGain]
 
 
-def prove_gust(heli: Helicopter, baseline: Baseline, effort: Effort) -> GustProofs:
-    """Baseline, and with effort the exact models; continuous time."""
-    exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=False)
+Answer = tuple[float, list[Bound]]
+"""What was found, after the seconds it took."""
+
+
+@dataclass(frozen=True)
+class Questions:
+    """Proofs that need nothing of each other, and what their answers become together; those of
+    `long` take longest and go first.
+    """
+
+    proofs: Sequence[Proof]
+    together: Callable[[tuple[Bound, ...]], Any]
+    long: Sequence[Proof] = ()
+
+    def asked(self, processes: Processes) -> list[Future[Answer]]:
+        """An answer to come for each proof."""
+        order = [*self.long, *(proof for proof in self.proofs if proof not in self.long)]
+        answers = processes.submit([partial(_timed, proof) for proof in order])
+        return [answers[order.index(proof)] for proof in self.proofs]
+
+
+def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Questions:
+    """About the baseline, and with effort the exact models; continuous time."""
     loop = guarantees.gust_loop(baseline.nodes)
-    found = [
-        *guarantees.bounds(
-            "baseline", "gust", loop, effort.gust_rates, effort.gust_segments, effort.search
-        ),
-        *guarantees.lft_bounds("baseline", "gust", loop),
-    ]
+    baseline_proofs = guarantees.bounds(
+        "baseline", "gust", loop, effort.gust_rates, effort.gust_segments, effort.search
+    )
+    asked = [*baseline_proofs, *guarantees.lft_bounds("baseline", "gust", loop)]
+    long: list[Proof] = []
     if effort.thorough:
-        found += guarantees.memory_bounds(
-            "baseline", "gust", loop, effort.gust_rates, effort.search
-        )
+        long = guarantees.memory_bounds("baseline", "gust", loop, effort.gust_rates, effort.search)
+        asked += long
         exact = ExactLateral.of(heli).loop("gust")
-        found += guarantees.bounds(
+        asked += guarantees.bounds(
             "exact", "gust", exact, effort.exact_rates, effort.gust_segments, effort.search
         )
-    return GustProofs(bounds=tuple(found), exact_frozen=exact_frozen)
+    exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=False)
+    return Questions(
+        asked, lambda bounds: GustProofs(bounds=bounds, exact_frozen=exact_frozen), long[::-1]
+    )
 
 
-def prove_longitudinal(heli: Helicopter, effort: Effort) -> LongitudinalProofs:
-    """Baseline, continuous time."""
-    loop = longitudinal_loop(heli)
-    found = [
-        *guarantees.bounds(
-            "baseline",
-            "longitudinal",
-            loop,
-            effort.longitudinal_rates,
-            effort.gust_segments,
-            GLANCE,
-        ),
-        *guarantees.lft_bounds("baseline", "longitudinal", loop),
-    ]
-    return LongitudinalProofs(bounds=tuple(found))
+def longitudinal_questions(heli: Helicopter, effort: Effort) -> Questions:
+    """About the baseline, continuous time."""
+    loop, channel = longitudinal_loop(heli), "longitudinal"
+    asked = guarantees.bounds(
+        "baseline", channel, loop, effort.longitudinal_rates, effort.gust_segments, GLANCE
+    )
+    asked += guarantees.lft_bounds("baseline", channel, loop)
+    return Questions(asked, lambda bounds: LongitudinalProofs(bounds=bounds))
 
 
-def prove_servo(
+def servo_questions(
     heli: Helicopter, baseline: Baseline, identification: Identification, effort: Effort
-) -> ServoProofs:
-    """Baseline and identified models, with effort the exact ones; 50 Hz."""
-    exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=True)
+) -> Questions:
+    """About the baseline and the identified models, with effort the exact ones; 50 Hz."""
     aggressive = identification.of(LATERAL, NOISES[0]).model
     loops = guarantees.servo_loops(
         heli if effort.thorough else None, baseline.nodes, identification.gentle, aggressive
     )
-    found, peaks = [], {}
+    asked: list[Proof] = []
     for name, loop in loops.items():
-        peaks[name] = frozen_gain(loop)
-        found += guarantees.bounds(
+        asked += guarantees.bounds(
             name, "servo", loop, effort.servo_rates, effort.servo_segments, GLANCE
         )
         if effort.thorough and guarantees.has_lft(loop):
-            found += guarantees.lft_bounds(name, "servo", loop)
-    return ServoProofs(bounds=tuple(found), exact_frozen=exact_frozen, frozen_peaks=peaks)
+            asked += guarantees.lft_bounds(name, "servo", loop)
+    exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=True)
+    peaks = {name: frozen_gain(loop) for name, loop in loops.items()}
+    return Questions(
+        asked,
+        lambda bounds: ServoProofs(bounds=bounds, exact_frozen=exact_frozen, frozen_peaks=peaks),
+    )
+
+
+def _timed(proof: Proof) -> Answer:
+    begin = time.perf_counter()
+    found = proof()
+    return time.perf_counter() - begin, found

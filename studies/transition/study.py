@@ -6,12 +6,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from studies.processes import Processes
 from studies.transition.baseline import Baseline, build_baseline
 from studies.transition.comparison import Comparison, compare
 from studies.transition.effort import Effort
@@ -20,12 +22,14 @@ from studies.transition.identified import Identification, identify_axes
 from studies.transition.outcome import Outcome
 from studies.transition.paper_experiment import PERIOD, PaperExperiments, run_experiments
 from studies.transition.proofs import (
+    Answer,
     GustProofs,
     LongitudinalProofs,
+    Questions,
     ServoProofs,
-    prove_gust,
-    prove_longitudinal,
-    prove_servo,
+    gust_questions,
+    longitudinal_questions,
+    servo_questions,
 )
 from studies.transition.recovery import Recoveries, recover_at
 from studies.transition.report import write_report, write_results
@@ -54,13 +58,37 @@ class Study(Outcome):
 @dataclass(frozen=True)
 class Stage:
     """What fills one field of an `Outcome`: its title, the type of its result, and how it is
-    computed from what is there.
+    computed from the stages it `needs`: at once, or as `Questions` that processes answer.
     """
 
     name: str
     title: str
     kind: type
+    needs: tuple[str, ...]
     compute: Callable[[Study, Effort], Any]
+    asks: bool = False
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A stage whose questions are being answered."""
+
+    questions: Questions
+    answers: Sequence[Future[Answer]]
+
+    @classmethod
+    def of(cls, stage: Stage, study: Study, effort: Effort, processes: Processes) -> Asked:
+        """Hand its questions over."""
+        questions = stage.compute(study, effort)
+        return cls(questions, questions.asked(processes))
+
+    def stored(self) -> Stored:
+        """Wait for the answers; `seconds` is the work they were."""
+        found = [answer.result() for answer in self.answers]
+        bounds = tuple(bound for _, own in found for bound in own)
+        return Stored(
+            result=self.questions.together(bounds), seconds=sum(seconds for seconds, _ in found)
+        )
 
 
 def run_study(
@@ -73,22 +101,35 @@ def run_study(
     """Run every stage, store it and write results.json after each, and report.html with its figures
     into `out` at the end.
 
-    `resume` takes the stages that an earlier run has stored in `out`, where code, libraries,
-    vehicle, effort and seed are the same; others, and those that are damaged, are computed again.
-    Progress goes to standard error. An interrupted run leaves its finished stages and their
-    results; files are whole or absent.
+    Proofs that do not need each other run side by side, in a process a core, while the other stages
+    are computed here. `resume` takes the stages that an earlier run has stored in `out`, where
+    code, libraries, vehicle, effort and seed are the same; others, and those that are damaged, are
+    computed again. Progress goes to standard error. An interrupted run leaves its finished stages
+    and their results; files are whole or absent.
     """
     out, effort = Path(out), Effort.look() if quick else Effort()
     heli = Helicopter.load(vehicle, governor="ideal")
     study = Study(vehicle=vehicle, quick=quick, seed=seed, heli=heli)
     stored = StoredStages(out / STAGES, content_key(heli, effort, seed))
-    for stage in stages(effort):
-        found = _taken(stored, stage) if resume else None
-        if found is None:
-            found = computed(stage, study, effort)
+    todo = list(stages(effort))
+    for stage in todo[:] if resume else ():
+        if (found := _taken(stored, stage)) is not None:
+            study = with_stage(study, stage, found)
+            todo.remove(stage)
+    with Processes() as processes:
+        asked: dict[str, Asked] = {}
+        while todo:
+            ready = [stage for stage in todo if set(stage.needs) <= study.seconds.keys()]
+            for stage in ready:
+                if stage.asks and stage.name not in asked:
+                    asked[stage.name] = Asked.of(stage, study, effort, processes)
+            stage = next((stage for stage in ready if not stage.asks), ready[0])
+            with _shown(stage.title):
+                found = asked[stage.name].stored() if stage.asks else computed(stage, study, effort)
             stored.save(stage.name, found)
-        study = with_stage(study, stage, found)
-        write_results(study, out)
+            study = with_stage(study, stage, found)
+            write_results(study, out)
+            todo.remove(stage)
     study = replace(study, complete=True)
     with _shown("Writing figures and report"):
         write_report(study, out)
@@ -96,36 +137,42 @@ def run_study(
 
 
 def stages(effort: Effort) -> tuple[Stage, ...]:
-    """In order: each needs those before it."""
+    """In order: each needs some of those before it."""
     longitudinal = Stage(
         "longitudinal",
         "Proving gains of the longitudinal gust loop (baseline, continuous)",
         LongitudinalProofs,
-        lambda s, effort: prove_longitudinal(_there(s.heli), effort),
+        (),
+        lambda s, effort: longitudinal_questions(_there(s.heli), effort),
+        asks=True,
     )
     return (
         Stage(
             "baseline",
             "Model and baseline: trim, linearize, interpolate, LFT",
             Baseline,
+            (),
             lambda s, _: build_baseline(_there(s.heli)),
         ),
         Stage(
             "paper_experiment",
             "The paper's experiment, open and closed loop",
             PaperExperiments,
+            ("baseline",),
             lambda s, _: run_experiments(_there(s.baseline).nodes, s.seed),
         ),
         Stage(
             "exact_recovery",
             "Exact recovery of A(p), B(p)",
             Recoveries,
+            ("baseline",),
             lambda s, _: recover_at(_there(s.baseline).nodes, (0.02, PERIOD), s.seed),
         ),
         Stage(
             "flights",
             "Flying the transitions",
             Flights,
+            (),
             lambda s, effort: fly_transitions(
                 _there(s.heli), s.seed, effort.ramps, effort.gentle_ramps
             ),
@@ -134,12 +181,14 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             "identification",
             "Identifying and scoring",
             Identification,
+            ("flights",),
             lambda s, _: identify_axes(_there(s.heli), _there(s.flights)),
         ),
         Stage(
             "comparison",
             "Comparing with the baseline",
             Comparison,
+            ("baseline", "flights", "identification"),
             lambda s, _: compare(
                 _there(s.heli), _there(s.baseline), _there(s.flights), _there(s.identification)
             ),
@@ -148,25 +197,31 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             "gust",
             "Proving gains of the lateral gust loop (baseline and exact, continuous)",
             GustProofs,
-            lambda s, effort: prove_gust(_there(s.heli), _there(s.baseline), effort),
+            ("baseline",),
+            lambda s, effort: gust_questions(_there(s.heli), _there(s.baseline), effort),
+            asks=True,
         ),
         *((longitudinal,) if effort.longitudinal_rates else ()),
         Stage(
             "servo",
             "Proving gains of the servo loop (exact, baseline and identified, 50 Hz)",
             ServoProofs,
-            lambda s, effort: prove_servo(
+            ("baseline", "identification"),
+            lambda s, effort: servo_questions(
                 _there(s.heli), _there(s.baseline), _there(s.identification), effort
             ),
+            asks=True,
         ),
     )
 
 
 def computed(stage: Stage, study: Study, effort: Effort) -> Stored:
-    """Compute a stage, and say so."""
+    """Compute a stage here."""
+    if stage.asks:
+        with Processes(1) as here:
+            return Asked.of(stage, study, effort, here).stored()
     begin = time.perf_counter()
-    with _shown(stage.title):
-        result = stage.compute(study, effort)
+    result = stage.compute(study, effort)
     return Stored(result=result, seconds=time.perf_counter() - begin)
 
 

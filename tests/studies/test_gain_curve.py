@@ -55,10 +55,8 @@ def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
         [[[-2.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
     )
     quick = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
-    found = [
-        *guarantees.bounds("baseline", "gust", lpv, (0.0, 1.0, math.inf), (2,), quick),
-        *guarantees.lft_bounds("baseline", "gust", lpv),
-    ]
+    asked = guarantees.bounds("baseline", "gust", lpv, (0.0, 1.0, math.inf), (2,), quick)
+    found = guarantees.answered([*asked, *guarantees.lft_bounds("baseline", "gust", lpv)])
     table = gain_tables.guarantee(found, "gust")
     assert table.columns[5:] == ["P(p)", "constant P", *guarantees.LFT_TESTS]
     # a first-order lag with pole -1 at the worst: gain 1 whatever p does, and every test finds it
@@ -76,7 +74,7 @@ def test_a_proof_of_a_model_that_the_exact_one_exceeds_is_said_not_to_hold_for_t
         )
 
     def bounds(model, gain):
-        return list(
+        return guarantees.answered(
             guarantees.bounds(
                 model,
                 "gust",

@@ -105,7 +105,8 @@ def test_a_loop_that_is_unstable_when_frozen_gets_its_report(full, tmp_path, unp
         [[[0.0]]],
         Scheduling("airspeed", "m/s", 0.0, 2.0),
     )
-    found = list(guarantees.bounds("baseline", "gust", growing, (0.0, math.inf), (2,), GLIMPSE))
+    asked = guarantees.bounds("baseline", "gust", growing, (0.0, math.inf), (2,), GLIMPSE)
+    found = guarantees.answered(asked)
     gust = replace(full.gust, bounds=tuple(found), exact_frozen=math.inf)
     outcome = replace(full, gust=gust)
     assert "unstable" in page(outcome, tmp_path)

@@ -1,0 +1,79 @@
+"""Calls side by side in processes of their own."""
+
+import os
+import subprocess
+import sys
+import textwrap
+import time
+from functools import partial
+
+import pytest
+
+from studies.processes import Processes
+from symheli.errors import InputError, SymheliError
+
+
+def test_every_call_is_answered_in_its_place():
+    with Processes(2) as processes:
+        answers = processes.submit([partial(pow, 2, k) for k in range(20)])
+        assert [a.result() for a in answers] == [2**k for k in range(20)]
+        assert processes.submit([os.getpid])[0].result() != os.getpid()
+
+
+def test_one_process_is_this_one():
+    with Processes(1) as processes:
+        assert processes.submit([os.getpid])[0].result() == os.getpid()
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_exception_comes_back_and_the_others_go_on(count):
+    with Processes(count) as processes:
+        bad, good = processes.submit([partial(int, "x"), partial(int, "7")])
+        with pytest.raises(ValueError, match="invalid literal"):
+            bad.result()
+        assert good.result() == 7
+
+
+def test_what_a_call_prints_is_no_answer(capfd):
+    with Processes(2) as processes:
+        assert processes.submit([partial(print, "hello")])[0].result() is None
+    assert "hello" in capfd.readouterr().err
+
+
+def test_a_process_that_dies_says_so_and_the_others_are_answered():
+    with Processes(2) as processes:
+        dead, *alive = processes.submit(
+            [partial(os._exit, 3), *(partial(pow, k, 2) for k in range(6))]
+        )
+        with pytest.raises(SymheliError, match="a process that computed _exit has ended"):
+            dead.result()
+        assert [a.result() for a in alive] == [k**2 for k in range(6)]
+
+
+def test_what_cannot_travel_is_refused_at_once():
+    with Processes(2) as processes, pytest.raises((AttributeError, TypeError, ValueError)):
+        processes.submit([lambda: 3])
+
+
+def test_leaving_by_an_exception_ends_what_is_under_way():
+    begin = time.monotonic()
+    with pytest.raises(InputError), Processes(2) as processes:
+        processes.submit([partial(time.sleep, 60)] * 4)
+        raise InputError("enough")
+    assert time.monotonic() - begin < 30
+
+
+def test_a_script_without_a_guard_may_ask(tmp_path):
+    """Nothing of the script is imported again, so that it need not guard its main part."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        textwrap.dedent("""
+        from functools import partial
+        from studies.processes import Processes
+        print("begin")
+        with Processes(2) as processes:
+            print(processes.submit([partial(pow, 3, 2)])[0].result())
+        """)
+    )
+    said = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == ["begin", "9"]
