@@ -28,49 +28,96 @@ One step flatters: report one step, a horizon and the free run.
 98
 """
 
-from identification.design.excitation import ExcitationReport, excitation_report
-from identification.design.experiment_design import (
-    Experiment,
-    Plan,
-    choose_experiments,
-    compare_experiments,
-)
-from identification.estimators.estimate import fit
-from identification.estimators.instrumental_variables import InstrumentalVariables
-from identification.estimators.instruments import InstrumentSource, LaggedSignals
-from identification.estimators.lasso import Lasso
-from identification.estimators.least_squares import LeastSquares
-from identification.estimators.method import Estimate, Method
-from identification.estimators.output_error import OutputError
-from identification.estimators.recursion import Recursion
-from identification.estimators.refined_instruments import RefinedInstruments
-from identification.estimators.ridge import Ridge
-from identification.judge.against_constant import AgainstConstant, against_constant
-from identification.judge.beside_baseline import (
-    BaselineModel,
-    BaselinePredictor,
-    BesideBaseline,
-    beside_baseline,
-)
-from identification.judge.dependence import DependenceReport, dependence_report
-from identification.judge.frequency_response import FrequencyResponse, frequency_response
-from identification.judge.frozen_models import FrozenModels, frozen_models, pole_miss
-from identification.judge.order_scan import OrderScan, Trial, order_scan
-from identification.judge.residuals import ResidualAnalysis, Theil, residual_analysis, theil
-from identification.judge.response_band import ResponseBand
-from identification.judge.scores import Scores, scores
-from identification.judge.slow_modes import SlowMode, SlowModes, slow_modes
-from identification.judge.uncertainty import Band, Uncertainty, uncertainty
-from identification.model.coefficients import Coefficients, CoefficientValues
-from identification.model.lpvarx_model import LPVARXModel
-from identification.model.prediction import fit_percent
-from identification.recursive.forgetting import Constant, Directional, Forgetting, Variable
-from identification.recursive.history import History
-from identification.recursive.online import Online
-from identification.recursive.recursive_least_squares import RecursiveLeastSquares
-from identification.recursive.rls_state import RLSInfo, RLSState
-from identification.structure.lpvarx import LPVARX, Entry, Group, Term
-from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from symheli.lazy import lazily
+
+if TYPE_CHECKING:
+    from identification.design.excitation import ExcitationReport, excitation_report
+    from identification.design.experiment_design import (
+        Experiment,
+        Plan,
+        choose_experiments,
+        compare_experiments,
+    )
+    from identification.estimators.estimate import fit
+    from identification.estimators.instrumental_variables import InstrumentalVariables
+    from identification.estimators.instruments import InstrumentSource, LaggedSignals
+    from identification.estimators.lasso import Lasso
+    from identification.estimators.least_squares import LeastSquares
+    from identification.estimators.method import Estimate, Method
+    from identification.estimators.output_error import OutputError
+    from identification.estimators.recursion import Recursion
+    from identification.estimators.refined_instruments import RefinedInstruments
+    from identification.estimators.ridge import Ridge
+    from identification.judge.against_constant import AgainstConstant, against_constant
+    from identification.judge.beside_baseline import (
+        BaselineModel,
+        BaselinePredictor,
+        BesideBaseline,
+        beside_baseline,
+    )
+    from identification.judge.dependence import DependenceReport, dependence_report
+    from identification.judge.frequency_response import FrequencyResponse, frequency_response
+    from identification.judge.frozen_models import FrozenModels, frozen_models, pole_miss
+    from identification.judge.order_scan import OrderScan, Trial, order_scan
+    from identification.judge.residuals import ResidualAnalysis, Theil, residual_analysis, theil
+    from identification.judge.response_band import ResponseBand
+    from identification.judge.scores import Scores, scores
+    from identification.judge.slow_modes import SlowMode, SlowModes, slow_modes
+    from identification.judge.uncertainty import Band, Uncertainty, uncertainty
+    from identification.model.coefficients import Coefficients, CoefficientValues
+    from identification.model.lpvarx_model import LPVARXModel
+    from identification.model.prediction import fit_percent
+    from identification.recursive.forgetting import Constant, Directional, Forgetting, Variable
+    from identification.recursive.history import History
+    from identification.recursive.online import Online
+    from identification.recursive.recursive_least_squares import RecursiveLeastSquares
+    from identification.recursive.rls_state import RLSInfo, RLSState
+    from identification.structure.lpvarx import LPVARX, Entry, Group, Term
+    from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
+
+_ROOMS = {
+    "identification.design.excitation": "ExcitationReport excitation_report",
+    "identification.design.experiment_design": (
+        "Experiment Plan choose_experiments compare_experiments"
+    ),
+    "identification.estimators.estimate": "fit",
+    "identification.estimators.instrumental_variables": "InstrumentalVariables",
+    "identification.estimators.instruments": "InstrumentSource LaggedSignals",
+    "identification.estimators.lasso": "Lasso",
+    "identification.estimators.least_squares": "LeastSquares",
+    "identification.estimators.method": "Estimate Method",
+    "identification.estimators.output_error": "OutputError",
+    "identification.estimators.recursion": "Recursion",
+    "identification.estimators.refined_instruments": "RefinedInstruments",
+    "identification.estimators.ridge": "Ridge",
+    "identification.judge.against_constant": "AgainstConstant against_constant",
+    "identification.judge.beside_baseline": (
+        "BaselineModel BaselinePredictor BesideBaseline beside_baseline"
+    ),
+    "identification.judge.dependence": "DependenceReport dependence_report",
+    "identification.judge.frequency_response": "FrequencyResponse frequency_response",
+    "identification.judge.frozen_models": "FrozenModels frozen_models pole_miss",
+    "identification.judge.order_scan": "OrderScan Trial order_scan",
+    "identification.judge.residuals": "ResidualAnalysis Theil residual_analysis theil",
+    "identification.judge.response_band": "ResponseBand",
+    "identification.judge.scores": "Scores scores",
+    "identification.judge.slow_modes": "SlowMode SlowModes slow_modes",
+    "identification.judge.uncertainty": "Band Uncertainty uncertainty",
+    "identification.model.coefficients": "Coefficients CoefficientValues",
+    "identification.model.lpvarx_model": "LPVARXModel",
+    "identification.model.prediction": "fit_percent",
+    "identification.recursive.forgetting": "Constant Directional Forgetting Variable",
+    "identification.recursive.history": "History",
+    "identification.recursive.online": "Online",
+    "identification.recursive.recursive_least_squares": "RecursiveLeastSquares",
+    "identification.recursive.rls_state": "RLSInfo RLSState",
+    "identification.structure.lpvarx": "LPVARX Entry Group Term",
+    "symheli.lpv": ("BSpline PiecewiseLinear Polynomial Product Spline UserFunctions"),
+}
 
 __all__ = [
     "LPVARX",
@@ -144,3 +191,9 @@ __all__ = [
     "theil",
     "uncertainty",
 ]
+
+__getattr__ = lazily(__name__, _ROOMS)
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

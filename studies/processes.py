@@ -64,7 +64,7 @@ class Processes:
         self._leaving = True
         for process in self._running if kind is not None else ():
             process.kill()
-        for thread in self._serving:
+        for _ in self._serving:
             self._waiting.put(None)
         for thread in self._serving:
             thread.join()

@@ -11,8 +11,9 @@ library. The examples of this package start from
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from symheli.lazy import lazily
 
 if TYPE_CHECKING:
     from symheli.airframe.identified_models import (
@@ -108,8 +109,6 @@ _ROOMS = {
         " TrimError UnknownNameError"
     ),
 }
-_HOME = {name: module for module, names in _ROOMS.items() for name in names.split()}
-
 __all__ = [
     "LFT",
     "AccuracyError",
@@ -182,12 +181,7 @@ __all__ = [
 __version__ = "0.1.0"
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'symheli' has no attribute {name!r}")
-    value = getattr(importlib.import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
+__getattr__ = lazily(__name__, _ROOMS)
 
 
 def __dir__() -> list[str]:

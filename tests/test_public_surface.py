@@ -30,6 +30,7 @@ SHARED = (
     "symheli.lpv",
     "symheli.errors",
     "symheli.extras",
+    "symheli.lazy",
 )
 """What identification and synthesis may see of the model's room."""
 
@@ -71,15 +72,36 @@ def test_every_public_name_exists_and_is_documented(package):
 
 
 def test_importing_the_packages_loads_no_heavy_library():
-    heavy = "('casadi', 'cvxpy', 'matplotlib', 'pandas', 'control', 'sympy')"
+    heavy = "('casadi', 'cvxpy', 'matplotlib', 'numpy', 'scipy', 'pandas', 'control', 'sympy')"
     code = (
-        f"import sys, symheli, symheli.lpv, identification, synthesis; print([m for m in {heavy} if"
+        f"import sys, symheli, identification, synthesis; print([m for m in {heavy} if"
         " m in sys.modules])"
     )
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.strip()
     assert loaded == "[]"
+
+
+@pytest.mark.parametrize("package", ["symheli", "identification", "synthesis"])
+def test_every_name_of_a_package_is_listed_and_typed(package):
+    """What is loaded at first use stands in three lists."""
+    module = importlib.import_module(package)
+    tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
+    (checked,) = (node for node in tree.body if isinstance(node, ast.If))
+    typed = {
+        alias.name: node.module
+        for node in checked.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    rooms = {name: home for home, names in module._ROOMS.items() for name in names.split()}
+    assert set(typed) == set(rooms) == set(module.__all__)
+    for name, home in rooms.items():
+        assert getattr(importlib.import_module(home), name) is getattr(
+            importlib.import_module(typed[name]), name
+        )
+    assert set(module.__all__) <= set(dir(module))
 
 
 def test_importing_the_studies_changes_no_environment_variable():

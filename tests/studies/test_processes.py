@@ -56,10 +56,14 @@ def test_what_cannot_travel_is_refused_at_once():
 
 
 def test_leaving_by_an_exception_ends_what_is_under_way():
+    def enough():
+        with Processes(2) as processes:
+            processes.submit([partial(time.sleep, 60)] * 4)
+            raise InputError("enough")
+
     begin = time.monotonic()
-    with pytest.raises(InputError), Processes(2) as processes:
-        processes.submit([partial(time.sleep, 60)] * 4)
-        raise InputError("enough")
+    with pytest.raises(InputError):
+        enough()
     assert time.monotonic() - begin < 30
 
 
