@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from symheli.helicopter import Helicopter
     from symheli.integrate import (
         Batch,
+        CashKarp,
         DormandPrince,
         Feedback,
         Radau,
@@ -91,7 +92,7 @@ _ROOMS = {
     "symheli.steady.trim_map": "TrimMap trim_map",
     "symheli.steady.derivative_table": "DerivativeTable derivatives",
     "symheli.integrate": (
-        "Batch DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
+        "Batch CashKarp DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
     ),
     "symheli.flight": (
         "AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightDataset"
@@ -116,6 +117,7 @@ __all__ = [
     "AirspeedSchedule",
     "Autopilot",
     "Batch",
+    "CashKarp",
     "CertificateError",
     "CompilerWarning",
     "Controller",

@@ -1,7 +1,7 @@
-/* One flight by the pair of Dormand and Prince, orders 5 and 4, with step control: NX states, NP
-   parameters, SWITCHED_NK held values. The generated switched_held(u, wind, p, kept) and
+/* One flight by a pair of explicit Runge-Kutta methods of orders 5 and 4 with step control: NX
+   states, NP parameters, SWITCHED_NK held values. The generated switched_held(u, wind, p, kept) and
    switched_rates(x, kept, xdot, switches) come before this text; STAGES, A, B, E (b - b of order 4),
-   SWITCHES and NEAR too. */
+   AT_END (the stage at the end of the step), SWITCHES and NEAR too. */
 
 struct flight {
   const double *x0, *u, *wind; long wind_sample;         /* NX; sample, 4; sample or one, 3 */
@@ -15,29 +15,32 @@ struct flight {
 /* sum_j weights[j] k[j] of so many stages */
 static inline void weighted(double *sum, const double *weights, lane (*k)[NX], int stages)
 {
-  for (int i = 0; i < NX; ++i) sum[i] = weights[0] * k[0][i][0];
-  for (int j = 1; j < stages; ++j)
+  for (int i = 0; i < NX; ++i) sum[i] = 0;
+  for (int j = 0; j < stages; ++j)
     for (int i = 0; i < NX; ++i) sum[i] = FUSED(weights[j], k[j][i][0], sum[i]);
 }
 
-/* Start from x, rates k[0]: the end, normalised, in `end`, the switching functions there in
-   `switches`; returns the error in units of the tolerance. */
-static double dormand_prince(const struct flight *f, const lane *x, const lane *kept, lane (*k)[NX],
-                             double h, lane *end, lane *switches)
+/* A step from x: its end, normalised, in `end`, the switching functions in `before` and `after`; the
+   error in units of the tolerance. Where it is not the first from x, k[0] and `before` are there. */
+static double pair(const struct flight *f, const lane *x, const lane *kept, lane (*k)[NX], double h,
+                   int first, lane *end, lane *before, lane *after)
 {
   double sum[NX];
-  for (int s = 1; s < STAGES; ++s) {
+  lane between[SWITCHES];
+  for (int s = first ? 0 : 1; s < STAGES; ++s) {
     weighted(sum, A[s], k, s);
     for (int i = 0; i < NX; ++i) end[i][0] = FUSED(h, sum[i], x[i][0]);
-    switched_rates((const lane *)end, kept, k[s], switches); /* the last stage is the end itself: its row of A is B */
+    switched_rates((const lane *)end, kept, k[s], s == 0 ? before : s == AT_END ? after : between);
   }
+  weighted(sum, B, k, STAGES);
+  for (int i = 0; i < NX; ++i) end[i][0] = FUSED(h, sum[i], x[i][0]);
   weighted(sum, E, k, STAGES);
-  double total = 0;
+  double total = 0, error[NX];
   for (int i = 0; i < NX; ++i) {
-    const double before = fabs(x[i][0]), after = fabs(end[i][0]);
-    const double error = h * sum[i] / (f->atol[i] + f->rtol * (before > after ? before : after));
-    total = FUSED(error, error, total);
+    const double start = fabs(x[i][0]), stop = fabs(end[i][0]);
+    error[i] = h * sum[i] / FUSED(f->rtol, start > stop ? start : stop, f->atol[i]);
   }
+  for (int i = 0; i < NX; ++i) total = FUSED(error[i], error[i], total);
   const double scale = 1.0 / sqrt(end[6][0] * end[6][0] + end[7][0] * end[7][0] +
                                   end[8][0] * end[8][0] + end[9][0] * end[9][0]);
   for (int i = 6; i < 10; ++i) end[i][0] *= scale;
@@ -50,9 +53,9 @@ static double first_switch(const lane *before, const lane *after)
 {
   double first = 1;
   for (int i = 0; i < SWITCHES; ++i) {
+    if (!(before[i][0] * after[i][0] < 0)) continue;
     const double share = before[i][0] / (before[i][0] - after[i][0]);
-    if (before[i][0] * after[i][0] < 0 && share > NEAR && share < 1 - NEAR && share < first)
-      first = share;
+    if (share > NEAR && share < 1 - NEAR && share < first) first = share;
   }
   return first;
 }
@@ -80,9 +83,8 @@ long fly(const struct flight *f)
       const int last = count <= 1 && cut >= left;
       const double h = even < cut ? even : cut;
       if (taken == f->capacity || !(h >= 1e-12 * f->dt)) return -1 - sample;
-      if (fresh) switched_rates((const lane *)x, (const lane *)kept, k[0], before);
       const double error =
-          dormand_prince(f, (const lane *)x, (const lane *)kept, k, h, end, after);
+          pair(f, (const lane *)x, (const lane *)kept, k, h, fresh, end, before, after);
       evaluations += STAGES - 1 + fresh;
       fresh = 0;
       const double share = first_switch((const lane *)before, (const lane *)after);
@@ -96,15 +98,16 @@ long fly(const struct flight *f)
         rejected = 1;
         continue;
       }
-      /* proportional and integral */
-      double grow = 0.9 * pow(error > 1e-10 ? error : 1e-10, -0.17) * pow(previous, 0.04);
-      grow = grow < 0.2 ? 0.2 : grow > 5 ? 5 : grow;
-      if (rejected && grow > 1) grow = 1;
+      if (!last || wanted < longest) { /* proportional and integral */
+        double grow = 0.9 * pow(error > 1e-10 ? error : 1e-10, -0.17) * pow(previous, 0.04);
+        grow = grow < 0.2 ? 0.2 : grow > 5 ? 5 : grow;
+        if (rejected && grow > 1) grow = 1;
+        /* a step cut short says little about the next */
+        if (!(last || h < even) || wanted < h * grow) wanted = h * grow;
+        if (wanted > longest) wanted = longest;
+      }
       previous = error > 1e-4 ? error : 1e-4;
       rejected = 0;
-      /* a step cut short says little about the next */
-      if (!(last || h < even) || wanted < h * grow) wanted = h * grow;
-      if (wanted > longest) wanted = longest;
       f->steps[taken++] = h;
       left = last ? 0 : left - h;
       cut = INFINITY;
