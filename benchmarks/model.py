@@ -25,8 +25,18 @@ import symheli  # noqa: E402
 from benchmarks.opponents import scipy_flight  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
+from symheli.codegen import program  # noqa: E402
 from symheli.codegen.numeric import Numeric  # noqa: E402
 from symheli.integrate import RungeKutta4  # noqa: E402
+from symheli.steady.flight_conditions import FlightConditions  # noqa: E402
+from symheli.steady.kinks import kink_speeds  # noqa: E402
+from symheli.steady.steady_flights import SteadyFlights  # noqa: E402
+from symheli.steady.trim_batch import (  # noqa: E402
+    hover,
+    one_after_another,
+    trimmed,
+    unknowns,
+)
 
 DT, STEPS = 0.02, 4  # s; Runge-Kutta steps of 5 ms
 STILL = np.zeros(3)
@@ -234,52 +244,88 @@ def fly_many(race: Race, who: Contestants) -> None:
 
 
 def sweep(race: Race, who: Contestants) -> None:
-    """200 trims with their linear models, hover to 13 m/s."""
+    """200 trims with their linear models, hover to 13 m/s; and over acceleration too."""
     from benchmarks.opponents import python_control_sweep
 
     speeds = np.linspace(0.0, 13.0, 25 if race.quick else 200)
+    grid, pushes = np.linspace(0.0, 13.0, 27), [-4.0, -2.0, 0.0, 2.0, 4.0]
     if race.quick:
         race.notes.append(f"sweep: {len(speeds)} airspeeds in place of 200")
+    ours, theirs = "symheli.sweep (exact derivatives, kinks found)", "python-control"
+    both = "symheli.sweep_grid, 27 airspeeds by 5 accelerations"
     candidates = {
-        "symheli.sweep": lambda: symheli.sweep(who.heli, speeds),
-        "python-control": lambda: python_control_sweep.sweep(speeds),
+        ours: lambda: symheli.sweep(who.heli, speeds),
+        both: lambda: symheli.sweep_grid(who.heli, grid, acceleration=pushes),
+        theirs: lambda: python_control_sweep.sweep(speeds),
     }
     times = medians(candidates, 0.0 if race.quick else 5.0, time.thread_time)
-    family, theirs = symheli.sweep(who.heli, speeds), python_control_sweep.sweep(speeds)
+    family, found = symheli.sweep(who.heli, speeds), python_control_sweep.sweep(speeds)
     trims = max(
-        np.abs(x - t.x.array).max() for (x, _, _), t in zip(theirs, family.trims, strict=True)
+        np.abs(x - t.x.array).max() for (x, _, _), t in zip(found, family.trims, strict=True)
     )
     smooth = [
         k
         for k, v in enumerate(speeds)
-        if all(abs(v - kink) > 0.05 for found in family.kinks.values() for kink in found)
+        if all(abs(v - kink) > 0.05 for kinks in family.kinks.values() for kink in kinks)
         and v > 0.05
     ]
-    models = max(np.abs(theirs[k][2].A - family.A[k]).max() for k in smooth)
+    models = max(np.abs(found[k][2].A - family.A[k]).max() for k in smooth)
     race.tables.append(
         table(
             f"### Trim and linear model at {len(speeds)} airspeeds, 0 to 13 m/s",
             [
-                (
-                    "symheli.sweep (exact derivatives, kinks found)",
-                    readable(times["symheli.sweep"]),
-                    "",
-                ),
+                (ours, readable(times[ours]), ""),
+                (both, readable(times[both]), ""),
                 (
                     "python-control, find_operating_point and linearize",
-                    readable(times["python-control"]),
+                    readable(times[theirs]),
                     f"trims {trims:.0e}, A {models:.0e}",
                 ),
             ],
             ("", "median", "largest difference to symheli (SI; A away from the kinks)"),
         )
     )
-    race.ratios.append(
+    race.tables.append(where_a_sweep_goes(race, who, speeds))
+    race.ratios += [
         Ratio(
             "sweep of trims and linear models: times faster than python-control",
-            times["python-control"] / times["symheli.sweep"],
-            200.0,
-        )
+            times[theirs] / times[ours],
+            30.0,
+        ),
+        Ratio("grid of 27 airspeeds by 5 accelerations, ms", 1e3 * times[both], 30.0, at_most=True),
+    ]
+
+
+def where_a_sweep_goes(race: Race, who: Contestants, speeds: np.ndarray) -> str:
+    """The steps of a sweep, each alone, with the operations of the code generated for it."""
+    flights = SteadyFlights([who.heli], np.zeros(len(speeds), int), FlightConditions(speeds))
+    start, after = hover(flights), one_after_another(len(speeds))
+    trims = trimmed(flights, start, after)
+    z = unknowns(who.heli, trims)
+    steps = {
+        "Newton's method": ("system", lambda: flights.solved(start, after)),
+        "residuals, switching functions": ("point", lambda: flights.points(z)),
+        "A, B, E": ("slopes", lambda: flights.slopes(trims.x, trims.u, trims.wind)),
+        "kinks": (None, lambda: kink_speeds(who.heli, trims)),
+        "all of it": (None, lambda: symheli.sweep(who.heli, speeds)),
+    }
+    times = medians(
+        {name: call for name, (_, call) in steps.items()},
+        0.2 if race.quick else 2.0,
+        time.thread_time,
+    )
+    counts = {
+        name: len(program(flights.equations.function(name)).operations)
+        for name, _ in steps.values()
+        if name
+    }
+    return table(
+        f"### Where a sweep of {len(speeds)} airspeeds spends its time",
+        [
+            (step, readable(times[step]), str(counts[name]) if name else "")
+            for step, (name, _) in steps.items()
+        ],
+        ("", "median", "operations an evaluation, eight flights at once"),
     )
 
 
