@@ -5,6 +5,7 @@ and what rewrites such a list.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -52,6 +53,12 @@ class Program:
     sizes: tuple[int, ...]
     operations: tuple[Operation, ...]
     outputs: tuple[tuple[int, ...], ...]
+
+    def count(self) -> Counter[str]:
+        """How many operations of each name compute something, both sides of every selection
+        counted.
+        """
+        return Counter(o.name for o in self.operations if o.name not in ("input", "constant"))
 
     def depends(self, inputs: Sequence[int]) -> list[bool]:
         """Whether each operation depends on one of these inputs."""

@@ -13,12 +13,17 @@ from typing import Any, Literal
 from symheli.codegen import Layout, Program, as_casadi, c_function, program
 from symheli.codegen.compile import library, loaded
 from symheli.codegen.numeric import Numeric
-from symheli.codegen.symbolic import SX, Function, adjoint_product, tangent_product
+from symheli.codegen.symbolic import SX, Function, adjoint_product, column, tangent_product
 from symheli.dynamics import Dynamics
 from symheli.helicopter import Helicopter
 
-Which = Literal["rates", "tangent_rates", "adjoint_rates"]
-VARYING = {"rates": (0,), "tangent_rates": (0, 4), "adjoint_rates": (0, 4)}
+Which = Literal["rates", "switched_rates", "tangent_rates", "adjoint_rates"]
+VARYING = {
+    "rates": (0,),
+    "switched_rates": (0,),
+    "tangent_rates": (0, 4),
+    "adjoint_rates": (0, 4),
+}
 """Inputs of each function that change from stage to stage; u, wind, parameters and their changes
 are held for a sample.
 """
@@ -108,8 +113,9 @@ def equations(heli: Helicopter) -> Equations:
 
 
 def _functions(dynamics: Dynamics) -> dict[str, Function]:
-    """(x, u, wind, p) -> xdot; (x, u, wind, p, dx, du, dwind) -> xdot, dxdot; (x, u, wind, p,
-    x_bar) -> x_bar' d xdot/d(x, u, wind).
+    """(x, u, wind, p) -> xdot, and the same with the switching functions of the parts, which are
+    zero where the equations change their form; (x, u, wind, p, dx, du, dwind) -> xdot, dxdot; (x,
+    u, wind, p, x_bar) -> x_bar' d xdot/d(x, u, wind).
     """
     sizes = {"x": len(dynamics.flight_states), "u": 4, "wind": 3}
     point, change = (
@@ -121,11 +127,13 @@ def _functions(dynamics: Dynamics) -> dict[str, Function]:
     def form(solver: Callable[..., Any]) -> Any:
         return dynamics.quaternion(x, u, wind, p, solver)
 
-    xdot = form(dynamics.inflow_solver)[0]
+    xdot, total = form(dynamics.inflow_solver)
+    switches = column([*total.switches.values()] or [SX(1.0)])
     tangent = dynamics.derived(form, lambda f: [tangent_product(f, point, change)])
     adjoint = dynamics.derived(form, lambda f: [adjoint_product(f, z, bar) for z in point])
     return {
         "rates": Function("rates", [*point, p], [xdot]),
+        "switched_rates": Function("switched_rates", [*point, p], [xdot, switches]),
         "tangent_rates": Function("tangent_rates", [*point, p, *change], [xdot, *tangent]),
         "adjoint_rates": Function("adjoint_rates", [*point, p, bar], adjoint),
     }

@@ -30,19 +30,17 @@ static void normalise(lane *x)
 static void runge_kutta(lane *x, const lane *kept, double h)
 {
   lane k[NX], y[NX], sum[NX];
-  rates((const lane *)x, kept, k);
-  for (int i = 0; i < NX; ++i)
-    for (int l = 0; l < LANES; ++l) sum[i][l] = k[i][l], y[i][l] = FUSED(h / 2, k[i][l], x[i][l]);
-  for (int stage = 2; stage < 4; ++stage) {
-    const double next = stage == 2 ? h / 2 : h;
+  memcpy(y, x, sizeof y);
+  memset(sum, 0, sizeof sum);
+  for (int stage = 0; stage < 4; ++stage) {
+    const double weight = stage == 1 || stage == 2 ? 2.0 : 1.0, next = stage < 2 ? h / 2 : h;
     rates((const lane *)y, kept, k);
     for (int i = 0; i < NX; ++i)
       for (int l = 0; l < LANES; ++l)
-        sum[i][l] = FUSED(2.0, k[i][l], sum[i][l]), y[i][l] = FUSED(next, k[i][l], x[i][l]);
+        sum[i][l] = FUSED(weight, k[i][l], sum[i][l]), y[i][l] = FUSED(next, k[i][l], x[i][l]);
   }
-  rates((const lane *)y, kept, k);
   for (int i = 0; i < NX; ++i)
-    for (int l = 0; l < LANES; ++l) x[i][l] = FUSED(h / 6, sum[i][l] + k[i][l], x[i][l]);
+    for (int l = 0; l < LANES; ++l) x[i][l] = FUSED(h / 6, sum[i][l], x[i][l]);
   normalise(x);
 }
 

@@ -84,7 +84,7 @@ def simulate(
         if not isinstance(chosen, RungeKutta4):
             raise InputError('feedback is flown by "rk4" only')
         feedback.check(heli, problem.samples)
-    states, inputs, steps, per_sample = _flown(made, problem, chosen, feedback)
+    states, inputs, steps, per_sample, evaluations = _flown(made, problem, chosen, feedback)
     lost = ~np.isfinite(states).all(axis=1)
     if lost.any():
         raise SymheliError(
@@ -101,6 +101,7 @@ def simulate(
         signals=heli.flight_states,
         steps=steps,
         per_sample=per_sample,
+        evaluations=evaluations,
         method=chosen,
         parameters=heli.parameters,
     )
@@ -116,16 +117,16 @@ def _chosen(method: str | Method) -> Method:
 
 def _flown(
     made: Equations, problem: Problem, method: Method, feedback: Feedback | None
-) -> tuple[Array, Array, Array, Array]:
-    """States, inputs used, steps, steps of each sample."""
+) -> tuple[Array, Array, Array, Array, int | None]:
+    """States, inputs used, steps, steps of each sample, evaluations of the right-hand side."""
     n, u = problem.samples, problem.u[0]
     if isinstance(method, DormandPrince):
-        states, steps, per_sample = dopri.fly(made, problem, method)
-        return states, u, steps, per_sample
+        states, steps, per_sample, evaluations = dopri.fly(made, problem, method)
+        return states, u, steps, per_sample, evaluations
     substeps, step = problem.substeps(method.step)
     steps, per_sample = np.full(n * substeps, step), np.full(n, substeps)
     if isinstance(method, Radau):
-        return radau.fly(made, problem, method), u, steps, per_sample
+        return radau.fly(made, problem, method), u, steps, per_sample, None
     flights = Flights(made, problem, method, feedback, 1, False, Layout())
     flights.run(0, 1)
     return (
@@ -133,4 +134,5 @@ def _flown(
         u if flights.inputs is None else flights.inputs[0, :-1],
         steps,
         per_sample,
+        method.tableau.stages * len(steps),
     )

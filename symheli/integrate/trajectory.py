@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from symheli.errors import InputError
 from symheli.physics.attitude import euler_state
 from symheli.records.flight_record import FlightRecord
@@ -34,6 +36,8 @@ class Trajectory:
         Those the method took, s.
     per_sample : array (n,)
         How many of them in each sample: derivatives follow the same steps.
+    evaluations : int or None
+        How often the right-hand side was evaluated; None where the method does not count.
     method : RungeKutta4, DormandPrince or Radau
         With its options.
     parameters : NamedVector
@@ -54,6 +58,7 @@ class Trajectory:
     signals: tuple[Signal, ...]
     steps: Array
     per_sample: Array
+    evaluations: int | None
     method: Any
     parameters: NamedVector
 
@@ -67,7 +72,7 @@ class Trajectory:
         object.__setattr__(self, "inputs", frozen(self.inputs, "inputs", (n, 4)))
         object.__setattr__(self, "wind", frozen(self.wind, "wind", (n, 3)))
         object.__setattr__(self, "steps", frozen(self.steps, "steps", (None,)))
-        if len(self.per_sample) != n or int(sum(self.per_sample)) != len(self.steps):
+        if len(self.per_sample) != n or int(np.sum(self.per_sample)) != len(self.steps):
             raise InputError(
                 f"expected the number of steps of {n} samples, {len(self.steps)} in all, got"
                 f" {self.per_sample}"

@@ -80,8 +80,8 @@ def solve(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -
     one quotient each) stay between 0 and that bound until one is below `SETTLED`. Negative thrust
     is the mirror image.
     """
-    sign = where(c0 >= 0, 1.0, -1.0)
-    drive, flow = sign * c0, sign * mu_z
+    drive, flow = absolute(c0), where(c0 >= 0, mu_z, -mu_z)
+    mu2 = mu2 + _ROOT_GUARD
     excess = drive - ct_max
     balance = (
         4 * efficiency**2 * excess**2 * (c1**2 * mu2 + (excess - c1 * flow) ** 2)
@@ -92,15 +92,15 @@ def solve(c0: Any, c1: Any, ct_max: Any, mu2: Any, mu_z: Any, efficiency: Any) -
     below = maximum(flow, 0.0)
     b = 2 * efficiency * absolute(flow) + line1
     rest = maximum(line0 - line1 * below, 0.0)
-    axial = below + 2 * rest / (b + sqrt(b**2 + 8 * efficiency * rest + _TINY))
-    forward = line0 / (2 * efficiency * sqrt(mu2 + _ROOT_GUARD) + line1)
+    axial = below + 2 * rest / (b + sqrt(b**2 + _TINY + 8 * efficiency * rest))
+    forward = line0 / (2 * efficiency * sqrt(mu2) + line1)
     previous = top = minimum(axial, forward)
     lam = clip(_halley_step(top, line0, line1, mu2, flow, efficiency), 0.0, top)
     for _ in range(HALLEY_STEPS - 1):
         settled = absolute(lam - previous) <= SETTLED
         following = clip(_halley_step(lam, line0, line1, mu2, flow, efficiency), 0.0, top)
         previous, lam = lam, where(settled, lam, following)
-    return sign * lam
+    return where(c0 >= 0, lam, -lam)
 
 
 def _halley_step(lam: Any, line0: Any, line1: Any, mu2: Any, flow: Any, efficiency: Any) -> Any:
@@ -108,10 +108,10 @@ def _halley_step(lam: Any, line0: Any, line1: Any, mu2: Any, flow: Any, efficien
     sqrt(mu^2 + (lam - mu_z)^2).
 
     Numerator and denominator are multiplied by root^4: g' root and g'' root^3 are polynomials in
-    root.
+    root. mu2 > 0.
     """
     axial = lam - flow
-    square = mu2 + axial**2 + _ROOT_GUARD
+    square = mu2 + axial**2
     root = sqrt(square)
     residual = (2 * efficiency * lam * root - (line0 - line1 * lam)) * root
     slope = 2 * efficiency * (square + lam * axial) + line1 * root

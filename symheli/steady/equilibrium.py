@@ -153,7 +153,7 @@ def trim(
     )
     best = problem.point(z)
     if throw and not best.success:
-        raise failure(problem.heli, best)
+        raise problem.failure(z)
     return best
 
 
@@ -179,25 +179,6 @@ def _stops(point: TrimPoint) -> str:
     )
 
 
-def failure(heli: Helicopter, best: TrimPoint) -> TrimError:
-    """What the best point misses, equation by equation, the worst first."""
-    misses = sorted(
-        zip(best.residual.array, best.residual.signals, strict=True), key=lambda miss: -abs(miss[0])
-    )
-    table = ", ".join(f"d{s}/dt = {r:.2e} {quotient(s.unit, 's')}" for r, s in misses)
-    said = "; ".join(
-        [
-            f"no trim at {best.condition}: the best point leaves {table}",
-            *([_stops(best)] if best.on_stops else []),
-            *_throttle(heli, best),
-            *_jumps(heli, best),
-            *(["in a vortex ring"] if best.vortex_ring else []),
-            "try a nearer condition as `start`, or throw=False for the best point",
-        ]
-    )
-    return TrimError(said, best)
-
-
 def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
     """What the engine says at a point that is no trim."""
     if "om_i" not in point.x:
@@ -210,19 +191,6 @@ def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
         if throttle <= 0
         else []
     )
-
-
-def _jumps(heli: Helicopter, point: TrimPoint) -> list[str]:
-    """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as a
-    trim would step across.
-    """
-    switches = heli.switches(point.x.array, point.u.array, point.wind.array)
-    near = [
-        name.partition("jump ")[2]
-        for name, value in switches.items()
-        if "jump " in name and abs(value) < 0.1
-    ]
-    return [f"the equations jump here, {name}: there may be no equilibrium" for name in near]
 
 
 class Equilibrium:
@@ -320,6 +288,36 @@ class Equilibrium:
             vortex_ring=bool(in_vortex_ring(switches, self.equations.switches)),
             density=heli.density,
         )
+
+    def failure(self, z: Array) -> TrimError:
+        """What the best point, at z, misses, equation by equation, the worst first."""
+        best = self.point(z)
+        misses = sorted(
+            zip(best.residual.array, best.residual.signals, strict=True),
+            key=lambda miss: -abs(miss[0]),
+        )
+        table = ", ".join(f"d{s}/dt = {r:.2e} {quotient(s.unit, 's')}" for r, s in misses)
+        said = [
+            f"no trim at {best.condition}: the best point leaves {table}",
+            *([_stops(best)] if best.on_stops else []),
+            *_throttle(self.heli, best),
+            *self._jumps(z),
+            *(["in a vortex ring"] if best.vortex_ring else []),
+            "try a nearer condition as `start`, or throw=False for the best point",
+        ]
+        return TrimError("; ".join(said), best)
+
+    def _jumps(self, z: Array) -> list[str]:
+        """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as
+        a trim would step across.
+        """
+        switches = numeric(self.heli, "point")(z, self.demand)[4]
+        near = [
+            name.partition("jump ")[2]
+            for name, value in zip(self.equations.switches, switches, strict=True)
+            if "jump " in name and abs(value) < 0.1
+        ]
+        return [f"the equations jump here, {name}: there may be no equilibrium" for name in near]
 
     def _system(self, z: Array) -> tuple[Array, Array]:
         residual, slopes = self._evaluate(z, self.demand)

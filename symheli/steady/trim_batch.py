@@ -14,7 +14,6 @@ from symheli.steady.equations import SIDE_BY_SIDE, steady_equations
 from symheli.steady.equilibrium import (
     Equilibrium,
     TrimPoint,
-    failure,
     in_vortex_ring,
     on_stops,
     stops,
@@ -244,7 +243,7 @@ def trimmed(
         z[k] = alone.search(z[k], continuation)
         miss[k] = alone.miss(z[k])
         if throw and not miss[k] < TOLERANCE:
-            raise failure(alone.heli, alone.point(z[k]))
+            raise alone.failure(z[k])
     return _described(flights, z)
 
 

@@ -31,6 +31,15 @@ def held(heli, seconds, airspeed=6.0, dt=0.02):
     return x0, u, symheli.Feedback(np.tile(gain, (n, 1, 1)), reference, heli.travel)
 
 
+def transition(heli):
+    """Start and inputs (n, 4) of 11 s from hover to 8 m/s and back, through the edge of the wake
+    and the stall of fin and tail.
+    """
+    schedule = symheli.AirspeedSchedule.transition(0.0, 8.0, acceleration=3.0, hold=0.5)
+    inputs = symheli.fly(heli, schedule).columns(heli.inputs)[:-1]
+    return flight_state(symheli.trim(heli, 0.0).x.array), inputs
+
+
 def without_compiler(monkeypatch, heli):
     """The same helicopter, its equations never compiled."""
     monkeypatch.setattr("symheli.integrate.equations.library", lambda source, name: None)
