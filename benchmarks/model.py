@@ -27,19 +27,10 @@ from benchmarks.opponents import scipy_flight  # noqa: E402
 from benchmarks.peak import processor  # noqa: E402
 from benchmarks.physical_limit import Flown, described, limits, work  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
+from benchmarks.sweep_steps import sweep_steps  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
-from symheli.codegen import program  # noqa: E402
 from symheli.codegen.numeric import Numeric  # noqa: E402
 from symheli.integrate import DormandPrince, RungeKutta4  # noqa: E402
-from symheli.steady.flight_conditions import FlightConditions  # noqa: E402
-from symheli.steady.kinks import kink_speeds  # noqa: E402
-from symheli.steady.steady_flights import SteadyFlights  # noqa: E402
-from symheli.steady.trim_batch import (  # noqa: E402
-    hover,
-    one_after_another,
-    trimmed,
-    unknowns,
-)
 
 DT, STEPS = 0.02, 4  # s; Runge-Kutta steps of 5 ms
 STILL = np.zeros(3)
@@ -329,7 +320,7 @@ def sweep(race: Race, who: Contestants) -> None:
             ("", "median", "largest difference to symheli (SI; A away from the kinks)"),
         )
     )
-    race.tables.append(where_a_sweep_goes(race, who, speeds))
+    race.tables.append(sweep_steps(who.heli, speeds, 0.2 if race.quick else 2.0))
     race.ratios += [
         Ratio(
             "sweep of trims and linear models: times faster than python-control",
@@ -338,39 +329,6 @@ def sweep(race: Race, who: Contestants) -> None:
         ),
         Ratio("grid of 27 airspeeds by 5 accelerations, ms", 1e3 * times[both], 30.0, at_most=True),
     ]
-
-
-def where_a_sweep_goes(race: Race, who: Contestants, speeds: np.ndarray) -> str:
-    """The steps of a sweep, each alone, with the operations of the code generated for it."""
-    flights = SteadyFlights([who.heli], np.zeros(len(speeds), int), FlightConditions(speeds))
-    start, after = hover(flights), one_after_another(len(speeds))
-    trims = trimmed(flights, start, after)
-    z = unknowns(who.heli, trims)
-    steps = {
-        "Newton's method": ("system", lambda: flights.solved(start, after)),
-        "residuals, switching functions": ("point", lambda: flights.points(z)),
-        "A, B, E": ("slopes", lambda: flights.slopes(trims.x, trims.u, trims.wind)),
-        "kinks": (None, lambda: kink_speeds(who.heli, trims)),
-        "all of it": (None, lambda: symheli.sweep(who.heli, speeds)),
-    }
-    times = medians(
-        {name: call for name, (_, call) in steps.items()},
-        0.2 if race.quick else 2.0,
-        time.thread_time,
-    )
-    counts = {
-        name: len(program(flights.equations.function(name)).operations)
-        for name, _ in steps.values()
-        if name
-    }
-    return table(
-        f"### Where a sweep of {len(speeds)} airspeeds spends its time",
-        [
-            (step, readable(times[step]), str(counts[name]) if name else "")
-            for step, (name, _) in steps.items()
-        ],
-        ("", "median", "operations an evaluation, eight flights at once"),
-    )
 
 
 def main() -> None:

@@ -259,9 +259,9 @@ class Equilibrium:
             from scipy.optimize import root
 
             found = root(
-                lambda z: self._system(z)[0][self.equations.balanced],
+                lambda z: self.system(z)[0][self.equations.balanced],
                 start,
-                jac=lambda z: self._system(z)[1],
+                jac=lambda z: self.system(z)[1],
                 method="hybr",
                 options={"xtol": 1e-14},
             )
@@ -270,7 +270,7 @@ class Equilibrium:
 
     def newton(self, start: Array) -> tuple[Array, float]:
         """Newton's method alone: where it ends, and the largest residual there."""
-        return newton(self._system, self.equations.balanced, start)
+        return newton(self.system, self.equations.balanced, start)
 
     def point(self, z: Array) -> TrimPoint:
         """All that is known at these unknowns."""
@@ -319,7 +319,8 @@ class Equilibrium:
         ]
         return [f"the equations jump here, {name}: there may be no equilibrium" for name in near]
 
-    def _system(self, z: Array) -> tuple[Array, Array]:
+    def system(self, z: Array) -> tuple[Array, Array]:
+        """Residual of every equation, and the derivative of the balanced ones."""
         residual, slopes = self._evaluate(z, self.demand)
         return residual, slopes.reshape(len(z), len(z))
 
@@ -329,7 +330,7 @@ class Equilibrium:
 
     def miss(self, z: Array) -> float:
         """Largest residual; infinite where one is no number."""
-        return float(np.nan_to_num(np.abs(self._system(z)[0]), nan=np.inf).max())
+        return float(np.nan_to_num(np.abs(self.system(z)[0]), nan=np.inf).max())
 
     def _found(self, z: Array) -> bool:
         return self.miss(z) < TOLERANCE
@@ -358,9 +359,9 @@ class Equilibrium:
         bound = np.concatenate([np.full(2, 1.4), np.full(n - 2, np.inf), self.heli.travel])
         start = np.clip(start, -0.9 * bound, 0.9 * bound)
         return least_squares(
-            lambda z: self._system(z)[0][self.equations.balanced],
+            lambda z: self.system(z)[0][self.equations.balanced],
             start,
-            lambda z: self._system(z)[1],  # type: ignore[arg-type]
+            lambda z: self.system(z)[1],  # type: ignore[arg-type]
             bounds=(-bound, bound),
             max_nfev=200,
         ).x
