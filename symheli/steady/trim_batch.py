@@ -24,11 +24,12 @@ from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import ALONE, SteadyFlights
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
-from symheli.values.signal import Signal
+from symheli.values.operating_points import OperatingPoints
+from symheli.values.signal import Signal, indices
 
 
 @dataclass(frozen=True, eq=False)
-class TrimBatch(Sequence[TrimPoint]):
+class TrimBatch(OperatingPoints):
     """N trims as arrays; found[k] is one as a `TrimPoint`, made when it is asked for.
 
     Parameters
@@ -102,6 +103,21 @@ class TrimBatch(Sequence[TrimPoint]):
         if k not in self._made:
             self._made[k] = self._point(k)
         return self._made[k]
+
+    def state(self, names: Sequence[str]) -> Array:
+        """These states (N, n)."""
+        return self.x[:, indices(names, self.states, "state")]
+
+    def rate(self, names: Sequence[str]) -> Array:
+        """Derivatives of these states (N, n)."""
+        return self.xdot[:, indices(names, self.states, "state")]
+
+    def input(self, names: Sequence[str]) -> Array:
+        """These inputs (N, n), 0 where none has that name (a gust)."""
+        out = np.zeros((len(self), len(names)))
+        known = [k for k, name in enumerate(names) if name in self.inputs]
+        out[:, known] = self.u[:, indices([names[k] for k in known], self.inputs, "input")]
+        return out
 
     def at(self, which: Array) -> TrimBatch:
         """The trims at these positions."""

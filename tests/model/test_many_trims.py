@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 import symheli
 from symheli.steady.equations import SteadyEquations, steady_equations
 from symheli.steady.newton import TOLERANCE
+from symheli.values.operating_points import OperatingPoints
 
 SPEEDS = np.linspace(0.0, 20.0, 29)
 JUMP = "jump as the flow turns at the disc"
@@ -173,6 +176,18 @@ def test_one_trim_and_its_linear_model_wait_for_no_compiler(monkeypatch):
     assert symheli.linearize(heli, symheli.trim(heli, 6.0, climb_rate=1.0)).A.shape == (12, 12)
 
 
+def test_a_trim_from_the_command_line_loads_no_scipy():
+    """Half of what a person waits for were libraries that one trim does not need."""
+    code = (
+        "import sys; from studies.cli import main; main(['trim', '--airspeed', '10']);"
+        " print([m for m in ('scipy', 'symheli.lpv', 'matplotlib', 'cvxpy') if m in sys.modules])"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
+    assert said.strip().endswith("[]")
+
+
 def test_one_that_fails_among_many_says_so_and_harms_no_other(ideal):
     speeds = [5.0, 60.0, 6.0, 61.0, *np.linspace(7.0, 12.0, 20)]
     with pytest.raises(symheli.TrimError, match="no trim at 60 m/s") as caught:
@@ -307,3 +322,14 @@ def test_the_batch_compiles_once_for_all_airframes_of_one_arrangement(ideal, mon
     symheli.sweep(ideal.scaled(2.0), [3.0, 4.0])
     symheli.sweep_grid(ideal, [3.0], mass=[8.0, 9.0])
     symheli.sweep_grid(ideal, [3.0], altitude=[0.0, 1000.0])
+
+
+def test_tables_of_a_batch_are_those_of_its_points(ideal):
+    found = symheli.trim_batch(ideal, SPEEDS[:7], acceleration=1.0)
+    listed = OperatingPoints.of(list(found))
+    states, inputs = ["theta", "u", "b1"], ["d_col", "v_w", "d_lat"]
+    np.testing.assert_array_equal(found.state(states), listed.state(states))
+    np.testing.assert_array_equal(found.rate(states), listed.rate(states))
+    np.testing.assert_array_equal(found.input(inputs), listed.input(inputs))
+    with pytest.raises(symheli.UnknownNameError, match="theta"):
+        found.state(["thet"])
