@@ -252,15 +252,19 @@ def trimmed(
     demand = flights.conditions.demand
     for k in np.flatnonzero(~(miss < TOLERANCE)).tolist():
         alone = Equilibrium(flights.heli(k), flights.conditions[k])
-        found = np.flatnonzero(miss < TOLERANCE)
-        if len(found):
-            apart = np.linalg.norm(demand[found] - demand[k], axis=1)
-            z[k] = z[found[apart.argmin()]]
+        others = np.flatnonzero(miss < TOLERANCE)
+        if len(others):
+            apart = np.linalg.norm(demand[others] - demand[k], axis=1)
+            z[k] = z[others[apart.argmin()]]
         z[k] = alone.search(z[k], continuation)
         miss[k] = alone.miss(z[k])
         if throw and not miss[k] < TOLERANCE:
-            raise alone.failure(z[k])
-    return _described(flights, z)
+            break
+    found = _described(flights, z)
+    if throw and not found.success.all():
+        first = int(found.success.argmin())
+        raise Equilibrium(flights.heli(first), flights.conditions[first]).failure(z[first])
+    return found
 
 
 def _described(flights: SteadyFlights, z: Array) -> TrimBatch:
