@@ -30,7 +30,7 @@ from benchmarks.race import Ratio, present, readable, table  # noqa: E402
 from benchmarks.sweep_steps import sweep_steps  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
 from symheli.codegen.numeric import Numeric  # noqa: E402
-from symheli.integrate import DormandPrince, RungeKutta4  # noqa: E402
+from symheli.integrate import CashKarp, RungeKutta4  # noqa: E402
 
 DT, STEPS = 0.02, 4  # s; Runge-Kutta steps of 5 ms
 STILL = np.zeros(3)
@@ -39,10 +39,10 @@ FLIGHTS, QUICK_FLIGHTS = 10_000, 128
 # and this 2e-6
 RTOL = 5e-10
 # one step a sample but where a part switches: less error than either of them
-ADAPTIVE = DormandPrince(relative=1e-6, absolute=1e-6)
+ADAPTIVE = CashKarp(relative=1e-6, absolute=1e-6)
 
 C, NUMBA = "C by hand, -O3 -march=native", "Numba, fastmath"
-OURS, OURS_ADAPTIVE = "symheli.simulate", "symheli.simulate, DormandPrince(1e-6, 1e-6)"
+OURS, OURS_ADAPTIVE = "symheli.simulate", "symheli.simulate, CashKarp(1e-6, 1e-6)"
 
 Fly = Callable[
     [np.ndarray, np.ndarray, np.ndarray], np.ndarray

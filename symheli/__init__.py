@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from symheli.helicopter import Helicopter
     from symheli.integrate import (
         Batch,
+        CashKarp,
         DormandPrince,
         Feedback,
         Radau,
@@ -82,7 +83,7 @@ _ROOMS = {
     "symheli.steady.trim_map": "TrimMap trim_map",
     "symheli.steady.derivative_table": "DerivativeTable derivatives",
     "symheli.integrate": (
-        "Batch DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
+        "Batch CashKarp DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
     ),
     "symheli.flight": "AirspeedSchedule Autopilot Excitation Sensor Servo fly gain_scheduled_lqr",
     "symheli.flight.stitched_model": "StitchedModel",
@@ -105,6 +106,7 @@ __all__ = [
     "AirspeedSchedule",
     "Autopilot",
     "Batch",
+    "CashKarp",
     "CertificateError",
     "CompilerWarning",
     "ConvergenceWarning",

@@ -113,7 +113,7 @@ class Helicopter:
 
     # --- other numbers, same equations -----------------------------------------------------------
 
-    @property
+    @cached_property
     def parameters(self) -> NamedVector:
         """Every number of the model by name, in SI: "density", "body.mass", "main_rotor.radius",
         ...

@@ -4,8 +4,8 @@ derivatives both ways.
 
 from __future__ import annotations
 
+from symheli.integrate.adaptive import CashKarp, DormandPrince
 from symheli.integrate.batch import Batch, simulate_batch
-from symheli.integrate.dopri import DormandPrince
 from symheli.integrate.feedback import Feedback
 from symheli.integrate.radau import Radau
 from symheli.integrate.rk4 import RungeKutta4
@@ -16,6 +16,7 @@ from symheli.integrate.trajectory import Trajectory
 
 __all__ = [
     "Batch",
+    "CashKarp",
     "DormandPrince",
     "Feedback",
     "Gradient",

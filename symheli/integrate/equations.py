@@ -40,7 +40,7 @@ class Equations:
         self._functions = _functions(dynamics)
         self._programs: dict[str, Program] = {}
         self._hoisted: dict[str, tuple[Program, Program]] = {}
-        self._libraries: dict[tuple[str, Layout], ctypes.CDLL | None] = {}
+        self._libraries: dict[tuple[str | Layout, ...], ctypes.CDLL | None] = {}
 
     def hoisted(self, which: Which) -> tuple[Program, Program]:
         """(held, rest) of one of the functions; see `Program.hoist`."""
@@ -81,7 +81,7 @@ class Equations:
         no compiler.
         """
         layout = layout or Layout()
-        key = (kernel, layout)
+        key = (kernel, *which, layout, head)
         if key not in self._libraries:
             nx = len(self.states)
             parts = [

@@ -15,22 +15,22 @@ def structure(arguments: dict[str, Any]) -> ctypes.Structure:
 
     The arrays must be contiguous; the structure keeps them alive.
     """
+    members, values = [], []
     for name, value in arguments.items():
-        assert not isinstance(value, np.ndarray) or value.flags.c_contiguous, name  # noqa: S101
-    made = _type(tuple((name, _member(value)) for name, value in arguments.items()))()
-    for name, value in arguments.items():
-        setattr(made, name, value.ctypes.data if isinstance(value, np.ndarray) else value)
+        kind = ctypes.c_void_p
+        if isinstance(value, np.ndarray):
+            assert value.flags.c_contiguous, name  # noqa: S101
+            value = value.__array_interface__["data"][0]
+        elif value is not None:
+            kind = ctypes.c_double if isinstance(value, float) else ctypes.c_long
+        members.append((name, kind))
+        values.append(value)
+    made = _type(tuple(members))(*values)
     made.kept = arguments
     return made
 
 
-def _member(value: Any) -> Any:
-    if value is None or isinstance(value, np.ndarray):
-        return ctypes.c_void_p
-    return ctypes.c_double if isinstance(value, float) else ctypes.c_long
-
-
 @functools.cache
-def _type(fields: tuple[tuple[str, Any], ...]) -> Any:
-    """Made once for each list of members: making a type takes longer than a second of flight."""
-    return type("Arguments", (ctypes.Structure,), {"_fields_": list(fields)})
+def _type(members: tuple[tuple[str, Any], ...]) -> Any:
+    """Made once for each list of members: making a type takes as long as a second of flight."""
+    return type("Arguments", (ctypes.Structure,), {"_fields_": list(members)})

@@ -7,8 +7,8 @@ import numpy as np
 from symheli.codegen import Layout
 from symheli.errors import InputError, SymheliError, UnknownNameError
 from symheli.helicopter import Helicopter
-from symheli.integrate import dopri, radau
-from symheli.integrate.dopri import DormandPrince
+from symheli.integrate import adaptive, radau
+from symheli.integrate.adaptive import Adaptive, CashKarp, DormandPrince
 from symheli.integrate.equations import Equations, equations
 from symheli.integrate.feedback import Feedback
 from symheli.integrate.problem import Problem, one_flight
@@ -17,8 +17,13 @@ from symheli.integrate.rk4 import Flights, RungeKutta4
 from symheli.integrate.trajectory import Trajectory
 from symheli.values.arrays import Array
 
-Method = RungeKutta4 | DormandPrince | Radau
-METHODS: dict[str, type[Method]] = {"rk4": RungeKutta4, "dopri": DormandPrince, "radau": Radau}
+Method = RungeKutta4 | Adaptive | Radau
+METHODS: dict[str, type[Method]] = {
+    "rk4": RungeKutta4,
+    "cash_karp": CashKarp,
+    "dopri": DormandPrince,
+    "radau": Radau,
+}
 """Methods by their short name, with their default options."""
 
 
@@ -49,9 +54,9 @@ def simulate(
         North east down, m/s.
     dt : float
         How long each row of u is held, s.
-    method : {"rk4", "dopri", "radau"}, RungeKutta4, DormandPrince or Radau
-        Equal steps, steps by a tolerance, implicit (for stiff equations), or one of these with
-        options.
+    method : {"rk4", "cash_karp", "dopri", "radau"}, RungeKutta4, CashKarp, DormandPrince or Radau
+        Equal steps, steps by a tolerance (two pairs), implicit (for stiff equations), or one of
+        these with options.
     feedback : Feedback, optional
         With "rk4" only.
 
@@ -85,8 +90,8 @@ def simulate(
             raise InputError('feedback is flown by "rk4" only')
         feedback.check(heli, problem.samples)
     states, inputs, steps, per_sample, evaluations = _flown(made, problem, chosen, feedback)
-    lost = ~np.isfinite(states).all(axis=1)
-    if lost.any():
+    if not np.isfinite(states[-1]).all():  # what is lost stays lost
+        lost = ~np.isfinite(states).all(axis=1)
         raise SymheliError(
             f"the flight left the range of numbers at {dt * int(lost.argmax()):.6g} s: milder"
             " inputs, or a shorter step, please"
@@ -120,8 +125,8 @@ def _flown(
 ) -> tuple[Array, Array, Array, Array, int | None]:
     """States, inputs used, steps, steps of each sample, evaluations of the right-hand side."""
     n, u = problem.samples, problem.u[0]
-    if isinstance(method, DormandPrince):
-        states, steps, per_sample, evaluations = dopri.fly(made, problem, method)
+    if isinstance(method, Adaptive):
+        states, steps, per_sample, evaluations = adaptive.fly(made, problem, method)
         return states, u, steps, per_sample, evaluations
     substeps, step = problem.substeps(method.step)
     steps, per_sample = np.full(n * substeps, step), np.full(n, substeps)

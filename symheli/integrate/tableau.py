@@ -31,24 +31,54 @@ def _tableau(rows: list[list[float]], b: list[float]) -> Tableau:
     return Tableau(a, np.array(b))
 
 
+@dataclass(frozen=True, eq=False)
+class Pair(Tableau):
+    """A method of order 5 that is followed, and weights `lower` (stages,) of one of order 4 with
+    the same stages; stage `at_end` lies at the end of the step.
+    """
+
+    lower: Array
+    at_end: int
+
+    @property
+    def error(self) -> Array:
+        """Weights of the difference (stages,)."""
+        return self.b - self.lower
+
+
+def _pair(rows: list[list[float]], b: list[float], lower: list[float], at_end: int) -> Pair:
+    plain = _tableau(rows, b)
+    return Pair(plain.a, plain.b, np.array(lower), at_end)
+
+
 CLASSICAL = _tableau([[1 / 2], [0, 1 / 2], [0, 0, 1]], [1 / 6, 1 / 3, 1 / 3, 1 / 6])
 """Kutta's method of order 4."""
 
-DORMAND_PRINCE = _tableau(
+DORMAND_PRINCE = _pair(
     [
         [1 / 5],
         [3 / 40, 9 / 40],
         [44 / 45, -56 / 15, 32 / 9],
         [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
         [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
     ],
-    [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0],
+    [5179 / 57600, 0, 7571 / 16695, 393 / 640, -92097 / 339200, 187 / 2100, 1 / 40],
+    at_end=6,
 )
-"""Order 5 of the pair of Dormand and Prince (1980), without the seventh stage, which only the error
-estimate uses.
-"""
+"""The pair of Dormand and Prince (1980): its seventh stage is the end of the step."""
 
-DORMAND_PRINCE_ERROR = np.array(
-    [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]
+CASH_KARP = _pair(
+    [
+        [1 / 5],
+        [3 / 40, 9 / 40],
+        [3 / 10, -9 / 10, 6 / 5],
+        [-11 / 54, 5 / 2, -70 / 27, 35 / 27],
+        [1631 / 55296, 175 / 512, 575 / 13824, 44275 / 110592, 253 / 4096],
+    ],
+    [37 / 378, 0, 250 / 621, 125 / 594, 0, 512 / 1771],
+    [2825 / 27648, 0, 18575 / 48384, 13525 / 55296, 277 / 14336, 1 / 4],
+    at_end=4,
 )
-"""b of order 5 less b of order 4, seven stages: the last one is at the end of the step."""
+"""The pair of Cash and Karp (1990)."""

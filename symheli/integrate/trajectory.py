@@ -38,7 +38,7 @@ class Trajectory:
         How many of them in each sample: derivatives follow the same steps.
     evaluations : int or None
         How often the right-hand side was evaluated; None where the method does not count.
-    method : RungeKutta4, DormandPrince or Radau
+    method : RungeKutta4, CashKarp, DormandPrince or Radau
         With its options.
     parameters : NamedVector
         Of the helicopter.

@@ -42,10 +42,10 @@ def feedback(heli, n, seed=0):
 
 
 def test_each_flight_is_the_single_flight_to_the_bit(heli):
-    x0, u, wind, mass = many(heli, 37)  # two full groups of lanes and a rest
+    x0, u, wind, mass = many(heli, 37)  # all lanes once, and a rest
     batch = simulate_batch(heli, x0, u, wind, dt=0.02, parameters={"body.mass": mass}, keep=1)
     assert batch.states.shape == (37, 6, len(heli.flight_states))
-    for i in (0, 15, 16, 36):
+    for i in (0, 7, 8, 31, 32, 36):
         alone = simulate(
             heli.with_parameters({"body.mass": mass[i]}), x0[i], u[i], wind[i], dt=0.02
         )

@@ -9,12 +9,12 @@ from scipy.linalg import expm
 
 import symheli
 from symheli import InputError, simulate
-from symheli.integrate import DormandPrince, Radau, RungeKutta4, gradient, tangent
+from symheli.integrate import CashKarp, DormandPrince, Radau, RungeKutta4, gradient, tangent
 from symheli.physics.attitude import euler_state, flight_state
 
-METHODS = [RungeKutta4(), DormandPrince(1e3, largest=0.01), Radau()]
-"""The adaptive one with equal steps: derivatives are those at the steps taken, and differences must
-not change them.
+METHODS = [RungeKutta4(), CashKarp(1e3, largest=0.01), DormandPrince(1e3, largest=0.01), Radau()]
+"""The adaptive ones with equal steps: derivatives are those at the steps taken, and differences
+must not change them.
 """
 
 

@@ -9,7 +9,7 @@ from flights import held, manoeuvre, transition, without_compiler
 import symheli
 from symheli import InputError, SymheliError, simulate
 from symheli.codegen.numeric import Numeric
-from symheli.integrate import DormandPrince, Feedback, Radau, RungeKutta4, runge_kutta
+from symheli.integrate import CashKarp, DormandPrince, Feedback, Radau, RungeKutta4, runge_kutta
 from symheli.physics.attitude import euler_state, flight_state
 
 
@@ -21,6 +21,7 @@ from symheli.physics.attitude import euler_state, flight_state
             [DormandPrince(relative=1e3, largest=0.02 / k) for k in (1, 2, 4)],
             5,
         ),  # any error is tolerated: equal steps
+        ([CashKarp(relative=1e3, largest=0.02 / k) for k in (1, 2, 4)], 5),
         ([Radau(0.04 / k, stages=2) for k in (1, 2, 4)], 3),
         ([Radau(0.04 / k, stages=3) for k in (1, 2, 4)], 5),
     ],
@@ -41,10 +42,15 @@ def test_the_error_falls_with_the_order_of_the_method(ideal, methods, order):
 def test_three_methods_fly_the_same_flight(heli):
     x0, u = manoeuvre(heli, n=25)
     wind = 0.5 * np.sin(np.arange(25)[:, None] * [0.3, 0.5, 0.7])
-    methods = RungeKutta4(0.0025), DormandPrince(1e-10, 1e-10), Radau(0.01)
+    methods = (
+        RungeKutta4(0.0025),
+        DormandPrince(1e-10, 1e-10),
+        CashKarp(1e-10, 1e-10),
+        Radau(0.01),
+    )
     flights = [simulate(heli, x0, u, wind, dt=0.02, method=m) for m in methods]
     for other in flights[1:]:
-        # twice the errors against steps of 0.2 ms: 4e-8, 2e-10, 3e-8
+        # twice the errors against steps of 0.2 ms: 4e-8, 2e-10 twice, 3e-8
         np.testing.assert_allclose(other.states, flights[0].states, atol=2e-7)
     for flown in flights:
         np.testing.assert_allclose(np.linalg.norm(flown.states[:, 6:10], axis=1), 1.0, atol=4e-16)
@@ -60,24 +66,26 @@ def test_the_fixed_step_is_that_of_the_closed_loop_flights(heli):
     )  # two programs, rounded apart
 
 
-def test_a_tighter_tolerance_means_a_smaller_error(ideal):
+@pytest.mark.parametrize("pair", [CashKarp, DormandPrince])
+def test_a_tighter_tolerance_means_a_smaller_error(ideal, pair):
     x0, u = manoeuvre(ideal, n=10)
     exact = simulate(ideal, x0, u, dt=0.1, method=DormandPrince(1e-13, 1e-13)).final
     errors = [
-        np.abs(simulate(ideal, x0, u, dt=0.1, method=DormandPrince(t, t)).final - exact).max()
+        np.abs(simulate(ideal, x0, u, dt=0.1, method=pair(t, t)).final - exact).max()
         for t in (1e-5, 1e-7, 1e-9)
     ]
     assert errors[0] < 1e-3
     assert all(after < before / 10 for before, after in pairwise(errors))
 
 
-def test_steps_end_where_the_equations_change_their_form(ideal):
+@pytest.mark.parametrize("pair", [CashKarp, DormandPrince])
+def test_steps_end_where_the_equations_change_their_form(ideal, pair):
     """One step a sample, and two more where a part switches, leave less than a fifth of the error
     of four classical steps, with less than half of their evaluations: those cross the kinks.
     """
     x0, u = transition(ideal)
     exact = simulate(ideal, x0, u, dt=0.02, method=RungeKutta4(0.02 / 128)).states
-    adaptive = simulate(ideal, x0, u, dt=0.02, method=DormandPrince(1e-6, 1e-6))
+    adaptive = simulate(ideal, x0, u, dt=0.02, method=pair(1e-6, 1e-6))
     equal = simulate(ideal, x0, u, dt=0.02)
     error, classical = (np.abs(flown.states - exact).max() for flown in (adaptive, equal))
     assert error < classical / 5
@@ -94,12 +102,11 @@ def test_steps_end_where_the_equations_change_their_form(ideal):
                 assert not 0.02 < share < 0.98, (k, name)  # 0.01, and what normalising moves
 
 
-def test_without_a_compiler_the_same_switches_are_stepped_to(ideal, monkeypatch):
+@pytest.mark.parametrize("method", [CashKarp(1e-6, 1e-6), DormandPrince(1e-6, 1e-6)])
+def test_without_a_compiler_the_same_switches_are_stepped_to(ideal, monkeypatch, method):
     x0, u = transition(ideal)
-    compiled = simulate(ideal, x0, u[:200], dt=0.02, method=DormandPrince(1e-6, 1e-6))
-    plain = simulate(
-        without_compiler(monkeypatch, ideal), x0, u[:200], dt=0.02, method=DormandPrince(1e-6, 1e-6)
-    )
+    compiled = simulate(ideal, x0, u[:200], dt=0.02, method=method)
+    plain = simulate(without_compiler(monkeypatch, ideal), x0, u[:200], dt=0.02, method=method)
     assert (compiled.per_sample > 1).any()
     np.testing.assert_array_equal(plain.per_sample, compiled.per_sample)
     assert plain.evaluations == compiled.evaluations
@@ -126,7 +133,7 @@ def test_flapping_too_fast_for_explicit_steps_is_flown_by_the_implicit_method(id
 def test_without_a_compiler_a_flight_differs_by_rounding(heli, monkeypatch):
     x0, u = manoeuvre(heli, n=5)
     changed = heli.with_parameters({"body.mass": 8.0, "density": 1.1})
-    for method in ("rk4", "dopri"):
+    for method in ("rk4", "cash_karp", "dopri"):
         compiled = simulate(changed, x0, u, (1.0, 0.0, 0.5), dt=0.02, method=method)
         with monkeypatch.context() as patch:
             plain = simulate(

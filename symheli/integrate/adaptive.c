@@ -1,7 +1,7 @@
-/* One flight by the pair of Dormand and Prince, orders 5 and 4, with step control: NX states, NP
-   parameters, SWITCHED_NK held values. The generated switched_held(u, wind, p, kept) and
+/* One flight by a pair of explicit Runge-Kutta methods of orders 5 and 4 with step control: NX
+   states, NP parameters, SWITCHED_NK held values. The generated switched_held(u, wind, p, kept) and
    switched_rates(x, kept, xdot, switches) come before this text; STAGES, A, B, E (b - b of order 4),
-   SWITCHES and NEAR too. */
+   AT_END (the stage at the end of the step), SWITCHES and NEAR too. */
 
 struct flight {
   const double *x0, *u, *wind; long wind_sample;         /* NX; sample, 4; sample or one, 3 */
@@ -22,16 +22,18 @@ static inline void weighted(double *sum, const double *weights, lane (*k)[NX], i
 
 /* A step from x: its end, normalised, in `end`, the switching functions in `before` and `after`; the
    error in units of the tolerance. Where it is not the first from x, k[0] and `before` are there. */
-static double dormand_prince(const struct flight *f, const lane *x, const lane *kept, lane (*k)[NX],
-                             double h, int first, lane *end, lane *before, lane *after)
+static double pair(const struct flight *f, const lane *x, const lane *kept, lane (*k)[NX], double h,
+                   int first, lane *end, lane *before, lane *after)
 {
   double sum[NX];
+  lane between[SWITCHES];
   for (int s = first ? 0 : 1; s < STAGES; ++s) {
     weighted(sum, A[s], k, s);
     for (int i = 0; i < NX; ++i) end[i][0] = FUSED(h, sum[i], x[i][0]);
-    /* the last stage is the end itself: its row of A is B */
-    switched_rates((const lane *)end, kept, k[s], s > 0 ? after : before);
+    switched_rates((const lane *)end, kept, k[s], s == 0 ? before : s == AT_END ? after : between);
   }
+  weighted(sum, B, k, STAGES);
+  for (int i = 0; i < NX; ++i) end[i][0] = FUSED(h, sum[i], x[i][0]);
   weighted(sum, E, k, STAGES);
   double total = 0, error[NX];
   for (int i = 0; i < NX; ++i) {
@@ -81,8 +83,8 @@ long fly(const struct flight *f)
       const int last = count <= 1 && cut >= left;
       const double h = even < cut ? even : cut;
       if (taken == f->capacity || !(h >= 1e-12 * f->dt)) return -1 - sample;
-      const double error = dormand_prince(f, (const lane *)x, (const lane *)kept, k, h, fresh, end,
-                                          before, after);
+      const double error =
+          pair(f, (const lane *)x, (const lane *)kept, k, h, fresh, end, before, after);
       evaluations += STAGES - 1 + fresh;
       fresh = 0;
       const double share = first_switch((const lane *)before, (const lane *)after);

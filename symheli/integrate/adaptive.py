@@ -1,12 +1,14 @@
-"""The pair of Dormand and Prince, orders 5 and 4, with proportional-integral control of the
-step.
+"""Pairs of explicit Runge-Kutta methods, orders 5 and 4, with proportional-integral control of the
+step, which ends where the equations change their form.
 """
 
 from __future__ import annotations
 
 import ctypes
+import functools
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from symheli.errors import InputError, SymheliError
 from symheli.integrate.equations import Equations
 from symheli.integrate.kernel import structure
 from symheli.integrate.problem import Problem
-from symheli.integrate.tableau import DORMAND_PRINCE, DORMAND_PRINCE_ERROR, Tableau
+from symheli.integrate.tableau import CASH_KARP, DORMAND_PRINCE, Pair
 from symheli.values.arrays import Array
 
 SCALE = {"m/s": 1.0, "rad/s": 1.0, "1": 0.1, "m": 1.0, "rad": 0.1}
@@ -26,13 +28,31 @@ that the switch makes is the square of that.
 
 
 @dataclass(frozen=True)
-class DormandPrince:
-    """Steps of order 5 whose estimated error stays below a tolerance.
+class Adaptive:
+    """Steps of order 5 whose estimated error stays below a tolerance: `DormandPrince` and
+    `CashKarp`, which see.
+    """
+
+    relative: float = 1e-8
+    absolute: float = 1e-8
+    largest: float = math.inf
+    most: int = 1_000_000
+
+    tableau: ClassVar[Pair]
+
+    def __post_init__(self) -> None:
+        for name in ("relative", "absolute", "largest", "most"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name} must be positive, got {getattr(self, name)}")
+
+
+class DormandPrince(Adaptive):
+    """Steps of order 5 whose estimated error stays below a tolerance, seven evaluations a step.
 
     A step ends where a sample does, for inputs and wind jump there, and where a switching function
     of a part is zero (a fin begins to stall, the wake reaches the tail), for the derivative of the
-    equations jumps there: elsewhere they are smooth, and one step of order 5 does for a sample of
-    20 ms. The quaternion is brought back to unit length after each step.
+    equations jumps there: elsewhere they are smooth, and one step does for a sample of 20 ms. The
+    quaternion is brought back to unit length after each step.
 
     Parameters
     ----------
@@ -65,24 +85,49 @@ class DormandPrince:
     True
     """
 
-    relative: float = 1e-8
-    absolute: float = 1e-8
-    largest: float = math.inf
-    most: int = 1_000_000
+    tableau = DORMAND_PRINCE
 
-    def __post_init__(self) -> None:
-        for name in ("relative", "absolute", "largest", "most"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"{name} must be positive, got {getattr(self, name)}")
 
-    @property
-    def tableau(self) -> Tableau:
-        """Coefficients of order 5."""
-        return DORMAND_PRINCE
+class CashKarp(Adaptive):
+    """As `DormandPrince`, with six evaluations a step: the seventh there is free only where the
+    next step has the same inputs. The method to choose for inputs that are held for some 20 ms.
+
+    Parameters
+    ----------
+    relative : float
+        Of the value of a state.
+    absolute : float
+        Of the usual size of a state (`SCALE`); the two are added.
+    largest : float
+        Longest step, s.
+    most : int
+        Steps before it gives up.
+
+    Raises
+    ------
+    InputError
+        A number that is not positive.
+
+    References
+    ----------
+    Cash and Karp (1990), A variable order Runge-Kutta method for initial value problems with
+    rapidly varying right-hand sides, ACM Transactions on Mathematical Software 16.
+
+    Examples
+    --------
+    >>> point = symheli.trim(heli, airspeed=5.0)
+    >>> inputs = np.tile(point.u.array, (10, 1))
+    >>> quick = symheli.CashKarp(relative=1e-6, absolute=1e-6)
+    >>> flown = symheli.simulate(heli, point, inputs, dt=0.02, method=quick)
+    >>> len(flown.steps), flown.evaluations
+    (10, 60)
+    """
+
+    tableau = CASH_KARP
 
 
 def fly(
-    equations: Equations, problem: Problem, method: DormandPrince
+    equations: Equations, problem: Problem, method: Adaptive
 ) -> tuple[Array, Array, Array, int]:
     """States (n+1, nx), steps taken (m,) in s, their number in each sample (n,), and how often the
     right-hand side was evaluated.
@@ -90,7 +135,8 @@ def fly(
     n = problem.samples
     atol = np.array([method.absolute * SCALE[s.unit] for s in equations.states])
     switches = len(equations.hoisted("switched_rates")[1].outputs[1])
-    library = equations.machine_code("dopri.c", ("switched_rates",), head=_head(switches))
+    head = _head(method.tableau, switches)
+    library = equations.machine_code("adaptive.c", ("switched_rates",), head=head)
     if library is None:
         return _in_python(equations, problem, method, atol)
     states, per_sample = np.empty((n + 1, len(atol))), np.zeros(n, ctypes.c_long)
@@ -126,29 +172,31 @@ def fly(
         capacity = min(10 * capacity, method.most)
 
 
-def _gave_up(sample: int, dt: float, method: DormandPrince) -> SymheliError:
+def _gave_up(sample: int, dt: float, method: Adaptive) -> SymheliError:
     return SymheliError(
         f"the steps became too small or too many (most={method.most}) near {sample * dt:.6g} s: "
         'the flight is lost there, or the equations are stiff (try "radau")'
     )
 
 
-def _head(switches: int) -> str:
-    """The tableau as C, with the end of the step as seventh stage, and the number of switching
-    functions.
-    """
-    a = np.zeros((7, 7))
-    a[:6, :6], a[6, :6] = DORMAND_PRINCE.a, DORMAND_PRINCE.b
-    rows = ", ".join("{" + ", ".join(map(repr, row.tolist())) + "}" for row in a)
+@functools.cache
+def _head(pair: Pair, switches: int) -> str:
+    """The tableau as C, and the number of switching functions."""
+
+    def values(row: Array) -> str:
+        return "{" + ", ".join(map(repr, row.tolist())) + "}"
+
+    stages = pair.stages
+    rows = ", ".join(map(values, pair.a))
     return (
-        f"#define STAGES 7\n#define SWITCHES {switches}\n#define NEAR {NEAR!r}\n"
-        f"static const double A[7][7] = {{{rows}}}, E[7] ="
-        f" {{{', '.join(map(repr, DORMAND_PRINCE_ERROR.tolist()))}}};\n"
+        f"#define STAGES {stages}\n#define AT_END {pair.at_end}\n#define SWITCHES {switches}\n"
+        f"#define NEAR {NEAR!r}\nstatic const double A[{stages}][{stages}] = {{{rows}}},"
+        f" B[{stages}] = {values(pair.b)}, E[{stages}] = {values(pair.error)};\n"
     )
 
 
 def _first_switch(before: Array, after: Array) -> float:
-    """As `first_switch` in dopri.c."""
+    """As `first_switch` in adaptive.c."""
     with np.errstate(all="ignore"):
         share = before / (before - after)
         share = share[(before * after < 0) & (share > NEAR) & (share < 1 - NEAR)]
@@ -156,11 +204,11 @@ def _first_switch(before: Array, after: Array) -> float:
 
 
 def _in_python(
-    equations: Equations, problem: Problem, method: DormandPrince, atol: Array
+    equations: Equations, problem: Problem, method: Adaptive, atol: Array
 ) -> tuple[Array, Array, Array, int]:
-    """As dopri.c, operation by operation."""
+    """As adaptive.c, operation by operation."""
     rates = equations.virtual_machine("switched_rates")
-    rows = [*DORMAND_PRINCE.a, DORMAND_PRINCE.b]
+    pair = method.tableau
     x, states, steps, per_sample = (
         problem.x0[0],
         [problem.x0[0]],
@@ -186,16 +234,17 @@ def _in_python(
             h = min(even, cut)
             if len(steps) == method.most or not h >= 1e-12 * problem.dt:
                 raise _gave_up(sample, problem.dt, method)
-            evaluations += 6 if start else 7
+            evaluations += pair.stages - bool(start)
             start = start or rates(x, u, wind, p)
-            k, end, after = [start[0]], x, start[1]
-            for row in rows[1:]:
-                end = x + h * weighted(row, k)
-                slope, after = rates(end, u, wind, p)
-                k.append(slope)
+            stages = [start]
+            k = [start[0]]
+            for row in pair.a[1:]:
+                stages.append(rates(x + h * weighted(row, k), u, wind, p))
+                k.append(stages[-1][0])
+            end, after = x + h * weighted(pair.b, k), stages[pair.at_end][1]
             scaled = (
                 h
-                * weighted(DORMAND_PRINCE_ERROR, k)
+                * weighted(pair.error, k)
                 / (atol + method.relative * np.maximum(np.abs(x), np.abs(end)))
             )
             error = math.sqrt(sum((scaled * scaled).tolist()) / len(x))
