@@ -27,6 +27,7 @@ from benchmarks.opponents import scipy_flight  # noqa: E402
 from benchmarks.peak import processor  # noqa: E402
 from benchmarks.physical_limit import Flown, described, limits, work  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
+from benchmarks.sweep_steps import sweep_steps  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
 from symheli.codegen.numeric import Numeric  # noqa: E402
 from symheli.integrate import CashKarp, RungeKutta4  # noqa: E402
@@ -278,53 +279,59 @@ def physical_limit(race: Race, who: Contestants) -> None:
 
 
 def sweep(race: Race, who: Contestants) -> None:
-    """200 trims with their linear models, hover to 13 m/s."""
+    """200 trims with their linear models, hover to 13 m/s; and over acceleration too."""
     from benchmarks.opponents import python_control_sweep
 
-    speeds = np.linspace(0.0, 13.0, 25 if race.quick else 200)
-    if race.quick:
-        race.notes.append(f"sweep: {len(speeds)} airspeeds in place of 200")
+    speeds = np.linspace(0.0, 13.0, 200)
+    grid, pushes = np.linspace(0.0, 13.0, 27), [-4.0, -2.0, 0.0, 2.0, 4.0]
+    ours, theirs = "symheli.sweep (exact derivatives, kinks found)", "python-control"
+    both = "symheli.sweep_grid, 27 airspeeds by 5 accelerations"
     candidates = {
-        "symheli.sweep": lambda: symheli.sweep(who.heli, speeds),
-        "python-control": lambda: python_control_sweep.sweep(speeds),
+        ours: lambda: symheli.sweep(who.heli, speeds),
+        both: lambda: symheli.sweep_grid(who.heli, grid, acceleration=pushes),
+        theirs: lambda: python_control_sweep.sweep(speeds),
     }
     times = medians(candidates, 0.0 if race.quick else 5.0, time.thread_time)
-    family, theirs = symheli.sweep(who.heli, speeds), python_control_sweep.sweep(speeds)
+    family, found = symheli.sweep(who.heli, speeds), python_control_sweep.sweep(speeds)
     trims = max(
-        np.abs(x - t.x.array).max() for (x, _, _), t in zip(theirs, family.trims, strict=True)
+        np.abs(x - t.x.array).max() for (x, _, _), t in zip(found, family.trims, strict=True)
     )
     smooth = [
         k
         for k, v in enumerate(speeds)
-        if all(abs(v - kink) > 0.05 for found in family.kinks.values() for kink in found)
+        if all(abs(v - kink) > 0.05 for kinks in family.kinks.values() for kink in kinks)
         and v > 0.05
     ]
-    models = max(np.abs(theirs[k][2].A - family.A[k]).max() for k in smooth)
+    models = max(np.abs(found[k][2].A - family.A[k]).max() for k in smooth)
     race.tables.append(
         table(
             f"### Trim and linear model at {len(speeds)} airspeeds, 0 to 13 m/s",
             [
-                (
-                    "symheli.sweep (exact derivatives, kinks found)",
-                    readable(times["symheli.sweep"]),
-                    "",
-                ),
+                (ours, readable(times[ours]), ""),
+                (both, readable(times[both]), ""),
                 (
                     "python-control, find_operating_point and linearize",
-                    readable(times["python-control"]),
+                    readable(times[theirs]),
                     f"trims {trims:.0e}, A {models:.0e}",
                 ),
             ],
             ("", "median", "largest difference to symheli (SI; A away from the kinks)"),
         )
     )
-    race.ratios.append(
+    race.tables.append(sweep_steps(who.heli, speeds, 0.2 if race.quick else 2.0))
+    race.ratios += [
         Ratio(
             "sweep of trims and linear models: times faster than python-control",
-            times["python-control"] / times["symheli.sweep"],
-            200.0,
-        )
-    )
+            times[theirs] / times[ours],
+            30.0,
+        ),
+        Ratio(
+            "grid of 27 airspeeds by 5 accelerations: its time over 30 ms",
+            times[both] / 30e-3,
+            1.0,
+            at_most=True,
+        ),
+    ]
 
 
 def main() -> None:

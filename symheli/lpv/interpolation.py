@@ -90,9 +90,8 @@ def _schedule(models: LinearModels, values: Sequence[Array], points: Array) -> T
     known = models.points
     if not len(known):
         return None
-    x0 = np.array([[trim.x[s] for s in models.states] for trim in known])
-    u0 = np.array([[trim.u[i] if i in trim.u else 0.0 for i in models.inputs] for trim in known])
-    xdot = np.array([[trim.xdot[s] for s in models.states] for trim in known])
+    x0, u0 = known.state(models.states), known.input(models.inputs)
+    xdot = known.rate(models.states)
     basis = _product([_factor("spline" if len(n) >= 4 else "linear", n, 0) for n in values])
     rates = basis.fit(points, xdot) if np.abs(xdot).max(initial=0.0) > AT_REST else None
     return TrimSchedule(basis, basis.fit(points, x0), basis.fit(points, u0), rates)

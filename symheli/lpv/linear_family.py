@@ -15,6 +15,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
+from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal
 
 AIRSPEED = Signal("airspeed", "m/s")
@@ -64,7 +65,7 @@ class LinearFamily:
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
-    trims: Sequence[OperatingPoint] = ()
+    trims: Sequence[OperatingPoint] | OperatingPoints = ()
     dt: float | None = None
     kinks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     models: LinearModels = field(init=False, repr=False)
@@ -82,7 +83,7 @@ class LinearFamily:
             self.inputs,
             self.outputs,
             self.dt,
-            self.trims,
+            OperatingPoints.of(self.trims),
         )
         if len(models) != len(self.airspeeds):
             raise InputError(
@@ -91,6 +92,7 @@ class LinearFamily:
             )
         for name in ("A", "B", "C", "D", "states", "inputs", "outputs"):
             object.__setattr__(self, name, getattr(models, name))
+        object.__setattr__(self, "trims", models.points)
         object.__setattr__(self, "models", models)
 
     @classmethod
@@ -121,14 +123,14 @@ class LinearFamily:
     def __getitem__(self, k: int) -> LinearModel:
         return self.models[k]
 
-    def known_trims(self, purpose: str) -> Sequence[OperatingPoint]:
+    def known_trims(self, purpose: str) -> OperatingPoints:
         """The trims; raises `InputError` where there are none, which `purpose` needs."""
-        if not self.trims:
+        if not self.models.points:
             raise InputError(
                 f"{purpose} needs the trim at each airspeed, and this family has none; give its"
                 " models a point, or sweep"
             )
-        return self.trims
+        return self.models.points
 
     def select(
         self,

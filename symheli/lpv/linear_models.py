@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import overload
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel, selected
 from symheli.values.arrays import Array, frozen
-from symheli.values.operating_point import OperatingPoint
+from symheli.values.operating_points import ListedPoints, OperatingPoints
 from symheli.values.signal import Signal, signals
 
 
@@ -28,7 +28,7 @@ class LinearModels(Sequence[LinearModel]):
         Strings that carry their unit.
     dt : float, optional
         Sample period, s; None: continuous.
-    points : sequence of OperatingPoint
+    points : OperatingPoints
         What x and u of each are measured from; empty where it is not known.
 
     Raises
@@ -45,7 +45,7 @@ class LinearModels(Sequence[LinearModel]):
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     dt: float | None = None
-    points: Sequence[OperatingPoint] = ()
+    points: OperatingPoints = field(default_factory=ListedPoints)
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):
@@ -73,7 +73,8 @@ class LinearModels(Sequence[LinearModel]):
                     " discretize first"
                 )
         A, B, C, D = (np.stack([getattr(model, name) for model in models]) for name in "ABCD")
-        return cls(A, B, C, D, *names, tuple(model.point for model in models if model.point))
+        points = OperatingPoints.of([model.point for model in models if model.point])
+        return cls(A, B, C, D, *names, points)
 
     def __len__(self) -> int:
         return len(self.A)
@@ -99,9 +100,14 @@ class LinearModels(Sequence[LinearModel]):
 
     def at(self, which: Array) -> LinearModels:
         """The models at these positions."""
-        points = tuple(self.points[k] for k in which.tolist()) if self.points else ()
+        points = [self.points[k] for k in which.tolist()] if self.points else ()
         return replace(
-            self, A=self.A[which], B=self.B[which], C=self.C[which], D=self.D[which], points=points
+            self,
+            A=self.A[which],
+            B=self.B[which],
+            C=self.C[which],
+            D=self.D[which],
+            points=OperatingPoints.of(points),
         )
 
     def select(

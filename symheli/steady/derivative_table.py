@@ -134,11 +134,10 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
         raise InputError(
             f"derivatives are those of continuous models; this family has dt = {family.dt} s"
         )
-    for point in family.known_trims("a table of derivatives"):
-        if any(
-            abs(point.x[rate]) > 1e-9 for rate in ("p", "q", "r") if rate in point.x
-        ):  # straight to the accuracy of a trim
-            raise InputError("derivatives are tabulated for straight flight; this family turns")
+    trims = family.known_trims("a table of derivatives")
+    rates = [rate for rate in ("p", "q", "r") if rate in trims[0].x]
+    if np.any(np.abs(trims.state(rates)) > 1e-9):  # straight to the accuracy of a trim
+        raise InputError("derivatives are tabulated for straight flight; this family turns")
     columns = [
         s for s in family.states if s not in ("phi", "theta")
     ]  # these enter by gravity and kinematics alone
@@ -151,7 +150,7 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
             entry = family.A[:, i, family.states.index(column)]
             if (state, column) in KINEMATIC:
                 velocity, sign = KINEMATIC[str(state), str(column)]
-                entry = entry + sign * np.array([point.x[velocity] for point in family.trims])
+                entry = entry + sign * trims.state([velocity])[:, 0]
             names.append(Signal(f"{symbol}_{column}", quotient(unit, column.unit)))
             values.append(entry)
         for j, control in enumerate(family.inputs):

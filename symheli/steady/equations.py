@@ -96,7 +96,7 @@ class SteadyEquations:
         xdot, total = self.dynamics.euler(x, u, column(wind), par, self.dynamics.inflow_solver)
         return Flight([z, demand, par], x, u, column(wind), asked, xdot, total)
 
-    @property
+    @cached_property
     def switches(self) -> tuple[str, ...]:
         """Names of the switching functions."""
         return tuple(name.replace("_", " ") for name in self._flight.total.switches)

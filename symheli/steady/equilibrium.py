@@ -153,7 +153,7 @@ def trim(
     )
     best = problem.point(z)
     if throw and not best.success:
-        raise failure(problem.heli, best)
+        raise problem.failure(z)
     return best
 
 
@@ -179,25 +179,6 @@ def _stops(point: TrimPoint) -> str:
     )
 
 
-def failure(heli: Helicopter, best: TrimPoint) -> TrimError:
-    """What the best point misses, equation by equation, the worst first."""
-    misses = sorted(
-        zip(best.residual.array, best.residual.signals, strict=True), key=lambda miss: -abs(miss[0])
-    )
-    table = ", ".join(f"d{s}/dt = {r:.2e} {quotient(s.unit, 's')}" for r, s in misses)
-    said = "; ".join(
-        [
-            f"no trim at {best.condition}: the best point leaves {table}",
-            *([_stops(best)] if best.on_stops else []),
-            *_throttle(heli, best),
-            *_jumps(heli, best),
-            *(["in a vortex ring"] if best.vortex_ring else []),
-            "try a nearer condition as `start`, or throw=False for the best point",
-        ]
-    )
-    return TrimError(said, best)
-
-
 def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
     """What the engine says at a point that is no trim."""
     if "om_i" not in point.x:
@@ -210,19 +191,6 @@ def _throttle(heli: Helicopter, point: TrimPoint) -> list[str]:
         if throttle <= 0
         else []
     )
-
-
-def _jumps(heli: Helicopter, point: TrimPoint) -> list[str]:
-    """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as a
-    trim would step across.
-    """
-    switches = heli.switches(point.x.array, point.u.array, point.wind.array)
-    near = [
-        name.partition("jump ")[2]
-        for name, value in switches.items()
-        if "jump " in name and abs(value) < 0.1
-    ]
-    return [f"the equations jump here, {name}: there may be no equilibrium" for name in near]
 
 
 class Equilibrium:
@@ -291,9 +259,9 @@ class Equilibrium:
             from scipy.optimize import root
 
             found = root(
-                lambda z: self._system(z)[0][self.equations.balanced],
+                lambda z: self.system(z)[0][self.equations.balanced],
                 start,
-                jac=lambda z: self._system(z)[1],
+                jac=lambda z: self.system(z)[1],
                 method="hybr",
                 options={"xtol": 1e-14},
             )
@@ -302,7 +270,7 @@ class Equilibrium:
 
     def newton(self, start: Array) -> tuple[Array, float]:
         """Newton's method alone: where it ends, and the largest residual there."""
-        return newton(self._system, self.equations.balanced, start)
+        return newton(self.system, self.equations.balanced, start)
 
     def point(self, z: Array) -> TrimPoint:
         """All that is known at these unknowns."""
@@ -321,7 +289,38 @@ class Equilibrium:
             density=heli.density,
         )
 
-    def _system(self, z: Array) -> tuple[Array, Array]:
+    def failure(self, z: Array) -> TrimError:
+        """What the best point, at z, misses, equation by equation, the worst first."""
+        best = self.point(z)
+        misses = sorted(
+            zip(best.residual.array, best.residual.signals, strict=True),
+            key=lambda miss: -abs(miss[0]),
+        )
+        table = ", ".join(f"d{s}/dt = {r:.2e} {quotient(s.unit, 's')}" for r, s in misses)
+        said = [
+            f"no trim at {best.condition}: the best point leaves {table}",
+            *([_stops(best)] if best.on_stops else []),
+            *_throttle(self.heli, best),
+            *self._jumps(z),
+            *(["in a vortex ring"] if best.vortex_ring else []),
+            "try a nearer condition as `start`, or throw=False for the best point",
+        ]
+        return TrimError("; ".join(said), best)
+
+    def _jumps(self, z: Array) -> list[str]:
+        """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as
+        a trim would step across.
+        """
+        switches = numeric(self.heli, "point")(z, self.demand)[4]
+        near = [
+            name.partition("jump ")[2]
+            for name, value in zip(self.equations.switches, switches, strict=True)
+            if "jump " in name and abs(value) < 0.1
+        ]
+        return [f"the equations jump here, {name}: there may be no equilibrium" for name in near]
+
+    def system(self, z: Array) -> tuple[Array, Array]:
+        """Residual of every equation, and the derivative of the balanced ones."""
         residual, slopes = self._evaluate(z, self.demand)
         return residual, slopes.reshape(len(z), len(z))
 
@@ -331,7 +330,7 @@ class Equilibrium:
 
     def miss(self, z: Array) -> float:
         """Largest residual; infinite where one is no number."""
-        return float(np.nan_to_num(np.abs(self._system(z)[0]), nan=np.inf).max())
+        return float(np.nan_to_num(np.abs(self.system(z)[0]), nan=np.inf).max())
 
     def _found(self, z: Array) -> bool:
         return self.miss(z) < TOLERANCE
@@ -360,9 +359,9 @@ class Equilibrium:
         bound = np.concatenate([np.full(2, 1.4), np.full(n - 2, np.inf), self.heli.travel])
         start = np.clip(start, -0.9 * bound, 0.9 * bound)
         return least_squares(
-            lambda z: self._system(z)[0][self.equations.balanced],
+            lambda z: self.system(z)[0][self.equations.balanced],
             start,
-            lambda z: self._system(z)[1],  # type: ignore[arg-type]
+            lambda z: self.system(z)[1],  # type: ignore[arg-type]
             bounds=(-bound, bound),
             max_nfev=200,
         ).x

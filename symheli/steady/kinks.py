@@ -45,7 +45,9 @@ def _crossings(heli: Helicopter, trims: TrimBatch, names: list[str], between: Ar
     at = np.stack([between, between + 1], axis=1)
     ends = trims.conditions.airspeed[at]
     values = np.array([trims.switches[name][k] for name, k in zip(names, at, strict=True)])
-    asked, start = trims.conditions.at(between), unknowns(heli, trims.at(between))
+    # in each bracket one cut after the other, the brackets side by side
+    asked = trims.conditions.at(np.tile(between, CUTS))
+    start = unknowns(heli, trims)[between]
     while np.any(np.ptp(ends, axis=1) > ACCURACY):
         cuts = _cuts(ends, values)
         found, heights = _heights(heli, asked, names, cuts, start)
@@ -64,8 +66,7 @@ def _heights(
 ) -> tuple[Array, Array]:
     """Whether there is a trim at each cut (n, CUTS), and the function of its row there."""
     n, count = cuts.shape
-    # in each bracket one cut after the other, the brackets side by side
-    conditions = replace(asked.at(np.tile(np.arange(n), count)), airspeed=cuts.T.ravel())
+    conditions = replace(asked, airspeed=cuts.T.ravel())
     flights = SteadyFlights([heli], np.zeros(n * count, int), conditions)
     after = np.maximum(np.arange(n * count) - n, ALONE)
     z, miss = flights.solved(np.tile(start, (count, 1)), after)

@@ -15,8 +15,7 @@ from symheli.steady.equilibrium import TrimPoint
 from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import SteadyFlights
 from symheli.steady.trim_batch import TrimBatch
-from symheli.values.arrays import Array
-from symheli.values.signal import indices
+from symheli.values.signal import Signal, indices
 
 
 def linearize(
@@ -70,28 +69,27 @@ def linearize(
         )
     heli = heli.in_air(point.density)
     found = numeric(heli, "slopes")(point.x.array, point.u.array, point.wind.array)
-    A, B, E = (matrix.reshape(1, len(heli.states), -1) for matrix in found)
-    return _models(heli, A, B, E, inputs, [point])[0]
+    n, (columns, names) = len(heli.states), _columns(heli, inputs)
+    A, B, E = (matrix.reshape(n, -1) for matrix in found)
+    return LinearModel(
+        A,
+        np.hstack([B, E])[:, columns],
+        np.eye(n),
+        np.zeros((n, len(columns))),
+        heli.states,
+        names,
+        heli.states,
+        point=point,
+    )
 
 
 def linear_models(
     flights: SteadyFlights, trims: TrimBatch, inputs: Sequence[str] | None
 ) -> LinearModels:
     """`linearize` at the trims of these flights, in machine code."""
+    heli = flights.helis[0]
     A, B, E = flights.slopes(trims.x, trims.u, trims.wind)
-    return _models(flights.helis[0], A, B, E, inputs, trims)
-
-
-def _models(
-    heli: Helicopter,
-    A: Array,
-    B: Array,
-    E: Array,
-    inputs: Sequence[str] | None,
-    points: Sequence[TrimPoint],
-) -> LinearModels:
-    names = (*heli.inputs, *heli.wind)
-    columns = indices(heli.inputs if inputs is None else inputs, names, "input")
+    columns, names = _columns(heli, inputs)
     K, n = A.shape[:2]
     return LinearModels(
         A,
@@ -99,7 +97,16 @@ def _models(
         np.broadcast_to(np.eye(n), (K, n, n)),
         np.zeros((K, n, len(columns))),
         heli.states,
-        tuple(names[i] for i in columns),
+        names,
         heli.states,
-        points=points,
+        points=trims,
     )
+
+
+def _columns(
+    heli: Helicopter, inputs: Sequence[str] | None
+) -> tuple[list[int], tuple[Signal, ...]]:
+    """Columns of the four controls and the three winds that these inputs are, and their names."""
+    every = (*heli.inputs, *heli.wind)
+    columns = indices(heli.inputs if inputs is None else inputs, every, "input")
+    return columns, tuple(every[i] for i in columns)

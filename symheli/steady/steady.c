@@ -1,8 +1,8 @@
 /* Steady flights by Newton's method, LANES side by side: NZ unknowns, NX states, NC numbers of the
-   flight condition, NP parameters, NS switching functions, NK held values. The generated
-   held(demand, p, kept), system_of(z, kept, residual, slopes), point_of(z, demand, p, x, wind, xdot,
-   residual, switches, torque) and slopes_of(x, u, wind, p, A, B, E) come before this text, and
-   which equations are balanced. */
+   flight condition, NP parameters, NS switching functions, NK held values. Before this text come
+   held(demand, p, kept), system_of(z, kept, residual, slopes), point_of(z, demand, p, x, wind,
+   xdot, residual, switches, torque) and slopes_of(x, u, wind, p, A, B, E), generated, and which
+   equations are balanced. */
 
 static void load(lane *to, const double *from, long first, long lanes, long stride, int size)
 {
@@ -113,8 +113,8 @@ void trims(long count, const long *after, const double *demand, const double *p,
   }
 }
 
-/* What is known at given unknowns: x (count x NX), wind (3), xdot (NX), residual (NX), switches (NS),
-   torque (1). */
+/* What is known at given unknowns: x (count x NX), wind (3), xdot (NX), residual (NX), switches
+   (NS), torque (1). */
 void points(long count, const double *z, const double *demand, const double *p, long p_stride,
             double *x, double *wind, double *xdot, double *residual, double *switches,
             double *torque)

@@ -14,7 +14,6 @@ from symheli.steady.equations import SIDE_BY_SIDE, steady_equations
 from symheli.steady.equilibrium import (
     Equilibrium,
     TrimPoint,
-    failure,
     in_vortex_ring,
     on_stops,
     stops,
@@ -25,11 +24,12 @@ from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import ALONE, SteadyFlights
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
-from symheli.values.signal import Signal
+from symheli.values.operating_points import OperatingPoints
+from symheli.values.signal import Signal, indices
 
 
 @dataclass(frozen=True, eq=False)
-class TrimBatch(Sequence[TrimPoint]):
+class TrimBatch(OperatingPoints):
     """N trims as arrays; found[k] is one as a `TrimPoint`, made when it is asked for.
 
     Parameters
@@ -103,6 +103,21 @@ class TrimBatch(Sequence[TrimPoint]):
         if k not in self._made:
             self._made[k] = self._point(k)
         return self._made[k]
+
+    def state(self, names: Sequence[str]) -> Array:
+        """These states (N, n)."""
+        return self.x[:, indices(names, self.states, "state")]
+
+    def rate(self, names: Sequence[str]) -> Array:
+        """Derivatives of these states (N, n)."""
+        return self.xdot[:, indices(names, self.states, "state")]
+
+    def input(self, names: Sequence[str]) -> Array:
+        """These inputs (N, n), 0 where none has that name (a gust)."""
+        out = np.zeros((len(self), len(names)))
+        known = [k for k, name in enumerate(names) if name in self.inputs]
+        out[:, known] = self.u[:, indices([names[k] for k in known], self.inputs, "input")]
+        return out
 
     def at(self, which: Array) -> TrimBatch:
         """The trims at these positions."""
@@ -237,15 +252,19 @@ def trimmed(
     demand = flights.conditions.demand
     for k in np.flatnonzero(~(miss < TOLERANCE)).tolist():
         alone = Equilibrium(flights.heli(k), flights.conditions[k])
-        found = np.flatnonzero(miss < TOLERANCE)
-        if len(found):
-            apart = np.linalg.norm(demand[found] - demand[k], axis=1)
-            z[k] = z[found[apart.argmin()]]
+        others = np.flatnonzero(miss < TOLERANCE)
+        if len(others):
+            apart = np.linalg.norm(demand[others] - demand[k], axis=1)
+            z[k] = z[others[apart.argmin()]]
         z[k] = alone.search(z[k], continuation)
         miss[k] = alone.miss(z[k])
         if throw and not miss[k] < TOLERANCE:
-            raise failure(alone.heli, alone.point(z[k]))
-    return _described(flights, z)
+            break
+    found = _described(flights, z)
+    if throw and not found.success.all():
+        first = int(found.success.argmin())
+        raise Equilibrium(flights.heli(first), flights.conditions[first]).failure(z[first])
+    return found
 
 
 def _described(flights: SteadyFlights, z: Array) -> TrimBatch:

@@ -198,13 +198,3 @@ def test_a_grid_refuses_what_it_does_not_hold(ideal):
         symheli.sweep_grid(ideal, [3.0], density=[1.0], altitude=[0.0])
     with pytest.raises(symheli.InputError, match="increasing"):
         symheli.sweep_grid(ideal, [3.0], mass=[9.0, 8.0])
-
-
-def test_a_grid_compiles_nothing_anew(ideal, monkeypatch):
-    for name in ("rhs", "jacobian", "diagnostics"):
-        ideal.numeric(name)
-    monkeypatch.setattr(
-        "symheli.helicopter.compiled", lambda function: pytest.fail("compiled anew")
-    )
-    symheli.sweep_grid(ideal, [3.0], mass=[8.0, 9.0])
-    symheli.sweep_grid(ideal, [3.0], altitude=[0.0, 1000.0])
