@@ -182,7 +182,6 @@ def fly_in_chunks(
         raise InputError(f"expected a Helicopter, got {heli!r:.80}; try Helicopter.load('xcell60')")
     flights, threads, every = Flights(heli), workers_of(workers), range(len(plans))
     for plan in plans:  # what they share is made before the threads start
-        flights.course(plan)
         flights.equipment(plan)
     if any(not isinstance(flights.controller(p), ScheduledController) for p in plans):
         threads = 1  # one object, asked by one flight at a time

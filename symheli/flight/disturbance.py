@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,9 +35,16 @@ class Disturbances:
     ) -> Disturbances:
         """The same for the same seeds, whatever else flies."""
         longest = max(len(course.time) for course in courses)
-        count = len(plans)
-        white = np.empty((count, longest, 8)) if readings.noise[:8].any() else None
-        white_air = np.zeros((count, longest)) if readings.noise[8] else None
+        calm = cls(_winds(plans, courses, longest), _excitations(plans, courses), None, None)
+        return calm.with_noise(plans, courses, readings)
+
+    def with_noise(
+        self, plans: Sequence[FlightPlan], courses: Sequence[Course], readings: Readings
+    ) -> Disturbances:
+        """The same with numbers drawn for the sensors that are noisy."""
+        shape = len(plans), max(len(course.time) for course in courses)
+        white = np.empty((*shape, 8)) if readings.noise[:8].any() else None
+        white_air = np.zeros(shape) if readings.noise[8] else None
         for i, (plan, course) in enumerate(zip(plans, courses, strict=True)):
             n = len(course.time)
             if white is not None:
@@ -45,7 +52,7 @@ class Disturbances:
                 white[i, n:] = 0.0
             if white_air is not None:
                 np.random.default_rng((plan.seed, 1)).standard_normal(out=white_air[i, :n])
-        return cls(_winds(plans, courses, longest), _excitations(plans, courses), white, white_air)
+        return replace(self, white=white, white_air=white_air)
 
 
 def _winds(plans: Sequence[FlightPlan], courses: Sequence[Course], longest: int) -> Array:

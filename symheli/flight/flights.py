@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from threading import Lock
+from typing import Any
 
 import numpy as np
 
 from symheli.codegen import Layout
 from symheli.flight.autopilot import gain_scheduled_lqr
-from symheli.flight.controller import Controller, ScheduledController, controller_of
+from symheli.flight.controller import MEASURED, Controller, ScheduledController, controller_of
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
 from symheli.flight.flight_data import FlightData
 from symheli.flight.loops import Flown, Loops
-from symheli.flight.plan import FlightPlan
+from symheli.flight.plan import READ, FlightPlan
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
+
+KEPT = 256
+"""Courses that are kept for the next plan that has the same."""
 
 
 @dataclass
@@ -30,6 +35,7 @@ class Flights:
     _equipment: dict[Hashable, Equipment] = field(default_factory=dict)
     _under_way: set[Loops] = field(default_factory=set)
     _stopped: bool = False
+    _lock: Any = field(default_factory=Lock)
 
     def controller(self, plan: FlightPlan) -> ScheduledController | Controller:
         """That of a plan, sampled; an LQR over the commanded airspeeds where it names none."""
@@ -56,11 +62,14 @@ class Flights:
         return Clock.of(plan, self.controller(plan).dt)
 
     def course(self, plan: FlightPlan) -> Course:
-        """What a plan is held to."""
+        """What a plan is held to; the last ones are kept."""
         key = (plan.schedule, plan.dt, self.clock(plan), plan.wind.steady, plan.trims)
-        if key not in self._courses:
-            self._courses[key] = Course.of(self.heli, plan, self.clock(plan))
-        return self._courses[key]
+        with self._lock:
+            if key not in self._courses:
+                self._courses[key] = Course.of(self.heli, plan, self.clock(plan))
+                if len(self._courses) > KEPT:
+                    del self._courses[next(iter(self._courses))]
+            return self._courses[key]
 
     def equipment(self, plan: FlightPlan) -> Equipment:
         """What is built in; the same object for plans that can fly side by side."""
@@ -76,23 +85,19 @@ class Flights:
             )
         return self._equipment[key]
 
-    def loops(self, plans: Sequence[FlightPlan], noise: Array | None = None) -> Loops:
-        """Plans with the same equipment, ready to fly; `noise` (N, 9) in place of the sensors'."""
-        equipment = self.equipment(plans[0])
-        flown = [self.course(plan) for plan in plans]
+    def loops(self, plans: Sequence[FlightPlan], flown: Sequence[Course]) -> Loops:
+        """Plans with the same equipment, ready to fly their courses."""
         courses = {id(c): c for c in flown}
         position = {key: i for i, key in enumerate(courses)}
-        readings = equipment.readings
-        if noise is not None:
-            readings = replace(readings, noise=noise.max(axis=0))
+        equipment = self.equipment(plans[0])
         return Loops(
             self.heli,
             self.clock(plans[0]),
             equipment,
             list(courses.values()),
             [position[id(course)] for course in flown],
-            Disturbances.of(plans, flown, readings),
-            noise,
+            Disturbances.of(plans, flown, equipment.readings),
+            equipment.readings.noise[None],
         )
 
     def stop(self) -> None:
@@ -114,27 +119,30 @@ class Flights:
         """Fly plans with the same equipment; where a plan gives its noise in decibels, without
         noise first.
         """
-        flown = self._run(self.loops(plans), layout)
+        clock, courses = self.clock(plans[0]), [self.course(plan) for plan in plans]
+        loops = self.loops(plans, courses)
+        found = self._data(plans, courses, clock, self._run(loops, layout))
         if any(plan.noise_db is not None for plan in plans):
-            noise = np.stack([self._noise(plan, i, flown) for i, plan in enumerate(plans)])
-            flown = self._run(self.loops(plans, noise), layout)
-        clock = self.clock(plans[0])
+            noise = np.stack([_noise(data) for data in found])
+            noisy = replace(loops.equipment.readings, noise=noise.max(axis=0))
+            loops.disturbances = loops.disturbances.with_noise(plans, courses, noisy)
+            loops.noise = noise
+            found = self._data(plans, courses, clock, self._run(loops, layout))
+        return found
+
+    def _data(
+        self, plans: Sequence[FlightPlan], courses: Sequence[Course], clock: Clock, flown: Flown
+    ) -> list[FlightData]:
         return [
-            FlightData(self.heli, plan, clock, self.course(plan), out, int(lost))
-            for plan, out, lost in zip(plans, flown.out, flown.lost, strict=True)
+            FlightData(self.heli, plan, clock, course, out, int(lost))
+            for plan, course, out, lost in zip(plans, courses, flown.out, flown.lost, strict=True)
         ]
 
-    def _noise(self, plan: FlightPlan, i: int, flown: Flown) -> Array:
-        """Standard deviations (9,) so many decibels below those of the flight without noise."""
-        out = np.zeros(9)
-        if plan.noise_db is not None:
-            data = FlightData(
-                self.heli,
-                plan,
-                self.clock(plan),
-                self.course(plan),
-                flown.out[i],
-                int(flown.lost[i]),
-            )
-            out[:8] = data.out[: data.kept, :8].std(axis=0) * 10 ** (-plan.noise_db / 20)
-        return out
+
+def _noise(data: FlightData) -> Array:
+    """Standard deviations (9,) so many decibels below those of a flight without noise."""
+    out = np.zeros(len(READ))
+    if data.plan.noise_db is not None:
+        spread = data.out[: data.kept, : len(MEASURED)].std(axis=0)
+        out[: len(MEASURED)] = spread * 10 ** (-data.plan.noise_db / 20)
+    return out

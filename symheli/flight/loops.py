@@ -53,16 +53,14 @@ class Loops:
         courses: Sequence[Course],
         chosen: Sequence[int],
         disturbances: Disturbances,
-        noise: Array | None = None,
+        noise: Array,
     ):
-        """Flight i flies courses[chosen[i]] under its disturbances; `noise` (N, 9) stands in place
-        of the sensors' own.
+        """Flight i flies courses[chosen[i]] under its disturbances; `noise` (N or 1, 9) are the
+        standard deviations of its sensors.
         """
         self.heli, self.clock, self.equipment = heli, clock, equipment
         self.courses, self.chosen, self.disturbances = courses, list(chosen), disturbances
-        self.noise = np.ascontiguousarray(
-            equipment.readings.noise[None] if noise is None else noise, float
-        )
+        self.noise = noise
         self.samples = np.array([len(courses[i].time) for i in self.chosen], np.int_)
         self._stop = np.zeros(1, np.intc)
 
