@@ -1,7 +1,7 @@
 /* One flight by a pair of explicit Runge-Kutta methods of orders 5 and 4 with step control: NX
    states, NP parameters, SWITCHED_NK held values. The generated switched_held(u, wind, p, kept) and
-   switched_rates(x, kept, xdot, switches) come before this text; STAGES, A, B, E (b - b of order 4),
-   AT_END (the stage at the end of the step), SWITCHES and NEAR too. */
+   switched_rates(x, kept, xdot, switches) come before this text; STAGES, A, B, E (b less b of order
+   4), AT_END (the stage at the end of the step), SWITCHES and NEAR too. */
 
 struct flight {
   const double *x0, *u, *wind; long wind_sample;         /* NX; sample, 4; sample or one, 3 */
@@ -20,8 +20,9 @@ static inline void weighted(double *sum, const double *weights, lane (*k)[NX], i
     for (int i = 0; i < NX; ++i) sum[i] = FUSED(weights[j], k[j][i][0], sum[i]);
 }
 
-/* A step from x: its end, normalised, in `end`, the switching functions in `before` and `after`; the
-   error in units of the tolerance. Where it is not the first from x, k[0] and `before` are there. */
+/* A step from x: its end, normalised, in `end`, the switching functions in `before` and `after`;
+   the error in units of the tolerance. Where it is not the first from x, k[0] and `before` are
+   there. */
 static double pair(const struct flight *f, const lane *x, const lane *kept, lane (*k)[NX], double h,
                    int first, lane *end, lane *before, lane *after)
 {
