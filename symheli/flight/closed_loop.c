@@ -23,8 +23,8 @@ struct loops {
   const double *noise; long noise_flight;
   const double *bias, *quantum;
   const long *delay, *period;
-  /* Controller with `own` states: (own + 4) x (own + TOLD) entries, polynomials of p - break between
-     `pieces` + 1 breaks: piece, power from the highest (degree + 1), entry. */
+  /* Controller with `own` states: (own + 4) x (own + TOLD) entries, polynomials of p - break
+     between `pieces` + 1 breaks: piece, power from the highest (degree + 1), entry. */
   long own, pieces, degree, by_reading, governed;
   const double *breaks, *coefficients;
   /* Servos: A (4, ORDER, ORDER), B, C and the state that holds 1 rad (4, ORDER), the fastest change
@@ -156,9 +156,10 @@ static void measure(const struct loops *f, struct block *b, long k)
     const long before = k < f->delay[j] ? 0 : k - f->delay[j];
     const long source = f->period[j] > 1 ? before - before % f->period[j] : before;
     const lane *then = (const lane *)b->history + (source % b->recent) * SEEN + j;
-    const double *white = j < 8 ? f->white + j : f->white_air, bias = f->bias[j], quantum = f->quantum[j];
-    const long width = j < 8 ? 8 : 1;
     const int noisy = j < 8 ? f->white != NULL : f->white_air != NULL;
+    const double *white = noisy ? (j < 8 ? f->white + j : f->white_air) : NULL;
+    const double bias = f->bias[j], quantum = f->quantum[j];
+    const long width = j < 8 ? 8 : 1;
     for (int l = 0; l < LANES; ++l) {
       const long flight = b->first + (l < b->lanes ? l : b->lanes - 1);
       const double drawn =
@@ -259,8 +260,9 @@ static void servos(const struct loops *f, struct block *b, const lane *effective
       const double x = b->servo[i][0][l], y = b->servo[i][1][l], z = b->servo[i][2][l];
       b->followed[i][l] = followed;
       for (int j = 0; j < ORDER; ++j)
-        b->servo[i][j][l] = FUSED(A[ORDER * j + 2], z,
-                                  FUSED(A[ORDER * j + 1], y, FUSED(A[ORDER * j], x, B[j] * followed)));
+        b->servo[i][j][l] = FUSED(
+            A[ORDER * j + 2], z,
+            FUSED(A[ORDER * j + 1], y, FUSED(A[ORDER * j], x, B[j] * followed)));
     }
   }
   deflections(f, b);
@@ -282,8 +284,8 @@ static void advance(const struct loops *f, struct block *b, long k)
   memcpy(b->commands + (k % b->issued) * 4, b->command, sizeof b->command);
   for (long s = 0; s < f->substeps; ++s) {
     const long at = k * f->substeps + s - f->late;
-    const lane *effective =
-        at < 0 ? (const lane *)b->initial : (const lane *)b->commands + at / f->substeps % b->issued * 4;
+    const long asked = at / f->substeps % b->issued;
+    const lane *effective = (const lane *)(at < 0 ? b->initial : b->commands + asked * 4);
     if (s == 0) keep(f, b, k, f->A ? (const lane *)b->reached : effective);
     if (f->A) servos(f, b, effective, u);
     else memcpy(u, effective, sizeof u);
@@ -326,7 +328,10 @@ int fly_loops(const struct loops *f, long first, long last)
 /* The same in steps, for a controller from outside: begin; read and command at every
    sample; end. */
 
-void *begin_loops(const struct loops *f, long first, long last) { return begin(f, first, last - first); }
+void *begin_loops(const struct loops *f, long first, long last)
+{
+  return begin(f, first, last - first);
+}
 
 /* Readings (lanes, SEEN + 2, the last two of the rotor) at sample k; returns whether a flight is
    still under way. */
@@ -344,7 +349,8 @@ int read_loops(const struct loops *f, struct block *b, long k, double *readings)
 void command_loops(const struct loops *f, struct block *b, long k, const double *command)
 {
   for (int l = 0; l < LANES; ++l)
-    for (int i = 0; i < 4; ++i) b->command[i][l] = command[(l < b->lanes ? l : b->lanes - 1) * 4 + i];
+    for (int i = 0; i < 4; ++i)
+      b->command[i][l] = command[(l < b->lanes ? l : b->lanes - 1) * 4 + i];
   advance(f, b, k);
 }
 
