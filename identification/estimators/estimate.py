@@ -7,6 +7,14 @@ from collections.abc import Iterable
 
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
+from identification.estimators import (  # noqa: F401  known by their shorthand once loaded
+    instrumental_variables,
+    lasso,
+    output_error,
+    recursion,
+    refined_instruments,
+    ridge,
+)
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, method_of
 from identification.model.lpvarx_model import LPVARXModel
