@@ -38,6 +38,8 @@ START = 10.0
 """Least multiple of the identity to start from, for slacks and multipliers."""
 FEASIBLE = 1e-9
 """Residual of the blocks, of their constants, below which they are kept without one."""
+LEAST = 0.01
+"""A level smaller than this is known to fractions of this."""
 SMALL = 1e-4
 """Steps below this lead nowhere."""
 REFINED = 1e-11
@@ -267,7 +269,7 @@ class _Cones:
             dual_y,
             max(float(np.abs(dual).max()), abs(dual_y)) / max(1.0, most),
             product,
-            product / abs(point.y) if point.y else np.inf,
+            product / max(abs(point.y), LEAST),
             max(float(np.abs(dual).max()), abs(level)) / -constant if constant < 0 else np.inf,
         )
 
