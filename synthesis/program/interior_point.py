@@ -146,6 +146,8 @@ class _Inequalities:
         self.blocks = blocks
         self.constant = -blocks.constant - program.back_off
         self.level = np.broadcast_to(program.level, self.constant.shape)
+        x = blocks.varying
+        self.used = [np.flatnonzero(np.any(x[:, j], axis=(0, 2, 3))) for j in range(x.shape[1])]
 
     def linear(self, P: Array) -> Array:
         return -self.blocks.linear(P)
@@ -158,18 +160,19 @@ class _Inequalities:
         n = f.shape[1]
         fH, xH = f @ H[:, None], x @ H[:, None, None]
         f, x = np.swapaxes(f, -1, -2), np.swapaxes(x, -1, -2)
-        # by m, r and s: f_r H f_s', and for every j x_jr H f_s'
-        ff, xf = fH[:, :, None] @ f, np.moveaxis(xH[:, :, :, None] @ f, 1, 0)
+        # by m, r and s: f_r H f_s' and, for every j, x_jr H f_s'; of the r and s that are not zero
+        ff = fH[:, :, None] @ f
+        xf = [xH[:, j][:, r, None] @ f for j, r in enumerate(self.used)]
 
         def flat(M: Array) -> Array:
             return M.reshape(-1, n * n)
 
-        turned = flat(np.swapaxes(ff, 1, 2))
-        for j in range(len(columns)):
-            for k in range(j + 1):
-                xx = xH[:, j, :, None] @ x[:, k, None]
-                left = np.concatenate([flat(xf[j]), flat(xx)])
-                right = np.concatenate([flat(np.swapaxes(xf[k], 1, 2)), turned])
+        for j, r in enumerate(self.used):
+            for k, s in enumerate(self.used[: j + 1]):
+                xx = xH[:, j][:, r, None] @ x[:, k][:, None, s]
+                left = np.concatenate([flat(xf[j][:, :, s]), flat(xx)])
+                turned = np.swapaxes(xf[k][:, :, r], 1, 2), np.swapaxes(ff[:, s][:, :, r], 1, 2)
+                right = np.concatenate([flat(M) for M in turned])
                 _add(out, (columns[j], columns[k]), 2.0 * _on_vectors(left.T @ right, n))
 
 
