@@ -69,6 +69,7 @@ def discrete_products(
             np.concatenate([M, state[None]]),
             varying.reshape(q * s, *varying.shape[2:]),
             np.repeat(constant, s, axis=0),
+            symmetric=True,
         )
 
 

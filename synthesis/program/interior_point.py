@@ -37,7 +37,9 @@ Normal = dict[tuple[int, int], Array]
 START = 10.0
 """Least multiple of the identity to start from, for slacks and multipliers."""
 FEASIBLE = 1e-9
-"""Residual of the blocks, of their constants, below which they are kept without one."""
+"""Residual of the blocks, of their constants, below which they are kept without one, where they
+can be.
+"""
 LEAST = 0.01
 """A level smaller than this is known to fractions of this."""
 SMALL = 1e-4
@@ -52,7 +54,7 @@ it right.
 """
 DUAL = 1e-6
 """Residual of the multipliers, of the largest of their entries, at a solution."""
-IMPOSSIBLE = 1e-9
+IMPOSSIBLE = 1e-7
 """Residual of multipliers, of what they show to be contradictory, that prove that there is no P."""
 
 
@@ -61,7 +63,7 @@ def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
     allow.
 
     The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
-    feasible or there is none. Never raises for a failed solve.
+    feasible to rounding or there is none. Never raises for a failed solve.
     """
     tolerance, iterations, seconds = (
         solver.options[name] for name in ("tolerance", "iterations", "seconds")
@@ -71,8 +73,11 @@ def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
     point, count, feasible = cones.start(), 0, False
     while True:
         at = cones.residuals(point)
-        feasible = feasible or at.primal_size <= FEASIBLE
-        if feasible and at.gap <= tolerance and at.dual_size <= DUAL:
+        close = at.primal_size <= FEASIBLE
+        if close and not feasible and cones.inside(point):
+            feasible, point = True, point._replace(S=cones.slacks(point.P, point.y))
+            at = cones.residuals(point)
+        if close and at.gap <= tolerance and at.dual_size <= DUAL:
             word = "solved"
         elif at.contradiction < IMPOSSIBLE:
             word = "infeasible"
@@ -90,8 +95,9 @@ def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
                 continue
             word = "out of digits"
         answer = {"solved": Answer.SOLVED, "infeasible": Answer.INFEASIBLE}.get(word, Answer.FAILED)
-        x = np.append(svec(point.P).ravel(), point.y) if feasible else None
-        message = f"{word} after {count} iterations, relative gap {at.gap:.1e}"
+        x = np.append(svec(point.P).ravel(), point.y) if close else None
+        gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
+        message = f"{word} after {count} iterations{gap}"
         return Candidate(answer, x, time.perf_counter() - begin, message)
 
 
@@ -169,11 +175,16 @@ class _Inequalities:
 
         for j, r in enumerate(self.used):
             for k, s in enumerate(self.used[: j + 1]):
-                xx = xH[:, j][:, r, None] @ x[:, k][:, None, s]
-                left = np.concatenate([flat(xf[j][:, :, s]), flat(xx)])
-                turned = np.swapaxes(xf[k][:, :, r], 1, 2), np.swapaxes(ff[:, s][:, :, r], 1, 2)
-                right = np.concatenate([flat(M) for M in turned])
-                _add(out, (columns[j], columns[k]), 2.0 * _on_vectors(left.T @ right, n))
+                left = flat(xf[j][:, :, s])
+                right = flat(np.swapaxes(xf[k][:, :, r], 1, 2))
+                if self.blocks.symmetric:  # the other half is the same
+                    factor = 4.0
+                else:
+                    xx = xH[:, j][:, r, None] @ x[:, k][:, None, s]
+                    left = np.concatenate([left, flat(xx)])
+                    turned = np.swapaxes(ff[:, s][:, :, r], 1, 2)
+                    right, factor = np.concatenate([right, flat(turned)]), 2.0
+                _add(out, (columns[j], columns[k]), factor * _on_vectors(left.T @ right, n))
 
 
 class _Bounds:
@@ -246,6 +257,15 @@ class _Cones:
             cone.constant + change
             for cone, change in zip(self.each, self.change(P, y), strict=True)
         ]
+
+    def inside(self, point: _Point) -> bool:
+        """Whether the slacks as they ought to be are in the cones."""
+        try:
+            for S in self.slacks(point.P, point.y):
+                np.linalg.cholesky(S)
+        except np.linalg.LinAlgError:
+            return False
+        return True
 
     def adjoint(self, Z: list[Array]) -> tuple[Array, float]:
         """(P', y') with <Z, change(P, y)> = <P', P> + y' y."""

@@ -23,13 +23,15 @@ class LyapunovBlocks(NamedTuple):
     diag(0, I).
 
     `columns` (k,) says which coefficients of P are involved; `fixed` (R, n, N) are the same in all
-    m blocks, `varying` (m, k, R, n, N) are not; `constant` (m, N, N).
+    m blocks, `varying` (m, k, R, n, N) are not; `constant` (m, N, N). `symmetric`: each sum over r
+    is, without its transpose.
     """
 
     columns: Array
     fixed: Array
     varying: Array
     constant: Array
+    symmetric: bool = False
 
     def linear(self, P: Array) -> Array:
         """The part (m, N, N) linear in P, at the coefficients P (k', n, n) of the whole spline."""
