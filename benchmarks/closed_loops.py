@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import symheli
-from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
+from symheli import LinearFamily, LinearModel, LPVStateSpace, Scheduling
 from symheli.flight import XCELL_SERVOS, Autopilot, gain_scheduled_lqr
 from symheli.lpv import pade_delay
 from symheli.values import Signal
@@ -68,7 +68,7 @@ LOOPS = {
 
 def closed_loop(states: int, rate: float = RATE) -> LPVStateSpace:
     """The loop of so many states, one of `LOOPS`: gusts (m/s) -> yaw rate, roll and pitch angle."""
-    heli, family, autopilot = _flown()
+    family, autopilot = _flown()
     parts = LOOPS[states]
     models = [
         closed(parts.around(family[k]), autopilot, float(family.airspeeds[k]), parts.filters)
@@ -81,7 +81,7 @@ def sampled_loop(rate: float = RATE) -> LPVStateSpace:
     """Twenty states at 50 Hz: helicopter and cyclic servos sampled, every command exactly one
     sample late.
     """
-    heli, family, autopilot = _flown()
+    family, autopilot = _flown()
     parts = Parts(servos=CYCLIC)
     models = []
     for k in range(len(family)):
@@ -105,7 +105,7 @@ def filtered(model: LinearModel, sensors: Sequence[str]) -> LinearModel:
     """The model with a first-order filter on each of these outputs, seen as `<name>_measured`."""
     n, nu, k = len(model.states), len(model.inputs), len(sensors)
     rows = [model.outputs.index(y) for y in sensors]  # type: ignore[arg-type]
-    names = tuple(Signal(f"{y}_measured", model.outputs[i].unit) for y, i in zip(sensors, rows))
+    names = tuple(Signal(f"{model.outputs[i]}_measured", model.outputs[i].unit) for i in rows)
     return replace(
         model,
         A=np.block(
@@ -120,11 +120,11 @@ def filtered(model: LinearModel, sensors: Sequence[str]) -> LinearModel:
     )
 
 
-def _flown() -> tuple[Helicopter, LinearFamily, Autopilot]:
+def _flown() -> tuple[LinearFamily, Autopilot]:
     heli = symheli.Helicopter.load("xcell60", governor="ideal")
     airspeeds = np.linspace(LOW, HIGH, POINTS)
     family = symheli.sweep(heli, airspeeds, inputs=(*CONTROLS, *GUSTS))
-    return heli, family, gain_scheduled_lqr(heli, LOW, HIGH, DELAY, POINTS, XCELL_SERVOS)
+    return family, gain_scheduled_lqr(heli, LOW, HIGH, DELAY, POINTS, XCELL_SERVOS)
 
 
 def _one_sample_late(name: str) -> LinearModel:
