@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import multiprocessing
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,17 @@ def peak() -> float:
         else None
     )
     return int(found.group(1)) / 1024 if found else math.nan
+
+
+def with_children() -> float:
+    """Largest resident size of this process or of one that it started and that has ended, MiB."""
+    try:
+        import resource
+    except ImportError:
+        return peak()
+    unit = 1 if sys.platform == "darwin" else 1024
+    children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit / 2**20
+    return max(peak(), children)
 
 
 def alone(call: Callable[..., Any], *args: Any) -> Any:
