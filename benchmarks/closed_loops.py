@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 import symheli
 from symheli import LinearFamily, LinearModel, LPVStateSpace, Scheduling
-from symheli.flight import XCELL_SERVOS, Autopilot, gain_scheduled_lqr
+from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from symheli.lpv import pade_delay
 from symheli.values import Signal
 
@@ -68,10 +69,10 @@ LOOPS = {
 
 def closed_loop(states: int, rate: float = RATE) -> LPVStateSpace:
     """The loop of so many states, one of `LOOPS`: gusts (m/s) -> yaw rate, roll and pitch angle."""
-    family, autopilot = _flown()
+    family, controller = _flown()
     parts = LOOPS[states]
     models = [
-        closed(parts.around(family[k]), autopilot, float(family.airspeeds[k]), parts.filters)
+        closed(parts.around(family[k]), controller.gains[k], controller.measured(parts.filters))
         for k in range(len(family))
     ]
     return _scheduled(family, models, rate)
@@ -81,23 +82,21 @@ def sampled_loop(rate: float = RATE) -> LPVStateSpace:
     """Twenty states at 50 Hz: helicopter and cyclic servos sampled, every command exactly one
     sample late.
     """
-    family, autopilot = _flown()
+    family, controller = _flown()
     parts = Parts(servos=CYCLIC)
     models = []
     for k in range(len(family)):
         plant = parts.around(family[k]).discretize(DELAY)
         late = plant.driven_by({u: _one_sample_late(u) for u in CONTROLS})
-        models.append(closed(late, autopilot, float(family.airspeeds[k])))
+        models.append(closed(late, controller.gains[k], controller.measured()))
     return _scheduled(family, models, rate)
 
 
-def closed(
-    model: LinearModel, autopilot: Autopilot, airspeed: float, filters: Sequence[str] = ()
-) -> LinearModel:
-    """u = -K(V) y with the outputs of the filters where there are any."""
-    K = -autopilot.gain(airspeed)
-    measured = [f"{s}_measured" if s in filters else str(s) for s in autopilot.states]
-    gains = {(u, y): float(K[i, j]) for i, u in enumerate(CONTROLS) for j, y in enumerate(measured)}
+def closed(model: LinearModel, K: np.ndarray, measured: Sequence[str]) -> LinearModel:
+    """u = -K y, K (4, len(measured)), from the gusts to what they are seen by."""
+    gains = {
+        (u, y): -float(K[i, j]) for i, u in enumerate(CONTROLS) for j, y in enumerate(measured)
+    }
     return model.feedback(gains).select(inputs=GUSTS, outputs=SHOWN)
 
 
@@ -120,11 +119,28 @@ def filtered(model: LinearModel, sensors: Sequence[str]) -> LinearModel:
     )
 
 
-def _flown() -> tuple[LinearFamily, Autopilot]:
+class Controller(NamedTuple):
+    """Gains (K, 4, 8) on these states, one an airspeed."""
+
+    gains: np.ndarray
+    states: tuple[Signal, ...]
+
+    def measured(self, filters: Sequence[str] = ()) -> list[str]:
+        """The outputs it takes: those of the filters where there are any."""
+        return [f"{s}_measured" if s in filters else str(s) for s in self.states]
+
+
+def _flown() -> tuple[LinearFamily, Controller]:
+    """The helicopter, and a controller whose gains are polynomials in the airspeed through those
+    of the scheduled LQR.
+    """
     heli = symheli.Helicopter.load("xcell60", governor="ideal")
     airspeeds = np.linspace(LOW, HIGH, POINTS)
     family = symheli.sweep(heli, airspeeds, inputs=(*CONTROLS, *GUSTS))
-    return family, gain_scheduled_lqr(heli, LOW, HIGH, DELAY, POINTS, XCELL_SERVOS)
+    lqr = gain_scheduled_lqr(heli, LOW, HIGH, DELAY, POINTS, XCELL_SERVOS)
+    powers = np.vander(airspeeds / HIGH, DEGREE + 1)
+    fitted = powers @ np.linalg.lstsq(powers, lqr.gains.reshape(POINTS, -1), rcond=None)[0]
+    return family, Controller(fitted.reshape(lqr.gains.shape), lqr.states)
 
 
 def _one_sample_late(name: str) -> LinearModel:

@@ -3,13 +3,18 @@ the exact test of definiteness that its proofs are believed for.
 """
 
 import math
+import sys
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from models import constant, random_stable, searched, spring
 
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # benchmarks/ is not installed
+
 import synthesis.program.interior_point as method
+from benchmarks.closed_loops import DELAY, GUSTS, LOOPS, closed_loop, sampled_loop
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import (
@@ -233,6 +238,36 @@ def test_a_method_that_is_stopped_says_so_and_proves_nothing_it_has_not_reached(
     assert "out of time" in str(late.attempts[0])
     assert late.status is Status.FAILED
     assert not late.verified
+
+
+@pytest.mark.parametrize("states", LOOPS)
+def test_the_loops_of_the_benchmark_have_the_states_they_name_and_are_stable_when_frozen(states):
+    loop = closed_loop(states)
+    assert len(loop.states) == states
+    assert loop.inputs == GUSTS
+    poles = np.linalg.eigvals(loop.matrices(np.linspace(0.0, 13.0, 27)).A)
+    assert poles.real.max() < -0.5
+
+
+def test_a_closed_loop_as_it_flies_is_proven_near_its_frozen_gain():
+    cert = l2_gain(closed_loop(16), 1.0, search=None)
+    assert cert.solver.startswith("LYAPUNOV")
+    # at 1 m/s^2 the rate is worth about a percent
+    assert cert.frozen < cert.gamma < 1.02 * cert.frozen
+    assert cert.verify(rigorous=True)
+
+
+def test_a_command_one_sample_late_is_held_exactly():
+    loop = sampled_loop()
+    assert len(loop.states) == 20
+    assert loop.dt == DELAY
+    late = [i for i, s in enumerate(loop.states) if str(s).endswith("_late")]
+    K = loop.matrices(6.5).A[late]
+    # the four states are the commands of the sample before: they depend on what is measured alone
+    measured = [i for i, s in enumerate(loop.states) if str(s) in "u v w p q r phi theta".split()]
+    others = np.setdiff1d(np.arange(20), measured)
+    assert np.all(K[:, others] == 0)
+    assert np.all(np.abs(K[:, measured]).max(axis=1) > 0)
 
 
 def rational(M):
