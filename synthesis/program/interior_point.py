@@ -70,7 +70,7 @@ def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
     )
     begin = time.perf_counter()
     cones = _Cones(program)
-    point, count, feasible = cones.start(), 0, False
+    point, count, feasible, before = cones.start(), 0, False, np.inf
     while True:
         at = cones.residuals(point)
         close = at.primal_size <= FEASIBLE
@@ -79,6 +79,8 @@ def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
             at = cones.residuals(point)
         if close and at.gap <= tolerance and at.dual_size <= DUAL:
             word = "solved"
+        elif close and at.gap <= tolerance and at.dual_size >= before:
+            word = "out of digits"  # the multipliers no longer improve
         elif at.contradiction < IMPOSSIBLE:
             word = "infeasible"
         elif count == iterations:
@@ -91,7 +93,7 @@ def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
             except np.linalg.LinAlgError:
                 following = None
             if following is not None:
-                point, count = following, count + 1
+                point, count, before = following, count + 1, at.dual_size
                 continue
             word = "out of digits"
         answer = {"solved": Answer.SOLVED, "infeasible": Answer.INFEASIBLE}.get(word, Answer.FAILED)
