@@ -45,6 +45,7 @@ bench: $(STAMP)
 	$(BIN)/python benchmarks/model.py --write
 	$(BIN)/python benchmarks/identification.py --write
 	$(BIN)/python benchmarks/analysis.py --write
+	$(BIN)/python benchmarks/closed_loop_certificates.py --write
 
 clean:
 	rm -rf $(VENV) study build *.egg-info

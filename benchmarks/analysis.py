@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import multiprocessing
-import re
 import statistics
 import sys
 import time
@@ -29,6 +27,7 @@ one_thread()
 import numpy as np  # noqa: E402
 
 import symheli  # noqa: E402
+from benchmarks.memory import alone, peak  # noqa: E402
 from benchmarks.opponents import gridded_lmi  # noqa: E402
 from benchmarks.timing import arguments, keep  # noqa: E402
 from studies.loops.lateral import HOLD, OUTPUTS, STATES, lateral_loop  # noqa: E402
@@ -150,19 +149,6 @@ def alternating(
     return {name: statistics.median(times) for name, times in spent.items()}, results
 
 
-def _peak() -> float:
-    """Largest resident size of this process so far, MiB; NaN where the system does not say (it is
-    Linux that does).
-    """
-    status = Path("/proc/self/status")
-    found = (
-        re.search(r"VmHWM:\s*(\d+) kB", status.read_text(encoding="utf-8"))
-        if status.exists()
-        else None
-    )
-    return int(found.group(1)) / 1024 if found else math.nan
-
-
 def _memory(call: Callable[..., Any], *args: Any) -> float:
     """Growth of the largest resident size over one call, MiB, with both contestants' libraries
     loaded before.
@@ -170,15 +156,14 @@ def _memory(call: Callable[..., Any], *args: Any) -> float:
     import clarabel  # noqa: F401
     import cvxpy  # noqa: F401
 
-    before = _peak()
+    before = peak()
     call(*args)
-    return _peak() - before
+    return peak() - before
 
 
 def memory(call: Callable[..., Any], *args: Any) -> float:
-    """`_memory` in a process of its own, where nothing else has set the peak."""
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        return pool.apply(_memory, (call, *args))
+    """`_memory` in a process of its own."""
+    return alone(_memory, call, *args)
 
 
 def exponent(sizes: list[int], times: list[float]) -> float:

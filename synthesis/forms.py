@@ -79,14 +79,15 @@ class Spline(_InP):
     ----------
     degree : int or tuple of int, optional
         Of P in every parameter, or one each, 0 to 4; 0 is a constant P. By default for `l2_gain`
-        and `stability` of one parameter 3 in continuous and 2 in discrete time, for several 2 and
-        1, but as for one in a parameter whose rate is another. Where p may jump P is constant,
-        whatever the degree.
+        and `stability` of one parameter 3 in continuous and 2 in discrete time (more than 12
+        states: 2 and 1), for several 2 and 1, but as for one in a parameter whose rate is another.
+        Where p may jump P is constant, whatever the degree.
     segments : int or tuple, optional
         Of P in every parameter; several numbers are tried in turn until the bound is good enough,
         each an integer or a tuple of one a parameter. By default 16 and 32, in discrete time 8 and
-        16; 4 and 8 in the general analysis of one parameter and of one whose rate is another, 1 of
-        several. A constant P has no knots, but its LMIs are cut there (8).
+        16; 4 and 8 with more than 12 states, in the general analysis of one parameter and of one
+        whose rate is another, 1 of several. A constant P has no knots, but its LMIs are cut there
+        (8).
     grading : float, optional
         Knots at low + (high - low)(k/K)^grading; by default 2 for one parameter and for one whose
         rate is another, 1 for several.

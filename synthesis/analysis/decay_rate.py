@@ -18,7 +18,7 @@ def decay_rate(
     *,
     form: Spline | None = None,
     impose: Imposed | None = None,
-    solver: Solver | str = "CLARABEL",
+    solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> Certificate:
     """Largest alpha found such that |x(t)| <= c exp(-alpha t) |x(0)| for every admissible p(t).
@@ -36,8 +36,8 @@ def decay_rate(
         The form of the Lyapunov function.
     impose : Bernstein, SumOfSquares, Vertices or Grid, optional
         How the inequalities are imposed for every p; Bernstein coefficients by default.
-    solver : Solver or str
-        Which solver, and when it stops.
+    solver : Solver or str, optional
+        Which solver, and when it stops; by default Clarabel.
     search : Search or None
         How hard to look for bad trajectories; with None the
         slowest frozen mode is the upper bound.

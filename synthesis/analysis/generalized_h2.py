@@ -18,7 +18,7 @@ def generalized_h2(
     *,
     form: Spline | None = None,
     impose: Imposed | None = None,
-    solver: Solver | str = "CLARABEL",
+    solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> Certificate:
     """Certified upper bound of max_t |y(t)| / |u|_2, from rest, over every admissible p(t).
@@ -36,8 +36,8 @@ def generalized_h2(
         The form of the Lyapunov function.
     impose : Bernstein, SumOfSquares, Vertices or Grid, optional
         How the inequalities are imposed for every p; Bernstein coefficients by default.
-    solver : Solver or str
-        Which solver, and when it stops.
+    solver : Solver or str, optional
+        Which solver, and when it stops; by default Clarabel.
     search : Search or None
         How hard to look for bad trajectories; with None the
         worst frozen gain is the lower bound.

@@ -18,7 +18,7 @@ def l2_gain(
     *,
     form: LyapunovForm | None = None,
     impose: Imposed | None = None,
-    solver: Solver | str = "CLARABEL",
+    solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> Certificate:
     """Certified upper bound of the L2 gain over every p(t) in its range within its rates.
@@ -38,8 +38,9 @@ def l2_gain(
         The form of the Lyapunov function.
     impose : Bernstein, SumOfSquares, Vertices or Grid, optional
         How the inequalities are imposed for every p; Bernstein coefficients by default.
-    solver : Solver or str
-        Which solver, and when it stops.
+    solver : Solver or str, optional
+        Which solver, and when it stops; by default Clarabel, for a `Spline` in one parameter and
+        more than 12 states this package's own, "LYAPUNOV".
     search : Search or None
         How hard to look for bad trajectories; with None the
         worst frozen gain is the lower bound.

@@ -10,11 +10,13 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace
 from synthesis.analysis.ladder import NOTHING, Found, Ladder, inflated
-from synthesis.assemble.bounded_real import Blocks, assemble
-from synthesis.assemble.unknowns import Unknown, constant, scaled_problem, unknowns
+from synthesis.assemble.bounded_real import assemble
+from synthesis.assemble.unknowns import Quadratic, Unknown, constant, scaled_problem, unknowns
 from synthesis.certificate import Attempt, Proof
 from synthesis.impose import Bernstein
-from synthesis.program.cone_program import Answer, Candidate, solve
+from synthesis.program import interior_point
+from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, solve
+from synthesis.program.lyapunov_program import LyapunovProgram
 
 Array = np.ndarray
 
@@ -61,8 +63,10 @@ class OneParameter(Ladder):
     def attempt(self, shape: Unknown, margin: float, alpha: float = 0.0) -> Found:
         """One P and one margin."""
         start = time.perf_counter()
-        blocks = shape.weighed(self.problem, self.elevation)
-        candidate, rounds = self._solve_by_rounds(shape, blocks, margin)
+        if self.asked.solver.name == LYAPUNOV:
+            candidate = self._solve_by_products(shape, margin)
+        else:
+            candidate = self._solve_by_rounds(shape, margin)
         solved = time.perf_counter()
         found = self._judged(candidate, shape)
         self.spent += (
@@ -71,19 +75,26 @@ class OneParameter(Ladder):
             time.perf_counter() - solved,
         )
         verified = "verified" if found.proof is not None else "not verified"
-        words = f"{candidate.message} ({rounds} round(s)), {verified}"
+        words = f"{candidate.message}, {verified}"
         if self.asked.gains and found.proof is not None:
             words += f", gamma {found.bound:.6g}"
         program = f"{len(shape.knots) - 1} segments of degree {shape.degree}"
         self.attempts.append(Attempt(program, margin, words, found.bound))
         return found
 
-    def _solve_by_rounds(
-        self, form: Unknown, blocks: list[Blocks], margin: float
-    ) -> tuple[Candidate, int]:
+    def _solve_by_products(self, form: Unknown, margin: float) -> Candidate:
+        """Solve with all blocks, kept as products with P."""
+        assert isinstance(form, Quadratic)  # noqa: S101 - see `Question`
+        blocks = form.products(self.problem, self.elevation)
+        inputs, floor = len(self.problem.lpv.inputs), self.asked.impose.least
+        program = LyapunovProgram(blocks, form.size, inputs, form.unknowns, margin, floor)
+        return interior_point.minimise(program, self.asked.solver)
+
+    def _solve_by_rounds(self, form: Unknown, margin: float) -> Candidate:
         """Solve with the blocks likely to bind, add those that came out violated, and so on: far
         fewer blocks in all.
         """
+        blocks = form.weighed(self.problem, self.elevation)
         n, m = form.size, len(self.problem.lpv.inputs)
         active = [np.full(len(block.constant), block.likely) for block in blocks]
         seconds, rounds = 0.0, 0
@@ -117,7 +128,8 @@ class OneParameter(Ladder):
                 added += int(new.sum())
             if not added:
                 break
-        return replace(candidate, seconds=seconds), rounds
+        message = f"{candidate.message} ({rounds} round(s))"
+        return replace(candidate, seconds=seconds, message=message)
 
     def _judged(self, candidate: Candidate, shape: Unknown) -> Found:
         """The gain that P itself admits, whatever the solver said."""

@@ -12,7 +12,8 @@ from synthesis.forms import HigherOrder, LyapunovForm, Memory, Spline
 from synthesis.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces, pieces
-from synthesis.program.cone_program import Solver
+from synthesis.program.cone_program import LYAPUNOV, Solver, general_solver
+from synthesis.program.lyapunov_program import MANY
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.lower_bound import Search
 from synthesis.worst.rates import Rate
@@ -56,7 +57,7 @@ def question(
     kind: Kind,
     form: LyapunovForm | None,
     impose: Imposed | None,
-    solver: Solver | str,
+    solver: Solver | str | None,
     search: Search | None,
 ) -> Question:
     """The question, its options checked against one another and against the model.
@@ -64,7 +65,6 @@ def question(
     Raises `InputError` for an option that has no meaning for the question.
     """
     form, impose = form or Spline(), impose or Bernstein()
-    solver = solver if isinstance(solver, Solver) else Solver(solver)
     if not isinstance(form, Spline | Memory | HigherOrder):
         raise InputError(f"form must be a Spline, Memory or HigherOrder, got {form!r:.60}")
     if not isinstance(impose, Bernstein | SumOfSquares | Vertices | Grid):
@@ -81,10 +81,19 @@ def question(
         _check_rest(motion, moving)
     elif any(isinstance(s.rate, str) for s in model.parameters):
         model = model.with_scheduling(moving)
-    asked = Question(pieces(model), Demand(kind, motion), form, impose, solver, search)
+    asked = Question(pieces(model), Demand(kind, motion), form, impose, Solver("CLARABEL"), search)
     _check_channels(asked)
     _check_options(asked)
-    return asked
+    return asked._replace(solver=_solver(asked, solver))
+
+
+def _solver(asked: Question, solver: Solver | str | None) -> Solver:
+    by_products = asked.one_parameter and isinstance(asked.form, Spline)
+    if solver is None:
+        return Solver(LYAPUNOV if by_products and asked.model.sizes[0] > MANY else "CLARABEL")
+    if by_products:
+        return solver if isinstance(solver, Solver) else Solver(solver)
+    return general_solver(solver)
 
 
 def _accepted(model: Model) -> LPVStateSpace:

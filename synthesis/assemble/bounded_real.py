@@ -74,79 +74,46 @@ def continuous_blocks(
     Bernstein form.
     """
     for cell in cells:
-        A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
-        E = basis(A.shape[1])
-        lyapunov = E @ A[:, None]
-        coupling = E @ B[:, None]
+        form = over_cell(cell, knots, degree, extra)
+        E = basis(form.A.shape[1])
+        lyapunov = E @ form.A[:, None]
+        coupling = E @ form.B[:, None]
         operator = svec(bordered(lyapunov + np.swapaxes(lyapunov, -1, -2), coupling))
-        direct = svec(bordered(E, np.zeros((*E.shape[:2], B.shape[2]))))
-        output = output_terms(cell)
-        d = max(degree + dM, len(output) - 1) + extra
-        a, b, width = local_coordinates(cell, knots)
-        here = restriction(degree, a, b)
-        up = elevation_matrix(degree + dM, d)
-        product = np.einsum("qm,mik,kj->qij", up, product_weights(dM, degree), here)
-        linear = np.einsum("mij,ivl->mjvl", product, operator)
-        constant = elevation_matrix(len(output) - 1, d) @ svec(output)
-        slope = slope_over(degree, here, (b - a) * width)
-        slope = elevation_matrix(len(slope) - 1, d) @ slope
+        direct = svec(bordered(E, np.zeros((*E.shape[:2], form.B.shape[2]))))
+        linear = np.einsum("mij,ivl->mjvl", form.flow, operator)
+        constant = form.up @ svec(form.output)
         for nu in (-rate, rate) if rate > 0 else (0.0,):
-            drift = nu * slope[:, :, None, None] * direct
-            yield Blocks(
-                cell.segment * degree + np.arange(degree + 1),
-                linear + drift,
-                constant,
-                np.ones(d + 1),
-            )
+            drift = nu * form.slope[:, :, None, None] * direct
+            yield Blocks(form.columns, linear + drift, constant, np.ones(len(constant)))
 
 
 def discrete_blocks(
     strips: Sequence[Strip], knots: Array, degree: int, extra: int
 ) -> Iterator[Blocks]:
-    """The blocks of every strip. Likely to bind: the border lines of the widest cell of each
-    segment and piece.
-    """
-    widest: dict[tuple[int, float], float] = {}
-    for cell in (strip.cell for strip in strips):
-        place = (cell.segment, cell.piece.low)
-        widest[place] = max(widest.get(place, 0.0), cell.high - cell.low)
-    for strip in strips:
-        cell = strip.cell
-        wide_cell = cell.high - cell.low >= 0.5 * widest[cell.segment, cell.piece.low]
-        A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
-        M = np.concatenate([A, B], axis=2)
-        E = basis(A.shape[1])
+    """The blocks of every strip."""
+    for form in over_strips(strips, knots, degree, extra):
+        M = np.concatenate([form.A, form.B], axis=2)
+        E = basis(form.A.shape[1])
         inner = E @ M[:, None]
+        dM = len(M) - 1
         pairs = np.einsum("rik,iab,kvac->rvbc", product_weights(dM, dM), M, inner, optimize=True)
         operator = svec(0.5 * (pairs + np.swapaxes(pairs, -1, -2)))
-        direct = svec(bordered(E, np.zeros((*E.shape[:2], B.shape[2]))))
-        output = output_terms(cell)
-        d = max(degree + 2 * dM, len(output) - 1) + extra
-        a, b, _ = local_coordinates(cell, knots)
-        here = elevation_matrix(degree, d) @ restriction(degree, a, b)
-        constant = elevation_matrix(len(output) - 1, d) @ svec(output)
-        low, high = knots[strip.next_segment], knots[strip.next_segment + 1]
-        corners = [[(q - low) / (high - low) for q in pair] for pair in strip.corners]
-        after = composition(degree, corners)
-        up = elevation_matrix(degree + 2 * dM, d)
-        now = here[:, :, None, None] * direct
-        for k in range(degree + 1):
+        direct = svec(bordered(E, np.zeros((*E.shape[:2], form.B.shape[2]))))
+        constant = form.up @ svec(form.output)
+        now = form.here[:, :, None, None] * direct
+        for k, likely in enumerate(form.likely):
             after_k = np.einsum(
                 "qm,mri,ij,rvl->qjvl",
-                up,
+                form.raised,
                 product_weights(2 * dM, degree),
-                after[:, k],
+                form.after[:, k],
                 operator,
                 optimize=True,
             )
-            first = min(strip.next_segment, cell.segment)
-            count = (abs(strip.next_segment - cell.segment) + 1) * degree + 1
-            linear = np.zeros((len(after_k), count, *after_k.shape[2:]))
-            start, own = (strip.next_segment - first) * degree, (cell.segment - first) * degree
-            linear[:, start : start + degree + 1] += after_k
-            linear[:, own : own + degree + 1] -= now
-            columns = first * degree + np.arange(count)
-            yield Blocks(columns, linear, constant, np.ones(d + 1), wide_cell and k in (0, degree))
+            linear = np.zeros((len(after_k), len(form.columns), *after_k.shape[2:]))
+            linear[:, form.next : form.next + degree + 1] += after_k
+            linear[:, form.own : form.own + degree + 1] -= now
+            yield Blocks(form.columns, linear, constant, np.ones(len(constant)), likely)
 
 
 def assemble(
@@ -207,6 +174,95 @@ def assemble(
     sizes = [N] * len(weights) + [states] * (unknowns * (len(A) - 1))
     c = np.append(np.zeros(columns - 1), 1.0 if inputs else -1.0)
     return ConeProgram(c, sparse.csc_matrix(sparse.vstack(A)), np.concatenate(b), tuple(sizes))
+
+
+class OverCell(NamedTuple):
+    """What the blocks of one cell are made of, in continuous time.
+
+    `columns` (k,) of P; A, B of the same degree; the block q has A_i and B_i by P_j with the weight
+    `flow` (q, i, j), P_j in dP/dp with `slope` (q, j), and `output` r with `up` (q, r).
+    """
+
+    columns: Array
+    A: Array
+    B: Array
+    flow: Array
+    slope: Array
+    output: Array
+    up: Array
+
+
+def over_cell(cell: Cell, knots: Array, degree: int, extra: int) -> OverCell:
+    """The weights of one cell; `extra` raises the degree of the Bernstein form."""
+    A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
+    output = output_terms(cell)
+    d = max(degree + dM, len(output) - 1) + extra
+    a, b, width = local_coordinates(cell, knots)
+    here = restriction(degree, a, b)
+    up = elevation_matrix(degree + dM, d)
+    flow = np.einsum("qm,mik,kj->qij", up, product_weights(dM, degree), here)
+    slope = slope_over(degree, here, (b - a) * width)
+    slope = elevation_matrix(len(slope) - 1, d) @ slope
+    columns = cell.segment * degree + np.arange(degree + 1)
+    return OverCell(columns, A, B, flow, slope, output, elevation_matrix(len(output) - 1, d))
+
+
+class OverStrip(NamedTuple):
+    """What the blocks of one strip are made of, in discrete time.
+
+    `columns` (k,) of P, those of p from `own` on and those of p(k+1) from `next` on; A, B of the
+    same degree. P(p) has the weights `here` (q, j); P(p(k+1)) those of `after` (x, s, j), its
+    product with A and B twice those of `raised`; `output` r has `up` (q, r). One group of blocks
+    for every s, `likely` (s) or not to bind.
+    """
+
+    columns: Array
+    own: int
+    next: int
+    A: Array
+    B: Array
+    here: Array
+    after: Array
+    raised: Array
+    output: Array
+    up: Array
+    likely: tuple[bool, ...]
+
+
+def over_strips(
+    strips: Sequence[Strip], knots: Array, degree: int, extra: int
+) -> Iterator[OverStrip]:
+    """The weights of every strip. Likely to bind: the border lines of the widest cell of each
+    segment and piece.
+    """
+    widest: dict[tuple[int, float], float] = {}
+    for cell in (strip.cell for strip in strips):
+        place = (cell.segment, cell.piece.low)
+        widest[place] = max(widest.get(place, 0.0), cell.high - cell.low)
+    for strip in strips:
+        cell = strip.cell
+        wide_cell = cell.high - cell.low >= 0.5 * widest[cell.segment, cell.piece.low]
+        A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
+        output = output_terms(cell)
+        d = max(degree + 2 * dM, len(output) - 1) + extra
+        a, b, _ = local_coordinates(cell, knots)
+        low, high = knots[strip.next_segment], knots[strip.next_segment + 1]
+        corners = [[(q - low) / (high - low) for q in pair] for pair in strip.corners]
+        first = min(strip.next_segment, cell.segment)
+        count = (abs(strip.next_segment - cell.segment) + 1) * degree + 1
+        yield OverStrip(
+            first * degree + np.arange(count),
+            (cell.segment - first) * degree,
+            (strip.next_segment - first) * degree,
+            A,
+            B,
+            elevation_matrix(degree, d) @ restriction(degree, a, b),
+            composition(degree, corners),
+            elevation_matrix(degree + 2 * dM, d),
+            output,
+            elevation_matrix(len(output) - 1, d),
+            tuple(wide_cell and k in (0, degree) for k in range(degree + 1)),
+        )
 
 
 def common_degree(A: Array, B: Array, cell: Cell) -> tuple[Array, Array, int]:

@@ -16,14 +16,16 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace
 from synthesis.assemble.bounded_real import Blocks, continuous_blocks, discrete_blocks
+from synthesis.assemble.lyapunov_blocks import continuous_products, discrete_products
 from synthesis.assemble.memory_blocks import memory_blocks
-from synthesis.forms import HigherOrder, LyapunovForm, Memory
+from synthesis.forms import HigherOrder, LyapunovForm, Memory, Spline
 from synthesis.lyapunov.lag import LagRegion
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov, graded_knots
-from synthesis.polynomial.cells import cells, strips
+from synthesis.polynomial.cells import Strip, cells, strips
 from synthesis.polynomial.pieces import ModelPiece, model_pieces
 from synthesis.polynomial.symmetric import extended, length, smat, svec
 from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
+from synthesis.program.lyapunov_program import MANY, LyapunovBlocks
 from synthesis.program.scaling import Scaling, scaling
 from synthesis.proof.one_parameter import Evidence
 
@@ -131,9 +133,24 @@ class Quadratic(Unknown):
                     cells(problem.scaled, self.knots), self.knots, self.degree, rate, extra
                 )
             )
+        return list(discrete_blocks(self._strips(problem), self.knots, self.degree, extra))
+
+    def products(self, problem: Problem, extra: int) -> tuple[LyapunovBlocks, ...]:
+        """The same blocks as products with P, in coordinates in which slow and fast states count
+        alike.
+        """
+        if problem.lpv.dt is None:
+            rate = problem.scaled_rate if self.degree else 0.0
+            regions = cells(problem.scaled, self.knots)
+            every = continuous_products(regions, self.knots, self.degree, rate, extra)
+        else:
+            every = discrete_products(self._strips(problem), self.knots, self.degree, extra)
+        W = extended(problem.units.weight, len(problem.lpv.inputs))
+        return tuple(block.congruent(W) for block in every)
+
+    def _strips(self, problem: Problem) -> tuple[Strip, ...]:
         step = problem.step if self.degree else 0.0
-        regions = strips(problem.scaled, self.knots, (-step, step))
-        return list(discrete_blocks(regions, self.knots, self.degree, extra))
+        return strips(problem.scaled, self.knots, (-step, step))
 
     def lyapunov(self, x: Array) -> SplineLyapunov:
         """V at the solver's point x."""
@@ -230,17 +247,19 @@ class Remembering(Unknown):
 def unknowns(problem: Problem, form: LyapunovForm) -> Iterator[Unknown]:
     """The finer and finer P to try in turn."""
     n, sampled = len(problem.lpv.states), problem.lpv.dt is not None
+    many = isinstance(form, Spline) and n > MANY
     higher = isinstance(form, HigherOrder)
     remembers = isinstance(form, Memory) and 0 < problem.rate < math.inf
     (own,) = form.degrees(1)
     constant = math.isinf(problem.rate) or own == 0
-    degree = 0 if constant and not remembers else (own or (2 if higher or sampled else 3))
+    usual_degree = (1 if sampled else 2) if many else (2 if higher or sampled else 3)
+    degree = 0 if constant and not remembers else (own or usual_degree)
     if not degree:
         usual = (8,)
     elif remembers:
         usual = (12,)
     else:
-        usual = (4, 8) if higher else (8, 16) if sampled else (16, 32)
+        usual = (4, 8) if higher or many else (8, 16) if sampled else (16, 32)
     for (segments,) in form.segments_tried(1) or [[k] for k in usual]:
         knots = _knots(problem, form, segments, degree)
         if isinstance(form, Memory) and remembers:

@@ -22,7 +22,14 @@ from synthesis.lft.program import (
     with_state_channels,
 )
 from synthesis.lft.proof import Evidence, Quadratic
-from synthesis.program.cone_program import Answer, Candidate, ConeProgram, Solver, solve
+from synthesis.program.cone_program import (
+    Answer,
+    Candidate,
+    ConeProgram,
+    Solver,
+    general_solver,
+    solve,
+)
 from synthesis.program.scaling import in_its_own_scale
 from synthesis.worst.budget import said
 from synthesis.worst.lft import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
@@ -298,7 +305,7 @@ def _checked(lft: LFT, scaling: str, solver: Solver | str) -> Solver:
         raise InputError(
             "the LFT has no states; its gain is the largest norm of its matrix over the box"
         )
-    return solver if isinstance(solver, Solver) else Solver(solver)
+    return general_solver(solver)
 
 
 def _at_rest(frozen: BoxGain) -> Trajectory:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 Array = np.ndarray
 Number = Callable[[float], Any]
@@ -27,9 +29,70 @@ def rational() -> Number:
 
 
 def positive_definite(M: Array) -> bool:
-    """Whether the symmetric rational matrix is positive definite: all pivots of its LDL'
-    factorisation positive.
+    """Whether the symmetric rational matrix is positive definite; only its lower triangle is read.
+
+    Shown by a congruence with rounded numbers that leaves nearly the identity, where that is
+    strictly dominant in its diagonal: a few products of integers. Else all pivots of an LDL'
+    factorisation decide, whose numbers grow with every row.
     """
+    return (len(M) > FEW and _dominant(M)) or _pivots_are_positive(M)
+
+
+FEW = 6
+"""Rows up to which the factorisation is as fast."""
+DIGITS = 50
+"""Bits of the rounded numbers of the congruence."""
+
+
+def _dominant(M: Array) -> bool:
+    """Whether R' M R is strictly dominant in its diagonal, R the inverse of a Cholesky factor in
+    floating point, rounded: it is then positive definite, and R regular, so that M is too. Exact.
+    """
+    try:
+        rounded = M.astype(float)
+    except OverflowError:
+        return False
+    size = np.diag(rounded).copy()
+    if not np.all(np.isfinite(rounded)) or not np.all(size > 0):
+        return False
+    size = 1.0 / np.sqrt(size)
+    lower = np.tril(rounded * size * size[:, None])
+    try:
+        factor = np.linalg.cholesky(lower + np.tril(lower, -1).T)
+    except np.linalg.LinAlgError:
+        return False
+    R = size[:, None] * linalg.solve_triangular(factor, np.eye(len(M)), lower=True).T
+    exponents = np.frexp(np.abs(R).max(axis=0))[1]
+    if not np.all(np.isfinite(R)):
+        return False
+    # R is `whole` times a power of two a column
+    whole = np.rint(np.ldexp(R, DIGITS - exponents)).astype(np.int64).astype(object)
+    own = _whole(M)
+    Q = whole.T @ (own @ whole)
+    steps = [1 << int(e) for e in exponents - exponents.min()]
+    for i, row in enumerate(Q):
+        others = sum(
+            abs(q) * step for j, (q, step) in enumerate(zip(row, steps, strict=True)) if j != i
+        )
+        if not row[i] * steps[i] > others:
+            return False
+    return True
+
+
+def _whole(M: Array) -> Array:
+    """The symmetric matrix of this lower triangle times what makes all its entries integers."""
+    denominators = {int(v.denominator) for v in M.ravel()}
+    common = math.lcm(*denominators)
+    out = np.array(
+        [[int(v.numerator) * (common // int(v.denominator)) for v in row] for row in M],
+        dtype=object,
+    )
+    rows, columns = np.tril_indices(len(M), -1)
+    out[columns, rows] = out[rows, columns]
+    return out
+
+
+def _pivots_are_positive(M: Array) -> bool:
     M = M.copy()
     for k in range(len(M)):
         pivot = M[k, k]

@@ -18,7 +18,8 @@ def length(n: int) -> int:
 
 
 @lru_cache(maxsize=64)
-def _indices(n: int) -> tuple[Array, Array, Array]:
+def indices(n: int) -> tuple[Array, Array, Array]:
+    """Row and column of every entry of such a vector, and its weight."""
     columns, rows = np.tril_indices(n)
     return rows, columns, np.where(rows == columns, 1.0, math.sqrt(2.0))
 
@@ -27,13 +28,13 @@ def svec(M: Array) -> Array:
     """Vectors (..., n (n + 1) / 2) of symmetric matrices (..., n, n); <M, N> = svec(M) .
     svec(N).
     """
-    rows, columns, weight = _indices(M.shape[-1])
+    rows, columns, weight = indices(M.shape[-1])
     return M[..., rows, columns] * weight
 
 
 def smat(v: Array, n: int) -> Array:
     """Matrices (..., n, n) from vectors (..., n (n + 1) / 2)."""
-    rows, columns, weight = _indices(n)
+    rows, columns, weight = indices(n)
     out = np.zeros((*v.shape[:-1], n, n))
     out[..., rows, columns] = out[..., columns, rows] = v / weight
     return out

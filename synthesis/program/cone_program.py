@@ -32,6 +32,10 @@ from synthesis.program.interruptible import in_process, in_thread
 Array = np.ndarray
 
 
+LYAPUNOV = "LYAPUNOV"
+"""The method of `interior_point`, which takes programs of Lyapunov inequalities alone."""
+
+
 class Answer(Enum):
     """What the solver says of the program."""
 
@@ -48,10 +52,10 @@ class Solver:
     Parameters
     ----------
     name : str
-        As cvxpy spells it.
+        As cvxpy spells it; or "LYAPUNOV", this package's own method for a P of many states.
     tolerance : float, optional
-        On residuals and gap, relative: 1e-8; SCS, a first-order method, 1e-5, since the gain is
-        recomputed from P afterwards and more digits cost minutes.
+        On residuals and gap, relative: 1e-8; SCS, a first-order method, and LYAPUNOV 1e-5, since
+        the gain is recomputed from P afterwards and more digits cost minutes.
     iterations : int, optional
         At most: 200; SCS 20000.
     time_limit : float, optional
@@ -77,15 +81,15 @@ class Solver:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", str(self.name).upper())
-        if self.name not in installed_solvers():
+        if self.name not in (*installed_solvers(), LYAPUNOV):
             raise SolverError(
                 f"solver {self.name!r} is not available; installed here:"
-                f" {', '.join(installed_solvers())}"
+                f" {', '.join(installed_solvers())}, and {LYAPUNOV}"
             )
         for setting, usual in _USUAL.items():
             given = getattr(self, setting)
             if given is None:
-                usual = _FIRST_ORDER.get(setting, usual) if self.name == "SCS" else usual
+                usual = _OTHER.get(self.name, {}).get(setting, usual)
                 object.__setattr__(self, setting, usual if setting in _OPTIONS[self.name] else None)
             elif setting not in _OPTIONS[self.name]:
                 raise InputError(
@@ -110,7 +114,7 @@ class Solver:
     @property
     def version(self) -> str:
         """Version of the installed package."""
-        return importlib.metadata.version(_PACKAGES[self.name])
+        return importlib.metadata.version(_PACKAGES.get(self.name, "symheli"))
 
     def __str__(self) -> str:
         limit = "no time limit" if self.time_limit is None else f"{self.time_limit:g} s"
@@ -131,9 +135,17 @@ _PACKAGES = {
 
 
 _USUAL: dict[str, Any] = {"tolerance": 1e-8, "iterations": 200, "time_limit": 600.0}
-_FIRST_ORDER: dict[str, Any] = {"tolerance": 1e-5, "iterations": 20000}
+_OTHER: dict[str, dict[str, Any]] = {
+    "SCS": {"tolerance": 1e-5, "iterations": 20000},
+    LYAPUNOV: {"tolerance": 1e-5},
+}
 
 _OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
+    LYAPUNOV: {
+        "tolerance": ("tolerance",),
+        "iterations": ("iterations",),
+        "time_limit": ("seconds",),
+    },
     "CLARABEL": {
         "tolerance": ("tol_gap_abs", "tol_gap_rel", "tol_feas"),
         "iterations": ("max_iter",),
@@ -166,8 +178,19 @@ option.
 """
 
 
+def general_solver(solver: Solver | str) -> Solver:
+    """A solver for any cone program; raises `InputError` for the one that is not."""
+    solver = solver if isinstance(solver, Solver) else Solver(solver)
+    if solver.name == LYAPUNOV:
+        raise InputError(
+            f"{LYAPUNOV} is for l2_gain and stability of an LPVStateSpace in one parameter with"
+            " form=Spline(...) by plain Bernstein coefficients; take solver='CLARABEL' here"
+        )
+    return solver
+
+
 def installed_solvers() -> tuple[str, ...]:
-    """Semidefinite solvers that can be used here.
+    """Semidefinite solvers for any program that can be used here.
 
     Returns
     -------

@@ -15,6 +15,7 @@ from symheli.lpv import LPVStateSpace, Scheduling
 from synthesis import Solver, Spline, SplineLyapunov, Status, installed_solvers, l2_gain, stability
 
 COARSE = Spline(segments=2, degree=2)
+EVERY = (*installed_solvers(), "LYAPUNOV")
 
 
 def unstable(excess, scale, dt=None):
@@ -33,7 +34,7 @@ def unstable(excess, scale, dt=None):
     )
 
 
-@pytest.mark.parametrize("solver", installed_solvers())
+@pytest.mark.parametrize("solver", EVERY)
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
 @pytest.mark.parametrize("excess", [1e-1, 1e-4, 1e-8])
 def test_an_unstable_plant_is_never_called_stable(solver, scale, excess):
@@ -54,7 +55,7 @@ def test_an_unstable_plant_is_never_called_stable(solver, scale, excess):
                 assert searched(lpv, rate, kind, COARSE, solver=quick).proof is None
 
 
-@pytest.mark.parametrize("solver", installed_solvers())
+@pytest.mark.parametrize("solver", EVERY)
 def test_a_stable_plant_is_called_stable_by_every_solver(solver):
     for dt in (None, 0.1):
         cert = stability(unstable(-0.05, 10.0, dt), 0.05, form=COARSE, solver=solver)
@@ -64,9 +65,7 @@ def test_a_stable_plant_is_called_stable_by_every_solver(solver):
 
 
 def test_solvers_agree_on_the_gain():
-    quick = [
-        Solver(name, iterations=2000 if name == "SCS" else None) for name in installed_solvers()
-    ]
+    quick = [Solver(name, iterations=2000 if name == "SCS" else None) for name in EVERY]
     gains = [
         l2_gain(random_stable(1), form=COARSE, solver=solver, search=None).gamma for solver in quick
     ]

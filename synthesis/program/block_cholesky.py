@@ -1,0 +1,57 @@
+"""Cholesky's factorisation of a symmetric matrix of square blocks, most of which are zero: a band,
+where P is a spline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy import linalg
+
+Array = np.ndarray
+
+
+class BlockCholesky:
+    """M = L L' of a positive definite M by its lower blocks {(i, j): block}, i >= j, each (v, v).
+
+    Raises `numpy.linalg.LinAlgError` where M is not positive definite. The blocks are overwritten.
+    """
+
+    def __init__(self, blocks: Mapping[tuple[int, int], Array]):
+        self.size = 1 + max(i for i, _ in blocks)
+        self.columns: list[dict[int, Array]] = [{} for _ in range(self.size)]
+        for (i, j), block in blocks.items():
+            self.columns[j][i] = block
+        for k, column in enumerate(self.columns):
+            pivot = linalg.cholesky(column[k], lower=True, check_finite=False, overwrite_a=True)
+            column[k] = pivot
+            below = sorted(i for i in column if i > k)
+            for i in below:
+                # L_ik = M_ik L_kk^-T
+                column[i] = linalg.solve_triangular(
+                    pivot, column[i].T, lower=True, check_finite=False
+                ).T
+            for at, j in enumerate(below):
+                for i in below[at:]:
+                    update = column[i] @ column[j].T
+                    if i in self.columns[j]:
+                        self.columns[j][i] -= update
+                    else:
+                        self.columns[j][i] = -update
+
+    def solve(self, b: Array) -> Array:
+        """x (size, v) with M x = b."""
+        x = b.copy()
+        for k, column in enumerate(self.columns):
+            x[k] = linalg.solve_triangular(column[k], x[k], lower=True, check_finite=False)
+            for i, block in column.items():
+                if i > k:
+                    x[i] -= block @ x[k]
+        for k in reversed(range(self.size)):
+            column = self.columns[k]
+            for i, block in column.items():
+                if i > k:
+                    x[k] -= block.T @ x[i]
+            x[k] = linalg.solve_triangular(column[k], x[k], lower=True, trans=1, check_finite=False)
+        return x

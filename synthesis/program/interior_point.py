@@ -1,0 +1,454 @@
+"""A primal-dual interior-point method for programs of Lyapunov inequalities of many states.
+
+    minimise cost y  subject to  S = constant + y level + linear(P) in the cone, for every block
+
+with the directions of Nesterov and Todd and the predictor and corrector of Mehrotra. With H the
+inverse of the scaling matrix of a block, the entries of the normal equations between coefficients j
+and k of P are those of the maps
+
+    V -> 2 sum_rs (x_jr H f_s' V x_ks H f_r' + x_jr H x_ks' V f_s H f_r')
+
+(f fixed, x varying): sums of Kronecker products, which for all blocks together are one product of
+two matrices of n^2 rows. A general solver takes every block as a dense matrix on its N (N + 1)/2
+entries and factors that with the rest; here the sixth power of n is in the factorisation of the
+normal equations alone, once a coefficient of P.
+
+Sources: Todd, Toh and Tutuncu, "On the Nesterov-Todd direction in semidefinite programming", SIAM
+J. Optimization 8 (1998); Vandenberghe, Balakrishnan, Wallin, Hansson and Roh, "Interior-point
+algorithms for semidefinite programming problems derived from the KYP lemma", in Positive
+Polynomials in Control (2005).
+"""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from synthesis.polynomial.symmetric import indices, smat, svec, symmetrized
+from synthesis.program.block_cholesky import BlockCholesky
+from synthesis.program.cone_program import Answer, Candidate, Solver
+from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram
+
+Array = np.ndarray
+Normal = dict[tuple[int, int], Array]
+
+START = 10.0
+"""Least multiple of the identity to start from, for slacks and multipliers."""
+FEASIBLE = 1e-9
+"""Residual of the blocks, of their constants, below which they are kept without one, where they
+can be.
+"""
+LEAST = 0.01
+"""A level smaller than this is known to fractions of this."""
+SMALL = 1e-4
+"""Steps below this lead nowhere."""
+REFINED = 1e-11
+"""Residual of the normal equations, relative, that is small enough."""
+REFINEMENTS = 12
+"""Most conjugate gradients for a solution of the normal equations."""
+SHIFT = 1e-13
+"""The diagonal of the normal equations is factored larger by this fraction, and the gradients put
+it right.
+"""
+DUAL = 1e-6
+"""Residual of the multipliers, of the largest of their entries, at a solution."""
+IMPOSSIBLE = 1e-7
+"""Residual of multipliers, of what they show to be contradictory, that prove that there is no P."""
+
+
+def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
+    """The least level, to the tolerance of the solver or as near as rounding, iterations and time
+    allow.
+
+    The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
+    feasible to rounding or there is none. Never raises for a failed solve.
+    """
+    tolerance, iterations, seconds = (
+        solver.options[name] for name in ("tolerance", "iterations", "seconds")
+    )
+    begin = time.perf_counter()
+    cones = _Cones(program)
+    point, count, feasible, before = cones.start(), 0, False, np.inf
+    while True:
+        at = cones.residuals(point)
+        close = at.primal_size <= FEASIBLE
+        if close and not feasible and cones.inside(point):
+            feasible, point = True, point._replace(S=cones.slacks(point.P, point.y))
+            at = cones.residuals(point)
+        if close and at.gap <= tolerance and at.dual_size <= DUAL:
+            word = "solved"
+        elif close and at.gap <= tolerance and at.dual_size >= before:
+            word = "out of digits"  # the multipliers no longer improve
+        elif at.contradiction < IMPOSSIBLE:
+            word = "infeasible"
+        elif count == iterations:
+            word = "out of iterations"
+        elif time.perf_counter() - begin > seconds:
+            word = "out of time"
+        else:
+            try:
+                following = _step(cones, point, at, feasible)
+            except np.linalg.LinAlgError:
+                following = None
+            if following is not None:
+                point, count, before = following, count + 1, at.dual_size
+                continue
+            word = "out of digits"
+        answer = {"solved": Answer.SOLVED, "infeasible": Answer.INFEASIBLE}.get(word, Answer.FAILED)
+        x = np.append(svec(point.P).ravel(), point.y) if close else None
+        gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
+        message = f"{word} after {count} iterations{gap}"
+        return Candidate(answer, x, time.perf_counter() - begin, message)
+
+
+class _Point(NamedTuple):
+    """Coefficients of P (K, n, n), the level, and slack and multiplier of every cone."""
+
+    P: Array
+    y: float
+    S: list[Array]
+    Z: list[Array]
+
+
+class _Residuals(NamedTuple):
+    """What is missing: to the slacks `primal`, to the multipliers `dual` and `dual_y`, with their
+    sizes; <S, Z> `product`, relative to the level `gap`. `contradiction`: how nearly the
+    multipliers prove infeasibility.
+    """
+
+    primal: list[Array]
+    primal_size: float
+    dual: Array
+    dual_y: float
+    dual_size: float
+    product: float
+    gap: float
+    contradiction: float
+
+
+class _Cone(Protocol):
+    """Blocks of one size that share coefficients of P: S = constant + y level + linear(P)."""
+
+    constant: Array
+    level: Array
+
+    def linear(self, P: Array) -> Array:
+        """Matrices (m, N, N) from the coefficients of P."""
+        ...
+
+    def add_adjoint(self, Z: Array, out: Array) -> None:
+        """To `out` (K, n, n) its share in <Z, linear(.)>."""
+        ...
+
+    def add_normal(self, H: Array, out: Normal) -> None:
+        """To the lower blocks of the normal equations those of P -> adjoint(H linear(P) H)."""
+        ...
+
+
+class _Inequalities:
+    """The blocks F < 0."""
+
+    def __init__(self, blocks: LyapunovBlocks, program: LyapunovProgram):
+        self.blocks = blocks
+        self.constant = -blocks.constant - program.back_off
+        self.level = np.broadcast_to(program.level, self.constant.shape)
+        x = blocks.varying
+        self.used = [np.flatnonzero(np.any(x[:, j], axis=(0, 2, 3))) for j in range(x.shape[1])]
+
+    def linear(self, P: Array) -> Array:
+        return -self.blocks.linear(P)
+
+    def add_adjoint(self, Z: Array, out: Array) -> None:
+        np.add.at(out, self.blocks.columns, -self.blocks.adjoint(Z))
+
+    def add_normal(self, H: Array, out: Normal) -> None:
+        columns, f, x = self.blocks.columns, self.blocks.fixed, self.blocks.varying
+        n = f.shape[1]
+        fH, xH = f @ H[:, None], x @ H[:, None, None]
+        f, x = np.swapaxes(f, -1, -2), np.swapaxes(x, -1, -2)
+        # by m, r and s: f_r H f_s' and, for every j, x_jr H f_s'; of the r and s that are not zero
+        ff = fH[:, :, None] @ f
+        xf = [xH[:, j][:, r, None] @ f for j, r in enumerate(self.used)]
+
+        def flat(M: Array) -> Array:
+            return M.reshape(-1, n * n)
+
+        for j, r in enumerate(self.used):
+            for k, s in enumerate(self.used[: j + 1]):
+                left = flat(xf[j][:, :, s])
+                right = flat(np.swapaxes(xf[k][:, :, r], 1, 2))
+                if self.blocks.symmetric:  # the other half is the same
+                    factor = 4.0
+                else:
+                    xx = xH[:, j][:, r, None] @ x[:, k][:, None, s]
+                    left = np.concatenate([left, flat(xx)])
+                    turned = np.swapaxes(ff[:, s][:, :, r], 1, 2)
+                    right, factor = np.concatenate([right, flat(turned)]), 2.0
+                _add(out, (columns[j], columns[k]), factor * _on_vectors(left.T @ right, n))
+
+
+class _Bounds:
+    """sign P + constant I >= 0 of every coefficient."""
+
+    def __init__(self, sign: float, constant: float, states: int, unknowns: int):
+        self.sign = sign
+        self.constant = np.tile(constant * np.eye(states), (unknowns, 1, 1))
+        self.level = np.zeros_like(self.constant)
+
+    def linear(self, P: Array) -> Array:
+        return self.sign * P
+
+    def add_adjoint(self, Z: Array, out: Array) -> None:
+        out += self.sign * Z
+
+    def add_normal(self, H: Array, out: Normal) -> None:
+        n = H.shape[1]
+        for j, h in enumerate(H):
+            _add(out, (j, j), _on_vectors(np.outer(h, h), n))
+
+
+def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
+    i, j = (int(k) for k in at)
+    if i < j:
+        i, j, block = j, i, block.T
+    if (i, j) in out:
+        out[i, j] += block
+    else:
+        out[i, j] = block
+
+
+def _on_vectors(K: Array, n: int) -> Array:
+    """Matrix on vectors of V -> the symmetric part of sum L V R, where K = sum vec(L) vec(R)' by
+    rows, (n^2, n^2).
+    """
+    a, b, _ = indices(n)
+    K = K.reshape(n, n, n, n).transpose(3, 0, 1, 2)
+    rows = K[a, b] + K[b, a]
+    scale = np.where(a == b, 0.5, np.sqrt(0.5))
+    return (rows[:, a, b] + rows[:, b, a]) * scale[:, None] * scale
+
+
+class _Cones:
+    """All cones of the program."""
+
+    def __init__(self, program: LyapunovProgram):
+        self.program = program
+        self.each: list[_Cone] = [_Inequalities(b, program) for b in program.blocks]
+        self.each += [_Bounds(*b, program.states, program.unknowns) for b in program.bounds]
+        self.size = 1.0 + max(float(np.abs(c.constant).max(initial=0.0)) for c in self.each)
+        self.order = sum(c.constant.shape[0] * c.constant.shape[1] for c in self.each)
+
+    def start(self) -> _Point:
+        """Far inside the cones, wherever that is."""
+        n = self.program.states
+        far = max(START, self.size)
+        S = [
+            far * np.broadcast_to(np.eye(c.constant.shape[1]), c.constant.shape) for c in self.each
+        ]
+        return _Point(np.zeros((self.program.unknowns, n, n)), 0.0, S, S)
+
+    def change(self, P: Array, y: float) -> list[Array]:
+        """Of the slacks with P and y."""
+        return [y * cone.level + cone.linear(P) for cone in self.each]
+
+    def slacks(self, P: Array, y: float) -> list[Array]:
+        """As they ought to be."""
+        return [
+            cone.constant + change
+            for cone, change in zip(self.each, self.change(P, y), strict=True)
+        ]
+
+    def inside(self, point: _Point) -> bool:
+        """Whether the slacks as they ought to be are in the cones."""
+        try:
+            for S in self.slacks(point.P, point.y):
+                np.linalg.cholesky(S)
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+    def adjoint(self, Z: list[Array]) -> tuple[Array, float]:
+        """(P', y') with <Z, change(P, y)> = <P', P> + y' y."""
+        out = np.zeros((self.program.unknowns, self.program.states, self.program.states))
+        for cone, each in zip(self.each, Z, strict=True):
+            cone.add_adjoint(each, out)
+        return out, sum(float(np.sum(c.level * z)) for c, z in zip(self.each, Z, strict=True))
+
+    def residuals(self, point: _Point) -> _Residuals:
+        """Of slacks and multipliers at this point."""
+        primal = [
+            wanted - S for wanted, S in zip(self.slacks(point.P, point.y), point.S, strict=True)
+        ]
+        dual, level = self.adjoint(point.Z)
+        constant = sum(
+            float(np.sum(c.constant * z)) for c, z in zip(self.each, point.Z, strict=True)
+        )
+        dual_y, most = level - self.program.cost, max(float(np.abs(z).max()) for z in point.Z)
+        product = sum(float(np.sum(s * z)) for s, z in zip(point.S, point.Z, strict=True))
+        return _Residuals(
+            primal,
+            max(float(np.abs(r).max()) for r in primal) / self.size,
+            dual,
+            dual_y,
+            max(float(np.abs(dual).max()), abs(dual_y)) / max(1.0, most),
+            product,
+            product / max(abs(point.y), LEAST),
+            max(float(np.abs(dual).max()), abs(level)) / -constant if constant < 0 else np.inf,
+        )
+
+
+class _Scaling(NamedTuple):
+    """Nesterov and Todd's of one cone: r^-1 S r^-T = r' Z r = diag(values), H = (r r')^-1;
+    `inverse` is r^-1.
+    """
+
+    r: Array
+    inverse: Array
+    values: Array
+    H: Array
+
+    @classmethod
+    def of(cls, S: Array, Z: Array) -> _Scaling:
+        left, right = np.linalg.cholesky(S), np.linalg.cholesky(Z)
+        U, values, Vt = np.linalg.svd(np.swapaxes(right, 1, 2) @ left)
+        root = np.sqrt(values)[:, None, :]
+        r = left @ (np.swapaxes(Vt, 1, 2) / root)
+        inverse = np.swapaxes(right @ (U / root), 1, 2)
+        return cls(r, inverse, values, np.swapaxes(inverse, 1, 2) @ inverse)
+
+    @property
+    def diagonal(self) -> Array:
+        """Slack and multiplier themselves."""
+        return self.values[:, :, None] * np.eye(self.values.shape[1])
+
+    def of_slack(self, change: Array) -> Array:
+        """A change of the slack in the coordinates in which both are diagonal."""
+        return symmetrized(self.inverse @ change @ np.swapaxes(self.inverse, 1, 2))
+
+    def slack(self, scaled: Array) -> Array:
+        """The change of the slack that is `scaled` in them."""
+        return symmetrized(self.r @ scaled @ np.swapaxes(self.r, 1, 2))
+
+    def multiplier(self, scaled: Array) -> Array:
+        """The change of the multiplier that is."""
+        return symmetrized(np.swapaxes(self.inverse, 1, 2) @ scaled @ self.inverse)
+
+    def divided(self, M: Array) -> Array:
+        """T with (T diag + diag T)/2 = M."""
+        return 2.0 * M / (self.values[:, :, None] + self.values[:, None, :])
+
+    def longest(self, scaled: Array) -> float:
+        """The longest step along `scaled` that stays in the cone."""
+        root = np.sqrt(self.values)
+        least = float(np.linalg.eigvalsh(scaled / (root[:, :, None] * root[:, None, :])).min())
+        return 1.0 / -least if least < 0 else np.inf
+
+
+class _NormalEquations:
+    """M (P, y) = adjoint(H change(P, y) H), factored."""
+
+    def __init__(self, cones: _Cones, scalings: list[_Scaling]):
+        self.cones, self.scalings = cones, scalings
+        blocks: Normal = {}
+        for cone, scaling in zip(cones.each, scalings, strict=True):
+            cone.add_normal(scaling.H, blocks)
+        for (i, j), block in blocks.items():
+            if i == j:
+                block[np.diag_indices(len(block))] *= 1.0 + SHIFT
+        self.factor = BlockCholesky(blocks)
+        border, corner = self.times(np.zeros_like(cones.start().P), 1.0)
+        self.border = svec(border)
+        self.across = self.factor.solve(self.border)
+        self.pivot = corner - float(np.sum(self.border * self.across))
+
+    def times(self, P: Array, y: float) -> tuple[Array, float]:
+        """M (P, y), block by block."""
+        moved = self.cones.change(P, y)
+        return self.cones.adjoint(
+            [at.H @ M @ at.H for at, M in zip(self.scalings, moved, strict=True)]
+        )
+
+    def _by_factors(self, b: Array, d: float) -> tuple[Array, float]:
+        x = self.factor.solve(svec(b))
+        y = (d - float(np.sum(self.border * x))) / self.pivot
+        return smat(x - y * self.across, b.shape[-1]), y
+
+    def solve(self, b: Array, d: float) -> tuple[Array, float]:
+        """(P, y) of the right-hand side (b, d), by conjugate gradients that the factors
+        precondition: near the end these know the equations to some digits only.
+        """
+        P, y, rest, left = np.zeros_like(b), 0.0, b, d
+        along, pace, size = None, 0.0, _inner(b, d, b, d)
+        best, least = (P, y), np.inf
+        for _ in range(REFINEMENTS):
+            zP, zy = self._by_factors(rest, left)
+            before, pace = pace, _inner(rest, left, zP, zy)
+            if along is not None:
+                zP, zy = zP + pace / before * along[0], zy + pace / before * along[1]
+            along = zP, zy
+            MP, My = self.times(*along)
+            share = pace / _inner(*along, MP, My)
+            P, y = P + share * along[0], y + share * along[1]
+            rest, left = rest - share * MP, left - share * My
+            misfit = np.sqrt(_inner(rest, left, rest, left) / size)
+            if not np.isfinite(misfit):
+                raise np.linalg.LinAlgError
+            if misfit < least:
+                best, least = (P, y), misfit
+            if misfit <= REFINED:
+                break
+        return best
+
+
+def _inner(P: Array, y: float, Q: Array, z: float) -> float:
+    return float(np.sum(P * Q) + y * z)
+
+
+def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Point | None:
+    """The next point, None where no step is left."""
+    scalings = [_Scaling.of(s, z) for s, z in zip(point.S, point.Z, strict=True)]
+    normal = _NormalEquations(cones, scalings)
+    diagonals = [scaling.diagonal for scaling in scalings]
+
+    def direction(targets: list[Array]) -> tuple[Array, float, list[Array], list[Array]]:
+        """dP, dy and the scaled changes of slacks and multipliers, which add up to the targets."""
+        known = [
+            s.multiplier(T) - s.H @ r @ s.H
+            for s, T, r in zip(scalings, targets, at.primal, strict=True)
+        ]
+        b, d = cones.adjoint(known)
+        dP, dy = normal.solve(b + at.dual, d + at.dual_y)
+        moved = cones.change(dP, dy)
+        dS = [s.of_slack(M + r) for s, M, r in zip(scalings, moved, at.primal, strict=True)]
+        return dP, dy, dS, [T - s for T, s in zip(targets, dS, strict=True)]
+
+    def longest(scaled: list[Array], share: float) -> float:
+        return min(1.0, share * min(s.longest(d) for s, d in zip(scalings, scaled, strict=True)))
+
+    _, _, aS, aZ = direction([-D for D in diagonals])
+    along, across = longest(aS, 1.0), longest(aZ, 1.0)
+    left = sum(
+        float(np.sum((D + along * s) * (D + across * z)))
+        for D, s, z in zip(diagonals, aS, aZ, strict=True)
+    )
+    # Mehrotra's centring: little where the predictor alone goes far
+    centring = min(1.0, max(left / at.product, 0.0)) ** 2 if min(along, across) > 0.1 else 0.5
+    level = centring * at.product / cones.order
+    targets = [
+        scaling.divided(level * np.eye(D.shape[1]) - D @ D - symmetrized(s @ z))
+        for scaling, D, s, z in zip(scalings, diagonals, aS, aZ, strict=True)
+    ]
+    share = 0.9 + 0.08 * min(along, across)
+    dP, dy, dS, dZ = direction(targets)
+    along, across = longest(dS, share), longest(dZ, share)
+    if max(along, across) < SMALL:
+        return None
+    P, y = symmetrized(point.P + along * dP), point.y + along * dy
+    if feasible:
+        S = [symmetrized(s) for s in cones.slacks(P, y)]
+    else:
+        S = [s + along * c.slack(d) for s, c, d in zip(point.S, scalings, dS, strict=True)]
+    Z = [z + across * c.multiplier(d) for z, c, d in zip(point.Z, scalings, dZ, strict=True)]
+    return _Point(P, y, S, Z)

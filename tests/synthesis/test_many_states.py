@@ -1,0 +1,319 @@
+"""Proofs of many states: blocks kept as products with P, the interior-point method for them, and
+the exact test of definiteness that its proofs are believed for.
+"""
+
+import math
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from models import constant, random_stable, searched, spring
+
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # benchmarks/ is not installed
+
+import synthesis.program.interior_point as method
+from benchmarks.closed_loops import DELAY, GUSTS, LOOPS, closed_loop, sampled_loop
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace, Scheduling
+from synthesis import (
+    Bernstein,
+    Certificate,
+    Memory,
+    Solver,
+    Spline,
+    Status,
+    SumOfSquares,
+    decay_rate,
+    frozen_gain,
+    generalized_h2,
+    l2_gain,
+    lft_gain,
+    stability,
+)
+from synthesis.analysis.question import question
+from synthesis.assemble.unknowns import Quadratic, scaled_problem
+from synthesis.lyapunov.spline import graded_knots
+from synthesis.polynomial import exact
+from synthesis.polynomial.symmetric import length, svec, symmetrized
+from synthesis.program.block_cholesky import BlockCholesky
+from synthesis.program.cone_program import Answer
+from synthesis.program.lyapunov_program import LyapunovProgram
+
+FORM = Spline(segments=2, degree=2)
+
+
+def springs(masses, rate, growing=False):
+    """A row of light springs whose stiffness moves with p, each mass damped; the first is pushed,
+    the last is seen.
+    """
+    n = 2 * masses
+    A = np.zeros((2, n, n))
+    for i in range(masses):
+        A[0, 2 * i, 2 * i + 1] = 1.0
+        A[0, 2 * i + 1, 2 * i : 2 * i + 2] = -2.0 - 0.2 * i, 0.05 if growing and not i else -0.8
+        A[1, 2 * i + 1, 2 * i] = -0.8
+        if i:
+            A[0, 2 * i + 1, 2 * i - 2] = 0.7
+    B, C = np.zeros((n, 1)), np.zeros((1, n))
+    B[1], C[0, -2] = 1.0, 1.0
+    return LPVStateSpace.polynomial(
+        list(A), [B], [C], [[[0.0]]], Scheduling("p", "1", -1.0, 1.0, rate)
+    )
+
+
+def problem(lpv, degree, rate=0.3, segments=3, with_gain=True):
+    s = lpv.scheduling
+    scaled = scaled_problem(lpv, rate, 1.0, with_gain=with_gain)
+    shape = Quadratic(graded_knots(s.low, s.high, segments, 2.0), degree, len(lpv.states))
+    return scaled, shape
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("with_gain", [True, False])
+def test_blocks_as_products_are_the_blocks_entry_by_entry(dt, degree, with_gain):
+    scaled, shape = problem(random_stable(2, dt=dt), degree, with_gain=with_gain)
+    P = np.random.default_rng(0).standard_normal((shape.unknowns, length(shape.size)))
+    N = shape.size + len(scaled.lpv.inputs)
+
+    def sorted_by_trace(values):
+        return values[np.lexsort((values[:, 0, -1], np.trace(values, axis1=1, axis2=2)))]
+
+    vectors = np.concatenate([b.values(P, N) for b in shape.weighed(scaled, 1)])
+    matrices = np.array([np.zeros((shape.size, shape.size))] * len(P))
+    rows, columns = np.tril_indices(shape.size)
+    matrices[:, rows, columns] = P / np.where(rows == columns, 1.0, np.sqrt(2.0))
+    matrices[:, columns, rows] = matrices[:, rows, columns]
+    products = np.concatenate([b.linear(matrices) + b.constant for b in shape.products(scaled, 1)])
+    assert products.shape == vectors.shape
+    # rounding of some hundred products of numbers of order one
+    np.testing.assert_allclose(
+        sorted_by_trace(products), sorted_by_trace(vectors), atol=1e-11 * np.abs(vectors).max()
+    )
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+def test_the_normal_equations_are_what_the_blocks_say_one_direction_at_a_time(dt):
+    scaled, shape = problem(random_stable(3, dt=dt), 2, segments=2)
+    n, inputs = shape.size, len(scaled.lpv.inputs)
+    blocks = shape.products(scaled, 0)
+    cones = method._Cones(LyapunovProgram(blocks, n, inputs, shape.unknowns, 1e-6, 1e-6))
+    rng = np.random.default_rng(1)
+    normal = {}
+    H = []
+    for cone in cones.each:
+        m, N = cone.constant.shape[:2]
+        F = rng.standard_normal((m, N, N))
+        H.append(symmetrized(F @ np.swapaxes(F, 1, 2)) + np.eye(N))
+        cone.add_normal(H[-1], normal)
+    v = length(n)
+    whole = np.zeros((shape.unknowns * v,) * 2)
+    for (i, j), block in normal.items():
+        whole[i * v : (i + 1) * v, j * v : (j + 1) * v] = block
+        whole[j * v : (j + 1) * v, i * v : (i + 1) * v] = block.T
+    P = symmetrized(rng.standard_normal((shape.unknowns, n, n)))
+    by_blocks, _ = cones.adjoint(
+        [h @ change @ h for h, change in zip(H, cones.change(P, 0.0), strict=True)]
+    )
+    expected = svec(by_blocks).ravel()
+    found = whole @ svec(P).ravel()
+    np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+    # a map and its adjoint
+    Z = [symmetrized(rng.standard_normal(cone.constant.shape)) for cone in cones.each]
+    back, level = cones.adjoint(Z)
+    forth = sum(np.sum(z * c) for z, c in zip(Z, cones.change(P, 2.0), strict=True))
+    assert forth == pytest.approx(np.sum(back * P) + 2.0 * level, rel=1e-11)
+
+
+def test_the_block_factorisation_solves_what_the_whole_matrix_does():
+    rng = np.random.default_rng(0)
+    v, size, band = 3, 5, 2
+    lower = np.kron(np.tri(size) - np.tri(size, k=-band - 1), np.ones((v, v)))
+    F = np.tril(rng.standard_normal((size * v, size * v)) * lower) + 4 * np.eye(size * v)
+    M = F @ F.T
+    blocks = {
+        (i, j): M[i * v : (i + 1) * v, j * v : (j + 1) * v].copy()
+        for i in range(size)
+        for j in range(i + 1)
+        if np.any(M[i * v : (i + 1) * v, j * v : (j + 1) * v])
+    }
+    # an arrow too, which fills in
+    blocks[size - 1, 0] = blocks.get((size - 1, 0), np.zeros((v, v))) + 0.1
+    M[-v:, :v] += 0.1
+    M[:v, -v:] += 0.1
+    b = rng.standard_normal((size, v))
+    found = BlockCholesky(blocks).solve(b)
+    np.testing.assert_allclose(found.ravel(), np.linalg.solve(M, b.ravel()), rtol=1e-9)
+
+
+def test_a_matrix_of_blocks_that_is_not_definite_is_refused():
+    with pytest.raises(np.linalg.LinAlgError):
+        BlockCholesky({(0, 0): np.eye(2), (1, 0): 2 * np.eye(2), (1, 1): np.eye(2)})
+
+
+@pytest.mark.parametrize("dt", [None, 0.05])
+def test_of_a_model_that_does_not_move_it_finds_the_frozen_norm(dt):
+    """The bounded real lemma is exact there; the norm comes from level sets of the response."""
+    rng = np.random.default_rng(4)
+    n = 14
+    A = rng.standard_normal((n, n))
+    A -= (np.linalg.eigvals(A).real.max() + 0.5) * np.eye(n)
+    A = A if dt is None else np.eye(n) + dt * A
+    lpv = constant(
+        A, rng.standard_normal((n, 2)), rng.standard_normal((2, n)), np.zeros((2, 2)), dt
+    )
+    form = Spline(segments=1, degree=0)
+    cert = l2_gain(lpv, form=form, search=None)
+    assert cert.solver.startswith("LYAPUNOV")
+    # the tolerance is 1e-5 of gamma^2, the margin of the LMI 1e-6
+    assert cert.gamma == pytest.approx(frozen_gain(lpv).gamma, rel=1e-4)
+    assert cert.verify(rigorous=True)
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+def test_it_agrees_with_a_general_solver(dt):
+    for seed in (1, 2):
+        lpv = random_stable(seed, states=4, dt=dt)
+        own, general = (
+            l2_gain(lpv, form=FORM, solver=solver, search=None)
+            for solver in ("LYAPUNOV", "CLARABEL")
+        )
+        assert own.verified
+        assert general.verified
+        # what is left to both is the accuracy at which Clarabel stops, "almost solved" at 5e-5
+        assert own.gamma == pytest.approx(general.gamma, rel=2e-4)
+        assert own.gamma >= own.frozen
+
+
+def test_more_than_twelve_states_take_it_unless_told_otherwise(tmp_path):
+    lpv = springs(7, 0.2)
+    cert = l2_gain(lpv, form=FORM, search=None)
+    assert cert.solver.startswith("LYAPUNOV")
+    assert cert.frozen <= cert.gamma < 1.5 * cert.frozen
+    assert cert.verify(rigorous=True)
+    loaded = Certificate.load(cert.save(tmp_path / "proof.json"))
+    assert loaded.verify(rigorous=True)
+    # a thousandth less is not proven by this P
+    assert not loaded.proof.exact(cert.gamma * (1 - 1e-3))
+    assert stability(lpv, search=None).verify(rigorous=True)
+    few = springs(6, 0.2)
+    assert l2_gain(few, form=Spline(degree=0), search=None).solver.startswith("CLARABEL")
+    for form, impose in ((Memory(0.5, segments=1), None), (None, SumOfSquares())):
+        asked = question(lpv, None, "l2 gain", form, impose, None, None)
+        assert asked.solver.name == "CLARABEL"
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: l2_gain(spring(), form=Memory(0.5), solver="LYAPUNOV"),
+        lambda: l2_gain(spring(), impose=SumOfSquares(), solver="LYAPUNOV"),
+        lambda: l2_gain(spring(), impose=Bernstein(subdivision=1), solver="LYAPUNOV"),
+        lambda: decay_rate(spring(), solver="LYAPUNOV"),
+        lambda: generalized_h2(spring(), solver=Solver("LYAPUNOV")),
+        lambda: lft_gain(spring().to_lft(), solver="LYAPUNOV"),
+    ],
+)
+def test_where_it_does_not_apply_it_is_refused_with_what_to_take(call):
+    with pytest.raises(InputError, match=r"LYAPUNOV is for l2_gain and stability .*CLARABEL"):
+        call()
+
+
+def test_what_grows_when_moved_is_not_proven():
+    lpv = springs(7, math.inf, growing=True)
+    assert l2_gain(lpv, form=FORM, search=None).status is Status.UNSTABLE
+    for kind in ("stability", "l2 gain"):
+        found = searched(lpv, math.inf, kind, FORM, solver="LYAPUNOV")
+        assert found.proof is None
+        assert found.answer is Answer.INFEASIBLE
+
+
+def test_a_method_that_is_stopped_says_so_and_proves_nothing_it_has_not_reached():
+    lpv = springs(7, 0.2)
+    early = l2_gain(lpv, form=FORM, solver=Solver("LYAPUNOV", iterations=1), search=None)
+    assert "out of iterations after 1 iterations" in str(early.attempts[0])
+    late = l2_gain(lpv, form=FORM, solver=Solver("LYAPUNOV", time_limit=1e-9), search=None)
+    assert "out of time" in str(late.attempts[0])
+    assert late.status is Status.FAILED
+    assert not late.verified
+
+
+@pytest.mark.parametrize("states", LOOPS)
+def test_the_loops_of_the_benchmark_have_the_states_they_name_and_are_stable_when_frozen(states):
+    loop = closed_loop(states)
+    assert len(loop.states) == states
+    assert loop.inputs == GUSTS
+    poles = np.linalg.eigvals(loop.matrices(np.linspace(0.0, 13.0, 27)).A)
+    assert poles.real.max() < -0.5
+
+
+def test_a_closed_loop_as_it_flies_is_proven_near_its_frozen_gain():
+    cert = l2_gain(closed_loop(16), 1.0, search=None)
+    assert cert.solver.startswith("LYAPUNOV")
+    # at 1 m/s^2 the rate is worth about a percent
+    assert cert.frozen < cert.gamma < 1.02 * cert.frozen
+    assert cert.verify(rigorous=True)
+
+
+def test_a_command_one_sample_late_is_held_exactly():
+    loop = sampled_loop()
+    assert len(loop.states) == 20
+    assert loop.dt == DELAY
+    late = [i for i, s in enumerate(loop.states) if str(s).endswith("_late")]
+    K = loop.matrices(6.5).A[late]
+    # the four states are the commands of the sample before: they depend on what is measured alone
+    measured = [i for i, s in enumerate(loop.states) if str(s) in "u v w p q r phi theta".split()]
+    others = np.setdiff1d(np.arange(20), measured)
+    assert np.all(K[:, others] == 0)
+    assert np.all(np.abs(K[:, measured]).max(axis=1) > 0)
+
+
+def rational(M):
+    return np.array([[Fraction(float(v)) for v in row] for row in M], dtype=object)
+
+
+@pytest.fixture(params=["installed", "standard library"])
+def number(request):
+    return exact.rational() if request.param == "installed" else Fraction
+
+
+def test_dominance_and_pivots_tell_the_same(number):
+    rng = np.random.default_rng(0)
+    for n in (7, 12):
+        for shift in (1.0, 1e-3, 1e-12, -1e-12, -1e-3):
+            F = rng.standard_normal((n, n - 1)) * 10.0 ** rng.uniform(-6, 6, n)[:, None]
+            M = exact.exact(F, number)
+            # exactly singular, then not: positive definite or indefinite by a hair
+            M = M @ M.T + exact.exact(shift * np.diag(np.sum(F * F, axis=1)), number)
+            assert exact.positive_definite(M) == exact._pivots_are_positive(M) == (shift > 0)
+
+
+def test_a_matrix_that_rounds_to_a_definite_one_and_is_not_is_refused(number):
+    """Indefinite by 1e-40, which no double sees."""
+    n = 8
+    half = number(0.5)
+    M = exact.exact(np.eye(n), number)
+    M[0, 1] = M[1, 0] = number(1.0) - half**140
+    assert exact.positive_definite(M)
+    M[0, 1] = M[1, 0] = number(1.0) + half**140
+    assert not exact.positive_definite(M)
+    assert not exact._dominant(M)
+
+
+def test_only_the_lower_triangle_is_read(number):
+    rng = np.random.default_rng(1)
+    F = rng.standard_normal((9, 9))
+    M = exact.exact(symmetrized(F @ F.T + np.eye(9)), number)
+    torn = M.copy()
+    torn[0, 8] = number(1e6)
+    assert exact.positive_definite(torn)
+    assert exact._dominant(torn)
+
+
+def test_numbers_beyond_the_doubles_are_left_to_the_pivots():
+    M = rational(np.eye(8))
+    M[0, 0] = Fraction(10) ** 400
+    assert not exact._dominant(M)
+    assert exact.positive_definite(M)
