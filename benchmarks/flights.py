@@ -4,6 +4,7 @@ Python, and flights whose inputs are known.
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -19,9 +20,12 @@ import numpy as np  # noqa: E402
 
 import symheli  # noqa: E402
 from benchmarks.opponents.flight_in_python import FlightInPython  # noqa: E402
+from benchmarks.peak import processor  # noqa: E402
+from benchmarks.physical_limit import Flown, limits, work  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
 from symheli.flight import XCELL_SERVOS  # noqa: E402
+from symheli.physics.attitude import flight_state  # noqa: E402
 
 DT = 0.02
 FLIGHTS, QUICK_FLIGHTS, ALONE = 1000, 128, 5
@@ -85,6 +89,12 @@ def main() -> None:
     ]
     notes.append(f"the flight in Python differs from symheli.fly by {apart:.0e} at most (SI)")
     notes.append(f"flights of {SCHEDULE.duration:.0f} s, steps of 5 ms, noise, excitation")
+    steps = 4 * n
+    ours = (
+        Flown(one, steps, times[one], 1),
+        Flown(batch, steps * count, times[batch], len(os.sched_getaffinity(0))),
+    )
+    limit, shares = physical_limit(heli, record, ours, notes)
     title = "### Flights under feedback, hover to 13 m/s and back in 40 s, recorded at 50 Hz"
     ratios = [
         Ratio(
@@ -110,7 +120,29 @@ def main() -> None:
         ),
         Ratio("flights under feedback: to disk over in memory", times[kept] / times[batch]),
     ]
-    present("flights", options, [table(title, rows, ("", "median", "each"))], ratios, notes)
+    tables = [table(title, rows, ("", "median", "each")), *limit]
+    present("flights", options, tables, [*ratios, *shares], notes)
+
+
+def physical_limit(
+    heli: symheli.Helicopter,
+    record: symheli.FlightRecord,
+    flown: tuple[Flown, Flown],
+    notes: list[str],
+) -> tuple[list[str], list[Ratio]]:
+    """The helicopter's own operations in these flights, beside what this processor can do."""
+    processors = {way.threads: processor(way.threads) for way in flown}
+    if None in processors.values():
+        notes.append("the physical limit: left out, no C compiler")
+        return [], []
+    inputs = record.columns(heli.inputs)
+    states = flight_state(record.columns(heli.states))
+    done = work(heli, states, inputs, 4, processors[1].wait)
+    text, ratios = limits(*flown, done, processors)
+    notes.append(
+        "operations counted: the helicopter's; trims, sensors, gains and noise come on top"
+    )
+    return [text], ratios
 
 
 if __name__ == "__main__":

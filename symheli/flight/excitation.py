@@ -75,27 +75,27 @@ class Excitation:
             )
         rng = np.random.default_rng(self.seed)
         shape = {"multisine": self._multisine, "prbs": self._prbs, "chirp": self._chirp}[self.kind]
-        return {
-            name: size * shape(time, i, rng)
-            for i, (name, size) in enumerate(self.amplitude.items())
-        }
+        sizes = np.array(list(self.amplitude.values()))
+        return dict(zip(self.amplitude, sizes[:, None] * shape(time, rng), strict=True))
 
-    def _multisine(self, time: np.ndarray, i: int, rng: np.random.Generator) -> np.ndarray:
-        length = len(time) * float(time[1] - time[0])
-        harmonics = np.arange(np.ceil(self.band[0] * length), np.floor(self.band[1] * length) + 1)[
-            i :: len(self.amplitude)
-        ]
-        phases = rng.uniform(0, 2 * np.pi, len(harmonics))
-        spectrum = np.zeros(len(time) // 2 + 1, complex)
-        spectrum[harmonics.astype(int)] = np.exp(1j * phases)
-        return (
-            np.fft.irfft(spectrum, len(time)) * len(time) / 2 * np.sqrt(1 / max(len(harmonics), 1))
-        )
+    def _multisine(self, time: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        n, count = len(time), len(self.amplitude)
+        length = n * float(time[1] - time[0])
+        harmonics = np.arange(np.ceil(self.band[0] * length), np.floor(self.band[1] * length) + 1)
+        spectrum = np.zeros((count, n // 2 + 1), complex)
+        for i in range(count):
+            own = harmonics[i::count].astype(int)
+            phases = rng.uniform(0, 2 * np.pi, len(own))
+            spectrum[i, own] = np.exp(1j * phases) * (n / 2 * np.sqrt(1 / max(len(own), 1)))
+        return np.fft.irfft(spectrum, n)
 
-    def _prbs(self, time: np.ndarray, i: int, rng: np.random.Generator) -> np.ndarray:
+    def _prbs(self, time: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         cell = np.floor((time - time[0]) * 2 * self.band[1]).astype(int)
-        return rng.choice([-1.0, 1.0], size=cell[-1] + 1)[cell]
+        return rng.choice([-1.0, 1.0], size=(len(self.amplitude), cell[-1] + 1))[:, cell]
 
-    def _chirp(self, time: np.ndarray, i: int, rng: np.random.Generator) -> np.ndarray:
-        shifted = np.mod(time + i * self.period / max(len(self.amplitude), 1), self.period)
+    def _chirp(self, time: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        from scipy.signal import chirp
+
+        late = self.period / max(len(self.amplitude), 1) * np.arange(len(self.amplitude))
+        shifted = np.mod(time + late[:, None], self.period)
         return np.asarray(chirp(shifted, self.band[0], self.period, self.band[1], phi=-90))
