@@ -94,7 +94,6 @@ class Excitation:
         return rng.choice([-1.0, 1.0], size=(len(self.amplitude), cell[-1] + 1))[:, cell]
 
     def _chirp(self, time: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        from scipy.signal import chirp
 
         late = self.period / max(len(self.amplitude), 1) * np.arange(len(self.amplitude))
         shifted = np.mod(time + late[:, None], self.period)

@@ -9,7 +9,7 @@ import numpy as np
 from symheli.errors import UnknownNameError
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import excitation_of
-from symheli.flight.loops import LEVEL
+from symheli.flight.in_numpy import LEVEL
 from symheli.flight.plan import FlightPlan
 from symheli.helicopter import Helicopter
 from symheli.records.flight_record import FlightRecord
