@@ -43,6 +43,7 @@ lint: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[benchmark]'
 	$(BIN)/python benchmarks/model.py --write
+	$(BIN)/python benchmarks/flights.py --write
 	$(BIN)/python benchmarks/identification.py --write
 	$(BIN)/python benchmarks/analysis.py --write
 	$(BIN)/python benchmarks/closed_loop_certificates.py --write
