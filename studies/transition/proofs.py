@@ -63,11 +63,34 @@ class Questions:
     together: Callable[[tuple[Bound, ...]], Any]
     long: Sequence[Proof] = ()
 
-    def asked(self, processes: Processes) -> list[Future[Answer]]:
-        """An answer to come for each proof."""
-        order = [*self.long, *(proof for proof in self.proofs if proof not in self.long)]
-        answers = processes.submit([partial(_timed, proof) for proof in order])
-        return [answers[order.index(proof)] for proof in self.proofs]
+    def asked(
+        self,
+        processes: Processes,
+        known: Mapping[int, Answer],
+        found: Callable[[int, Answer], object],
+    ) -> list[Future[Answer]]:
+        """An answer to come for each proof, at once for those that are `known` by position;
+        `found` is called with every new one.
+        """
+        order = [self.proofs.index(proof) for proof in self.long]
+        order += [i for i in range(len(self.proofs)) if i not in order]
+        open_ones = [i for i in order if i not in known]
+        answers = processes.submit([partial(_timed, self.proofs[i]) for i in open_ones])
+        for i, answer in zip(open_ones, answers, strict=True):
+            answer.add_done_callback(partial(_told, found, i))
+        new = dict(zip(open_ones, answers, strict=True))
+        return [new[i] if i in new else _known(known[i]) for i in range(len(self.proofs))]
+
+
+def _told(found: Callable[[int, Answer], object], i: int, answer: Future[Answer]) -> None:
+    if not answer.cancelled() and answer.exception() is None:
+        found(i, answer.result())
+
+
+def _known(answer: Answer) -> Future[Answer]:
+    future: Future[Answer] = Future()
+    future.set_result(answer)
+    return future
 
 
 def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Questions:

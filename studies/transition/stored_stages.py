@@ -7,6 +7,7 @@ digest of its bytes. Pickles run code when they are read: only folders of one's 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import pickle
 import platform
@@ -75,8 +76,42 @@ class StoredStages:
             raise NotUsable(f"{path} is damaged: it holds another stage")
         return stored
 
+    def answers(self, stage: str) -> StoredAnswers:
+        """Where the answers to the questions of a stage are stored until it is finished."""
+        return StoredAnswers(self, stage)
+
     def _head(self, content: bytes) -> bytes:
         return f"{FORMAT} {self.key} {hashlib.sha256(content).hexdigest()}\n".encode()
+
+
+@dataclass(frozen=True)
+class StoredAnswers:
+    """Answers to the questions of a stage that is not finished, each stored as it is found."""
+
+    stored: StoredStages
+    stage: str
+
+    def save(self, i: int, answer: tuple[float, Any]) -> Path:
+        """Store the answer to question i, found in so many seconds."""
+        seconds, found = answer
+        return self.stored.save(self._name(i), Stored(result=found, seconds=seconds))
+
+    def load(self, count: int) -> dict[int, tuple[float, Any]]:
+        """Those that are there and whole, of `count`."""
+        known = {}
+        for i in range(count):
+            with contextlib.suppress(NotUsable):
+                if (answer := self.stored.load(self._name(i), list)) is not None:
+                    known[i] = (answer.seconds, answer.result)
+        return known
+
+    def clear(self) -> None:
+        """Remove them: the stage is stored."""
+        for path in self.stored.folder.glob(f"{self.stage}-*.stage"):
+            path.unlink(missing_ok=True)
+
+    def _name(self, i: int) -> str:
+        return f"{self.stage}-{i}"
 
 
 def content_key(heli: Helicopter, effort: object, seed: int) -> str:

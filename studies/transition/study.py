@@ -34,7 +34,13 @@ from studies.transition.proofs import (
 from studies.transition.recovery import Recoveries, recover_at
 from studies.transition.report import write_report, write_results
 from studies.transition.results import to_dict
-from studies.transition.stored_stages import NotUsable, Stored, StoredStages, content_key
+from studies.transition.stored_stages import (
+    NotUsable,
+    Stored,
+    StoredAnswers,
+    StoredStages,
+    content_key,
+)
 from studies.transition.summary import summary
 from symheli import Helicopter
 
@@ -77,10 +83,17 @@ class Asked:
     answers: Sequence[Future[Answer]]
 
     @classmethod
-    def of(cls, stage: Stage, study: Study, effort: Effort, processes: Processes) -> Asked:
-        """Hand its questions over."""
-        questions = stage.compute(study, effort)
-        return cls(questions, questions.asked(processes))
+    def of(
+        cls,
+        questions: Questions,
+        processes: Processes,
+        kept: StoredAnswers | None = None,
+        resume: bool = False,
+    ) -> Asked:
+        """Hand the questions over; answers are `kept`, and with `resume` taken from there."""
+        known = kept.load(len(questions.proofs)) if kept is not None and resume else {}
+        found = (lambda i, answer: None) if kept is None else kept.save
+        return cls(questions, questions.asked(processes, known, found))
 
     def stored(self) -> Stored:
         """Wait for the answers; `seconds` is the work they were."""
@@ -104,8 +117,8 @@ def run_study(
     Proofs that do not need each other run side by side, in a process a core, while the other stages
     are computed here. `resume` takes the stages that an earlier run has stored in `out`, where
     code, libraries, vehicle, effort and seed are the same; others, and those that are damaged, are
-    computed again. Progress goes to standard error. An interrupted run leaves its finished stages
-    and their results; files are whole or absent.
+    computed again. Progress goes to standard error. An interrupted run leaves its finished stages,
+    the proofs that are found and their results; files are whole or absent.
     """
     out, effort = Path(out), Effort.look() if quick else Effort()
     heli = Helicopter.load(vehicle, governor="ideal")
@@ -122,11 +135,13 @@ def run_study(
             ready = [stage for stage in todo if set(stage.needs) <= study.seconds.keys()]
             for stage in ready:
                 if stage.asks and stage.name not in asked:
-                    asked[stage.name] = Asked.of(stage, study, effort, processes)
+                    questions, kept = stage.compute(study, effort), stored.answers(stage.name)
+                    asked[stage.name] = Asked.of(questions, processes, kept, resume)
             stage = next((stage for stage in ready if not stage.asks), ready[0])
             with _shown(stage.title):
                 found = asked[stage.name].stored() if stage.asks else computed(stage, study, effort)
             stored.save(stage.name, found)
+            stored.answers(stage.name).clear()
             study = with_stage(study, stage, found)
             write_results(study, out)
             todo.remove(stage)
@@ -219,7 +234,7 @@ def computed(stage: Stage, study: Study, effort: Effort) -> Stored:
     """Compute a stage here."""
     if stage.asks:
         with Processes(1) as here:
-            return Asked.of(stage, study, effort, here).stored()
+            return Asked.of(stage.compute(study, effort), here).stored()
     begin = time.perf_counter()
     result = stage.compute(study, effort)
     return Stored(result=result, seconds=time.perf_counter() - begin)

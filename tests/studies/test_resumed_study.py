@@ -6,11 +6,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
+from studies.processes import Processes
 from studies.transition import study
 from studies.transition.effort import Effort
+from studies.transition.proofs import Questions
 from studies.transition.recovery import Recoveries
 from studies.transition.stored_stages import NotUsable, Stored, StoredStages, content_key
 
@@ -159,3 +162,38 @@ def test_the_command_says_how_to_go_on(short, tmp_path, monkeypatch, capsys):
     assert cli.main(["study", "--quick", "--out", str(tmp_path), "--resume", "--json"]) == 0
     assert short == ["paper_experiment", "exact_recovery"]
     assert json.loads(capsys.readouterr().out)["complete"]
+
+
+def test_proofs_that_were_found_are_not_proven_again(tmp_path, monkeypatch):
+    """A stage of questions that is stopped keeps its answers; the next run asks the others."""
+    asked = []
+
+    def question(k):
+        asked.append(k)
+        if k == 2 and asked.count(2) == 1:
+            raise KeyboardInterrupt
+        return [k]
+
+    stage = study.Stage(
+        "gust",
+        "Three questions",
+        tuple,
+        (),
+        lambda *_: Questions([partial(question, k) for k in range(3)], lambda bounds: bounds),
+        asks=True,
+    )
+    monkeypatch.setattr(study, "stages", lambda effort: (stage,))
+    monkeypatch.setattr(study, "Processes", lambda: Processes(1))
+    for name in ("write_report", "write_results"):
+        monkeypatch.setattr(study, name, lambda *_: None)
+    with pytest.raises(KeyboardInterrupt):
+        study.run_study(out=tmp_path, quick=True)
+    assert asked == [0, 1, 2]
+    assert sorted(p.name for p in (tmp_path / "stages").iterdir()) == [
+        "gust-0.stage",
+        "gust-1.stage",
+    ]
+    done = study.run_study(out=tmp_path, quick=True, resume=True)
+    assert asked == [0, 1, 2, 2]
+    assert done.gust == (0, 1, 2)
+    assert [p.name for p in (tmp_path / "stages").iterdir()] == ["gust.stage"]
