@@ -113,6 +113,7 @@ def test_a_helicopter_that_brakes_less_than_it_accelerates_is_searched_as_hard_a
     assert np.abs(np.diff(p) / np.diff(cert.worst.time)).max() <= 0.05 * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_sampled_the_worst_trajectory_is_one_that_a_flight_can_have():
     cert = l2_gain(
         tied(1.0, 0.1, slope=0.3),
@@ -152,7 +153,7 @@ def test_a_smoothed_trapezoid_keeps_range_rate_and_jerk():
     np.testing.assert_allclose(path.at(t[:10] + wave.period)[0], p[:10], atol=1e-12)
 
 
-@pytest.mark.parametrize("jerk", [math.inf, 3.0, 0.5])
+@pytest.mark.parametrize("jerk", [math.inf, pytest.param(3.0, marks=pytest.mark.slow), 0.5])
 def test_sampled_the_error_of_the_step_is_included(jerk):
     alone = l2_gain(stiffening(0.1), form=Spline(degree=2, segments=4), search=None)
     both = l2_gain(tied(jerk, 0.1), form=Spline(degree=(2, 1), segments=((4, 1),)), search=None)
