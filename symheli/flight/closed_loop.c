@@ -84,7 +84,7 @@ static struct block *begin(const struct loops *f, long first, long lanes)
   b->first = first, b->lanes = lanes, b->recent = 1;
   for (int j = 0; j < SEEN; ++j) {
     const long reach = f->delay[j] + (f->period[j] > 1 ? f->period[j] : 1);
-    if (reach > b->recent) b->recent = reach;
+    if (reach > b->recent) b->recent = reach < f->longest ? reach : f->longest;
   }
   b->issued = f->late / f->substeps + 2;
   b->entries = (f->own + 4) * (f->own + TOLD);

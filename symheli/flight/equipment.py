@@ -19,6 +19,9 @@ from symheli.flight.servo import Servo, ServoBank
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
 
+FOREVER = 2**40
+"""Steps that no flight has."""
+
 
 @dataclass(frozen=True, eq=False)
 class Readings:
@@ -40,15 +43,10 @@ class Readings:
             np.array([getattr(s, name) for s in bank]) for name in ("noise", "bias", "quantum")
         )
         delay, period = (
-            np.array([math.ceil(getattr(s, name) / dt - 1e-9) for s in bank], dtype=np.int_)
+            np.array([_whole(getattr(s, name), dt) for s in bank], dtype=np.int_)
             for name in ("delay", "period")
         )
         return cls(noise, bias, quantum, delay, np.maximum(period, 1))
-
-    @property
-    def late(self) -> int:
-        """How many samples back a reading can reach."""
-        return int((self.delay + self.period).max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +74,11 @@ class Equipment:
             controller,
             Readings.of(sensors or {}, clock.dt),
             None if servos is None else ServoBank(servos, INPUTS, heli.travel, clock.step),
-            math.ceil(delay / clock.step - 1e-9),
+            _whole(delay, clock.step),
             np.ascontiguousarray(heli.travel, float),
         )
+
+
+def _whole(seconds: float, step: float) -> int:
+    """Steps that last so long, rounded up; more than any flight has where that is very long."""
+    return min(math.ceil(min(seconds / step, FOREVER) - 1e-9), FOREVER)

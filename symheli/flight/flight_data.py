@@ -94,7 +94,7 @@ class FlightData:
         nx, last = len(self.heli.states), self.out[max(self.kept - 1, 0)]
         signs = []
         for name, i in (("bank", 6), ("pitch", 7)):
-            if abs(last[i]) > 0.8 * LEVEL:
+            if 0.8 * LEVEL < abs(last[i]) < np.pi:  # as read: noise may say anything
                 signs.append(f"{name} {np.degrees(last[i]):.0f} deg")
         second = self.out[max(0, self.kept - round(1 / self.plan.dt)) : self.kept, nx + 4 : nx + 8]
         share = (

@@ -148,7 +148,7 @@ class Loops:
                 for name in ("A", "B", "C", "settled", "change", "resolution")
             },
             "travel": e.travel,
-            "late": e.late,
+            "late": min(e.late, longest * self.clock.substeps),
             "out": found.out,
             "lost": found.lost,
             "slots": found.out.shape[1],
