@@ -39,6 +39,10 @@ class Operation:
     value: float = 0.0
     element: tuple[int, int] = (0, 0)
 
+    def on(self, arguments: tuple[int, ...]) -> Operation:
+        """The same operation on other arguments."""
+        return Operation(self.name, arguments, self.value, self.element)
+
 
 @dataclass(frozen=True)
 class Program:
@@ -164,9 +168,7 @@ def rewritten(
     for k, operation in enumerate(given.operations):
         arguments = tuple(moved[a] for a in operation.arguments)
         replaced = rule(builder, k, arguments)
-        moved.append(
-            builder.add(replace(operation, arguments=arguments)) if replaced is None else replaced
-        )
+        moved.append(builder.add(operation.on(arguments)) if replaced is None else replaced)
     outputs = tuple(tuple(moved[a] for a in output) for output in given.outputs)
     return replace(given, operations=tuple(builder.operations), outputs=outputs)
 
@@ -179,7 +181,7 @@ def without_unused(given: Program) -> Program:
             used.update(given.operations[position].arguments)
     new = {old: k for k, old in enumerate(sorted(used))}
     operations = tuple(
-        replace(o, arguments=tuple(new[a] for a in o.arguments))
+        o.on(tuple([new[a] for a in o.arguments]))
         for o in (given.operations[old] for old in sorted(used))
     )
     return replace(
