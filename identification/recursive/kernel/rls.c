@@ -43,8 +43,12 @@ typedef lanes part;
 #define TOGETHER 4
 typedef rls_real part VECTOR(TOGETHER * sizeof(rls_real));
 #else
-#define TOGETHER ((int)(16 / sizeof(rls_real)))
-typedef rls_real part VECTOR(16);
+#ifdef RLS_SINGLE
+#define TOGETHER 4
+#else
+#define TOGETHER 2
+#endif
+typedef rls_real part VECTOR(TOGETHER * sizeof(rls_real));
 #endif
 #else
 #define TOGETHER 1
@@ -65,8 +69,12 @@ typedef struct {
 
 static const lanes none; /* zeros */
 
+/* Rows of a block that are worked on at a time: with more, the registers would not hold what they
+   take, one or two numbers a row in all lanes. */
+#define ROWS (TOGETHER > 2 ? TOGETHER : 2)
+
 /* Lanes of two vectors, counted through, without a way through memory. */
-#if defined(__has_builtin) && defined(WHOLE)
+#if defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
 #define SHUFFLE __builtin_shufflevector
 #endif
@@ -76,13 +84,33 @@ static inline lanes *lanes_at(rls_real *numbers) { return (lanes *)numbers; }
 
 static inline const lanes *lanes_of(const rls_real *numbers) { return (const lanes *)numbers; }
 
+/* Numbers that were computed one by one, side by side. */
+static inline lanes gathered(const rls_real *t)
+{
+#if TOGETHER == 8
+    return (lanes){t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]};
+#elif TOGETHER == 4
+    return (lanes){{{t[0], t[1], t[2], t[3]}, {t[4], t[5], t[6], t[7]}}};
+#else
+    lanes v;
+    for (int i = 0; i < LANES; i++) LANE(v, i) = t[i];
+    return v;
+#endif
+}
+
 /* Each lane becomes the sum of those up to it: neighbours first, then pairs, then fours. */
 static inline void running_sums(lanes *v)
 {
-#ifdef SHUFFLE
+#if defined(SHUFFLE) && TOGETHER == 8
     *v += SHUFFLE(none, *v, 0, 8, 9, 10, 11, 12, 13, 14);
     *v += SHUFFLE(none, *v, 0, 1, 8, 9, 10, 11, 12, 13);
     *v += SHUFFLE(none, *v, 0, 1, 2, 3, 8, 9, 10, 11);
+#elif defined(SHUFFLE) && TOGETHER == 4
+    v->at[1] += SHUFFLE(v->at[0], v->at[1], 3, 4, 5, 6);
+    v->at[0] += SHUFFLE(none.at[0], v->at[0], 0, 4, 5, 6);
+    v->at[1] += SHUFFLE(v->at[0], v->at[1], 2, 3, 4, 5);
+    v->at[0] += SHUFFLE(none.at[0], v->at[0], 0, 1, 4, 5);
+    v->at[1] += v->at[0];
 #else
     for (int step = 1; step < LANES; step *= 2)
         for (int i = LANES - 1; i >= step; i--) LANE(*v, i) += LANE(*v, i - step);
@@ -92,39 +120,52 @@ static inline void running_sums(lanes *v)
 /* The lane before, and `first` before all. */
 static inline void shift(lanes *v, rls_real first)
 {
-#ifdef SHUFFLE
+#if defined(SHUFFLE) && TOGETHER == 8
     *v = SHUFFLE(none + first, *v, 0, 8, 9, 10, 11, 12, 13, 14);
+#elif defined(SHUFFLE) && TOGETHER == 4
+    v->at[1] = SHUFFLE(v->at[0], v->at[1], 3, 4, 5, 6);
+    v->at[0] = SHUFFLE(none.at[0] + first, v->at[0], 0, 4, 5, 6);
 #else
     for (int i = LANES - 1; i > 0; i--) LANE(*v, i) = LANE(*v, i - 1);
     LANE(*v, 0) = first;
 #endif
 }
 
-static inline void transpose(lanes *v)
+/* The sum of each of LANES vectors: lanes four apart first, then two, then neighbours. */
+static inline lanes sums(const lanes *v)
 {
-#ifdef SHUFFLE
-    lanes a[LANES];
-    for (int i = 0; i < LANES; i += 2) {
-        a[i] = SHUFFLE(v[i], v[i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
-        a[i + 1] = SHUFFLE(v[i], v[i + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+#if defined(SHUFFLE) && TOGETHER == 8
+    lanes four[4], two[2];
+    for (int i = 0; i < 4; i++)
+        four[i] = SHUFFLE(v[i], v[i + 4], 0, 1, 2, 3, 8, 9, 10, 11) +
+                  SHUFFLE(v[i], v[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+    for (int i = 0; i < 2; i++)
+        two[i] = SHUFFLE(four[i], four[i + 2], 0, 1, 8, 9, 4, 5, 12, 13) +
+                 SHUFFLE(four[i], four[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+    return SHUFFLE(two[0], two[1], 0, 8, 2, 10, 4, 12, 6, 14) +
+           SHUFFLE(two[0], two[1], 1, 9, 3, 11, 5, 13, 7, 15);
+#elif defined(SHUFFLE) && TOGETHER == 4
+    part four[LANES], two[LANES / 2];
+    lanes one;
+    for (int i = 0; i < LANES; i++) four[i] = v[i].at[0] + v[i].at[1];
+    for (int k = 0; k < 2; k++) {
+        for (int i = 4 * k; i < 4 * k + 2; i++)
+            two[i - 2 * k] = SHUFFLE(four[i], four[i + 2], 0, 1, 4, 5) +
+                             SHUFFLE(four[i], four[i + 2], 2, 3, 6, 7);
+        one.at[k] = SHUFFLE(two[2 * k], two[2 * k + 1], 0, 4, 2, 6) +
+                    SHUFFLE(two[2 * k], two[2 * k + 1], 1, 5, 3, 7);
     }
-    for (int i = 0; i < LANES; i += 4)
-        for (int j = i; j < i + 2; j++) {
-            v[j] = SHUFFLE(a[j], a[j + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-            v[j + 2] = SHUFFLE(a[j], a[j + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-        }
-    for (int j = 0; j < 4; j++) {
-        const lanes upper = v[j];
-        v[j] = SHUFFLE(upper, v[j + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        v[j + 4] = SHUFFLE(upper, v[j + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
+    return one;
 #else
-    for (int i = 0; i < LANES; i++)
-        for (int j = 0; j < i; j++) {
-            const rls_real below = LANE(v[i], j);
-            LANE(v[i], j) = LANE(v[j], i);
-            LANE(v[j], i) = below;
-        }
+    lanes one;
+    for (int i = 0; i < LANES; i++) {
+        rls_real s[LANES];
+        for (int j = 0; j < LANES; j++) s[j] = LANE(v[i], j);
+        for (int half = LANES / 2; half > 0; half /= 2)
+            for (int j = 0; j < half; j++) s[j] += s[j + half];
+        LANE(one, i) = s[0];
+    }
+    return one;
 #endif
 }
 
@@ -274,25 +315,20 @@ static inline void times(const rls_real *rows, int stride, int count, const rls_
     lanes s[LANES];
     int i = 0;
     for (int j = 0; j < LANES; j++) s[j] = none;
-    if (count == LANES) /* usual numbers, as constants for the compiler */
-        partial_sums(rows, stride, LANES, b, length, s);
-    else {
-        for (; i + 4 <= count; i += 4) partial_sums(rows + i * stride, stride, 4, b, length, s + i);
-        for (; i < count; i++) partial_sums(rows + i * stride, stride, 1, b, length, s + i);
-    }
-    transpose(s);
-    for (int half = LANES / 2; half > 0; half /= 2)
-        for (int j = 0; j < half; j++) LANEWISE EACH(s[j]) += EACH(s[j + half]);
-    *lanes_at(result) = s[0];
+    /* usual numbers, as constants for the compiler */
+    for (; i + ROWS <= count; i += ROWS)
+        partial_sums(rows + i * stride, stride, ROWS, b, length, s + i);
+    for (; i < count; i++) partial_sums(rows + i * stride, stride, 1, b, length, s + i);
+    *lanes_at(result) = sums(s);
 }
 
-/* LANES columns of a block of rows: for each row i in turn x <- x - lead[i] row, row <- row +
+/* LANES columns of ROWS rows of a block: for each row i in turn x <- x - lead[i] row, row <- row +
    gain[i] x. */
 static inline void rotate(rls_real *block, int stride, rls_real *x, const rls_real *lead,
                           const rls_real *gain)
 {
     lanes t = *lanes_of(x);
-    for (int i = 0; i < LANES; i++) {
+    for (int i = 0; i < ROWS; i++) {
         lanes row = *lanes_of(block + i * stride);
         LANEWISE EACH(t) -= lead[i] * EACH(row);
         LANEWISE EACH(row) += gain[i] * EACH(t);
@@ -328,12 +364,18 @@ typedef struct {
 static inline void eliminate(const rls_real *block, int stride, int rows, const lanes *x,
                              rls_real *lead)
 {
-    lanes t = *x;
-    for (int i = 0; i < LANES; i++) {
-        const rls_real f = LANE(t, i);
-        lead[i] = f;
-        LANEWISE EACH(t) -= f * EACH(*lanes_of(block + i * stride));
-    }
+    rls_real t[LANES];
+    for (int i = 0; i < LANES; i++) t[i] = LANE(*x, i);
+#define LESS(j, i) t[j] -= t[i] * block[(i) * stride + (j)]
+    LESS(1, 0);
+    LESS(2, 0); LESS(2, 1);
+    LESS(3, 0); LESS(3, 1); LESS(3, 2);
+    LESS(4, 0); LESS(4, 1); LESS(4, 2); LESS(4, 3);
+    LESS(5, 0); LESS(5, 1); LESS(5, 2); LESS(5, 3); LESS(5, 4);
+    LESS(6, 0); LESS(6, 1); LESS(6, 2); LESS(6, 3); LESS(6, 4); LESS(6, 5);
+    LESS(7, 0); LESS(7, 1); LESS(7, 2); LESS(7, 3); LESS(7, 4); LESS(7, 5); LESS(7, 6);
+#undef LESS
+    for (int i = 0; i < LANES; i++) lead[i] = t[i];
     for (int i = rows; i < LANES; i++) lead[i] = 0;
 }
 
@@ -423,7 +465,9 @@ static inline void sweep(const group *a, int first, int last, rls_real kept, rls
         }
         if (weigh(lead, a->d + start, kept, &left, gain)) {
             *lanes_at(a->s + start) = *lanes_of(gain);
-            for (int k = 0; k < length; k += LANES) rotate(block + k, length, x + k, lead, gain);
+            for (int i = 0; i < LANES; i += ROWS)
+                for (int k = 0; k < length; k += LANES)
+                    rotate(block + i * length + k, length, x + k, lead + i, gain + i);
         } else {
             renew_rows(a, start, last - start < LANES ? last - start : LANES, kept, &left);
         }
@@ -431,19 +475,19 @@ static inline void sweep(const group *a, int first, int last, rls_real kept, rls
     }
 }
 
-/* Solve with the unit triangle of a block of rows: t <- block^-1 t. */
-static inline void solve(const rls_real *block, int stride, lanes *t)
+/* Solve with the unit triangle of a block of rows: t <- block^-1 t. Each entry waits for the one
+   after it: numbers one by one wait less than vectors do. */
+static inline void solve(const rls_real *block, int stride, rls_real *t)
 {
-    lanes column[LANES];
-    for (int i = 0; i < LANES; i++) {
-        column[i] = *lanes_of(block + i * stride);
-        LANE(column[i], i) = 0;
-    }
-    transpose(column);
-    for (int k = LANES - 1; k > 0; k--) {
-        const rls_real own = LANE(*t, k);
-        LANEWISE EACH(*t) -= own * EACH(column[k]);
-    }
+#define LESS(i, k) t[i] -= block[(i) * stride + (k)] * t[k]
+    LESS(6, 7);
+    LESS(5, 7); LESS(5, 6);
+    LESS(4, 7); LESS(4, 6); LESS(4, 5);
+    LESS(3, 7); LESS(3, 6); LESS(3, 5); LESS(3, 4);
+    LESS(2, 7); LESS(2, 6); LESS(2, 5); LESS(2, 4); LESS(2, 3);
+    LESS(1, 7); LESS(1, 6); LESS(1, 5); LESS(1, 4); LESS(1, 3); LESS(1, 2);
+    LESS(0, 7); LESS(0, 6); LESS(0, 5); LESS(0, 4); LESS(0, 3); LESS(0, 2); LESS(0, 1);
+#undef LESS
 }
 
 /* gain <- triangle^-1 s */
@@ -452,13 +496,11 @@ static inline void find_gain(const group *a)
     for (int start = a->tall - LANES; start >= 0; start -= LANES) {
         const int length = a->wide - start;
         const rls_real *block = block_at(a, start);
-        rls_real right[LANES];
-        lanes t;
-        times(block + LANES, length, LANES, a->gain + start + LANES, a->tall - start - LANES,
-              right);
-        LANEWISE EACH(t) = EACH(*lanes_of(a->s + start)) - EACH(*lanes_of(right));
-        solve(block, length, &t);
-        *lanes_at(a->gain + start) = t;
+        rls_real t[LANES];
+        times(block + LANES, length, LANES, a->gain + start + LANES, a->tall - start - LANES, t);
+        for (int i = 0; i < LANES; i++) t[i] = a->s[start + i] - t[i];
+        solve(block, length, t);
+        *lanes_at(a->gain + start) = gathered(t);
     }
 }
 
