@@ -64,7 +64,17 @@ typedef struct {
 } lanes;
 #define LANEWISE for (int k_ = 0; k_ < LANES / TOGETHER; k_++)
 #define EACH(of) (of).at[k_]
-#define LANE(of, i) ((rls_real *)&(of).at[(i) / TOGETHER])[(i) % TOGETHER]
+#if TOGETHER == 1
+#define LANE(of, i) (of).at[i]
+#else
+#define LANE(of, i) (of).at[(i) / TOGETHER][(i) % TOGETHER]
+#endif
+#endif
+
+#if defined(__GNUC__)
+#define INLINED inline __attribute__((always_inline))
+#else
+#define INLINED inline
 #endif
 
 static const lanes none; /* zeros */
@@ -83,6 +93,17 @@ static const lanes none; /* zeros */
 static inline lanes *lanes_at(rls_real *numbers) { return (lanes *)numbers; }
 
 static inline const lanes *lanes_of(const rls_real *numbers) { return (const lanes *)numbers; }
+
+/* Part by part, as every vector is copied here: a compiler copies a whole struct in shorter moves,
+   and a load that finds its number in two stores waits for both to reach the cache. */
+static INLINED lanes load(const rls_real *from)
+{
+    lanes v;
+    LANEWISE EACH(v) = EACH(*lanes_of(from));
+    return v;
+}
+
+static INLINED void store(lanes v, rls_real *to) { LANEWISE EACH(*lanes_at(to)) = EACH(v); }
 
 /* Numbers that were computed one by one, side by side. */
 static inline lanes gathered(const rls_real *t)
@@ -132,7 +153,7 @@ static inline void shift(lanes *v, rls_real first)
 }
 
 /* The sum of each of LANES vectors: lanes four apart first, then two, then neighbours. */
-static inline lanes sums(const lanes *v)
+static INLINED lanes sums(const lanes *v)
 {
 #if defined(SHUFFLE) && TOGETHER == 8
     lanes four[4], two[2];
@@ -299,8 +320,8 @@ void rls_init(const rls_config *c, rls_real *state, rls_real *work)
 static inline rls_real absolute(rls_real a) { return a > -a ? a : -a; }
 
 /* For each of `count` rows a: a'b in LANES partial sums, from the last column on. */
-static inline void partial_sums(const rls_real *rows, int stride, int count, const rls_real *b,
-                                int length, lanes *sums)
+static INLINED void partial_sums(const rls_real *rows, int stride, int count, const rls_real *b,
+                                 int length, lanes *sums)
 {
     for (int k = length - LANES; k >= 0; k -= LANES)
         for (int i = 0; i < count; i++)
@@ -309,17 +330,17 @@ static inline void partial_sums(const rls_real *rows, int stride, int count, con
 }
 
 /* a'b for each of `count` rows a of a matrix, LANES at most; 0 for the rest of LANES. */
-static inline void times(const rls_real *rows, int stride, int count, const rls_real *b, int length,
-                         rls_real *result)
+static INLINED lanes times(const rls_real *rows, int stride, int count, const rls_real *b,
+                           int length)
 {
     lanes s[LANES];
     int i = 0;
-    for (int j = 0; j < LANES; j++) s[j] = none;
+    for (int j = 0; j < LANES; j++) LANEWISE EACH(s[j]) = EACH(none);
     /* usual numbers, as constants for the compiler */
     for (; i + ROWS <= count; i += ROWS)
         partial_sums(rows + i * stride, stride, ROWS, b, length, s + i);
     for (; i < count; i++) partial_sums(rows + i * stride, stride, 1, b, length, s + i);
-    *lanes_at(result) = sums(s);
+    return sums(s);
 }
 
 /* LANES columns of ROWS rows of a block: for each row i in turn x <- x - lead[i] row, row <- row +
@@ -327,14 +348,14 @@ static inline void times(const rls_real *rows, int stride, int count, const rls_
 static inline void rotate(rls_real *block, int stride, rls_real *x, const rls_real *lead,
                           const rls_real *gain)
 {
-    lanes t = *lanes_of(x);
+    lanes t = load(x);
     for (int i = 0; i < ROWS; i++) {
-        lanes row = *lanes_of(block + i * stride);
+        lanes row = load(block + i * stride);
         LANEWISE EACH(t) -= lead[i] * EACH(row);
         LANEWISE EACH(row) += gain[i] * EACH(t);
-        *lanes_at(block + i * stride) = row;
+        store(row, block + i * stride);
     }
-    *lanes_at(x) = t;
+    store(t, x);
 }
 
 /* What x becomes by that, the block left as it is. */
@@ -361,11 +382,10 @@ typedef struct {
 } weight;
 
 /* The entry of x that each row of a block eliminates, 0 from row `rows` on. */
-static inline void eliminate(const rls_real *block, int stride, int rows, const lanes *x,
-                             rls_real *lead)
+static INLINED lanes eliminate(const rls_real *block, int stride, int rows, lanes x)
 {
     rls_real t[LANES];
-    for (int i = 0; i < LANES; i++) t[i] = LANE(*x, i);
+    for (int i = 0; i < LANES; i++) t[i] = LANE(x, i);
 #define LESS(j, i) t[j] -= t[i] * block[(i) * stride + (j)]
     LESS(1, 0);
     LESS(2, 0); LESS(2, 1);
@@ -375,17 +395,15 @@ static inline void eliminate(const rls_real *block, int stride, int rows, const 
     LESS(6, 0); LESS(6, 1); LESS(6, 2); LESS(6, 3); LESS(6, 4); LESS(6, 5);
     LESS(7, 0); LESS(7, 1); LESS(7, 2); LESS(7, 3); LESS(7, 4); LESS(7, 5); LESS(7, 6);
 #undef LESS
-    for (int i = 0; i < LANES; i++) lead[i] = t[i];
-    for (int i = rows; i < LANES; i++) lead[i] = 0;
+    for (int i = 0; i < LANES; i++) t[i] = i < rows ? t[i] : 0;
+    return gathered(t);
 }
 
 /* What that does to a block of rows: d, and the gain. 0 where a row may have to be renewed: then
    nothing has changed. */
-static inline int weigh(const rls_real *leads, rls_real *d, rls_real kept, weight *w,
-                        rls_real *gain)
+static INLINED int weigh(lanes lead, rls_real *d, rls_real kept, weight *w, lanes *gain)
 {
-    const lanes lead = *lanes_of(leads);
-    lanes old = *lanes_of(d), ratio = old, sum = old, over = old;
+    lanes old = load(d), ratio, sum, over;
     rls_real least = 1, value;
     LANEWISE EACH(old) *= kept;
     for (int i = 0; i < LANES; i++) least = LANE(old, i) < least ? LANE(old, i) : least;
@@ -395,7 +413,7 @@ static inline int weigh(const rls_real *leads, rls_real *d, rls_real kept, weigh
     LANEWISE EACH(sum) += w->inverse;
     if (!(LANE(sum, LANES - 1) <= 4 * w->inverse && least > TINY)) return 0;
     LANEWISE EACH(over) = REAL(1) / EACH(sum);
-    LANEWISE EACH(*lanes_at(gain)) = EACH(ratio) * EACH(over);
+    LANEWISE EACH(*gain) = EACH(ratio) * EACH(over);
     value = LANE(over, LANES - 1);
     shift(&over, w->value);
     LANEWISE EACH(*lanes_at(d)) = EACH(old) + EACH(lead) * (EACH(lead) * EACH(over));
@@ -447,31 +465,36 @@ static void renew_rows(const group *a, int start, int rows, rls_real kept, weigh
 
 /* Rotate x, of weight w, into rows first .. last - 1, whose information is first multiplied by
    `kept`; x is 0 before `first`. s gets R^-T phi in the scale of the triangle. What the next block
-   eliminates is found before this one is changed: the chain of eliminations is the longest there
+   eliminates, and its gain, are found before this one is changed: they are the longest chain there
    is, and a processor does the rest beside it. */
 static inline void sweep(const group *a, int first, int last, rls_real kept, rls_real w)
 {
-    int start = block_start(first);
     weight left = {1 / w, w};
-    rls_real lead[LANES], next[LANES], gain[LANES];
-    eliminate(block_at(a, start), a->wide - start, last - start, lanes_of(a->x + start), lead);
+    int start = block_start(first);
+    lanes lead = eliminate(block_at(a, start), a->wide - start, last - start,
+                           load(a->x + start));
     for (; start < last; start += LANES) {
         const int length = a->wide - start;
-        rls_real *x = a->x + start, *block = block_at(a, start);
+        rls_real *x = a->x + start, *block = block_at(a, start), leads[LANES], gains[LANES];
+        lanes gain, now = lead;
+        store(lead, leads);
         if (start + LANES < last) {
-            lanes t = *lanes_of(x + LANES);
-            reduce(block + LANES, length, &t, lead);
-            eliminate(block + LANES * length, length - LANES, last - start - LANES, &t, next);
+            lanes t = load(x + LANES);
+            reduce(block + LANES, length, &t, leads);
+            lead = eliminate(block + LANES * length, length - LANES, last - start - LANES, t);
         }
-        if (weigh(lead, a->d + start, kept, &left, gain)) {
-            *lanes_at(a->s + start) = *lanes_of(gain);
+        if (weigh(now, a->d + start, kept, &left, &gain)) {
+            store(gain, gains);
+            store(gain, a->s + start);
             for (int i = 0; i < LANES; i += ROWS)
                 for (int k = 0; k < length; k += LANES)
-                    rotate(block + i * length + k, length, x + k, lead + i, gain + i);
+                    rotate(block + i * length + k, length, x + k, leads + i, gains + i);
         } else {
             renew_rows(a, start, last - start < LANES ? last - start : LANES, kept, &left);
+            if (start + LANES < last)
+                lead = eliminate(block + LANES * length, length - LANES, last - start - LANES,
+                                 load(x + LANES));
         }
-        for (int i = 0; i < LANES; i++) lead[i] = next[i];
     }
 }
 
@@ -497,10 +520,12 @@ static inline void find_gain(const group *a)
         const int length = a->wide - start;
         const rls_real *block = block_at(a, start);
         rls_real t[LANES];
-        times(block + LANES, length, LANES, a->gain + start + LANES, a->tall - start - LANES, t);
-        for (int i = 0; i < LANES; i++) t[i] = a->s[start + i] - t[i];
+        lanes right = times(block + LANES, length, LANES, a->gain + start + LANES,
+                            a->tall - start - LANES);
+        LANEWISE EACH(right) = EACH(*lanes_of(a->s + start)) - EACH(right);
+        for (int i = 0; i < LANES; i++) t[i] = LANE(right, i);
         solve(block, length, t);
-        *lanes_at(a->gain + start) = gathered(t);
+        store(gathered(t), a->gain + start);
     }
 }
 
@@ -586,7 +611,7 @@ static inline void forget_direction(const group *a, rls_real factor)
 {
     rls_real length2 = 0, share, left = factor;
     for (int start = 0; start < a->tall; start += LANES)
-        times(block_at(a, start), a->wide - start, LANES, a->phi + start, a->tall - start,
+        store(times(block_at(a, start), a->wide - start, LANES, a->phi + start, a->tall - start),
               a->s + start);
     for (int i = 0; i < a->n; i++) length2 += a->d[i] * (a->s[i] * a->s[i]);
     if (!(length2 > TINY)) return;
@@ -745,9 +770,9 @@ static inline void predict(const group *a, const int *output, const rls_real *y)
 {
     for (int j = 0; j < a->m; j += LANES) {
         const int count = a->m - j < LANES ? a->m - j : LANES;
-        rls_real prediction[LANES];
-        times(a->theta + j * a->tall, a->tall, count, a->phi, a->tall, prediction);
-        for (int i = 0; i < count; i++) a->innovation[j + i] = y[output[j + i]] - prediction[i];
+        lanes prediction = times(a->theta + j * a->tall, a->tall, count, a->phi, a->tall);
+        for (int i = 0; i < count; i++)
+            a->innovation[j + i] = y[output[j + i]] - LANE(prediction, i);
     }
 }
 
@@ -758,7 +783,8 @@ static inline void correct(const group *a)
 {
     rls_real error = 0;
     int small = 1;
-    lanes sum = none;
+    lanes sum;
+    LANEWISE EACH(sum) = EACH(none);
     for (int k = 0; k < a->tall; k += LANES)
         LANEWISE EACH(sum) += EACH(*lanes_of(a->energy + k)) *
                               (EACH(*lanes_of(a->gain + k)) * EACH(*lanes_of(a->gain + k)));
