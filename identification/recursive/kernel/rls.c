@@ -319,14 +319,16 @@ void rls_init(const rls_config *c, rls_real *state, rls_real *work)
 
 static inline rls_real absolute(rls_real a) { return a > -a ? a : -a; }
 
-/* For each of `count` rows a: a'b in LANES partial sums, from the last column on. */
+/* For each of `count` rows a, ROWS at most: a'b in LANES partial sums, from the last column on. */
 static INLINED void partial_sums(const rls_real *rows, int stride, int count, const rls_real *b,
                                  int length, lanes *sums)
 {
+    lanes s[ROWS];
+    for (int i = 0; i < count; i++) LANEWISE EACH(s[i]) = EACH(none);
     for (int k = length - LANES; k >= 0; k -= LANES)
         for (int i = 0; i < count; i++)
-            LANEWISE EACH(sums[i]) +=
-                EACH(*lanes_of(b + k)) * EACH(*lanes_of(rows + i * stride + k));
+            LANEWISE EACH(s[i]) += EACH(*lanes_of(b + k)) * EACH(*lanes_of(rows + i * stride + k));
+    for (int i = 0; i < count; i++) LANEWISE EACH(sums[i]) = EACH(s[i]);
 }
 
 /* a'b for each of `count` rows a of a matrix, LANES at most; 0 for the rest of LANES. */
@@ -335,11 +337,11 @@ static INLINED lanes times(const rls_real *rows, int stride, int count, const rl
 {
     lanes s[LANES];
     int i = 0;
-    for (int j = 0; j < LANES; j++) LANEWISE EACH(s[j]) = EACH(none);
-    /* usual numbers, as constants for the compiler */
+    /* a usual number, as a constant for the compiler */
     for (; i + ROWS <= count; i += ROWS)
         partial_sums(rows + i * stride, stride, ROWS, b, length, s + i);
     for (; i < count; i++) partial_sums(rows + i * stride, stride, 1, b, length, s + i);
+    for (; i < LANES; i++) LANEWISE EACH(s[i]) = EACH(none);
     return sums(s);
 }
 
@@ -359,7 +361,7 @@ static inline void rotate(rls_real *block, int stride, rls_real *x, const rls_re
 }
 
 /* What x becomes by that, the block left as it is. */
-static inline void reduce(const rls_real *block, int stride, lanes *x, const rls_real *lead)
+static INLINED void reduce(const rls_real *block, int stride, lanes *x, const rls_real *lead)
 {
     for (int i = 0; i < LANES; i++)
         LANEWISE EACH(*x) -= lead[i] * EACH(*lanes_of(block + i * stride));
@@ -382,9 +384,8 @@ typedef struct {
 } weight;
 
 /* The entry of x that each row of a block eliminates, 0 from row `rows` on. */
-static INLINED lanes eliminate(const rls_real *block, int stride, int rows, lanes x)
+static INLINED void eliminate(const rls_real *block, int stride, int rows, lanes x, rls_real *t)
 {
-    rls_real t[LANES];
     for (int i = 0; i < LANES; i++) t[i] = LANE(x, i);
 #define LESS(j, i) t[j] -= t[i] * block[(i) * stride + (j)]
     LESS(1, 0);
@@ -396,7 +397,6 @@ static INLINED lanes eliminate(const rls_real *block, int stride, int rows, lane
     LESS(7, 0); LESS(7, 1); LESS(7, 2); LESS(7, 3); LESS(7, 4); LESS(7, 5); LESS(7, 6);
 #undef LESS
     for (int i = 0; i < LANES; i++) t[i] = i < rows ? t[i] : 0;
-    return gathered(t);
 }
 
 /* What that does to a block of rows: d, and the gain. 0 where a row may have to be renewed: then
@@ -471,17 +471,18 @@ static inline void sweep(const group *a, int first, int last, rls_real kept, rls
 {
     weight left = {1 / w, w};
     int start = block_start(first);
-    lanes lead = eliminate(block_at(a, start), a->wide - start, last - start,
-                           load(a->x + start));
+    rls_real lead[LANES];
+    eliminate(block_at(a, start), a->wide - start, last - start, load(a->x + start), lead);
     for (; start < last; start += LANES) {
         const int length = a->wide - start;
         rls_real *x = a->x + start, *block = block_at(a, start), leads[LANES], gains[LANES];
-        lanes gain, now = lead;
-        store(lead, leads);
+        const lanes now = gathered(lead);
+        lanes gain;
+        store(now, leads);
         if (start + LANES < last) {
             lanes t = load(x + LANES);
-            reduce(block + LANES, length, &t, leads);
-            lead = eliminate(block + LANES * length, length - LANES, last - start - LANES, t);
+            reduce(block + LANES, length, &t, lead);
+            eliminate(block + LANES * length, length - LANES, last - start - LANES, t, lead);
         }
         if (weigh(now, a->d + start, kept, &left, &gain)) {
             store(gain, gains);
@@ -492,8 +493,8 @@ static inline void sweep(const group *a, int first, int last, rls_real kept, rls
         } else {
             renew_rows(a, start, last - start < LANES ? last - start : LANES, kept, &left);
             if (start + LANES < last)
-                lead = eliminate(block + LANES * length, length - LANES, last - start - LANES,
-                                 load(x + LANES));
+                eliminate(block + LANES * length, length - LANES, last - start - LANES,
+                          load(x + LANES), lead);
         }
     }
 }
@@ -513,19 +514,30 @@ static inline void solve(const rls_real *block, int stride, rls_real *t)
 #undef LESS
 }
 
-/* gain <- triangle^-1 s */
+/* gain <- triangle^-1 s. The longest chain there is goes from a block to the one above it: that
+   product comes last, and from registers. */
 static inline void find_gain(const group *a)
 {
+    lanes below;
+    LANEWISE EACH(below) = EACH(none);
     for (int start = a->tall - LANES; start >= 0; start -= LANES) {
-        const int length = a->wide - start;
+        const int length = a->wide - start, behind = a->tall - start - 2 * LANES;
         const rls_real *block = block_at(a, start);
+        lanes right, s[LANES];
         rls_real t[LANES];
-        lanes right = times(block + LANES, length, LANES, a->gain + start + LANES,
-                            a->tall - start - LANES);
+        for (int i = 0; i < LANES; i += ROWS)
+            partial_sums(block + i * length + 2 * LANES, length, ROWS,
+                         a->gain + start + 2 * LANES, behind, s + i);
+        if (behind >= 0)
+            for (int i = 0; i < LANES; i++)
+                LANEWISE EACH(s[i]) +=
+                    EACH(below) * EACH(*lanes_of(block + i * length + LANES));
+        right = sums(s);
         LANEWISE EACH(right) = EACH(*lanes_of(a->s + start)) - EACH(right);
         for (int i = 0; i < LANES; i++) t[i] = LANE(right, i);
         solve(block, length, t);
-        store(gathered(t), a->gain + start);
+        below = gathered(t);
+        store(below, a->gain + start);
     }
 }
 
