@@ -39,15 +39,11 @@
 #define TOGETHER LANES
 typedef rls_real lanes VECTOR(LANES * sizeof(rls_real));
 typedef lanes part;
-#elif defined(__AVX__)
+#elif defined(__AVX__) || defined(RLS_SINGLE)
 #define TOGETHER 4
 typedef rls_real part VECTOR(TOGETHER * sizeof(rls_real));
 #else
-#ifdef RLS_SINGLE
-#define TOGETHER 4
-#else
 #define TOGETHER 2
-#endif
 typedef rls_real part VECTOR(TOGETHER * sizeof(rls_real));
 #endif
 #else
@@ -391,7 +387,8 @@ typedef struct {
     rls_real inverse, value;
 } weight;
 
-/* The entry of x that each row of a block eliminates, 0 from row `rows` on. */
+/* The entry t of x that each row of a block eliminates, 0 from row `rows` on. Each waits for the
+   one before it: numbers one by one wait less than vectors do. */
 static INLINED void eliminate(const rls_real *block, int stride, int rows, lanes x, rls_real *t)
 {
     for (int i = 0; i < LANES; i++) t[i] = LANE(x, i);
@@ -473,8 +470,9 @@ static void renew_rows(const group *a, int start, int rows, rls_real kept, weigh
 
 /* Rotate x, of weight w, into rows first .. last - 1, whose information is first multiplied by
    `kept`; x is 0 before `first`. s gets R^-T phi in the scale of the triangle. What the next block
-   eliminates, and its gain, are found before this one is changed: they are the longest chain there
-   is, and a processor does the rest beside it. */
+   eliminates is found before this one is changed: the chain of eliminations is the longest there
+   is, and a processor does the rest beside it. Where rows were renewed x may have been explained
+   in full: then it is found afterwards. */
 static inline void sweep(const group *a, int first, int last, rls_real kept, rls_real w)
 {
     weight left = {1 / w, w};
@@ -482,27 +480,26 @@ static inline void sweep(const group *a, int first, int last, rls_real kept, rls
     rls_real lead[LANES];
     eliminate(block_at(a, start), a->wide - start, last - start, load(a->x + start), lead);
     for (; start < last; start += LANES) {
-        const int length = a->wide - start;
-        rls_real *x = a->x + start, *block = block_at(a, start), leads[LANES], gains[LANES];
+        const int length = a->wide - start, rest = last - start - LANES;
+        rls_real *x = a->x + start, *block = block_at(a, start), *below = block + LANES * length,
+                 leads[LANES], gains[LANES];
         const lanes now = gathered(lead);
         lanes gain;
-        store(now, leads);
-        if (start + LANES < last) {
-            lanes t = load(x + LANES);
-            reduce(block + LANES, length, &t, lead);
-            eliminate(block + LANES * length, length - LANES, last - start - LANES, t, lead);
-        }
         if (weigh(now, a->d + start, kept, &left, &gain)) {
+            store(now, leads);
             store(gain, gains);
             store(gain, a->s + start);
+            if (rest > 0) {
+                lanes t = load(x + LANES);
+                reduce(block + LANES, length, &t, lead);
+                eliminate(below, length - LANES, rest, t, lead);
+            }
             for (int i = 0; i < LANES; i += ROWS)
                 for (int k = 0; k < length; k += LANES)
                     rotate(block + i * length + k, length, x + k, leads + i, gains + i);
         } else {
-            renew_rows(a, start, last - start < LANES ? last - start : LANES, kept, &left);
-            if (start + LANES < last)
-                eliminate(block + LANES * length, length - LANES, last - start - LANES,
-                          load(x + LANES), lead);
+            renew_rows(a, start, rest < 0 ? rest + LANES : LANES, kept, &left);
+            if (rest > 0) eliminate(below, length - LANES, rest, load(x + LANES), lead);
         }
     }
 }
