@@ -37,7 +37,7 @@ def kernel(precision, level):
         [f"{FOLDER}/{precision}_precision.c"],
         depends=SOURCES,
         define_macros=[("RLS_MODULE", module), ("RLS_SOURCE", f'"{DIGEST.hexdigest()}"')],
-        extra_compile_args=LEVELS[level],
+        extra_compile_args=list(LEVELS[level]),
         py_limited_api=True,
         optional=True,
     )

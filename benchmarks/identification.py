@@ -1,7 +1,9 @@
 """Recursive identification in real time: one update that yields the coefficients against what
 others write, its cost, and an LPV analysis.
 
-Times are those of one thread at work: what else the computer does is not counted.
+The race is run twice where the processor has AVX-512: as it is, and with both sides kept to AVX2,
+in a process of its own. Times are those of one thread at work: what else the computer does is not
+counted.
 
 --plot FILE draws the cost against outputs and regressors.
 """
@@ -9,6 +11,7 @@ Times are those of one thread at work: what else the computer does is not counte
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -30,8 +33,10 @@ from benchmarks.opponents.covariance_rls import (  # noqa: E402
     padasip_is_installed,
 )
 from benchmarks.timing import arguments, keep, lines, medians  # noqa: E402
+from benchmarks.unfused import unfused_peak  # noqa: E402
 from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
-from identification.recursive.kernel import compiled_kernel  # noqa: E402
+from identification.recursive import kernel  # noqa: E402
+from identification.recursive.online import Online  # noqa: E402
 
 BASIS = Polynomial(2, 0.0, 13.0)
 CASES = {
@@ -46,18 +51,67 @@ GOALS = {
     "MIMO: covariance RLS (NumPy) / ours": 7.0,
     "MIMO: padasip once an output / ours": 200.0,
 }
+LEVEL_GOAL = 1.6
+"""Kernel alone: AVX2 takes at most so many times as long as AVX-512."""
+KEPT_TO = "SYMHELI_BENCHMARK_LEVEL"
+"""Environment variable of the process that races at a lesser level than the processor's."""
 WARM, CALLS = 300, 100
 
 
 def main() -> None:
     options = arguments(__doc__, plot=True, write=True)
+    seconds = 0.4 if options.quick else 6.0
+    if level := os.environ.get(KEPT_TO):
+        keep_to(level)
+        print(json.dumps(race(seconds)))
+        return
+    notes = []
+    if kernel.compiled_kernel("double") is None:
+        notes.append("the kernel is not compiled: this is its NumPy twin")
+    if not padasip_is_installed():
+        notes.append("padasip is not installed (pip install padasip): its ratios are left out")
+    times, ratios = race(seconds)
+    goals = [goal(name, ratios[name], wanted) for name, wanted in GOALS.items() if name in ratios]
+    levels = list(kernel.compiled_kernels("double"))
+    if levels[:2] == ["avx512", "avx2"]:
+        lesser_times, lesser = raced_at("avx2")
+        times |= {f"{name}, AVX2": t for name, t in lesser_times.items()}
+        ratios |= {f"{name}, AVX2": ratio for name, ratio in lesser.items()}
+        goals += [
+            goal(f"{name}, AVX2", lesser[name], wanted)
+            for name, wanted in GOALS.items()
+            if name in lesser
+        ]
+    else:
+        notes.append("no AVX-512 here, or no kernel for it: the race is run at one level only")
+    alone = at_levels(seconds / 6)
+    ratios |= alone
+    goals += [goal(name, alone[name], LEVEL_GOAL, most=True) for name in alone if "AVX2 /" in name]
+    cost = costs(0.01 if options.quick else 0.3)
+    ratios |= analysis()
+    if options.json:
+        print(json.dumps(ratios, indent=1))
+    else:
+        text = "\n".join([*lines(times, ratios), table(cost), *goals, *notes])
+        print(text)
+        if options.write:
+            keep("identification", text)
+    if options.plot:
+        draw(cost, options.plot)
+
+
+def goal(name: str, value: float, wanted: float, most: bool = False) -> str:
+    met = value <= wanted if most else value >= wanted
+    bound = "at most" if most else "at least"
+    return f"goal {name}: {value:.2f}, {bound} {wanted:g}: {'met' if met else 'MISSED'}"
+
+
+def race(seconds: float) -> tuple[dict[str, float], dict[str, float]]:
+    """Times of one update of each side in s, and ratios to ours, of every case."""
     times: dict[str, float] = {}
     ratios: dict[str, float] = {}
-    notes = (
-        [] if compiled_kernel("double") else ["the kernel is not compiled: this is its NumPy twin"]
-    )
     for case, arx in CASES.items():
-        measured, extra = updates(case, arx, 0.4 if options.quick else 6.0)
+        measured, extra = updates(case, arx, seconds)
         times |= measured
         own = measured[f"{case}: ours"]
         ratios |= {
@@ -66,25 +120,69 @@ def main() -> None:
             if name != f"{case}: ours" and "ours" not in name
         }
         ratios |= {f"{case}: {name}": value for name, value in extra.items()}
-    if not padasip_is_installed():
-        notes.append("padasip is not installed (pip install padasip): its ratios are left out")
-    cost = costs(0.01 if options.quick else 0.3)
-    ratios |= analysis()
-    if options.json:
-        print(json.dumps(ratios, indent=1))
-    else:
-        goals = [
-            f"goal {name}: {ratios[name]:.1f}, wanted"
-            f" {goal:g}{'' if ratios[name] >= goal else '  MISSED'}"
-            for name, goal in GOALS.items()
-            if name in ratios
-        ]
-        text = "\n".join([*lines(times, ratios), table(cost), *goals, *notes])
-        print(text)
-        if options.write:
-            keep("identification", text)
-    if options.plot:
-        draw(cost, options.plot)
+    return times, ratios
+
+
+def keep_to(level: str) -> None:
+    """Our kernel uses no instruction above `level`."""
+    levels = kernel.processor_levels()
+    kept = levels[levels.index(level) :]
+    kernel.processor_levels = lambda: kept
+    kernel.compiled_kernel.cache_clear()
+
+
+def raced_at(level: str) -> tuple[dict[str, float], dict[str, float]]:
+    """`race` where NumPy, SciPy and ours are kept to AVX2: each chooses when it is loaded, so in a
+    process of its own.
+    """
+    found = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    above = [name for name in found if name.startswith("AVX512") or name == "X86_V4"]
+    limits = {"OPENBLAS_CORETYPE": "Haswell", "NPY_DISABLE_CPU_FEATURES": " ".join(above)}
+    quick = ["--quick"] if "--quick" in sys.argv else []
+    done = subprocess.run(
+        [sys.executable, __file__, *quick],
+        env={**os.environ, **limits, KEPT_TO: level},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    times, ratios = json.loads(done.stdout)
+    return times, ratios
+
+
+def at_levels(seconds: float) -> dict[str, float]:
+    """An update in a loop in C at each level of vector instructions, in us, interleaved; its
+    operations a second, as a share of the peak at that level; and AVX2 against AVX-512.
+    """
+    told: dict[str, float] = {}
+    kernels = kernel.compiled_kernels("double")
+    peaks = {level: unfused_peak(level) for level in kernels}
+    for level, peak in peaks.items():
+        if peak:
+            told[f"GFLOP/s of products and sums, peak at {level}"] = 1e-9 * peak
+    for case, arx in CASES.items():
+        rng, rls = np.random.default_rng(0), RecursiveLeastSquares(arx)
+        rows = np.column_stack(
+            [rng.standard_normal((WARM, arx.ny + arx.nu)), rng.uniform(0.0, 13.0, WARM)]
+        )
+        some, runs = rows[:CALLS], {}
+        for level, module in kernels.items():
+            online = Online(
+                rls.configuration, module.Kernel(*rls.configuration.arguments), rls.init()
+            )
+            online.run(rows, history=False)
+            runs[level] = lambda online=online, some=some: online.run(some, history=False)
+        times = medians(runs, seconds, time.thread_time, settled=True)
+        count = operations(arx.n_regressors, arx.ny)
+        for level, t in times.items():
+            told[f"{case}: update in a loop in C, {level}, us"] = 1e6 * t / CALLS
+            speed = count / (t / CALLS)
+            told[f"{case}: GFLOP/s of it, {level}"] = 1e-9 * speed
+            if peak := peaks[level]:
+                told[f"{case}: share of the peak at {level}"] = speed / peak
+        if {"avx512", "avx2"} <= set(times):
+            told[f"{case}: kernel alone, AVX2 / AVX-512"] = times["avx2"] / times["avx512"]
+    return told
 
 
 def updates(case: str, arx: LPVARX, seconds: float) -> tuple[dict[str, float], dict[str, float]]:

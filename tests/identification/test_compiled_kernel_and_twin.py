@@ -76,6 +76,21 @@ def test_c_and_numpy_agree_to_the_last_bit(name, way, precision):
     assert np.isfinite(compiled.coefficients).all()
 
 
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_an_output_that_speaks_up_late_explains_all_of_a_sample(precision):
+    """Nothing is known of the first of eight outputs when the ninth, in the next block of rows, has
+    long been measured: the new row takes all that is left of the sample, and none of it may reach
+    the next block.
+    """
+    arx = STRUCTURES["nine outputs"]
+    rows = awkward(arx)[:40]
+    rows[:20, :8] = 0.0
+    compiled, numpy = both(idn.RecursiveLeastSquares(arx, precision=precision))
+    compiled.run(rows)
+    numpy.run(rows)
+    np.testing.assert_array_equal(compiled.state.memory, numpy.state.memory)
+
+
 def split():
     """Output a knows its own past and u; b everything: two factors."""
     orders = {"a": {"a": 2, "b": 0}, "b": 2}

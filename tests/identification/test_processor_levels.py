@@ -2,10 +2,12 @@
 bits from each.
 """
 
+import ctypes
 import platform
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from test_compiled_kernel_and_twin import STRUCTURES, WAYS, awkward
 import identification as idn
 from identification.recursive import kernel
 from identification.recursive.online import Online
+from symheli.codegen.compile import library
 
 compiled_only = pytest.mark.skipif(
     not kernel.compiled_kernels("double"), reason="no compiled kernel is installed"
@@ -83,3 +86,39 @@ def test_what_runs_everywhere_holds_no_instruction_of_a_level_above(ending):
         ).stdout
         assert len(code) > 1000
         assert not re.search(r"\t(v[a-z]+\s|.*%[yz]mm)", code)
+
+
+IN_USE = """
+unsigned in_use(void)
+{
+    unsigned low, high;
+    __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(1));
+    return low;
+}
+"""
+
+
+def can_tell_what_is_in_use():
+    cpu = Path("/proc/cpuinfo")
+    return cpu.is_file() and "xgetbv1" in cpu.read_text(encoding="utf-8")
+
+
+@compiled_only
+@pytest.mark.skipif(not can_tell_what_is_in_use(), reason="wants a processor with XGETBV of 1")
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_no_level_leaves_anything_in_the_upper_halves_of_the_registers(precision):
+    """Once, whatever used short vectors after an update ran at a quarter of its speed: other
+    people's code, and the baseline kernel in the same process.
+    """
+    path = library(IN_USE, "in-use")
+    if path is None:
+        pytest.skip("wants a C compiler")
+    code = ctypes.PyDLL(str(path))
+    rls = idn.RecursiveLeastSquares(STRUCTURES["nine outputs"], precision=precision)
+    phi, y = np.ones(rls.structure.n_regressors), np.ones(rls.structure.ny)
+    rows = awkward(rls.structure)
+    for module in kernel.compiled_kernels(precision).values():
+        online = Online(rls.configuration, module.Kernel(*rls.configuration.arguments), rls.init())
+        for call in (lambda online=online: online.absorb(phi, y), lambda o=online: o.run(rows)):
+            call()
+            assert not code.in_use() & 4  # bit 2: upper halves of the sixteen ymm

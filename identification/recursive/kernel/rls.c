@@ -39,12 +39,12 @@
 #define TOGETHER LANES
 typedef rls_real lanes VECTOR(LANES * sizeof(rls_real));
 typedef lanes part;
-#elif defined(__AVX__)
+#elif defined(__AVX__) || defined(RLS_SINGLE)
 #define TOGETHER 4
 typedef rls_real part VECTOR(TOGETHER * sizeof(rls_real));
 #else
-#define TOGETHER ((int)(16 / sizeof(rls_real)))
-typedef rls_real part VECTOR(16);
+#define TOGETHER 2
+typedef rls_real part VECTOR(TOGETHER * sizeof(rls_real));
 #endif
 #else
 #define TOGETHER 1
@@ -60,13 +60,35 @@ typedef struct {
 } lanes;
 #define LANEWISE for (int k_ = 0; k_ < LANES / TOGETHER; k_++)
 #define EACH(of) (of).at[k_]
-#define LANE(of, i) ((rls_real *)&(of).at[(i) / TOGETHER])[(i) % TOGETHER]
+#if TOGETHER == 1
+#define LANE(of, i) (of).at[i]
+#else
+#define LANE(of, i) (of).at[(i) / TOGETHER][(i) % TOGETHER]
+#endif
+#endif
+
+#if defined(__GNUC__)
+#define INLINED inline __attribute__((always_inline))
+#else
+#define INLINED inline
+#endif
+
+/* Code for processors without long vectors runs at a quarter of its speed as long as anything is
+   left in the upper halves of the registers; compilers forget to empty them here. */
+#if defined(__GNUC__) && defined(__AVX__)
+#define LEAVE_VECTORS() __builtin_ia32_vzeroupper()
+#else
+#define LEAVE_VECTORS() (void)0
 #endif
 
 static const lanes none; /* zeros */
 
+/* Rows of a block that are worked on at a time: with more, the registers would not hold what they
+   take, one or two numbers a row in all lanes. */
+#define ROWS (TOGETHER > 2 ? TOGETHER : 2)
+
 /* Lanes of two vectors, counted through, without a way through memory. */
-#if defined(__has_builtin) && defined(WHOLE)
+#if defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
 #define SHUFFLE __builtin_shufflevector
 #endif
@@ -76,13 +98,44 @@ static inline lanes *lanes_at(rls_real *numbers) { return (lanes *)numbers; }
 
 static inline const lanes *lanes_of(const rls_real *numbers) { return (const lanes *)numbers; }
 
+/* Part by part, as every vector is copied here: a compiler copies a whole struct in shorter moves,
+   and a load that finds its number in two stores waits for both to reach the cache. */
+static INLINED lanes load(const rls_real *from)
+{
+    lanes v;
+    LANEWISE EACH(v) = EACH(*lanes_of(from));
+    return v;
+}
+
+static INLINED void store(lanes v, rls_real *to) { LANEWISE EACH(*lanes_at(to)) = EACH(v); }
+
+/* Numbers that were computed one by one, side by side. */
+static inline lanes gathered(const rls_real *t)
+{
+#if TOGETHER == 8
+    return (lanes){t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7]};
+#elif TOGETHER == 4
+    return (lanes){{{t[0], t[1], t[2], t[3]}, {t[4], t[5], t[6], t[7]}}};
+#else
+    lanes v;
+    for (int i = 0; i < LANES; i++) LANE(v, i) = t[i];
+    return v;
+#endif
+}
+
 /* Each lane becomes the sum of those up to it: neighbours first, then pairs, then fours. */
 static inline void running_sums(lanes *v)
 {
-#ifdef SHUFFLE
+#if defined(SHUFFLE) && TOGETHER == 8
     *v += SHUFFLE(none, *v, 0, 8, 9, 10, 11, 12, 13, 14);
     *v += SHUFFLE(none, *v, 0, 1, 8, 9, 10, 11, 12, 13);
     *v += SHUFFLE(none, *v, 0, 1, 2, 3, 8, 9, 10, 11);
+#elif defined(SHUFFLE) && TOGETHER == 4
+    v->at[1] += SHUFFLE(v->at[0], v->at[1], 3, 4, 5, 6);
+    v->at[0] += SHUFFLE(none.at[0], v->at[0], 0, 4, 5, 6);
+    v->at[1] += SHUFFLE(v->at[0], v->at[1], 2, 3, 4, 5);
+    v->at[0] += SHUFFLE(none.at[0], v->at[0], 0, 1, 4, 5);
+    v->at[1] += v->at[0];
 #else
     for (int step = 1; step < LANES; step *= 2)
         for (int i = LANES - 1; i >= step; i--) LANE(*v, i) += LANE(*v, i - step);
@@ -92,39 +145,52 @@ static inline void running_sums(lanes *v)
 /* The lane before, and `first` before all. */
 static inline void shift(lanes *v, rls_real first)
 {
-#ifdef SHUFFLE
+#if defined(SHUFFLE) && TOGETHER == 8
     *v = SHUFFLE(none + first, *v, 0, 8, 9, 10, 11, 12, 13, 14);
+#elif defined(SHUFFLE) && TOGETHER == 4
+    v->at[1] = SHUFFLE(v->at[0], v->at[1], 3, 4, 5, 6);
+    v->at[0] = SHUFFLE(none.at[0] + first, v->at[0], 0, 4, 5, 6);
 #else
     for (int i = LANES - 1; i > 0; i--) LANE(*v, i) = LANE(*v, i - 1);
     LANE(*v, 0) = first;
 #endif
 }
 
-static inline void transpose(lanes *v)
+/* The sum of each of LANES vectors: lanes four apart first, then two, then neighbours. */
+static INLINED lanes sums(const lanes *v)
 {
-#ifdef SHUFFLE
-    lanes a[LANES];
-    for (int i = 0; i < LANES; i += 2) {
-        a[i] = SHUFFLE(v[i], v[i + 1], 0, 8, 2, 10, 4, 12, 6, 14);
-        a[i + 1] = SHUFFLE(v[i], v[i + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+#if defined(SHUFFLE) && TOGETHER == 8
+    lanes four[4], two[2];
+    for (int i = 0; i < 4; i++)
+        four[i] = SHUFFLE(v[i], v[i + 4], 0, 1, 2, 3, 8, 9, 10, 11) +
+                  SHUFFLE(v[i], v[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+    for (int i = 0; i < 2; i++)
+        two[i] = SHUFFLE(four[i], four[i + 2], 0, 1, 8, 9, 4, 5, 12, 13) +
+                 SHUFFLE(four[i], four[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+    return SHUFFLE(two[0], two[1], 0, 8, 2, 10, 4, 12, 6, 14) +
+           SHUFFLE(two[0], two[1], 1, 9, 3, 11, 5, 13, 7, 15);
+#elif defined(SHUFFLE) && TOGETHER == 4
+    part four[LANES], two[LANES / 2];
+    lanes one;
+    for (int i = 0; i < LANES; i++) four[i] = v[i].at[0] + v[i].at[1];
+    for (int k = 0; k < 2; k++) {
+        for (int i = 4 * k; i < 4 * k + 2; i++)
+            two[i - 2 * k] = SHUFFLE(four[i], four[i + 2], 0, 1, 4, 5) +
+                             SHUFFLE(four[i], four[i + 2], 2, 3, 6, 7);
+        one.at[k] = SHUFFLE(two[2 * k], two[2 * k + 1], 0, 4, 2, 6) +
+                    SHUFFLE(two[2 * k], two[2 * k + 1], 1, 5, 3, 7);
     }
-    for (int i = 0; i < LANES; i += 4)
-        for (int j = i; j < i + 2; j++) {
-            v[j] = SHUFFLE(a[j], a[j + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-            v[j + 2] = SHUFFLE(a[j], a[j + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-        }
-    for (int j = 0; j < 4; j++) {
-        const lanes upper = v[j];
-        v[j] = SHUFFLE(upper, v[j + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        v[j + 4] = SHUFFLE(upper, v[j + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
+    return one;
 #else
-    for (int i = 0; i < LANES; i++)
-        for (int j = 0; j < i; j++) {
-            const rls_real below = LANE(v[i], j);
-            LANE(v[i], j) = LANE(v[j], i);
-            LANE(v[j], i) = below;
-        }
+    lanes one;
+    for (int i = 0; i < LANES; i++) {
+        rls_real s[LANES];
+        for (int j = 0; j < LANES; j++) s[j] = LANE(v[i], j);
+        for (int half = LANES / 2; half > 0; half /= 2)
+            for (int j = 0; j < half; j++) s[j] += s[j + half];
+        LANE(one, i) = s[0];
+    }
+    return one;
 #endif
 }
 
@@ -257,52 +323,49 @@ void rls_init(const rls_config *c, rls_real *state, rls_real *work)
 
 static inline rls_real absolute(rls_real a) { return a > -a ? a : -a; }
 
-/* For each of `count` rows a: a'b in LANES partial sums, from the last column on. */
-static inline void partial_sums(const rls_real *rows, int stride, int count, const rls_real *b,
-                                int length, lanes *sums)
+/* For each of `count` rows a, ROWS at most: a'b in LANES partial sums, from the last column on. */
+static INLINED void partial_sums(const rls_real *rows, int stride, int count, const rls_real *b,
+                                 int length, lanes *sums)
 {
+    lanes s[ROWS];
+    for (int i = 0; i < count; i++) LANEWISE EACH(s[i]) = EACH(none);
     for (int k = length - LANES; k >= 0; k -= LANES)
         for (int i = 0; i < count; i++)
-            LANEWISE EACH(sums[i]) +=
-                EACH(*lanes_of(b + k)) * EACH(*lanes_of(rows + i * stride + k));
+            LANEWISE EACH(s[i]) += EACH(*lanes_of(b + k)) * EACH(*lanes_of(rows + i * stride + k));
+    for (int i = 0; i < count; i++) LANEWISE EACH(sums[i]) = EACH(s[i]);
 }
 
 /* a'b for each of `count` rows a of a matrix, LANES at most; 0 for the rest of LANES. */
-static inline void times(const rls_real *rows, int stride, int count, const rls_real *b, int length,
-                         rls_real *result)
+static INLINED lanes times(const rls_real *rows, int stride, int count, const rls_real *b,
+                           int length)
 {
     lanes s[LANES];
     int i = 0;
-    for (int j = 0; j < LANES; j++) s[j] = none;
-    if (count == LANES) /* usual numbers, as constants for the compiler */
-        partial_sums(rows, stride, LANES, b, length, s);
-    else {
-        for (; i + 4 <= count; i += 4) partial_sums(rows + i * stride, stride, 4, b, length, s + i);
-        for (; i < count; i++) partial_sums(rows + i * stride, stride, 1, b, length, s + i);
-    }
-    transpose(s);
-    for (int half = LANES / 2; half > 0; half /= 2)
-        for (int j = 0; j < half; j++) LANEWISE EACH(s[j]) += EACH(s[j + half]);
-    *lanes_at(result) = s[0];
+    /* a usual number, as a constant for the compiler */
+    for (; i + ROWS <= count; i += ROWS)
+        partial_sums(rows + i * stride, stride, ROWS, b, length, s + i);
+    for (; i < count; i++) partial_sums(rows + i * stride, stride, 1, b, length, s + i);
+    for (; i < LANES; i++) LANEWISE EACH(s[i]) = EACH(none);
+    return sums(s);
 }
 
-/* LANES columns of a block of rows: for each row i in turn x <- x - lead[i] row, row <- row +
+/* LANES columns of ROWS rows of a block: for each row i in turn x <- x - lead[i] row, row <- row +
    gain[i] x. */
 static inline void rotate(rls_real *block, int stride, rls_real *x, const rls_real *lead,
                           const rls_real *gain)
 {
-    lanes t = *lanes_of(x);
-    for (int i = 0; i < LANES; i++) {
-        lanes row = *lanes_of(block + i * stride);
+    lanes t = load(x);
+    for (int i = 0; i < ROWS; i++) {
+        lanes row = load(block + i * stride);
         LANEWISE EACH(t) -= lead[i] * EACH(row);
         LANEWISE EACH(row) += gain[i] * EACH(t);
-        *lanes_at(block + i * stride) = row;
+        store(row, block + i * stride);
     }
-    *lanes_at(x) = t;
+    store(t, x);
 }
 
 /* What x becomes by that, the block left as it is. */
-static inline void reduce(const rls_real *block, int stride, lanes *x, const rls_real *lead)
+static INLINED void reduce(const rls_real *block, int stride, lanes *x, const rls_real *lead)
 {
     for (int i = 0; i < LANES; i++)
         LANEWISE EACH(*x) -= lead[i] * EACH(*lanes_of(block + i * stride));
@@ -324,26 +387,28 @@ typedef struct {
     rls_real inverse, value;
 } weight;
 
-/* The entry of x that each row of a block eliminates, 0 from row `rows` on. */
-static inline void eliminate(const rls_real *block, int stride, int rows, const lanes *x,
-                             rls_real *lead)
+/* The entry t of x that each row of a block eliminates, 0 from row `rows` on. Each waits for the
+   one before it: numbers one by one wait less than vectors do. */
+static INLINED void eliminate(const rls_real *block, int stride, int rows, lanes x, rls_real *t)
 {
-    lanes t = *x;
-    for (int i = 0; i < LANES; i++) {
-        const rls_real f = LANE(t, i);
-        lead[i] = f;
-        LANEWISE EACH(t) -= f * EACH(*lanes_of(block + i * stride));
-    }
-    for (int i = rows; i < LANES; i++) lead[i] = 0;
+    for (int i = 0; i < LANES; i++) t[i] = LANE(x, i);
+#define LESS(j, i) t[j] -= t[i] * block[(i) * stride + (j)]
+    LESS(1, 0);
+    LESS(2, 0); LESS(2, 1);
+    LESS(3, 0); LESS(3, 1); LESS(3, 2);
+    LESS(4, 0); LESS(4, 1); LESS(4, 2); LESS(4, 3);
+    LESS(5, 0); LESS(5, 1); LESS(5, 2); LESS(5, 3); LESS(5, 4);
+    LESS(6, 0); LESS(6, 1); LESS(6, 2); LESS(6, 3); LESS(6, 4); LESS(6, 5);
+    LESS(7, 0); LESS(7, 1); LESS(7, 2); LESS(7, 3); LESS(7, 4); LESS(7, 5); LESS(7, 6);
+#undef LESS
+    for (int i = 0; i < LANES; i++) t[i] = i < rows ? t[i] : 0;
 }
 
 /* What that does to a block of rows: d, and the gain. 0 where a row may have to be renewed: then
    nothing has changed. */
-static inline int weigh(const rls_real *leads, rls_real *d, rls_real kept, weight *w,
-                        rls_real *gain)
+static INLINED int weigh(lanes lead, rls_real *d, rls_real kept, weight *w, lanes *gain)
 {
-    const lanes lead = *lanes_of(leads);
-    lanes old = *lanes_of(d), ratio = old, sum = old, over = old;
+    lanes old = load(d), ratio, sum, over;
     rls_real least = 1, value;
     LANEWISE EACH(old) *= kept;
     for (int i = 0; i < LANES; i++) least = LANE(old, i) < least ? LANE(old, i) : least;
@@ -353,7 +418,7 @@ static inline int weigh(const rls_real *leads, rls_real *d, rls_real kept, weigh
     LANEWISE EACH(sum) += w->inverse;
     if (!(LANE(sum, LANES - 1) <= 4 * w->inverse && least > TINY)) return 0;
     LANEWISE EACH(over) = REAL(1) / EACH(sum);
-    LANEWISE EACH(*lanes_at(gain)) = EACH(ratio) * EACH(over);
+    LANEWISE EACH(*gain) = EACH(ratio) * EACH(over);
     value = LANE(over, LANES - 1);
     shift(&over, w->value);
     LANEWISE EACH(*lanes_at(d)) = EACH(old) + EACH(lead) * (EACH(lead) * EACH(over));
@@ -406,59 +471,78 @@ static void renew_rows(const group *a, int start, int rows, rls_real kept, weigh
 /* Rotate x, of weight w, into rows first .. last - 1, whose information is first multiplied by
    `kept`; x is 0 before `first`. s gets R^-T phi in the scale of the triangle. What the next block
    eliminates is found before this one is changed: the chain of eliminations is the longest there
-   is, and a processor does the rest beside it. */
+   is, and a processor does the rest beside it. Where rows were renewed x may have been explained
+   in full: then it is found afterwards. */
 static inline void sweep(const group *a, int first, int last, rls_real kept, rls_real w)
 {
-    int start = block_start(first);
     weight left = {1 / w, w};
-    rls_real lead[LANES], next[LANES], gain[LANES];
-    eliminate(block_at(a, start), a->wide - start, last - start, lanes_of(a->x + start), lead);
+    int start = block_start(first);
+    rls_real lead[LANES];
+    eliminate(block_at(a, start), a->wide - start, last - start, load(a->x + start), lead);
     for (; start < last; start += LANES) {
-        const int length = a->wide - start;
-        rls_real *x = a->x + start, *block = block_at(a, start);
-        if (start + LANES < last) {
-            lanes t = *lanes_of(x + LANES);
-            reduce(block + LANES, length, &t, lead);
-            eliminate(block + LANES * length, length - LANES, last - start - LANES, &t, next);
-        }
-        if (weigh(lead, a->d + start, kept, &left, gain)) {
-            *lanes_at(a->s + start) = *lanes_of(gain);
-            for (int k = 0; k < length; k += LANES) rotate(block + k, length, x + k, lead, gain);
+        const int length = a->wide - start, rest = last - start - LANES;
+        rls_real *x = a->x + start, *block = block_at(a, start), *below = block + LANES * length,
+                 leads[LANES], gains[LANES];
+        const lanes now = gathered(lead);
+        lanes gain;
+        if (weigh(now, a->d + start, kept, &left, &gain)) {
+            store(now, leads);
+            store(gain, gains);
+            store(gain, a->s + start);
+            if (rest > 0) {
+                lanes t = load(x + LANES);
+                reduce(block + LANES, length, &t, lead);
+                eliminate(below, length - LANES, rest, t, lead);
+            }
+            for (int i = 0; i < LANES; i += ROWS)
+                for (int k = 0; k < length; k += LANES)
+                    rotate(block + i * length + k, length, x + k, leads + i, gains + i);
         } else {
-            renew_rows(a, start, last - start < LANES ? last - start : LANES, kept, &left);
+            renew_rows(a, start, rest < 0 ? rest + LANES : LANES, kept, &left);
+            if (rest > 0) eliminate(below, length - LANES, rest, load(x + LANES), lead);
         }
-        for (int i = 0; i < LANES; i++) lead[i] = next[i];
     }
 }
 
-/* Solve with the unit triangle of a block of rows: t <- block^-1 t. */
-static inline void solve(const rls_real *block, int stride, lanes *t)
+/* Solve with the unit triangle of a block of rows: t <- block^-1 t. Each entry waits for the one
+   after it: numbers one by one wait less than vectors do. */
+static inline void solve(const rls_real *block, int stride, rls_real *t)
 {
-    lanes column[LANES];
-    for (int i = 0; i < LANES; i++) {
-        column[i] = *lanes_of(block + i * stride);
-        LANE(column[i], i) = 0;
-    }
-    transpose(column);
-    for (int k = LANES - 1; k > 0; k--) {
-        const rls_real own = LANE(*t, k);
-        LANEWISE EACH(*t) -= own * EACH(column[k]);
-    }
+#define LESS(i, k) t[i] -= block[(i) * stride + (k)] * t[k]
+    LESS(6, 7);
+    LESS(5, 7); LESS(5, 6);
+    LESS(4, 7); LESS(4, 6); LESS(4, 5);
+    LESS(3, 7); LESS(3, 6); LESS(3, 5); LESS(3, 4);
+    LESS(2, 7); LESS(2, 6); LESS(2, 5); LESS(2, 4); LESS(2, 3);
+    LESS(1, 7); LESS(1, 6); LESS(1, 5); LESS(1, 4); LESS(1, 3); LESS(1, 2);
+    LESS(0, 7); LESS(0, 6); LESS(0, 5); LESS(0, 4); LESS(0, 3); LESS(0, 2); LESS(0, 1);
+#undef LESS
 }
 
-/* gain <- triangle^-1 s */
+/* gain <- triangle^-1 s. The longest chain there is goes from a block to the one above it: that
+   product comes last, and from registers. */
 static inline void find_gain(const group *a)
 {
+    lanes below;
+    LANEWISE EACH(below) = EACH(none);
     for (int start = a->tall - LANES; start >= 0; start -= LANES) {
-        const int length = a->wide - start;
+        const int length = a->wide - start, behind = a->tall - start - 2 * LANES;
         const rls_real *block = block_at(a, start);
-        rls_real right[LANES];
-        lanes t;
-        times(block + LANES, length, LANES, a->gain + start + LANES, a->tall - start - LANES,
-              right);
-        LANEWISE EACH(t) = EACH(*lanes_of(a->s + start)) - EACH(*lanes_of(right));
-        solve(block, length, &t);
-        *lanes_at(a->gain + start) = t;
+        lanes right, s[LANES];
+        rls_real t[LANES];
+        for (int i = 0; i < LANES; i += ROWS)
+            partial_sums(block + i * length + 2 * LANES, length, ROWS,
+                         a->gain + start + 2 * LANES, behind, s + i);
+        if (behind >= 0)
+            for (int i = 0; i < LANES; i++)
+                LANEWISE EACH(s[i]) +=
+                    EACH(below) * EACH(*lanes_of(block + i * length + LANES));
+        right = sums(s);
+        LANEWISE EACH(right) = EACH(*lanes_of(a->s + start)) - EACH(right);
+        for (int i = 0; i < LANES; i++) t[i] = LANE(right, i);
+        solve(block, length, t);
+        below = gathered(t);
+        store(below, a->gain + start);
     }
 }
 
@@ -544,7 +628,7 @@ static inline void forget_direction(const group *a, rls_real factor)
 {
     rls_real length2 = 0, share, left = factor;
     for (int start = 0; start < a->tall; start += LANES)
-        times(block_at(a, start), a->wide - start, LANES, a->phi + start, a->tall - start,
+        store(times(block_at(a, start), a->wide - start, LANES, a->phi + start, a->tall - start),
               a->s + start);
     for (int i = 0; i < a->n; i++) length2 += a->d[i] * (a->s[i] * a->s[i]);
     if (!(length2 > TINY)) return;
@@ -703,9 +787,9 @@ static inline void predict(const group *a, const int *output, const rls_real *y)
 {
     for (int j = 0; j < a->m; j += LANES) {
         const int count = a->m - j < LANES ? a->m - j : LANES;
-        rls_real prediction[LANES];
-        times(a->theta + j * a->tall, a->tall, count, a->phi, a->tall, prediction);
-        for (int i = 0; i < count; i++) a->innovation[j + i] = y[output[j + i]] - prediction[i];
+        lanes prediction = times(a->theta + j * a->tall, a->tall, count, a->phi, a->tall);
+        for (int i = 0; i < count; i++)
+            a->innovation[j + i] = y[output[j + i]] - LANE(prediction, i);
     }
 }
 
@@ -716,7 +800,8 @@ static inline void correct(const group *a)
 {
     rls_real error = 0;
     int small = 1;
-    lanes sum = none;
+    lanes sum;
+    LANEWISE EACH(sum) = EACH(none);
     for (int k = 0; k < a->tall; k += LANES)
         LANEWISE EACH(sum) += EACH(*lanes_of(a->energy + k)) *
                               (EACH(*lanes_of(a->gain + k)) * EACH(*lanes_of(a->gain + k)));
@@ -808,6 +893,7 @@ int rls_absorb(const rls_config *c, rls_real *state, rls_real *work, const rls_r
         state[COUNT] = 0;
         state[MILLIONS] += 1;
     }
+    LEAVE_VECTORS();
     return RLS_LEARNT | status(c, state, work);
 }
 
