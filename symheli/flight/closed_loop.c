@@ -35,7 +35,7 @@ struct loops {
   double *out; /* flight, kept sample (slots), COLUMNS */
   long *lost;  /* flight: the sample at which it was, or -1 */
   long slots, every, substeps;
-  double step;
+  double step, level; /* s; rad */
   const volatile int *stop;
 };
 
@@ -56,11 +56,6 @@ static void finish(struct block *b)
 {
   if (!b) return;
   free(b->own), free(b->next), free(b->matrix), free(b->history), free(b->commands), free(b);
-}
-
-static double within(double value, double most)
-{
-  return value < -most ? -most : value > most ? most : value;
 }
 
 static void deflections(const struct loops *f, struct block *b)
@@ -111,8 +106,8 @@ static struct block *begin(const struct loops *f, long first, long lanes)
   return b;
 }
 
-/* Attitude and airspeed from the quaternion form, and who is lost: beyond 80 deg of bank or pitch,
-   or out of the range of numbers. */
+/* Euler form and airspeed, and who is lost: beyond `level` of bank or pitch, or out of the range of
+   numbers. */
 static void look(const struct loops *f, struct block *b, long k)
 {
   for (int l = 0; l < LANES; ++l) {
@@ -124,9 +119,6 @@ static void look(const struct loops *f, struct block *b, long k)
   for (int l = 0; l < LANES; ++l) {
     const double q0 = b->x[6][l], q1 = b->x[7][l], q2 = b->x[8][l], q3 = b->x[9][l];
     const double n = b->wind[0][l], e = b->wind[1][l], d = b->wind[2][l];
-    const double sine = 2 * (q0 * q2 - q3 * q1);
-    b->euler[6][l] = elementary_atan2(2 * (q0 * q1 + q2 * q3), 1 - 2 * (q1 * q1 + q2 * q2));
-    b->euler[7][l] = elementary_asin(sine < -1 ? -1 : sine > 1 ? 1 : sine);
     const double u = b->x[0][l] - ((1 - 2 * (q2 * q2 + q3 * q3)) * n +
                                    2 * (q1 * q2 + q0 * q3) * e + 2 * (q1 * q3 - q0 * q2) * d);
     const double v = b->x[1][l] - (2 * (q1 * q2 - q0 * q3) * n +
@@ -135,12 +127,12 @@ static void look(const struct loops *f, struct block *b, long k)
                                    (1 - 2 * (q1 * q1 + q2 * q2)) * d);
     b->air[0][l] = sqrt(u * u + v * v + w * w);
   }
-  for (int j = 0; j < 6; ++j) memcpy(b->euler[j], b->x[j], sizeof(lane));
-  for (int j = 8; j < NE; ++j) memcpy(b->euler[j], b->x[j + 5], sizeof(lane));
+  euler_form((const lane *)b->x, b->euler);
   for (int l = 0; l < LANES; ++l) {
     double sum = 0;
     for (int i = 0; i < NX; ++i) sum += b->x[i][l] * 0; /* not a number where one is not finite */
-    const int flying = sum == 0 && fabs(b->euler[6][l]) <= 1.4 && fabs(b->euler[7][l]) <= 1.4;
+    const int flying =
+        sum == 0 && fabs(b->euler[6][l]) <= f->level && fabs(b->euler[7][l]) <= f->level;
     if (!flying && b->lost[l] < 0 && k < b->samples[l]) b->lost[l] = k;
   }
 }

@@ -14,7 +14,7 @@ from symheli.flight.controller import ROTOR, SCHEDULING, ScheduledController
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
-from symheli.flight.in_numpy import InNumpy
+from symheli.flight.in_numpy import LEVEL, InNumpy
 from symheli.flight.plan import READ
 from symheli.helicopter import Helicopter
 from symheli.integrate.equations import equations
@@ -64,14 +64,6 @@ class Loops:
     def stop(self) -> None:
         """Ask every flight under way to end at its next sample."""
         self._stop[0] = 1
-
-    @property
-    def compiled(self) -> bool:
-        """Whether the whole flight runs in machine code."""
-        return (
-            isinstance(self.equipment.controller, ScheduledController)
-            and library(self.heli, Layout()) is not None
-        )
 
     def fly(self, layout: Layout) -> Flown:
         """Fly them all; the bits are the same in every layout. Raises `KeyboardInterrupt` where it
@@ -155,6 +147,7 @@ class Loops:
             "every": self.clock.every,
             "substeps": self.clock.substeps,
             "step": self.clock.step,
+            "level": LEVEL,
             "stop": self._stop,
         }
         return structure(members)

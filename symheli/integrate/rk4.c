@@ -44,28 +44,38 @@ static void runge_kutta(lane *x, const lane *kept, double h)
   normalise(x);
 }
 
-/* u - K (x - reference) in Euler form, within the travel */
-static void feed_back(const struct flights *f, long sample, const lane *x, lane *u)
+static double within(double value, double most)
 {
-  const double *gains = f->gains + sample * 4 * NE, *reference = f->reference + sample * NE;
-  lane e[NE];
+  return value < -most ? -most : value > most ? most : value;
+}
+
+/* NE states in Euler form from NX in quaternion form; heading and position are left out. */
+static void euler_form(const lane *x, lane *e)
+{
   for (int l = 0; l < LANES; ++l) {
     const double q0 = x[6][l], q1 = x[7][l], q2 = x[8][l], q3 = x[9][l],
                  sine = 2 * FUSED(q0, q2, -q3 * q1);
     for (int j = 0; j < 6; ++j) e[j][l] = x[j][l];
     e[6][l] = elementary_atan2(2 * FUSED(q0, q1, q2 * q3),
                                FUSED(-2.0, FUSED(q1, q1, q2 * q2), 1.0));
-    e[7][l] = elementary_asin(sine < -1 ? -1 : sine > 1 ? 1 : sine);
+    e[7][l] = elementary_asin(within(sine, 1));
     for (int j = 8; j < NE; ++j) e[j][l] = x[j + 5][l];
   }
+}
+
+/* u - K (x - reference) in Euler form, within the travel */
+static void feed_back(const struct flights *f, long sample, const lane *x, lane *u)
+{
+  const double *gains = f->gains + sample * 4 * NE, *reference = f->reference + sample * NE;
+  lane e[NE];
+  euler_form(x, e);
   for (int j = 0; j < NE; ++j)
     for (int i = 0; i < 4; ++i)
       for (int l = 0; l < LANES; ++l)
         u[i][l] = FUSED(-gains[i * NE + j], e[j][l] - reference[j], u[i][l]);
   for (int i = 0; i < 4; ++i) {
     const double most = f->travel[i];
-    for (int l = 0; l < LANES; ++l)
-      u[i][l] = u[i][l] < -most ? -most : u[i][l] > most ? most : u[i][l];
+    for (int l = 0; l < LANES; ++l) u[i][l] = within(u[i][l], most);
   }
 }
 
