@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import pickle
 import queue
 import subprocess
@@ -15,15 +14,10 @@ from types import TracebackType
 from typing import Any
 
 from symheli.errors import SymheliError
+from symheli.integrate.side_by_side import workers_of
 
 Call = Callable[[], Any]
 """A function of a module with its arguments (`functools.partial`), which can be pickled."""
-
-
-def cores() -> int:
-    """How many this process may use."""
-    usable = getattr(os, "sched_getaffinity", None)
-    return len(usable(0)) if usable else os.cpu_count() or 1
 
 
 class Processes:
@@ -35,7 +29,7 @@ class Processes:
     """
 
     def __init__(self, count: int | None = None):
-        self._count = cores() if count is None else count
+        self._count = workers_of(count)
         self._waiting: queue.SimpleQueue[tuple[str, bytes, Future[Any]] | None]
         self._waiting = queue.SimpleQueue()
         self._running: list[subprocess.Popen[bytes]] = []

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symheli.errors import UnknownNameError
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import excitation_of
 from symheli.flight.in_numpy import LEVEL
@@ -14,7 +13,7 @@ from symheli.flight.plan import FlightPlan
 from symheli.helicopter import Helicopter
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
-from symheli.values.signal import Signal
+from symheli.values.signal import Signal, indices
 
 WIND = ("wind_n", "wind_e", "wind_d")
 
@@ -40,25 +39,31 @@ class FlightData:
 
     def columns(self) -> dict[str, Array]:
         """Every signal of the record (kept,) by name."""
-        flown = slice(0, self.kept * self.clock.every, self.clock.every)
-        added = excitation_of(self.plan, self.course)
-        blocks = {
-            "out": self.out[: self.kept],
-            "added": np.broadcast_to(added, (len(self.course.time), 4))[flown],
-            "command": self.course.p[flown],
-            "reference": self.course.reference[flown],
-        }
-        if not self.plan.wind.is_steady:
-            blocks["wind"] = self.plan.wind.history(self.course.time, self.course.p[:, 0])[flown]
         table = _table(self.heli, self.plan)
+        blocks = {block: self._block(block) for block in dict.fromkeys(b for _, b, _ in table)}
         return {str(signal): blocks[block][:, i] for signal, block, i in table}
 
     def column(self, name: str) -> Array:
         """One signal (kept,) of the record."""
-        columns = self.columns()
-        if name not in columns:
-            raise UnknownNameError("signal", name, columns)
-        return columns[name]
+        table = _table(self.heli, self.plan)
+        _, block, i = table[indices([name], [s for s, _, _ in table], "signal")[0]]
+        return self._block(block)[:, i]
+
+    def _block(self, name: str) -> Array:
+        """Signals that come from one place, side by side (kept, ...)."""
+        flown = slice(0, self.kept * self.clock.every, self.clock.every)
+        time, p = self.course.time, self.course.p
+        match name:
+            case "out":
+                return self.out[: self.kept]
+            case "added":
+                added = excitation_of(self.plan, self.course)
+                return np.broadcast_to(added, (len(time), added.shape[1]))[flown]
+            case "wind":
+                return self.plan.wind.history(time, p[:, 0])[flown]
+            case "command":
+                return p[flown]
+        return self.course.reference[flown]
 
     def record(self) -> FlightRecord | None:
         """Everything until the end, or until it was lost; None where that is less than two

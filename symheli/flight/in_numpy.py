@@ -9,7 +9,7 @@ import numpy as np
 from symheli.flight.plan import READ
 from symheli.integrate.equations import Equations, equations
 from symheli.integrate.rk4 import runge_kutta_step
-from symheli.physics.attitude import flight_state
+from symheli.physics.attitude import euler_state, flight_state
 from symheli.physics.rigid_body import body_to_earth
 from symheli.values.arrays import Array
 
@@ -101,9 +101,5 @@ class InNumpy:
 
 def _seen(flight: Array, wind: Array) -> tuple[Array, float]:
     """Euler-form state and true airspeed (m/s) from the quaternion form; wind in earth axes."""
-    q0, q1, q2, q3 = flight[6:10]
-    phi = np.arctan2(2 * (q0 * q1 + q2 * q3), 1 - 2 * (q1**2 + q2**2))
-    theta = np.arcsin(np.clip(2 * (q0 * q2 - q3 * q1), -1.0, 1.0))
-    velocity = flight[:3] - np.array(body_to_earth(q0, q1, q2, q3)).T @ wind
-    euler = np.concatenate([flight[:6], [phi, theta], flight[13:]])
-    return euler, float(np.linalg.norm(velocity))
+    velocity = flight[:3] - np.array(body_to_earth(*flight[6:10])).T @ wind
+    return euler_state(flight), float(np.linalg.norm(velocity))

@@ -17,7 +17,7 @@ from symheli.flight.controller import MEASURED
 from symheli.flight.excitation import Excitation
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
-from symheli.flight.servo import Servo
+from symheli.flight.servo import Servo, one_each
 
 READ = (*map(str, MEASURED), "airspeed")
 """Signals that have a sensor."""
@@ -123,8 +123,8 @@ class FlightPlan:
         object.__setattr__(self, "wind", _wind(self.wind))
         _each("servos", self.servos, Servo, INPUTS)
         _each("sensors", self.sensors, Sensor, READ)
-        if self.servos is not None and (missing := [n for n in INPUTS if n not in self.servos]):
-            raise InputError(f"servos: none given for {', '.join(missing)}")
+        if self.servos is not None:
+            one_each(self.servos, INPUTS)
         if not _number("delay", self.delay, "a number of seconds >= 0") >= 0:
             raise InputError(f"delay: expected a number of seconds >= 0, got {self.delay}")
         if self.trims not in get_args(Trims):

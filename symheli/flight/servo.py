@@ -113,6 +113,15 @@ XCELL_SERVOS: Mapping[str, Servo] = {
 """The servos of the X-Cell .60 by input."""
 
 
+def one_each(servos: Mapping[str, Servo], inputs: Sequence[str]) -> None:
+    """Raises `InputError` where an input has no servo, or a servo no input."""
+    for name in servos:
+        if name not in inputs:
+            raise UnknownNameError("input", name, inputs)
+    if missing := [name for name in inputs if name not in servos]:
+        raise InputError(f"servos: none given for {', '.join(missing)}")
+
+
 ORDER = 3
 """Most states a servo has."""
 
@@ -137,12 +146,7 @@ class ServoBank:
         self, servos: Mapping[str, Servo], inputs: Sequence[str], travel: np.ndarray, dt: float
     ):
         """One servo for each of `inputs` with its `travel` (n,), rad, symmetric."""
-        for name in servos:
-            if name not in inputs:
-                raise UnknownNameError("input", name, inputs)
-        missing = [name for name in inputs if name not in servos]
-        if missing:
-            raise InputError(f"servos: none given for {', '.join(missing)}")
+        one_each(servos, inputs)
         bank, count = [servos[name] for name in inputs], len(inputs)
         self.A, self.B, self.C, self.settled = (
             np.zeros((count, ORDER, ORDER)),
