@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import symheli
 from symheli import AirspeedSchedule, Dryden, Excitation, Gust, Sensor, Wind
 from symheli.flight import XCELL_SERVOS
+
+SLOW = {name: replace(servo, rate=0.4) for name, servo in XCELL_SERVOS.items()}
+"""Those of the X-Cell with a limit on their rate, rad/s, which these flights reach."""
 
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 SENSORS = {
@@ -21,7 +26,7 @@ EVERYTHING = {
     "excitation": STIRRED,
     "wind": STORM,
     "sensors": SENSORS,
-    "servos": XCELL_SERVOS,
+    "servos": SLOW,
     "delay": 0.017,
 }
 SHORT = AirspeedSchedule((7.0, 1.0), (3.0, 3.0), (0.5, 0.5), lead=0.5)

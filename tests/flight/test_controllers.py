@@ -3,11 +3,11 @@
 import control
 import numpy as np
 import pytest
-from flight.flown import EVERYTHING, INPUTS, SHORT, InPython, differences, dynamic
+from flight.flown import EVERYTHING, INPUTS, SHORT, SLOW, InPython, differences, dynamic
 
 import symheli
 from symheli import InputError, LinearModel, fly
-from symheli.flight import Autopilot, ScheduledController, gain_scheduled_lqr
+from symheli.flight import XCELL_SERVOS, Autopilot, ScheduledController, gain_scheduled_lqr
 
 
 @pytest.fixture(scope="module")
@@ -201,3 +201,12 @@ def test_what_is_no_controller_is_refused(ideal, pilot):
         ScheduledController(model(symheli.Scheduling("acceleration", "m/s^2", -1, 1)), "reading")
     with pytest.raises(InputError, match="gains: expected shape"):
         Autopilot([0.0, 5.0], np.zeros((3, 4, 8)), pilot.states, 0.02)
+
+
+def test_the_rate_of_a_servo_is_limited_in_flight(ideal, pilot):
+    """Where the limit is not reached nothing else differs: these flights reach it."""
+    limited, free = (
+        fly(ideal, SHORT, controller=pilot, **{**EVERYTHING, "servos": servos})
+        for servos in (SLOW, XCELL_SERVOS)
+    )
+    assert differences(limited, free) > 1e-3
