@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from typing import overload
 
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
@@ -17,23 +18,43 @@ from identification.estimators import (  # noqa: F401  known by their shorthand 
 )
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, method_of
+from identification.model.kinematic_fit import mean_trim
+from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
+from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
 from symheli.records import FlightRecord
 
 
+@overload
+def fit(
+    structure: KinematicARX,
+    records: FlightRecord | Iterable[FlightRecord],
+    method: Method | str = "ls",
+) -> KinematicModel: ...
+
+
+@overload
 def fit(
     structure: LPVARX,
     records: FlightRecord | Iterable[FlightRecord],
     method: Method | str = "ls",
-) -> LPVARXModel:
+) -> LPVARXModel: ...
+
+
+def fit(
+    structure: LPVARX | KinematicARX,
+    records: FlightRecord | Iterable[FlightRecord],
+    method: Method | str = "ls",
+) -> LPVARXModel | KinematicModel:
     """Identify the coefficients of a structure from one record or several.
 
     Parameters
     ----------
-    structure : LPVARX
-        Signals, orders, delays and the basis in the scheduling parameters.
+    structure : LPVARX or KinematicARX
+        Signals, orders, delays and the basis in the scheduling parameters; with known kinematics
+        only the aerodynamics are fitted.
     records : FlightRecord or iterable of FlightRecord
         Of one sample period and in the same units; lags never reach across a gap or from one record
         into the next.
@@ -53,7 +74,7 @@ def fit(
 
     Returns
     -------
-    LPVARXModel
+    LPVARXModel, or KinematicModel of a KinematicARX
         Its `method` is the shorthand, its `excitation` the report on the data, its `details` what
         the method chose (weights, iterations, strength of the instruments).
 
@@ -91,8 +112,14 @@ def fit(
     >>> print(found.coefficients.at(0.0).A.round(2))
     [[[-0.5]]]
     """
+    if isinstance(structure, KinematicARX):
+        records = as_records(records)
+        aerodynamics = fit(structure.aerodynamics, records, method)
+        trim = mean_trim(structure, records)
+        return KinematicModel(structure=structure, aerodynamics=aerodynamics, trim=trim)
     require_structure(structure)
-    method, records = method_of(method), as_records(records)
+    method = method_of(method)
+    records = tuple(structure.prepared(record) for record in as_records(records))
     outputs, inputs = units_of(structure.outputs, records), units_of(structure.inputs, records)
     scheduling = units_of(structure.parameters, records)
     warn_of_leakage(structure, records)

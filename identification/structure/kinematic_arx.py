@@ -68,9 +68,7 @@ class Aerodynamics(LPVARX):
         for signal in RIGID_BODY:
             found = record.signals[record.signals.index(str(signal))]  # type: ignore[arg-type]
             if found.unit != signal.unit:
-                raise InputError(
-                    f"{found} is in {found.unit}; kinematics need it in {signal.unit}"
-                )
+                raise InputError(f"{found} is in {found.unit}; kinematics need it in {signal.unit}")
         out = np.full_like(y, np.nan)
         for part in record.segments():
             out[part] = increments(y[part], record.dt)
@@ -158,8 +156,10 @@ class KinematicARX:
         """The regression: `INCREMENTS` from lagged velocities and inputs, as any method takes
         it.
         """
-        na = self.na if isinstance(self.na, Mapping | int) else dict(
-            zip(MOVING, self.na, strict=True)
+        na = (
+            self.na
+            if isinstance(self.na, Mapping | int)
+            else dict(zip(MOVING, self.na, strict=True))
         )
         orders = {z: na if isinstance(na, int) else na.get(z, FLAPPING[z]) for z in MOVING}
         nb = self.nb
