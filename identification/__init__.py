@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         compare_experiments,
     )
     from identification.estimators.estimate import fit
+    from identification.estimators.filter_error import FilterError
     from identification.estimators.instrumental_variables import InstrumentalVariables
     from identification.estimators.instruments import (
         FlightSource,
@@ -91,6 +92,7 @@ _ROOMS = {
         "Experiment Plan choose_experiments compare_experiments"
     ),
     "identification.estimators.estimate": "fit",
+    "identification.estimators.filter_error": "FilterError",
     "identification.estimators.instrumental_variables": "InstrumentalVariables",
     "identification.estimators.instruments": "FlightSource InstrumentSource LaggedSignals",
     "identification.estimators.lasso": "Lasso",
@@ -144,6 +146,7 @@ __all__ = [
     "Estimate",
     "ExcitationReport",
     "Experiment",
+    "FilterError",
     "FlightSource",
     "Forgetting",
     "FrequencyResponse",

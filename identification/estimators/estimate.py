@@ -9,6 +9,7 @@ from typing import overload
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
 from identification.estimators import (  # noqa: F401  known by their shorthand once loaded
+    filter_error,
     instrumental_variables,
     lasso,
     output_error,
@@ -25,6 +26,7 @@ from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
 from symheli.records import FlightRecord
+from symheli.values.arrays import Array
 
 
 @overload
@@ -114,9 +116,24 @@ def fit(
     """
     if isinstance(structure, KinematicARX):
         records = as_records(records)
-        aerodynamics = fit(structure.aerodynamics, records, method)
-        trim = mean_trim(structure, records)
-        return KinematicModel(structure=structure, aerodynamics=aerodynamics, trim=trim)
+        aerodynamics, covariance = _fitted(structure.aerodynamics, records, method)
+        return KinematicModel(
+            structure=structure,
+            aerodynamics=aerodynamics,
+            trim=mean_trim(structure, records),
+            coefficient_covariance=covariance,
+        )
+    return _fitted(structure, records, method)[0]
+
+
+def _fitted(
+    structure: LPVARX,
+    records: FlightRecord | Iterable[FlightRecord],
+    method: Method | str,
+) -> tuple[LPVARXModel, Array | None]:
+    """The model of a regression, and the covariance of its coefficients where the method says
+    it.
+    """
     require_structure(structure)
     method = method_of(method)
     records = tuple(structure.prepared(record) for record in as_records(records))
@@ -129,11 +146,11 @@ def fit(
         report.require()
     found = method.estimate(structure, records, data)
     for remark in found.remarks:
-        warnings.warn(remark, stacklevel=2)
+        warnings.warn(remark, stacklevel=3)
     covariance = found.residual_covariance
     if covariance is None:
         covariance = residual_covariance(structure, data.phi, data.y, found.theta)
-    return LPVARXModel(
+    model = LPVARXModel(
         structure=structure,
         theta=found.theta,
         dt=records[0].dt,
@@ -147,3 +164,4 @@ def fit(
         excitation=report,
         details=found.details,
     )
+    return model, found.covariance

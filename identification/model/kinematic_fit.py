@@ -19,16 +19,18 @@ NEGLIGIBLE = 1e-6
 def mean_trim(kin: KinematicARX, records: Sequence[FlightRecord]) -> Array:
     """(basis size, 8): what is flown where p stands still.
 
-    Least squares of the states on the functions of p, and on those times its rate. Where the first
-    parameter is a speed, u is that and a constant, the headwind: a mean over few passes would
-    rather tell how the controller lags behind.
+    Least squares of the states on the functions of p and, where p is one parameter, on those
+    times its rate: trims depend on it. Where the first
+    parameter is a speed, u makes the velocity up to that, less a constant headwind: a mean over few
+    passes would rather tell how the controller lags behind.
     """
     aero, size = kin.aerodynamics, kin.basis.size
     rows, states, parameters = [], [], []
     for record in records:
         p = scheduling_values(aero, record).reshape(len(record), -1)
         f = basis_values(aero, p[:, 0] if p.shape[1] == 1 else p)
-        rows.append(np.hstack([f, *(f * column[:, None] for column in record.slope(p).T)]))
+        rate = record.slope(p) if p.shape[1] == 1 else np.zeros((len(p), 0))
+        rows.append(np.hstack([f, *(f * column[:, None] for column in rate.T)]))
         states.append(record.columns(STATES))
         parameters.append(p)
     F, y, p = np.vstack(rows), np.vstack(states), np.vstack(parameters)
@@ -37,6 +39,13 @@ def mean_trim(kin: KinematicARX, records: Sequence[FlightRecord]) -> Array:
     scale = column_scale(F)
     found = np.linalg.lstsq(F / scale, y, rcond=NEGLIGIBLE)[0][:size] / scale[:size, None]
     if units_of(aero.parameters[:1], records)[0].unit == "m/s":
-        along = np.linalg.lstsq(F[:, :size], p[:, 0] + np.mean(y[:, 0] - p[:, 0]), rcond=None)[0]
-        found[:, 0] = along
+        found[:, 0] = _forward_speed(F[:, :size], y, p[:, 0], F[:, :size] @ found[:, 1:3])
     return found
+
+
+def _forward_speed(f: Array, y: Array, airspeed: Array, across: Array) -> Array:
+    """Coefficients (size,) of u where u^2 + `across`^2 is the airspeed less the headwind."""
+    fast = airspeed >= np.median(airspeed)
+    headwind = np.mean(airspeed[fast] - np.linalg.norm(y[fast, :3], axis=1))
+    square = np.maximum(airspeed - headwind, 0.0) ** 2 - np.sum(across**2, axis=1)
+    return np.linalg.lstsq(f, np.sqrt(np.maximum(square, 0.0)), rcond=None)[0]
