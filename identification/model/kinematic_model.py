@@ -168,11 +168,18 @@ class KinematicModel:
         """The state-space form: states, matrices at any p."""
         return Realization.of(self.structure, self.theta, self.trim, self.inputs, self.dt)
 
-    def at(self, p: float | Sequence[float]) -> LinearModel:
+    def at(
+        self,
+        p: float | Sequence[float],
+        outputs: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+    ) -> LinearModel:
         """The discrete model with the scheduling held at p (one number a parameter), linear about
-        the trim there: deviation dynamics, u v w p q r phi theta from the inputs.
+        the trim there: deviation dynamics.
+
+        With `outputs` and `inputs` only these, as `to_state_space` keeps them.
         """
-        return self.realization.at(p)
+        return self.realization.at(p, outputs, inputs)
 
     def to_state_space(
         self,

@@ -115,11 +115,23 @@ class Realization:
                 B[:, row, column - nz] = 1.0
         return A, B
 
-    def at(self, p: object) -> LinearModel:
+    def at(
+        self, p: object, outputs: Sequence[str] | None, inputs: Sequence[str] | None
+    ) -> LinearModel:
         """The model with p held."""
         value = one_value(p, self.kin.basis)
-        matrices = (M[0] for M in self.matrices(value[None]))
-        return LinearModel(*matrices, self.states, self.inputs, RIGID_BODY, dt=self.dt)
+        x, u, y = self.kept(outputs, inputs)
+        A, B, C, D = (M[0] for M in self.matrices(value[None]))
+        return LinearModel(
+            A[np.ix_(x, x)],
+            B[np.ix_(x, u)],
+            C[np.ix_(y, x)],
+            D[np.ix_(y, u)],
+            tuple(self.states[i] for i in x),
+            tuple(self.inputs[i] for i in u),
+            tuple(RIGID_BODY[i] for i in y),
+            dt=self.dt,
+        )
 
     def kept(
         self, outputs: Sequence[str] | None, inputs: Sequence[str] | None
