@@ -293,8 +293,9 @@ class LPVStateSpace:
 
         Outputs that depend on p multiply inputs that do: a polynomial model then has up to twice
         the degree, in another basis `InputError`. A loop through constant feedthrough is solved;
-        through feedthrough D(p) that depends on p the closed loop is rational and `InputError` says
-        so: `to_lft().feedback(gains)` closes it exactly, as an `LFT`.
+        through feedthrough D(p) that depends on p, from an input that is driven to an output that
+        is fed back, the closed loop is rational and `InputError` says so:
+        `to_lft().feedback(gains)` closes it exactly, as an `LFT`.
         """
         from symheli.lpv.output_feedback import close
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.errors import InputError
 from synthesis.analysis.fine_sampling import fine_sampling
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
@@ -20,6 +21,7 @@ from synthesis.analysis.one_parameter_search import OneParameter
 from synthesis.analysis.question import Question
 from synthesis.certificate import Certificate, Seconds, Status
 from synthesis.impose import Grid
+from synthesis.polynomial.pieces import Pieces, pieces
 from synthesis.worst.box import (
     Worst,
     growing,
@@ -29,6 +31,7 @@ from synthesis.worst.box import (
     worst_moving,
 )
 from synthesis.worst.budget import said
+from synthesis.worst.perturbation import worst_perturbation
 from synthesis.worst.trajectory import Trajectory
 
 Array = np.ndarray
@@ -44,13 +47,15 @@ class Beaten(NamedTuple):
     limit: float
     worst: Trajectory | None
     seconds: float
+    perturbation: Array | None = None
 
 
 def certify(asked: Question) -> Certificate:
     """The answer to the question."""
-    model, demand, search = asked.model, asked.demand, asked.search
+    demand, search = asked.demand, asked.search
     sign = 1.0 if asked.gains else -1.0
     start = time.perf_counter()
+    model, delta = _worst_member(asked)
     frozen = worst_frozen(model, measure(demand, model.dt))
     report = _Report(asked)
     if math.isinf(frozen.value) if asked.gains else frozen.value >= 0:
@@ -62,6 +67,7 @@ def certify(asked: Question) -> Certificate:
                 sign * frozen.value,
                 Trajectory(np.zeros(1), p),
                 time.perf_counter() - start,
+                delta,
             )
             return report.nothing(Status.UNSTABLE, beaten)
         # stable or not to rounding: nothing is known from below
@@ -69,7 +75,11 @@ def certify(asked: Question) -> Certificate:
     stability = demand.kind == "stability"
     limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
     beaten = Beaten(
-        sign * frozen.value, sign * limit.value, limit.trajectory, time.perf_counter() - start
+        sign * frozen.value,
+        sign * limit.value,
+        limit.trajectory,
+        time.perf_counter() - start,
+        delta,
     )
     if math.isinf(limit.value) if asked.gains else limit.value >= 0:
         return report.nothing(Status.GROWING, beaten)
@@ -83,6 +93,21 @@ def certify(asked: Question) -> Certificate:
             return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
     cert = report.found(best, beaten, ladder)
     return cert if stability else cert.resting_on(said(search and search.seconds, beaten.seconds))
+
+
+def _worst_member(asked: Question) -> tuple[Pieces, Array | None]:
+    """The model that no proof can beat is looked for in, and which Delta it is where a whole set
+    is asked about: the worst one found.
+    """
+    unc = asked.uncertain
+    if unc is None:
+        return asked.model, None
+    delta = worst_perturbation(unc, gains=asked.gains).delta
+    try:
+        return pieces(unc.perturbed(delta)), delta
+    except InputError:
+        # a basis that does not hold the products: the nominal model is one of the set
+        return asked.model, np.zeros(unc.shape)
 
 
 def route(asked: Question) -> Ladder:
@@ -129,7 +154,7 @@ class _Report:
                 kind,
                 asked.model.parameters,
                 asked.demand.rates,
-                asked.model.source,
+                asked.uncertain or asked.model.source,
                 (*self._how(best, status), *self._sampling(bounds)),
             ),
             method=f"{type(asked.form).__name__}, {asked.impose.found_by}",
@@ -138,6 +163,7 @@ class _Report:
             conditioning=best.conditioning,
             attempts=tuple(ladder.attempts) if ladder else (),
             worst=beaten.worst,
+            perturbation=beaten.perturbation,
             indicative=best.bound if status is Status.UNPROVEN else math.nan,
             proof=best.proof,
         )
