@@ -105,8 +105,10 @@ def read(path: str | os.PathLike[str]) -> Certificate:
     try:
         with np.errstate(all="ignore"):
             cert = _certificate(content)
-    except (CertificateError, InputError) as error:
-        raise type(error)(f"{path}: {error}") from None
+    except CertificateError as error:
+        raise CertificateError(f"{path}: {error}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     except (
         *(TypeError, ValueError, AttributeError, LookupError),
         *(ArithmeticError, RecursionError, np.linalg.LinAlgError),

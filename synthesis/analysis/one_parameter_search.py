@@ -121,7 +121,7 @@ class OneParameter(Ladder):
             for block, which in zip(blocks, active, strict=True):
                 if which.all():
                     continue
-                excess = block.values(P, multiplier, sizes.rows)
+                excess = block.values(P, sizes.rows, multiplier)
                 excess = excess - block.weight[:, None, None] * target
                 new = ~which & (np.linalg.eigvalsh(excess)[:, -1] > VIOLATED)
                 which |= new

@@ -56,12 +56,12 @@ class Blocks(NamedTuple):
     likely: bool = True
     supply: Supply | None = None
 
-    def values(self, P: Array, multipliers: Array, N: int) -> Array:
-        """F (m, N, N) with g = 0 at the coefficients P (k, n (n + 1)/2) and multipliers (k',) of
-        the whole splines.
+    def values(self, P: Array, N: int, multipliers: Array | None = None) -> Array:
+        """F (m, N, N) with g = 0 at the coefficients P (k, n (n + 1)/2) and, around a block,
+        multipliers (k',) of the whole splines.
         """
         F = np.einsum("mjvl,jv->ml", self.linear, P[self.columns]) + self.constant
-        if self.supply is not None:
+        if self.supply is not None and multipliers is not None:
             F = F + np.einsum("mjl,j->ml", self.supply.linear, multipliers[self.supply.columns])
         return smat(F, N)
 
