@@ -9,6 +9,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from symheli.values.arrays import Array
+from symheli.values.signal import signals
 
 SAFETY = 2.0
 """What is covered is this many times the largest difference measured."""
@@ -98,4 +99,4 @@ def covering(lpv: LPVStateSpace, rest: Remainder) -> UncertainStateSpace:
         residuals=None,
     )
     source = f"{SAFETY:g} times the largest difference measured of the models that are covered"
-    return UncertainStateSpace(model, d, v, 1.0, 1.0, source)
+    return UncertainStateSpace(model, signals(d), signals(v), 1.0, 1.0, source)
