@@ -84,8 +84,8 @@ class OneParameter(Ladder):
         """Solve with all blocks, kept as products with P."""
         assert isinstance(form, Quadratic)  # noqa: S101 - see `Question`
         blocks = form.products(self.problem, self.elevation)
-        inputs, floor = len(self.problem.lpv.inputs), self.asked.impose.least
-        program = LyapunovProgram(blocks, form.size, inputs, form.unknowns, margin, floor)
+        sizes, floor = self.problem.sizes(form), self.asked.impose.least
+        program = LyapunovProgram(blocks, sizes, margin, floor)
         return interior_point.minimise(program, self.asked.solver)
 
     def _solve_by_rounds(self, form: Unknown, margin: float) -> Candidate:

@@ -96,8 +96,7 @@ def question(
 
 
 def _solver(asked: Question, solver: Solver | str | None) -> Solver:
-    # the method by products knows no multiplier
-    by_products = asked.one_parameter and isinstance(asked.form, Spline) and asked.uncertain is None
+    by_products = asked.one_parameter and isinstance(asked.form, Spline)
     if solver is None:
         return Solver(LYAPUNOV if by_products and asked.model.sizes[0] > MANY else "CLARABEL")
     if by_products:

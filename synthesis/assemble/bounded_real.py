@@ -36,6 +36,7 @@ from synthesis.polynomial.bernstein import (
 from synthesis.polynomial.cells import Cell, Strip
 from synthesis.polynomial.symmetric import basis, smat, svec
 from synthesis.program.cone_program import ConeProgram
+from synthesis.program.lyapunov_program import Sizes
 
 Array = np.ndarray
 
@@ -157,28 +158,6 @@ def discrete_blocks(
             linear[:, form.own : form.own + degree + 1] -= now
             weight = np.ones(len(constant))
             yield Blocks(form.columns, linear, constant, weight, likely, form.supply)
-
-
-class Sizes(NamedTuple):
-    """Of a program: `states`, and the inputs d of a block, which are held below a margin; `inputs`
-    u, to which g belongs; coefficients of P (`unknowns`) and of the multiplier.
-    """
-
-    states: int
-    inputs: int
-    unknowns: int
-    perturbations: int = 0
-    multipliers: int = 0
-
-    @property
-    def strict(self) -> int:
-        """Rows of a block that are held below a margin."""
-        return self.states + self.perturbations
-
-    @property
-    def rows(self) -> int:
-        """Rows of a block."""
-        return self.strict + self.inputs
 
 
 def assemble(

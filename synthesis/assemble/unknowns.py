@@ -18,7 +18,6 @@ from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from synthesis.assemble.bounded_real import (
     Blocks,
     Multiplier,
-    Sizes,
     continuous_blocks,
     discrete_blocks,
 )
@@ -32,7 +31,7 @@ from synthesis.polynomial.cells import Strip, cells, strips
 from synthesis.polynomial.pieces import ModelPiece, model_pieces
 from synthesis.polynomial.symmetric import extended, length, smat, svec
 from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
-from synthesis.program.lyapunov_program import MANY, LyapunovBlocks
+from synthesis.program.lyapunov_program import MANY, LyapunovBlocks, Sizes
 from synthesis.program.scaling import Scaling, block_scaling, scaling
 from synthesis.proof.one_parameter import Evidence
 
@@ -150,24 +149,28 @@ class Quadratic(Unknown):
 
     def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
         """One block per Bernstein coefficient, cell or strip, and sign of the rate."""
-        e, block = self.multiplier_degree, problem.block
-        own = None if e is None or block is None else Multiplier(block, e)
+        own = self._multiplier(problem)
         if problem.lpv.dt is None:
             rate = problem.scaled_rate if self.degree else 0.0
             regions = cells(problem.scaled, self.knots)
             return list(continuous_blocks(regions, self.knots, self.degree, rate, extra, own))
         return list(discrete_blocks(self._strips(problem), self.knots, self.degree, extra, own))
 
+    def _multiplier(self, problem: Problem) -> Multiplier | None:
+        e, block = self.multiplier_degree, problem.block
+        return None if e is None or block is None else Multiplier(block, e)
+
     def products(self, problem: Problem, extra: int) -> tuple[LyapunovBlocks, ...]:
         """The same blocks as products with P, in coordinates in which slow and fast states count
         alike.
         """
+        own = self._multiplier(problem)
         if problem.lpv.dt is None:
             rate = problem.scaled_rate if self.degree else 0.0
             regions = cells(problem.scaled, self.knots)
-            every = continuous_products(regions, self.knots, self.degree, rate, extra)
+            every = continuous_products(regions, self.knots, self.degree, rate, extra, own)
         else:
-            every = discrete_products(self._strips(problem), self.knots, self.degree, extra)
+            every = discrete_products(self._strips(problem), self.knots, self.degree, extra, own)
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return tuple(block.congruent(W) for block in every)
 

@@ -311,11 +311,22 @@ def test_what_is_not_asked_of_a_set_is_refused_with_what_to_do(ask):
         ask()
 
 
-def test_wrong_rates_solvers_and_channels_are_refused():
+@pytest.mark.parametrize("dt", [None, 0.1])
+def test_the_method_for_many_states_finds_what_the_general_solver_finds(dt):
+    unc = random_uncertain(1, 0.3, dt)
+    own, general = (
+        l2_gain(unc, form=COARSE, search=None, solver=solver) for solver in ("LYAPUNOV", "CLARABEL")
+    )
+    assert own.gamma == pytest.approx(general.gamma, rel=CLOSE)
+    assert own.verify(rigorous=True)
+    assert stability(unc, form=COARSE, search=None, solver="LYAPUNOV").verify(rigorous=True)
+    wide = uncertain_pole(0.5, 0.6, 0.1)
+    assert searched(wide, 0.5, "l2 gain", solver="LYAPUNOV").proof is None
+
+
+def test_wrong_rates_and_channels_are_refused():
     unc = uncertain_pole(-1.0, 0.2)
     with pytest.raises(UnknownNameError, match="airspeed"):
         l2_gain(unc, {"airspeed": 1.0})
-    with pytest.raises(InputError, match="LYAPUNOV is for"):
-        l2_gain(unc, solver="LYAPUNOV")
     with pytest.raises(InputError, match="a gain needs inputs and outputs, got 0 and 1"):
         l2_gain(unc.select(inputs=[]))
