@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cholesky, eigh
 from scipy.special import gammaln, ndtri
-from scipy.stats import chi2
+from scipy.stats import binom, chi2
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
@@ -23,6 +23,8 @@ ROUNDING = 10 * np.finfo(float).eps
 """Times the square of the number of coefficients: what forming and factoring a matrix of ones on
 the diagonal may lose of its least eigenvalue (Rump, BIT Numerical Mathematics 46 (2006)).
 """
+CHANCE = 1e-6
+"""That a radius of draws is too small."""
 LOOSEST = 1e3
 """A cover that is verified only this many times larger than computed is none."""
 
@@ -69,14 +71,18 @@ class MatrixEllipsoid(NamedTuple):
         return (np.linalg.norm(D, 2, axis=(-2, -1)) <= self.bound) & (known == 0.0)
 
 
-def matrix_ellipsoid(covariance: object, probability: float) -> MatrixEllipsoid:
+def matrix_ellipsoid(
+    covariance: object, probability: float, draws: int = 0, seed: int = 0
+) -> MatrixEllipsoid:
     """The ellipsoid of matrices that holds a Gaussian matrix with at least this probability.
 
     The covariance P need not have the form Sigma (x) V^-1 of a matrix Gaussian: the nearest of that
     form is fitted (flip-flop iteration) and scaled until P <= s Sigma (x) V^-1, which is verified
     by a Cholesky factorisation with a margin for rounding. A Gaussian of smaller covariance is in
     every symmetric convex set at least as often (Anderson), so that the ball of the larger one
-    serves: `spectral_radius` times the root of s.
+    serves: `spectral_radius` times the root of s. That is proven, and larger than it need be; with
+    `draws` the radius is the least that holds so many of `draws` matrices of the covariance itself
+    that the probability is exceeded but for a chance of 1e-6.
 
     Parameters
     ----------
@@ -85,6 +91,10 @@ def matrix_ellipsoid(covariance: object, probability: float) -> MatrixEllipsoid:
         Coefficients without variance are known exactly.
     probability : float
         In (0, 1).
+    draws : int
+        0: the proven radius; else of that many draws, some thousands.
+    seed : int
+        Of the draws.
 
     Returns
     -------
@@ -95,7 +105,7 @@ def matrix_ellipsoid(covariance: object, probability: float) -> MatrixEllipsoid:
     ------
     InputError
         For another shape, a matrix that is no covariance or is one of no variance at all, a
-        probability outside (0, 1).
+        probability outside (0, 1), too few draws for it.
 
     References
     ----------
@@ -136,12 +146,13 @@ def matrix_ellipsoid(covariance: object, probability: float) -> MatrixEllipsoid:
     left, right, inflation = _cover(P)
     whole_left, whole_right = np.zeros((n, n)), np.zeros((m, m))
     whole_left[np.ix_(seen, seen)], whole_right[np.ix_(heard, heard)] = left, right
-    radius = spectral_radius(len(left), len(right), float(probability))
+    if draws:
+        bound = _drawn_radius(P, left, right, float(probability), draws, seed)
+    else:
+        bound = math.sqrt(inflation) * spectral_radius(len(left), len(right), float(probability))
     for array in (whole_left, whole_right):
         array.flags.writeable = False
-    return MatrixEllipsoid(
-        whole_left, whole_right, math.sqrt(inflation) * radius, float(probability), inflation
-    )
+    return MatrixEllipsoid(whole_left, whole_right, bound, float(probability), inflation)
 
 
 def spectral_radius(n: int, m: int, probability: float) -> float:
@@ -183,6 +194,31 @@ def spectral_radius(n: int, m: int, probability: float) -> float:
     if deviation < 0:  # the median bounds what is above it
         return frobenius
     return min(_mean_length(n) + _mean_length(m) + deviation, frobenius)
+
+
+def _drawn_radius(
+    P: Array, left: Array, right: Array, probability: float, draws: int, seed: int
+) -> float:
+    """An order statistic of the norm that is below its quantile with a chance of `CHANCE` at
+    most.
+    """
+    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 0:
+        raise InputError(f"draws: expected an integer >= 0, got {draws!r:.60}")
+    # below the quantile are so many of the draws, or more, with that chance
+    rank = int(binom.isf(CHANCE, draws, probability)) + 1
+    if rank > draws:
+        least = math.ceil(math.log(CHANCE) / math.log(probability))
+        raise InputError(
+            f"draws: expected at least {least} to tell a probability of {probability:g}, got"
+            f" {draws}"
+        )
+    m, n = P.shape[:2]
+    values, vectors = eigh(P.reshape(m * n, m * n))
+    white = np.random.default_rng(seed).standard_normal((draws, m * n))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    error = (white @ root.T).reshape(draws, m, n).swapaxes(1, 2)
+    D = np.linalg.solve(left, error) @ np.linalg.inv(right)
+    return float(np.sort(np.linalg.norm(D, 2, axis=(1, 2)))[rank - 1])
 
 
 def _mean_length(k: int) -> float:

@@ -41,6 +41,19 @@ def test_the_matrix_is_inside_at_least_as_often_as_promised(n, m):
 
 
 @pytest.mark.parametrize(("n", "m"), SIZES)
+def test_a_radius_of_draws_is_smaller_and_keeps_the_promise_too(n, m):
+    P, count = correlated(n, m), 20000
+    found = matrix_ellipsoid(P, 0.95, draws=20000, seed=7)
+    inside = found.contains(drawn(P, count)).mean()
+    error = math.sqrt(0.95 * 0.05 / count)
+    # both are counts of as many draws: the rank lies 4.75 standard errors up, and either scatters
+    assert 0.95 - 3 * error < inside < 0.95 + 11 * error
+    # the covariance of one output is a product: what is proven is exact there
+    proven = matrix_ellipsoid(P, 0.95).bound
+    assert found.bound < (proven if m > 1 else 1.02 * proven)
+
+
+@pytest.mark.parametrize(("n", "m"), SIZES)
 def test_the_cover_holds_in_exact_arithmetic(n, m):
     P = correlated(n, m)
     found = matrix_ellipsoid(P, 0.9)
@@ -98,6 +111,10 @@ def test_wrong_covariances_are_refused():
         matrix_ellipsoid(P + np.triu(np.ones((6, 6)), 1).reshape(P.shape), 0.9)
     with pytest.raises(InputError, match="known exactly"):
         matrix_ellipsoid(0 * P, 0.9)
+    with pytest.raises(InputError, match=r"at least 270 to tell a probability of 0\.95, got 200"):
+        matrix_ellipsoid(P, 0.95, draws=200)
+    with pytest.raises(InputError, match="integer >= 0"):
+        matrix_ellipsoid(P, 0.95, draws=-5)
     for probability in (0.0, 1.0, math.nan, True):
         with pytest.raises(InputError, match="probability"):
             matrix_ellipsoid(P, probability)
