@@ -55,11 +55,10 @@ def certify(asked: Question) -> Certificate:
     demand, search = asked.demand, asked.search
     sign = 1.0 if asked.gains else -1.0
     start = time.perf_counter()
-    model, delta = _worst_member(asked)
-    frozen = worst_frozen(model, measure(demand, model.dt))
+    model, frozen, delta, unstable = _worst_member(asked)
     report = _Report(asked)
     if math.isinf(frozen.value) if asked.gains else frozen.value >= 0:
-        at = unstable_at(model, frozen.p or ())
+        at = unstable or unstable_at(model, frozen.p or ())
         if at is not None:
             p = np.array(at) if len(at) == 1 else np.array([at])
             beaten = Beaten(
@@ -95,19 +94,32 @@ def certify(asked: Question) -> Certificate:
     return cert if stability else cert.resting_on(said(search and search.seconds, beaten.seconds))
 
 
-def _worst_member(asked: Question) -> tuple[Pieces, Array | None]:
-    """The model that no proof can beat is looked for in, and which Delta it is where a whole set
-    is asked about: the worst one found.
+class _Member(NamedTuple):
+    """The `model` along whose motions no proof can go lower, and the worst `frozen` one.
+
+    Of a set the one with `perturbation`; where no basis holds it the nominal one, beside the frozen
+    one with the perturbation, which is `unstable` at some p or nowhere (None).
     """
-    unc = asked.uncertain
+
+    model: Pieces
+    frozen: Worst
+    perturbation: Array | None = None
+    unstable: tuple[float, ...] | None = None
+
+
+def _worst_member(asked: Question) -> _Member:
+    unc, size = asked.uncertain, measure(asked.demand, asked.model.dt)
     if unc is None:
-        return asked.model, None
-    delta = worst_perturbation(unc, gains=asked.gains).delta
+        return _Member(asked.model, worst_frozen(asked.model, size))
+    found = worst_perturbation(unc, gains=asked.gains)
     try:
-        return pieces(unc.perturbed(delta)), delta
+        model = pieces(unc.perturbed(found.delta))
     except InputError:
-        # a basis that does not hold the products: the nominal model is one of the set
-        return asked.model, np.zeros(unc.shape)
+        at = (found.p,)
+        return _Member(
+            asked.model, Worst(found.value, at), found.delta, at if found.unstable else None
+        )
+    return _Member(model, worst_frozen(model, size), found.delta)
 
 
 def route(asked: Question) -> Ladder:

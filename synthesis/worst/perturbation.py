@@ -18,6 +18,7 @@ from symheli.lpv import Matrices, UncertainStateSpace
 from symheli.values.signal import indices
 from synthesis.worst.frozen import norm
 from synthesis.worst.over_box import worst_over
+from synthesis.worst.spectrum import surely_unstable
 
 Array = np.ndarray
 
@@ -35,13 +36,14 @@ SEED = 0
 
 
 class Perturbed(NamedTuple):
-    """`delta` (nd, nv), and the worst value of its frozen models: the gain, or the growth in 1/s or
-    a sample (logarithm), at `p`.
+    """`delta` (nd, nv), and the worst value of its frozen models, at `p`: the gain, or the growth
+    in 1/s. `unstable` there, beyond rounding.
     """
 
     delta: Array
     value: float
     p: float
+    unstable: bool = False
 
 
 def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
@@ -72,7 +74,7 @@ def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
                 break
         if best.value == math.inf:
             break
-    return best
+    return best._replace(unstable=surely_unstable(frozen.closed(best.delta, best.p).A, unc.dt))
 
 
 class _Frozen(NamedTuple):
@@ -121,7 +123,7 @@ class _Frozen(NamedTuple):
     def _growth(self, poles: Array) -> float:
         if self.unc.dt is None:
             return float(np.real(poles).max())
-        return math.log(max(float(np.abs(poles).max()), 1e-300))
+        return math.log(max(float(np.abs(poles).max()), 1e-300)) / self.unc.dt
 
     def slope(self, at: Matrices) -> Array:
         """The derivative of the value by Delta, (nd, nv), up to a positive factor."""

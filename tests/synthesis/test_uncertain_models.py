@@ -197,9 +197,12 @@ def test_a_spline_that_holds_no_products_is_certified_too():
     assert cert.lower == pytest.approx(2.0, rel=1e-6)  # 1/(1 - 0.5) at the kink
     assert cert.verify(rigorous=True)
     both = l2_gain(kinked([0.5, 1.0, 0.2], [0.5, 1.0, 0.2]))
-    # no member can be written down: the bound from below is that of the nominal one
-    assert both.lower == pytest.approx(1.0, rel=1e-6)
+    # no member can be written down, but each can be frozen
+    assert both.lower == pytest.approx(2.0, rel=1e-6)
     assert 2.0 <= both.gamma < 2.0 * (1 + CLOSE)
+    unstable = kinked([1.0, 2.1, 1.0], [0.5, 1.0, 0.2])
+    for cert in (l2_gain(unstable), stability(unstable)):
+        assert cert.status is Status.UNSTABLE
 
 
 def test_a_certificate_says_for_which_perturbations_and_with_what_promise():
