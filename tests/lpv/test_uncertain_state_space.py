@@ -14,16 +14,18 @@ P = np.linspace(0.0, 13.0, 7)
 
 
 def uncertain(dt=None, degree=1, bound=0.3):
-    """Two states, inputs u w, outputs y z, Delta (2, 3), everything a polynomial of `degree`."""
+    """Two states, inputs u w, outputs y z, Delta (2, 3), all but the feedthrough to y and z a
+    polynomial of `degree`.
+    """
     rng = np.random.default_rng(0)
 
     def powers(*shape):
         return [rng.standard_normal(shape) / 13.0**k for k in range(degree + 1)]
 
     D = powers(5, 4)
-    for M in D:
-        M[2:, 2:] = 0.0
-    D = [D[0], *(0 * M for M in D[1:])]
+    for k, M in enumerate(D):
+        M[2:, 2:] = M[0, 2:] = 0.0  # no loop through the block alone, nor through y
+        M[:2] *= k == 0
     model = LPVStateSpace.polynomial(
         *(powers(2, 2), powers(2, 4), powers(5, 2), D, SPEED, dt),
         inputs=["u", "w", "d1", "d2"],
