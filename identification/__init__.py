@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from identification.judge.dependence import DependenceReport, dependence_report
     from identification.judge.frequency_response import FrequencyResponse, frequency_response
     from identification.judge.frozen_models import FrozenModels, frozen_models, pole_miss
+    from identification.judge.matrix_ellipsoid import MatrixEllipsoid, matrix_ellipsoid
     from identification.judge.order_scan import OrderScan, Trial, order_scan
     from identification.judge.residuals import ResidualAnalysis, Theil, residual_analysis, theil
     from identification.judge.response_band import ResponseBand
@@ -109,6 +110,7 @@ _ROOMS = {
     "identification.judge.dependence": "DependenceReport dependence_report",
     "identification.judge.frequency_response": "FrequencyResponse frequency_response",
     "identification.judge.frozen_models": "FrozenModels frozen_models pole_miss",
+    "identification.judge.matrix_ellipsoid": "MatrixEllipsoid matrix_ellipsoid",
     "identification.judge.order_scan": "OrderScan Trial order_scan",
     "identification.judge.residuals": "ResidualAnalysis Theil residual_analysis theil",
     "identification.judge.response_band": "ResponseBand",
@@ -161,6 +163,7 @@ __all__ = [
     "LaggedSignals",
     "Lasso",
     "LeastSquares",
+    "MatrixEllipsoid",
     "Method",
     "Online",
     "OrderScan",
@@ -197,6 +200,7 @@ __all__ = [
     "fit_percent",
     "frequency_response",
     "frozen_models",
+    "matrix_ellipsoid",
     "order_scan",
     "pole_miss",
     "residual_analysis",

@@ -47,6 +47,7 @@ from symheli.lpv.nu_gap import chordal_distance, nu_gap
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
 from symheli.lpv.trim_schedule import TrimSchedule
+from symheli.lpv.uncertain_state_space import UncertainStateSpace
 
 __all__ = [
     "LFT",
@@ -70,6 +71,7 @@ __all__ = [
     "Spline",
     "TrimSchedule",
     "Truncation",
+    "UncertainStateSpace",
     "UserFunctions",
     "WellPosedness",
     "append",
