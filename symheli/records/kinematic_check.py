@@ -14,9 +14,8 @@ from scipy.stats import t as student
 from symheli.errors import InputError
 from symheli.records.flight_path import WINDOW
 from symheli.records.flight_record import FlightRecord
-from symheli.records.kinematics import ANGLES, FORCES, GRAVITY, RATES, VELOCITIES
+from symheli.records.kinematics import ANGLES, FORCES, GRAVITY, RATES, VELOCITIES, comparable
 from symheli.records.sensor_faults import (
-    COMPARED,
     DEGREES,
     FEWEST,
     FOLLOWS,
@@ -188,8 +187,7 @@ def check_kinematics(record: FlightRecord) -> KinematicCheck:
     step = float(np.median(np.diff(record.time)))
     rows = tuple(
         _row(record.signals[record.signals.index(name)], found, limit, step, record.signals)
-        for name in COMPARED
-        if name in record.signals
+        for name in comparable(record.signals)
     )
     return KinematicCheck(rows, found.windows, limit)
 

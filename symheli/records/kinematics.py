@@ -12,6 +12,7 @@ import numpy as np
 
 from symheli.records.flight_path import Channel, Kinematics, Windows
 from symheli.values.arrays import Array
+from symheli.values.signal import Signal
 from symheli.values.units import to_si
 
 RATES = ("p", "q", "r")
@@ -20,7 +21,27 @@ VELOCITIES = ("u", "v", "w")
 FORCES = ("ax", "ay", "az")
 """Specific forces, what accelerometers read: 0 0 -g in level hover; m/s^2."""
 
+COMPARED = (*RATES, *ANGLES, *VELOCITIES, *FORCES)
+UNIT = {
+    **dict.fromkeys(RATES, "rad/s"),
+    **dict.fromkeys(ANGLES, "rad"),
+    **dict.fromkeys(VELOCITIES, "m/s"),
+    **dict.fromkeys(FORCES, "m/s^2"),
+}
+
 GRAVITY, _ = to_si("g")
+
+
+def comparable(signals: Sequence[Signal]) -> list[str]:
+    """Which of the signals these kinematics tie together are there, in their unit."""
+    units = {str(signal): signal.unit for signal in signals}
+    return [name for name in COMPARED if units.get(name) == UNIT[name]]
+
+
+def lacking(signals: Sequence[Signal]) -> list[str]:
+    """Which are not, of those without which nothing can be compared."""
+    there = comparable(signals)
+    return [name for name in (*RATES, *ANGLES[:2]) if name not in there]
 
 
 def attitude(windows: Windows, signals: Mapping[str, Array]) -> Kinematics:

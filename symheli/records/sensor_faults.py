@@ -29,12 +29,12 @@ from symheli.records.kinematics import (
     VELOCITIES,
     attitude,
     axis,
+    comparable,
     continuous,
+    lacking,
     motion,
 )
 from symheli.values.arrays import Array
-
-COMPARED = (*RATES, *ANGLES, *VELOCITIES, *FORCES)
 
 SCALE, RATE_BIAS, TILT, FORCE_BIAS = 0.02, 0.005, pi / 180, 0.3
 """What an identification bears: 2 %, 0.3 deg/s, 1 deg, and the specific force (m/s^2) of 1.8 deg of
@@ -99,13 +99,13 @@ def sensor_faults(record: FlightRecord) -> Faults:
     """Of p q r phi theta, psi where recorded, and u v w ax ay az where all are; see
     `check_kinematics`.
     """
-    names = [name for name in COMPARED if name in record.signals]
-    lacking = [name for name in (*RATES, *ANGLES[:2]) if name not in names]
-    if lacking:
+    missing = lacking(record.signals)
+    if missing:
         raise InputError(
-            "the kinematics tie p q r to phi theta; the record lacks"
-            f" {', '.join(lacking)}: add them by record.with_signals, or rename them"
+            "the kinematics tie p q r (rad/s) to phi theta (rad); the record lacks"
+            f" {', '.join(missing)}: add them by record.with_signals, with their unit"
         )
+    names = comparable(record.signals)
     table = record.columns(names)
     whole = np.where(np.isfinite(table).all(axis=1), 0.0, np.nan)
     stretches = [
@@ -197,7 +197,7 @@ class _Fit:
             )
             both = np.flatnonzero(self.free[[i, 3 + i]]) * 3 + i
             slopes = np.array([-offset / inverse**2, 1 / inverse])[(both - i) // 3] / f
-            variance = slopes @ self.found.covariance[np.ix_(both, both)] @ slopes
+            variance = slopes @ self.found.covariance[both][:, both] @ slopes
             faults.bias[name] = Estimate(
                 float(offset / (f * inverse)), float(np.sqrt(variance)) if self.free[3 + i] else inf
             )

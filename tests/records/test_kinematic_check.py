@@ -125,7 +125,9 @@ def test_faults_of_every_kind_come_back_within_their_errors(seed):
         assert estimate.standard_error < 0.2 * abs(true)
     assert {row.signal for row in found.inconsistent} == {"p", "q", "psi", "u", "az", "ay"}
     assert "(3.5 samples) after the rates" in found["psi"].verdict
-    with pytest.raises(InputError, match=r"p: it reads -0\.03\d* rad/s too much: subtract it; q: it"):
+    with pytest.raises(
+        InputError, match=r"p: it reads -0\.03\d* rad/s too much: subtract it; q: it"
+    ):
         found.require()
 
 
