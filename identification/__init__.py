@@ -43,8 +43,13 @@ if TYPE_CHECKING:
         compare_experiments,
     )
     from identification.estimators.estimate import fit
+    from identification.estimators.filter_error import FilterError
     from identification.estimators.instrumental_variables import InstrumentalVariables
-    from identification.estimators.instruments import InstrumentSource, LaggedSignals
+    from identification.estimators.instruments import (
+        FlightSource,
+        InstrumentSource,
+        LaggedSignals,
+    )
     from identification.estimators.lasso import Lasso
     from identification.estimators.least_squares import LeastSquares
     from identification.estimators.method import Estimate, Method
@@ -69,6 +74,7 @@ if TYPE_CHECKING:
     from identification.judge.slow_modes import SlowMode, SlowModes, slow_modes
     from identification.judge.uncertainty import Band, Uncertainty, uncertainty
     from identification.model.coefficients import Coefficients, CoefficientValues
+    from identification.model.kinematic_model import KinematicModel
     from identification.model.lpvarx_model import LPVARXModel
     from identification.model.prediction import fit_percent
     from identification.recursive.forgetting import Constant, Directional, Forgetting, Variable
@@ -76,6 +82,7 @@ if TYPE_CHECKING:
     from identification.recursive.online import Online
     from identification.recursive.recursive_least_squares import RecursiveLeastSquares
     from identification.recursive.rls_state import RLSInfo, RLSState
+    from identification.structure.kinematic_arx import KinematicARX
     from identification.structure.lpvarx import LPVARX, Entry, Group, Term
     from symheli.lpv import BSpline, PiecewiseLinear, Polynomial, Product, Spline, UserFunctions
 
@@ -85,8 +92,9 @@ _ROOMS = {
         "Experiment Plan choose_experiments compare_experiments"
     ),
     "identification.estimators.estimate": "fit",
+    "identification.estimators.filter_error": "FilterError",
     "identification.estimators.instrumental_variables": "InstrumentalVariables",
-    "identification.estimators.instruments": "InstrumentSource LaggedSignals",
+    "identification.estimators.instruments": "FlightSource InstrumentSource LaggedSignals",
     "identification.estimators.lasso": "Lasso",
     "identification.estimators.least_squares": "LeastSquares",
     "identification.estimators.method": "Estimate Method",
@@ -108,6 +116,7 @@ _ROOMS = {
     "identification.judge.slow_modes": "SlowMode SlowModes slow_modes",
     "identification.judge.uncertainty": "Band Uncertainty uncertainty",
     "identification.model.coefficients": "Coefficients CoefficientValues",
+    "identification.model.kinematic_model": "KinematicModel",
     "identification.model.lpvarx_model": "LPVARXModel",
     "identification.model.prediction": "fit_percent",
     "identification.recursive.forgetting": "Constant Directional Forgetting Variable",
@@ -115,6 +124,7 @@ _ROOMS = {
     "identification.recursive.online": "Online",
     "identification.recursive.recursive_least_squares": "RecursiveLeastSquares",
     "identification.recursive.rls_state": "RLSInfo RLSState",
+    "identification.structure.kinematic_arx": "KinematicARX",
     "identification.structure.lpvarx": "LPVARX Entry Group Term",
     "symheli.lpv": ("BSpline PiecewiseLinear Polynomial Product Spline UserFunctions"),
 }
@@ -136,6 +146,8 @@ __all__ = [
     "Estimate",
     "ExcitationReport",
     "Experiment",
+    "FilterError",
+    "FlightSource",
     "Forgetting",
     "FrequencyResponse",
     "FrozenModels",
@@ -143,6 +155,8 @@ __all__ = [
     "History",
     "InstrumentSource",
     "InstrumentalVariables",
+    "KinematicARX",
+    "KinematicModel",
     "LPVARXModel",
     "LaggedSignals",
     "Lasso",

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         ScheduledController,
         Sensor,
         Servo,
+        SimulatedFlight,
         fly,
         fly_batch,
         fly_campaign,
@@ -96,7 +97,7 @@ _ROOMS = {
     ),
     "symheli.flight": (
         "AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightDataset"
-        " FlightPlan ScheduledController Sensor Servo fly fly_batch fly_campaign"
+        " FlightPlan ScheduledController Sensor Servo SimulatedFlight fly fly_batch fly_campaign"
         " gain_scheduled_lqr"
     ),
     "symheli.flight.stitched_model": "StitchedModel",
@@ -152,6 +153,7 @@ __all__ = [
     "Sensor",
     "Servo",
     "Signal",
+    "SimulatedFlight",
     "SolverError",
     "StitchedModel",
     "SymheliError",

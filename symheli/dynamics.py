@@ -17,7 +17,6 @@ from symheli.errors import InputError
 from symheli.physics import inflow
 from symheli.physics.drivetrain import Drive, ideal_governor, pi_governor
 from symheli.physics.rigid_body import (
-    GRAVITY,
     body_to_earth,
     euler_rates,
     gravity_euler,
@@ -25,6 +24,7 @@ from symheli.physics.rigid_body import (
     rotation,
     translation,
 )
+from symheli.values.kinematics import GRAVITY
 from symheli.values.signal import Signal, signals
 
 VELOCITY = signals(("u", "v", "w", "p", "q", "r"))

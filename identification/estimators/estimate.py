@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
+from typing import overload
 
 from identification.design.excitation import excitation_of
 from identification.design.leakage import warn_of_leakage
 from identification.estimators import (  # noqa: F401  known by their shorthand once loaded
+    filter_error,
     instrumental_variables,
     lasso,
     output_error,
@@ -17,23 +19,44 @@ from identification.estimators import (  # noqa: F401  known by their shorthand 
 )
 from identification.estimators.least_squares import residual_covariance
 from identification.estimators.method import Method, method_of
+from identification.model.kinematic_fit import mean_trim
+from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
+from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
 from symheli.records import FlightRecord
+from symheli.values.arrays import Array
 
 
+@overload
+def fit(
+    structure: KinematicARX,
+    records: FlightRecord | Iterable[FlightRecord],
+    method: Method | str = "ls",
+) -> KinematicModel: ...
+
+
+@overload
 def fit(
     structure: LPVARX,
     records: FlightRecord | Iterable[FlightRecord],
     method: Method | str = "ls",
-) -> LPVARXModel:
+) -> LPVARXModel: ...
+
+
+def fit(
+    structure: LPVARX | KinematicARX,
+    records: FlightRecord | Iterable[FlightRecord],
+    method: Method | str = "ls",
+) -> LPVARXModel | KinematicModel:
     """Identify the coefficients of a structure from one record or several.
 
     Parameters
     ----------
-    structure : LPVARX
-        Signals, orders, delays and the basis in the scheduling parameters.
+    structure : LPVARX or KinematicARX
+        Signals, orders, delays and the basis in the scheduling parameters; with known kinematics
+        only the aerodynamics are fitted.
     records : FlightRecord or iterable of FlightRecord
         Of one sample period and in the same units; lags never reach across a gap or from one record
         into the next.
@@ -53,7 +76,7 @@ def fit(
 
     Returns
     -------
-    LPVARXModel
+    LPVARXModel, or KinematicModel of a KinematicARX
         Its `method` is the shorthand, its `excitation` the report on the data, its `details` what
         the method chose (weights, iterations, strength of the instruments).
 
@@ -91,8 +114,29 @@ def fit(
     >>> print(found.coefficients.at(0.0).A.round(2))
     [[[-0.5]]]
     """
+    if isinstance(structure, KinematicARX):
+        records = as_records(records)
+        aerodynamics, covariance = _fitted(structure.aerodynamics, records, method)
+        return KinematicModel(
+            structure=structure,
+            aerodynamics=aerodynamics,
+            trim=mean_trim(structure, records),
+            coefficient_covariance=covariance,
+        )
+    return _fitted(structure, records, method)[0]
+
+
+def _fitted(
+    structure: LPVARX,
+    records: FlightRecord | Iterable[FlightRecord],
+    method: Method | str,
+) -> tuple[LPVARXModel, Array | None]:
+    """The model of a regression, and the covariance of its coefficients where the method says
+    it.
+    """
     require_structure(structure)
-    method, records = method_of(method), as_records(records)
+    method = method_of(method)
+    records = tuple(structure.prepared(record) for record in as_records(records))
     outputs, inputs = units_of(structure.outputs, records), units_of(structure.inputs, records)
     scheduling = units_of(structure.parameters, records)
     warn_of_leakage(structure, records)
@@ -102,11 +146,11 @@ def fit(
         report.require()
     found = method.estimate(structure, records, data)
     for remark in found.remarks:
-        warnings.warn(remark, stacklevel=2)
+        warnings.warn(remark, stacklevel=3)
     covariance = found.residual_covariance
     if covariance is None:
         covariance = residual_covariance(structure, data.phi, data.y, found.theta)
-    return LPVARXModel(
+    model = LPVARXModel(
         structure=structure,
         theta=found.theta,
         dt=records[0].dt,
@@ -120,3 +164,4 @@ def fit(
         excitation=report,
         details=found.details,
     )
+    return model, found.covariance

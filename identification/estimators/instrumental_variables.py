@@ -18,6 +18,7 @@ from identification.design.excitation import (
 )
 from identification.estimators.first_stage import WEAK, FirstStage, first_stage
 from identification.estimators.instruments import (
+    FlightSource,
     Instruments,
     InstrumentSource,
     column_space,
@@ -45,9 +46,11 @@ class InstrumentalVariables(Method):
 
     Parameters
     ----------
-    instruments : str, sequence of str, or InstrumentSource
+    instruments : str, sequence of str, InstrumentSource or FlightSource
         Names of signals of the record, `LaggedSignals` of them with their window, or another
         source. In closed loop name what is added to the stabilised inputs, in open loop the inputs.
+        A `FlightSource` such as `symheli.SimulatedFlight` gives the regressors themselves as a
+        simulator flies them: theta = (Z' Phi)^-1 Z' Y.
 
     Raises
     ------
@@ -57,7 +60,9 @@ class InstrumentalVariables(Method):
     References
     ----------
     Soderstrom and Stoica (1989), System Identification, ch. 8; Ljung (1999), sec. 15.3. Strength:
-    Staiger and Stock, Econometrica 65 (1997).
+    Staiger and Stock, Econometrica 65 (1997). Instruments from a simulator: Gilson, Garnier and Van
+    den Hof (2004), American Control Conference; Larsson, Sobron, Lundstrom and Enqvist (2020),
+    Aerospace 7(9).
 
     Examples
     --------
@@ -109,7 +114,7 @@ def starting_point(
     arx: LPVARX,
     records: Sequence[FlightRecord],
     data: Regression,
-    source: InstrumentSource | None,
+    source: InstrumentSource | FlightSource | None,
 ) -> Array:
     """theta (n, ny) from which an iteration starts: by instruments, or without them by least
     squares.
@@ -120,7 +125,10 @@ def starting_point(
 
 
 def instrumental_variables(
-    arx: LPVARX, records: Sequence[FlightRecord], data: Regression, source: InstrumentSource
+    arx: LPVARX,
+    records: Sequence[FlightRecord],
+    data: Regression,
+    source: InstrumentSource | FlightSource,
 ) -> tuple[Array, FirstStage]:
     """theta (n, ny) by two-stage least squares with more instruments than unknowns, and how strong
     they are where they are weakest.
@@ -149,7 +157,12 @@ def instrumental_variables(
 
 
 def _two_stages(
-    phi: Array, y: Array, W: Array, Q: Array, names: tuple[str, ...], source: InstrumentSource
+    phi: Array,
+    y: Array,
+    W: Array,
+    Q: Array,
+    names: tuple[str, ...],
+    source: InstrumentSource | FlightSource,
 ) -> Array:
     n = phi.shape[1]
     if W.shape[1] < n or len(W) < W.shape[1]:

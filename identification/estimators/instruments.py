@@ -13,6 +13,7 @@ import numpy as np
 from identification.design.excitation import RANK_TOLERANCE, column_scale
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import (
+    Samples,
     basis_values,
     regressor_rows,
     scheduling_values,
@@ -64,7 +65,35 @@ class InstrumentSource(Protocol):
         ...
 
 
-Instruments = str | Sequence[str] | InstrumentSource
+@runtime_checkable
+class FlightSource(Protocol):
+    """The flight of a record once more, without what disturbed and blurred it: its regressors are
+    the instruments, as many as there are coefficients.
+
+    `symheli.SimulatedFlight` flies the plan of the record in a simulator. That may be wrong: the
+    regressors of its flight depend on nothing but what was commanded.
+
+    Examples
+    --------
+    >>> class Clean:
+    ...     def flown(self, record):
+    ...         y = np.zeros(len(record))
+    ...         for k in range(1, len(y)):
+    ...             y[k] = 0.4 * y[k - 1] + record["u"][k - 1]
+    ...         return record.with_signals({"y": "1"}, y=y)
+    >>> isinstance(Clean(), idn.FlightSource)
+    True
+    >>> found = idn.fit(arx, record, method=idn.InstrumentalVariables(Clean()))
+    >>> print(found.coefficients.at(0.0).A.round(2))
+    [[[-0.5]]]
+    """
+
+    def flown(self, record: FlightRecord) -> FlightRecord:
+        """A record at the times of `record`, with the signals the structure needs."""
+        ...
+
+
+Instruments = str | Sequence[str] | InstrumentSource | FlightSource
 """A source of instruments, or the names of signals of the record with the defaults of
 `LaggedSignals`.
 """
@@ -129,11 +158,11 @@ class LaggedSignals:
         return tuple(int(i) for i in np.unique(np.round(np.linspace(first, last, count))))
 
 
-def source_of(instruments: Instruments) -> InstrumentSource:
+def source_of(instruments: Instruments) -> InstrumentSource | FlightSource:
     """A source itself, or names of signals at the default lags; raises `InputError` for anything
     else.
     """
-    if isinstance(instruments, InstrumentSource):
+    if isinstance(instruments, InstrumentSource | FlightSource):
         return instruments
     if isinstance(instruments, str | list | tuple):
         return LaggedSignals(instruments)  # type: ignore[arg-type]
@@ -144,14 +173,39 @@ def source_of(instruments: Instruments) -> InstrumentSource:
 
 
 def instrument_rows(
-    arx: LPVARX, records: Sequence[FlightRecord], source: InstrumentSource, first: int
+    arx: LPVARX,
+    records: Sequence[FlightRecord],
+    source: InstrumentSource | FlightSource,
+    first: int,
 ) -> Array:
     """Instruments (n, m) of every sample of the records, from lag `first` on, NaN where one is
     missing.
 
-    Offsets and the increment of p instrument themselves.
+    Offsets and the increment of p instrument themselves; of a `FlightSource` they are those of the
+    flight, as all its regressors are.
     """
+    if isinstance(source, FlightSource):
+        return np.vstack([flown_rows(arx, record, source) for record in records])
     return np.vstack([_rows(arx, record, source, first) for record in records])
+
+
+def flown_rows(arx: LPVARX, record: FlightRecord, source: FlightSource) -> Array:
+    """Regressors (n, n_regressors) of the flight a source makes of a record, NaN without a full
+    past; raises `InputError` where its samples are not those of the record.
+    """
+    flown = source.flown(record)
+    if len(flown) != len(record) or not np.allclose(flown.time, record.time, atol=1e-3 * record.dt):
+        raise InputError(
+            f"{source} flew other samples than those of the record: {len(flown)} from"
+            f" {flown.time[0]:.6g} s, not {len(record)} from {record.time[0]:.6g} s"
+        )
+    s, out = Samples.of(arx, flown), np.full((len(record), arx.n_regressors), np.nan)
+    for part in record.segments():
+        if part.stop - part.start > arx.memory:
+            out[part.start + arx.memory : part.stop] = regressor_rows(
+                arx, s.y[part], s.u[part], s.p[part], s.f[part]
+            )
+    return out
 
 
 def _rows(arx: LPVARX, record: FlightRecord, source: InstrumentSource, first: int) -> Array:
@@ -193,7 +247,7 @@ def column_space(W: Array) -> Array:
 
 
 def explained(
-    arx: LPVARX, records: Sequence[FlightRecord], source: InstrumentSource
+    arx: LPVARX, records: Sequence[FlightRecord], source: InstrumentSource | FlightSource
 ) -> tuple[list[FlightRecord], list[FlightRecord]]:
     """The records, and the same with inputs and outputs replaced by what the instruments explain of
     them (least squares, lags from 0 on).

@@ -30,6 +30,8 @@ class Estimate:
         The warnings `fit` issues.
     residual_covariance : array (ny, ny), optional
         Of the one-step residuals; None: that of the batch of regressors.
+    covariance : array (ny, n_regressors, ny, n_regressors), optional
+        Of all coefficients together, where the method knows it.
 
     Examples
     --------
@@ -41,6 +43,7 @@ class Estimate:
     details: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[Warning, ...] = ()
     residual_covariance: Array | None = None
+    covariance: Array | None = None
 
 
 class Method(ABC):

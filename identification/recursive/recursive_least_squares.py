@@ -139,7 +139,7 @@ class RecursiveLeastSquares:
                 f"run takes one record, got {len(records)}; go on from its state: run(second,"
                 " run(first).state)"
             )
-        record = records[0]
+        record = arx.prepared(records[0])
         s, online = Samples.of(arx, record), self.online(state)
         rows = np.column_stack([s.y, s.u, s.p])
         online.forget_past()

@@ -14,6 +14,7 @@ import numpy as np
 from identification.structure.orders import Orders, Table, compact, table
 from symheli.errors import InputError
 from symheli.lpv import Basis, FunctionSpace, Polynomial, Product
+from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 
@@ -354,6 +355,12 @@ class LPVARX:
             for name in self.channels(t)
             for j in range(self.basis.size)
         )
+
+    def prepared(self, record: FlightRecord) -> FlightRecord:
+        """The record with every signal the structure needs: as it is, unless a structure derives
+        some of them.
+        """
+        return record
 
     def lti(self) -> LPVARX:
         """The same signals, orders and delays with constant coefficients: the baseline that

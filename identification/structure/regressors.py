@@ -42,6 +42,7 @@ class Samples:
         """Raises `UnknownNameError` for a signal the record lacks, `InputError` where p leaves the
         basis or a size is absurd.
         """
+        record = arx.prepared(record)
         p = scheduling_values(arx, record)
         for name in (*arx.outputs, *arx.inputs):
             _check_size(name, record[name])

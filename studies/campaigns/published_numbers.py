@@ -17,7 +17,7 @@ from scipy.optimize import root
 import symheli
 from symheli import Helicopter
 from symheli.errors import SymheliError
-from symheli.physics.rigid_body import GRAVITY
+from symheli.values.kinematics import GRAVITY
 
 SPEEDS = (0.0, 3.0, 5.0, 10.0, 15.0, 20.0, 25.0)
 Y_V = (-0.038, -0.047, -0.0485, -0.060, -0.072, -0.0805, -0.086)

@@ -11,6 +11,7 @@ from symheli.flight.plan import FlightPlan
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import XCELL_SERVOS, Servo, ServoBank
+from symheli.flight.simulated_flight import SimulatedFlight
 
 __all__ = [
     "XCELL_SERVOS",
@@ -25,6 +26,7 @@ __all__ = [
     "Sensor",
     "Servo",
     "ServoBank",
+    "SimulatedFlight",
     "fly",
     "fly_batch",
     "fly_campaign",

@@ -137,5 +137,6 @@ def _table(heli: Helicopter, plan: FlightPlan) -> list[tuple[Signal, str, int]]:
     if not plan.wind.is_steady:
         table += [(Signal(name), "wind", i) for i, name in enumerate(WIND)]
     table += [(Signal("airspeed"), "out", nx + 8), (Signal("airspeed_command"), "command", 0)]
+    table.append((Signal("acceleration_command", "m/s^2"), "command", 1))
     held = (Signal(f"{s}_reference", s.unit) for s in (*heli.states, *heli.inputs))
     return table + [(s, "reference", i) for i, s in enumerate(held)]

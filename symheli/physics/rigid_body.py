@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from symheli.codegen.symbolic import cos, sin, tan
-
-GRAVITY = 9.81
-"""Gravity, m/s^2, to the digits the published numbers of the airframe were computed with."""
+from symheli.values.kinematics import GRAVITY
 
 
 def translation(

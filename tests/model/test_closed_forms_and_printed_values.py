@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import symheli
-from symheli.physics.rigid_body import GRAVITY
+from symheli.values.kinematics import GRAVITY
 
 M, RHO, OM, R, C, SLOPE = 8.2, 1.225, 167.0, 0.775, 0.058, 5.5
 SIGMA, ETA = 2 * C / (math.pi * R), 0.9

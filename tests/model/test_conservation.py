@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import symheli
-from symheli.physics.rigid_body import GRAVITY
+from symheli.values.kinematics import GRAVITY
 
 NO_AIR = {"density": 1e-30, "main_rotor.hub_stiffness": 0.0}
 """Without air there is no thrust, and without stiffness the hub passes on no flapping: gravity and

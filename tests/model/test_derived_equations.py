@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 import symheli
 from symheli.physics.rigid_body import (
-    GRAVITY,
     body_to_earth,
     euler_rates,
     gravity_euler,
@@ -19,6 +18,7 @@ from symheli.physics.rigid_body import (
     rotation,
     translation,
 )
+from symheli.values.kinematics import GRAVITY
 
 DRAWS = 20
 

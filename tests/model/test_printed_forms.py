@@ -11,7 +11,7 @@ import pytest
 
 import symheli
 from symheli.airframe.printed_forms import PRINTED
-from symheli.physics.rigid_body import GRAVITY
+from symheli.values.kinematics import GRAVITY
 
 OFF_TRIM = {
     "u": 6.0,

@@ -1,0 +1,233 @@
+"""An identified rigid vehicle: known kinematics around identified aerodynamics."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from identification.model import kinematic_run
+from identification.model.kinematic_realization import Realization
+from identification.model.kinematic_run import Run
+from identification.model.lpvarx_model import LPVARXModel
+from identification.model.prediction import fit_percent, require_horizon
+from identification.structure.kinematic_arx import STATES, KinematicARX
+from symheli.errors import InputError
+from symheli.lpv import LinearModel, LPVStateSpace
+from symheli.records import FlightRecord
+from symheli.values import NamedVector, Signal
+from symheli.values.arrays import Array, frozen
+from symheli.values.kinematics import RIGID_BODY
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class KinematicModel:
+    """A `KinematicARX` with its coefficients, as `fit` returns it.
+
+    Parameters
+    ----------
+    structure : KinematicARX
+        Signals, lags, basis.
+    aerodynamics : LPVARXModel
+        The regression: coefficients, residual covariance, what the method said.
+    trim : array (basis size, 8)
+        u v w p q r phi theta at steady p, as functions of p: the mean of the records there. What
+        the kinematics are linearized about in `at` and `to_state_space`, and nothing else.
+    coefficient_covariance : array (6, n, 6, n), optional
+        Of all coefficients together, (equation, regressor, equation, regressor).
+
+    Raises
+    ------
+    InputError
+        Shapes, or a regression, that are not those of the structure.
+
+    Examples
+    --------
+    >>> import identification as idn, symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> plan = symheli.AirspeedSchedule((6.0, 2.0), (1.5, 1.5), (2.0, 2.0), start=2.0)
+    >>> excitation = symheli.Excitation(dict.fromkeys(heli.inputs, 0.01))
+    >>> flight = symheli.fly(heli, plan, excitation=excitation)
+    >>> kin = idn.KinematicARX(
+    ...     heli.inputs, "airspeed_command", basis=idn.Polynomial(1, 2.0, 6.0))
+    >>> model = idn.fit(kin, flight)
+    >>> model.predict(flight, horizon=25).shape[1], bool(model.score(flight, 25)["p"] > 90)
+    (8, True)
+    """
+
+    structure: KinematicARX
+    aerodynamics: LPVARXModel
+    trim: Array
+    coefficient_covariance: Array | None = None
+
+    def __post_init__(self) -> None:
+        n, size = self.structure.n_regressors, self.structure.basis.size
+        object.__setattr__(self, "trim", frozen(self.trim, "trim", (size, len(STATES))))
+        if self.aerodynamics.structure != self.structure.aerodynamics:
+            raise InputError("aerodynamics: another regression than that of the structure")
+        if self.coefficient_covariance is not None:
+            covariance = frozen(self.coefficient_covariance, "coefficient covariance", (6, n, 6, n))
+            object.__setattr__(self, "coefficient_covariance", covariance)
+
+    # --- what it is ------------------------------------------------------------------------------
+
+    @property
+    def outputs(self) -> tuple[Signal, ...]:
+        """u v w p q r phi theta."""
+        return RIGID_BODY
+
+    @property
+    def inputs(self) -> tuple[Signal, ...]:
+        """The controls."""
+        return self.aerodynamics.inputs[len(self.structure.aerodynamics.inputs) - self._nu :]
+
+    @property
+    def _nu(self) -> int:
+        return len(self.structure.inputs)
+
+    @property
+    def parameters(self) -> tuple[Signal, ...]:
+        """The scheduling parameters, also where there is one."""
+        return self.aerodynamics.parameters
+
+    @property
+    def dt(self) -> float:
+        """Sample period, s."""
+        return self.aerodynamics.dt
+
+    @property
+    def theta(self) -> Array:
+        """Coefficients (n_regressors, 6)."""
+        return self.aerodynamics.theta
+
+    @property
+    def method(self) -> str:
+        """How it was fitted."""
+        return self.aerodynamics.method
+
+    @property
+    def details(self) -> Any:
+        """What the method said."""
+        return self.aerodynamics.details
+
+    # --- what it says of a record ----------------------------------------------------------------
+
+    def predict(self, record: FlightRecord, horizon: int) -> Array:
+        """Predictions (n, 8) `horizon` samples ahead: states known up to t - horizon, inputs and p
+        up to t.
+
+        Each step solves the trapezoidal rule by two corrections. NaN where a past is incomplete,
+        infinite where a prediction overflows or pitch passes 90 deg. Raises `InputError` for
+        another sample period or unit.
+        """
+        require_horizon(horizon)
+        return kinematic_run.predict(self._along(record), int(horizon))
+
+    def simulate(self, record: FlightRecord) -> Array:
+        """Free run (n, 8) from the first samples of each segment with the record's inputs and p.
+
+        In open loop: a plant that is unstable there leaves the record whatever the model is worth;
+        see `closed_loop`.
+        """
+        return kinematic_run.simulate(self._along(record))
+
+    def closed_loop(self, record: FlightRecord, controller: Any = None) -> Array:
+        """The model flown in the loop of the record, (n, 8): same controller, reference and
+        excitation.
+
+        `controller` has reset() and step(measured, reference, p) as `symheli.Controller`; default
+        that of the record's plan. From the first samples of each segment on nothing measured is
+        used. Raises `InputError` for a record without references, or without a controller.
+        """
+        return kinematic_run.closed_loop(
+            self._along(record), self.structure.inputs, record, controller
+        )
+
+    def score(self, record: FlightRecord, horizon: int | None) -> NamedVector:
+        """Fit of each state in percent, `horizon` samples ahead or with None in free run."""
+        guess = self.simulate(record) if horizon is None else self.predict(record, horizon)
+        fit = fit_percent(record.columns(STATES), guess)
+        return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)
+
+    def states(self, record: FlightRecord) -> Array:
+        """States (n, nx) of the whole `to_state_space` along a record, as measured: y(k), and what
+        is remembered of earlier samples; NaN where a past is missing.
+
+        They are not deviations: take a trim away for that.
+        """
+        run = self._along(record)
+        return self.realization.remembered(run.y, run.u, run.segments)
+
+    # --- for design ------------------------------------------------------------------------------
+
+    @cached_property
+    def realization(self) -> Realization:
+        """The state-space form: states, matrices at any p."""
+        return Realization.of(self.structure, self.theta, self.trim, self.inputs, self.dt)
+
+    def at(self, p: float | Sequence[float]) -> LinearModel:
+        """The discrete model with the scheduling held at p (one number a parameter), linear about
+        the trim there: deviation dynamics, u v w p q r phi theta from the inputs.
+        """
+        return self.realization.at(p)
+
+    def to_state_space(
+        self,
+        outputs: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        *,
+        held: Mapping[str, float] | None = None,
+        degree: int | None = None,
+    ) -> LPVStateSpace:
+        """The discrete LPV model of deviations from the moving trim, its kinematic rows known
+        numbers.
+
+        x(k+1) = A(p) x(k) + B(p) u(k) with p that of the sample the step leads to.
+
+        Parameters
+        ----------
+        outputs, inputs : sequence of str, optional
+            Only these; the influence of the other states is left out, as `LinearFamily.select`
+            leaves it out.
+        held : mapping of str to float, optional
+            Parameters that stay where they are: {"acceleration_command": 0.0}.
+        degree : int, optional
+            Of the polynomials in each parameter; default the least at which no entry is 1e-9 of
+            the largest off. What is off stands in `.residuals`.
+
+        Returns
+        -------
+        LPVStateSpace
+            Rates unlimited: see `.with_rate`.
+
+        Raises
+        ------
+        UnknownNameError
+            A signal or a parameter that the model does not have.
+        InputError
+            A basis that is not polynomial, or nothing that moves.
+        """
+        return self.realization.lpv(self.parameters, outputs, inputs, held or {}, degree)
+
+    # --- files -----------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the model as JSON, every number exact, at once or not at all; see `load`."""
+        from identification.model import saved_kinematic_model
+
+        return saved_kinematic_model.save(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> KinematicModel:
+        """A saved model, equal to the last bit. Raises `InputError` for any other file."""
+        from identification.model import saved_kinematic_model
+
+        return saved_kinematic_model.load(path)
+
+    def _along(self, record: FlightRecord) -> Run:
+        prepared = self.structure.aerodynamics.prepared(record)
+        self.aerodynamics.require_same_kind(prepared)
+        return Run.along(self.structure, self.theta, prepared)

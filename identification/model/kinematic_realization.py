@@ -1,0 +1,242 @@
+"""State-space forms of identified aerodynamics within known kinematics, linear about the trim."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.model.realization import one_value
+from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
+from symheli.errors import InputError
+from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace, Matrices, Scheduling
+from symheli.lpv.bases.polynomials import interpolation_points, lobatto_points, polynomials
+from symheli.values import Signal
+from symheli.values.arrays import Array
+from symheli.values.kinematics import RIGID_BODY, kinematic_jacobian
+from symheli.values.signal import indices
+
+EXACT = 1e-9
+"""Largest error of an interpolated entry, as a share of the largest entry."""
+
+HIGHEST = 16
+"""Degree in each parameter at which interpolation gives up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Realization:
+    """x(k+1) = A x(k) + B u(k), y = C x: y(k) first, then what is remembered: z and u of earlier
+    samples, those only that a coefficient multiplies.
+
+        M y(k+1) = N y(k) + [sum_i A_i z(k+1-i) + sum_j B_j u(k+1-j); 0],
+        M = I - dt/2 J(p), N = I + dt/2 J(p), J the kinematics linearized at the trim.
+
+    In straight flight J^3 = 0, so that M^-1 = I + dt/2 J + (dt/2 J)^2 and the entries are
+    polynomials of the trim.
+    """
+
+    kin: KinematicARX
+    theta: Array
+    trim: Array
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    memory: tuple[tuple[int, int], ...]
+    """(column of z and u side by side, how many samples back) of each state after y(k)."""
+    dt: float
+
+    @classmethod
+    def of(
+        cls, kin: KinematicARX, theta: Array, trim: Array, inputs: tuple[Signal, ...], dt: float
+    ) -> Realization:
+        """From coefficients (n, 6) and the trim (basis size, 8)."""
+        lags = [len(r) for r in kin.aerodynamics.input_lag_ranges[0]]
+        names = (*RIGID_BODY[: len(MOVING)], *inputs)
+        memory = tuple((c, back) for c, n in enumerate(lags) for back in range(1, n))
+        remembered = tuple(Signal(f"{names[c]}_lag{b}", names[c].unit) for c, b in memory)
+        return cls(kin, theta, trim, (*RIGID_BODY, *remembered), inputs, memory, dt)
+
+    def matrices(self, p: Array) -> Matrices:
+        """At each p (K,) or (K, parameters)."""
+        A, B = self._linear(p)
+        C = np.broadcast_to(np.eye(len(STATES), A.shape[-1]), (len(p), len(STATES), A.shape[-1]))
+        return Matrices(A, B, C, np.zeros((len(p), len(STATES), B.shape[-1])))
+
+    def solved(self, p: Array) -> Array:
+        """M^-1 (K, 8, 6): what an aerodynamic increment does to y(k+1)."""
+        return np.linalg.inv(np.eye(len(STATES)) - 0.5 * self.dt * self._jacobian(p))[
+            :, :, : len(MOVING)
+        ]
+
+    def _jacobian(self, p: Array) -> Array:
+        y = self.kin.basis(p) @ self.trim
+        y[..., 3:6] = 0.0  # straight flight
+        return kinematic_jacobian(y)
+
+    def regressor(self) -> tuple[Array, Array]:
+        """Selection (lagged signals, nx) and (lagged signals, nu): the signals that coefficients
+        multiply, in the order of the regression, from x(k) and u(k).
+        """
+        entries = [e for e in self.kin.aerodynamics.entries if e.kind == "input"]
+        X, U = (
+            np.zeros((len(entries), len(self.states))),
+            np.zeros((len(entries), len(self.inputs))),
+        )
+        nz, ny = len(MOVING), len(STATES)
+        for row, e in enumerate(entries):
+            if e.lag > 1:
+                X[row, ny + self.memory.index((e.channel, e.lag - 1))] = 1.0
+            elif e.channel < nz:
+                X[row, e.channel] = 1.0
+            else:
+                U[row, e.channel - nz] = 1.0
+        return X, U
+
+    def _linear(self, p: Array) -> tuple[Array, Array]:
+        X, U = self.regressor()
+        ny, f = len(STATES), self.kin.basis(p)
+        blocks = self.theta.reshape(-1, f.shape[-1], len(MOVING))[: len(X)]
+        C = np.einsum("kf,sfo->kos", f, blocks)
+        solved = self.solved(p)
+        half = 0.5 * self.dt * self._jacobian(p)
+        nx, nu = X.shape[1], U.shape[1]
+        A, B = np.zeros((len(f), nx, nx)), np.zeros((len(f), nx, nu))
+        A[:, :ny, :ny] = np.linalg.solve(np.eye(ny) - half, np.eye(ny) + half)
+        A[:, :ny] += solved @ C @ X
+        B[:, :ny] = solved @ C @ U
+        nz = len(MOVING)
+        for row, (column, back) in enumerate(self.memory, start=ny):
+            if back > 1:
+                A[:, row, ny + self.memory.index((column, back - 1))] = 1.0
+            elif column < nz:
+                A[:, row, column] = 1.0
+            else:
+                B[:, row, column - nz] = 1.0
+        return A, B
+
+    def at(self, p: object) -> LinearModel:
+        """The model with p held."""
+        value = one_value(p, self.kin.basis)
+        matrices = (M[0] for M in self.matrices(value[None]))
+        return LinearModel(*matrices, self.states, self.inputs, RIGID_BODY, dt=self.dt)
+
+    def kept(
+        self, outputs: Sequence[str] | None, inputs: Sequence[str] | None
+    ) -> tuple[list[int], list[int], list[int]]:
+        """Positions of the states, inputs and outputs that stay where only some signals do."""
+        y = indices(STATES if outputs is None else outputs, RIGID_BODY, "output")
+        u = indices(self.inputs if inputs is None else inputs, self.inputs, "input")
+        nz, ny = len(MOVING), len(STATES)
+        stays = {c for c in y if c < nz} | {nz + i for i in u}
+        x = y + [ny + i for i, (column, _) in enumerate(self.memory) if column in stays]
+        return x, u, y
+
+    def lpv(
+        self,
+        parameters: tuple[Signal, ...],
+        outputs: Sequence[str] | None,
+        inputs: Sequence[str] | None,
+        held: Mapping[str, float],
+        degree: int | None,
+    ) -> LPVStateSpace:
+        """Polynomials through the matrices, of a degree or of that at which they are exact."""
+        x, u, y = (np.array(i) for i in self.kept(outputs, inputs))
+        line = Line.of(self.kin, parameters, held)
+
+        def part(p: Array) -> Matrices:
+            A, B, C, D = self.matrices(line.whole(p))
+            y_, x_ = y[:, None], x[:, None]
+            return Matrices(A[:, x_, x], B[:, x_, u], C[:, y_, x], D[:, y_, u])
+
+        basis, fitted, nodes = interpolated(part, line, degree)
+        model = LPVStateSpace(
+            basis,
+            *fitted,
+            tuple(
+                Scheduling(str(s), s.unit, low, high)
+                for s, (low, high) in zip(line.moving, line.ranges, strict=True)
+            ),
+            tuple(self.states[i] for i in x),
+            tuple(self.inputs[i] for i in u),
+            tuple(RIGID_BODY[i] for i in y),
+            self.dt,
+        )
+        return model.with_residuals(nodes, part(nodes))
+
+    def remembered(self, y: Array, u: Array, segments: Sequence[slice]) -> Array:
+        """x (n, nx) along samples y (n, 8), u (n, nu)."""
+        signals = np.hstack([y[:, : len(MOVING)], u])
+        out = np.full((len(y), len(self.states)), np.nan)
+        out[:, : y.shape[1]] = y
+        for part in segments:
+            for i, (column, back) in enumerate(self.memory, start=y.shape[1]):
+                out[part.start + back : part.stop, i] = signals[
+                    part.start : max(part.stop - back, part.start), column
+                ]
+        return out
+
+
+class Line(NamedTuple):
+    """The parameters that move, their ranges and degrees, where the others are `held` (NaN for
+    those that move).
+    """
+
+    moving: tuple[Signal, ...]
+    ranges: tuple[tuple[float, float], ...]
+    degrees: tuple[int, ...]
+    held: Array
+
+    @classmethod
+    def of(
+        cls, kin: KinematicARX, parameters: tuple[Signal, ...], held: Mapping[str, float]
+    ) -> Line:
+        """Raises `UnknownNameError` for another parameter, `InputError` where none moves, or where
+        the basis has no polynomials.
+        """
+        degrees = kin.basis.degrees
+        if degrees is None:
+            raise InputError(
+                "a state-space form needs polynomial functions of the scheduling, the model has"
+                f" {kin.basis}; identify with Polynomial, or take .at(p)"
+            )
+        indices(list(held), parameters, "scheduling parameter")
+        values = np.array([held.get(str(s), np.nan) for s in parameters])
+        kept = np.flatnonzero(np.isnan(values))
+        if not len(kept):
+            raise InputError("held: leave at least one parameter moving, or take .at(p)")
+        return cls(
+            tuple(parameters[i] for i in kept),
+            tuple(kin.basis.ranges[i] for i in kept),
+            tuple(degrees[i] for i in kept),
+            values,
+        )
+
+    def whole(self, p: Array) -> Array:
+        """All parameters (K, d) at the moving ones p; (K,) where there is one in all."""
+        out = np.tile(self.held, (len(p), 1))
+        out[:, np.isnan(self.held)] = p.reshape(len(p), -1)
+        return out[:, 0] if len(self.held) == 1 else out
+
+
+def interpolated(
+    part: Callable[[Array], Matrices], line: Line, degree: int | None
+) -> tuple[FunctionSpace, Matrices, Array]:
+    """Basis, coefficients and check points of polynomials through matrices at any p, of `degree`
+    in each parameter, or raised until nothing is `EXACT` off.
+    """
+    for more in range(1, HIGHEST):
+        degrees = [degree if degree is not None else d + more if d else 0 for d in line.degrees]
+        basis = polynomials(degrees, line.ranges)
+        points = interpolation_points(degrees, line.ranges)
+        fitted = Matrices(*(basis.fit(points, M) for M in part(points)))
+        nodes = lobatto_points(max(degrees) + 2, line.ranges)
+        f, exact = basis(nodes), part(nodes)
+        error = max(
+            float(np.abs(np.tensordot(f, M, axes=1) - E).max(initial=0.0))
+            for M, E in zip(fitted, exact, strict=True)
+        )
+        size = max(float(np.abs(M).max(initial=0.0)) for M in exact)
+        if degree is not None or error <= EXACT * size:
+            break
+    return basis, fitted, nodes

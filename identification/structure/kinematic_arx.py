@@ -1,0 +1,193 @@
+"""A rigid vehicle: kinematics known, aerodynamics to be identified."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from identification.structure.lpvarx import LPVARX
+from identification.structure.orders import Orders
+from symheli.errors import InputError
+from symheli.lpv import FunctionSpace
+from symheli.records import FlightRecord
+from symheli.values import Signal
+from symheli.values.arrays import Array
+from symheli.values.kinematics import RIGID_BODY, VELOCITIES, kinematic_rates
+
+STATES = tuple(map(str, RIGID_BODY))
+MOVING = tuple(map(str, VELOCITIES))
+INCREMENTS: tuple[Signal, ...] = tuple(Signal(f"{s}_aero", s.unit) for s in VELOCITIES)
+"""What air and inertia add to the velocities over one sample."""
+
+FLAPPING = {"u": 1, "v": 1, "w": 1, "p": 2, "q": 2, "r": 1}
+"""Lags where what is not measured is the flapping of a rotor: two more states, and two samples of
+roll and pitch rate show them. With a second lag of the other velocities the regressors are nearly
+dependent: in a linear flight two combinations of them vanish.
+"""
+
+
+def increments(y: Array, dt: float) -> Array:
+    """(n, 8): what y(k) - y(k-1) has beyond the kinematics, by the trapezoidal rule; NaN at k = 0.
+
+    For y (n, 8) in the order of `STATES`. The last two columns, attitude, are the misfit of the
+    Euler equations: zero but for noise and O(dt^3).
+    """
+    k = kinematic_rates(y)
+    out = np.full_like(y, np.nan)
+    out[1:] = np.diff(y, axis=0) - 0.5 * dt * (k[1:] + k[:-1])
+    return out
+
+
+@dataclass(frozen=True)
+class Aerodynamics(LPVARX):
+    """The regression inside a `KinematicARX`: `INCREMENTS` from lagged velocities and inputs.
+
+    It derives its outputs from u v w p q r phi theta of a record, so that every method, recursive
+    ones too, works on records as they are.
+
+    Examples
+    --------
+    >>> import identification as idn
+    >>> kin = idn.KinematicARX("d_lon", "airspeed", basis=idn.Polynomial(1, 0.0, 13.0))
+    >>> kin.aerodynamics.outputs[0], kin.aerodynamics.inputs[-1]
+    ('u_aero', 'd_lon')
+    """
+
+    def prepared(self, record: FlightRecord) -> FlightRecord:
+        """The record with `INCREMENTS`; raises `UnknownNameError` for a velocity or an angle it
+        lacks, `InputError` for one in another unit.
+        """
+        names = [str(s) for s in INCREMENTS]
+        if set(names) <= set(record.signals):
+            return record
+        y = record.columns(STATES)
+        for signal in RIGID_BODY:
+            found = record.signals[record.signals.index(str(signal))]  # type: ignore[arg-type]
+            if found.unit != signal.unit:
+                raise InputError(f"{found} is in {found.unit}; kinematics need it in {signal.unit}")
+        out = np.full_like(y, np.nan)
+        for part in record.segments():
+            out[part] = increments(y[part], record.dt)
+        units = {str(s): s.unit for s in INCREMENTS}
+        return record.with_signals(units, **dict(zip(names, out.T, strict=False)))
+
+
+@dataclass(frozen=True)
+class KinematicARX:
+    """A rigid vehicle whose inertial, gravity and Euler terms are known and whose aerodynamics are
+    functions of scheduling parameters p; any vehicle, any inputs.
+
+    With y = (u v w p q r phi theta), kinematics k(y) and z = (u v w p q r),
+
+        T(k) = y(k) - y(k-1) - dt/2 (k(y(k)) + k(y(k-1)))
+             = sum_i A_i(p(k)) z(k-i) + sum_j B_j(p(k)) u(k-j) + c(p(k))
+               + d(p(k)) (p(k) - p(k-1))          in its first six rows, 0 in the last two.
+
+    The air does not see attitude: z has none, and roll and pitch need no coefficient.
+
+    Parameters
+    ----------
+    inputs : str or sequence of str
+        Controls, as the record names them.
+    scheduling : str or sequence of str
+        One parameter, or several: then `basis` is a `Product`. Best a commanded airspeed, and the
+        commanded acceleration beside it where trim attitudes depend on it.
+    na : int or {velocity: int}
+        Lags of the velocities; the default is that of a rotorcraft, see `FLAPPING`.
+    nb : int or {input: int}
+        Lags of the inputs, from 1 on.
+    basis : FunctionSpace
+        The functions of p, on the range they are declared on.
+    offset_rate : bool
+        Whether there is d(p); with an acceleration among the parameters c(p) says as much.
+
+    Raises
+    ------
+    InputError
+        As `LPVARX`, or an input that is a state.
+
+    References
+    ----------
+    Klein and Morelli (2006), Aircraft System Identification, ch. 5, for equation error with known
+    kinematics; with coefficients that move, here.
+
+    Examples
+    --------
+    >>> kin = idn.KinematicARX(
+    ...     inputs=("d_lon", "d_lat", "d_col", "d_ped"),
+    ...     scheduling="airspeed_command",
+    ...     na=2,
+    ...     nb=2,
+    ...     basis=idn.Polynomial(degree=2, low=0.0, high=13.0),
+    ... )
+    >>> kin.n_regressors, kin.outputs
+    (66, ('u', 'v', 'w', 'p', 'q', 'r', 'phi', 'theta'))
+    """
+
+    inputs: tuple[str, ...]
+    scheduling: str | tuple[str, ...]
+    _: KW_ONLY
+    basis: FunctionSpace
+    na: int | Mapping[str, int] | tuple[int, ...] = tuple(FLAPPING.values())
+    nb: Orders = 2
+    offset_rate: bool = True
+
+    outputs: ClassVar[tuple[str, ...]] = STATES
+
+    def __post_init__(self) -> None:
+        given = (self.inputs,) if isinstance(self.inputs, str) else tuple(self.inputs)
+        object.__setattr__(self, "inputs", given)
+        clash = sorted({*map(str, given)} & set(STATES))
+        if clash:
+            raise InputError(f"{', '.join(clash)}: a state of the body is no input")
+        aero = self.aerodynamics  # raises for anything else that does not fit
+        object.__setattr__(self, "scheduling", aero.scheduling)
+        lags = aero.input_lag_ranges[0]
+        object.__setattr__(self, "na", tuple(len(r) for r in lags[: len(MOVING)]))
+        if 0 in self.na:  # type: ignore[operator]
+            raise InputError("na: every velocity needs at least one lag")
+
+    @cached_property
+    def aerodynamics(self) -> Aerodynamics:
+        """The regression: `INCREMENTS` from lagged velocities and inputs, as any method takes
+        it.
+        """
+        na = (
+            self.na
+            if isinstance(self.na, Mapping | int)
+            else dict(zip(MOVING, self.na, strict=True))
+        )
+        orders = {z: na if isinstance(na, int) else na.get(z, FLAPPING[z]) for z in MOVING}
+        nb = self.nb
+        more = {u: nb if isinstance(nb, int) else nb[u] for u in self.inputs}  # type: ignore[index,call-overload]
+        return Aerodynamics(
+            tuple(map(str, INCREMENTS)),
+            (*MOVING, *self.inputs),
+            self.scheduling,
+            na=0,
+            nb=orders | more,
+            delay=1,
+            basis=self.basis,
+            scheduling_at="now",
+            offset=True,
+            offset_rate=self.offset_rate,
+        )
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the scheduling parameters, also where there is one."""
+        return self.aerodynamics.parameters
+
+    @property
+    def n_regressors(self) -> int:
+        """Unknown coefficients of each of the six equations."""
+        return self.aerodynamics.n_regressors
+
+    @property
+    def memory(self) -> int:
+        """How many samples before k the regressor of y(k) reaches back."""
+        return self.aerodynamics.memory
