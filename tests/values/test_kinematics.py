@@ -1,4 +1,4 @@
-"""Kinematics of a rigid body, for arrays, against the symbolic ones the helicopter is built from."""
+"""Kinematics of a rigid body for arrays, against the symbolic ones of the helicopter."""
 
 import casadi as ca
 import numpy as np
