@@ -16,7 +16,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from identification.model.prediction import fit_percent, require_horizon
 from identification.structure.kinematic_arx import STATES, KinematicARX
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace
+from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen
@@ -228,11 +228,23 @@ class KinematicModel:
         return saved_kinematic_model.save(self, path)
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> KinematicModel:
-        """A saved model, equal to the last bit. Raises `InputError` for any other file."""
+    def load(
+        cls, path: str | os.PathLike[str], basis: FunctionSpace | None = None
+    ) -> KinematicModel:
+        """A saved model, equal to the last bit; one with `UserFunctions` needs its `basis`. Raises
+        `InputError` for any other file.
+        """
         from identification.model import saved_kinematic_model
 
-        return saved_kinematic_model.load(path)
+        return saved_kinematic_model.load(path, basis)
+
+    def save_mat(self, path: str | os.PathLike[str]) -> Path:
+        """Write coefficients, trim, names and units as a MATLAB file (version 5), with a readme
+        inside.
+        """
+        from identification.model import saved_kinematic_model
+
+        return saved_kinematic_model.save_mat(self, path)
 
     def _along(self, record: FlightRecord) -> Run:
         prepared = self.structure.aerodynamics.prepared(record)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 from dataclasses import fields
 from pathlib import Path
@@ -11,24 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from identification.model import model_file
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
-from symheli.errors import InputError
-from symheli.lpv import (
-    BSpline,
-    FunctionSpace,
-    PiecewiseLinear,
-    Polynomial,
-    Product,
-    Spline,
-    UserFunctions,
-)
-from symheli.values import Signal
-from symheli.values.whole_files import write_bytes, write_text
+from symheli.lpv import FunctionSpace
 
-SCHEMA, VERSION = "symheli LPV-ARX model", 1
-BASES = {kind.__name__: kind for kind in (BSpline, PiecewiseLinear, Polynomial, Spline)}
-"""Bases that are their fields."""
+SCHEMA = "symheli LPV-ARX model"
 
 
 def save(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:
@@ -38,12 +24,20 @@ def save(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:
     Raises `InputError` where `details` hold more than plain values, `SymheliError` where the file
     cannot be written.
     """
-    arx = model.structure
-    content = {
-        "structure": (
-            {f.name: getattr(arx, f.name) for f in fields(arx) if f.name != "basis"}
-            | {"basis": _basis_fields(arx.basis)}
-        ),
+    structure = described_structure(model.structure)
+    return model_file.write(path, SCHEMA, {"structure": structure, **described(model)})
+
+
+def described_structure(structure: Any) -> dict[str, Any]:
+    """The fields of a structure in plain values."""
+    return {f.name: getattr(structure, f.name) for f in fields(structure) if f.name != "basis"} | {
+        "basis": model_file.described_basis(structure.basis)
+    }
+
+
+def described(model: LPVARXModel) -> dict[str, Any]:
+    """All of a model but its structure, in plain values."""
+    return {
         "units": {str(s): s.unit for s in (*model.outputs, *model.inputs, *model.parameters)},
         "dt": model.dt,
         "theta": model.theta.tolist(),
@@ -54,14 +48,6 @@ def save(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:
         "method": model.method,
         "details": dict(model.details),
     }
-    try:
-        content = json.loads(_canonical(content))
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"a model file holds plain finite numbers, texts and lists: {error}"
-        ) from error
-    whole = {"schema": SCHEMA, "version": VERSION, **content, "digest": _digest(content)}
-    return write_text(path, json.dumps(whole, indent=1, allow_nan=False) + "\n")
 
 
 def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> LPVARXModel:
@@ -71,33 +57,44 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> LP
     A model with `UserFunctions` needs the `basis` it was identified with: functions are not written
     to files.
     """
-    content = _read(Path(path))
+    content = model_file.read(path, SCHEMA)
     try:
-        given = dict(content["structure"])
-        described = given.pop("basis")
-        structure = LPVARX(
-            **{k: _tuples(v) for k, v in given.items()}, basis=_basis(described, basis, path)
-        )
-        units = content["units"]
-        return LPVARXModel(
-            structure=structure,
-            theta=np.array(content["theta"], float).reshape(-1, structure.ny),
-            dt=content["dt"],
-            outputs=_signals(structure.outputs, units),
-            inputs=_signals(structure.inputs, units),
-            scheduling=_signals(structure.parameters, units),
-            residual_covariance=content["residual_covariance"],
-            rows_used=content["rows_used"],
-            rows_dropped=content["rows_dropped"],
-            method=content["method"],
-            excitation=None,
-            details=content["details"],
-            covariance=content["covariance"],
-        )
+        structure = LPVARX(**fields_of_structure(content, basis, path))
+        return model_of(structure, content)
     except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"{path}: a part of the model is missing or of the wrong kind ({error})"
-        ) from error
+        raise model_file.incomplete(path, error) from error
+
+
+def fields_of_structure(
+    content: dict[str, Any], basis: FunctionSpace | None, path: str | os.PathLike[str]
+) -> dict[str, Any]:
+    """What `described_structure` described, ready to make a structure of."""
+    given = dict(content["structure"])
+    described = given.pop("basis")
+    return {
+        **{k: model_file.tuples(v) for k, v in given.items()},
+        "basis": model_file.basis_of(described, basis, path),
+    }
+
+
+def model_of(structure: LPVARX, content: dict[str, Any]) -> LPVARXModel:
+    """The model of a structure that `described` described."""
+    units = content["units"]
+    return LPVARXModel(
+        structure=structure,
+        theta=np.array(content["theta"], float).reshape(-1, structure.ny),
+        dt=content["dt"],
+        outputs=model_file.signals_of(structure.outputs, units),
+        inputs=model_file.signals_of(structure.inputs, units),
+        scheduling=model_file.signals_of(structure.parameters, units),
+        residual_covariance=content["residual_covariance"],
+        rows_used=content["rows_used"],
+        rows_dropped=content["rows_dropped"],
+        method=content["method"],
+        excitation=None,
+        details=content["details"],
+        covariance=content["covariance"],
+    )
 
 
 def save_mat(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:
@@ -108,12 +105,8 @@ def save_mat(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:
     c(:,j), d(:,j) (or d(:,j,:) with several parameters). With polynomials they are those of the
     powers of p in `powers`, a row a function; else of the functions `basis` describes.
     """
-    import io
-
-    from scipy.io import savemat
-
     arx, coefficients = model.structure, model.coefficients
-    powers = _powers(arx.basis)
+    powers = model_file.powers_of(arx.basis)
     values = coefficients if powers is None else coefficients.form("monomial")
     content = {
         "readme": (
@@ -137,111 +130,6 @@ def save_mat(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:
         "dt": model.dt,
         "method": model.method,
         "residual_covariance": model.residual_covariance,
-        **{
-            f"{name}{ending}": np.array([text(s) for s in group], dtype=object)
-            for name, group in (
-                ("outputs", model.outputs),
-                ("inputs", model.inputs),
-                ("scheduling", model.parameters),
-            )
-            for ending, text in (("", str), ("_units", lambda s: s.unit))
-        },
+        **model_file.cells(outputs=model.outputs, inputs=model.inputs, scheduling=model.parameters),
     }
-    buffer = io.BytesIO()
-    savemat(buffer, content)
-    return write_bytes(path, buffer.getvalue())
-
-
-def _powers(basis: FunctionSpace) -> np.ndarray | None:
-    """(functions, parameters) powers of p, None where the basis is not made of polynomials."""
-    if isinstance(basis, Polynomial):
-        return np.arange(basis.size, dtype=float)[:, None]
-    if isinstance(basis, Product) and all(isinstance(f, Polynomial) for f in basis.factors):
-        return np.array(basis.indices, dtype=float)
-    return None
-
-
-def _basis_fields(basis: FunctionSpace) -> dict[str, Any]:
-    kind = type(basis).__name__
-    if isinstance(basis, Product):
-        return {
-            "kind": kind,
-            "factors": [_basis_fields(f) for f in basis.factors],
-            "total_degree": basis.total_degree,
-        }
-    if isinstance(basis, UserFunctions):
-        return {"kind": kind, "names": basis.names, "low": basis.low, "high": basis.high}
-    if kind not in BASES:
-        raise InputError(
-            f"a basis of kind {kind} cannot be written to a file; choose from"
-            f" {', '.join([*BASES, 'Product', 'UserFunctions'])}"
-        )
-    return {"kind": kind, **{f.name: getattr(basis, f.name) for f in fields(basis)}}  # type: ignore[arg-type]
-
-
-def _basis(
-    described: dict[str, Any], given: FunctionSpace | None, path: str | os.PathLike[str]
-) -> FunctionSpace:
-    if given is not None:
-        if json.loads(_canonical(_basis_fields(given))) != described:
-            raise InputError(
-                f"{path}: the model belongs to another basis than the one given: {described}"
-            )
-        return given
-    options = dict(described)
-    kind = options.pop("kind")
-    if kind == "Product":
-        factors = tuple(_basis(f, None, path) for f in options["factors"])
-        return Product(factors, options["total_degree"])  # type: ignore[arg-type]
-    if kind == "UserFunctions":
-        raise InputError(
-            f"{path}: the functions {', '.join(options['names'])} are not in the file; give the"
-            " basis: load(path, basis=...)"
-        )
-    if kind not in BASES:
-        raise InputError(
-            f"{path}: a basis of kind {kind!r}, expected one of"
-            f" {', '.join([*BASES, 'Product', 'UserFunctions'])}"
-        )
-    return BASES[kind](**{k: _tuples(v) for k, v in options.items()})
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        whole = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
-    except ValueError as error:
-        raise InputError(
-            f"{path}: not a whole file of {SCHEMA!r} ({error}); take an older copy"
-        ) from error
-    if not isinstance(whole, dict) or whole.get("schema") != SCHEMA:
-        found = whole.get("schema") if isinstance(whole, dict) else type(whole).__name__
-        raise InputError(f"{path}: expected a file of {SCHEMA!r}, got {found!r}")
-    if whole.get("version") != VERSION:
-        raise InputError(
-            f"{path}: version {whole.get('version')!r} of the format, this program reads {VERSION}"
-        )
-    content = {k: v for k, v in whole.items() if k not in ("schema", "version", "digest")}
-    if whole.get("digest") != _digest(content):
-        raise InputError(
-            f"{path}: the content does not match its digest, the file was damaged or edited; take"
-            " an older copy"
-        )
-    return content
-
-
-def _canonical(content: Any) -> str:
-    return json.dumps(content, sort_keys=True, allow_nan=False)
-
-
-def _digest(content: dict[str, Any]) -> str:
-    return hashlib.sha256(_canonical(content).encode()).hexdigest()
-
-
-def _tuples(value: Any) -> Any:
-    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
-
-
-def _signals(names: tuple[str, ...], units: dict[str, str]) -> tuple[Signal, ...]:
-    return tuple(Signal(n, units[n]) for n in names)
+    return model_file.write_mat(path, content)

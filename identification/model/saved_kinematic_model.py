@@ -1,0 +1,96 @@
+"""An identified rigid vehicle as a file: JSON with a schema, every number exact; and for MATLAB."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from identification.model import model_file, saved_model
+from identification.model.kinematic_model import KinematicModel
+from identification.structure.kinematic_arx import MOVING, KinematicARX
+from symheli.lpv import FunctionSpace
+from symheli.values.kinematics import GRAVITY
+
+SCHEMA = "symheli model with known kinematics"
+
+
+def save(model: KinematicModel, path: str | os.PathLike[str]) -> Path:
+    """Write a model; a reader sees the old file or the new one, never half of it. The excitation
+    report is not kept.
+
+    Raises `InputError` where `details` hold more than plain values, `SymheliError` where the file
+    cannot be written.
+    """
+    covariance = model.coefficient_covariance
+    return model_file.write(
+        path,
+        SCHEMA,
+        {
+            "structure": saved_model.described_structure(model.structure),
+            **saved_model.described(model.aerodynamics),
+            "trim": model.trim.tolist(),
+            "coefficient_covariance": None if covariance is None else covariance.tolist(),
+        },
+    )
+
+
+def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> KinematicModel:
+    """The model in `path`, equal to the last bit; raises `InputError` unless the file is whole and
+    of this kind. One with `UserFunctions` needs its `basis`.
+    """
+    content = model_file.read(path, SCHEMA)
+    try:
+        given = saved_model.fields_of_structure(content, basis, path)
+        given["na"] = dict(zip(MOVING, given["na"], strict=True))
+        kin = KinematicARX(**given)
+        return KinematicModel(
+            structure=kin,
+            aerodynamics=saved_model.model_of(kin.aerodynamics, content),
+            trim=content["trim"],
+            coefficient_covariance=content["coefficient_covariance"],
+        )
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise model_file.incomplete(path, error) from error
+
+
+def save_mat(model: KinematicModel, path: str | os.PathLike[str]) -> Path:
+    """Write a model as a MATLAB file (version 5; MATLAB, Octave, scipy.io.loadmat): coefficients,
+    trim, names, units and a readme.
+
+    A(:,:,j,i) belongs to the function j of the basis and z(k-i), z = (u v w p q r), B(:,:,j,i) to
+    u(k-i), c(:,j), d(:,j) (or d(:,j,:) with several parameters), trim(:,j). With polynomials they
+    are those of the powers of p in `powers`, a row a function; else of the functions `basis`
+    describes.
+    """
+    aero, basis = model.aerodynamics, model.structure.basis
+    powers = model_file.powers_of(basis)
+    values = aero.coefficients if powers is None else aero.coefficients.form("monomial")
+    trim = model.trim if powers is None else basis.form("monomial").T @ model.trim
+    lagged = np.moveaxis(values.B, (0, 1), (3, 2))
+    content = {
+        "readme": (
+            "y = (u v w p q r phi theta), z its first six; y(k) - y(k-1) - dt/2 (kin(y(k)) +"
+            " kin(y(k-1))) = [sum_i A_i(p) z(k-i) + sum_i B_i(p) u(k-i) + c(p) + d(p)"
+            " (p(k)-p(k-1)); 0; 0], p that of k; kin(y) = (v r - w q - g sin(theta), w p - u r + g"
+            " sin(phi) cos(theta), u q - v p + g cos(phi) cos(theta), 0, 0, 0, p + tan(theta) (q"
+            " sin(phi) + r cos(phi)), q cos(phi) - r sin(phi)); A(:,:,j,i) multiplies function j,"
+            f" {'prod(p.^powers(j,:))' if powers is not None else 'see basis'}; SI units and"
+            " radians"
+        ),
+        "A": lagged[:, : len(MOVING)],
+        "B": lagged[:, len(MOVING) :],
+        "c": np.moveaxis(values.c, 0, 1),
+        "d": np.moveaxis(values.d, 0, 1),
+        "trim": trim.T,
+        "g": GRAVITY,
+        "powers": np.zeros((0, 0)) if powers is None else powers,
+        "basis": repr(basis),
+        "ranges": np.array(basis.ranges),
+        "dt": model.dt,
+        "method": model.method,
+        "residual_covariance": aero.residual_covariance,
+        **model_file.cells(outputs=model.outputs, inputs=model.inputs, scheduling=model.parameters),
+    }
+    return model_file.write_mat(path, content)
