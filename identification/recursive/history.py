@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
+from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
 from symheli.values import Signal
 from symheli.values.arrays import Array
@@ -20,7 +22,7 @@ class History:
 
     Parameters
     ----------
-    structure : LPVARX
+    structure : LPVARX or KinematicARX
         What was identified.
     time : array (n,)
         Of the samples, s.
@@ -36,6 +38,8 @@ class History:
         With the units of the record.
     dropped : int
         Samples without a regressor.
+    trim : array (basis size, 8), optional
+        With known kinematics, see `KinematicModel`.
 
     Examples
     --------
@@ -46,7 +50,7 @@ class History:
     [[[-0.5]]]
     """
 
-    structure: LPVARX
+    structure: LPVARX | KinematicARX
     time: Array
     coefficients: Array
     innovations: Array
@@ -56,12 +60,14 @@ class History:
     inputs: tuple[Signal, ...]
     scheduling: Signal | tuple[Signal, ...]
     dropped: int
+    trim: Array | None = None
 
     @property
-    def model(self) -> LPVARXModel:
+    def model(self) -> LPVARXModel | KinematicModel:
         """The model at the end, its coefficients solved from the triangular factor."""
-        return LPVARXModel(
-            structure=self.structure,
+        kin = self.structure if isinstance(self.structure, KinematicARX) else None
+        regression = LPVARXModel(
+            structure=self.state.configuration.structure,
             theta=self.state.solve(),
             dt=self.dt,
             outputs=self.outputs,
@@ -72,3 +78,6 @@ class History:
             rows_dropped=self.dropped,
             method="rls",
         )
+        if kin is None:
+            return regression
+        return KinematicModel(structure=kin, aerodynamics=regression, trim=self.trim)

@@ -111,6 +111,11 @@ class Online:
         self._state[at.FILLED] = 0
 
     @property
+    def _filled(self) -> bool:
+        """Whether the last sample is remembered."""
+        return self._state[at.FILLED] > 0
+
+    @property
     def coefficients(self) -> Array:
         """(n, ny) as they are now: a view of what `update` changes where all outputs share their
         regressors, else a copy.

@@ -11,12 +11,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from identification.model.kinematic_fit import mean_trim
 from identification.recursive import kernel, saved_state
 from identification.recursive.forgetting import Forgetting, forgetting_of
 from identification.recursive.history import History
 from identification.recursive.kernel.configuration import Configuration
 from identification.recursive.online import Online, vector
+from identification.recursive.rigid_body_online import RigidBodyOnline
 from identification.recursive.rls_state import RLSInfo, RLSState
+from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import Samples, as_records, units_of
 from symheli.errors import InputError
@@ -47,8 +50,9 @@ class RecursiveLeastSquares:
 
     Parameters
     ----------
-    structure : LPVARX
-        What is identified.
+    structure : LPVARX or KinematicARX
+        What is identified. With known kinematics a sample is y (8,), u, p, and outputs are what the
+        increments of u v w p q r have beyond the kinematics.
     forgetting : float or Forgetting
         A factor l in (0, 1] (a sample k steps old has the weight l^k), or one of `Constant`,
         `Variable`, `Directional`.
@@ -77,22 +81,28 @@ class RecursiveLeastSquares:
     (True, True)
     """
 
-    structure: LPVARX
+    structure: LPVARX | KinematicARX
     forgetting: float | Forgetting = 1.0
     floor: float | None = None
     precision: Literal["double", "single"] = "double"
 
     def __post_init__(self) -> None:
-        require_structure(self.structure)
+        require_structure(self.regression)
         if self.precision not in PRECISIONS:
             raise InputError(f'precision: expected "double" or "single", got {self.precision!r}')
         forgetting_of(self.forgetting, self.floor)
+
+    @property
+    def regression(self) -> LPVARX:
+        """What the kernel solves: the structure, or the aerodynamics within its kinematics."""
+        structure = self.structure
+        return structure.aerodynamics if isinstance(structure, KinematicARX) else structure
 
     @cached_property
     def configuration(self) -> Configuration:
         """What the kernel is told; its `sizes` are the numbers of memory the estimator takes."""
         forgetting = forgetting_of(self.forgetting, self.floor)
-        return Configuration(self.structure, forgetting, PRECISIONS[self.precision])
+        return Configuration(self.regression, forgetting, PRECISIONS[self.precision])
 
     def init(self) -> RLSState:
         """The state that knows nothing."""
@@ -102,8 +112,19 @@ class RecursiveLeastSquares:
         self._kernel.start(state, work)
         return RLSState(self.configuration, state)
 
-    def online(self, state: RLSState | None = None) -> Online:
-        """An estimator that goes on from `state`, or from nothing, changing in place."""
+    def online(self, state: RLSState | None = None, dt: float | None = None) -> Online:
+        """An estimator that goes on from `state`, or from nothing, changing in place.
+
+        With known kinematics its samples are those of a rigid body, `dt` s apart, and the first is
+        a start: the attitude before is not in `state`. Raises `InputError` without `dt` there.
+        """
+        if not isinstance(self.structure, KinematicARX):
+            return self._online(state)
+        if dt is None or not 0 < dt < np.inf:
+            raise InputError(f"dt: known kinematics need the sample period in s, got {dt!r}")
+        return RigidBodyOnline(self.configuration, self._kernel, self._own(state), dt)
+
+    def _online(self, state: RLSState | None = None) -> Online:
         return Online(self.configuration, self._kernel, self._own(state))
 
     def update(self, state: RLSState, y: object, u: object, p: object) -> tuple[RLSState, RLSInfo]:
@@ -111,9 +132,15 @@ class RecursiveLeastSquares:
         did.
 
         A NaN anywhere is a missing sample: nothing is learnt and the lags start afresh. Raises
-        `InputError` for wrong shapes, infinite values and p outside the basis.
+        `InputError` for wrong shapes, infinite values and p outside the basis, and with known
+        kinematics: a state does not remember the attitude before.
         """
-        online = self.online(state)
+        if isinstance(self.structure, KinematicARX):
+            raise InputError(
+                "with known kinematics a sample says nothing without the one before, which a state"
+                " does not hold: take online().update(y, u, p), or run(record)"
+            )
+        online = self._online(state)
         return _outcome(online, online.update(y, u, p))
 
     def absorb(self, state: RLSState, phi: Array, y: Array) -> tuple[RLSState, RLSInfo]:
@@ -121,10 +148,11 @@ class RecursiveLeastSquares:
 
         Raises `InputError` for another shape and numbers that are not finite.
         """
-        phi, y = vector(phi, self.structure.n_regressors, "phi"), vector(y, self.structure.ny, "y")
+        arx = self.regression
+        phi, y = vector(phi, arx.n_regressors, "phi"), vector(y, arx.ny, "y")
         if not (np.isfinite(phi).all() and np.isfinite(y).all()):
             raise InputError("phi and y must be finite; leave an incomplete regressor out")
-        online = self.online(state)
+        online = self._online(state)
         return _outcome(online, online.absorb(phi, y))
 
     def run(self, record: FlightRecord, state: RLSState | None = None) -> History:
@@ -133,15 +161,16 @@ class RecursiveLeastSquares:
 
         The same as `update` sample by sample.
         """
-        arx, records = self.structure, as_records(record)
+        arx, records = self.regression, as_records(record)
         if len(records) != 1:
             raise InputError(
                 f"run takes one record, got {len(records)}; go on from its state: run(second,"
                 " run(first).state)"
             )
         record = arx.prepared(records[0])
-        s, online = Samples.of(arx, record), self.online(state)
-        rows = np.column_stack([s.y, s.u, s.p])
+        s, online = Samples.of(arx, record), self.online(state, record.dt)
+        measured = record.columns((*self.structure.outputs, *self.structure.inputs))
+        rows = np.column_stack([measured, s.p])
         online.forget_past()
         parts = []
         for segment in s.segments:
@@ -151,7 +180,7 @@ class RecursiveLeastSquares:
             np.concatenate(part) for part in zip(*parts, strict=True)
         )
         return History(
-            structure=arx,
+            structure=self.structure,
             time=record.time,
             coefficients=coefficients.astype(float, copy=False),
             innovations=innovations.astype(float, copy=False),
@@ -161,6 +190,9 @@ class RecursiveLeastSquares:
             inputs=units_of(arx.inputs, [record]),
             scheduling=units_of(arx.parameters, [record]),
             dropped=int(len(record) - learnt.sum()),
+            trim=mean_trim(self.structure, [record])
+            if isinstance(self.structure, KinematicARX)
+            else None,
         )
 
     def save(self, state: RLSState, path: str | os.PathLike[str]) -> None:
@@ -187,7 +219,7 @@ class RecursiveLeastSquares:
                 f"state: expected one from init, update, run or load, got {state!r:.80}"
             )
         if (
-            state.configuration.structure != self.structure
+            state.configuration.structure != self.regression
             or state.memory.dtype != self.configuration.dtype
         ):
             raise InputError(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from symheli.values.arrays import Array
@@ -44,21 +46,34 @@ def kinematic_rates(y: Array) -> Array:
     >>> print(kinematic_rates(np.array([10.0, 0, 0, 0, 0, 0.1, 0, 0])).round(2))
     [ 0.   -1.    9.81  0.    0.    0.    0.    0.  ]
     """
-    u, v, w, p, q, r, phi, theta = np.moveaxis(y, -1, 0)
-    sine, cosine, slope = np.sin(phi), np.cos(phi), np.cos(theta)
-    turn, none = q * sine + r * cosine, np.zeros_like(u)
-    return np.stack(
-        [
-            v * r - w * q - GRAVITY * np.sin(theta),
-            w * p - u * r + GRAVITY * sine * slope,
-            u * q - v * p + GRAVITY * cosine * slope,
-            none,
-            none,
-            none,
-            p + np.tan(theta) * turn,
-            q * cosine - r * sine,
-        ],
-        axis=-1,
+    rates = rates_of(*np.moveaxis(y, -1, 0), np)
+    return np.stack(np.broadcast_arrays(*rates), axis=-1)
+
+
+def rates_of(
+    u: Any, v: Any, w: Any, p: Any, q: Any, r: Any, phi: Any, theta: Any, functions: Any
+) -> tuple[Any, ...]:
+    """The eight rates one by one, with sin, cos and tan of `functions`: `numpy` for arrays, `math`
+    for numbers in real time.
+
+    Examples
+    --------
+    >>> import math
+    >>> from symheli.values.kinematics import rates_of
+    >>> rates_of(10.0, 0, 0, 0, 0, 0.1, 0, 0, math)[1]
+    -1.0
+    """
+    sine, cosine, slope = functions.sin(phi), functions.cos(phi), functions.cos(theta)
+    turn = q * sine + r * cosine
+    return (
+        v * r - w * q - GRAVITY * functions.sin(theta),
+        w * p - u * r + GRAVITY * sine * slope,
+        u * q - v * p + GRAVITY * cosine * slope,
+        0.0,
+        0.0,
+        0.0,
+        p + functions.tan(theta) * turn,
+        q * cosine - r * sine,
     )
 
 
