@@ -1,0 +1,150 @@
+"""An identified rigid vehicle as C99 for an autopilot or a simulator: known kinematics around the
+exported aerodynamics, with a check of what Python computed.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from identification.export.checked import TOLERANCE, samples
+from identification.export.model import write_model
+from identification.export.rigid_body import rigid_body_files
+from identification.model.kinematic_model import KinematicModel
+from symheli.records import FlightRecord
+from symheli.values.c_text import define, identifier, rows
+from symheli.values.template import filled
+from symheli.values.whole_files import write_text
+
+HERE = Path(__file__).parent
+"""kinematic_model.c, .h and _check.c lie here, with marked places for one model."""
+
+ORDINARY = 0.1
+"""Size of the states and inputs the check computes with: angles and rates of a flight."""
+
+
+def write_kinematic_model(
+    model: KinematicModel,
+    folder: str | os.PathLike[str],
+    name: str = "model",
+    precision: Literal["double", "single"] = "double",
+) -> tuple[Path, ...]:
+    """Write an identified rigid vehicle as C99 that predicts and simulates: no allocation, of a
+    library only sin, cos and tan.
+
+    NAME_check.c is a program that carries a record and exits with 0 where the compiled model gives
+    the predictions and the free run computed here.
+
+    Parameters
+    ----------
+    model : KinematicModel
+        The identified model.
+    folder : path
+        Where the files go; made as needed.
+    name : str
+        A C identifier: of the files and functions, in capitals of the macros.
+    precision : {"double", "single"}
+        Of every number in the C code.
+
+    Returns
+    -------
+    tuple of Path
+        NAME.h, NAME.c, NAME_check.c; NAME_body.h, NAME_body.c, the kinematics; NAME_aero.h,
+        NAME_aero.c and NAME_aero_check.c, the aerodynamics as `write_model` writes them.
+
+    Raises
+    ------
+    InputError
+        For a name that is no C identifier, another precision, and functions of p that are not
+        piecewise polynomial.
+    SymheliError
+        Where a file cannot be written.
+
+    Examples
+    --------
+    >>> import identification as idn, symheli, tempfile
+    >>> from identification.export import write_kinematic_model
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> plan = symheli.AirspeedSchedule((6.0, 2.0), (1.5, 1.5), (2.0, 2.0), start=2.0)
+    >>> excitation = symheli.Excitation(dict.fromkeys(heli.inputs, 0.01))
+    >>> kin = idn.KinematicARX(
+    ...     heli.inputs, "airspeed_command", basis=idn.Polynomial(1, 2.0, 6.0))
+    >>> model = idn.fit(kin, symheli.fly(heli, plan, excitation=excitation))
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> [file.name for file in write_kinematic_model(model, folder.name, "heli")][:3]
+    ['heli.h', 'heli.c', 'heli_check.c']
+    >>> folder.cleanup()
+    """
+    inner = write_model(model.aerodynamics, folder, f"{name}_aero", precision)
+    folder, up = Path(folder), f"{name.upper()}_"
+    names = {"model_": f"{name}_", "MODEL_": up}
+    own = names | {"model.": f"{name}."}
+    files = {
+        f"{name}.h": filled(HERE / "kinematic_model.h", _header(model, up), names),
+        f"{name}.c": filled(HERE / "kinematic_model.c", {}, own),
+        f"{name}_check.c": filled(
+            HERE / "kinematic_model_check.c",
+            {"cases": _cases(model, name, precision)},
+            own | {"model:": f"{name}:"},
+        ),
+        **rigid_body_files(name, model.dt, precision),
+    }
+    return (*(write_text(folder / file, content) for file, content in files.items()), *inner)
+
+
+def _header(model: KinematicModel, up: str) -> dict[str, object]:
+    ranges = zip(model.parameters, model.structure.basis.ranges, strict=True)
+    blocks = [
+        [
+            define(f"{up}NY", len(model.outputs)),
+            define(f"{up}NU", len(model.inputs)),
+            define(f"{up}NP", len(model.parameters)),
+            define(f"{up}MEMORY", model.structure.memory, "samples the model reaches back"),
+        ],
+        [define(f"{up}Y_{identifier(s)}", i, s.unit) for i, s in enumerate(model.outputs)],
+        [define(f"{up}U_{identifier(s)}", i, s.unit) for i, s in enumerate(model.inputs)],
+        [
+            define(f"{up}P_{identifier(s)}", i, f"{s.unit}, {low:g} to {high:g}")
+            for i, (s, (low, high)) in enumerate(ranges)
+        ],
+    ]
+    return {
+        "dt": f"{model.dt:.9g}",
+        "method": model.method,
+        "sizes": "\n\n".join("\n".join(b) for b in blocks),
+    }
+
+
+def _cases(model: KinematicModel, name: str, precision: str) -> str:
+    """A record of a fixed seed, one sample missing, with one-step predictions, and the free run up
+    to the missing sample.
+    """
+    dtype = np.float32 if precision == "single" else np.float64
+    memory, wide = model.structure.memory, len(model.outputs) + len(model.inputs)
+    count = 2 * memory + 60
+    given = samples(wide, model.structure.basis.ranges, count)
+    given[:, :wide] *= ORDINARY
+    given = given.astype(dtype).astype(float)
+    record = FlightRecord(
+        model.dt * np.arange(count), given, (*model.outputs, *model.inputs, *model.parameters)
+    )
+    guess = model.predict(record, 1)
+    complete = np.isfinite(given).all(axis=1)
+    there = [k for k in range(memory, count) if complete[k - memory : k].all()]
+    free = record.columns(map(str, model.outputs))[: count // 2].copy()
+    free[memory:] = model.simulate(record)[memory : count // 2]
+    real, outputs = f"{name}_real", f"{name.upper()}_NY"
+    return "\n".join(
+        [
+            define("SAMPLES", count),
+            define("THERE", len(there)),
+            define("HALF", count // 2),
+            define("TOLERANCE", f"{TOLERANCE[precision]:g}"),
+            rows(real, "samples", str(given.shape[1]), given, dtype),
+            rows(real, "predicted", outputs, guess[there], dtype),
+            rows(real, "simulated", outputs, free, dtype),
+        ]
+    )
