@@ -80,8 +80,10 @@ if TYPE_CHECKING:
     from identification.model.prediction import fit_percent
     from identification.recursive.forgetting import Constant, Directional, Forgetting, Variable
     from identification.recursive.history import History
+    from identification.recursive.kinematic_observer import KinematicObserver
     from identification.recursive.online import Online
     from identification.recursive.recursive_least_squares import RecursiveLeastSquares
+    from identification.recursive.rigid_body_online import RigidBodyOnline
     from identification.recursive.rls_state import RLSInfo, RLSState
     from identification.structure.kinematic_arx import KinematicARX
     from identification.structure.lpvarx import LPVARX, Entry, Group, Term
@@ -119,12 +121,14 @@ _ROOMS = {
     "identification.judge.uncertainty": "Band Uncertainty uncertainty",
     "identification.model.coefficients": "Coefficients CoefficientValues",
     "identification.model.kinematic_model": "KinematicModel",
+    "identification.recursive.kinematic_observer": "KinematicObserver",
     "identification.model.lpvarx_model": "LPVARXModel",
     "identification.model.prediction": "fit_percent",
     "identification.recursive.forgetting": "Constant Directional Forgetting Variable",
     "identification.recursive.history": "History",
     "identification.recursive.online": "Online",
     "identification.recursive.recursive_least_squares": "RecursiveLeastSquares",
+    "identification.recursive.rigid_body_online": "RigidBodyOnline",
     "identification.recursive.rls_state": "RLSInfo RLSState",
     "identification.structure.kinematic_arx": "KinematicARX",
     "identification.structure.lpvarx": "LPVARX Entry Group Term",
@@ -159,6 +163,7 @@ __all__ = [
     "InstrumentalVariables",
     "KinematicARX",
     "KinematicModel",
+    "KinematicObserver",
     "LPVARXModel",
     "LaggedSignals",
     "Lasso",
@@ -180,6 +185,7 @@ __all__ = [
     "ResidualAnalysis",
     "ResponseBand",
     "Ridge",
+    "RigidBodyOnline",
     "Scores",
     "SlowMode",
     "SlowModes",

@@ -88,7 +88,9 @@ def write_estimator(
     >>> folder.cleanup()
     """
     require_identifier(name)
-    arx, folder = rls.structure, Path(folder)
+    if rls.structure is not rls.regression:
+        raise InputError("a KinematicARX is written by write_kinematic_estimator, with its dt")
+    arx, folder = rls.regression, Path(folder)
     if missing := [s for s in (*arx.outputs, *arx.inputs, *arx.parameters) if s not in units]:
         raise InputError(f"units: none given for {', '.join(missing)}")
     if not rls.configuration.factors:
@@ -122,7 +124,7 @@ def _rls_header(precision: str) -> str:
 
 def _header(rls: RecursiveLeastSquares, units: Mapping[str, str], up: str) -> dict[str, object]:
     """Sizes, the index of every signal and regressor, and what is estimated in words."""
-    arx, c = rls.structure, rls.configuration
+    arx, c = rls.regression, rls.configuration
     ranges = dict(zip(arx.parameters, arx.basis.ranges, strict=True))
     state, work = c.sizes
     blocks = [
@@ -182,8 +184,8 @@ def _configuration(rls: RecursiveLeastSquares, up: str) -> str:
     lines.append(table("int", "products", c.index.reshape(-1).tolist()))
     lines.append(table("rls_real", "largest", literals(c.largest, c.dtype)))
     kind, *values = numbers(c.forgetting)
-    counts = f"{rls.structure.memory}, {len(c.entries)}, {len(c.groups)}"
-    basis = f"{rls.structure.basis.size}, {len(factors)}, factors, products, largest"
+    counts = f"{rls.regression.memory}, {len(c.entries)}, {len(c.groups)}"
+    basis = f"{rls.regression.basis.size}, {len(factors)}, factors, products, largest"
     return "\n".join(
         [
             *lines,
@@ -200,7 +202,7 @@ def _cases(rls: RecursiveLeastSquares, up: str) -> str:
     """A record of a fixed seed, one sample missing, with the innovations and coefficients that come
     out here.
     """
-    c, arx = rls.configuration, rls.structure
+    c, arx = rls.configuration, rls.regression
     given = samples(arx.ny + arx.nu, arx.basis.ranges, arx.memory + 3 * arx.basis.size + 20)
     learnt, *history = rls.online().run(given)
     innovations, coefficients = map(np.asarray, history)

@@ -132,7 +132,7 @@ def _cases(model: KinematicModel, name: str, precision: str) -> str:
         model.dt * np.arange(count), given, (*model.outputs, *model.inputs, *model.parameters)
     )
     guess = model.predict(record, 1)
-    complete = np.isfinite(given).all(axis=1)
+    complete = np.logical_and.reduce(np.isfinite(given), axis=1)
     there = [k for k in range(memory, count) if complete[k - memory : k].all()]
     free = record.columns(map(str, model.outputs))[: count // 2].copy()
     free[memory:] = model.simulate(record)[memory : count // 2]

@@ -7,20 +7,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from identification.model import kinematic_run
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.prediction import fit_percent, require_horizon
-from identification.structure.kinematic_arx import STATES, KinematicARX
+from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, LinearModel, LPVStateSpace
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen
 from symheli.values.kinematics import RIGID_BODY
+
+if TYPE_CHECKING:
+    from identification.recursive.kinematic_observer import KinematicObserver
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -160,6 +163,43 @@ class KinematicModel:
         """
         run = self._along(record)
         return self.realization.remembered(run.y, run.u, run.segments)
+
+    def observer(
+        self,
+        noise: Mapping[str, float],
+        process: Mapping[str, float] | float | None = None,
+    ) -> KinematicObserver:
+        """The states in flight from noisy measurements: an extended Kalman filter.
+
+        Parameters
+        ----------
+        noise : mapping of str to float
+            Standard deviation of the sensor of each of u v w p q r phi theta, in its unit.
+        process : mapping of str to float, or float, optional
+            Standard deviation of what one sample adds to each of u v w p q r beyond the model (m/s,
+            rad/s); default what `FilterError` found.
+
+        Raises
+        ------
+        UnknownNameError
+            Another name.
+        InputError
+            A name without a number, one that is not positive, or no `process` where the method
+            found none.
+        """
+        from identification.recursive.kinematic_observer import KinematicObserver, deviations
+
+        found = self.details.get("process_noise") if process is None else process
+        if found is None:
+            raise InputError(
+                "process: give the standard deviation of what gusts and model errors add in a"
+                f' sample; the method "{self.method}" has not found it, "filter error" does'
+            )
+        return KinematicObserver(
+            self,
+            deviations(noise, STATES, "sensor in noise"),
+            deviations(found, MOVING, "velocity in process"),
+        )
 
     # --- for design ------------------------------------------------------------------------------
 

@@ -84,13 +84,19 @@ class Run:
         lagged = np.stack(rows, axis=-2)[..., self.lags - 1, self.columns]
         added = np.zeros(past[0].shape)
         added[..., :6] = np.einsum("...s,...so->...o", lagged, self.C[k]) + self.known[k]
-        rate, half = kinematic_rates(past[0]), 0.5 * self.dt
-        y = past[0] + added + 2 * half * rate
-        for _ in range(CORRECTIONS):
-            y = past[0] + added + half * (rate + kinematic_rates(y))
+        y = stepped(past[0], added, self.dt)
         lost = ~(np.abs(y).max(axis=-1) < DIVERGED) | ~(np.abs(y[..., 7]) < STEEP)
         known = np.isfinite(self.known[k]).all(axis=-1) & np.isfinite(lagged).all(axis=-1)
         return np.where(lost[..., None], np.where(known, np.inf, np.nan)[..., None], y)
+
+
+def stepped(before: Array, added: Array, dt: float) -> Array:
+    """States (..., 8) one sample after `before`: kinematics, and what is `added` (..., 8)."""
+    rate, half = kinematic_rates(before), 0.5 * dt
+    y = before + added + 2 * half * rate
+    for _ in range(CORRECTIONS):
+        y = before + added + half * (rate + kinematic_rates(y))
+    return y
 
 
 def predict(run: Run, horizon: int) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from identification.model.kinematic_model import KinematicModel
 from identification.model.lpvarx_model import LPVARXModel
@@ -63,8 +63,10 @@ class History:
     trim: Array | None = None
 
     @property
-    def model(self) -> LPVARXModel | KinematicModel:
-        """The model at the end, its coefficients solved from the triangular factor."""
+    def model(self) -> Any:
+        """The model at the end, its coefficients solved from the triangular factor: an
+        `LPVARXModel`, or the `KinematicModel` of a `KinematicARX`.
+        """
         kin = self.structure if isinstance(self.structure, KinematicARX) else None
         regression = LPVARXModel(
             structure=self.state.configuration.structure,
@@ -78,6 +80,6 @@ class History:
             rows_dropped=self.dropped,
             method="rls",
         )
-        if kin is None:
+        if kin is None or self.trim is None:
             return regression
         return KinematicModel(structure=kin, aerodynamics=regression, trim=self.trim)

@@ -68,7 +68,7 @@ class RigidBodyOnline(Online):
             raise
         self._u[:FAST] = y[:FAST]
         now = tuple(y.tolist())
-        new = rates_of(*now, math)
+        new = rates_of(now, math)
         if not last:  # a start: any number will do, there is no regressor yet
             last, rates = now, new
         half, complete = self._half, new[WIDE - 2] - new[WIDE - 2]  # NaN where an angle or rate is
@@ -96,7 +96,7 @@ class RigidBodyOnline(Online):
         added = _starting(added, np.hstack([y, samples[:, WIDE:]]))
         out = super().run(np.column_stack([added, y[:, :FAST], samples[:, WIDE:]]), history)
         self._last = tuple(y[-1].tolist()) if self._filled else ()
-        self._rates = rates_of(*self._last, math) if self._last else ()
+        self._rates = rates_of(self._last, math) if self._last else ()
         return out
 
     def forget_past(self) -> None:
@@ -109,5 +109,6 @@ def _starting(added: Array, measured: Array) -> Array:
     """Increments (n, 6) with zeros where all of a sample was `measured` (n, any) but not the one
     before: no regressor is complete there, and its lags may be filled from it on.
     """
-    start = np.isnan(added).any(axis=1) & np.isfinite(measured).all(axis=1)
+    unknown = np.logical_or.reduce(np.isnan(added), axis=1)
+    start = unknown & np.logical_and.reduce(np.isfinite(measured), axis=1)
     return np.where(start[:, None], 0.0, added)

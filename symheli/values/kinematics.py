@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -46,23 +47,22 @@ def kinematic_rates(y: Array) -> Array:
     >>> print(kinematic_rates(np.array([10.0, 0, 0, 0, 0, 0.1, 0, 0])).round(2))
     [ 0.   -1.    9.81  0.    0.    0.    0.    0.  ]
     """
-    rates = rates_of(*np.moveaxis(y, -1, 0), np)
+    rates = rates_of(np.moveaxis(y, -1, 0), np)
     return np.stack(np.broadcast_arrays(*rates), axis=-1)
 
 
-def rates_of(
-    u: Any, v: Any, w: Any, p: Any, q: Any, r: Any, phi: Any, theta: Any, functions: Any
-) -> tuple[Any, ...]:
-    """The eight rates one by one, with sin, cos and tan of `functions`: `numpy` for arrays, `math`
-    for numbers in real time.
+def rates_of(y: Iterable[Any], functions: Any) -> tuple[Any, ...]:
+    """The eight rates one by one from the eight states y, with sin, cos and tan of `functions`:
+    `numpy` for arrays, `math` for numbers in real time.
 
     Examples
     --------
     >>> import math
     >>> from symheli.values.kinematics import rates_of
-    >>> rates_of(10.0, 0, 0, 0, 0, 0.1, 0, 0, math)[1]
+    >>> rates_of((10.0, 0, 0, 0, 0, 0.1, 0, 0), math)[1]
     -1.0
     """
+    u, v, w, p, q, r, phi, theta = y
     sine, cosine, slope = functions.sin(phi), functions.cos(phi), functions.cos(theta)
     turn = q * sine + r * cosine
     return (
