@@ -35,7 +35,14 @@ from benchmarks.opponents.covariance_rls import (  # noqa: E402
 )
 from benchmarks.timing import arguments, keep, lines, medians  # noqa: E402
 from benchmarks.unfused import unfused_peak  # noqa: E402
-from identification import LPVARX, Directional, Polynomial, RecursiveLeastSquares  # noqa: E402
+from identification import (  # noqa: E402
+    LPVARX,
+    Directional,
+    KinematicARX,
+    Polynomial,
+    Product,
+    RecursiveLeastSquares,
+)
 from identification.recursive import kernel  # noqa: E402
 from identification.recursive.online import Online  # noqa: E402
 
@@ -52,6 +59,10 @@ GOALS = {
     "MIMO: covariance RLS (NumPy) / ours": 7.0,
     "MIMO: padasip once an output / ours": 200.0,
 }
+BODY_GOAL = 1.2
+"""An update with known kinematics takes at most so many times that of LPV-ARX with as many
+regressors.
+"""
 LEVEL_GOAL = 1.6
 """Kernel alone: AVX2 takes at most so many times as long as AVX-512."""
 KEPT_TO = "SYMHELI_BENCHMARK_LEVEL"
@@ -89,12 +100,15 @@ def main() -> None:
     alone = at_levels(kernels, seconds / 6) if kernels else {}
     ratios |= alone
     goals += [goal(name, alone[name], LEVEL_GOAL, most=True) for name in alone if "AVX2 /" in name]
+    bodies, body_lines = rigid_bodies(seconds / 3)
+    ratios |= bodies
+    goals += [goal(name, bodies[name], BODY_GOAL, most=True) for name in bodies if "/" in name]
     cost = costs(0.01 if options.quick else 0.3)
     ratios |= analysis()
     if options.json:
         print(json.dumps(ratios, indent=1))
     else:
-        text = "\n".join([*lines(times, ratios), table(cost), *goals, *notes])
+        text = "\n".join([*lines(times, ratios), *body_lines, table(cost), *goals, *notes])
         print(text)
         if options.write:
             keep("identification", text)
@@ -302,6 +316,60 @@ def costs(seconds: float) -> dict[tuple[int, int], float]:
         )
         found[outputs, n] = spent[""] / len(some)
     return found
+
+
+def rigid_bodies(seconds: float) -> tuple[dict[str, float], list[str]]:
+    """Updates of a rigid vehicle with known kinematics beside LPV-ARX with as many regressors, one
+    by one and as a whole record; and what a second scheduling parameter costs.
+    """
+    controls = ("d_lon", "d_lat", "d_col", "d_ped")
+    acceleration = Polynomial(1, -3.0, 3.0)
+    sizes = {
+        "airspeed": ("V", BASIS),
+        "airspeed x acceleration": (("V", "a"), Product((BASIS, acceleration), None)),
+    }
+    ratios, told, rng = {}, [], np.random.default_rng(0)
+    for name, (scheduling, basis) in sizes.items():
+        kin = KinematicARX(controls, scheduling, na=2, nb=2, basis=basis)
+        velocities = tuple(f"{s}_" for s in "uvwpqr")
+        arx = LPVARX(
+            velocities,
+            controls,
+            scheduling,
+            na=2,
+            nb=2,
+            delay=1,
+            basis=basis,
+            scheduling_at="now",
+            offset=True,
+            offset_rate=True,
+        )
+        assert kin.n_regressors == arx.n_regressors
+        y, u = 0.1 * rng.standard_normal((WARM, 8)), rng.standard_normal((WARM, 4))
+        p = np.column_stack([rng.uniform(low, high, WARM) for low, high in basis.ranges])
+        runs = {}
+        for kind, rls, states in (("body", kin, y), ("arx", arx, y[:, :6].copy())):
+            made = RecursiveLeastSquares(rls)
+            online = made.online(dt=0.02)
+            rows = np.column_stack([states, u, p])
+            online.run(rows, history=False)
+            some = [(states[k].copy(), u[k].copy(), p[k].copy()) for k in range(CALLS)]
+            runs[kind] = lambda online=online, some=some: [online.update(*one) for one in some]
+            runs[f"{kind}, record"] = lambda online=online, rows=rows[:CALLS]: online.run(
+                rows, history=False
+            )
+        times = medians(runs, seconds, time.thread_time, settled=True)
+        told.append(
+            f"rigid body, {name}: {kin.n_regressors} regressors, an update"
+            f" {1e6 * times['body'] / CALLS:.2f} us, of a record"
+            f" {1e6 * times['body, record'] / CALLS:.2f} us; LPV-ARX"
+            f" {1e6 * times['arx'] / CALLS:.2f} and {1e6 * times['arx, record'] / CALLS:.2f} us"
+        )
+        ratios[f"rigid body by {name}: update / LPV-ARX"] = times["body"] / times["arx"]
+        ratios[f"rigid body by {name}: record / LPV-ARX"] = (
+            times["body, record"] / times["arx, record"]
+        )
+    return ratios, told
 
 
 def table(cost: dict[tuple[int, int], float]) -> str:

@@ -59,21 +59,23 @@ class RigidBodyOnline(Online):
         last, rates = self._last, self._rates
         self._last = ()
         try:
-            y = vector(y, WIDE, "y")
-            self._u[FAST:] = vector(u, self._controls, "u")
-            if np.isinf(y).any():
+            now = tuple(vector(y, WIDE, "y").tolist())
+            controls = vector(u, self._controls, "u")
+            if not math.isfinite(sum(now)) and any(map(math.isinf, now)):
                 raise InputError("y is infinite; mark a missing sample as NaN")
         except InputError:
             self.forget_past()
             raise
-        self._u[:FAST] = y[:FAST]
-        now = tuple(y.tolist())
         new = rates_of(now, math)
         if not last:  # a start: any number will do, there is no regressor yet
             last, rates = now, new
         half, complete = self._half, new[WIDE - 2] - new[WIDE - 2]  # NaN where an angle or rate is
-        for i in range(FAST):
-            self._y[i] = now[i] - last[i] - half * (new[i] + rates[i]) + complete
+        self._y[:] = [
+            y1 - y0 - half * (k1 + k0) + complete
+            for y1, y0, k1, k0 in zip(now[:FAST], last, new, rates, strict=False)
+        ]
+        self._u[:FAST] = now[:FAST]
+        self._u[FAST:] = controls
         learnt = super().update(self._y, self._u, p)
         if self._filled:
             self._last, self._rates = now, new

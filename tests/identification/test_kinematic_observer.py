@@ -117,7 +117,7 @@ def test_what_it_must_be_told_is_asked_for(vehicle, flown):
         model.observer(NOISE, {"phi": 0.1})
     with pytest.raises(InputError, match="expected positive"):
         model.observer(NOISE, -1.0)
-    with pytest.raises(InputError, match="outside"):
+    with pytest.raises(InputError, match="declare the basis over the whole range"):
         model.observer(NOISE, PROCESS).run(
             flown[1].with_signals({"airspeed_command": "m/s"}, airspeed_command=np.full(900, 99.0))
         )
