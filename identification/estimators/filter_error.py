@@ -147,6 +147,7 @@ class FilterError(Method):
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
         scores = sum(s.scores(theta, R, Q) for s in flights)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
+        covariance = 0.5 * (covariance + covariance.T)
         n = arx.n_regressors
         residual = sum(len(s.y) * s.residual(theta) for s in flights) / sum(
             len(s.y) for s in flights
