@@ -234,7 +234,7 @@ class Realization:
         rows = np.array([i for i in y if i < nz])
         n = f.size
         blocks = covariance.reshape(nz, -1, n, nz, covariance.shape[1] // n, n)
-        part = blocks[np.ix_(rows, kept, range(n), rows, kept, range(n))]
+        part = blocks[rows][:, kept][:, :, :, rows][:, :, :, :, kept]
         part = np.einsum("gf,asfbth,kh->asgbtk", project, part, project, optimize=True)
         size = len(kept) * own.size
         part = part.reshape(len(rows), size, len(rows), size)

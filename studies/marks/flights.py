@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from studies.transition.flights import AMPLITUDE, NOISE_DB, TOP
+from studies.transition.flights import NOISE_DB, TOP
 from symheli import AirspeedSchedule, Excitation, FlightPlan, Wind
 from symheli.flight import XCELL_SERVOS, Autopilot
 
@@ -17,18 +17,23 @@ helps to tell what is there.
 RAMPS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5)
 """Peak accelerations, m/s^2, in turn."""
 
-HOLD = 1.5
+HOLD = 3.0
 """At each airspeed, s."""
 
 LONGEST = 150.0
 """Of the aggressive flight, s."""
 
-LINES = (0.05, 5.0)
+LINES = (0.02, 4.0)
 """Of the multisines, Hz."""
+
+AMPLITUDE = {"d_lon": 0.018, "d_lat": 0.010, "d_col": 0.015, "d_ped": 0.016}
+"""Of the multisines, rad: louder where the slow longitudinal modes are, and low enough sideways
+that the flapping stays linear.
+"""
 
 GENTLE_LONGEST = 230.0
 GENTLE_HOLD = 8.0
-GENTLE_LINES = (0.01, 5.0)
+GENTLE_LINES = (0.01, 4.0)
 """The same of the gentle flight at 1 m/s^2: slow modes take time."""
 
 DELAY = 0.02
