@@ -46,6 +46,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.nu_gap import chordal_distance, nu_gap
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
+from symheli.lpv.stability_margin import stability_margin
 from symheli.lpv.trim_schedule import TrimSchedule
 
 __all__ = [
@@ -82,4 +83,5 @@ __all__ = [
     "parallel",
     "series",
     "simulate",
+    "stability_margin",
 ]
