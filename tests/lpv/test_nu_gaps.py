@@ -18,7 +18,9 @@ def plant(radius, seed=0):
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((5, 5))
     A *= radius / np.abs(np.linalg.eigvals(A)).max()
-    names = [signals([f"{kind}{i}" for i in range(n)]) for kind, n in zip("xuy", (5, 2, 3), strict=True)]
+    names = [
+        signals([f"{kind}{i}" for i in range(n)]) for kind, n in zip("xuy", (5, 2, 3), strict=True)
+    ]
     B, C = rng.standard_normal((5, 2)), rng.standard_normal((3, 5))
     return LinearModel(A, B, C, np.zeros((3, 2)), *names, dt=0.02)
 
