@@ -226,6 +226,7 @@ class KinematicModel:
         inputs: Sequence[str] | None = None,
         *,
         held: Mapping[str, float] | None = None,
+        degree: int | None = None,
         draws: int = 0,
     ) -> UncertainStateSpace:
         """`to_state_space` with every model of an ellipsoid of coefficients: what a certificate
@@ -239,7 +240,7 @@ class KinematicModel:
         ----------
         probability : float
             Of the ellipsoid, for Gaussian errors with the estimated covariance.
-        outputs, inputs, held
+        outputs, inputs, held, degree
             As of `to_state_space`.
         draws : int
             0: a proven radius; else that of so many draws, see `matrix_ellipsoid`.
@@ -274,7 +275,7 @@ class KinematicModel:
             probability,
             draws,
         )
-        model = self.realization.lpv(self.parameters, outputs, inputs, held or {}, None, block)
+        model = self.realization.lpv(self.parameters, outputs, inputs, held or {}, degree, block)
         return UncertainStateSpace(
             model,
             block.perturbations,
