@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.ah1s.simulator import AH1S, DT, SPIN_UP, STATES, STICKS
+from studies.ah1s.simulator import AH1S, DT, STATES, STICKS
 from studies.ah1s.trim import Trim
 from symheli.errors import AccuracyError
 from symheli.lpv import LinearModel
@@ -45,8 +45,10 @@ STATIC = 0.02
 FRESH = 200, 10, 0.005
 """Samples of such movements, how many of them a stick stays, and its size."""
 
-SETTLE = 20.0
-"""Seconds held before each response, in which all but the governor settles."""
+GOVERNOR, SETTLE = 900.0, 20.0
+"""Seconds held before a realization, in which the governor (58 s) comes to rest, and before each
+response, in which the rest does: a rotor that still creeps does not cancel in differences.
+"""
 
 STATE_STEP = np.array([0.05, 0.05, 0.05, 0.01, 0.01, 0.01, 0.005, 0.005])
 STICK_STEP = 0.01
@@ -80,7 +82,7 @@ def realization(simulator: AH1S, trim: Trim) -> LinearModel:
 
     Source: Juang and Pappa (1985), An eigensystem realization algorithm, J. Guidance 8(5).
     """
-    simulator.hold(trim.state, trim.sticks, SPIN_UP)  # the governor too
+    simulator.hold(trim.state, trim.sticks, GOVERNOR)
     h = markov(simulator, trim) * SCALE[:, None]
     rows = len(h) // 2
     hankel = np.block([[h[i + j] for j in range(rows)] for i in range(rows)])
