@@ -10,7 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from identification import FilterError, KinematicARX, KinematicModel, Polynomial, Product, fit
+from identification import (
+    FilterError,
+    InstrumentalVariables,
+    KinematicARX,
+    KinematicModel,
+    Polynomial,
+    Product,
+    fit,
+)
 from studies.ah1s.flight import CalmFlight, Plan, fly, unknown
 from studies.ah1s.servos import behind, servos
 from studies.ah1s.simulator import AH1S, DEFLECTIONS, STATES, STICKS
@@ -40,6 +48,13 @@ AMPLITUDE = {"d_lon": 0.10, "d_lat": 0.15, "d_col": 0.06, "d_ped": 0.10}
 BAND = (0.05, 2.5)
 """Excitation, parts of the sticks' travel and Hz."""
 
+METHODS: dict[str, Any] = {
+    "filter error": FilterError(CalmFlight()),
+    "instruments": InstrumentalVariables(CalmFlight()),
+    "least squares": "ls",
+}
+"""Instruments are the same plan flown without noise."""
+
 NOISE_DB, DEGREE = 30.0, 3
 STICK_SCALE = 0.1
 """Part of its travel by which a stick is scaled before a nu-gap is taken."""
@@ -50,8 +65,8 @@ MARK = 0.15
 SECOND = 50
 """Samples of the predictions that are scored: 1 s."""
 
-SLOW = 0.15, 0.6
-"""Frequencies (rad/s) between which the phugoid lies."""
+SLOW, GENTLE = (0.15, 0.6), 0.3
+"""Frequencies (rad/s) between which the phugoid lies, and how fast it may grow or decay (1/s)."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +140,7 @@ def phugoid(model: LinearModel) -> complex:
     """
     poles = model.poles().astype(complex)
     s = np.log(poles[np.abs(poles) > 0.5]) / model.dt
-    slow = s[(s.imag > SLOW[0]) & (s.imag < SLOW[1])]
+    slow = s[(s.imag > SLOW[0]) & (s.imag < SLOW[1]) & (np.abs(s.real) < GENTLE)]
     return complex(max(slow, key=lambda pole: pole.real, default=complex(np.nan, np.nan)))
 
 
@@ -143,12 +158,9 @@ class Judged:
     constant: dict[str, float]
 
 
-def judge(
-    kind: Kind, knots: int, seed: int, exact: Sequence[LinearModel], method: Any = None
-) -> Judged:
-    """Fly, identify by the filter error method (instruments flown without noise), compare."""
+def judge(kind: Kind, knots: int, seed: int, exact: Sequence[LinearModel], method: Any) -> Judged:
+    """Fly, identify by a method, compare."""
     record, test = fly(training(knots, seed)), fly(unseen(knots, seed))
-    method = FilterError(CalmFlight()) if method is None else method
     high = FAST[knots]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # slow modes and weak instruments are judged here
@@ -169,10 +181,10 @@ def judge(
     )
 
 
-def tables(knots: int, exact: Sequence[LinearModel], found: Sequence[Judged]) -> str:
+def tables(knots: int, method: str, exact: Sequence[LinearModel], found: Sequence[Judged]) -> str:
     """Gaps, phugoids and what scheduling pays, a line a flight."""
     speeds = [f"{speed:.0f}" for speed in SPEEDS[knots]]
-    lines = [f"hover to {knots} kt, {NOISE_DB:g} dB noise, filter error method", ""]
+    lines = [f"hover to {knots} kt, {NOISE_DB:g} dB noise, {method}", ""]
     for kind in dict.fromkeys(one.kind for one in found):
         mine = [one for one in found if one.kind is kind]
         worst = max(max(one.gaps) for one in mine)
@@ -220,8 +232,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     parser.add_argument("--knots", type=int, nargs="+", choices=tuple(FAST), default=tuple(FAST))
+    parser.add_argument("--method", choices=tuple(METHODS), default="filter error")
     arguments = parser.parse_args()
+    method = METHODS[arguments.method]
     for knots in arguments.knots:
         exact = truth(SPEEDS[knots])
-        found = [judge(kind, knots, seed, exact) for kind in KINDS for seed in arguments.seeds]
-        print(tables(knots, exact, found), flush=True)
+        found = [
+            judge(kind, knots, seed, exact, method) for kind in KINDS for seed in arguments.seeds
+        ]
+        print(tables(knots, arguments.method, exact, found), flush=True)
