@@ -159,7 +159,7 @@ class Judged:
 
 
 def judge(kind: Kind, knots: int, seed: int, exact: Sequence[LinearModel], method: Any) -> Judged:
-    """Fly, identify by a method, compare."""
+    """Fly, identify, compare."""
     record, test = fly(training(knots, seed)), fly(unseen(knots, seed))
     high = FAST[knots]
     with warnings.catch_warnings():
