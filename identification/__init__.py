@@ -64,7 +64,9 @@ if TYPE_CHECKING:
         BesideBaseline,
         beside_baseline,
     )
+    from identification.judge.criterion import Criterion
     from identification.judge.dependence import DependenceReport, dependence_report
+    from identification.judge.fit_for_control import FitForControl, fit_for_control
     from identification.judge.frequency_response import FrequencyResponse, frequency_response
     from identification.judge.frozen_models import FrozenModels, frozen_models, pole_miss
     from identification.judge.matrix_ellipsoid import MatrixEllipsoid, matrix_ellipsoid
@@ -109,7 +111,9 @@ _ROOMS = {
     "identification.judge.beside_baseline": (
         "BaselineModel BaselinePredictor BesideBaseline beside_baseline"
     ),
+    "identification.judge.criterion": "Criterion",
     "identification.judge.dependence": "DependenceReport dependence_report",
+    "identification.judge.fit_for_control": "FitForControl fit_for_control",
     "identification.judge.frequency_response": "FrequencyResponse frequency_response",
     "identification.judge.frozen_models": "FrozenModels frozen_models pole_miss",
     "identification.judge.matrix_ellipsoid": "MatrixEllipsoid matrix_ellipsoid",
@@ -146,6 +150,7 @@ __all__ = [
     "CoefficientValues",
     "Coefficients",
     "Constant",
+    "Criterion",
     "DependenceReport",
     "Directional",
     "Entry",
@@ -153,6 +158,7 @@ __all__ = [
     "ExcitationReport",
     "Experiment",
     "FilterError",
+    "FitForControl",
     "FlightSource",
     "Forgetting",
     "FrequencyResponse",
@@ -203,6 +209,7 @@ __all__ = [
     "dependence_report",
     "excitation_report",
     "fit",
+    "fit_for_control",
     "fit_percent",
     "frequency_response",
     "frozen_models",

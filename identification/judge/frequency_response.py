@@ -63,14 +63,21 @@ class FrequencyResponse:
         Source: Tischler and Remple (2012), Aircraft and Rotorcraft System Identification, eq. 11.4.
         """
         H = model.select(inputs=self.inputs, outputs=self.outputs).frequency_response(self.omega)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = self.G / H
-            error = (20 * np.log10(np.abs(ratio))) ** 2 + 0.01745 * np.degrees(np.angle(ratio)) ** 2
-        weight = (1.58 * (1 - np.exp(-self.coherence))) ** 2
-        good = (self.coherence > coherence) & np.isfinite(error)
-        count = good.sum(axis=0)
-        total = np.sum(np.where(good, weight * error, 0.0), axis=0)
-        return np.where(count > 0, 20 * total / np.maximum(count, 1), np.nan)
+        return mismatch_cost(self.G, H, self.coherence, self.coherence > coherence)
+
+
+def mismatch_cost(G: Array, H: Array, coherence: Array, good: Array) -> Array:
+    """J (ny, nu) of H beside the measured G (n, ny, nu) over the `good` frequencies, see
+    `FrequencyResponse.mismatch`; NaN where there are none.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = G / H
+        error = (20 * np.log10(np.abs(ratio))) ** 2 + 0.01745 * np.degrees(np.angle(ratio)) ** 2
+    weight = (1.58 * (1 - np.exp(-coherence))) ** 2
+    good = good & np.isfinite(error)
+    count = good.sum(axis=0)
+    total = np.sum(np.where(good, weight * error, 0.0), axis=0)
+    return np.where(count > 0, 20 * total / np.maximum(count, 1), np.nan)
 
 
 def frequency_response(
@@ -122,18 +129,20 @@ def frequency_response(
     """
     records = as_records(records)
     outputs, inputs = units_of(outputs, records), units_of(inputs, records)
-    dt = records[0].dt
-    if not 7.5 * dt < window < np.inf:
-        raise InputError(f"window: expected at least eight samples, {8 * dt:.3g} s, got {window} s")
-    n = round(window / dt)
-    omega = 2 * np.pi * np.fft.rfftfreq(n, dt)
-    low, high = band or (2 * np.pi / window, np.pi / dt)
-    keep = (omega >= low * (1 - 1e-9)) & (omega <= high * (1 + 1e-9)) & (omega > 0)
-    if not keep.any():
-        raise InputError(
-            f"band: no frequency of a {window} s window lies between {low} and {high} rad/s"
-        )
-    S, count = _spectra(records, (*inputs, *outputs), n, keep)
+    omega, pieces = windows(records, (*inputs, *outputs), window, band)
+    mean = np.mean([S for S, _ in pieces], axis=0)
+    return response_of(omega, mean, len(pieces), outputs, inputs, window)
+
+
+def response_of(
+    omega: Array,
+    S: Array,
+    count: int,
+    outputs: tuple[Signal, ...],
+    inputs: tuple[Signal, ...],
+    window: float,
+) -> FrequencyResponse:
+    """From the mean cross spectra S (n, nu + ny, nu + ny) of `count` windows (s), inputs first."""
     nu = len(inputs)
     if count < nu + 1:
         raise ExcitationError(
@@ -165,7 +174,7 @@ def frequency_response(
             0.55 * (1 - coherence) / np.maximum(coherence, tiny) / (2 * max(_independent(count), 1))
         )
     return FrequencyResponse(
-        omega=omega[keep],
+        omega=omega,
         G=G,
         coherence=coherence,
         multiple=multiple,
@@ -180,21 +189,40 @@ def _independent(windows: int) -> float:
     return (windows + 1) / 2
 
 
-def _spectra(
-    records: Sequence[FlightRecord], names: Sequence[str], n: int, keep: Array
-) -> tuple[Array, int]:
-    """Cross spectral densities (nf, m, m), S[:, a, b] of a with the conjugate of b, and the number
-    of windows averaged.
+def windows(
+    records: Sequence[FlightRecord],
+    names: Sequence[str],
+    window: float,
+    band: tuple[float, float] | None,
+    also: tuple[str, ...] = (),
+) -> tuple[Array, list[tuple[Array, Array]]]:
+    """Frequencies (rad/s) of the band, and of each unbroken window (s) the cross spectral densities
+    (nf, m, m), S[:, a, b] of a with the conjugate of b, beside the means of the signals `also`.
+
+    Raises `InputError` for a window or a band that holds nothing, `ExcitationError` where no window
+    is unbroken.
     """
-    m, hop, total, count = len(names), n // 2, 0.0, 0
+    dt = records[0].dt
+    if not 7.5 * dt < window < np.inf:
+        raise InputError(f"window: expected at least eight samples, {8 * dt:.3g} s, got {window} s")
+    n = round(window / dt)
+    omega = 2 * np.pi * np.fft.rfftfreq(n, dt)
+    low, high = band or (2 * np.pi / window, np.pi / dt)
+    keep = (omega >= low * (1 - 1e-9)) & (omega <= high * (1 + 1e-9)) & (omega > 0)
+    if not keep.any():
+        raise InputError(
+            f"band: no frequency of a {window} s window lies between {low} and {high} rad/s"
+        )
+    m, hop, found = len(names), n // 2, []
     taper: Any = np.asarray(get_window("hann", n))
     untouched: Any = False
     for record in records:
-        values = record.columns(names)
+        values, others = record.columns(names), record.columns(also)
         for part in record.segments():
             for start in range(part.start, part.stop - n + 1, hop):
-                piece = values[start : start + n]
-                if not np.isfinite(piece).all():
+                rows = slice(start, start + n)
+                piece = values[rows]
+                if not (np.isfinite(piece).all() and np.isfinite(others[rows]).all()):
                     continue
                 piece = piece - piece.mean(axis=0)
                 a, b = np.meshgrid(np.arange(m), np.arange(m), indexing="ij")
@@ -208,9 +236,9 @@ def _spectra(
                     detrend=untouched,
                     axis=-1,
                 )[1]
-                total, count = total + np.moveaxis(S, -1, 0)[keep], count + 1
-    if not count:
+                found.append((np.moveaxis(S, -1, 0)[keep], others[rows].mean(axis=0)))
+    if not found:
         raise ExcitationError(
             f"no unbroken stretch of {n} samples; shorten the window or resample the record"
         )
-    return np.asarray(total) / count, count
+    return omega[keep], found

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from identification.judge.coefficient_covariance import covariances
+from identification.judge.draws import drawn
 from identification.judge.response_band import ResponseBand, response_band
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.regressors import Regression, as_records, stacked
@@ -168,16 +169,9 @@ class Uncertainty:
         """
         if not isinstance(count, int | np.integer) or count < 1:
             raise InputError(f"count: expected a whole number of models >= 1, got {count!r}")
-        arx, theta = self.model.structure, self.model.theta
-        free = arx.free.T.reshape(-1)
-        square = self.joint.reshape(len(free), len(free))[free][:, free]
-        scale = np.sqrt(np.diagonal(square))
-        scale = np.where(scale > 0, scale, 1.0)
-        values, vectors = np.linalg.eigh(square / np.outer(scale, scale))
-        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-        moved = np.tile(theta.T.reshape(-1), (count, 1))
-        moved[:, free] += np.random.default_rng(seed).standard_normal((count, len(root))) @ root.T
-        return tuple(replace(self.model, theta=row.reshape(arx.ny, -1).T) for row in moved)
+        free = self.model.structure.free
+        thetas = drawn(self.model.theta, self.joint, free, int(count), seed)
+        return tuple(replace(self.model, theta=theta) for theta in thetas)
 
     def frequency_response(self, p: object, omega: object) -> ResponseBand:
         """The response at `omega` (k,) in rad/s with the scheduling held at p, and its standard

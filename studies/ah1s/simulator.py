@@ -14,6 +14,9 @@ STATES = tuple(Signal(name) for name in ("u", "v", "w", "p", "q", "r", "phi", "t
 STICKS = tuple(Signal(name, "1") for name in ("d_lon", "d_lat", "d_col", "d_ped"))
 """Longitudinal and lateral stick, collective, pedals, as parts of their travel."""
 
+DEFLECTIONS = tuple(Signal(f"{name}_reached", "rad") for name in STICKS)
+"""What rotors and tail rotor are set to: sticks through gains, mixing and lags."""
+
 DT = 0.02
 """Sample period, s."""
 
@@ -44,6 +47,10 @@ RATES = (
 COMMANDS = (
     *("fcs/elevator-cmd-norm", "fcs/aileron-cmd-norm"),
     *("fcs/collective-cmd-norm", "fcs/rudder-cmd-norm"),
+)
+REACHED = (
+    *("propulsion/engine/longitudinal-ctrl-rad", "propulsion/engine/lateral-ctrl-rad"),
+    *("propulsion/engine/collective-ctrl-rad", "propulsion/engine[1]/antitorque-ctrl-rad"),
 )
 INTEGRATORS = tuple(
     f"simulation/integrator/{part}/{kind}"
@@ -105,6 +112,10 @@ class AH1S:
     def read(self) -> Array:
         """u v w p q r phi theta (8,)."""
         return np.array([self._fdm[name] for name in READ]) * TO_SI
+
+    def deflections(self) -> Array:
+        """`DEFLECTIONS` (4,)."""
+        return np.array([self._fdm[name] for name in REACHED])
 
     def step(self, sticks: Sequence[float] | Array) -> Array:
         """Hold sticks (4,) for one sample; the state (8,) after it."""

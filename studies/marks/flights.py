@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from studies.transition.flights import AMPLITUDE, NOISE_DB, TOP
+from collections.abc import Mapping
+
+from studies.transition.flights import AMPLITUDE as STUDY_AMPLITUDE
+from studies.transition.flights import NOISE_DB, TOP
 from symheli import AirspeedSchedule, Excitation, FlightPlan, Wind
 from symheli.flight import XCELL_SERVOS, Autopilot
 
@@ -17,19 +20,31 @@ helps to tell what is there.
 RAMPS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5)
 """Peak accelerations, m/s^2, in turn."""
 
-HOLD = 1.5
+HOLD = 3.0
 """At each airspeed, s."""
 
 LONGEST = 150.0
 """Of the aggressive flight, s."""
 
-LINES = (0.05, 5.0)
+LINES = (0.02, 4.0)
 """Of the multisines, Hz."""
 
+AMPLITUDE = {"d_lon": 0.018, "d_lat": 0.010, "d_col": 0.015, "d_ped": 0.016}
+"""Of the multisines, rad: louder where the slow longitudinal modes are, and low enough sideways
+that the flapping stays linear.
+"""
+
+GENTLE_TARGETS = (0.0, 2.0, 0.0, 4.0, 0.0, 13.0, 0.0, 1.0, 0.0, 7.0, 0.0, 3.0, 0.0)
 GENTLE_LONGEST = 230.0
-GENTLE_HOLD = 8.0
-GENTLE_LINES = (0.01, 5.0)
-"""The same of the gentle flight at 1 m/s^2: slow modes take time."""
+GENTLE_HOLD = 12.0
+GENTLE_LINES = (0.01, 4.0)
+"""The same of the gentle flight at 1 m/s^2: slow modes take time, and the slowest are those of
+hover.
+"""
+
+TEST_LINES = (0.1, 5.0)
+TEST_AMPLITUDE = STUDY_AMPLITUDE
+"""Of the flight that judges: those of the study."""
 
 DELAY = 0.02
 """From command to servo, s, where servos fly."""
@@ -56,8 +71,8 @@ def gentle(
     servos: bool = False,
     wind: Wind | None = None,
 ) -> FlightPlan:
-    """The same airspeeds at 1 m/s^2 with long holds and lower lines, at most 230 s."""
-    schedule = _ramps((1.0,), GENTLE_HOLD, GENTLE_LONGEST)
+    """Hover again and again, and what lies between at 1 m/s^2: long holds, lower lines, 230 s."""
+    schedule = _ramps((1.0,), GENTLE_HOLD, GENTLE_LONGEST, GENTLE_TARGETS)
     return _plan(schedule, 5000 + seed, autopilot, noise_db, servos, wind, GENTLE_LINES)
 
 
@@ -71,14 +86,21 @@ def transition(
 ) -> FlightPlan:
     """Hover, 13 m/s, hover at 3.2 m/s^2 with other multisines: the study's test flight."""
     schedule = AirspeedSchedule.transition(0.0, TOP, 3.2, hold=2.0)
-    return _plan(schedule, 3000 + seed, autopilot, noise_db, servos, wind)
+    return _plan(
+        schedule, 3000 + seed, autopilot, noise_db, servos, wind, TEST_LINES, TEST_AMPLITUDE
+    )
 
 
-def _ramps(accelerations: tuple[float, ...], hold: float, longest: float) -> AirspeedSchedule:
-    """As many of `TARGETS` as `longest` (s) allows."""
-    for count in range(len(TARGETS), 0, -1):
+def _ramps(
+    accelerations: tuple[float, ...],
+    hold: float,
+    longest: float,
+    targets: tuple[float, ...] = TARGETS,
+) -> AirspeedSchedule:
+    """As many of the targets as `longest` (s) allows."""
+    for count in range(len(targets), 0, -1):
         peaks = tuple(accelerations[i % len(accelerations)] for i in range(count))
-        schedule = AirspeedSchedule(TARGETS[:count], peaks, (hold,) * count)
+        schedule = AirspeedSchedule(targets[:count], peaks, (hold,) * count)
         if schedule.duration <= longest:
             break
     return schedule
@@ -92,10 +114,11 @@ def _plan(
     servos: bool,
     wind: Wind | None,
     lines: tuple[float, float] = LINES,
+    amplitude: Mapping[str, float] = AMPLITUDE,
 ) -> FlightPlan:
     return FlightPlan(
         schedule,
-        excitation=Excitation(AMPLITUDE, "multisine", lines, seed),
+        excitation=Excitation(amplitude, "multisine", lines, seed),
         noise_db=noise_db,
         seed=seed,
         controller=autopilot,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from studies.transition.guarantees import PERIOD, SIZES
 from symheli import Helicopter, LinearModel
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv import nu_gap
+from symheli.values import Signal
 from symheli.values.arrays import Array
 
 SPEEDS = np.linspace(0.0, TOP, 27)
@@ -103,7 +104,7 @@ def delayed(model: LinearModel) -> LinearModel:
     A = np.block([[model.A, model.B], [np.zeros((nu, nx + nu))]])
     B = np.vstack([np.zeros((nx, nu)), np.eye(nu)])
     C = np.hstack([model.C, model.D])
-    states = (*model.states, *(f"{u}_late" for u in model.inputs))
+    states = (*model.states, *(Signal(f"{u}_late", u.unit) for u in model.inputs))
     return LinearModel(
         A, B, C, np.zeros_like(model.D), states, model.inputs, model.outputs, dt=model.dt
     )
@@ -114,9 +115,8 @@ def frozen(model: KinematicModel, axis: Axis, airspeed: float) -> LinearModel:
     p = (airspeed, 0.0) if len(model.parameters) == 2 else airspeed
     commands = {u.removesuffix("_command"): u for u in map(str, model.inputs)}
     part = model.at(p, axis.outputs, [commands[u] for u in axis.inputs])
-    return LinearModel(
-        part.A, part.B, part.C, part.D, part.states, axis.inputs, axis.outputs, dt=part.dt
-    )
+    inputs = tuple(Signal(u.removesuffix("_command"), u.unit) for u in part.inputs)
+    return replace(part, inputs=inputs)
 
 
 def static_gain(model: LinearModel, hold: float = HOLD) -> float:

@@ -42,10 +42,13 @@ from symheli.lpv.lft import (
 from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.nu_gap import chordal_distance, nu_gap
+from symheli.lpv.nu_gaps import nu_gaps
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
+from symheli.lpv.stability_margin import stability_margin
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.lpv.uncertain_state_space import UncertainStateSpace
 
@@ -61,6 +64,7 @@ __all__ = [
     "LinearFamily",
     "LinearGrid",
     "LinearModel",
+    "LinearModels",
     "Matrices",
     "Patches",
     "Piece",
@@ -80,8 +84,10 @@ __all__ = [
     "connect",
     "feedback",
     "nu_gap",
+    "nu_gaps",
     "pade_delay",
     "parallel",
     "series",
     "simulate",
+    "stability_margin",
 ]

@@ -6,6 +6,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.linear_models import LinearModels
 from symheli.values.arrays import frozen
 from symheli.values.sample_period import same_period
 
@@ -68,7 +69,7 @@ def nu_gap(
             f"nu_gap compares discrete models with one sample period, got {first.dt} and"
             f" {second.dt} s; discretize them"
         )
-    _require_same_signals(first, second)
+    require_same_signals(first, second)
     su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
     sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
     unstable, poles = [], []
@@ -145,7 +146,7 @@ def chordal_distance(
     >>> lpv.chordal_distance(spring.at(0.0), spring.at(1.0), [0.1, 1.0]).round(2)
     array([0.08, 0.14])
     """
-    _require_same_signals(first, second)
+    require_same_signals(first, second)
     su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
     sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
     return _chordal(
@@ -156,7 +157,10 @@ def chordal_distance(
     )
 
 
-def _require_same_signals(first: LinearModel, second: LinearModel) -> None:
+def require_same_signals(
+    first: LinearModel | LinearModels, second: LinearModel | LinearModels
+) -> None:
+    """Raises `InputError` unless inputs and outputs are the same, in the same order."""
     if first.inputs != second.inputs or first.outputs != second.outputs:
         raise InputError(
             "nu-gap: expected models with the same inputs and outputs in the same order, got"

@@ -14,7 +14,7 @@ from scipy.stats import t as student
 from symheli.errors import InputError
 from symheli.records.flight_path import WINDOW
 from symheli.records.flight_record import FlightRecord
-from symheli.records.kinematics import ANGLES, FORCES, GRAVITY, RATES, VELOCITIES, comparable
+from symheli.records.kinematics import ANGLES, FORCES, RATES, VELOCITIES, comparable
 from symheli.records.sensor_faults import (
     DEGREES,
     FEWEST,
@@ -27,6 +27,7 @@ from symheli.records.sensor_faults import (
     Faults,
     sensor_faults,
 )
+from symheli.values.kinematics import GRAVITY
 from symheli.values.signal import Signal
 
 CHANCE = 5e-4

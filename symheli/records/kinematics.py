@@ -12,8 +12,8 @@ import numpy as np
 
 from symheli.records.flight_path import Channel, Kinematics, Windows
 from symheli.values.arrays import Array
+from symheli.values.kinematics import kinematic_rates
 from symheli.values.signal import Signal
-from symheli.values.units import to_si
 
 RATES = ("p", "q", "r")
 ANGLES = ("phi", "theta", "psi")
@@ -28,8 +28,6 @@ UNIT = {
     **dict.fromkeys(VELOCITIES, "m/s"),
     **dict.fromkeys(FORCES, "m/s^2"),
 }
-
-GRAVITY, _ = to_si("g")
 
 
 def comparable(signals: Sequence[Signal]) -> list[str]:
@@ -80,17 +78,14 @@ def motion(windows: Windows, signals: Mapping[str, Array]) -> Kinematics:
     Source: Klein and Morelli (2006), ch. 10.
     """
     velocities = np.column_stack([signals[name] for name in VELOCITIES])
-    p, q, r, phi, theta = (signals[name] for name in (*RATES, *ANGLES[:2]))
-    gravity = GRAVITY * np.column_stack(
-        [-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)]
-    )
+    turning = np.column_stack([signals[name] for name in (*RATES, *ANGLES[:2])])
 
     def at(delays: Array) -> list[Channel]:
-        u, v, w = (windows.advanced(velocities[:, [i]], delays[i])[:, 0] for i in range(3))
-        known = gravity + np.column_stack([v * r - w * q, w * p - u * r, u * q - v * p])
+        moving = [windows.advanced(velocities[:, [i]], delays[i]) for i in range(3)]
+        known = kinematic_rates(np.column_stack([*moving, turning]))
         out = []
         for i, (name, force) in enumerate(zip(VELOCITIES, FORCES, strict=True)):
-            columns = np.zeros((len(p), 6))
+            columns = np.zeros((len(turning), 6))
             columns[:, i], columns[:, 3 + i] = signals[force], -1.0
             out.append(Channel(name, velocities[:, i], known[:, i], columns))
         return out

@@ -112,18 +112,19 @@ def _polynomials(
     pieces, P, rate, dt, _, block = claim
     assert claim.meaningful  # noqa: S101 - checked by the callers
     one = PolynomialMatrix.constant(np.array([[number(1.0)]]), UNIT)
+    squares = {} if block is None else {q.low: _squares(q, block, number) for q in pieces}
     if isinstance(P, MemoryLyapunov):
         for cell in cells(pieces, P.knots):
             yield from _remembering(cell, P, rate, number)
     elif dt is None:
         for cell in cells(pieces, P.knots):
-            supply = _supply(cell, P, block, number)
+            supply = _supply(cell, P, squares.get(cell.piece.low), number)
             yield from ((_plus(F, supply), one) for F in _continuous(cell, P, rate, block, number))
     else:
         step = rate * dt if P.degree else 0.0
         for strip in strips(pieces, P.knots, (-step, step)):
             F = _discrete(strip, P, block, number)
-            yield _plus(F, _supply(strip.cell, P, block, number)), one
+            yield _plus(F, _supply(strip.cell, P, squares.get(strip.cell.piece.low), number)), one
 
 
 def _plus(F: PolynomialMatrix, supply: PolynomialMatrix | None) -> PolynomialMatrix:
@@ -131,25 +132,33 @@ def _plus(F: PolynomialMatrix, supply: PolynomialMatrix | None) -> PolynomialMat
 
 
 def _supply(
-    cell: Cell, P: SplineLyapunov, block: NormBounded | None, number: Number
+    cell: Cell, P: SplineLyapunov, squares: Array | None, number: Number
 ) -> PolynomialMatrix | None:
-    """lambda (bound^2 [G J H]'[G J H] - diag(0, I, 0)) over the cell, v = G x + J d + H u; None
-    without a block.
+    """lambda times the supply of a block for lambda = 1, `squares` over the piece, over the cell;
+    None without a block.
     """
-    if block is None:
+    if squares is None:
         return None
-    _, _, C, D = _model(cell, number, 1)
-    v = slice(-block.outputs, None)
-    rows = matrix([[_local(M.coefficients[..., v, :]) for M in (C, D)]])
-    bound = number(block.bound)
-    nx, nu = C.shape[1], D.shape[1]
-    of_d = np.diag(np.r_[np.zeros(nx), np.ones(block.inputs), np.zeros(nu - block.inputs)])
-    whole = rows.T @ rows * (bound * bound)
-    whole = whole - PolynomialMatrix.constant(exact(of_d, number), UNIT)
+    low, high = number(cell.piece.low), number(cell.piece.high)
+    a, b = (number(cell.low) - low) / (high - low), (number(cell.high) - low) / (high - low)
+    whole = _local(_apply(restriction(len(squares) - 1, a, b), squares)[:, None])
     a, b, _ = _within(cell, P.knots, number)
     values = exact(P.multiplier_segment(cell.segment), number)
     own = _apply(restriction(P.multiplier_degree, a, b), values)
     return _times(_scalar(own[:, None]), whole)
+
+
+def _squares(piece: ModelPiece, block: NormBounded, number: Number) -> Array:
+    """Bernstein coefficients of bound^2 [G J H]'[G J H] - diag(0, I, 0) over the piece, v = G x +
+    J d + H u.
+    """
+    v, bound = slice(-block.outputs, None), number(block.bound)
+    C, D = (_local(exact(M[:, None, v], number)) for M in (piece.C, piece.D))
+    rows = matrix([[C, D]])
+    nx, nu = C.shape[1], D.shape[1]
+    of_d = np.diag(np.r_[np.zeros(nx), np.ones(block.inputs), np.zeros(nu - block.inputs)])
+    whole = rows.T @ rows * (bound * bound) - PolynomialMatrix.constant(exact(of_d, number), UNIT)
+    return whole.coefficients[:, 0]
 
 
 def _continuous(

@@ -10,8 +10,8 @@ import symheli
 from symheli import FlightRecord
 from symheli.errors import InputError
 from symheli.records import check_kinematics
+from symheli.values.kinematics import GRAVITY as G
 
-G = 9.80665
 NOISE = {
     **dict.fromkeys("pqr", 0.01),
     **dict.fromkeys(("phi", "theta", "psi"), 0.004),

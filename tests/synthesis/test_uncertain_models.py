@@ -269,7 +269,7 @@ def test_half_a_block_in_search_and_proof_is_found_by_the_second_witness(monkeyp
     """An error that both would believe."""
     unc = random_uncertain(2, 1.0)
     assert l2_gain(unc, form=COARSE, search=None).verify(rigorous=True)
-    terms, supply = bounded_real.supply_terms, claim._supply
+    terms, squares = bounded_real.supply_terms, claim._squares
 
     def halved(block):
         return block and block._replace(bound=0.5 * block.bound)
@@ -280,7 +280,7 @@ def test_half_a_block_in_search_and_proof_is_found_by_the_second_witness(monkeyp
         lambda cell, m: terms(cell, m and m._replace(block=halved(m.block))),
     )
     monkeypatch.setattr(
-        claim, "_supply", lambda cell, P, block, number: supply(cell, P, halved(block), number)
+        claim, "_squares", lambda piece, block, number: squares(piece, halved(block), number)
     )
     with monkeypatch.context() as blind:
         blind.setattr(one_parameter, "holds_on_grid", lambda *args: True)
