@@ -13,8 +13,8 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Of e(k) = sum_i L_i(k) v(k-i) + w(k), v and w white: G with G G' the covariance of e, blocks
-    below the diagonal only as far as the sum reaches.
+    """Of e(k) = sum_i L_i(k) v(k-i) + .., a sum of such terms with white v: G with G G' the
+    covariance of e, blocks below the diagonal only as far as the sums reach.
 
     `band` is G in LAPACK's lower banded storage; `steps` are (m, size, size) blocks: the inverse of
     the diagonal ones, then that times the one i below.
@@ -24,16 +24,16 @@ class Whitening:
     steps: tuple[Array, ...]
 
     @classmethod
-    def of(cls, L: Sequence[Array], v: Array, w: Array) -> Whitening:
-        """From L_0, L_1, .. (m, size, size) and the variances v, w (size,)."""
-        reach, (m, size) = len(L) - 1, L[0].shape[:2]
+    def of(cls, terms: Sequence[tuple[Sequence[Array], Array]]) -> Whitening:
+        """From each term's blocks L_0, L_1, .. (m, size, inputs) and variances (inputs,)."""
+        reach = max(len(L) for L, _ in terms) - 1
+        m, size = terms[0][0][0].shape[:2]
         band = np.zeros(((reach + 1) * size, m * size))
         for d in range(reach + 1):
             block = np.zeros((m, size, size))
-            for i in range(d, reach + 1):
-                block[d:] += (L[i][d:] * v) @ L[i - d][: m - d].swapaxes(1, 2)
-            if d == 0:
-                block += np.diag(w)
+            for L, variances in terms:
+                for i in range(d, len(L)):
+                    block[d:] += (L[i][d:] * variances) @ L[i - d][: m - d].swapaxes(1, 2)
             for row, column, offset in _below(d, size):
                 band[offset, column : (m - d) * size : size] = block[d:, row, column]
         band = cholesky_banded(band, lower=True)
@@ -43,11 +43,6 @@ class Whitening:
                 G[d][d:, row, column] = band[offset, column : (m - d) * size : size]
         inverse = np.linalg.inv(G[0])
         return cls(band, (inverse, *(inverse @ g for g in G[1:])))
-
-    @property
-    def log_determinant(self) -> float:
-        """Of the covariance."""
-        return float(2 * np.log(self.band[0]).sum())
 
     def whitened(self, e: Array) -> Array:
         """G^-1 e for e (m, size)."""

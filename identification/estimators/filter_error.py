@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.signal import lfilter
 
 from identification.estimators.block_banded import Whitening
 from identification.estimators.instrumental_variables import instrumental_variables
@@ -63,6 +64,12 @@ class FilterError(Method):
         the spectrum above 0.8 of the Nyquist frequency.
     misfit : float
         Q as a multiple of the variance the structure leaves unexplained in the simulated flight.
+    gust : float
+        Standard deviation of gusts that nothing measures, m/s along each body axis; 0: still air.
+        They enter where the velocities do, as hidden states with the time constant `gust_time`: no
+        new coefficient.
+    gust_time : float
+        s; of the longitudinal Dryden spectrum its length scale over the airspeed.
     steps : int
         Gauss-Newton steps at most.
 
@@ -94,6 +101,8 @@ class FilterError(Method):
     simulator: FlightSource
     noise: Mapping[str, float] | None = None
     misfit: float = MISFIT
+    gust: float = 0.0
+    gust_time: float = 20.0
     steps: int = 3
     shorthand: ClassVar[str] = "filter error"
 
@@ -107,11 +116,14 @@ class FilterError(Method):
             if name not in STATES:
                 raise UnknownNameError("sensor in noise", name, STATES)
         numbers = [*(self.noise or {}).values(), self.misfit]
+        numbers.append(self.gust_time)
         if not all(np.isfinite(n) and n > 0 for n in numbers) or self.steps < 1:
             raise InputError(
-                "noise, misfit and steps must be positive, got"
-                f" {dict(self.noise or {})}, {self.misfit}, {self.steps}"
+                "noise, misfit, gust_time and steps must be positive, got"
+                f" {dict(self.noise or {})}, {self.misfit}, {self.gust_time}, {self.steps}"
             )
+        if not 0 <= self.gust < np.inf:
+            raise InputError(f"gust: expected a standard deviation >= 0, m/s, got {self.gust}")
 
     @classmethod
     def default(cls) -> Method:
@@ -134,18 +146,19 @@ class FilterError(Method):
         ]
         R = self._variances(records)
         Q = np.append(self.misfit * self._unexplained(arx, records), EXACT * R[6:])
+        noise = Noise(R, Q, self.gust**2, float(np.exp(-records[0].dt / self.gust_time)))
         count, settled = 0, False
         while count < self.steps and not settled:
             count += 1
-            normal, right = map(sum, zip(*(s.normal(theta, R, Q) for s in flights), strict=True))
+            normal, right = map(sum, zip(*(s.normal(theta, noise) for s in flights), strict=True))
             step, inverse = _solved(normal, right)  # type: ignore[arg-type]
             change = step.reshape(6, -1).T
             for s in flights:
-                s.smooth(theta, change, R, Q)
+                s.smooth(theta, change, noise)
             theta = theta + change
             spread = np.sqrt(np.diag(inverse))
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
-        scores = sum(s.scores(theta, R, Q) for s in flights)
+        scores = sum(s.scores(theta, noise) for s in flights)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
         n = arx.n_regressors
@@ -221,9 +234,35 @@ def _unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
     return [s for s in out if s.stop - s.start > 2 * arx.memory + 1]
 
 
+class Noise(NamedTuple):
+    """Variances of the sensors R (8,) and of the equations Q (8,), of the gust, and what is left of
+    a gust after a sample.
+    """
+
+    R: Array
+    Q: Array
+    gust: float
+    remains: float
+
+
+class Linearized(NamedTuple):
+    """The equations at the smoothed states: regressors F (m, n), what is left (m, 8), how it
+    answers errors of y(k-i), L_i (m, 8, 8), and of the gust, H (m, 8, 3), and the whitening of it
+    all.
+    """
+
+    F: Array
+    left: Array
+    L: list[Array]
+    H: Array
+    white: Whitening
+
+
 @dataclass(eq=False)
 class Stretch:
-    """Measured samples y (n, 8) without a gap, and the states `x` (n, 8) smoothed so far."""
+    """Measured samples y (n, 8) without a gap, and the states `x` (n, 8) and the gust (n, 3)
+    smoothed so far.
+    """
 
     arx: Aerodynamics
     y: Array
@@ -232,13 +271,15 @@ class Stretch:
     f: Array
     dt: float
     x: Array
+    gust: Array
 
     @classmethod
     def of(cls, arx: Aerodynamics, record: FlightRecord, part: slice) -> Stretch:
         """The samples of `part` of a record."""
         s = Samples.of(arx, record)
         y = record.columns(STATES)[part]
-        return cls(arx, y, s.u[part], s.p[part], s.f[part], record.dt, y.copy())
+        still = np.zeros((len(y), 3))
+        return cls(arx, y, s.u[part], s.p[part], s.f[part], record.dt, y.copy(), still)
 
     def _equations(self, theta: Array) -> tuple[Array, Array]:
         """Regressors (m, n) at the smoothed states, and what they leave (m, 8)."""
@@ -265,18 +306,37 @@ class Stretch:
                 L[e.lag][:, :6, e.channel] -= f @ theta[row * size : (row + 1) * size]
         return L
 
-    def _prepared(self, theta: Array, R: Array, Q: Array) -> tuple[Array, Array, list[Array], Any]:
+    def _linearized(self, theta: Array, noise: Noise) -> Linearized:
+        """With a gust every equation less what remains of the one before: what is left of the gust
+        in that is white.
+        """
         F, left = self._equations(theta)
-        L = self._sensitivity(theta)
+        L, first, n = self._sensitivity(theta), self.arx.memory, len(self.y)
         apart = self.y - self.x
-        first, n = self.arx.memory, len(self.y)
         for i, block in enumerate(L):
             left += np.einsum("kij,kj->ki", block, apart[first - i : n - i])
-        return F, left, L, Whitening.of(L, R, Q)
+        own = [np.broadcast_to(np.eye(8), L[0].shape)]
+        H = np.zeros((len(F), 8, 3))
+        if noise.gust:
+            a, size, f = noise.remains, self.arx.basis.size, self.f[first:]
+            for row, e in enumerate(self.arx.entries):
+                if e.kind == "input" and e.channel < 3 and e.lag == 1:
+                    H[:, :6, e.channel] -= f @ theta[row * size : (row + 1) * size]
+            none = np.zeros_like(L[0])
+            L = [
+                now[1:] - a * before[:-1]
+                for now, before in zip([*L, none], [none, *L], strict=True)
+            ]
+            F, left, H = F[1:] - a * F[:-1], left[1:] - a * left[:-1], H[1:]
+            own = [own[0][1:], -a * own[0][1:]]
+        terms: list[tuple[list[Array], Array]] = [(L, noise.R), (own, noise.Q)]
+        if noise.gust:
+            terms.append(([H], np.full(3, noise.gust * (1 - noise.remains**2))))
+        return Linearized(F, left, L, H, Whitening.of(terms))
 
-    def normal(self, theta: Array, R: Array, Q: Array) -> tuple[Array, Array]:
+    def normal(self, theta: Array, noise: Noise) -> tuple[Array, Array]:
         """X' X and X' e of the whitened regressors X (.., 6 n), equation by equation."""
-        F, left, _, white = self._prepared(theta, R, Q)
+        F, left, _, _, white = self._linearized(theta, noise)
         size = 6 * F.shape[1] + 1
         whole = np.zeros((size, size))
         for rows in self._whitened(F, left, white):
@@ -300,19 +360,23 @@ class Stretch:
                 before = [new, *before[: len(white.steps) - 2]]
             yield out
 
-    def smooth(self, theta: Array, change: Array, R: Array, Q: Array) -> None:
-        """Move the states to where the equations hold best with theta + `change`."""
-        F, left, L, white = self._prepared(theta, R, Q)
+    def smooth(self, theta: Array, change: Array, noise: Noise) -> None:
+        """Move the states, and the gust, to where the equations hold best with theta + `change`."""
+        F, left, L, H, white = self._linearized(theta, noise)
         left[:, :6] -= F @ change
         pull = white.adjoint(white.whitened(left))
-        moved, first, n = np.zeros_like(self.y), self.arx.memory, len(self.y)
+        moved, n = np.zeros_like(self.y), len(self.y)
+        first = n - len(F)
         for i, block in enumerate(L):
             moved[first - i : n - i] += np.einsum("kij,ki->kj", block, pull)
-        self.x = self.y - moved * R
+        self.x = self.y - moved * noise.R
+        if noise.gust:
+            drive = np.einsum("kij,ki->kj", H, pull) * noise.gust * (1 - noise.remains**2)
+            self.gust[first - 1 : -1] = lfilter([1.0], [1.0, -noise.remains], drive, axis=0)
 
-    def scores(self, theta: Array, R: Array, Q: Array) -> Array:
+    def scores(self, theta: Array, noise: Noise) -> Array:
         """Covariance (6 n, 6 n) of X' e, e correlated over `LAGS` samples (Newey and West)."""
-        F, left, _, white = self._prepared(theta, R, Q)
+        F, left, _, _, white = self._linearized(theta, noise)
         n, total, tail = 6 * F.shape[1], 0.0, np.zeros((0, 6 * F.shape[1]))
         out = np.zeros((n, n))
         for rows in self._whitened(F, left, white):

@@ -20,9 +20,9 @@ def mean_trim(kin: KinematicARX, records: Sequence[FlightRecord]) -> Array:
     """(basis size, 8): what is flown where p stands still.
 
     Least squares of the states on the functions of p and, where p is one parameter, on those
-    times its rate: trims depend on it. Where the first
-    parameter is a speed, u makes the velocity up to that, less a constant headwind: a mean over few
-    passes would rather tell how the controller lags behind.
+    times its rate: trims depend on it. Where the first parameter is a speed, the velocity is that
+    of level flight without sideslip at this airspeed and attitude: not that over ground, nor that
+    at which a controller lags behind.
     """
     aero, size = kin.aerodynamics, kin.basis.size
     rows, states, parameters = [], [], []
@@ -39,13 +39,15 @@ def mean_trim(kin: KinematicARX, records: Sequence[FlightRecord]) -> Array:
     scale = column_scale(F)
     found = np.linalg.lstsq(F / scale, y, rcond=NEGLIGIBLE)[0][:size] / scale[:size, None]
     if units_of(aero.parameters[:1], records)[0].unit == "m/s":
-        found[:, 0] = _forward_speed(F[:, :size], y, p[:, 0], F[:, :size] @ found[:, 1:3])
+        found[:, :3] = np.linalg.lstsq(
+            F[:, :size], _level(F[:, :size] @ found, p[:, 0]), rcond=None
+        )[0]
     return found
 
 
-def _forward_speed(f: Array, y: Array, airspeed: Array, across: Array) -> Array:
-    """Coefficients (size,) of u where u^2 + `across`^2 is the airspeed less the headwind."""
-    fast = airspeed >= np.median(airspeed)
-    headwind = np.mean(airspeed[fast] - np.linalg.norm(y[fast, :3], axis=1))
-    square = np.maximum(airspeed - headwind, 0.0) ** 2 - np.sum(across**2, axis=1)
-    return np.linalg.lstsq(f, np.sqrt(np.maximum(square, 0.0)), rcond=None)[0]
+def _level(trim: Array, airspeed: Array) -> Array:
+    """u v w (n, 3) of level flight at an airspeed without sideslip, at roll and pitch of a trim
+    (n, 8).
+    """
+    climb = np.arctan(np.tan(trim[:, 7]) / np.cos(trim[:, 6]))
+    return np.column_stack([airspeed * np.cos(climb), 0 * airspeed, airspeed * np.sin(climb)])

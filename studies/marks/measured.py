@@ -20,8 +20,14 @@ from studies.marks.truth import AXES, SPEEDS, Truth, static_gain
 from studies.output import as_json, progress
 from studies.processes import Processes
 from studies.stamped_tables import DOCS, keep, parsed, processor
-from studies.transition.flights import TOP, autopilot_for
-from symheli import FlightRecord, Helicopter
+from studies.transition.flights import (
+    ABOVE_GROUND,
+    BREEZE,
+    BREEZE_AT_20FT,
+    TOP,
+    autopilot_for,
+)
+from symheli import Dryden, FlightRecord, Helicopter, Wind
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from symheli.values.arrays import Array
 
@@ -58,6 +64,13 @@ class Setting:
     truth: str = "xcell60"
     simulator: str = PAIRS["xcell60"]
     servos: bool = False
+    turbulent: bool = False
+
+    def air(self, seed: int) -> Wind | None:
+        """The breeze and light turbulence of the study, where the air is to move."""
+        if not self.turbulent:
+            return None
+        return Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed)
 
     @property
     def governor(self) -> str:
@@ -80,8 +93,9 @@ def of_seed(setting: Setting, seed: int) -> Marks:
         if setting.servos
         else autopilot_for(heli)
     )
-    training = symheli.fly(heli, aggressive(seed, autopilot, servos=setting.servos))
-    model = identified(training, simulator, setting.servos)
+    plan = aggressive(seed, autopilot, servos=setting.servos, wind=setting.air(seed))
+    training = symheli.fly(heli, plan)
+    model = identified(training, simulator, setting.servos, setting.turbulent)
     test = symheli.fly(heli, transition(seed, autopilot, servos=setting.servos))
     truth = Truth.of(heli, setting.servos)
     gaps = {
@@ -148,7 +162,11 @@ def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, fl
         "| | mark | median | worst (seed) | |",
         "|---|---|---|---|---|",
     ]
-    limits = {"lateral": 0.05, "longitudinal": 0.05, "all axes": 0.15 if setting.servos else 0.10}
+    limits = (
+        dict.fromkeys(AXES, 0.15)
+        if setting.servos or setting.turbulent
+        else {"lateral": 0.05, "longitudinal": 0.05, "all axes": 0.10}
+    )
     for axis in marks[0].gaps:
         values = np.array([m.gaps[axis][0] for m in marks])
         lines.append(_row(f"worst nu-gap, {axis}", limits[axis], values, marks, 2 * limits[axis]))
@@ -216,15 +234,23 @@ def main() -> None:
     parser.add_argument("--seeds", default="0-20")
     parser.add_argument("--quick", action="store_true", help="the first two seeds")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--turbulent", action="store_true", help="breeze and light turbulence")
     options = parsed(parser, "marks.md", timed=False)
-    setting = Setting(options.truth, options.simulator or PAIRS[options.truth], options.servos)
+    setting = Setting(
+        options.truth,
+        options.simulator or PAIRS[options.truth],
+        options.servos,
+        options.turbulent,
+    )
     seeds = seeds_of(options.seeds)[: 2 if options.quick else None]
     progress(f"{len(seeds)} flights of {setting.truth}")
     marks, own = measure(setting, seeds)
     text = table(setting, marks, own)
     print(as_json(_plain(marks)) if options.json else text)
     if options.write:
-        section = setting.truth + (" with servos" if setting.servos else "")
+        section = setting.truth + (
+            " with servos" if setting.servos else " in turbulence" if setting.turbulent else ""
+        )
         keep(DOCS / "marks.md", section, text, processor())
 
 

@@ -12,10 +12,17 @@ FASTEST = 4.0
 """Largest commanded acceleration, m/s^2."""
 
 
-def structure(servos: bool = False) -> KinematicARX:
+GUST = 2.0
+"""Standard deviation given for what the air may do in light turbulence, m/s."""
+
+
+def structure(servos: bool = False, turbulent: bool = False) -> KinematicARX:
     """Cubic in airspeed, quadratic in acceleration, of total degree 3; where servos fly, from the
-    commands, with as many lags as delay and servo need.
+    commands, with as many lags as delay and servo need; in turbulence, which leaves less to be
+    told, quadratic in airspeed alone.
     """
+    if turbulent:
+        return KinematicARX(INPUTS, SCHEDULING[0], basis=Polynomial(2, 0.0, TOP))
     basis = Product(
         (Polynomial(3, 0.0, TOP), Polynomial(2, -FASTEST, FASTEST)),
         total_degree=3,
@@ -25,7 +32,13 @@ def structure(servos: bool = False) -> KinematicARX:
 
 
 def identified(
-    records: FlightRecord | list[FlightRecord], simulator: Helicopter, servos: bool = False
+    records: FlightRecord | list[FlightRecord],
+    simulator: Helicopter,
+    servos: bool = False,
+    turbulent: bool = False,
 ) -> KinematicModel:
-    """By the filter error method, its instruments flown in `simulator`."""
-    return fit(structure(servos), records, method=FilterError(SimulatedFlight(simulator)))
+    """By the filter error method, its instruments flown in `simulator`; the gust a hidden state
+    where the air is `turbulent`.
+    """
+    method = FilterError(SimulatedFlight(simulator), gust=GUST if turbulent else 0.0)
+    return fit(structure(servos, turbulent), records, method=method)
