@@ -38,8 +38,8 @@ void model_init(model_state *s);
    MODEL_REFUSED: p not finite or outside the range of the model; the past starts afresh.
    MODEL_LOST: the prediction leaves all bounds, or pitch passes 89 deg. */
 int model_predict(model_state *s, const model_real *p, model_real *y);
-/* What y[MODEL_NY] and u[MODEL_NU] were at this instant. A number that is not finite marks a missing
-   sample: the past starts afresh. */
+/* What y[MODEL_NY] and u[MODEL_NU] were at this instant. A number that is not finite marks a
+   missing sample: the past starts afresh. */
 void model_observe(model_state *s, const model_real *y, const model_real *u);
 #ifdef __cplusplus
 }

@@ -35,7 +35,8 @@ int body_step(const real *before, const real *added, real *y)
     for (int i = 0; i < 8; i++) y[i] = before[i] + gained[i] + 2 * HALF_PERIOD * rate[i];
     for (int n = 0; n < CORRECTIONS; n++) {
         body_rates(y, next);
-        for (int i = 0; i < 8; i++) y[i] = before[i] + gained[i] + HALF_PERIOD * (rate[i] + next[i]);
+        for (int i = 0; i < 8; i++)
+            y[i] = before[i] + gained[i] + HALF_PERIOD * (rate[i] + next[i]);
     }
     for (int i = 0; i < 8; i++)
         if (!(y[i] < DIVERGED && -y[i] < DIVERGED)) return 0;

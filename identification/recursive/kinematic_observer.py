@@ -56,7 +56,7 @@ class KinematicObserver:
     >>> noise = {s: float(np.std(noisy[s] - clean[s])) for s in kin.outputs}
     >>> observer = model.observer(noise, process=0.01)
     >>> y = observer.run(noisy)
-    >>> bool(np.std(y[:, 4] - clean["q"]) < 0.7 * noise["q"])
+    >>> bool(np.std(y[:, 7] - clean["theta"]) < 0.7 * noise["theta"])
     True
     """
 
