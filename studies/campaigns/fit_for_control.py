@@ -16,7 +16,14 @@ from typing import Any
 import numpy as np
 
 import symheli
-from identification import FilterError, InstrumentalVariables, KinematicARX, Polynomial, fit
+from identification import (
+    FilterError,
+    FitForControl,
+    InstrumentalVariables,
+    KinematicARX,
+    Polynomial,
+    fit,
+)
 from identification import fit_for_control as judge
 from identification.judge.fit_for_control import SHARE_OF_MARGIN
 from studies.loops.lateral import STATES
@@ -38,6 +45,9 @@ VEHICLES = {"xcell60": "xcell_kahn_hudson", "xcell_kahn_hudson": "xcell60"}
 """{vehicle flown: vehicle whose simulator makes the instruments}: never the same."""
 
 SPEEDS = tuple(float(v) for v in np.linspace(0.0, TOP, 9))
+
+DEGREE = 2
+"""Of the coefficients in the airspeed."""
 
 METHODS = ("filter error", "iv", "ls")
 
@@ -80,7 +90,8 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """One flight: the verdict, what the log says of d/b, and what is true of it.
+    """One flight: the verdict, what the log says of d/b (by draws alone, and in all), and what is
+    true of it.
 
     `true_ratio` is infinite where the estimate's own loop is unstable; `lost` says whether the loop
     is unstable around the truth anywhere. A method that refuses the flight has the verdict
@@ -93,9 +104,30 @@ class Outcome:
     seed: int
     verdict: str
     rows: dict[str, str]
+    drawn: float
     ratio: float
     true_ratio: float
     lost: bool
+
+    @classmethod
+    def of(cls, vehicle: str, kind: str, method: str, seed: int, found: FitForControl) -> Outcome:
+        """What was found of one flight, with the truth beside."""
+        feedback, loops = found["nu-gap over margin"], found["unstable loops"]
+        assert feedback.truth is not None  # noqa: S101
+        with np.errstate(divide="ignore"):
+            drawn = float((found.gap / found.margin).max())
+        return cls(
+            vehicle,
+            kind,
+            method,
+            seed,
+            found.verdict,
+            {row.name: row.verdict for row in found.criteria if row.decides},
+            drawn,
+            feedback.value,
+            feedback.truth,
+            bool(loops.truth),
+        )
 
     @property
     def is_fit(self) -> bool:
@@ -116,11 +148,16 @@ def _vehicle(name: str) -> tuple[Helicopter, Autopilot, dict[float, LinearModel]
 
 
 def outcome(vehicle: str, kind: str, method: str, seed: int) -> Outcome:
-    """Fly, identify with the other vehicle's simulator, judge."""
+    """Fly, identify with the other vehicle's simulator, judge; beside it a fit by instruments with
+    one degree more, which sees what the basis cannot hold.
+    """
     heli, autopilot, truth = _vehicle(vehicle)
     simulator = SimulatedFlight(_vehicle(VEHICLES[vehicle])[0])
     record = KINDS[kind].fly(heli, autopilot, seed)
-    structure = KinematicARX(heli.inputs, "airspeed_command", basis=Polynomial(2, 0.0, TOP))
+    structure, richer = (
+        KinematicARX(heli.inputs, "airspeed_command", basis=Polynomial(degree, 0.0, TOP))
+        for degree in (DEGREE, DEGREE + 1)
+    )
     how: Any = {
         "filter error": FilterError(simulator),
         "iv": InstrumentalVariables(simulator),
@@ -130,25 +167,13 @@ def outcome(vehicle: str, kind: str, method: str, seed: int) -> Outcome:
         warnings.simplefilter("ignore", DataWarning)
         try:
             model = fit(structure, record, method=how)
-            found = judge(model, record, FEEDBACK, scales=SIZES, truth=truth)
+            second = fit(richer, record, method=InstrumentalVariables(simulator))
+            found = judge(model, record, FEEDBACK, scales=SIZES, second=second, truth=truth)
         except (SymheliError, np.linalg.LinAlgError) as error:
             why = {"refused": f"{type(error).__name__}: {error}"}
             nan = float("nan")
-            return Outcome(vehicle, kind, method, seed, "refused", why, nan, nan, False)
-    assert found.true_gap is not None  # noqa: S101
-    with np.errstate(divide="ignore"):
-        true_ratio = float((found.true_gap / found.margin).max())
-    return Outcome(
-        vehicle,
-        kind,
-        method,
-        seed,
-        found.verdict,
-        {row.name: row.verdict for row in found.criteria if row.decides},
-        found["nu-gap over margin"].value,
-        true_ratio,
-        bool(found["unstable loops"].truth),
-    )
+            return Outcome(vehicle, kind, method, seed, "refused", why, nan, nan, nan, False)
+    return Outcome.of(vehicle, kind, method, seed, found)
 
 
 def campaign(
