@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from identification.judge.fit_for_control import FitForControl, fit_for_control
     from identification.judge.frequency_response import FrequencyResponse, frequency_response
     from identification.judge.frozen_models import FrozenModels, frozen_models, pole_miss
+    from identification.judge.matrix_ellipsoid import MatrixEllipsoid, matrix_ellipsoid
     from identification.judge.order_scan import OrderScan, Trial, order_scan
     from identification.judge.residuals import ResidualAnalysis, Theil, residual_analysis, theil
     from identification.judge.response_band import ResponseBand
@@ -113,6 +114,7 @@ _ROOMS = {
     "identification.judge.fit_for_control": "FitForControl fit_for_control",
     "identification.judge.frequency_response": "FrequencyResponse frequency_response",
     "identification.judge.frozen_models": "FrozenModels frozen_models pole_miss",
+    "identification.judge.matrix_ellipsoid": "MatrixEllipsoid matrix_ellipsoid",
     "identification.judge.order_scan": "OrderScan Trial order_scan",
     "identification.judge.residuals": "ResidualAnalysis Theil residual_analysis theil",
     "identification.judge.response_band": "ResponseBand",
@@ -167,6 +169,7 @@ __all__ = [
     "LaggedSignals",
     "Lasso",
     "LeastSquares",
+    "MatrixEllipsoid",
     "Method",
     "Online",
     "OrderScan",
@@ -204,6 +207,7 @@ __all__ = [
     "fit_percent",
     "frequency_response",
     "frozen_models",
+    "matrix_ellipsoid",
     "order_scan",
     "pole_miss",
     "residual_analysis",

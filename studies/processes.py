@@ -20,6 +20,10 @@ Call = Callable[[], Any]
 """A function of a module with its arguments (`functools.partial`), which can be pickled."""
 
 
+UNREADABLE = (TypeError, ValueError, AttributeError, ImportError, IndexError, KeyError)
+"""What goes wrong where an answer is no value of this project."""
+
+
 class Processes:
     """`count` processes (default: one a core) that compute what is submitted, in that order; with
     one, the caller computes when it asks for the result.
@@ -83,13 +87,17 @@ class Processes:
                 process.stdin.write(call)
                 process.stdin.flush()
                 done, result = pickle.load(process.stdout)
-            except (OSError, EOFError, pickle.PickleError) as error:
+            except (OSError, EOFError, pickle.PickleError, *UNREADABLE) as error:
+                gone = not isinstance(error, UNREADABLE)
                 future.set_exception(
                     SymheliError(
                         f"a process that computed {name} has ended ({error!r}): memory may have run"
                         " out; what is finished is kept"
+                        if gone
+                        else f"what {name} answered cannot be read here: {error!r}"
                     )
                 )
+                process.kill()
                 if not self._leaving:
                     self._start()  # the others go on
                 break

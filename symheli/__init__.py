@@ -68,7 +68,15 @@ if TYPE_CHECKING:
         simulate,
         simulate_batch,
     )
-    from symheli.lpv import LFT, LinearFamily, LinearGrid, LinearModel, LPVStateSpace, Scheduling
+    from symheli.lpv import (
+        LFT,
+        LinearFamily,
+        LinearGrid,
+        LinearModel,
+        LPVStateSpace,
+        Scheduling,
+        UncertainStateSpace,
+    )
     from symheli.records import FlightRecord
     from symheli.steady.airspeed_sweep import sweep
     from symheli.steady.derivative_table import DerivativeTable, derivatives
@@ -104,7 +112,9 @@ _ROOMS = {
     "symheli.environment": "Air Dryden Gust Wind standard_atmosphere",
     "symheli.values": "NamedVector Signal",
     "symheli.records": "FlightRecord",
-    "symheli.lpv": "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling",
+    "symheli.lpv": (
+        "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling UncertainStateSpace"
+    ),
     "symheli.errors": (
         "AccuracyError CertificateError CompilerWarning ConvergenceWarning DataWarning"
         " ExcitationError FlightLostError InputError PrecisionWarning SolverError SymheliError"
@@ -162,6 +172,7 @@ __all__ = [
     "TrimError",
     "TrimMap",
     "TrimPoint",
+    "UncertainStateSpace",
     "UnknownNameError",
     "Wind",
     "derivatives",

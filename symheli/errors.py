@@ -29,6 +29,10 @@ class UnknownNameError(InputError):
         if near and len(known) <= FEW:
             hint += f" ({every})"
         super().__init__(f"unknown {kind} {str(name)!r}; {hint}")
+        self._given = kind, str(name), known
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), self._given
 
 
 class TrimError(SymheliError):

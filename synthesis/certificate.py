@@ -168,6 +168,8 @@ class Certificate:
         Every cone program that was tried; printed as a line each.
     worst : Trajectory or None
         Scheduling trajectory behind `lower` or `upper`, None where p is constant there.
+    perturbation : array (nd, nv) or None
+        Delta of the model of an uncertain one behind `lower`, None where the model is one.
     indicative : float
         The bound at the points of a grid, where that was asked for: no proof. Else NaN.
     proof : Proof or None
@@ -208,6 +210,7 @@ class Certificate:
     conditioning: float = math.inf
     attempts: tuple[Attempt, ...] = ()
     worst: Trajectory | None = None
+    perturbation: Array | None = None
     indicative: float = math.nan
     proof: Proof | None = field(default=None, repr=False)
 

@@ -32,6 +32,7 @@ from synthesis.lft.multipliers import Multiplier
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.lyapunov.lag import LagRegion
 from synthesis.lyapunov.spline import MemoryLyapunov, SplineLyapunov
+from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import model_pieces, pieces
@@ -47,7 +48,7 @@ TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
         *(Attempt, Seconds, Trajectory, Scheduling, Block, LFT, LPVStateSpace),
-        *(PolynomialMatrix, Motion, Scaling, box.Units, Demand, Coordinates),
+        *(PolynomialMatrix, Motion, Scaling, box.Units, Demand, Coordinates, NormBounded),
         *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
         *(Multiplier, lft_proof.Quadratic),
         *(bases.Polynomial, bases.BSpline, bases.PiecewiseLinear, bases.Spline, bases.Product),
@@ -57,6 +58,9 @@ TYPES: dict[str, Any] = {
 
 LEFT_OUT = {LPVStateSpace: ("trim", "residuals")}
 """What the model of a proof does without."""
+
+LATER = ("perturbation",)
+"""Fields that files of this version may lack: what they were written of has none."""
 
 ROUTES = {
     "one parameter": one_parameter.Evidence,
@@ -101,8 +105,10 @@ def read(path: str | os.PathLike[str]) -> Certificate:
     try:
         with np.errstate(all="ignore"):
             cert = _certificate(content)
-    except (CertificateError, InputError) as error:
-        raise type(error)(f"{path}: {error}") from None
+    except CertificateError as error:
+        raise CertificateError(f"{path}: {error}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     except (
         *(TypeError, ValueError, AttributeError, LookupError),
         *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
@@ -116,6 +122,7 @@ def read(path: str | os.PathLike[str]) -> Certificate:
 
 def _certificate(content: Mapping[str, Any]) -> Certificate:
     names = {f.name for f in fields(Certificate)}
+    content = {**dict.fromkeys(LATER), **content}
     missing, foreign = names - content.keys(), content.keys() - names - {"schema", "version"}
     if missing or foreign:
         raise InputError(
@@ -128,7 +135,11 @@ def _certificate(content: Mapping[str, Any]) -> Certificate:
     claim["status"] = Status[claim["status"]]
     if not isinstance(claim["verified"], bool):
         raise InputError(f"verified must be true or false, got {claim['verified']!r:.60}")
-    for name, kind in (("seconds", Seconds), ("worst", Trajectory | None)):
+    for name, kind in (
+        ("seconds", Seconds),
+        ("worst", Trajectory | None),
+        ("perturbation", np.ndarray | None),
+    ):
         if not isinstance(claim[name], kind):
             raise InputError(f"{name} is not what it should be: {claim[name]!r:.60}")
     for name, kind in (("hypotheses", str), ("attempts", Attempt)):
@@ -145,6 +156,11 @@ def _certificate(content: Mapping[str, Any]) -> Certificate:
                 raise CertificateError(
                     "the hypotheses do not say for which range and rate of"
                     f" {s.name} the proof holds: {motion(s, rate)}"
+                )
+        for sentence in getattr(cert.proof.evidence, "sentences", ()):
+            if sentence not in cert.hypotheses:
+                raise CertificateError(
+                    f"the hypotheses do not say for which perturbations the proof holds: {sentence}"
                 )
     return cert
 
@@ -180,6 +196,8 @@ def _decoded_proof(content: Any) -> Proof:
     ):
         if name in own:
             _a(kind, own[name])
+    if own.get("block") is not None:
+        _a(NormBounded, own["block"])
     return Proof(ROUTES[route](**own), _decoded(content["lyapunov"]))
 
 

@@ -1,27 +1,18 @@
-"""A gain for every model within a measured distance of an LPV model: the distance enters as a
-disturbance of states and inputs.
-"""
+"""Every model within a measured distance of an LPV model, as an uncertain one."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace
+from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from symheli.values.arrays import Array
-from synthesis.analysis.l2_gain import l2_gain
-from synthesis.certificate import Certificate
-from synthesis.forms import LyapunovForm
-from synthesis.worst.frozen import frozen_gain
+from symheli.values.signal import signals
 
 SAFETY = 2.0
 """What is covered is this many times the largest difference measured."""
-
-ROOMS = (1.001, 1.01, 1.1)
-"""The covered gain is sought at these multiples of the gain without a remainder, in turn."""
 
 
 @dataclass(frozen=True)
@@ -51,44 +42,11 @@ class Remainder:
         return cls(SAFETY * norm * rows, columns, float(size.max()))
 
 
-def covering(lpv: LPVStateSpace, rest: Remainder, gain: float) -> LPVStateSpace:
-    """A model whose gain g <= 1 proves g `gain` for every model that differs from `lpv` by the
-    remainder.
+def covering(lpv: LPVStateSpace, rest: Remainder) -> UncertainStateSpace:
+    """The set of all models that differ from an LPV model by a remainder, for `l2_gain` and
+    `stability`.
 
-    dx/dt = A x + B u + rows d, z = columns (x, u), d = Delta z, with inputs (gain u, t d) and
-    outputs (y, t z). Then
-    |y|^2 + t^2 |z|^2 <= g^2 (gain^2 |u|^2 + t^2 |d|^2) and |d| <= |z| give |y| <= g gain |u|. The
-    scale t balances d to y with u to z.
-    """
-    nx, nu, ny = len(lpv.states), len(lpv.inputs), len(lpv.outputs)
-    one = lpv.basis.constant()
-    noise, seen = (
-        np.multiply.outer(one, np.diag(rest.rows)),
-        np.multiply.outer(one, np.diag(rest.columns)),
-    )
-    d, z = tuple(f"d_{s}" for s in lpv.states), tuple(f"z_{s}" for s in (*lpv.states, *lpv.inputs))
-    plain = replace(lpv, trim=None, residuals=None)
-    heard = replace(plain, B=noise, D=np.zeros((len(one), ny, nx)), inputs=d)
-    felt = replace(plain, C=seen[:, :, :nx], D=seen[:, :, nx:], outputs=z)
-    t = math.sqrt(gain * frozen_gain(heard).gamma / frozen_gain(felt).gamma)
-    above = np.concatenate([lpv.D / gain, heard.D / t], axis=2)
-    below = np.concatenate([t * felt.D / gain, np.zeros((len(one), nx + nu, nx))], axis=2)
-    return replace(
-        plain,
-        B=np.concatenate([lpv.B / gain, noise / t], axis=2),
-        C=np.concatenate([lpv.C, t * felt.C], axis=1),
-        D=np.concatenate([above, below], axis=1),
-        inputs=(*lpv.inputs, *d),
-        outputs=(*lpv.outputs, *z),
-    )
-
-
-def covered_gain(
-    lpv: LPVStateSpace, rest: Remainder, rate: float, form: LyapunovForm, gain: float
-) -> tuple[float, Certificate | None]:
-    """A gain proven for a model and for every model within a measured distance of it.
-
-    The distance enters as a disturbance of the states that states and inputs cause; see `covering`.
+    dx/dt = A x + B u + rows d, v = columns (x, u), d = Delta v, |Delta| <= 1.
 
     Parameters
     ----------
@@ -97,44 +55,48 @@ def covered_gain(
     rest : Remainder
         How far [A B] of the others may be from its own, as `Remainder.of` makes it of differences
         (K, nx, nx + nu).
-    rate : float
-        Limit on the rate of the scheduling parameter, per second.
-    form : Spline, Memory or HigherOrder
-        Of the Lyapunov function.
-    gain : float
-        A gain proven of `lpv` alone, near which the covered one is sought.
 
     Returns
     -------
-    (float, Certificate or None)
-        The gain and the certificate of the covering model; (inf, None) where nothing is proven.
+    UncertainStateSpace
+        With the perturbation inputs d_<state> and outputs z_<state>, z_<input>.
 
     Raises
     ------
     InputError
-        Where the remainder is of another size than the model, or the gain is not finite.
+        Where the remainder is of another size than the model.
 
     Examples
     --------
     >>> import numpy as np, symheli, synthesis
-    >>> from synthesis.cover import Remainder, covered_gain
+    >>> from synthesis.cover import Remainder, covering
     >>> lag = symheli.LPVStateSpace.polynomial(
     ...     [[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], symheli.Scheduling("p", "1", 0.0, 1.0))
     >>> rest = Remainder.of(np.array([[[0.0025, 0.0]]]))
-    >>> gain, _ = covered_gain(lag, rest, 0.0, synthesis.Spline(degree=0), 1.0)
-    >>> bool(1 / (1 - 0.005) <= gain < 1.02)
+    >>> cert = synthesis.l2_gain(covering(lag, rest), 0.0, form=synthesis.Spline(degree=0))
+    >>> bool(1 / (1 - 0.005) <= cert.gamma < 1.006)
     True
     """
-    nx, nu = len(lpv.states), len(lpv.inputs)
+    nx, nu, ny = len(lpv.states), len(lpv.inputs), len(lpv.outputs)
     if rest.rows.shape != (nx,) or rest.columns.shape != (nx + nu,):
         raise InputError(
             f"rest: expected the remainder of {nx} states and {nu} inputs, got rows"
             f" {rest.rows.shape} and columns {rest.columns.shape}"
         )
-    if not 0 < gain < math.inf:
-        raise InputError(f"gain: expected one that is proven of the model alone, got {gain:g}")
-    for room in ROOMS:
-        certificate = l2_gain(covering(lpv, rest, room * gain), rate, form=form, search=None)
-        if certificate.gamma <= 1:
-            return room * gain * certificate.gamma, certificate
-    return math.inf, None
+    one = lpv.basis.constant()
+    noise = np.multiply.outer(one, np.diag(rest.rows))
+    seen = np.multiply.outer(one, np.diag(rest.columns))
+    d, v = tuple(f"d_{s}" for s in lpv.states), tuple(f"z_{s}" for s in (*lpv.states, *lpv.inputs))
+    apart = np.zeros((len(one), ny + nx + nu, nx))
+    model = replace(
+        lpv,
+        B=np.concatenate([lpv.B, noise], axis=2),
+        C=np.concatenate([lpv.C, seen[:, :, :nx]], axis=1),
+        D=np.concatenate([np.concatenate([lpv.D, seen[:, :, nx:]], axis=1), apart], axis=2),
+        inputs=(*lpv.inputs, *d),
+        outputs=(*lpv.outputs, *v),
+        trim=None,
+        residuals=None,
+    )
+    source = f"{SAFETY:g} times the largest difference measured of the models that are covered"
+    return UncertainStateSpace(model, signals(d), signals(v), 1.0, 1.0, source)

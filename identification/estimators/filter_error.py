@@ -147,10 +147,10 @@ class FilterError(Method):
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
         scores = sum(s.scores(theta, R, Q) for s in flights)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
+        covariance = 0.5 * (covariance + covariance.T)
         n = arx.n_regressors
-        residual = sum(len(s.y) * s.residual(theta) for s in flights) / sum(
-            len(s.y) for s in flights
-        )
+        weights = [len(s.y) for s in flights]
+        residual = np.average([s.residual(theta) for s in flights], axis=0, weights=weights)
         return Estimate(
             theta=theta,
             details={
@@ -214,7 +214,8 @@ def _unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
     known = np.isfinite(record.columns(dict.fromkeys(names))).all(axis=1)
     out = []
     for part in record.segments():
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], known[part].astype(int), [0]])))
+        inside = np.asarray(known)[part].astype(int)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))
         pairs = zip(edges[::2], edges[1::2], strict=True)
         out += [slice(part.start + int(a), part.start + int(b)) for a, b in pairs]
     return [s for s in out if s.stop - s.start > 2 * arx.memory + 1]

@@ -16,7 +16,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from identification.model.prediction import fit_percent, require_horizon
 from identification.structure.kinematic_arx import STATES, KinematicARX
 from symheli.errors import InputError
-from symheli.lpv import LinearModel, LPVStateSpace
+from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen
@@ -168,11 +168,18 @@ class KinematicModel:
         """The state-space form: states, matrices at any p."""
         return Realization.of(self.structure, self.theta, self.trim, self.inputs, self.dt)
 
-    def at(self, p: float | Sequence[float]) -> LinearModel:
+    def at(
+        self,
+        p: float | Sequence[float],
+        outputs: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+    ) -> LinearModel:
         """The discrete model with the scheduling held at p (one number a parameter), linear about
-        the trim there: deviation dynamics, u v w p q r phi theta from the inputs.
+        the trim there: deviation dynamics.
+
+        With `outputs` and `inputs` only these, as `to_state_space` keeps them.
         """
-        return self.realization.at(p)
+        return self.realization.at(p, outputs, inputs)
 
     def to_state_space(
         self,
@@ -211,6 +218,76 @@ class KinematicModel:
             A basis that is not polynomial, or nothing that moves.
         """
         return self.realization.lpv(self.parameters, outputs, inputs, held or {}, degree)
+
+    def uncertain(
+        self,
+        probability: float = 0.95,
+        outputs: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        *,
+        held: Mapping[str, float] | None = None,
+        degree: int | None = None,
+        draws: int = 0,
+    ) -> UncertainStateSpace:
+        """`to_state_space` with every model of an ellipsoid of coefficients: what a certificate
+        must hold for if it is to hold for the vehicle.
+
+        The ellipsoid covers the estimated covariance, with the offsets and what `outputs` and
+        `inputs` leave out as they may be; kinematic rows are known numbers and carry no
+        uncertainty. One full block: d = Delta v, |Delta|_2 <= bound.
+
+        Parameters
+        ----------
+        probability : float
+            Of the ellipsoid, for Gaussian errors with the estimated covariance.
+        outputs, inputs, held, degree
+            As of `to_state_space`.
+        draws : int
+            0: a proven radius; else that of so many draws, see `matrix_ellipsoid`.
+
+        Returns
+        -------
+        UncertainStateSpace
+            Its `source` says what the probability is of.
+
+        Raises
+        ------
+        InputError
+            The method gave no covariance of all coefficients together: fit by `FilterError`.
+
+        References
+        ----------
+        Barenthin and Hjalmarsson (2008), Identification and control: joint input design and H-inf
+        state feedback with ellipsoidal parametric uncertainty via LMIs, Automatica 44, for
+        ellipsoids of coefficients in LMIs.
+        """
+        if self.coefficient_covariance is None:
+            raise InputError(
+                f"method {self.method!r} gives no covariance of all coefficients together: fit by"
+                " FilterError(SimulatedFlight(...))"
+            )
+        block, ellipsoid = self.realization.uncertain_part(
+            self.parameters,
+            outputs,
+            inputs,
+            held or {},
+            self.coefficient_covariance,
+            probability,
+            draws,
+        )
+        model = self.realization.lpv(self.parameters, outputs, inputs, held or {}, degree, block)
+        return UncertainStateSpace(
+            model,
+            block.perturbations,
+            block.excited,
+            bound=ellipsoid.bound,
+            probability=probability,
+            source=(
+                f"the coefficients identified by {self.method!r} lie within this bound with"
+                f" probability {probability:g} if their errors are Gaussian with the estimated"
+                " covariance; that the vehicle is of this structure is assumed"
+            ),
+        )
 
     # --- files -----------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from identification.judge.matrix_ellipsoid import MatrixEllipsoid, matrix_ellipsoid
 from identification.model.realization import one_value
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError
@@ -23,6 +24,21 @@ EXACT = 1e-9
 
 HIGHEST = 16
 """Degree in each parameter at which interpolation gives up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Coefficients (n, m) known to left D right, |D|_2 bounded: of the lagged signals `kept` and
+    the equations `rows`, as coefficients of `functions` of the parameters that move.
+    """
+
+    kept: tuple[int, ...]
+    rows: tuple[int, ...]
+    functions: FunctionSpace
+    left: Array
+    right: Array
+    perturbations: tuple[Signal, ...]
+    excited: tuple[Signal, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +131,23 @@ class Realization:
                 B[:, row, column - nz] = 1.0
         return A, B
 
-    def at(self, p: object) -> LinearModel:
+    def at(
+        self, p: object, outputs: Sequence[str] | None, inputs: Sequence[str] | None
+    ) -> LinearModel:
         """The model with p held."""
         value = one_value(p, self.kin.basis)
-        matrices = (M[0] for M in self.matrices(value[None]))
-        return LinearModel(*matrices, self.states, self.inputs, RIGID_BODY, dt=self.dt)
+        x, u, y = self.kept(outputs, inputs)
+        A, B, C, D = (M[0] for M in self.matrices(value[None]))
+        return LinearModel(
+            A[np.ix_(x, x)],
+            B[np.ix_(x, u)],
+            C[np.ix_(y, x)],
+            D[np.ix_(y, u)],
+            tuple(self.states[i] for i in x),
+            tuple(self.inputs[i] for i in u),
+            tuple(RIGID_BODY[i] for i in y),
+            dt=self.dt,
+        )
 
     def kept(
         self, outputs: Sequence[str] | None, inputs: Sequence[str] | None
@@ -139,17 +167,34 @@ class Realization:
         inputs: Sequence[str] | None,
         held: Mapping[str, float],
         degree: int | None,
+        block: Block | None = None,
     ) -> LPVStateSpace:
-        """Polynomials through the matrices, of a degree or of that at which they are exact."""
+        """Polynomials through the matrices, of a degree or of that at which they are exact; with
+        `block` its inputs d and outputs v after the others.
+        """
         x, u, y = (np.array(i) for i in self.kept(outputs, inputs))
         line = Line.of(self.kin, parameters, held)
 
         def part(p: Array) -> Matrices:
-            A, B, C, D = self.matrices(line.whole(p))
+            whole = line.whole(p)
+            A, B, C, D = self.matrices(whole)
             y_, x_ = y[:, None], x[:, None]
-            return Matrices(A[:, x_, x], B[:, x_, u], C[:, y_, x], D[:, y_, u])
+            found = Matrices(A[:, x_, x], B[:, x_, u], C[:, y_, x], D[:, y_, u])
+            if block is None:
+                return found
+            E, G, H = self._block(block, whole, p, line, x, u)
+            A, B, C, D = found
+            nothing = np.zeros((len(p), len(y), E.shape[2]))
+            open_ = np.zeros((len(p), G.shape[1], E.shape[2]))
+            return Matrices(
+                A,
+                np.concatenate([B, E], axis=2),
+                np.concatenate([C, G], axis=1),
+                np.block([[D, nothing], [H, open_]]),
+            )
 
         basis, fitted, nodes = interpolated(part, line, degree)
+        more = ((), ()) if block is None else (block.perturbations, block.excited)
         model = LPVStateSpace(
             basis,
             *fitted,
@@ -158,11 +203,69 @@ class Realization:
                 for s, (low, high) in zip(line.moving, line.ranges, strict=True)
             ),
             tuple(self.states[i] for i in x),
-            tuple(self.inputs[i] for i in u),
-            tuple(RIGID_BODY[i] for i in y),
+            (*(self.inputs[i] for i in u), *more[0]),
+            (*(RIGID_BODY[i] for i in y), *more[1]),
             self.dt,
         )
         return model.with_residuals(nodes, part(nodes))
+
+    def uncertain_part(
+        self,
+        parameters: tuple[Signal, ...],
+        outputs: Sequence[str] | None,
+        inputs: Sequence[str] | None,
+        held: Mapping[str, float],
+        covariance: Array,
+        probability: float,
+        draws: int,
+    ) -> tuple[Block, MatrixEllipsoid]:
+        """The ellipsoid of the coefficients that stay where only some signals do, on the line of
+        parameters that move: offsets are no dynamics, and what is left out is left out.
+        """
+        _, u, y = self.kept(outputs, inputs)
+        line = Line.of(self.kin, parameters, held)
+        nz, f = len(MOVING), self.kin.basis
+        signals = {i for i in y if i < nz} | {nz + i for i in u}
+        entries = [e for e in self.kin.aerodynamics.entries if e.kind == "input"]
+        kept = [row for row, e in enumerate(entries) if e.channel in signals]
+        own = polynomials(line.degrees, line.ranges)
+        points = interpolation_points(line.degrees, line.ranges)
+        project = own.fit(points, f(line.whole(points)))  # f(p) = project' own(p)
+        rows = np.array([i for i in y if i < nz])
+        n = f.size
+        blocks = covariance.reshape(nz, -1, n, nz, covariance.shape[1] // n, n)
+        part = blocks[rows][:, kept][:, :, :, rows][:, :, :, :, kept]
+        part = np.einsum("gf,asfbth,kh->asgbtk", project, part, project, optimize=True)
+        size = len(kept) * own.size
+        part = part.reshape(len(rows), size, len(rows), size)
+        part = 0.5 * (part + part.transpose(2, 3, 0, 1))
+        found = matrix_ellipsoid(part, probability, draws)
+        equations = [RIGID_BODY[i] for i in rows]
+        block = Block(
+            tuple(kept),
+            tuple(int(i) for i in rows),
+            own,
+            found.left,
+            found.right,
+            tuple(Signal(f"delta_{s}", s.unit) for s in equations),
+            tuple(Signal(f"excited_{i}", "1") for i in range(1, size + 1)),
+        )
+        return block, found
+
+    def _block(
+        self, block: Block, whole: Array, p: Array, line: Line, x: Array, u: Array
+    ) -> tuple[Array, Array, Array]:
+        """E (K, nx, m), G (K, n, nx), H (K, n, nu): what an error of the coefficients does, and
+        what shows it.
+        """
+        X, U = self.regressor()
+        E = np.zeros((len(p), len(self.states), len(block.rows)))
+        E[:, : len(STATES)] = self.solved(whole)[:, :, list(block.rows)] @ block.right.T
+        g = block.functions(p)
+        seen = block.left.T.reshape(-1, len(block.kept), block.functions.size)
+        seen = np.einsum("vsg,kg->kvs", seen, g)
+        rows = list(block.kept)
+        return E[:, x], seen @ X[rows][:, x], seen @ U[rows][:, u]
 
     def remembered(self, y: Array, u: Array, segments: Sequence[slice]) -> Array:
         """x (n, nx) along samples y (n, 8), u (n, nu)."""

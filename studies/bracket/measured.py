@@ -25,7 +25,7 @@ from studies.stamped_tables import DOCS, keep, parsed, processor
 from symheli import Helicopter, LPVStateSpace
 from symheli.lpv.bases import Polynomial
 from synthesis import HigherOrder, Memory, Search, Solver, Spline
-from synthesis.cover import Remainder, covered_gain
+from synthesis.cover import Remainder, covering
 from synthesis.forms import LyapunovForm
 
 SLOW = Memory(1.2, segments=12, grading=1.5, across_segments=4, across_degree=2)
@@ -110,10 +110,11 @@ def bracket(
     better = min(plain, memory, key=lambda c: c.gamma)
     covered, proof = math.nan, None
     if rest and plain.verified:
-        coarse = synthesis.l2_gain(loop, rate, form=COVER, search=None)
-        if coarse.verified:
-            covered, proof = covered_gain(loop, rest, rate, COVER, coarse.gamma)
-    exact = better.verify(rigorous=True) and (proof is None or proof.verify(rigorous=True))
+        proof = synthesis.l2_gain(covering(loop, rest), rate, form=COVER, search=None)
+        covered = proof.gamma
+    exact = better.verify(rigorous=True) and (
+        proof is None or math.isinf(covered) or proof.verify(rigorous=True)
+    )
     return Bracket(rate, memory.lower, memory.gamma, plain.gamma, exact, covered)
 
 

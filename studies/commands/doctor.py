@@ -29,6 +29,7 @@ OPTIONAL = {
     "pyulog": "reading PX4 logs",
     "python-flint": "fast exact verification of certificates",
     "scs": "a second solver to cross-check",
+    "jsbsim": "flying the AH-1S, a helicopter from elsewhere",
 }
 
 

@@ -15,7 +15,7 @@ from studies.output import Output
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
-    from symheli.records import FlightRecord
+    from symheli.records import FlightRecord, KinematicCheck
 
 METHODS = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
 """Those of `identification.fit`."""
@@ -276,7 +276,8 @@ def run(arguments: argparse.Namespace) -> Output:
         result,
         arguments.test,
     )
-    text, data = report.text(facts, result), report.data(facts, result)
+    check = prepared.kinematics
+    text, data = report.text(facts, result, check), report.data(facts, result, check)
     if arguments.loop:
         found = in_feedback.judged(result, arguments.loop)
         text = "\n\n".join([text, in_feedback.text(found)])
@@ -301,14 +302,15 @@ class _Signals(NamedTuple):
 
 
 class _Prepared(NamedTuple):
-    """A record ready to fit, the name of its scheduling signal, and how many samples were read and
-    `kept` between start and stop.
+    """A record ready to fit, the name of its scheduling signal, how many samples were read and
+    `kept` between start and stop, and whether attitude and rates agree where the log has them.
     """
 
     record: FlightRecord
     scheduling: str
     samples: int
     kept: int
+    kinematics: KinematicCheck | None
 
 
 def _method(name: str, instruments: tuple[str, ...]) -> Any:
@@ -331,6 +333,7 @@ def _prepared(
     """
     from studies.log.reading import COMBINED, format_of, read
     from symheli.records import FlightRecord, conditioning
+    from symheli.records.kinematics import lacking
 
     combined, scheduling = arguments.scheduling_from, signals.scheduling
     wanted = [
@@ -358,6 +361,8 @@ def _prepared(
     if not scheduling:
         scheduling = "constant"
         record = record.with_signals({scheduling: "1"}, **{scheduling: np.zeros(len(record))})
+    whole = record.between(arguments.start, arguments.stop) if cut else record
+    check = None if lacking(whole.signals) else whole.check_kinematics()
     record = record.select(
         list(dict.fromkeys([*signals.outputs, *signals.inputs, scheduling, *arguments.instruments]))
     )
@@ -366,7 +371,8 @@ def _prepared(
     kept = len(record)
     if arguments.smooth_scheduling:
         record = conditioning.smooth(record, scheduling, arguments.smooth_scheduling)
-    return _Prepared(conditioning.decimate(record, arguments.decimate), scheduling, samples, kept)
+    slower = conditioning.decimate(record, arguments.decimate)
+    return _Prepared(slower, scheduling, samples, kept, check)
 
 
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:

@@ -12,6 +12,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.logs.files import existing
 from symheli.logs.separated import SEPARATORS, SeparatedTable
 from symheli.records import FlightRecord
+from symheli.records.kinematics import COMPARED
 from symheli.values.signal import UNITS
 
 STILL = 1e-6
@@ -56,12 +57,16 @@ def read(
 ) -> FlightRecord:
     """The record, on a uniform step where `dt` (s) says so; a time column is in `time_unit`.
 
-    X-Plane logs declare their units. Elsewhere `units` declares those of `signals`; the names every
+    X-Plane logs declare their units. Of a table, what `check_kinematics` compares is read too where
+    it is there. Elsewhere `units` declares those of `signals`; the names every
     room knows (u, q, theta, ...) are SI unless declared otherwise. A time column and `dt` together
     resample. Raises `InputError`.
     """
     if format == "xplane":
         return FlightRecord.from_xplane(path, dt)
+    if format == "csv":
+        header = SeparatedTable.read(path).header
+        signals = list(dict.fromkeys([*signals, *(n for n in COMPARED if n in header)]))
     declared = {name: units.get(name) or UNITS.get(name) or _undeclared(name) for name in signals}
     for name in units:
         if name not in declared:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from identification import AgainstConstant, LPVARXModel, residual_analysis, slow
 from identification.judge.against_constant import HORIZONS
 from identification.judge.scores import Scores, percent
 from studies.output import columns
-from symheli.records import FlightRecord
+from symheli.records import FlightRecord, KinematicCheck, SensorCheck
 
 CERTAIN = ("ls", "rls")
 """Methods whose coefficients have a covariance here."""
@@ -59,12 +60,15 @@ def facts(
     }
 
 
-def text(found: dict[str, Any], result: AgainstConstant) -> str:
+def text(
+    found: dict[str, Any], result: AgainstConstant, check: KinematicCheck | None = None
+) -> str:
     """The whole answer for a reader."""
     fit = "fit in percent of the output's own variation (100: perfect, 0: no better than its mean)"
     parts = [
         *_read(found),
         *_structure(found, result),
+        *([] if check is None else ["", *_compatibility(check)]),
         "",
         str(result.scheduled.excitation),
         "",
@@ -79,7 +83,9 @@ def text(found: dict[str, Any], result: AgainstConstant) -> str:
     return "\n".join(parts).rstrip()
 
 
-def data(found: dict[str, Any], result: AgainstConstant) -> dict[str, Any]:
+def data(
+    found: dict[str, Any], result: AgainstConstant, check: KinematicCheck | None = None
+) -> dict[str, Any]:
     """The whole answer for a program."""
     models = {
         scored.label: {
@@ -96,6 +102,7 @@ def data(found: dict[str, Any], result: AgainstConstant) -> dict[str, Any]:
     certain = result.scheduled.method in CERTAIN
     return {
         "read": found,
+        "kinematics": None if check is None else [_sensor(row) for row in check.rows],
         "excitation": _excitation(result),
         "models": models,
         "judged": [scored.label for scored in result.judged],
@@ -110,6 +117,33 @@ def data(found: dict[str, Any], result: AgainstConstant) -> dict[str, Any]:
             uncertainty(result.scheduled, result.training).standard_errors if certain else None
         ),
         "slow_modes": _slow(result) if certain else None,
+    }
+
+
+def _compatibility(check: KinematicCheck) -> list[str]:
+    """The table where a sensor contradicts the others, else who agrees."""
+    if check.inconsistent:
+        return [str(check)]
+    agree = [row.signal for row in check.rows if row.verdict == "consistent"]
+    unknown = [row.signal for row in check.rows if row.verdict != "consistent"]
+    parts = [f"consistent: {', '.join(agree)}"] if agree else []
+    return [
+        "kinematics: "
+        + "; ".join(parts + ([f"not known: {', '.join(unknown)}"] if unknown else []))
+    ]
+
+
+def _sensor(row: SensorCheck) -> dict[str, Any]:
+    """A row of the check; None for what is not known."""
+    numbers = {"bias": row.bias, "scale": row.scale, "delay": row.delay}
+    return {
+        "signal": str(row.signal),
+        "unit": row.signal.unit,
+        "verdict": row.verdict,
+        **{
+            name: None if e is None or e.standard_error == inf else e._asdict()
+            for name, e in numbers.items()
+        },
     }
 
 

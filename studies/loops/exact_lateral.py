@@ -9,7 +9,7 @@ carry it through a proof.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 import symheli
-from studies.loops.lateral import CHANNELS, STATES, close
+from studies.loops.lateral import ATTITUDE_HOLD, CHANNELS, STATES, close
 from symheli import Helicopter, LinearFamily, LPVStateSpace, Scheduling
 from symheli.lpv import Patches
 
@@ -60,7 +60,12 @@ class ExactLateral:
             _family(heli, basis.points(4 * DEGREE + 5)),
         )
 
-    def loop(self, channel: Channel = "gust", dt: float | None = None) -> LPVStateSpace:
+    def loop(
+        self,
+        channel: Channel = "gust",
+        dt: float | None = None,
+        gains: Mapping[tuple[str, str], float] = ATTITUDE_HOLD,
+    ) -> LPVStateSpace:
         """The loop of `studies.loops.lateral` with exact models; `dt` (s): each held for so long,
         sampled.
         """
@@ -74,6 +79,7 @@ class ExactLateral:
                 self.basis, A, B, C, D, scheduling, family.states, family.inputs, family.outputs, dt
             ),
             channel,
+            gains,
         )
 
     def missed(self, loop: LPVStateSpace, channel: Channel = "gust") -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,8 @@ OUTPUTS = ("r", "phi")
 CHANNELS = {"gust": ("v_w",), "inputs": ("d_lat", "d_ped")}
 HOLD = -0.02
 """Attitude hold d_lat = HOLD phi, rad per rad."""
+
+ATTITUDE_HOLD: Mapping[tuple[str, str], float] = {("d_lat", "phi"): HOLD}
 
 
 def lateral_loop(
@@ -36,10 +39,12 @@ def lateral_loop(
     )
 
 
-def close(lateral: LPVStateSpace, channel: Literal["gust", "inputs"]) -> LPVStateSpace:
-    """Attitude hold around any lateral model (continuous or sampled) that has the channel's inputs
-    and the outputs r and phi.
+def close(
+    lateral: LPVStateSpace,
+    channel: Literal["gust", "inputs"],
+    gains: Mapping[tuple[str, str], float] = ATTITUDE_HOLD,
+) -> LPVStateSpace:
+    """`gains` (the attitude hold) around any lateral model (continuous or sampled) that has the
+    channel's inputs, the outputs r and phi, and what is fed back.
     """
-    return lateral.feedback({("d_lat", "phi"): HOLD}).select(
-        inputs=CHANNELS[channel], outputs=OUTPUTS
-    )
+    return lateral.feedback(gains).select(inputs=CHANNELS[channel], outputs=OUTPUTS)

@@ -6,10 +6,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-
-import numpy as np
 
 import synthesis
 from identification import LPVARXModel
@@ -19,8 +17,6 @@ from studies.loops.lateral import STATES, close
 from studies.transition.flights import TOP
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
 from symheli.lpv.bases import Polynomial
-from symheli.lpv.lpv_state_space import Matrices
-from symheli.values.arrays import Array
 from synthesis import Certificate, Memory, Search, Spline
 from synthesis.worst.frozen import norm
 
@@ -66,20 +62,8 @@ class Bound:
 
 def scaled(lpv: LPVStateSpace) -> LPVStateSpace:
     """Inputs and outputs measured in `SIZES`."""
-    inputs, outputs = (
-        np.array([SIZES[i] for i in lpv.inputs]),
-        np.array([SIZES[y] for y in lpv.outputs]),
-    )
-
-    def measured(A: Array, B: Array, C: Array, D: Array) -> Matrices:
-        return Matrices(A, B * inputs, C / outputs[:, None], D * inputs / outputs[:, None])
-
-    model = replace(
-        lpv, **measured(lpv.A, lpv.B, lpv.C, lpv.D)._asdict(), residuals=None, trim=None
-    )
-    origin = lpv.fitted_to
-    return (
-        model if origin is None else model.with_residuals(origin.nodes, measured(*origin.matrices))
+    return lpv.scaled(
+        {name: SIZES[name] for name in lpv.inputs}, {name: SIZES[name] for name in lpv.outputs}
     )
 
 

@@ -50,6 +50,7 @@ from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
 from symheli.lpv.stability_margin import stability_margin
 from symheli.lpv.trim_schedule import TrimSchedule
+from symheli.lpv.uncertain_state_space import UncertainStateSpace
 
 __all__ = [
     "LFT",
@@ -74,6 +75,7 @@ __all__ = [
     "Spline",
     "TrimSchedule",
     "Truncation",
+    "UncertainStateSpace",
     "UserFunctions",
     "WellPosedness",
     "append",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -292,12 +293,37 @@ class LPVStateSpace:
 
         Outputs that depend on p multiply inputs that do: a polynomial model then has up to twice
         the degree, in another basis `InputError`. A loop through constant feedthrough is solved;
-        through feedthrough D(p) that depends on p the closed loop is rational and `InputError` says
-        so: `to_lft().feedback(gains)` closes it exactly, as an `LFT`.
+        through feedthrough D(p) that depends on p, from an input that is driven to an output that
+        is fed back, the closed loop is rational and `InputError` says so:
+        `to_lft().feedback(gains)` closes it exactly, as an `LFT`.
         """
         from symheli.lpv.output_feedback import close
 
         return close(self, feedback_matrix(gains, self.inputs, self.outputs))
+
+    def scaled(
+        self, inputs: Mapping[str, float] | None = None, outputs: Mapping[str, float] | None = None
+    ) -> LPVStateSpace:
+        """The model with inputs and outputs {name: size} measured in that size (> 0): what was
+        `size` in its unit is 1. The others stay; the trim is left out.
+        """
+        sizes = [
+            _sizes(given or {}, names, kind)
+            for given, names, kind in (
+                (inputs, self.inputs, "input"),
+                (outputs, self.outputs, "output"),
+            )
+        ]
+
+        def measured(A: Array, B: Array, C: Array, D: Array) -> Matrices:
+            into, out = sizes[0], sizes[1][:, None]
+            return Matrices(A, B * into, C / out, D * into / out)
+
+        own = measured(self.A, self.B, self.C, self.D)
+        model = replace(self, **own._asdict(), trim=None, residuals=None)
+        if (origin := self.fitted_to) is None:
+            return model
+        return model.with_residuals(origin.nodes, measured(*origin.matrices))
 
     def discretize(
         self, dt: float, *, degree: int | Sequence[int] | None = None, nodes: int | None = None
@@ -423,6 +449,18 @@ class LPVStateSpace:
         from symheli.lpv.lft import LFT
 
         return LFT.from_polynomial(self)
+
+
+def _sizes(given: Mapping[str, float], names: Sequence[str], kind: str) -> Array:
+    """One size a name, 1 where none is given."""
+    out = np.ones(len(names))
+    for name, size in given.items():
+        if not 0 < float(size) < math.inf:
+            raise InputError(
+                f"the size of the {kind} {name} must be a number > 0, got {size!r:.60}"
+            )
+        out[indices([name], names, kind)[0]] = float(size)
+    return out
 
 
 def _by_exponents(

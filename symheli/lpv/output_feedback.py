@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import reduce
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,13 +22,6 @@ units play no part.
 """
 
 
-class _Loop(NamedTuple):
-    """u = N K y + N r of the loop u = K y + r: `L` = N K."""
-
-    L: Array
-    N: Array
-
-
 def close(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
     """The model with u = K y + r; see `LPVStateSpace.feedback`. It is a fit of what the loop makes
     of what `lpv` was fitted to.
@@ -44,38 +36,50 @@ def close(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
 
 
 def _closed(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
+    """u = K y + r is u = r + L (C x + D r) with L = (I - K D)^-1 K, of which only the feedthrough
+    from the inputs that are driven to the outputs that are fed back is a loop.
+    """
     values = lpv.matrices(lpv.basis.samples(lpv.box))
-    fed = np.any(K, axis=0)  # outputs that are fed back
-    if not _is_constant(values.D[:, fed]):
+    driven, fed = np.any(K, axis=1), np.any(K, axis=0)
+    through = values.D[:, fed][:, :, driven]
+    if not _is_constant(through):
         raise InputError(
             "the loop through the feedthrough D(p) depends on the scheduling: closed it is a"
             " rational function of it, which no basis holds; lpv.to_lft().feedback(...) closes it"
             " exactly"
         )
-    N = loop_inverse(K[:, fed] @ values.D[0, fed])
-    loop = _Loop(N @ K, N)
-    driven = np.any(loop.L, axis=1)  # inputs they act on
-    if _is_constant(values.C[:, fed]):
-        back = loop.L @ values.C[0]
-        closed = Matrices(lpv.A + lpv.B @ back, lpv.B @ N, lpv.C + lpv.D @ back, lpv.D @ N)
+    own = K[np.ix_(driven, fed)]
+    L = np.zeros(K.shape)
+    L[np.ix_(driven, fed)] = loop_inverse(own @ through[0]) @ own
+    if _is_constant(values.C[:, fed]) and _is_constant(values.D[:, fed]):
+        state, direct = L @ values.C[0], L @ values.D[0]
+        A, B, C, D = (
+            lpv.A + lpv.B @ state,
+            lpv.B + lpv.B @ direct,
+            lpv.C + lpv.D @ state,
+            lpv.D + lpv.D @ direct,
+        )
     elif _is_constant(values.B[:, :, driven]) and _is_constant(values.D[:, :, driven]):
-        back = loop.L @ lpv.C
-        closed = Matrices(
-            lpv.A + values.B[0] @ back, lpv.B @ N, lpv.C + values.D[0] @ back, lpv.D @ N
+        into, out = values.B[0] @ L, values.D[0] @ L
+        A, B, C, D = (
+            lpv.A + into @ lpv.C,
+            lpv.B + into @ lpv.D,
+            lpv.C + out @ lpv.C,
+            lpv.D + out @ lpv.D,
         )
     elif lpv.basis.degrees is not None:
-        return _product(lpv, lpv.basis.degrees, loop)
+        return _product(lpv, lpv.basis.degrees, L)
     else:
         raise InputError(
             "an output that is fed back depends on the scheduling, and so do the inputs: their"
             " product leaves this basis; interpolate with kind='polynomial', whose products are"
             " polynomials"
         )
-    return replace(lpv, A=closed.A, B=closed.B, C=closed.C, D=closed.D, trim=None, residuals=None)
+    return replace(lpv, A=A, B=B, C=C, D=D, trim=None, residuals=None)
 
 
-def _product(lpv: LPVStateSpace, degrees: tuple[int, ...], loop: _Loop) -> LPVStateSpace:
-    """A + B N K C and its like, of up to twice the degrees: exact, by values at as many points as
+def _product(lpv: LPVStateSpace, degrees: tuple[int, ...], L: Array) -> LPVStateSpace:
+    """A + B L C and its like, of up to twice the degrees: exact, by values at as many points as
     there are coefficients.
     """
     ranges = lpv.basis.ranges
@@ -85,11 +89,12 @@ def _product(lpv: LPVStateSpace, degrees: tuple[int, ...], loop: _Loop) -> LPVSt
     weights = reduce(np.multiply.outer, [w for _, w in axes]).ravel()
     f = lpv.basis(points)
     A, B, C, D = (np.tensordot(f, M, axes=1) for M in (lpv.A, lpv.B, lpv.C, lpv.D))
-    LC = loop.L @ C
+    state, direct = L @ C, L @ D
     # the functions are orthonormal for the mean over the box, which Gauss's rule takes exactly
     project = (double(points) * weights[:, None]).T
     closed = [
-        np.tensordot(project, M, axes=1) for M in (A + B @ LC, B @ loop.N, C + D @ LC, D @ loop.N)
+        np.tensordot(project, M, axes=1)
+        for M in (A + B @ state, B + B @ direct, C + D @ state, D + D @ direct)
     ]
     found = np.any([_matters(M) for M in closed], axis=0)
     exponents = np.array(double.indices) if len(degrees) > 1 else np.arange(double.size)[:, None]  # type: ignore[union-attr]

@@ -12,5 +12,16 @@ The examples of this package start from
 
 from symheli.records.conditioning import decimate, low_pass, smooth, split, with_norm
 from symheli.records.flight_record import FlightRecord
+from symheli.records.kinematic_check import KinematicCheck, SensorCheck, check_kinematics
 
-__all__ = ["FlightRecord", "decimate", "low_pass", "smooth", "split", "with_norm"]
+__all__ = [
+    "FlightRecord",
+    "KinematicCheck",
+    "SensorCheck",
+    "check_kinematics",
+    "decimate",
+    "low_pass",
+    "smooth",
+    "split",
+    "with_norm",
+]

@@ -159,13 +159,13 @@ def low_pass(
         if signal in leave:
             continue
         for part in record.segments():
-            for stretch in _unbroken(record.values[part, i]):
+            for stretch in unbroken(record.values[part, i]):
                 rows = slice(part.start + stretch.start, part.start + stretch.stop)
                 out[rows, i] = _filtered(sos, record.values[rows, i], zero_phase)
     return replace(record, values=out)
 
 
-def _unbroken(column: Array) -> list[slice]:
+def unbroken(column: Array) -> list[slice]:
     """Stretches of finite values."""
     known = np.concatenate([[False], np.isfinite(column), [False]])
     edges = np.flatnonzero(np.diff(known.astype(int)))

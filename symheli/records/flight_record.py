@@ -26,6 +26,8 @@ from symheli.values.units import to_si
 if TYPE_CHECKING:
     import pandas
 
+    from symheli.records.kinematic_check import KinematicCheck
+
 GAP = 1.5
 """Two samples further apart than this many median steps have a gap between them."""
 
@@ -282,6 +284,14 @@ class FlightRecord:
             if part.stop - part.start > 1:
                 out[part] = np.gradient(values[part], self.time[part], axis=0)
         return out
+
+    def check_kinematics(self) -> KinematicCheck:
+        """Whether attitude, rates, velocities and specific forces agree: bias, scale and delay of
+        each sensor, with standard errors and a verdict; see `symheli.records.check_kinematics`.
+        """
+        from symheli.records.kinematic_check import check_kinematics
+
+        return check_kinematics(self)
 
     def plot(self, names: Sequence[str] | None = None) -> Array:
         """Axes (signals,) of these signals (default: all) against time; gaps stay empty. See

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.errors import InputError
 from synthesis.analysis.fine_sampling import fine_sampling
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
@@ -20,6 +21,7 @@ from synthesis.analysis.one_parameter_search import OneParameter
 from synthesis.analysis.question import Question
 from synthesis.certificate import Certificate, Seconds, Status
 from synthesis.impose import Grid
+from synthesis.polynomial.pieces import Pieces, pieces
 from synthesis.worst.box import (
     Worst,
     growing,
@@ -29,6 +31,7 @@ from synthesis.worst.box import (
     worst_moving,
 )
 from synthesis.worst.budget import said
+from synthesis.worst.perturbation import worst_perturbation
 from synthesis.worst.trajectory import Trajectory
 
 Array = np.ndarray
@@ -44,17 +47,18 @@ class Beaten(NamedTuple):
     limit: float
     worst: Trajectory | None
     seconds: float
+    perturbation: Array | None = None
 
 
 def certify(asked: Question) -> Certificate:
     """The answer to the question."""
-    model, demand, search = asked.model, asked.demand, asked.search
+    demand, search = asked.demand, asked.search
     sign = 1.0 if asked.gains else -1.0
     start = time.perf_counter()
-    frozen = worst_frozen(model, measure(demand, model.dt))
+    model, frozen, delta, unstable = _worst_member(asked)
     report = _Report(asked)
     if math.isinf(frozen.value) if asked.gains else frozen.value >= 0:
-        at = unstable_at(model, frozen.p or ())
+        at = unstable or unstable_at(model, frozen.p or ())
         if at is not None:
             p = np.array(at) if len(at) == 1 else np.array([at])
             beaten = Beaten(
@@ -62,6 +66,7 @@ def certify(asked: Question) -> Certificate:
                 sign * frozen.value,
                 Trajectory(np.zeros(1), p),
                 time.perf_counter() - start,
+                delta,
             )
             return report.nothing(Status.UNSTABLE, beaten)
         # stable or not to rounding: nothing is known from below
@@ -69,7 +74,11 @@ def certify(asked: Question) -> Certificate:
     stability = demand.kind == "stability"
     limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
     beaten = Beaten(
-        sign * frozen.value, sign * limit.value, limit.trajectory, time.perf_counter() - start
+        sign * frozen.value,
+        sign * limit.value,
+        limit.trajectory,
+        time.perf_counter() - start,
+        delta,
     )
     if math.isinf(limit.value) if asked.gains else limit.value >= 0:
         return report.nothing(Status.GROWING, beaten)
@@ -83,6 +92,34 @@ def certify(asked: Question) -> Certificate:
             return report.nothing(Status.GROWING, beaten._replace(worst=worst), ladder)
     cert = report.found(best, beaten, ladder)
     return cert if stability else cert.resting_on(said(search and search.seconds, beaten.seconds))
+
+
+class _Member(NamedTuple):
+    """The `model` along whose motions no proof can go lower, and the worst `frozen` one.
+
+    Of a set the one with `perturbation`; where no basis holds it the nominal one, beside the frozen
+    one with the perturbation, which is `unstable` at some p or nowhere (None).
+    """
+
+    model: Pieces
+    frozen: Worst
+    perturbation: Array | None = None
+    unstable: tuple[float, ...] | None = None
+
+
+def _worst_member(asked: Question) -> _Member:
+    unc, size = asked.uncertain, measure(asked.demand, asked.model.dt)
+    if unc is None:
+        return _Member(asked.model, worst_frozen(asked.model, size))
+    found = worst_perturbation(unc, gains=asked.gains)
+    try:
+        model = pieces(unc.perturbed(found.delta))
+    except InputError:
+        at = (found.p,)
+        return _Member(
+            asked.model, Worst(found.value, at), found.delta, at if found.unstable else None
+        )
+    return _Member(model, worst_frozen(model, size), found.delta)
 
 
 def route(asked: Question) -> Ladder:
@@ -129,7 +166,7 @@ class _Report:
                 kind,
                 asked.model.parameters,
                 asked.demand.rates,
-                asked.model.source,
+                asked.uncertain or asked.model.source,
                 (*self._how(best, status), *self._sampling(bounds)),
             ),
             method=f"{type(asked.form).__name__}, {asked.impose.found_by}",
@@ -138,6 +175,7 @@ class _Report:
             conditioning=best.conditioning,
             attempts=tuple(ladder.attempts) if ladder else (),
             worst=beaten.worst,
+            perturbation=beaten.perturbation,
             indicative=best.bound if status is Status.UNPROVEN else math.nan,
             proof=best.proof,
         )

@@ -9,10 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.trim_drift import PREFIX
 from synthesis.certificate import Kind
+from synthesis.norm_bounded import open_block
 
 Array = np.ndarray
 
@@ -53,7 +54,20 @@ def hypotheses(
     """
     moving = tuple(motion(s, rate) for s, rate in zip(parameters, rates, strict=True))
     meaning = (MEANING[kind],) if kind in MEANING else ()
-    return (*moving, *fitted(model), *drifting(model), *found, *meaning)
+    return (*moving, *perturbed(model), *fitted(model), *drifting(model), *found, *meaning)
+
+
+def perturbed(model: object) -> tuple[str, ...]:
+    """For which perturbations a statement on a set of models holds, and what its bound promises."""
+    if not isinstance(model, UncertainStateSpace):
+        return ()
+    _, block = open_block(model, channels=False)
+    promise = (
+        "the bound on Delta holds"
+        if model.probability == 1.0
+        else f"the bound on Delta holds with probability {model.probability:g}"
+    )
+    return (block.sentence, f"{promise}: {model.source}")
 
 
 def motion(s: Scheduling, rate: float) -> str:
@@ -76,6 +90,7 @@ def motion(s: Scheduling, rate: float) -> str:
 
 def drifting(model: object) -> tuple[str, ...]:
     """What is left out where the model is one about a moving trim."""
+    model = model.model if isinstance(model, UncertainStateSpace) else model
     if not isinstance(model, LPVStateSpace):
         return ()
     if declared := [str(u) for u in model.inputs if u.startswith(PREFIX)]:
@@ -91,6 +106,7 @@ def fitted(model: object) -> tuple[str, ...]:
     """The misfit of an interpolated or sampled model, which is among the hypotheses; nothing for a
     model that was given as it is.
     """
+    model = model.model if isinstance(model, UncertainStateSpace) else model
     if not isinstance(model, LPVStateSpace) or model.residuals is None:
         return ()
     count = {1: 41, 2: 13}.get(len(model.parameters), 5)

@@ -29,8 +29,9 @@ def l2_gain(
 
     Parameters
     ----------
-    model : LPVStateSpace or LFT
-        The model.
+    model : LPVStateSpace, UncertainStateSpace or LFT
+        The model. Of an uncertain one the gain is that of every model of the set, with its
+        perturbation constant or moving.
     rate : float, sequence or mapping, optional
         Largest |dp/dt| in units of p per second: one for all parameters, one each, or by name; by
         default the model's own. math.inf: p may jump, and P is constant; 0: every frozen model.
@@ -48,8 +49,9 @@ def l2_gain(
     Returns
     -------
     Certificate
-        `gamma` bounds the gain, in units of y per unit of u, `lower` no proof can undercut. A
-        failed solve is a certificate with gamma = inf and its reason in `status`.
+        `gamma` bounds the gain, in units of y per unit of u, `lower` no proof can undercut; of an
+        uncertain model that is attained by the one with `perturbation`. A failed solve is a
+        certificate with gamma = inf and its reason in `status`.
 
     Raises
     ------

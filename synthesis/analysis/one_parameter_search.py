@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
 from synthesis.analysis.ladder import NOTHING, Found, Ladder, inflated
 from synthesis.assemble.bounded_real import assemble
 from synthesis.assemble.unknowns import Quadratic, Unknown, constant, scaled_problem, unknowns
@@ -35,9 +34,8 @@ class OneParameter(Ladder):
 
     def expect(self, bound: float) -> float:
         """Set the units; the unit of gains."""
-        lpv, (rate,) = self.asked.model.source, self.asked.demand.rates
-        assert isinstance(lpv, LPVStateSpace)  # noqa: S101 - see `Question.one_parameter`
-        self.problem = scaled_problem(lpv, rate, bound, with_gain=self.asked.gains)
+        model, (rate,) = self.asked.uncertain or self.asked.model.source, self.asked.demand.rates
+        self.problem = scaled_problem(model, rate, bound, with_gain=self.asked.gains)
         return self.problem.units.channel
 
     def shapes(self) -> list[Unknown]:
@@ -86,8 +84,8 @@ class OneParameter(Ladder):
         """Solve with all blocks, kept as products with P."""
         assert isinstance(form, Quadratic)  # noqa: S101 - see `Question`
         blocks = form.products(self.problem, self.elevation)
-        inputs, floor = len(self.problem.lpv.inputs), self.asked.impose.least
-        program = LyapunovProgram(blocks, form.size, inputs, form.unknowns, margin, floor)
+        sizes, floor = self.problem.sizes(form), self.asked.impose.least
+        program = LyapunovProgram(blocks, sizes, margin, floor)
         return interior_point.minimise(program, self.asked.solver)
 
     def _solve_by_rounds(self, form: Unknown, margin: float) -> Candidate:
@@ -95,7 +93,7 @@ class OneParameter(Ladder):
         fewer blocks in all.
         """
         blocks = form.weighed(self.problem, self.elevation)
-        n, m = form.size, len(self.problem.lpv.inputs)
+        sizes = self.problem.sizes(form)
         active = [np.full(len(block.constant), block.likely) for block in blocks]
         seconds, rounds = 0.0, 0
         while True:
@@ -106,23 +104,25 @@ class OneParameter(Ladder):
                 if which.any()
             ]
             candidate = solve(
-                assemble(chosen, n, m, form.unknowns, margin, self.asked.impose.least, form.null),
+                assemble(chosen, sizes, margin, self.asked.impose.least, form.null),
                 self.asked.solver,
             )
             seconds += candidate.seconds
             if candidate.x is None or rounds == ROUNDS or all(which.all() for which in active):
                 break
-            P, level = form.coefficients(candidate.x), candidate.x[-1]
+            P, multiplier = form.coefficients(candidate.x), form.multiplier(candidate.x)
+            level = candidate.x[-1]
             target = (
-                np.diag(np.concatenate([np.zeros(n), np.full(m, level)]))
+                np.diag(np.r_[np.zeros(sizes.strict), np.full(sizes.inputs, level)])
                 if self.asked.gains
-                else -level * np.eye(n)
+                else -level * np.eye(sizes.rows)
             )
             added = 0
             for block, which in zip(blocks, active, strict=True):
                 if which.all():
                     continue
-                excess = block.values(P, n + m) - block.weight[:, None, None] * target
+                excess = block.values(P, sizes.rows, multiplier)
+                excess = excess - block.weight[:, None, None] * target
                 new = ~which & (np.linalg.eigvalsh(excess)[:, -1] > VIOLATED)
                 which |= new
                 added += int(new.sum())
@@ -140,8 +140,9 @@ class OneParameter(Ladder):
         if not self.asked.gains and candidate.x[-1] <= NOTHING and answer is Answer.SOLVED:
             answer = Answer.INFEASIBLE
         # judged as it is stored, in physical units
+        units = problem.units
         P = shape.lyapunov(candidate.x).in_units(
-            problem.units.left, problem.units.channel**2, 1.0 / problem.units.time
+            units.left, units.channel**2, 1.0 / units.time, units.multiplier
         )
         evidence = problem.evidence(self.elevation)
         least, conditioning = evidence.least_gain(P)

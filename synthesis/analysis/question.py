@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from symheli.errors import InputError
-from symheli.lpv import LFT, LPVStateSpace, Scheduling
+from symheli.lpv import LFT, LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.certificate import Kind
 from synthesis.forms import HigherOrder, LyapunovForm, Memory, Spline
 from synthesis.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
@@ -19,11 +19,13 @@ from synthesis.worst.lower_bound import Search
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
-Model = LPVStateSpace | LFT
+Model = LPVStateSpace | LFT | UncertainStateSpace
 
 
 class Question(NamedTuple):
-    """A model in polynomial pieces, what is asked of it, and by which means."""
+    """A model in polynomial pieces, what is asked of it, and by which means; `uncertain` where it
+    is asked of a whole set, of which the model then is the nominal one.
+    """
 
     model: Pieces
     demand: Demand
@@ -31,6 +33,7 @@ class Question(NamedTuple):
     impose: Imposed
     solver: Solver
     search: Search | None
+    uncertain: UncertainStateSpace | None = None
 
     @property
     def one_parameter(self) -> bool:
@@ -73,6 +76,7 @@ def question(
         )
     if search is not None and not isinstance(search, Search):
         raise InputError(f"search must be a Search, or None for none, got {search!r:.60}")
+    uncertain = model if isinstance(model, UncertainStateSpace) else None
     model = _accepted(model)
     moving = limits(model.parameters, rate)
     motion = Motion.of(moving)
@@ -81,9 +85,13 @@ def question(
         _check_rest(motion, moving)
     elif any(isinstance(s.rate, str) for s in model.parameters):
         model = model.with_scheduling(moving)
-    asked = Question(pieces(model), Demand(kind, motion), form, impose, Solver("CLARABEL"), search)
+    if uncertain is not None:
+        uncertain = uncertain.with_scheduling(model.parameters)
+    demand = Demand(kind, motion)
+    asked = Question(pieces(model), demand, form, impose, Solver("CLARABEL"), search, uncertain)
     _check_channels(asked)
     _check_options(asked)
+    _check_block(asked)
     return asked._replace(solver=_solver(asked, solver))
 
 
@@ -99,10 +107,13 @@ def _solver(asked: Question, solver: Solver | str | None) -> Solver:
 def _accepted(model: Model) -> LPVStateSpace:
     if isinstance(model, LPVStateSpace):
         return model
+    if isinstance(model, UncertainStateSpace):
+        return model.nominal
     if not isinstance(model, LFT):
         raise InputError(
-            f"expected an LPVStateSpace or an LFT, got {type(model).__name__}; make one with"
-            " LPVStateSpace.polynomial(...) or LinearFamily.interpolate()"
+            "expected an LPVStateSpace, an UncertainStateSpace or an LFT, got"
+            f" {type(model).__name__}; make one with LPVStateSpace.polynomial(...) or"
+            " LinearFamily.interpolate()"
         )
     try:
         return model.to_lpv()
@@ -135,6 +146,17 @@ def _check_channels(asked: Question) -> None:
         raise InputError(
             "the energy-to-peak gain of a continuous model needs D = 0: feedthrough passes peaks of"
             " any height"
+        )
+
+
+def _check_block(asked: Question) -> None:
+    if asked.uncertain is None:
+        return
+    if not asked.one_parameter or not isinstance(asked.form, Spline):
+        raise InputError(
+            "an UncertainStateSpace is for l2_gain and stability of one scheduling parameter with"
+            " form=Spline(...) by plain Bernstein coefficients; for anything else take models of"
+            " the set, .nominal or .draws(...)"
         )
 
 

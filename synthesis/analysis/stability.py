@@ -28,8 +28,9 @@ def stability(
 
     Parameters
     ----------
-    model : LPVStateSpace or LFT
-        The model.
+    model : LPVStateSpace, UncertainStateSpace or LFT
+        The model. An uncertain one is stable where every model of the set is, with its perturbation
+        constant or moving.
     rate : float, sequence or mapping, optional
         Largest |dp/dt| in units of p per second: one for all parameters, one each, or by name; by
         default the model's own. math.inf: p may jump, and P is constant; 0: every frozen model.

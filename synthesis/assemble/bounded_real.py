@@ -10,6 +10,10 @@ discrete time, P+ = P(p(k+1)), |p(k+1) - p(k)| <= rate dt:
     [A'P+A - P + C'C   A'P+B + C'D      ]
     [B'P+A + D'C       B'P+B + D'D - g I]  < 0.
 
+With a norm-bounded block d = Delta v, v = G x + J d + H u, |Delta| <= beta, the inputs are (d, u),
+C and D are those of y alone, g belongs to u alone, and lambda(p) (beta^2 [G J H]'[G J H] - diag(0,
+I, 0)) is added with lambda >= 0, a spline on the knots of P.
+
 Source: Wu, Yang, Packard and Becker, "Induced L2-norm control for LPV systems with bounded
 parameter variation rates", Int. J. Robust and Nonlinear Control 6 (1996), theorem 3.1.
 """
@@ -22,6 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial.bernstein import (
     composition,
     elevation_matrix,
@@ -31,6 +36,7 @@ from synthesis.polynomial.bernstein import (
 from synthesis.polynomial.cells import Cell, Strip
 from synthesis.polynomial.symmetric import basis, smat, svec
 from synthesis.program.cone_program import ConeProgram
+from synthesis.program.lyapunov_program import Sizes
 
 Array = np.ndarray
 
@@ -41,7 +47,7 @@ class Blocks(NamedTuple):
 
     `columns` (k,) says which coefficients of P are involved; `linear` (m, k, n (n + 1)/2, L),
     `constant` (m, L), of matrices (N, N) with L = N (N + 1)/2; `weight` (m,) > 0. `likely`:
-    expected to be among the binding ones.
+    expected to be among the binding ones. `supply`: what a block adds, None without one.
     """
 
     columns: Array
@@ -49,32 +55,64 @@ class Blocks(NamedTuple):
     constant: Array
     weight: Array
     likely: bool = True
+    supply: Supply | None = None
 
-    def values(self, P: Array, N: int) -> Array:
-        """F (m, N, N) with g = 0 at the coefficients P (k, n (n + 1)/2) of the whole spline."""
-        return smat(np.einsum("mjvl,jv->ml", self.linear, P[self.columns]) + self.constant, N)
+    def values(self, P: Array, N: int, multipliers: Array | None = None) -> Array:
+        """F (m, N, N) with g = 0 at the coefficients P (k, n (n + 1)/2) and, around a block,
+        multipliers (k',) of the whole splines.
+        """
+        F = np.einsum("mjvl,jv->ml", self.linear, P[self.columns]) + self.constant
+        if self.supply is not None and multipliers is not None:
+            F = F + np.einsum("mjl,j->ml", self.supply.linear, multipliers[self.supply.columns])
+        return smat(F, N)
 
     def congruent(self, W: Array) -> Blocks:
         """W' F W for every F, W (N, N) not acting on the part with g."""
         N = len(W)
         K = svec(W.T @ basis(N) @ W)
-        return self._replace(linear=self.linear @ K, constant=self.constant @ K)
+        supply = self.supply and self.supply._replace(linear=self.supply.linear @ K)
+        return self._replace(linear=self.linear @ K, constant=self.constant @ K, supply=supply)
 
     def keep(self, which: Array) -> Blocks:
         """Only these of the m blocks."""
+        supply = self.supply and self.supply._replace(linear=self.supply.linear[which])
         return self._replace(
-            linear=self.linear[which], constant=self.constant[which], weight=self.weight[which]
+            linear=self.linear[which],
+            constant=self.constant[which],
+            weight=self.weight[which],
+            supply=supply,
         )
 
 
+class Supply(NamedTuple):
+    """sum_j linear[., j] multipliers[columns[j]], what a norm-bounded block adds to F: `linear` (m,
+    k, L).
+    """
+
+    columns: Array
+    linear: Array
+
+
+class Multiplier(NamedTuple):
+    """The multiplier lambda of a `block`: a spline of `degree` on the knots of P."""
+
+    block: NormBounded
+    degree: int
+
+
 def continuous_blocks(
-    cells: Sequence[Cell], knots: Array, degree: int, rate: float, extra: int
+    cells: Sequence[Cell],
+    knots: Array,
+    degree: int,
+    rate: float,
+    extra: int,
+    multiplier: Multiplier | None = None,
 ) -> Iterator[Blocks]:
     """The blocks of every cell for both signs of the rate; `extra` raises the degree of the
     Bernstein form.
     """
     for cell in cells:
-        form = over_cell(cell, knots, degree, extra)
+        form = over_cell(cell, knots, degree, extra, multiplier)
         E = basis(form.A.shape[1])
         lyapunov = E @ form.A[:, None]
         coupling = E @ form.B[:, None]
@@ -84,14 +122,19 @@ def continuous_blocks(
         constant = form.up @ svec(form.output)
         for nu in (-rate, rate) if rate > 0 else (0.0,):
             drift = nu * form.slope[:, :, None, None] * direct
-            yield Blocks(form.columns, linear + drift, constant, np.ones(len(constant)))
+            weight = np.ones(len(constant))
+            yield Blocks(form.columns, linear + drift, constant, weight, supply=form.supply)
 
 
 def discrete_blocks(
-    strips: Sequence[Strip], knots: Array, degree: int, extra: int
+    strips: Sequence[Strip],
+    knots: Array,
+    degree: int,
+    extra: int,
+    multiplier: Multiplier | None = None,
 ) -> Iterator[Blocks]:
     """The blocks of every strip."""
-    for form in over_strips(strips, knots, degree, extra):
+    for form in over_strips(strips, knots, degree, extra, multiplier):
         M = np.concatenate([form.A, form.B], axis=2)
         E = basis(form.A.shape[1])
         inner = E @ M[:, None]
@@ -113,29 +156,29 @@ def discrete_blocks(
             linear = np.zeros((len(after_k), len(form.columns), *after_k.shape[2:]))
             linear[:, form.next : form.next + degree + 1] += after_k
             linear[:, form.own : form.own + degree + 1] -= now
-            yield Blocks(form.columns, linear, constant, np.ones(len(constant)), likely)
+            weight = np.ones(len(constant))
+            yield Blocks(form.columns, linear, constant, weight, likely, form.supply)
 
 
 def assemble(
     blocks: Sequence[Blocks],
-    states: int,
-    inputs: int,
-    unknowns: int,
+    sizes: Sizes,
     margin: float,
     floor: float,
     null: Array | None = None,
 ) -> ConeProgram:
     """minimise g subject to every block <= -margin diag(I, 0) and every coefficient of P >= floor
-    I.
+    I, every one of a multiplier >= 0.
 
     Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability.
     Both I are times the weight of the block. `null` (s, L): symmetric matrices that may be added to
     each block, with weights of its own. The unknowns: P, coefficient by coefficient; the weights of
-    `null`, block by block; g or t.
+    `null`, block by block; the multiplier; g or t.
     """
-    N, nv = states + inputs, states * (states + 1) // 2
+    states, inputs, unknowns, _, multipliers = sizes
+    N, nv = sizes.rows, states * (states + 1) // 2
     of_P, of_block = unknowns * nv, 0 if null is None else len(null)
-    eye, zero = np.eye(states), np.zeros((states, inputs))
+    eye, zero = np.eye(sizes.strict), np.zeros((sizes.strict, inputs))
     gain = -svec(np.block([[0 * eye, zero], [zero.T, np.eye(inputs)]])) if inputs else svec(eye)
     back_off = (
         margin * svec(np.block([[eye, zero], [zero.T, np.zeros((inputs, inputs))]]))
@@ -144,43 +187,57 @@ def assemble(
     )
     L = len(gain)
     weights = np.concatenate([block.weight for block in blocks])
-    columns = of_P + of_block * len(weights) + 1
+    columns = of_P + of_block * len(weights) + multipliers + 1
+    of_lambda = columns - 1 - multipliers
     data, index, pointer, top = [], [], [], 0
-    for block in blocks:
-        m, count = block.linear.shape[:2]
-        rows = np.moveaxis(block.linear, 3, 1).reshape(m * L, count * nv)
-        place = (block.columns[:, None] * nv + np.arange(nv)).ravel()
+
+    def place(rows: Array, unknown: Array) -> None:
         where = np.nonzero(rows)
         data.append(rows[where])
         index.append(where[0] + top)
-        pointer.append(place[where[1]])
+        pointer.append(unknown[where[1]])
+
+    for block in blocks:
+        m, count = block.linear.shape[:2]
+        rows = np.moveaxis(block.linear, 3, 1).reshape(m * L, count * nv)
+        place(rows, (block.columns[:, None] * nv + np.arange(nv)).ravel())
+        if block.supply is not None:
+            rows = np.moveaxis(block.supply.linear, 2, 1).reshape(m * L, -1)
+            place(rows, of_lambda + block.supply.columns)
         top += m * L
     lmi = sparse.coo_matrix(
-        (np.concatenate(data), (np.concatenate(index), np.concatenate(pointer))), shape=(top, of_P)
+        (np.concatenate(data), (np.concatenate(index), np.concatenate(pointer))),
+        shape=(top, columns - 1),
     )
-    parts: list[Any] = [lmi]
     if null is not None:
-        parts.append(sparse.kron(sparse.identity(len(weights)), sparse.csc_matrix(null.T)))
+        own = sparse.kron(sparse.identity(len(weights)), sparse.csc_matrix(null.T))
+        beside = [sparse.csc_matrix((top, n)) for n in (of_P, multipliers)]
+        lmi = lmi + sparse.hstack([beside[0], own, beside[1]])
+    parts: list[Any] = [lmi]
     A = [sparse.hstack([*parts, sparse.csc_matrix(np.outer(weights, gain).reshape(-1, 1))])]
     b = [
         -np.concatenate([block.constant for block in blocks]).ravel()
         - np.outer(weights, back_off).ravel()
     ]
     positive = sparse.hstack([-sparse.identity(of_P), sparse.csc_matrix((of_P, columns - of_P))])
-    identities = np.tile(svec(eye), unknowns)
+    identities = np.tile(svec(np.eye(states)), unknowns)
     for sign, bound in ((1, -floor),) if inputs else ((1, 0), (-1, 1)):
         A.append(sign * positive)
         b.append(bound * identities)
-    sizes = [N] * len(weights) + [states] * (unknowns * (len(A) - 1))
+    cones = [N] * len(weights) + [states] * (unknowns * (len(A) - 1)) + [1] * multipliers
+    if multipliers:
+        A.append(-sparse.eye(multipliers, columns, of_lambda))
+        b.append(np.zeros(multipliers))
     c = np.append(np.zeros(columns - 1), 1.0 if inputs else -1.0)
-    return ConeProgram(c, sparse.csc_matrix(sparse.vstack(A)), np.concatenate(b), tuple(sizes))
+    return ConeProgram(c, sparse.csc_matrix(sparse.vstack(A)), np.concatenate(b), tuple(cones))
 
 
 class OverCell(NamedTuple):
     """What the blocks of one cell are made of, in continuous time.
 
     `columns` (k,) of P; A, B of the same degree; the block q has A_i and B_i by P_j with the weight
-    `flow` (q, i, j), P_j in dP/dp with `slope` (q, j), and `output` r with `up` (q, r).
+    `flow` (q, i, j), P_j in dP/dp with `slope` (q, j), and `output` r with `up` (q, r); `supply` of
+    a norm-bounded block.
     """
 
     columns: Array
@@ -190,13 +247,16 @@ class OverCell(NamedTuple):
     slope: Array
     output: Array
     up: Array
+    supply: Supply | None
 
 
-def over_cell(cell: Cell, knots: Array, degree: int, extra: int) -> OverCell:
+def over_cell(
+    cell: Cell, knots: Array, degree: int, extra: int, multiplier: Multiplier | None = None
+) -> OverCell:
     """The weights of one cell; `extra` raises the degree of the Bernstein form."""
     A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
-    output = output_terms(cell)
-    d = max(degree + dM, len(output) - 1) + extra
+    output, own = output_terms(cell, multiplier), supply_terms(cell, multiplier)
+    d = max(degree + dM, len(output) - 1, own.degree) + extra
     a, b, width = local_coordinates(cell, knots)
     here = restriction(degree, a, b)
     up = elevation_matrix(degree + dM, d)
@@ -204,7 +264,8 @@ def over_cell(cell: Cell, knots: Array, degree: int, extra: int) -> OverCell:
     slope = slope_over(degree, here, (b - a) * width)
     slope = elevation_matrix(len(slope) - 1, d) @ slope
     columns = cell.segment * degree + np.arange(degree + 1)
-    return OverCell(columns, A, B, flow, slope, output, elevation_matrix(len(output) - 1, d))
+    up = elevation_matrix(len(output) - 1, d)
+    return OverCell(columns, A, B, flow, slope, output, up, own.over(cell, knots, d))
 
 
 class OverStrip(NamedTuple):
@@ -227,10 +288,15 @@ class OverStrip(NamedTuple):
     output: Array
     up: Array
     likely: tuple[bool, ...]
+    supply: Supply | None
 
 
 def over_strips(
-    strips: Sequence[Strip], knots: Array, degree: int, extra: int
+    strips: Sequence[Strip],
+    knots: Array,
+    degree: int,
+    extra: int,
+    multiplier: Multiplier | None = None,
 ) -> Iterator[OverStrip]:
     """The weights of every strip. Likely to bind: the border lines of the widest cell of each
     segment and piece.
@@ -243,8 +309,8 @@ def over_strips(
         cell = strip.cell
         wide_cell = cell.high - cell.low >= 0.5 * widest[cell.segment, cell.piece.low]
         A, B, dM = common_degree(cell.piece.A, cell.piece.B, cell)
-        output = output_terms(cell)
-        d = max(degree + 2 * dM, len(output) - 1) + extra
+        output, own = output_terms(cell, multiplier), supply_terms(cell, multiplier)
+        d = max(degree + 2 * dM, len(output) - 1, own.degree) + extra
         a, b, _ = local_coordinates(cell, knots)
         low, high = knots[strip.next_segment], knots[strip.next_segment + 1]
         corners = [[(q - low) / (high - low) for q in pair] for pair in strip.corners]
@@ -262,6 +328,7 @@ def over_strips(
             output,
             elevation_matrix(len(output) - 1, d),
             tuple(wide_cell and k in (0, degree) for k in range(degree + 1)),
+            own.over(cell, knots, d),
         )
 
 
@@ -305,9 +372,56 @@ def bordered(top: Array, side: Array) -> Array:
     )
 
 
-def output_terms(cell: Cell) -> Array:
-    """Bernstein coefficients of [C D]'[C D] over the cell."""
-    C, D = (_restrict(M, cell) for M in (cell.piece.C, cell.piece.D))
+def output_terms(cell: Cell, multiplier: Multiplier | None = None) -> Array:
+    """Bernstein coefficients of [C D]'[C D] over the cell, of the outputs y alone where there is a
+    block.
+    """
+    own = slice(None, None if multiplier is None else -multiplier.block.outputs)
+    return _squared(cell.piece.C[:, own], cell.piece.D[:, own], cell)
+
+
+class SupplyTerms(NamedTuple):
+    """Bernstein coefficients `squares` (r, N, N) of the supply of a block over a cell for lambda =
+    1, lambda of `degree_in_p`; none without a block.
+    """
+
+    squares: Array
+    degree_in_p: int
+
+    @property
+    def degree(self) -> int:
+        """Of the supply with lambda; -1 without a block."""
+        return len(self.squares) - 1 + self.degree_in_p
+
+    def over(self, cell: Cell, knots: Array, degree: int) -> Supply | None:
+        """What the block adds to each of the degree + 1 coefficients."""
+        if not len(self.squares):
+            return None
+        e, (a, b, _) = self.degree_in_p, local_coordinates(cell, knots)
+        shares = np.einsum(
+            "qm,mri,ij->qrj",
+            elevation_matrix(self.degree, degree),
+            product_weights(len(self.squares) - 1, e),
+            restriction(e, a, b),
+        )
+        linear = np.einsum("qrj,rl->qjl", shares, svec(self.squares))
+        return Supply(cell.segment * e + np.arange(e + 1), linear)
+
+
+def supply_terms(cell: Cell, multiplier: Multiplier | None) -> SupplyTerms:
+    """bound^2 [G J H]'[G J H] - diag(0, I, 0) over the cell."""
+    if multiplier is None:
+        return SupplyTerms(np.zeros((0, 0, 0)), 0)
+    block, degree = multiplier
+    own = slice(-block.outputs, None)
+    squares = block.bound**2 * _squared(cell.piece.C[:, own], cell.piece.D[:, own], cell)
+    d = cell.piece.A.shape[1] + np.arange(block.inputs)
+    squares[:, d, d] -= 1.0
+    return SupplyTerms(squares, degree)
+
+
+def _squared(C: Array, D: Array, cell: Cell) -> Array:
+    C, D = (_restrict(M, cell) for M in (C, D))
     d = max(len(C), len(D)) - 1
     Y = np.concatenate([_raise(C, d), _raise(D, d)], axis=2)
-    return np.einsum("rik,iab,kac->rbc", product_weights(d, d), Y, Y)
+    return np.einsum("rik,iab,kac->rbc", product_weights(d, d), Y, Y, optimize=True)

@@ -8,22 +8,28 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from synthesis.assemble.bounded_real import over_cell, over_strips
+from synthesis.assemble.bounded_real import Multiplier, Supply, over_cell, over_strips
 from synthesis.polynomial.bernstein import product_weights
 from synthesis.polynomial.cells import Cell, Strip
-from synthesis.program.lyapunov_program import LyapunovBlocks
+from synthesis.polynomial.symmetric import smat
+from synthesis.program.lyapunov_program import LyapunovBlocks, Supplied
 
 Array = np.ndarray
 
 
 def continuous_products(
-    cells: Sequence[Cell], knots: Array, degree: int, rate: float, extra: int
+    cells: Sequence[Cell],
+    knots: Array,
+    degree: int,
+    rate: float,
+    extra: int,
+    multiplier: Multiplier | None = None,
 ) -> Iterator[LyapunovBlocks]:
     """The blocks of every cell, both signs of the rate together: [I 0]' P [A B] and its transpose,
     and half of the drift with each.
     """
     for cell in cells:
-        form = over_cell(cell, knots, degree, extra)
+        form = over_cell(cell, knots, degree, extra, multiplier)
         state = of_state(form.A, form.B)
         flow = np.tensordot(form.flow, np.concatenate([form.A, form.B], axis=2), axes=(1, 0))
         drift = 0.5 * form.slope[:, :, None, None] * state
@@ -34,16 +40,29 @@ def continuous_products(
             state[None],
             np.concatenate([flow + nu * drift for nu in rates])[:, :, None],
             np.concatenate([constant for _ in rates]),
+            False,
+            _supplied(form.supply, len(state.T), np.tile(np.arange(len(constant)), len(rates))),
         )
 
 
+def _supplied(supply: Supply | None, size: int, order: Array) -> Supplied | None:
+    """What a norm-bounded block adds as matrices, for the coefficients in this order."""
+    if supply is None:
+        return None
+    return Supplied(supply.columns, smat(supply.linear, size)[order])
+
+
 def discrete_products(
-    strips: Sequence[Strip], knots: Array, degree: int, extra: int
+    strips: Sequence[Strip],
+    knots: Array,
+    degree: int,
+    extra: int,
+    multiplier: Multiplier | None = None,
 ) -> Iterator[LyapunovBlocks]:
     """The blocks of every strip: M_i' P+ times what the coefficients M = [A B] beside it add up to,
     and P itself.
     """
-    for form in over_strips(strips, knots, degree, extra):
+    for form in over_strips(strips, knots, degree, extra, multiplier):
         M, state = np.concatenate([form.A, form.B], axis=2), of_state(form.A, form.B)
         dM = len(M) - 1
         # of M_i' P+_j M_l in the block (q, s), symmetric in i and l
@@ -69,7 +88,8 @@ def discrete_products(
             np.concatenate([M, state[None]]),
             varying.reshape(q * s, *varying.shape[2:]),
             np.repeat(constant, s, axis=0),
-            symmetric=True,
+            True,
+            _supplied(form.supply, len(state.T), np.repeat(np.arange(q), s)),
         )
 
 

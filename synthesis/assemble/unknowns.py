@@ -14,19 +14,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace
-from synthesis.assemble.bounded_real import Blocks, continuous_blocks, discrete_blocks
+from symheli.lpv import LPVStateSpace, UncertainStateSpace
+from synthesis.assemble.bounded_real import (
+    Blocks,
+    Multiplier,
+    continuous_blocks,
+    discrete_blocks,
+)
 from synthesis.assemble.lyapunov_blocks import continuous_products, discrete_products
 from synthesis.assemble.memory_blocks import memory_blocks
 from synthesis.forms import HigherOrder, LyapunovForm, Memory, Spline
 from synthesis.lyapunov.lag import LagRegion
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov, graded_knots
+from synthesis.norm_bounded import NormBounded, open_block
 from synthesis.polynomial.cells import Strip, cells, strips
 from synthesis.polynomial.pieces import ModelPiece, model_pieces
 from synthesis.polynomial.symmetric import extended, length, smat, svec
 from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
-from synthesis.program.lyapunov_program import MANY, LyapunovBlocks
-from synthesis.program.scaling import Scaling, scaling
+from synthesis.program.lyapunov_program import MANY, LyapunovBlocks, Sizes
+from synthesis.program.scaling import Scaling, block_scaling, scaling
 from synthesis.proof.one_parameter import Evidence
 
 Array = np.ndarray
@@ -41,6 +47,7 @@ class Problem(NamedTuple):
     scaled: tuple[ModelPiece, ...]
     units: Scaling
     with_gain: bool
+    block: NormBounded | None = None
 
     @property
     def scaled_rate(self) -> float:
@@ -49,7 +56,12 @@ class Problem(NamedTuple):
 
     def evidence(self, elevation: int) -> Evidence:
         """What verifies a P for this problem."""
-        return Evidence(self.lpv, self.pieces, self.units, self.rate, elevation)
+        return Evidence(self.lpv, self.pieces, self.units, self.rate, elevation, self.block)
+
+    def sizes(self, form: Unknown) -> Sizes:
+        """Of the program of a V of this form."""
+        d = 0 if self.block is None else self.block.inputs
+        return Sizes(form.size, len(self.lpv.inputs) - d, form.unknowns, d, form.multipliers)
 
     @property
     def step(self) -> float:
@@ -57,24 +69,18 @@ class Problem(NamedTuple):
         return self.rate * (self.lpv.dt or 0.0)
 
 
-def scaled_problem(lpv: LPVStateSpace, rate: float, gain: float, *, with_gain: bool) -> Problem:
+def scaled_problem(
+    model: LPVStateSpace | UncertainStateSpace, rate: float, gain: float, *, with_gain: bool
+) -> Problem:
     """The model scaled for an expected `gain`; without channels where only stability is asked."""
-    if not with_gain:
-        lpv = replace(
-            lpv,
-            B=lpv.B[:, :, :0],
-            C=lpv.C[:, :0],
-            D=lpv.D[:, :0, :0],
-            inputs=(),
-            outputs=(),
-            trim=None,
-            residuals=None,
-        )
-    units, pieces = scaling(lpv, gain), model_pieces(lpv)
-    scaled = tuple(
-        piece.scaled(units.left, units.right, units.channel, units.time) for piece in pieces
-    )
-    return Problem(lpv, rate, pieces, scaled, units, with_gain)
+    if isinstance(model, UncertainStateSpace):
+        lpv, block = open_block(model, channels=with_gain)
+        units = block_scaling(lpv, block, gain)
+    else:
+        lpv, block = model if with_gain else model.select(inputs=(), outputs=()), None
+        units = scaling(lpv, gain)
+    pieces = model_pieces(lpv)
+    return Problem(lpv, rate, pieces, units.of_pieces(pieces, block), units, with_gain, block)
 
 
 class Unknown(ABC):
@@ -87,6 +93,8 @@ class Unknown(ABC):
     size: int
     null: Array | None = None
     """What may be added to each block, (s, L) as vectors."""
+    multipliers: int = 0
+    """Number of coefficients of the multiplier of a block."""
 
     @property
     @abstractmethod
@@ -110,41 +118,59 @@ class Unknown(ABC):
         """Coefficients of P (unknowns, size (size + 1)/2) as vectors."""
         return x[: self.unknowns * length(self.size)].reshape(self.unknowns, -1)
 
+    def multiplier(self, x: Array) -> Array:
+        """Coefficients of the multiplier (multipliers,), none below 0: what a solver leaves there
+        is its tolerance.
+        """
+        return np.maximum(x[len(x) - 1 - self.multipliers : -1], 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Quadratic(Unknown):
-    """V = x' P(p) x, P a spline."""
+    """V = x' P(p) x, P a spline; around a block with a multiplier of `multiplier_degree`, None
+    without.
+    """
 
     knots: Array
     degree: int
     size: int
+    multiplier_degree: int | None = None
 
     @property
     def unknowns(self) -> int:
         """Number of coefficients of P."""
         return (len(self.knots) - 1) * self.degree + 1
 
+    @property
+    def multipliers(self) -> int:  # type: ignore[override]
+        """Number of coefficients of the multiplier."""
+        e = self.multiplier_degree
+        return 0 if e is None else (len(self.knots) - 1) * e + 1
+
     def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
         """One block per Bernstein coefficient, cell or strip, and sign of the rate."""
+        own = self._multiplier(problem)
         if problem.lpv.dt is None:
             rate = problem.scaled_rate if self.degree else 0.0
-            return list(
-                continuous_blocks(
-                    cells(problem.scaled, self.knots), self.knots, self.degree, rate, extra
-                )
-            )
-        return list(discrete_blocks(self._strips(problem), self.knots, self.degree, extra))
+            regions = cells(problem.scaled, self.knots)
+            return list(continuous_blocks(regions, self.knots, self.degree, rate, extra, own))
+        return list(discrete_blocks(self._strips(problem), self.knots, self.degree, extra, own))
+
+    def _multiplier(self, problem: Problem) -> Multiplier | None:
+        e, block = self.multiplier_degree, problem.block
+        return None if e is None or block is None else Multiplier(block, e)
 
     def products(self, problem: Problem, extra: int) -> tuple[LyapunovBlocks, ...]:
         """The same blocks as products with P, in coordinates in which slow and fast states count
         alike.
         """
+        own = self._multiplier(problem)
         if problem.lpv.dt is None:
             rate = problem.scaled_rate if self.degree else 0.0
             regions = cells(problem.scaled, self.knots)
-            every = continuous_products(regions, self.knots, self.degree, rate, extra)
+            every = continuous_products(regions, self.knots, self.degree, rate, extra, own)
         else:
-            every = discrete_products(self._strips(problem), self.knots, self.degree, extra)
+            every = discrete_products(self._strips(problem), self.knots, self.degree, extra, own)
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return tuple(block.congruent(W) for block in every)
 
@@ -153,8 +179,13 @@ class Quadratic(Unknown):
         return strips(problem.scaled, self.knots, (-step, step))
 
     def lyapunov(self, x: Array) -> SplineLyapunov:
-        """V at the solver's point x."""
-        return SplineLyapunov(self.knots, self.degree, smat(self.coefficients(x), self.size))
+        """V at the solver's point x, with the multiplier."""
+        return SplineLyapunov(
+            self.knots,
+            self.degree,
+            smat(self.coefficients(x), self.size),
+            multiplier=self.multiplier(x) if self.multipliers else None,
+        )
 
 
 class OfMonomials(Quadratic):
@@ -270,7 +301,14 @@ def unknowns(problem: Problem, form: LyapunovForm) -> Iterator[Unknown]:
         elif isinstance(form, HigherOrder):
             yield OfMonomials(knots, degree, n, form.order)
         else:
-            yield Quadratic(knots, degree, n)
+            yield Quadratic(knots, degree, n, _multiplier_degree(problem, degree))
+
+
+def _multiplier_degree(problem: Problem, degree: int) -> int | None:
+    """That of P, which then alone says of which degree the LMIs are, at least 1: a constant P says
+    nothing of where the block weighs most.
+    """
+    return None if problem.block is None else max(degree, 1)
 
 
 def constant(problem: Problem, form: LyapunovForm) -> Unknown:
@@ -278,7 +316,7 @@ def constant(problem: Problem, form: LyapunovForm) -> Unknown:
     n, knots = len(problem.lpv.states), _knots(problem, form, 8, 0)
     if isinstance(form, HigherOrder):
         return OfMonomials(knots, 0, n, form.order)
-    return Quadratic(knots, 0, n)
+    return Quadratic(knots, 0, n, _multiplier_degree(problem, 0))
 
 
 def _knots(problem: Problem, form: LyapunovForm, segments: int, degree: int) -> Array:

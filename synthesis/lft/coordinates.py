@@ -60,7 +60,7 @@ def scaled(lft: LFT, coordinates: Coordinates) -> Loop:
     """The LFT in these coordinates: outputs divided by the channel, time in its unit, energies keep
     their ratios.
     """
-    (left, right, channel, time, _), L, R = coordinates.units, coordinates.left, coordinates.right
+    (left, right, channel, time, *_), L, R = coordinates.units, coordinates.left, coordinates.right
     loop, root = split(lft), np.sqrt(time)
     return Loop(
         time * left @ loop.A @ right,

@@ -36,7 +36,9 @@ class SplineLyapunov:
 
     `order` m > 1: V = z' P(p) z with the N monomials z of degree m in the states (see
     `symmetric_power`), n = N then. `slack` (blocks, null space): what was added to each Bernstein
-    coefficient of -dV/dt to make it definite.
+    coefficient of -dV/dt to make it definite. `multiplier` (K e + 1,) >= 0 of a norm-bounded block:
+    Bernstein coefficients of lambda(p), a continuous spline of degree e on the same knots, in
+    squared outputs per squared output of the block.
     """
 
     knots: Array
@@ -44,9 +46,11 @@ class SplineLyapunov:
     coefficients: Array
     order: int = 1
     slack: Array | None = None
+    multiplier: Array | None = None
 
     def __post_init__(self) -> None:
-        _freeze(self, "knots", "coefficients", *(() if self.slack is None else ("slack",)))
+        given = (name for name in ("slack", "multiplier") if getattr(self, name) is not None)
+        _freeze(self, "knots", "coefficients", *given)
         if self.fault:
             raise InputError(self.fault)
 
@@ -66,7 +70,22 @@ class SplineLyapunov:
                 "slack must be finite numbers, a row a Bernstein coefficient, got shape"
                 f" {self.slack.shape}"
             )
-        return structure.symmetric(self.coefficients, (self.segments * self.degree + 1, n, n))
+        return structure.first(
+            structure.symmetric(self.coefficients, (self.segments * self.degree + 1, n, n)),
+            self._fault_of_multiplier(self.multiplier),
+        )
+
+    def _fault_of_multiplier(self, values: Array | None) -> str | None:
+        if values is None:
+            return None
+        if values.ndim != 1 or not len(values) or (len(values) - 1) % self.segments:
+            return (
+                f"a multiplier on {self.segments} segment(s) has a multiple of that many"
+                f" coefficients and one, got shape {values.shape}"
+            )
+        if not (np.all(np.isfinite(values)) and np.all(values >= 0)):
+            return "the coefficients of a multiplier must be finite numbers >= 0"
+        return None
 
     def fault_for(self, low: float, high: float, states: int) -> str | None:
         """What keeps it from being a function of `states` states for every p in [low, high]."""
@@ -95,11 +114,20 @@ class SplineLyapunov:
             if self.degree == 0
             else f"P a continuous spline of degree {self.degree} on {self.segments} segment(s)"
         )
+        if self.multiplier is not None:
+            P = f"{P}, multiplier of degree {self.multiplier_degree}"
         return P if self.order == 1 else f"V of degree {2 * self.order} in the states, {P}"
 
-    def in_units(self, T: Array, factor: float = 1.0, time: float = 1.0) -> SplineLyapunov:
-        """factor V as a function of the states z, x = T z, T (n, n), with time in units of
-        `time`.
+    @property
+    def multiplier_degree(self) -> int:
+        """Degree e of the multiplier; -1 without one."""
+        return -1 if self.multiplier is None else (len(self.multiplier) - 1) // self.segments
+
+    def in_units(
+        self, T: Array, factor: float = 1.0, time: float = 1.0, multiplier: float = 1.0
+    ) -> SplineLyapunov:
+        """factor V as a function of the states z, x = T z, T (n, n), with time in units of `time`
+        and the multiplier times `multiplier`.
         """
         lifted = power(T, self.order)
         slack = self.slack
@@ -109,17 +137,33 @@ class SplineLyapunov:
                 factor * time * lifted.T @ null_matrix(slack, n, self.order) @ lifted, n, self.order
             )
         return replace(
-            self, coefficients=_congruent(self.coefficients, lifted, factor), slack=slack
+            self,
+            coefficients=_congruent(self.coefficients, lifted, factor),
+            slack=slack,
+            multiplier=None if self.multiplier is None else multiplier * self.multiplier,
         )
 
     def segment(self, j: int) -> Array:
         """Bernstein coefficients (d + 1, n, n) on segment j."""
         return self.coefficients[j * self.degree : (j + 1) * self.degree + 1]
 
+    def multiplier_segment(self, j: int) -> Array:
+        """Bernstein coefficients (e + 1,) of the multiplier on segment j."""
+        assert self.multiplier is not None  # noqa: S101 - see the callers
+        e = self.multiplier_degree
+        return self.multiplier[j * e : (j + 1) * e + 1]
+
     def at(self, p: float | Array) -> Array:
         """P at p, shape p.shape + (n, n). Raises `InputError` outside the knots."""
         j, t = self._locate(p)
         return self._sum(self.coefficients, self.degree, j * self.degree, t)
+
+    def multiplier_at(self, p: float | Array) -> Array:
+        """lambda at p, shape p.shape; there must be one."""
+        assert self.multiplier is not None  # noqa: S101 - see the callers
+        j, t = self._locate(p)
+        e = self.multiplier_degree
+        return self._sum(self.multiplier[:, None, None], e, j * e, t)[..., 0, 0]
 
     def derivative(self, p: float | Array) -> Array:
         """dP/dp at p (per unit of p), the right-hand one at a knot, shape p.shape + (n, n)."""
@@ -176,6 +220,7 @@ class MemoryLyapunov:
 
     order = 1
     slack = None
+    multiplier = None
 
     def __post_init__(self) -> None:
         _freeze(self, "lead_knots", "coefficients")
@@ -234,9 +279,11 @@ class MemoryLyapunov:
             f"q a lag of p of {self.region.time:g} s: a known state of p, not of the model"
         )
 
-    def in_units(self, T: Array, factor: float = 1.0, time: float = 1.0) -> MemoryLyapunov:
-        """factor V as a function of the states z, x = T z, T (n, n), with time in units of
-        `time`.
+    def in_units(
+        self, T: Array, factor: float = 1.0, time: float = 1.0, multiplier: float = 1.0
+    ) -> MemoryLyapunov:
+        """factor V as a function of the states z, x = T z, T (n, n), with time in units of `time`;
+        of a `multiplier` it has none.
         """
         region = replace(self.region, time=self.region.time / time)
         return replace(self, region=region, coefficients=_congruent(self.coefficients, T, factor))

@@ -36,18 +36,20 @@ class ModelPiece(NamedTuple):
     C: Array
     D: Array
 
-    def scaled(self, left: Array, right: Array, channel: float, time: float) -> ModelPiece:
-        """The piece with states x = right z (left = right^-1), dt = time dtau and outputs divided
-        by `channel`.
+    def scaled(
+        self, left: Array, right: Array, inputs: Array, outputs: Array, time: float
+    ) -> ModelPiece:
+        """The piece with states x = right z (left = right^-1), dt = time dtau and u and y in the
+        units `inputs` (nu,) and `outputs` (ny,).
 
-        Inputs are per square root of the new time unit, so that energies keep their ratio.
+        Both are per square root of the new time unit, so that energies keep their ratio.
         """
-        root = np.sqrt(time)
+        root, out = np.sqrt(time), outputs[:, None]
         return self._replace(
             A=time * left @ self.A @ right,
-            B=root * left @ self.B,
-            C=root * self.C @ right / channel,
-            D=self.D / channel,
+            B=root * left @ self.B * inputs,
+            C=root * self.C @ right / out,
+            D=self.D * inputs / out,
         )
 
 

@@ -1,7 +1,8 @@
 """A primal-dual interior-point method for programs of Lyapunov inequalities of many states.
 
-    minimise cost y  subject to  S = constant + y level + linear(P) in the cone, for every block
+    minimise cost y_0  subject to  S = constant + along(y) + linear(P) in the cone, for every block
 
+y_0 the level and, around a norm-bounded block, y_1, ... >= 0 the coefficients of its multiplier,
 with the directions of Nesterov and Todd and the predictor and corrector of Mehrotra. With H the
 inverse of the scaling matrix of a block, the entries of the normal equations between coefficients j
 and k of P are those of the maps
@@ -29,7 +30,7 @@ import numpy as np
 from synthesis.polynomial.symmetric import indices, smat, svec, symmetrized
 from synthesis.program.block_cholesky import BlockCholesky
 from synthesis.program.cone_program import Answer, Candidate, Solver
-from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram
+from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 
 Array = np.ndarray
 Normal = dict[tuple[int, int], Array]
@@ -97,17 +98,17 @@ def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
                 continue
             word = "out of digits"
         answer = {"solved": Answer.SOLVED, "infeasible": Answer.INFEASIBLE}.get(word, Answer.FAILED)
-        x = np.append(svec(point.P).ravel(), point.y) if close else None
+        x = np.r_[svec(point.P).ravel(), point.y[1:], point.y[0]] if close else None
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
         return Candidate(answer, x, time.perf_counter() - begin, message)
 
 
 class _Point(NamedTuple):
-    """Coefficients of P (K, n, n), the level, and slack and multiplier of every cone."""
+    """Coefficients of P (K, n, n), y, and slack and dual matrix of every cone."""
 
     P: Array
-    y: float
+    y: Array
     S: list[Array]
     Z: list[Array]
 
@@ -121,7 +122,7 @@ class _Residuals(NamedTuple):
     primal: list[Array]
     primal_size: float
     dual: Array
-    dual_y: float
+    dual_y: Array
     dual_size: float
     product: float
     gap: float
@@ -129,10 +130,17 @@ class _Residuals(NamedTuple):
 
 
 class _Cone(Protocol):
-    """Blocks of one size that share coefficients of P: S = constant + y level + linear(P)."""
+    """Blocks of one size that share coefficients of P: S = constant + along(y) + linear(P)."""
 
     constant: Array
-    level: Array
+
+    def along(self, y: Array) -> Array:
+        """Matrices (m, N, N) from y."""
+        ...
+
+    def across(self, Z: Array) -> Array:
+        """The adjoint of that, of the length of y."""
+        ...
 
     def linear(self, P: Array) -> Array:
         """Matrices (m, N, N) from the coefficients of P."""
@@ -153,9 +161,22 @@ class _Inequalities:
     def __init__(self, blocks: LyapunovBlocks, program: LyapunovProgram):
         self.blocks = blocks
         self.constant = -blocks.constant - program.back_off
-        self.level = np.broadcast_to(program.level, self.constant.shape)
+        self.level = program.level
+        self.length = 1 + program.sizes.multipliers
         x = blocks.varying
         self.used = [np.flatnonzero(np.any(x[:, j], axis=(0, 2, 3))) for j in range(x.shape[1])]
+
+    def along(self, y: Array) -> Array:
+        out = np.broadcast_to(y[0] * self.level, self.constant.shape)
+        supply = self.blocks.supply
+        return out if supply is None else out - supply.matrices(y[1:])
+
+    def across(self, Z: Array) -> Array:
+        out = np.zeros(self.length)
+        out[0] = np.sum(self.level * Z.sum(axis=0))
+        if self.blocks.supply is not None:
+            self.blocks.supply.add_adjoint(-Z, out[1:])
+        return out
 
     def linear(self, P: Array) -> Array:
         return -self.blocks.linear(P)
@@ -192,10 +213,15 @@ class _Inequalities:
 class _Bounds:
     """sign P + constant I >= 0 of every coefficient."""
 
-    def __init__(self, sign: float, constant: float, states: int, unknowns: int):
-        self.sign = sign
-        self.constant = np.tile(constant * np.eye(states), (unknowns, 1, 1))
-        self.level = np.zeros_like(self.constant)
+    def __init__(self, sign: float, constant: float, sizes: Sizes):
+        self.sign, self.length = sign, 1 + sizes.multipliers
+        self.constant = np.tile(constant * np.eye(sizes.states), (sizes.unknowns, 1, 1))
+
+    def along(self, y: Array) -> Array:
+        return np.zeros_like(self.constant)
+
+    def across(self, Z: Array) -> Array:
+        return np.zeros(self.length)
 
     def linear(self, P: Array) -> Array:
         return self.sign * P
@@ -207,6 +233,28 @@ class _Bounds:
         n = H.shape[1]
         for j, h in enumerate(H):
             _add(out, (j, j), _on_vectors(np.outer(h, h), n))
+
+
+class _Multiplier:
+    """Coefficients of the multiplier >= 0."""
+
+    def __init__(self, count: int):
+        self.constant = np.zeros((count, 1, 1))
+
+    def along(self, y: Array) -> Array:
+        return y[1:, None, None]
+
+    def across(self, Z: Array) -> Array:
+        return np.r_[0.0, Z[:, 0, 0]]
+
+    def linear(self, P: Array) -> Array:
+        return np.zeros_like(self.constant)
+
+    def add_adjoint(self, Z: Array, out: Array) -> None:
+        pass
+
+    def add_normal(self, H: Array, out: Normal) -> None:
+        pass
 
 
 def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
@@ -236,24 +284,28 @@ class _Cones:
     def __init__(self, program: LyapunovProgram):
         self.program = program
         self.each: list[_Cone] = [_Inequalities(b, program) for b in program.blocks]
-        self.each += [_Bounds(*b, program.states, program.unknowns) for b in program.bounds]
+        self.sizes = program.sizes
+        self.each += [_Bounds(*b, self.sizes) for b in program.bounds]
+        if self.sizes.multipliers:
+            self.each.append(_Multiplier(self.sizes.multipliers))
         self.size = 1.0 + max(float(np.abs(c.constant).max(initial=0.0)) for c in self.each)
         self.order = sum(c.constant.shape[0] * c.constant.shape[1] for c in self.each)
 
     def start(self) -> _Point:
         """Far inside the cones, wherever that is."""
-        n = self.program.states
+        n = self.sizes.states
         far = max(START, self.size)
         S = [
             far * np.broadcast_to(np.eye(c.constant.shape[1]), c.constant.shape) for c in self.each
         ]
-        return _Point(np.zeros((self.program.unknowns, n, n)), 0.0, S, S)
+        y = np.zeros(1 + self.sizes.multipliers)
+        return _Point(np.zeros((self.sizes.unknowns, n, n)), y, S, S)
 
-    def change(self, P: Array, y: float) -> list[Array]:
+    def change(self, P: Array, y: Array) -> list[Array]:
         """Of the slacks with P and y."""
-        return [y * cone.level + cone.linear(P) for cone in self.each]
+        return [cone.along(y) + cone.linear(P) for cone in self.each]
 
-    def slacks(self, P: Array, y: float) -> list[Array]:
+    def slacks(self, P: Array, y: Array) -> list[Array]:
         """As they ought to be."""
         return [
             cone.constant + change
@@ -269,12 +321,14 @@ class _Cones:
             return False
         return True
 
-    def adjoint(self, Z: list[Array]) -> tuple[Array, float]:
-        """(P', y') with <Z, change(P, y)> = <P', P> + y' y."""
-        out = np.zeros((self.program.unknowns, self.program.states, self.program.states))
+    def adjoint(self, Z: list[Array]) -> tuple[Array, Array]:
+        """(P', y') with <Z, change(P, y)> = <P', P> + <y', y>."""
+        out = np.zeros((self.sizes.unknowns, self.sizes.states, self.sizes.states))
+        across = np.zeros(1 + self.sizes.multipliers)
         for cone, each in zip(self.each, Z, strict=True):
             cone.add_adjoint(each, out)
-        return out, sum(float(np.sum(c.level * z)) for c, z in zip(self.each, Z, strict=True))
+            across += cone.across(each)
+        return out, across
 
     def residuals(self, point: _Point) -> _Residuals:
         """Of slacks and multipliers at this point."""
@@ -285,18 +339,23 @@ class _Cones:
         constant = sum(
             float(np.sum(c.constant * z)) for c, z in zip(self.each, point.Z, strict=True)
         )
-        dual_y, most = level - self.program.cost, max(float(np.abs(z).max()) for z in point.Z)
+        dual_y, most = level.copy(), max(float(np.abs(z).max()) for z in point.Z)
+        dual_y[0] -= self.program.cost
         product = sum(float(np.sum(s * z)) for s, z in zip(point.S, point.Z, strict=True))
         return _Residuals(
             primal,
             max(float(np.abs(r).max()) for r in primal) / self.size,
             dual,
             dual_y,
-            max(float(np.abs(dual).max()), abs(dual_y)) / max(1.0, most),
+            _largest(dual, dual_y) / max(1.0, most),
             product,
-            product / max(abs(point.y), LEAST),
-            max(float(np.abs(dual).max()), abs(level)) / -constant if constant < 0 else np.inf,
+            product / max(abs(float(point.y[0])), LEAST),
+            _largest(dual, level) / -constant if constant < 0 else np.inf,
         )
+
+
+def _largest(P: Array, y: Array) -> float:
+    return max(float(np.abs(P).max()), float(np.abs(y).max()))
 
 
 class _Scaling(NamedTuple):
@@ -358,28 +417,31 @@ class _NormalEquations:
             if i == j:
                 block[np.diag_indices(len(block))] *= 1.0 + SHIFT
         self.factor = BlockCholesky(blocks)
-        border, corner = self.times(np.zeros_like(cones.start().P), 1.0)
-        self.border = svec(border)
-        self.across = self.factor.solve(self.border)
-        self.pivot = corner - float(np.sum(self.border * self.across))
+        start = cones.start()
+        columns = [self.times(np.zeros_like(start.P), unit) for unit in np.eye(len(start.y))]
+        # the rows of y beside those of P
+        self.border = np.stack([svec(border) for border, _ in columns])
+        self.across = np.stack([self.factor.solve(border) for border in self.border])
+        corner = np.stack([corner for _, corner in columns])
+        self.pivot = corner - np.einsum("ikl,jkl->ij", self.border, self.across)
 
-    def times(self, P: Array, y: float) -> tuple[Array, float]:
+    def times(self, P: Array, y: Array) -> tuple[Array, Array]:
         """M (P, y), block by block."""
         moved = self.cones.change(P, y)
         return self.cones.adjoint(
             [at.H @ M @ at.H for at, M in zip(self.scalings, moved, strict=True)]
         )
 
-    def _by_factors(self, b: Array, d: float) -> tuple[Array, float]:
+    def _by_factors(self, b: Array, d: Array) -> tuple[Array, Array]:
         x = self.factor.solve(svec(b))
-        y = (d - float(np.sum(self.border * x))) / self.pivot
-        return smat(x - y * self.across, b.shape[-1]), y
+        y = np.linalg.solve(self.pivot, d - np.einsum("ikl,kl->i", self.border, x))
+        return smat(x - np.tensordot(y, self.across, axes=1), b.shape[-1]), y
 
-    def solve(self, b: Array, d: float) -> tuple[Array, float]:
+    def solve(self, b: Array, d: Array) -> tuple[Array, Array]:
         """(P, y) of the right-hand side (b, d), by conjugate gradients that the factors
         precondition: near the end these know the equations to some digits only.
         """
-        P, y, rest, left = np.zeros_like(b), 0.0, b, d
+        P, y, rest, left = np.zeros_like(b), np.zeros_like(d), b, d
         along, pace, size = None, 0.0, _inner(b, d, b, d)
         best, least = (P, y), np.inf
         for _ in range(REFINEMENTS):
@@ -402,8 +464,8 @@ class _NormalEquations:
         return best
 
 
-def _inner(P: Array, y: float, Q: Array, z: float) -> float:
-    return float(np.sum(P * Q) + y * z)
+def _inner(P: Array, y: Array, Q: Array, z: Array) -> float:
+    return float(np.sum(P * Q) + y @ z)
 
 
 def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Point | None:
@@ -412,7 +474,7 @@ def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Poin
     normal = _NormalEquations(cones, scalings)
     diagonals = [scaling.diagonal for scaling in scalings]
 
-    def direction(targets: list[Array]) -> tuple[Array, float, list[Array], list[Array]]:
+    def direction(targets: list[Array]) -> tuple[Array, Array, list[Array], list[Array]]:
         """dP, dy and the scaled changes of slacks and multipliers, which add up to the targets."""
         known = [
             s.multiplier(T) - s.H @ r @ s.H

@@ -18,13 +18,52 @@ MANY = 12
 """States beyond which a P costs a general solver minutes."""
 
 
+class Sizes(NamedTuple):
+    """Of a program: `states`, and the inputs d of a block, which are held below a margin; `inputs`
+    u, to which g belongs; coefficients of P (`unknowns`) and of the multiplier.
+    """
+
+    states: int
+    inputs: int
+    unknowns: int
+    perturbations: int = 0
+    multipliers: int = 0
+
+    @property
+    def strict(self) -> int:
+        """Rows of a block that are held below a margin."""
+        return self.states + self.perturbations
+
+    @property
+    def rows(self) -> int:
+        """Rows of a block."""
+        return self.strict + self.inputs
+
+
+class Supplied(NamedTuple):
+    """sum_j each[., j] multipliers[columns[j]], what a norm-bounded block adds to F: `columns`
+    (k,), `each` (m, k, N, N).
+    """
+
+    columns: Array
+    each: Array
+
+    def matrices(self, multipliers: Array) -> Array:
+        """The sum (m, N, N) at the coefficients of the whole multiplier."""
+        return np.einsum("j,mjab->mab", multipliers[self.columns], self.each)
+
+    def add_adjoint(self, Z: Array, out: Array) -> None:
+        """To `out`, of the length of the multiplier, its share in <Z, matrices(.)>."""
+        out[self.columns] += np.einsum("mjab,mab->j", self.each, Z)
+
+
 class LyapunovBlocks(NamedTuple):
     """LMI blocks F = sum_jr (fixed_r' P_columns[j] varying_jr + its transpose) + constant - g
     diag(0, I).
 
     `columns` (k,) says which coefficients of P are involved; `fixed` (R, n, N) are the same in all
     m blocks, `varying` (m, k, R, n, N) are not; `constant` (m, N, N). `symmetric`: each sum over r
-    is, without its transpose.
+    is, without its transpose. `supply`: what a norm-bounded block adds to F, None without one.
     """
 
     columns: Array
@@ -32,6 +71,7 @@ class LyapunovBlocks(NamedTuple):
     varying: Array
     constant: Array
     symmetric: bool = False
+    supply: Supplied | None = None
 
     def linear(self, P: Array) -> Array:
         """The part (m, N, N) linear in P, at the coefficients P (k', n, n) of the whole spline."""
@@ -47,44 +87,44 @@ class LyapunovBlocks(NamedTuple):
     def congruent(self, W: Array) -> LyapunovBlocks:
         """W' F W for every F, W (N, N) not acting on the part with g."""
         return self._replace(
-            fixed=self.fixed @ W, varying=self.varying @ W, constant=W.T @ self.constant @ W
+            fixed=self.fixed @ W,
+            varying=self.varying @ W,
+            constant=W.T @ self.constant @ W,
+            supply=self.supply and self.supply._replace(each=W.T @ self.supply.each @ W),
         )
 
 
 @dataclass(frozen=True, eq=False)
 class LyapunovProgram:
     """minimise g subject to every block <= -margin diag(I, 0) and every coefficient of P >= floor
-    I.
+    I, every one of a multiplier >= 0.
 
     Without inputs: maximise t subject to blocks <= -t I and 0 <= P <= I; t > 0 proves stability.
-    There are `unknowns` coefficients of P.
     """
 
     blocks: tuple[LyapunovBlocks, ...]
-    states: int
-    inputs: int
-    unknowns: int
+    sizes: Sizes
     margin: float
     floor: float
 
     @property
     def cost(self) -> float:
         """Of the level, g or t, in what is minimised."""
-        return 1.0 if self.inputs else -1.0
+        return 1.0 if self.sizes.inputs else -1.0
 
     @property
     def level(self) -> Array:
         """Matrix (N, N) by which one unit of the level relaxes a block."""
-        n, m = self.states, self.inputs
+        n, m = self.sizes.strict, self.sizes.inputs
         return np.diag(np.r_[np.zeros(n), np.ones(m)]) if m else -np.eye(n)
 
     @property
     def back_off(self) -> Array:
         """Matrix (N, N) by which a block stays below zero."""
-        n, m = self.states, self.inputs
+        n, m = self.sizes.strict, self.sizes.inputs
         return self.margin * np.diag(np.r_[np.ones(n), np.zeros(m)]) if m else np.zeros((n, n))
 
     @property
     def bounds(self) -> tuple[tuple[float, float], ...]:
         """(sign, constant) of every sign P + constant I >= 0."""
-        return ((1.0, -self.floor),) if self.inputs else ((1.0, 0.0), (-1.0, 1.0))
+        return ((1.0, -self.floor),) if self.sizes.inputs else ((1.0, 0.0), (-1.0, 1.0))

@@ -5,15 +5,19 @@ units of the states.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from scipy import linalg
 
 from symheli.lpv import LinearModel, LPVStateSpace, Matrices
+from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial import structure
+from synthesis.polynomial.pieces import ModelPiece
 from synthesis.polynomial.symmetric import symmetrized
+from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
@@ -47,7 +51,8 @@ class Scaling(NamedTuple):
     discrete time).
 
     `weight` (n, n): in the coordinates weight^-1 z the state block of the LMI is near -I where P is
-    near I: slow and fast states then count alike.
+    near I: slow and fast states then count alike. `multiplier` is the unit of that of a
+    norm-bounded block, squared outputs per squared v.
     """
 
     left: Array
@@ -55,13 +60,30 @@ class Scaling(NamedTuple):
     channel: float
     time: float
     weight: Array
+    multiplier: float = 1.0
 
     def fault(self, states: int) -> str | None:
         """What keeps these from being coordinates of so many states, None where nothing does."""
         return structure.first(
-            structure.coordinates(self.left, self.right, (self.channel, self.time), states),
+            structure.coordinates(
+                self.left, self.right, (self.channel, self.time, self.multiplier), states
+            ),
             structure.symmetric(np.asarray(self.weight), (states, states), "the weight"),
         )
+
+    def of_pieces(
+        self, pieces: Iterable[ModelPiece], block: NormBounded | None = None
+    ) -> tuple[ModelPiece, ...]:
+        """The pieces of a model in these units, those of the channels of a `block` too."""
+
+        def scaled(piece: ModelPiece) -> ModelPiece:
+            inputs, outputs = np.ones(piece.B.shape[2]), np.full(piece.C.shape[1], self.channel)
+            if block is not None:
+                own = self.channel / math.sqrt(self.multiplier)
+                inputs[: block.inputs] = outputs[len(outputs) - block.outputs :] = own
+            return piece.scaled(self.left, self.right, inputs, outputs, self.time)
+
+        return tuple(map(scaled, pieces))
 
     def to_physical(self, P: Array) -> Array:
         """Lyapunov matrices in physical units from those in z."""
@@ -78,6 +100,44 @@ def scaling(lpv: LPVStateSpace, gain: float) -> Scaling:
     """
     s = lpv.scheduling
     return model_scaling(lpv.at(s.middle), gain, lpv.matrices(np.linspace(s.low, s.high, 9)))
+
+
+def block_scaling(lpv: LPVStateSpace, block: NormBounded, gain: float) -> Scaling:
+    """The same with a norm-bounded block: a multiplier of 1 in these units balances d to y with u
+    to v, as a constant one would.
+    """
+    d, v = slice(None, block.inputs), slice(len(lpv.outputs) - block.outputs, None)
+    u, y = slice(block.inputs, None), slice(None, len(lpv.outputs) - block.outputs)
+    into, out = np.ones(len(lpv.inputs)), np.ones(len(lpv.outputs))
+    t = 1.0
+    if lpv.inputs[u] and lpv.outputs[y] and 0 < gain < math.inf:
+        heard, felt, around = (_response(lpv, *pair) for pair in ((d, y), (u, v), (d, v)))
+        # a block of almost nothing would ask for a multiplier without limit
+        felt = max(block.bound, 1e-6 / around if around > 0 else 0.0) * felt
+        t = math.sqrt(gain * heard / felt) if heard > 0 and felt > 0 else 1.0
+        into[d] = gain / t
+    out[v] = t * block.bound
+    weighed = replace(
+        lpv,
+        B=lpv.B * into,
+        C=lpv.C * out[:, None],
+        D=lpv.D * into * out[:, None],
+        trim=None,
+        residuals=None,
+    )
+    return scaling(weighed, gain)._replace(multiplier=t * t)
+
+
+def _response(lpv: LPVStateSpace, inputs: slice, outputs: slice) -> float:
+    """Largest gain of some frozen models from these inputs to these outputs; 0 where none is
+    stable.
+    """
+    s = lpv.scheduling
+    found = [0.0]
+    for p in np.linspace(s.low, s.high, 5):
+        A, B, C, D = lpv.matrices(float(p))
+        found.append(norm(A, B[:, inputs], C[outputs], D[outputs, inputs], lpv.dt)[0])
+    return max(gain for gain in found if math.isfinite(gain))
 
 
 def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = None) -> Scaling:

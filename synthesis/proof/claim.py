@@ -8,17 +8,19 @@ by blossoms. An error there both would believe; `pointwise` would not.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
+from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial.bernstein import composition, restriction
 from synthesis.polynomial.cells import Cell, Strip, cells, strips
 from synthesis.polynomial.exact import Number, exact
-from synthesis.polynomial.matrix import PolynomialMatrix, block
+from synthesis.polynomial.matrix import PolynomialMatrix
+from synthesis.polynomial.matrix import block as matrix
 from synthesis.polynomial.pieces import ModelPiece
 from synthesis.polynomial.symmetric_power import generator, null_matrix
 
@@ -49,6 +51,12 @@ class Claim(NamedTuple):
     rate: float
     dt: float | None
     elevation: int = 0
+    block: NormBounded | None = None
+
+    @property
+    def strict(self) -> int:
+        """Rows of a block of the LMI to which g does not belong."""
+        return self.P.coefficients.shape[-1] + (0 if self.block is None else self.block.inputs)
 
     @property
     def meaningful(self) -> bool:
@@ -56,8 +64,10 @@ class Claim(NamedTuple):
         bound then.
 
         False also where this form of V is not written for the model: a memory or a higher order in
-        discrete time or with channels.
+        discrete time or with channels, or a multiplier without a block and a block without one.
         """
+        if (self.block is None) != (self.P.multiplier is None):
+            return False
         if isinstance(self.P, MemoryLyapunov):
             return self.dt is None and math.isfinite(self.rate)
         if self.P.order > 1 and (
@@ -99,34 +109,71 @@ def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
 def _polynomials(
     claim: Claim, number: Number
 ) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
-    pieces, P, rate, dt, _ = claim
+    pieces, P, rate, dt, _, block = claim
     assert claim.meaningful  # noqa: S101 - checked by the callers
     one = PolynomialMatrix.constant(np.array([[number(1.0)]]), UNIT)
+    squares = {} if block is None else {q.low: _squares(q, block, number) for q in pieces}
     if isinstance(P, MemoryLyapunov):
         for cell in cells(pieces, P.knots):
             yield from _remembering(cell, P, rate, number)
     elif dt is None:
         for cell in cells(pieces, P.knots):
-            yield from ((F, one) for F in _continuous(cell, P, rate, number))
+            supply = _supply(cell, P, squares.get(cell.piece.low), number)
+            yield from ((_plus(F, supply), one) for F in _continuous(cell, P, rate, block, number))
     else:
         step = rate * dt if P.degree else 0.0
         for strip in strips(pieces, P.knots, (-step, step)):
-            yield _discrete(strip, P, number), one
+            F = _discrete(strip, P, block, number)
+            yield _plus(F, _supply(strip.cell, P, squares.get(strip.cell.piece.low), number)), one
+
+
+def _plus(F: PolynomialMatrix, supply: PolynomialMatrix | None) -> PolynomialMatrix:
+    return F if supply is None else F + supply
+
+
+def _supply(
+    cell: Cell, P: SplineLyapunov, squares: Array | None, number: Number
+) -> PolynomialMatrix | None:
+    """lambda times the supply of a block for lambda = 1, `squares` over the piece, over the cell;
+    None without a block.
+    """
+    if squares is None:
+        return None
+    low, high = number(cell.piece.low), number(cell.piece.high)
+    a, b = (number(cell.low) - low) / (high - low), (number(cell.high) - low) / (high - low)
+    whole = _local(_apply(restriction(len(squares) - 1, a, b), squares)[:, None])
+    a, b, _ = _within(cell, P.knots, number)
+    values = exact(P.multiplier_segment(cell.segment), number)
+    own = _apply(restriction(P.multiplier_degree, a, b), values)
+    return _times(_scalar(own[:, None]), whole)
+
+
+def _squares(piece: ModelPiece, block: NormBounded, number: Number) -> Array:
+    """Bernstein coefficients of bound^2 [G J H]'[G J H] - diag(0, I, 0) over the piece, v = G x +
+    J d + H u.
+    """
+    v, bound = slice(-block.outputs, None), number(block.bound)
+    C, D = (_local(exact(M[:, None, v], number)) for M in (piece.C, piece.D))
+    rows = matrix([[C, D]])
+    nx, nu = C.shape[1], D.shape[1]
+    of_d = np.diag(np.r_[np.zeros(nx), np.ones(block.inputs), np.zeros(nu - block.inputs)])
+    whole = rows.T @ rows * (bound * bound) - PolynomialMatrix.constant(exact(of_d, number), UNIT)
+    return whole.coefficients[:, 0]
 
 
 def _continuous(
-    cell: Cell, P: SplineLyapunov, rate: float, number: Number
+    cell: Cell, P: SplineLyapunov, rate: float, block: NormBounded | None, number: Number
 ) -> Iterator[PolynomialMatrix]:
-    A, B, C, D = _model(cell, number, P.order)
+    A, B, C, D = _of_y(_model(cell, number, P.order), block)
     here, span = _now(cell, P, number)
     flow = A.T @ here
     top, side, corner = flow + flow.T + C.T @ C, here @ B + C.T @ D, D.T @ D
     if P.degree == 0 or rate == 0:
-        yield block([[top, side], [side.T, corner]])
+        yield matrix([[top, side], [side.T, corner]])
         return
     slope = here.derivative(0) * (number(1.0) / span)
     for nu in (-number(rate), number(rate)):
-        yield block([[top + nu * slope, side], [side.T, corner]])
+        yield matrix([[top + nu * slope, side], [side.T, corner]])
 
 
 def _remembering(
@@ -160,11 +207,13 @@ def _remembering(
                 number(1.0) / number(region.time)
             )
             top = flow + flow.T + outer[0] + nu * in_p + _times(drift, in_share)
-            yield block([[top, side], [side.T, outer[2]]]), height
+            yield matrix([[top, side], [side.T, outer[2]]]), height
 
 
-def _discrete(strip: Strip, P: SplineLyapunov, number: Number) -> PolynomialMatrix:
-    A, B, C, D = _model(strip.cell, number, 1)
+def _discrete(
+    strip: Strip, P: SplineLyapunov, block: NormBounded | None, number: Number
+) -> PolynomialMatrix:
+    A, B, C, D = _of_y(_model(strip.cell, number, 1), block)
     here, _ = _now(strip.cell, P, number)
     bottom, top = (
         number(float(P.knots[strip.next_segment])),
@@ -175,7 +224,7 @@ def _discrete(strip: Strip, P: SplineLyapunov, number: Number) -> PolynomialMatr
     after = _local(_apply(composition(P.degree, corners), there))
     left_A, left_B = A.T @ after, B.T @ after
     state, side = left_A @ A - here + C.T @ C, left_A @ B + C.T @ D
-    return block([[state, side], [side.T, left_B @ B + D.T @ D]])
+    return matrix([[state, side], [side.T, left_B @ B + D.T @ D]])
 
 
 def _model(cell: Cell, number: Number, order: int) -> list[PolynomialMatrix]:
@@ -193,6 +242,13 @@ def _model(cell: Cell, number: Number, order: int) -> list[PolynomialMatrix]:
             np.zeros((1, 0, N), dtype=coefficients[0].dtype),
         ]
     return [_local(_apply(restriction(len(M) - 1, a, b), M)[:, None]) for M in coefficients]
+
+
+def _of_y(model: Sequence[PolynomialMatrix], block: NormBounded | None) -> list[PolynomialMatrix]:
+    """The model without the outputs v of a block."""
+    A, B, C, D = model
+    y = slice(None, None if block is None else -block.outputs)
+    return [A, B, *(_local(M.coefficients[..., y, :]) for M in (C, D))]
 
 
 def _now(cell: Cell, P: SplineLyapunov, number: Number) -> tuple[PolynomialMatrix, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace, Matrices, Scheduling
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
+from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial import structure
 from synthesis.polynomial.exact import Number, exact, positive_definite, rational
 from synthesis.polynomial.pieces import ModelPiece, model_pieces, same_pieces
@@ -45,15 +46,15 @@ def examine(claim: Claim, weight: Array) -> Findings:
     P = claim.P
     if not claim.meaningful:
         return Findings(False, False, math.inf, math.inf)
-    n = P.coefficients.shape[-1]
-    values = np.linalg.eigvalsh(P.coefficients.reshape(-1, n, n))
-    positive = bool(np.all(values[:, 0] > _rounding(n) * np.abs(values).max()))
+    states, n = P.coefficients.shape[-1], claim.strict
+    values = np.linalg.eigvalsh(P.coefficients.reshape(-1, states, states))
+    positive = bool(np.all(values[:, 0] > _rounding(states) * np.abs(values).max()))
     conditioning = float(np.max(values[:, -1] / values[:, 0])) if positive else math.inf
     decreasing, g = True, 0.0
     for form in lmi_polynomials(claim, float):
         F = form.block.coefficients.reshape(-1, *form.block.shape)
-        if len(weight) == n:
-            W = extended(weight, F.shape[1] - n)
+        if len(weight) == states:
+            W = extended(weight, F.shape[1] - states)
             F = symmetrized(W.T @ F @ W)
         top = F[:, :n, :n]
         eigenvalues = np.linalg.eigvalsh(top)
@@ -77,7 +78,12 @@ def _rounding(n: int) -> float:
 
 
 def holds_on_grid(
-    lpv: LPVStateSpace, P: Lyapunov, rate: float, gamma: float, transform: Array
+    lpv: LPVStateSpace,
+    P: Lyapunov,
+    rate: float,
+    gamma: float,
+    transform: Array,
+    block: NormBounded | None = None,
 ) -> bool:
     """The LMI at some hundred points and the extreme rates, from the model's own matrices; g =
     gamma^2.
@@ -89,11 +95,16 @@ def holds_on_grid(
         return _holds_with_memory(lpv, P, rate, gamma, transform)
     if P.order > 1:
         return _decreases_on_states(lpv, P, rate, transform)
-    return _holds_in_p(lpv, P, rate, gamma, transform)
+    return _holds_in_p(lpv, P, rate, gamma, transform, block)
 
 
 def _holds_in_p(
-    lpv: LPVStateSpace, P: SplineLyapunov, rate: float, gamma: float, transform: Array
+    lpv: LPVStateSpace,
+    P: SplineLyapunov,
+    rate: float,
+    gamma: float,
+    transform: Array,
+    block: NormBounded | None,
 ) -> bool:
     low, high = lpv.scheduling.low, lpv.scheduling.high
     grid = np.unique(np.concatenate([np.linspace(low, high, 201), P.knots]))
@@ -104,11 +115,13 @@ def _holds_in_p(
     moving = P.degree > 0 and rate > 0
     outer = np.concatenate([C, D], 2)
     M = np.concatenate([A, B], 2)
-    widen = np.zeros((A.shape[1], B.shape[2]))
-    state, inputs = (
-        np.concatenate([np.eye(len(widen)), widen], 1),
-        np.concatenate([widen.T, np.eye(B.shape[2])], 1),
-    )
+    nx, own = A.shape[1], 0 if block is None else block.inputs
+    state, d, inputs = np.split(np.eye(M.shape[2]), [nx, nx + own])
+    supply = np.zeros((M.shape[2], M.shape[2]))
+    if block is not None:
+        outer, v = np.split(outer, [-block.outputs], axis=1)
+        lam = P.multiplier_at(grid)[:, None, None]
+        supply = lam * (block.bound**2 * np.swapaxes(v, -1, -2) @ v - d.T @ d)
     if lpv.dt is None:
         slopes = [nu * P.derivative(grid) for nu in ((-rate, rate) if moving else (0.0,))]
         moves = [
@@ -119,8 +132,9 @@ def _holds_in_p(
         step = min(rate * lpv.dt, high - low) if moving else 0.0
         after = [P.at(np.clip(grid + side, low, high)) for side in (-step, 0.0, step)]
         moves = [np.swapaxes(M, -1, -2) @ Q @ M - state.T @ now @ state for Q in after]
-    whole = np.block([[transform, widen], [widen.T, np.eye(B.shape[2])]])
+    whole = extended(transform, B.shape[2])
     for move in moves:
+        move = move + supply
         F = (
             move
             if math.isnan(gamma)
@@ -201,8 +215,10 @@ def proven(claim: Claim, gamma: float) -> bool:
     number, P = rational(), claim.P
     if not (claim.meaningful and claim.invariant(number)):
         return False
-    n = P.coefficients.shape[-1]
-    for coefficient in P.coefficients.reshape(-1, n, n):
+    states, n = P.coefficients.shape[-1], claim.strict
+    if P.multiplier is not None and not np.all(P.multiplier >= 0):
+        return False
+    for coefficient in P.coefficients.reshape(-1, states, states):
         if not positive_definite(
             np.array([[number(float(v)) for v in row] for row in coefficient], dtype=object)
         ):
@@ -226,7 +242,8 @@ def proven(claim: Claim, gamma: float) -> bool:
 class Evidence(NamedTuple):
     """A model with a rate, against which any P(p) and gain can be checked.
 
-    `pieces` of the model in physical units, `units` in which its numbers are of order one.
+    `pieces` of the model in physical units, `units` in which its numbers are of order one. Around a
+    `block` the inputs are (d, u) and the outputs (y, v).
     """
 
     lpv: LPVStateSpace
@@ -234,6 +251,7 @@ class Evidence(NamedTuple):
     units: Scaling
     rate: float
     elevation: int
+    block: NormBounded | None = None
 
     @property
     def parameters(self) -> tuple[Scheduling, ...]:
@@ -246,7 +264,10 @@ class Evidence(NamedTuple):
         """
         if not isinstance(P, SplineLyapunov | MemoryLyapunov):
             return f"expected a SplineLyapunov or a MemoryLyapunov, got {type(P).__name__}"
-        if kind != ("l2 gain" if self.lpv.inputs else "stability"):
+        if fault := self._fault_of_block(P):
+            return fault
+        own = 0 if self.block is None else self.block.inputs
+        if kind != ("l2 gain" if len(self.lpv.inputs) > own else "stability"):
             return f"the model of the proof is not one of the kind {kind!r}"
         if not self.rate >= 0 or rates != (self.rate,):
             return f"the proof is for rates {(self.rate,)}, the claim for {rates}"
@@ -262,23 +283,35 @@ class Evidence(NamedTuple):
             ),
         )
 
+    def _fault_of_block(self, P: Lyapunov) -> str | None:
+        if self.block is None:
+            return None if P.multiplier is None else "a multiplier needs a norm-bounded block"
+        if not isinstance(self.block, NormBounded):
+            return f"expected a NormBounded block or None, got {self.block!r:.60}"
+        if P.multiplier is None or P.order > 1:
+            return "a norm-bounded block needs V = x' P(p) x with a multiplier"
+        return self.block.fault(self.lpv)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """For which perturbations a proof holds; nothing without a block."""
+        return () if self.block is None else (self.block.sentence,)
+
     def least_gain(self, P: Lyapunov) -> tuple[float, float]:
         """(gain that P admits, conditioning of P); inf where P proves nothing, NaN without
         channels. Floating point.
         """
         units = self.units
-        scaled = tuple(
-            piece.scaled(units.left, units.right, units.channel, units.time)
-            for piece in self.pieces
-        )
-        back = P.in_units(units.right, units.channel**-2, units.time)
+        scaled = units.of_pieces(self.pieces, self.block)
+        back = P.in_units(units.right, units.channel**-2, units.time, 1.0 / units.multiplier)
         rate = self.rate * units.time if self.lpv.dt is None else self.rate
-        findings = examine(Claim(scaled, back, rate, self.lpv.dt, self.elevation), units.weight)
+        claim = Claim(scaled, back, rate, self.lpv.dt, self.elevation, self.block)
+        findings = examine(claim, units.weight)
         if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
             return math.inf, math.inf
-        return (
-            units.channel * math.sqrt(findings.g) if self.lpv.inputs else math.nan
-        ), findings.conditioning
+        own = 0 if self.block is None else self.block.inputs
+        gains = len(self.lpv.inputs) > own
+        return (units.channel * math.sqrt(findings.g) if gains else math.nan), findings.conditioning
 
     def floating(self, P: Lyapunov, gamma: float) -> bool:
         """Every Bernstein coefficient and a grid of p, in floating point."""
@@ -287,7 +320,8 @@ class Evidence(NamedTuple):
         claim = self._claim(P)
         if not (enough and claim.meaningful and claim.invariant(rational())):
             return False
-        return holds_on_grid(self.lpv, P, self.rate, gamma, self.units.right @ self.units.weight)
+        transform = self.units.right @ self.units.weight
+        return holds_on_grid(self.lpv, P, self.rate, gamma, transform, self.block)
 
     def exact(self, P: Lyapunov, gamma: float) -> bool:
         """The same over the whole interval in rational arithmetic, and again at some p through the
@@ -317,7 +351,7 @@ class Evidence(NamedTuple):
                 pointwise.memory_inequalities(P, p, model, self.rate, g, number)
                 if isinstance(P, MemoryLyapunov)
                 else pointwise.spline_inequalities(
-                    P, p, model, self.rate, lpv.dt, g, (s.low, s.high), number
+                    P, p, model, self.rate, lpv.dt, g, (s.low, s.high), number, self.block
                 )
             )
             if not all(positive_definite(-F) for F in every):
@@ -340,4 +374,4 @@ class Evidence(NamedTuple):
         return True
 
     def _claim(self, P: Lyapunov) -> Claim:
-        return Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation)
+        return Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation, self.block)

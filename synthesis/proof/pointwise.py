@@ -13,12 +13,13 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations_with_replacement, pairwise, product
 from math import comb
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symheli.lpv import Matrices
 from synthesis.lyapunov.spline import MemoryLyapunov, SplineLyapunov
+from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial.exact import Number, exact
 
 Array = np.ndarray
@@ -103,12 +104,30 @@ def _at(coefficients: Array, local: Sequence[Any]) -> Array:
     return coefficients
 
 
+class Supplied(NamedTuple):
+    """A norm-bounded block of `inputs` d and `outputs` v, |d| <= bound |v|, with its multiplier at
+    one p.
+    """
+
+    inputs: int
+    outputs: int
+    bound: Any
+    multiplier: Any
+
+
 def dissipation(
-    model: Matrices, P: Array, drift: Array | None, after: Array | None, g: Any
+    model: Matrices,
+    P: Array,
+    drift: Array | None,
+    after: Array | None,
+    g: Any,
+    supplied: Supplied | None = None,
 ) -> Array:
     """The bounded real inequality at one p; `drift` dP/dt, or `after` P(p(k+1)) in discrete time. g
-    None: the state block.
+    None: the state block, with that of d where there is a block.
     """
+    if supplied is not None:
+        return _around(model, P, drift, after, g, supplied)
     A, B, C, D = model
     if after is None:
         top, side, corner = A.T @ P + P @ A, P @ B, D.T @ D
@@ -119,6 +138,30 @@ def dissipation(
         return top
     top, side = top + C.T @ C, side + C.T @ D
     return np.block([[top, side], [side.T, corner - np.eye(len(corner), dtype=int) * g]])
+
+
+def _around(
+    model: Matrices, P: Array, drift: Array | None, after: Array | None, g: Any, block: Supplied
+) -> Array:
+    """The inequality around a block: dV/dt + |y|^2 - g |u|^2 + multiplier (bound^2 |v|^2 - |d|^2),
+    as a quadratic form in x, d and u, from the equations of each.
+    """
+    A, B, C, D = model
+    n, m, y = len(A), B.shape[1], len(C) - block.outputs
+    one = np.eye(n + m, dtype=int)
+    x, d, u = one[:n], one[n : n + block.inputs], one[n + block.inputs :]
+    move, out = A @ x + B @ np.vstack([d, u]), C @ x + D @ np.vstack([d, u])
+    if after is None:
+        change = x.T @ (P @ move) + (x.T @ (P @ move)).T
+        change = change if drift is None else change + x.T @ (drift @ x)
+    else:
+        change = move.T @ (after @ move) - x.T @ (P @ x)
+    v = out[y:]
+    change = change + block.multiplier * (block.bound * block.bound * (v.T @ v) - d.T @ d)
+    if g is None:
+        strict = n + block.inputs
+        return change[:strict, :strict]
+    return change + out[:y].T @ out[:y] - g * (u.T @ u)
 
 
 def paces(
@@ -188,21 +231,29 @@ def spline_inequalities(
     g: Any,
     ends: tuple[float, float],
     number: Number,
+    block: NormBounded | None = None,
 ) -> Iterator[Array]:
-    """What must be negative definite at p for V = x'P(p)x."""
+    """What must be negative definite at p for V = x'P(p)x, the multiplier of a `block` too."""
     here, slope = spline(P.knots, P.degree, P.coefficients, p, number)
     yield -here
+    supplied = None
+    if block is not None and P.multiplier is not None:
+        e = P.multiplier_degree
+        value, _ = spline(P.knots, e, np.reshape(P.multiplier, (-1, 1, 1)), p, number)
+        yield -value
+        bound = number(block.bound)
+        supplied = Supplied(block.inputs, block.outputs, bound, value[0, 0])
     if dt is not None:
         step = rate * dt if P.degree else 0.0
         for (q,) in reached((p,), [(-step, step)], (ends,)):
-            yield dissipation(
-                model, here, None, spline(P.knots, P.degree, P.coefficients, q, number)[0], g
-            )
+            after = spline(P.knots, P.degree, P.coefficients, q, number)[0]
+            yield dissipation(model, here, None, after, g, supplied)
     elif P.degree == 0 or rate == 0:
-        yield dissipation(model, here, None, None, g)
+        yield dissipation(model, here, None, None, g, supplied)
     else:
         yield from (
-            dissipation(model, here, sign * number(rate) * slope, None, g) for sign in (-1, 1)
+            dissipation(model, here, sign * number(rate) * slope, None, g, supplied)
+            for sign in (-1, 1)
         )
 
 

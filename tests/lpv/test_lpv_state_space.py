@@ -26,6 +26,37 @@ def test_powers_of_p_are_in_physical_units():
     )
 
 
+def test_a_channel_measured_in_its_size_counts_that_as_one():
+    lpv = stable().discretize(0.1, degree=1)  # a fit, whose misfit is measured so too
+    scaled = lpv.scaled({"u1": 0.01}, {"y2": 0.1})
+    for p in (0.0, 7.0, 13.0):
+        own, model = scaled.at(p), lpv.at(p)
+        np.testing.assert_allclose(own.B, 0.01 * model.B)
+        np.testing.assert_allclose(own.C, model.C / [[1.0], [0.1]])
+        np.testing.assert_allclose(own.D, 0.01 * model.D / [[1.0], [0.1]])
+    np.testing.assert_allclose(scaled.residuals.B, 0.01 * lpv.residuals.B, atol=1e-16)
+    for wrong in (0.0, -1.0, np.inf, np.nan):
+        with pytest.raises(InputError, match="size of the input u1 must be a number > 0"):
+            lpv.scaled({"u1": wrong})
+
+
+def test_feedthrough_that_moves_beside_the_loop_is_no_part_of_it():
+    """u1 = k y1 + r, with D(p) from u2 to y1 and from u1 to y2: the loop is constant, and closed
+    exactly.
+    """
+    rng = np.random.default_rng(0)
+    A, B, C, D = ([rng.standard_normal((2, 2)), rng.standard_normal((2, 2)) / 13] for _ in range(4))
+    D[1][0, 0] = 0.0
+    lpv = LPVStateSpace.polynomial(A, B, C, D, SPEED)
+    closed = lpv.feedback({("u1", "y1"): 0.3})
+    for p in (0.0, 5.0, 13.0):
+        np.testing.assert_allclose(
+            stacked(closed.at(p)), stacked(lpv.at(p).feedback({("u1", "y1"): 0.3})), atol=1e-11
+        )
+    with pytest.raises(InputError, match="depends on the scheduling"):
+        lpv.feedback({("u2", "y1"): 0.3})
+
+
 def test_many_p_at_once_are_the_frozen_models_one_by_one():
     lpv, _ = random_lpv(2)
     p = np.linspace(0, 13, 5)

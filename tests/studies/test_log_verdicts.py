@@ -9,6 +9,7 @@ import warnings
 import numpy as np
 import pytest
 
+import symheli
 from identification import LPVARX, AgainstConstant, Polynomial, Scores, against_constant, fit
 from identification.judge.against_constant import Scored, difference
 from studies import cli
@@ -281,3 +282,29 @@ def test_the_moving_trim_is_not_tried_where_the_data_cannot_tell_it():
     found = against_constant(arx, record, None, trim="auto")
     assert found.trim_note.startswith("offset_rate is not tried: the regressors have rank")
     assert len(found.models) == 2
+
+
+def flown_csv(path, heli, **factors):
+    """A flight as a table without units, signals times factors."""
+    record = symheli.fly(
+        heli,
+        symheli.AirspeedSchedule.transition(0.0, 13.0, acceleration=3.0),
+        excitation=symheli.Excitation({"d_lon": 0.012, "d_lat": 0.012, "d_ped": 0.03}),
+    )
+    names = ("p", "q", "r", "phi", "theta", "d_lon", "airspeed_command")
+    table = [record.time, *(factors.get(name, 1.0) * record[name] for name in names)]
+    np.savetxt(path, np.stack(table, axis=1), delimiter=",", header=",".join(("t", *names)))
+    return path
+
+
+def test_rates_in_degrees_are_noticed_before_anything_is_believed(tmp_path, ideal, capsys):
+    asked = ("--outputs", "q,theta", "--inputs", "d_lon", "--scheduling", "airspeed_command")
+    sound = flown_csv(tmp_path / "sound.csv", ideal)
+    assert cli.main(["identify", str(sound), *asked, "--na", "2"]) == 0
+    assert "kinematics: consistent: p, q, r, phi, theta\n" in capsys.readouterr().out
+    wrong = flown_csv(tmp_path / "wrong.csv", ideal, p=180 / np.pi)
+    assert cli.main(["identify", str(wrong), *asked, "--na", "2", "--json"]) == 0
+    rows = {row["signal"]: row for row in json.loads(capsys.readouterr().out)["kinematics"]}
+    assert "it is in deg/s, declare that unit" in rows["p"]["verdict"]
+    assert rows["p"]["scale"]["value"] == pytest.approx(180 / np.pi, rel=0.01)
+    assert rows["q"]["verdict"] == "consistent"

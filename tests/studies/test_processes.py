@@ -10,7 +10,7 @@ from functools import partial
 import pytest
 
 from studies.processes import Processes
-from symheli.errors import InputError, SymheliError
+from symheli.errors import InputError, SymheliError, UnknownNameError
 
 
 def test_every_call_is_answered_in_its_place():
@@ -81,3 +81,30 @@ def test_a_script_without_a_guard_may_ask(tmp_path):
     )
     said = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
     assert said.stdout.split() == ["begin", "9"]
+
+
+def _unknown():
+    raise UnknownNameError("signal", "phy", ("phi", "theta"))
+
+
+class _Unreadable(Exception):
+    def __init__(self, first, second):
+        super().__init__(first)
+
+
+def _unreadable():
+    raise _Unreadable("a", "b")
+
+
+def test_an_error_with_arguments_of_its_own_comes_back_as_it_was():
+    with Processes(2) as processes:
+        with pytest.raises(UnknownNameError, match="did you mean 'phi'"):
+            processes.submit([_unknown])[0].result(timeout=60)
+
+
+def test_an_answer_that_cannot_be_read_is_said_and_does_not_hang():
+    with Processes(2) as processes:
+        bad, good = processes.submit([_unreadable, partial(int, "7")])
+        with pytest.raises(SymheliError, match="cannot be read here"):
+            bad.result(timeout=60)
+        assert good.result(timeout=60) == 7

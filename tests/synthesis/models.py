@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.analysis.certify import route
 from synthesis.analysis.question import question
 
@@ -47,6 +47,42 @@ def fastest_growth(damping, change):
 def constant(A, B, C, D, dt=None):
     """A time-invariant model in LPV clothes."""
     return LPVStateSpace.polynomial([A], [B], [C], [D], Scheduling("p", "1", 0.0, 1.0, 0.5), dt=dt)
+
+
+def uncertain_pole(pole, bound, dt=None):
+    """dx/dt = (pole + delta) x + u, y = x, |delta| <= bound, whatever p is; or x(k+1)."""
+    model = LPVStateSpace.polynomial(
+        *([[[pole]]], [[[1.0, 1.0]]], [[[1.0], [1.0]]], [np.zeros((2, 2))]),
+        *(Scheduling("p", "1", 0.0, 1.0, 0.5), dt, ["x"], ["u", "d"], ["y", "v"]),
+    )
+    return UncertainStateSpace(model, "d", "v", bound, 0.95, "a pole read off a plot")
+
+
+def random_uncertain(seed, bound, dt=None):
+    """`random_stable` with a full block (2, 3) that all states and inputs feed, E and G moving with
+    p.
+    """
+    rng = np.random.default_rng(seed + 100)
+    lpv = random_stable(seed, dt=dt)
+    n, nx = lpv.basis.size, len(lpv.states)
+    slow = 1.0 if dt is None else dt
+
+    def moving(*shape):
+        return (
+            0.3 * rng.standard_normal((n, *shape)) * np.r_[1.0, np.full(n - 1, 0.3)][:, None, None]
+        )
+
+    E, G = slow * moving(nx, 2), moving(3, nx)
+    out = np.concatenate([lpv.D, 0.3 * moving(3, 2)], axis=1)
+    model = replace(
+        lpv,
+        B=np.concatenate([lpv.B, E], axis=2),
+        C=np.concatenate([lpv.C, G], axis=1),
+        D=np.concatenate([out, np.zeros((n, 5, 2))], axis=2),
+        inputs=(*lpv.inputs, "d1", "d2"),
+        outputs=(*lpv.outputs, "v1", "v2", "v3"),
+    )
+    return UncertainStateSpace(model, ["d1", "d2"], ["v1", "v2", "v3"], bound, 1.0, "by choice")
 
 
 def random_stable(seed, states=3, degree=2, dt=None, rate=0.3):

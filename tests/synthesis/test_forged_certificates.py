@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from models import forged, lag, random_stable, spring
+from models import forged, lag, random_stable, random_uncertain, spring
 
 from symheli.errors import SymheliError
 from symheli.lpv import LPVStateSpace
@@ -37,6 +37,11 @@ FORMS = {
     "stability": lambda: stability(damped, 0.1, form=COARSE, search=None),
     "degree four": lambda: stability(damped, 0.1, form=HigherOrder(2, segments=2), search=None),
     "memory": lambda: l2_gain(damped, 0.5, form=Memory(1.0, segments=3, degree=2), search=None),
+    "uncertain": lambda: l2_gain(random_uncertain(2, 0.3), form=COARSE, search=None),
+    "uncertain, sampled": lambda: l2_gain(
+        random_uncertain(2, 0.3, dt=0.1), form=COARSE, search=None
+    ),
+    "uncertain stability": lambda: stability(random_uncertain(2, 0.3), form=COARSE, search=None),
     "box": lambda: l2_gain(damped, 0.1, **BOX, search=None),
     "box stability": lambda: stability(damped, 0.1, **BOX, search=None),
     "energy to peak": lambda: generalized_h2(damped, 0.1, **BOX, search=None),
@@ -76,6 +81,7 @@ SAID = {
     "status",
 }
 SAID |= {"lower", "upper", "verified", "lft", "lpv", "source", "elevation", "slack"}
+SAID |= {"perturbation"}
 
 
 @cache
@@ -134,7 +140,10 @@ def test_junk_in_any_field_is_refused(form, data):
     junk = data.draw(st.sampled_from([j for j in JUNK if not same(j, value)]))
     # the coordinates only serve the eyes of the floating check: other ones are as good
     if (
-        path[-1] in ("channel", "time", "inputs", "outputs", "storage")
+        (
+            path[-1] in ("channel", "time", "inputs", "outputs", "storage")
+            or path[-2:] == ("units", "multiplier")
+        )
         and isinstance(junk, float | bool)
         and 0 < junk < math.inf
     ):

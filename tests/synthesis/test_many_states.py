@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from models import constant, random_stable, searched, spring
+from models import constant, random_stable, random_uncertain, searched, spring
 
 sys.path.append(str(Path(__file__).resolve().parents[2]))  # benchmarks/ is not installed
 
@@ -66,27 +66,42 @@ def springs(masses, rate, growing=False):
 def problem(lpv, degree, rate=0.3, segments=3, with_gain=True):
     s = lpv.scheduling
     scaled = scaled_problem(lpv, rate, 1.0, with_gain=with_gain)
-    shape = Quadratic(graded_knots(s.low, s.high, segments, 2.0), degree, len(lpv.states))
-    return scaled, shape
+    knots = graded_knots(s.low, s.high, segments, 2.0)
+    own = None if scaled.block is None else 1
+    return scaled, Quadratic(knots, degree, len(lpv.states), own)
+
+
+MODELS = {
+    "a model": random_stable,
+    "a set": lambda seed, dt: random_uncertain(seed, 0.3, dt=dt),
+}
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize("with_gain", [True, False])
-def test_blocks_as_products_are_the_blocks_entry_by_entry(dt, degree, with_gain):
-    scaled, shape = problem(random_stable(2, dt=dt), degree, with_gain=with_gain)
-    P = np.random.default_rng(0).standard_normal((shape.unknowns, length(shape.size)))
+@pytest.mark.parametrize("model", MODELS)
+def test_blocks_as_products_are_the_blocks_entry_by_entry(model, dt, degree, with_gain):
+    scaled, shape = problem(MODELS[model](2, dt=dt), degree, with_gain=with_gain)
+    rng = np.random.default_rng(0)
+    P = rng.standard_normal((shape.unknowns, length(shape.size)))
+    multiplier = rng.standard_normal(shape.multipliers)
     N = shape.size + len(scaled.lpv.inputs)
 
     def sorted_by_trace(values):
         return values[np.lexsort((values[:, 0, -1], np.trace(values, axis1=1, axis2=2)))]
 
-    vectors = np.concatenate([b.values(P, N) for b in shape.weighed(scaled, 1)])
+    vectors = np.concatenate([b.values(P, N, multiplier) for b in shape.weighed(scaled, 1)])
     matrices = np.array([np.zeros((shape.size, shape.size))] * len(P))
     rows, columns = np.tril_indices(shape.size)
     matrices[:, rows, columns] = P / np.where(rows == columns, 1.0, np.sqrt(2.0))
     matrices[:, columns, rows] = matrices[:, rows, columns]
-    products = np.concatenate([b.linear(matrices) + b.constant for b in shape.products(scaled, 1)])
+    products = np.concatenate(
+        [
+            b.linear(matrices) + b.constant + (b.supply.matrices(multiplier) if b.supply else 0.0)
+            for b in shape.products(scaled, 1)
+        ]
+    )
     assert products.shape == vectors.shape
     # rounding of some hundred products of numbers of order one
     np.testing.assert_allclose(
@@ -95,11 +110,12 @@ def test_blocks_as_products_are_the_blocks_entry_by_entry(dt, degree, with_gain)
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])
-def test_the_normal_equations_are_what_the_blocks_say_one_direction_at_a_time(dt):
-    scaled, shape = problem(random_stable(3, dt=dt), 2, segments=2)
-    n, inputs = shape.size, len(scaled.lpv.inputs)
+@pytest.mark.parametrize("model", MODELS)
+def test_the_normal_equations_are_what_the_blocks_say_one_direction_at_a_time(model, dt):
+    scaled, shape = problem(MODELS[model](3, dt=dt), 2, segments=2)
+    n, still = shape.size, np.zeros(1 + shape.multipliers)
     blocks = shape.products(scaled, 0)
-    cones = method._Cones(LyapunovProgram(blocks, n, inputs, shape.unknowns, 1e-6, 1e-6))
+    cones = method._Cones(LyapunovProgram(blocks, scaled.sizes(shape), 1e-6, 1e-6))
     rng = np.random.default_rng(1)
     normal = {}
     H = []
@@ -115,16 +131,17 @@ def test_the_normal_equations_are_what_the_blocks_say_one_direction_at_a_time(dt
         whole[j * v : (j + 1) * v, i * v : (i + 1) * v] = block.T
     P = symmetrized(rng.standard_normal((shape.unknowns, n, n)))
     by_blocks, _ = cones.adjoint(
-        [h @ change @ h for h, change in zip(H, cones.change(P, 0.0), strict=True)]
+        [h @ change @ h for h, change in zip(H, cones.change(P, still), strict=True)]
     )
     expected = svec(by_blocks).ravel()
     found = whole @ svec(P).ravel()
     np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
     # a map and its adjoint
     Z = [symmetrized(rng.standard_normal(cone.constant.shape)) for cone in cones.each]
-    back, level = cones.adjoint(Z)
-    forth = sum(np.sum(z * c) for z, c in zip(Z, cones.change(P, 2.0), strict=True))
-    assert forth == pytest.approx(np.sum(back * P) + 2.0 * level, rel=1e-11)
+    back, across = cones.adjoint(Z)
+    y = rng.standard_normal(len(still))
+    forth = sum(np.sum(z * c) for z, c in zip(Z, cones.change(P, y), strict=True))
+    assert forth == pytest.approx(np.sum(back * P) + across @ y, rel=1e-11)
 
 
 def test_the_block_factorisation_solves_what_the_whole_matrix_does():

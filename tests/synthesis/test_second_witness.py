@@ -57,10 +57,10 @@ def forget_the_rate(monkeypatch):
     monkeypatch.setattr(
         forms,
         "continuous_blocks",
-        lambda cells, knots, degree, rate, extra: blocks(cells, knots, degree, 0.0, extra),
+        lambda cells, knots, degree, rate, *rest: blocks(cells, knots, degree, 0.0, *rest),
     )
     monkeypatch.setattr(
-        claim, "_continuous", lambda cell, P, rate, number: block(cell, P, 0.0, number)
+        claim, "_continuous", lambda cell, P, rate, *rest: block(cell, P, 0.0, *rest)
     )
 
     def still(model, region, P, demand, number):

@@ -1,0 +1,1 @@
+"""How well identified models stand for the helicopter, on flights of many seeds."""

@@ -1,0 +1,128 @@
+"""One aggressive flight to identify from, one to judge by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from studies.transition.flights import AMPLITUDE as STUDY_AMPLITUDE
+from studies.transition.flights import NOISE_DB, TOP
+from symheli import AirspeedSchedule, Excitation, FlightPlan, Wind
+from symheli.flight import XCELL_SERVOS, Autopilot
+
+TARGETS = (
+    *(13.0, 0.0, 6.5, 13.0, 3.0, 10.0, 0.0, 13.0, 5.0, 0.0),
+    *(9.0, 13.0, 0.0, 7.0, 2.0, 12.0, 0.0, 13.0, 0.0, 8.0),
+)
+"""Airspeeds reached in turn, m/s: both ends of the range several times, since nothing beyond an end
+helps to tell what is there.
+"""
+
+RAMPS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5)
+"""Peak accelerations, m/s^2, in turn."""
+
+HOLD = 3.0
+"""At each airspeed, s."""
+
+LONGEST = 150.0
+"""Of the aggressive flight, s."""
+
+LINES = (0.02, 4.0)
+"""Of the multisines, Hz."""
+
+AMPLITUDE = {"d_lon": 0.018, "d_lat": 0.010, "d_col": 0.015, "d_ped": 0.016}
+"""Of the multisines, rad: louder where the slow longitudinal modes are, and low enough sideways
+that the flapping stays linear.
+"""
+
+GENTLE_TARGETS = (0.0, 2.0, 0.0, 4.0, 0.0, 13.0, 0.0, 1.0, 0.0, 7.0, 0.0, 3.0, 0.0)
+GENTLE_LONGEST = 230.0
+GENTLE_HOLD = 12.0
+GENTLE_LINES = (0.01, 4.0)
+"""The same of the gentle flight at 1 m/s^2: slow modes take time, and the slowest are those of
+hover.
+"""
+
+TEST_LINES = (0.1, 5.0)
+TEST_AMPLITUDE = STUDY_AMPLITUDE
+"""Of the flight that judges: those of the study."""
+
+DELAY = 0.02
+"""From command to servo, s, where servos fly."""
+
+
+def aggressive(
+    seed: int,
+    autopilot: Autopilot,
+    *,
+    noise_db: float | None = NOISE_DB,
+    servos: bool = False,
+    wind: Wind | None = None,
+) -> FlightPlan:
+    """Ramps at 1.5 to 4 m/s^2 between 0 and 13 m/s, multisines on all inputs, at most 150 s."""
+    schedule = _ramps(RAMPS, HOLD, LONGEST)
+    return _plan(schedule, seed, autopilot, noise_db, servos, wind)
+
+
+def gentle(
+    seed: int,
+    autopilot: Autopilot,
+    *,
+    noise_db: float | None = NOISE_DB,
+    servos: bool = False,
+    wind: Wind | None = None,
+) -> FlightPlan:
+    """Hover again and again, and what lies between at 1 m/s^2: long holds, lower lines, 230 s."""
+    schedule = _ramps((1.0,), GENTLE_HOLD, GENTLE_LONGEST, GENTLE_TARGETS)
+    return _plan(schedule, 5000 + seed, autopilot, noise_db, servos, wind, GENTLE_LINES)
+
+
+def transition(
+    seed: int,
+    autopilot: Autopilot,
+    *,
+    noise_db: float | None = NOISE_DB,
+    servos: bool = False,
+    wind: Wind | None = None,
+) -> FlightPlan:
+    """Hover, 13 m/s, hover at 3.2 m/s^2 with other multisines: the study's test flight."""
+    schedule = AirspeedSchedule.transition(0.0, TOP, 3.2, hold=2.0)
+    return _plan(
+        schedule, 3000 + seed, autopilot, noise_db, servos, wind, TEST_LINES, TEST_AMPLITUDE
+    )
+
+
+def _ramps(
+    accelerations: tuple[float, ...],
+    hold: float,
+    longest: float,
+    targets: tuple[float, ...] = TARGETS,
+) -> AirspeedSchedule:
+    """As many of the targets as `longest` (s) allows."""
+    for count in range(len(targets), 0, -1):
+        peaks = tuple(accelerations[i % len(accelerations)] for i in range(count))
+        schedule = AirspeedSchedule(targets[:count], peaks, (hold,) * count)
+        if schedule.duration <= longest:
+            break
+    return schedule
+
+
+def _plan(
+    schedule: AirspeedSchedule,
+    seed: int,
+    autopilot: Autopilot,
+    noise_db: float | None,
+    servos: bool,
+    wind: Wind | None,
+    lines: tuple[float, float] = LINES,
+    amplitude: Mapping[str, float] = AMPLITUDE,
+) -> FlightPlan:
+    return FlightPlan(
+        schedule,
+        excitation=Excitation(amplitude, "multisine", lines, seed),
+        noise_db=noise_db,
+        seed=seed,
+        controller=autopilot,
+        wind=wind or Wind(),
+        servos=XCELL_SERVOS if servos else None,
+        delay=DELAY if servos else 0.0,
+    )

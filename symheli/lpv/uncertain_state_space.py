@@ -1,0 +1,236 @@
+"""An LPV model known up to a matrix of bounded norm: every model of a set, as one value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv.linear_model import feedback_matrix
+from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.output_feedback import close
+from symheli.lpv.scheduling import Rates, Scheduling
+from symheli.values.arrays import Array, frozen
+from symheli.values.signal import Signal, indices, signals
+
+ROUNDING = 1e-12
+"""A perturbation may exceed the bound by this fraction of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class UncertainStateSpace:
+    """Every LPV model dx/dt = A x + B u + E d, y = C x + D u + F d, d = Delta v, v = G x + H u + J
+    d, |Delta|_2 <= bound; or sampled.
+
+    All matrices are functions of the scheduling parameters, E, F, G, H and J known: `model` has the
+    inputs (u, d) and the outputs (y, v). What is derived of the set (a loop closed around it, fewer
+    or scaled channels) is derived of `model`; the block stays what it is.
+
+    Parameters
+    ----------
+    model : LPVStateSpace
+        With the block left open.
+    perturbation_inputs, perturbation_outputs : sequence of str
+        Its inputs d and outputs v: Delta is (nd, nv).
+    bound : float
+        Largest spectral norm of Delta, >= 0, in units of d per unit of v.
+    probability : float
+        With which the bound holds of what was modelled, in (0, 1].
+    source : str
+        What the bound promises, and by which argument: a sentence of every certificate.
+
+    Raises
+    ------
+    InputError
+        Names that the model does not have, a block without channels, a bound that is negative or
+        not finite, a probability outside (0, 1], no source.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> p = symheli.Scheduling("p", "1", low=0.0, high=1.0, rate=0.5)
+    >>> open_block = symheli.LPVStateSpace.polynomial(
+    ...     A=[[[0.5]]], B=[[[1.0, 1.0]]], C=[[[1.0], [1.0]]], D=[np.zeros((2, 2))], scheduling=p,
+    ...     dt=0.1, states=["x"], inputs=["u", "d"], outputs=["y", "v"])
+    >>> pole = symheli.UncertainStateSpace(  # x(k+1) = (0.5 + delta) x(k) + u(k)
+    ...     open_block, ["d"], ["v"], bound=0.2, probability=0.95, source="a pole read off a plot")
+    >>> float(pole.perturbed([[0.2]]).at(0.0).A[0, 0])
+    0.7
+    """
+
+    model: LPVStateSpace
+    perturbation_inputs: tuple[Signal, ...]
+    perturbation_outputs: tuple[Signal, ...]
+    bound: float
+    probability: float
+    source: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.model, LPVStateSpace):
+            raise InputError(f"model: expected an LPVStateSpace, got {type(self.model).__name__}")
+        for name, of, kind in (
+            ("perturbation_inputs", self.model.inputs, "input of the model"),
+            ("perturbation_outputs", self.model.outputs, "output of the model"),
+        ):
+            given = getattr(self, name)
+            given = (given,) if isinstance(given, str) else tuple(given)
+            if not given:
+                raise InputError(f"{name}: expected one name or more, got none")
+            known = tuple(of[i] for i in indices(given, of, kind))
+            object.__setattr__(self, name, signals(known))
+        for name, low, high in (("bound", 0.0, math.inf), ("probability", 0.0, 1.0)):
+            value = getattr(self, name)
+            number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+            if not number or not math.isfinite(value) or not low <= value <= high:
+                wanted = "a finite number >= 0" if name == "bound" else "a number in (0, 1]"
+                raise InputError(f"{name}: expected {wanted}, got {value!r:.60}")
+            object.__setattr__(self, name, float(value))
+        if self.probability == 0.0:
+            raise InputError("probability: expected a number in (0, 1], got 0")
+        if not isinstance(self.source, str) or not self.source.strip():
+            raise InputError(
+                f"source: expected a sentence on what the bound promises, got {self.source!r:.60}"
+            )
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """Names of the states."""
+        return self.model.states
+
+    @property
+    def inputs(self) -> tuple[Signal, ...]:
+        """Names of the inputs u, those of the block left out."""
+        return tuple(u for u in self.model.inputs if u not in self.perturbation_inputs)
+
+    @property
+    def outputs(self) -> tuple[Signal, ...]:
+        """Names of the outputs y, those of the block left out."""
+        return tuple(y for y in self.model.outputs if y not in self.perturbation_outputs)
+
+    @property
+    def parameters(self) -> tuple[Scheduling, ...]:
+        """The scheduling parameters."""
+        return self.model.parameters
+
+    @property
+    def scheduling(self) -> Scheduling:
+        """The scheduling parameter; raises `InputError` where there are several."""
+        return self.model.scheduling
+
+    @property
+    def dt(self) -> float | None:
+        """Sample period, s; None in continuous time."""
+        return self.model.dt
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of Delta: (nd, nv)."""
+        return len(self.perturbation_inputs), len(self.perturbation_outputs)
+
+    @property
+    def nominal(self) -> LPVStateSpace:
+        """The model of Delta = 0."""
+        return self.model.select(inputs=self.inputs, outputs=self.outputs)
+
+    def perturbed(self, delta: object) -> LPVStateSpace:
+        """The model of one Delta (nd, nv), exactly.
+
+        Where both E and G depend on the parameters a polynomial model has up to twice the degree.
+        Raises `InputError` for a Delta of another shape or beyond the bound, a basis that cannot
+        hold the products, and a block that is not well posed.
+        """
+        delta = frozen(delta, "delta", self.shape)
+        size = float(np.linalg.norm(delta, 2))
+        if size > self.bound * (1 + ROUNDING):
+            raise InputError(f"delta: expected a norm of at most {self.bound:g}, got {size:g}")
+        K = np.zeros((len(self.model.inputs), len(self.model.outputs)))
+        rows = indices(self.perturbation_inputs, self.model.inputs, "input")
+        columns = indices(self.perturbation_outputs, self.model.outputs, "output")
+        K[np.ix_(rows, columns)] = delta
+        return close(self.model, K).select(inputs=self.inputs, outputs=self.outputs)
+
+    def perturbations(
+        self, count: int, seed: int, where: Literal["ball", "boundary"] = "ball"
+    ) -> Array:
+        """`count` matrices Delta (count, nd, nv) within the bound.
+
+        "ball": uniform in the ball of spectral norms <= bound; "boundary": uniform among its
+        extreme points, all singular values at the bound. Neither is the distribution of an
+        estimate. Raises `InputError` for a count below 1 or another `where`.
+        """
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+            raise InputError(f"count: expected an integer >= 1, got {count!r:.60}")
+        if where not in ("ball", "boundary"):
+            raise InputError(f"where: expected 'ball' or 'boundary', got {where!r:.60}")
+        rng = np.random.default_rng(seed)
+        short, long = sorted(self.shape)
+        X = rng.standard_normal((count, short, long))
+        inner = X @ np.swapaxes(X, -1, -2)
+        if where == "ball":
+            # with Y Wishart of short + 1 degrees of freedom (X X' + Y)^-1/2 X is uniform
+            # (Gupta and Nagar, Matrix Variate Distributions (2000), ch. 4)
+            Y = rng.standard_normal((count, short, short + 1))
+            inner = inner + Y @ np.swapaxes(Y, -1, -2)
+        values, vectors = np.linalg.eigh(inner)
+        root = (vectors / np.sqrt(values)[:, None, :]) @ np.swapaxes(vectors, -1, -2)
+        delta = self.bound * root @ X
+        return delta if self.shape[0] == short else np.swapaxes(delta, -1, -2)
+
+    def draws(
+        self, count: int, seed: int, where: Literal["ball", "boundary"] = "ball"
+    ) -> tuple[LPVStateSpace, ...]:
+        """`count` models of the set, those of `perturbations`."""
+        return tuple(self.perturbed(delta) for delta in self.perturbations(count, seed, where))
+
+    def feedback(self, gains: Mapping[tuple[str, str], float]) -> UncertainStateSpace:
+        """Close u_i = gain * y_j + (new u_i) around every model of the set; see
+        `LPVStateSpace.feedback`. Raises `UnknownNameError` for the channels of the block.
+        """
+        feedback_matrix(gains, self.inputs, self.outputs)
+        return replace(self, model=self.model.feedback(gains))
+
+    def select(
+        self,
+        states: Sequence[str] | None = None,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> UncertainStateSpace:
+        """Keep these states, inputs and outputs; see `LPVStateSpace.select`. The block is kept."""
+        kept = self.model.select(states, self._with_block(inputs, "inputs"))
+        return replace(self, model=kept.select(outputs=self._with_block(outputs, "outputs")))
+
+    def _with_block(
+        self, names: Sequence[str] | None, group: Literal["inputs", "outputs"]
+    ) -> list[str] | None:
+        if names is None:
+            return None
+        own, block = getattr(self, group), getattr(self, f"perturbation_{group}")
+        return [*(own[i] for i in indices(names, own, group[:-1])), *block]
+
+    def scaled(
+        self, inputs: Mapping[str, float] | None = None, outputs: Mapping[str, float] | None = None
+    ) -> UncertainStateSpace:
+        """Inputs and outputs {name: size} measured in that size; see `LPVStateSpace.scaled`. Raises
+        `UnknownNameError` for the channels of the block.
+        """
+        indices(inputs or {}, self.inputs, "input")
+        indices(outputs or {}, self.outputs, "output")
+        return replace(self, model=self.model.scaled(inputs, outputs))
+
+    def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> UncertainStateSpace:
+        """The same set over narrower ranges or with other rate limits."""
+        return replace(self, model=self.model.with_scheduling(scheduling))
+
+    def with_rate(self, rate: Rates) -> UncertainStateSpace:
+        """The same set with |dp/dt| <= rate; see `LPVStateSpace.with_rate`."""
+        return replace(self, model=self.model.with_rate(rate))
+
+    def with_bound(self, bound: float) -> UncertainStateSpace:
+        """The same block with another bound; what the `source` says is then its reader's to
+        judge.
+        """
+        return replace(self, bound=bound)

@@ -1,0 +1,171 @@
+"""The worst model of an uncertain one: a Delta of the set at which some frozen model has the
+largest gain, or the slowest mode.
+
+The derivative of a peak gain, or of a pole, by Delta is a matrix of rank two at most; the point of
+the ball that it grows fastest towards has its polar factor as direction. From some Deltas the
+ascent goes there, as far as the value grows; p is chosen anew between ascents. What it finds is
+attained, whatever it misses.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from symheli.lpv import Matrices, UncertainStateSpace
+from symheli.values.signal import indices
+from synthesis.worst.frozen import norm
+from synthesis.worst.over_box import worst_over
+from synthesis.worst.spectrum import surely_unstable
+
+Array = np.ndarray
+
+GRID = 17
+"""Values of p between which the worst of a Delta is looked for, and the breaks of a spline."""
+STARTS = 2
+"""Ascents begin without a perturbation, and from so many extreme points of the set."""
+ROUNDS = 3
+"""Most times p is chosen anew."""
+STEPS = 20
+"""Most steps of an ascent at one p."""
+GAINED = 1e-4
+"""An ascent ends where a step gains less than this fraction."""
+SEED = 0
+
+
+class Perturbed(NamedTuple):
+    """`delta` (nd, nv), and the worst value of its frozen models, at `p`: the gain, or the growth
+    in 1/s. `unstable` there, beyond rounding.
+    """
+
+    delta: Array
+    value: float
+    p: float
+    unstable: bool = False
+
+
+def worst_perturbation(unc: UncertainStateSpace, *, gains: bool) -> Perturbed:
+    """The worst Delta found: of the largest gain of a frozen model (inf: unstable), or with
+    `gains` False of the fastest growing mode.
+    """
+    frozen = _Frozen.of(unc, gains)
+    grid = np.linspace(unc.scheduling.low, unc.scheduling.high, GRID)
+    ends = [p for piece in unc.model.basis.pieces() for p in (piece.low, piece.high)]
+    grid = np.unique([*grid, *(p for p in ends if grid[0] < p < grid[-1])])
+    starts = [np.zeros(unc.shape)]
+    if unc.bound > 0:
+        starts += [*unc.perturbations(STARTS, SEED, "boundary")]
+    best = Perturbed(starts[0], -math.inf, float(grid[0]))
+    for start in starts:
+        delta = start
+        for _ in range(ROUNDS):
+            value, at = worst_over(lambda p, d=delta: frozen.value(d, float(p[0])), [grid])
+            p = float(at[0])
+            if value > best.value:
+                best = Perturbed(delta, value, p)
+            if value == math.inf or unc.bound == 0:
+                break
+            delta, climbed = frozen.climbed(delta, value, p, unc.bound)
+            if climbed > best.value:
+                best = Perturbed(delta, climbed, p)
+            if climbed <= value + GAINED * abs(value) or climbed == math.inf:
+                break
+        if best.value == math.inf:
+            break
+    return best._replace(unstable=surely_unstable(frozen.closed(best.delta, best.p).A, unc.dt))
+
+
+class _Frozen(NamedTuple):
+    """The models frozen at each p, with the block open: inputs (u, d), outputs (y, v) in any
+    order.
+    """
+
+    unc: UncertainStateSpace
+    d: list[int]
+    v: list[int]
+    u: list[int]
+    y: list[int]
+    gains: bool
+
+    @classmethod
+    def of(cls, unc: UncertainStateSpace, gains: bool) -> _Frozen:
+        into, out = unc.model.inputs, unc.model.outputs
+        return cls(
+            unc,
+            indices(unc.perturbation_inputs, into, "input"),
+            indices(unc.perturbation_outputs, out, "output"),
+            indices(unc.inputs, into, "input"),
+            indices(unc.outputs, out, "output"),
+            gains,
+        )
+
+    def closed(self, delta: Array, p: float) -> Matrices:
+        """With d = delta v + what is added to d."""
+        A, B, C, D = self.unc.model.matrices(p)
+        K = np.zeros((B.shape[1], C.shape[0]))
+        K[np.ix_(self.d, self.v)] = delta
+        N = np.linalg.inv(np.eye(len(K)) - K @ D)
+        return Matrices(A + B @ N @ K @ C, B @ N, C + D @ N @ K @ C, D @ N)
+
+    def value(self, delta: Array, p: float) -> float:
+        """What is to be made large."""
+        return self._value(self.closed(delta, p))
+
+    def _value(self, at: Matrices) -> float:
+        if self.gains:
+            return norm(
+                at.A, at.B[:, self.u], at.C[self.y], at.D[np.ix_(self.y, self.u)], self.unc.dt
+            )[0]
+        return self._growth(np.linalg.eigvals(at.A))
+
+    def _growth(self, poles: Array) -> float:
+        if self.unc.dt is None:
+            return float(np.real(poles).max())
+        return math.log(max(float(np.abs(poles).max()), 1e-300)) / self.unc.dt
+
+    def slope(self, at: Matrices) -> Array:
+        """The derivative of the value by Delta, (nd, nv), up to a positive factor."""
+        A, B, C, D = at
+        E, G = B[:, self.d], C[self.v]
+        if not self.gains:
+            poles, right = np.linalg.eig(A)
+            k = int(np.argmax(np.real(poles) if self.unc.dt is None else np.abs(poles)))
+            left = np.linalg.inv(right)[k]
+            turn = 1.0 if self.unc.dt is None else np.conj(poles[k]) / max(abs(poles[k]), 1e-300)
+            return np.real(np.outer(turn * (left @ E), G @ right[:, k]))
+        u, y = self.u, self.y
+        _, omega = norm(A, B[:, u], C[y], D[np.ix_(y, u)], self.unc.dt)
+        if math.isinf(omega):
+            into, heard, out = D[np.ix_(y, self.d)], D[np.ix_(self.v, u)], D[np.ix_(y, u)]
+        else:
+            dt = self.unc.dt
+            z = 1j * omega if dt is None else np.exp(1j * omega * dt)
+            X = np.linalg.solve(z * np.eye(len(A)) - A, B)
+            into = C[y] @ X[:, self.d] + D[np.ix_(y, self.d)]
+            heard = G @ X[:, u] + D[np.ix_(self.v, u)]
+            out = C[y] @ X[:, u] + D[np.ix_(y, u)]
+        left, _, right = np.linalg.svd(out)
+        return np.real(np.outer(np.conj(left[:, 0]) @ into, heard @ np.conj(right[0])))
+
+    def climbed(self, delta: Array, value: float, p: float, bound: float) -> tuple[Array, float]:
+        """A better Delta at this p, and its value; the same where none was found."""
+        for _ in range(STEPS):
+            at = self.closed(delta, p)
+            left, sizes, right = np.linalg.svd(self.slope(at), full_matrices=False)
+            # where it does not matter Delta stays: directions of no slope are rounding
+            felt = sizes > 1e-8 * max(float(sizes[0]), 1e-300)
+            towards = bound * (left[:, felt] @ right[felt])
+            for share in (1.0, 0.5, 0.2, 0.05):
+                trial = delta + share * (towards - delta)
+                found = self.value(trial, p)
+                if found > value:
+                    break
+            else:
+                return delta, value
+            gained = found - value
+            delta, value = trial, found
+            if value == math.inf or gained <= GAINED * abs(value):
+                return delta, value
+        return delta, value
