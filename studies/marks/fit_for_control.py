@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -28,6 +27,8 @@ from identification import fit_for_control as judge
 from identification.judge.fit_for_control import SHARE_OF_MARGIN
 from studies.loops.lateral import STATES
 from studies.loops.robust_lateral import FEEDBACK, INPUTS, SIZES
+from studies.marks.measured import PAIRS, seeds_of
+from studies.output import progress
 from studies.processes import Processes
 from studies.transition.flights import ACCELERATIONS, AMPLITUDE, TOP, autopilot_for
 from symheli import (
@@ -40,9 +41,6 @@ from symheli import (
 )
 from symheli.errors import DataWarning, SymheliError
 from symheli.flight import Autopilot
-
-VEHICLES = {"xcell60": "xcell_kahn_hudson", "xcell_kahn_hudson": "xcell60"}
-"""{vehicle flown: vehicle whose simulator makes the instruments}: never the same."""
 
 SPEEDS = tuple(float(v) for v in np.linspace(0.0, TOP, 9))
 
@@ -152,7 +150,7 @@ def outcome(vehicle: str, kind: str, method: str, seed: int) -> Outcome:
     one degree more, which sees what the basis cannot hold.
     """
     heli, autopilot, truth = _vehicle(vehicle)
-    simulator = SimulatedFlight(_vehicle(VEHICLES[vehicle])[0])
+    simulator = SimulatedFlight(_vehicle(PAIRS[vehicle])[0])
     record = KINDS[kind].fly(heli, autopilot, seed)
     structure, richer = (
         KinematicARX(heli.inputs, "airspeed_command", basis=Polynomial(degree, 0.0, TOP))
@@ -177,15 +175,15 @@ def outcome(vehicle: str, kind: str, method: str, seed: int) -> Outcome:
 
 
 def campaign(
-    seeds: int, methods: Sequence[str] = METHODS[:1], processes: int | None = None
+    seeds: Sequence[int], methods: Sequence[str] = METHODS[:1], processes: int | None = None
 ) -> Iterator[Outcome]:
-    """Every vehicle, kind and method with `seeds` seeds."""
+    """Every vehicle, kind and method with each of the seeds."""
     calls = [
-        partial(outcome, vehicle, kind, method, 1000 + seed)
-        for seed in range(seeds)
+        partial(outcome, vehicle, kind, method, seed)
+        for seed in seeds
         for method in methods
         for kind in KINDS
-        for vehicle in VEHICLES
+        for vehicle in PAIRS
     ]
     with Processes(processes) as pool:
         for result in pool.submit(calls):
@@ -224,20 +222,19 @@ def table(outcomes: Sequence[Outcome]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """`python -m studies.campaigns.fit_for_control`."""
+    """`python -m studies.marks.fit_for_control`."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=10, metavar="N")
+    parser.add_argument("--seeds", default="1000-1009", metavar="A-B")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS[:1])
-    parser.add_argument("--processes", type=int, metavar="N")
+    parser.add_argument("--processes", type=int, metavar="N", help="default: one a core")
     parser.add_argument("--json", action="store_true", help="a line of JSON a flight instead")
     given = parser.parse_args(arguments)
     outcomes = []
-    for one in campaign(given.seeds, given.methods, given.processes):
+    for one in campaign(seeds_of(given.seeds), given.methods, given.processes):
         outcomes.append(one)
+        progress(f"{len(outcomes)} {one.vehicle} {one.kind} {one.seed}: {one.verdict}")
         if given.json:
             print(json.dumps(asdict(one)), flush=True)
-        else:
-            print(f"  {len(outcomes)} {one.vehicle} {one.kind}: {one.verdict}", file=sys.stderr)
     if not given.json:
         print(table(outcomes))
 
