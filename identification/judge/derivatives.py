@@ -98,9 +98,7 @@ class Certainty:
 
     @classmethod
     def of(cls, value: Array, covariance: Array) -> Certainty:
-        """Source: Tischler and Remple (2012), Aircraft and Rotorcraft System Identification, ch.
-        12.
-        """
+        """From values (m,) and their covariance (m, m)."""
         scale = np.sqrt(np.diagonal(covariance))
         safe = np.where(scale > 0, scale, 1.0)
         correlation = covariance / np.outer(safe, safe)

@@ -41,6 +41,7 @@ POINTS = 9
 
 TISCHLER = "Tischler and Remple (2012)"
 VINNICOMBE = "Vinnicombe (2001)"
+GUIDELINE = "usual guideline"
 HERE = "here"
 
 Point = float | tuple[float, ...]
@@ -488,7 +489,7 @@ def _certainty(at: Sequence[_AtPoint]) -> tuple[Criterion, ...]:
             value=value,
             threshold=threshold,
             verdict=judged(value, threshold, "not known"),
-            source=TISCHLER,
+            source=GUIDELINE,
             where=where,
         )
         for name, (value, threshold, where) in worst.items()
