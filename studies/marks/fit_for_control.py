@@ -24,7 +24,7 @@ from identification import (
     fit,
 )
 from identification import fit_for_control as judge
-from identification.judge.fit_for_control import SHARE_OF_MARGIN
+from identification.judge.criteria_in_feedback import SHARE_OF_MARGIN
 from studies.loops.lateral import STATES
 from studies.loops.robust_lateral import FEEDBACK, INPUTS, SIZES
 from studies.marks.measured import PAIRS, seeds_of

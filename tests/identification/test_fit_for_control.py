@@ -275,3 +275,12 @@ def test_what_makes_no_plant_is_refused(noisy):
         idn.fit_for_control(model, noisy, {("u", "z"): 1.0}, scales=SCALES, **SHORT)
     with pytest.raises(InputError, match="every point"):
         idn.fit_for_control(model, noisy, LOOP, scales=SCALES, points=[0.0], truth={})
+
+
+def test_a_loop_that_asks_for_no_derivative_is_content_with_any():
+    """A plant of gain 1e-3: without it the loop hardly changes."""
+    faint = flown(gain=1e-3, noise=1e-4)
+    model, joint = fitted(faint)
+    found = idn.fit_for_control(model, faint, LOOP, scales=SCALES, covariance=joint, **SHORT)
+    assert found["Cramer-Rao bound"].where == "none matters to this loop"
+    assert found["Cramer-Rao bound"].verdict == "fit"
