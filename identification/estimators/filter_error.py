@@ -88,7 +88,7 @@ class FilterError(Method):
     >>> wrong = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
     >>> found = idn.fit(kin, flight, method=idn.FilterError(symheli.SimulatedFlight(wrong)))
     >>> found.method, found.coefficient_covariance.shape
-    ('filter error', (6, 26, 6, 26))
+    ('filter error', (6, 28, 6, 28))
     """
 
     simulator: FlightSource
