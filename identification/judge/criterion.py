@@ -10,6 +10,15 @@ import numpy as np
 
 Verdict = Literal["fit", "not fit", "not known"]
 
+SET = 0.95
+"""Share of the distribution of the estimate inside the ellipsoid whose boundary is drawn from."""
+
+TISCHLER = "Tischler and Remple (2012)"
+VINNICOMBE = "Vinnicombe (2001)"
+GUIDELINE = "usual guideline"
+HERE = "here"
+NO_COVARIANCE = "no covariance"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:

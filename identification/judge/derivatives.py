@@ -13,6 +13,11 @@ from identification.model.kinematic_model import KinematicModel
 from identification.structure.kinematic_arx import MOVING
 from symheli.values.arrays import Array
 
+LEFT = 1e-3
+"""Of a derivative that is left out: without any damping a plant may integrate, and a pole on the
+unit circle has no nu-gap.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
@@ -33,7 +38,7 @@ class Derivatives:
     rows : array (m, ny, n)
         D changes by sum rows * theta.T.
     without : array (m, n, ny)
-        What added to theta makes each of them zero, by the first lag alone.
+        What added to theta leaves a thousandth of each of them, by the first lag alone.
     """
 
     names: tuple[str, ...]
@@ -71,7 +76,7 @@ class Derivatives:
                 own = -1.0 / dt if key == ("output", o) else 0.0
                 value = float(np.sum(row * theta.T)) + own
                 gone = np.zeros(theta.shape)
-                gone[blocks[0], o] = -sign * value * dt * f / (f @ f)
+                gone[blocks[0], o] = -sign * (1 - LEFT) * value * dt * f / (f @ f)
                 names.append(f"{output} from {signal}")
                 values.append(value)
                 rows.append(row)
@@ -98,9 +103,7 @@ class Certainty:
 
     @classmethod
     def of(cls, value: Array, covariance: Array) -> Certainty:
-        """Source: Tischler and Remple (2012), Aircraft and Rotorcraft System Identification, ch.
-        12.
-        """
+        """From values (m,) and their covariance (m, m)."""
         scale = np.sqrt(np.diagonal(covariance))
         safe = np.where(scale > 0, scale, 1.0)
         correlation = covariance / np.outer(safe, safe)

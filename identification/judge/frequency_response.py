@@ -171,7 +171,7 @@ def response_of(
     # and Remple, sec. 7.5)
     with np.errstate(divide="ignore"):
         random_error = np.sqrt(
-            0.55 * (1 - coherence) / np.maximum(coherence, tiny) / (2 * max(_independent(count), 1))
+            0.55 * (1 - coherence) / np.maximum(coherence, tiny) / (2 * max(independent(count), 1))
         )
     return FrequencyResponse(
         omega=omega,
@@ -184,7 +184,7 @@ def response_of(
     )
 
 
-def _independent(windows: int) -> float:
+def independent(windows: int) -> float:
     """Number of windows that do not overlap in as much data."""
     return (windows + 1) / 2
 

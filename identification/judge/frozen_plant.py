@@ -38,11 +38,9 @@ class FrozenPlant:
 
     def at(self, p: float | Sequence[float]) -> LinearModel:
         """Discrete, with the scheduling held at p."""
-        whole, states = self.model.at(p), None
         if isinstance(self.model, KinematicModel):
-            kept = self.model.realization.kept(self.outputs, self.inputs)[0]
-            states = [whole.states[i] for i in kept]
-        return whole.select(states, self.inputs, self.outputs)
+            return self.model.at(p, self.outputs, self.inputs)
+        return self.model.at(p).select(inputs=self.inputs, outputs=self.outputs)
 
     def of_each(self, thetas: Array, p: float | Sequence[float]) -> LinearModels:
         """The plants of coefficients (K, n, ny) in the place of the model's, at p."""

@@ -7,9 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.judge.frequency_response import FrequencyResponse, mismatch_cost, response_of
+from identification.judge.frequency_response import (
+    FrequencyResponse,
+    independent,
+    mismatch_cost,
+    response_of,
+)
 from identification.judge.frequency_response import windows as windows_of
 from identification.structure.regressors import as_records, units_of
+from symheli.errors import ExcitationError
 from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
@@ -18,6 +24,9 @@ COHERENCE, RANDOM_ERROR = 0.6, 0.2
 """Less coherence and a larger random error say too little of a response. Source: Tischler and
 Remple (2012), ch. 8 and 9.
 """
+
+WINDOWS = 2
+"""Independent windows an input: with fewer the inputs explain by chance what they do not cause."""
 
 LEAST, SPAN = 8, 3.0
 """A pair of signals counts where so many frequencies say enough, over such a ratio of them."""
@@ -57,12 +66,17 @@ def response_match(
 
     Each window of the record (s) has its own scheduling: the model is frozen at the mean there and
     averaged as the estimate averages, sum_w G(p_w) S_uu,w (sum_w S_uu,w)^-1, so that a moving
-    airspeed passes for no error. Raises `ExcitationError` as `frequency_response`.
+    airspeed passes for no error. Raises `ExcitationError` as `frequency_response`, and where the
+    windows are too few for so many inputs.
     """
     records = as_records(records)
     outputs_, inputs_ = units_of(outputs, records), units_of(inputs, records)
     nu = len(inputs_)
     omega, pieces = windows_of(records, (*inputs_, *outputs_), window, band, tuple(scheduling))
+    if independent(len(pieces)) < WINDOWS * nu:
+        raise ExcitationError(
+            f"{len(pieces)} windows of {window:g} s are too few for {nu} inputs: record longer"
+        )
     measured = response_of(
         omega, np.mean([S for S, _ in pieces], axis=0), len(pieces), outputs_, inputs_, window
     )

@@ -24,7 +24,12 @@ HELP = "fit an LPV-ARX model to a flight log and judge it on data it has not see
 XPLANE = {"outputs": ("q", "theta"), "inputs": ("stick_lon",), "scheduling": "airspeed"}
 """What is identified from an X-Plane log unless asked otherwise."""
 
-ONE_MODEL = {"plot": "draws the fits of", "bands": "draws the coefficients of", "save": "writes"}
+ONE_MODEL = {
+    "plot": "draws the fits of",
+    "bands": "draws the coefficients of",
+    "save": "writes",
+    "loop": "judges",
+}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -184,6 +189,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="draw every coefficient over the scheduling signal with its 95 %% band",
     )
     add(
+        "--loop",
+        type=options.feedback,
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="INPUT=OUTPUT:GAIN",
+        help="say whether the model is fit for this feedback, such as d_lat=phi:-0.03",
+    )
+    add(
         "--save",
         type=options.model_file,
         metavar="FILE",
@@ -194,7 +208,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Output:
     """Read, prepare, fit, judge."""
     from identification import LPVARX, Polynomial, against_constant
-    from studies.log import report
+    from studies.log import in_feedback, report
     from studies.log.reading import format_of, scheduling_range
 
     kind: Any = (
@@ -237,7 +251,7 @@ def run(arguments: argparse.Namespace) -> Output:
     )
     method = _method(arguments.method, arguments.instruments)
     if arguments.orders:
-        for option in ("plot", "bands", "save"):
+        for option in ("plot", "bands", "save", "loop"):
             if getattr(arguments, option):
                 raise InputError(
                     f"--{option} {ONE_MODEL[option]} one model; --orders compares many"
@@ -264,6 +278,10 @@ def run(arguments: argparse.Namespace) -> Output:
     )
     check = prepared.kinematics
     text, data = report.text(facts, result, check), report.data(facts, result, check)
+    if arguments.loop:
+        found = in_feedback.judged(result, arguments.loop)
+        text = "\n\n".join([text, in_feedback.text(found)])
+        data = {**data, "fit_for_control": in_feedback.data(found)}
     written = list(_write(arguments, result))
     if written:
         text, data = (

@@ -207,6 +207,17 @@ def unit(text: str) -> tuple[str, str]:
     return name, value
 
 
+def feedback(text: str) -> tuple[tuple[str, str], float]:
+    """input=output:gain"""
+    pair, colon, gain = text.rpartition(":")
+    to, sign, of = pair.partition("=")
+    if not (colon and to and sign and of):
+        raise argparse.ArgumentTypeError(
+            f"expected input=output:gain such as d_lat=phi:-0.03, got {text!r}"
+        )
+    return (to, of), number(gain)
+
+
 def _float(text: str) -> float:
     try:
         return float(text)

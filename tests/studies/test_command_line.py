@@ -284,6 +284,27 @@ def test_identify_writes_the_model_and_the_bands_of_its_coefficients(answer, run
     assert "cannot be written" in error
 
 
+def test_identify_says_whether_the_model_is_fit_for_a_loop(answer, run, tmp_path):
+    log = scheduled_csv(tmp_path / "log.csv", noise=0.01)
+    got = answer("identify", log, *STRUCTURE, *UNITS, "--loop", "u=y:-0.2")["fit_for_control"]
+    assert got["verdict"] == "not known"  # least squares has no covariance that knows of its bias
+    rows = {row["name"]: row for row in got["criteria"]}
+    assert rows["TIC"]["verdict"] == rows["J"]["verdict"] == "fit"
+    assert len(got["scheduling"]) == len(got["margin"]) == 9
+    assert min(got["margin"]) > 0
+    status, out, _ = run("identify", log, *STRUCTURE, *UNITS, "--loop", "u=y:-0.2")
+    assert status == 0
+    assert "verdict: not known" in out
+    unstable = answer("identify", log, *STRUCTURE, *UNITS, "--loop", "u=y:-50")
+    assert unstable["fit_for_control"]["verdict"] == "not fit"
+    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--loop", "phi")
+    assert status != 0
+    assert "input=output:gain" in error
+    status, _, error = run("identify", log, *STRUCTURE, *UNITS, "--loop", "u=z:1")
+    assert status != 0
+    assert "signal of --loop" in error
+
+
 def test_identify_says_where_scheduling_does_not_pay(run, tmp_path):
     log = tmp_path / "log.csv"
     rng = np.random.default_rng(1)

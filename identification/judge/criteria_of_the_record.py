@@ -1,0 +1,110 @@
+"""Criteria that hold a model against a record: its spectral estimate, its course."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from identification.estimators.filter_error import noise_variance
+from identification.judge.criterion import TISCHLER, Criterion, judged
+from identification.judge.frozen_plant import FrozenPlant
+from identification.judge.residuals import theil
+from identification.judge.response_match import response_match
+from symheli.errors import ExcitationError
+from symheli.records import FlightRecord
+
+COST = 50.0
+INEQUALITY = 0.25
+
+KNOWN = 1.1
+"""The variance of sensor noise is told from a fifth of a spectrum: to ten percent."""
+
+
+def responses(
+    plant: FrozenPlant, records: Sequence[FlightRecord], window: float, band: tuple[float, float]
+) -> Criterion:
+    """J, the mean over the pairs of signals that say enough."""
+    value, verdict, where = float("nan"), "not known", ""
+    model = plant.model
+    try:
+        found = response_match(
+            records,
+            lambda p: model.at(p if len(p) > 1 else float(p[0])),  # type: ignore[arg-type]
+            plant.outputs,
+            [str(u) for u in model.inputs],
+            plant.regression.parameters,
+            window=window,
+            band=band,
+            judged=plant.inputs,
+        )
+    except ExcitationError as error:
+        where = str(error)
+    else:
+        if np.isfinite(found.cost).any():
+            value = float(np.nanmean(found.cost))
+            worst = np.unravel_index(int(np.nanargmax(found.cost)), found.cost.shape)
+            where = (
+                f"mean of {int(np.isfinite(found.cost).sum())} pairs, worst"
+                f" {plant.outputs[worst[0]]} from {plant.inputs[worst[1]]}"
+                f" ({found.cost[worst]:.0f})"
+            )
+            explained = float(np.mean(found.scatter[np.isfinite(found.cost)]))
+            if not found.known:
+                where = f"{where}; an input is not seen in any output"
+            elif value <= COST:
+                verdict = "fit"
+            elif value - explained > COST:
+                verdict = "not fit"
+        else:
+            where = "too little coherence"
+    return Criterion(
+        name="J",
+        value=value,
+        threshold=COST,
+        verdict=verdict,  # type: ignore[arg-type]
+        source=TISCHLER,
+        where=where,
+    )
+
+
+def predictions(
+    plant: FrozenPlant, records: Sequence[FlightRecord], scales: Mapping[str, float], horizon: float
+) -> Criterion:
+    """TIC pooled over outputs and records; noise of the sensors excuses what it explains."""
+    model = plant.model
+    steps = max(round(horizon / model.dt), 1)
+    columns = [list(map(str, model.outputs)).index(y) for y in plant.outputs]
+    size = np.array([scales[y] for y in plant.outputs])
+    measured, guessed, noise = [], [], 0.0
+    for record in records:
+        y = record.columns(plant.outputs) / size
+        guess = model.predict(record, steps)[:, columns] / size
+        keep = np.isfinite(y).all(axis=1) & ~np.isnan(guess).any(axis=1)
+        if not keep.any():
+            continue
+        mean = y[keep].mean(axis=0)
+        measured.append((y[keep] - mean).ravel())
+        guessed.append((guess[keep] - mean).ravel())
+        noise += keep.sum() * sum(noise_variance(v, record.segments()) for v in y.T)
+    value, verdict, where = float("nan"), "not known", "no unbroken stretch so long"
+    if measured:
+        a, b = np.concatenate(measured), np.concatenate(guessed)
+        where = ""
+        if not np.isfinite(b).all():
+            value, verdict, where = 1.0, "not fit", "predictions diverge"
+        else:
+            value = theil(a, b).coefficient
+            both = np.sqrt(np.mean(a**2)) + np.sqrt(np.mean(b**2))
+            rest = np.sqrt(max(np.mean((a - b) ** 2) - KNOWN * noise / len(a), 0.0)) / both
+            verdict = judged(value, INEQUALITY, "not fit" if rest > INEQUALITY else "not known")
+            if verdict == "not known":
+                where = "noise explains it"
+    return Criterion(
+        name="TIC",
+        value=value,
+        threshold=INEQUALITY,
+        verdict=verdict,  # type: ignore[arg-type]
+        source=TISCHLER,
+        where=where or f"{horizon:g} s",
+    )
