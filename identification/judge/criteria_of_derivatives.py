@@ -37,7 +37,7 @@ def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
         if not len(matter):
             continue
         names = [all_.names[i] for i in matter]
-        sure = Certainty.of(all_.value[matter], all_.covariance(a.joint)[np.ix_(matter, matter)])
+        sure = Certainty.of(all_.value[matter], all_.covariance(a.joint)[matter][:, matter])
         pair = np.unravel_index(np.argmax(np.abs(sure.correlation)), sure.correlation.shape)
         for name, values, which in (
             ("Cramer-Rao bound", sure.bound, names[int(np.argmax(sure.bound))]),

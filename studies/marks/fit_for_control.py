@@ -243,4 +243,7 @@ if __name__ == "__main__":
     from studies.threads import one_thread
 
     one_thread()
-    main()
+
+    from studies.marks import fit_for_control  # under its own name: other processes import it
+
+    fit_for_control.main()
