@@ -153,7 +153,7 @@ class KinematicObserver:
 
     def _corrected(self, x: Array, y: Array) -> Array:
         there = np.flatnonzero(np.isfinite(y))
-        S = self._P[np.ix_(there, there)] + np.diag(self._R[there])
+        S = self._P[there][:, there] + np.diag(self._R[there])
         K = np.linalg.solve(S, self._P[there]).T
         kept = np.eye(len(x))
         kept[:, there] -= K

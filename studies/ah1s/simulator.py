@@ -73,7 +73,7 @@ class AH1S:
 
     def __init__(self) -> None:
         with extra("jsbsim", "the AH-1S"):
-            import jsbsim
+            import jsbsim  # pyright: ignore[reportMissingImports]
 
         jsbsim.FGJSBBase().debug_lvl = 0
         self._fdm = fdm = jsbsim.FGFDMExec(None)

@@ -40,9 +40,10 @@ def coverage(model: KinematicModel, truth: Truth, draws: int = 120, seed: int = 
         exact = _responses(truth.models["lateral"][k])
         own = _at(model, k)
         spread = np.stack([_at(member, k) for member in members]) - own
-        parts = np.stack([spread.real, spread.imag], axis=-1)
+        parts = np.stack([np.real(spread), np.imag(spread)], axis=-1)
         covariances = np.einsum("d...i,d...j->...ij", parts, parts) / draws
-        off = np.stack([(exact - own).real, (exact - own).imag], axis=-1)[..., None]
+        away = exact - own
+        off = np.stack([np.real(away), np.imag(away)], axis=-1)[..., None]
         distance = np.sum(off * np.linalg.solve(covariances, off), axis=(-2, -1))
         inside.append(distance <= WITHIN)
     return float(np.mean(inside))

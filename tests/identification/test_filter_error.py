@@ -8,7 +8,12 @@ from known_vehicles import STATES, Vehicle
 
 import identification as idn
 from identification.estimators.block_banded import Whitening
-from identification.estimators.filter_error import Stretch, noise_variance
+from identification.estimators.filter_error import (
+    Noise,
+    Stretch,
+    at_least_white,
+    noise_variance,
+)
 from identification.structure.kinematic_arx import increments
 from symheli.errors import InputError, UnknownNameError
 
@@ -36,8 +41,11 @@ class Cut:
         return self.whole.rows(np.isin(np.arange(len(self.whole)), at))
 
 
-def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle):
-    """X' S^-1 X and X' S^-1 e, S from finite differences of the equations by every measurement."""
+@pytest.mark.parametrize("gust", [0.0, 0.7])
+def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, gust):
+    """X' S^-1 X and X' S^-1 e, S from finite differences of the equations by every measurement;
+    with a gust of every equation less what remains of the one before.
+    """
     record = vehicle.record(9, sensors=SENSORS)
     aero = vehicle.kin.aerodynamics
     s = Stretch.of(aero, record, slice(0, 9))
@@ -64,15 +72,26 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle):
     X = np.zeros((8, 8, 6, F.shape[1]))
     for i in range(6):
         X[:, i, i] = F
-    X = X.reshape(64, -1)
-    normal, right = s.normal(theta, R, Q)
+    X, e, remains = X.reshape(64, -1), left(y0), 0.9
+    if gust:
+        A1 = (
+            s.f[1:]
+            @ theta.reshape(-1, vehicle.kin.basis.size, 6)
+            .swapaxes(0, 1)
+            .reshape(vehicle.kin.basis.size, -1)
+        ).reshape(8, -1, 6)
+        less = np.eye(64)[8:] - remains * np.eye(64)[:-8]
+        S, X, e = less @ S @ less.T, less @ X, less @ e
+        for k in range(7):  # velocities are what the gust is added to: -A1 of u v w
+            H = np.zeros((8, 3))
+            H[:6] = -A1[k + 1, :3].T
+            S[8 * k : 8 * k + 8, 8 * k : 8 * k + 8] += H @ H.T * gust**2 * (1 - remains**2)
+    normal, right = s.normal(theta, Noise(R, Q, gust**2, remains))
     weighed = np.linalg.solve(S, X)
     # differences of 1e-6: eps / h of every slope, and S is conditioned like R / Q
     tolerance = 1e-5 * np.abs(normal).max()
     np.testing.assert_allclose(normal, X.T @ weighed, atol=tolerance)
-    np.testing.assert_allclose(
-        right, weighed.T @ left(y0), rtol=1e-4, atol=1e-4 * np.abs(right).max()
-    )
+    np.testing.assert_allclose(right, weighed.T @ e, rtol=1e-4, atol=1e-4 * np.abs(right).max())
 
 
 def test_the_banded_factor_is_that_of_the_dense_covariance():
@@ -86,7 +105,8 @@ def test_the_banded_factor_is_that_of_the_dense_covariance():
             at = k + 2 - i
             dense[k * size : (k + 1) * size, at * size : (at + 1) * size] = block[k]
     S = dense @ np.diag(np.tile(v, m + 2)) @ dense.T + np.diag(np.tile(w, m))
-    white, e = Whitening.of(L, v, w), rng.normal(size=(m, size))
+    own = [np.broadcast_to(np.eye(size), (m, size, size))]
+    white, e = Whitening.of([(L, v), (own, w)]), rng.normal(size=(m, size))
     factor = np.linalg.cholesky(S)
     np.testing.assert_allclose(
         white.whitened(e).ravel(), np.linalg.solve(factor, e.ravel()), rtol=1e-11, atol=1e-12
@@ -94,7 +114,18 @@ def test_the_banded_factor_is_that_of_the_dense_covariance():
     np.testing.assert_allclose(
         white.adjoint(e).ravel(), np.linalg.solve(factor.T, e.ravel()), rtol=1e-11, atol=1e-12
     )
-    assert white.log_determinant == pytest.approx(np.linalg.slogdet(S)[1], rel=1e-12)
+
+
+def test_a_covariance_is_that_of_the_scores_but_never_below_white_noise():
+    rng = np.random.default_rng(1)
+    M = rng.normal(size=(5, 5))
+    inverse, scores = np.linalg.inv(M @ M.T), M @ np.diag([0.1, 0.5, 1.0, 2.0, 9.0]) @ M.T
+    found = at_least_white(inverse, scores)
+    sandwich = inverse @ scores @ inverse
+    for below in (inverse, sandwich):
+        assert np.linalg.eigvalsh(found - below).min() > -1e-12 * np.linalg.norm(found)
+    np.testing.assert_allclose(at_least_white(inverse, 3 * M @ M.T), 3 * inverse, rtol=1e-9)
+    assert np.trace(found) < np.trace(inverse + sandwich)
 
 
 def test_without_noise_the_coefficients_are_exact(vehicle):
