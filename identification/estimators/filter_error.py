@@ -159,7 +159,8 @@ class FilterError(Method):
             spread = np.sqrt(np.diag(inverse))
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
         scores = sum(s.scores(theta, noise) for s in flights)
-        covariance = at_least_white(inverse, scores)  # type: ignore[arg-type]
+        covariance = inverse @ scores @ inverse  # type: ignore[operator]
+        covariance = 0.5 * (covariance + covariance.T)
         n = arx.n_regressors
         weights = [len(s.y) for s in flights]
         residual = np.average([s.residual(theta) for s in flights], axis=0, weights=weights)
@@ -398,18 +399,6 @@ class Stretch:
         F = regressor_rows(self.arx, self.y[:, :6], self.u, self.p, self.f)
         e = increments(self.y, self.dt)[self.arx.memory :, :6] - F @ theta
         return e.T @ e / max(len(e) - F.shape[1], 1)
-
-
-def at_least_white(inverse: Array, scores: Array) -> Array:
-    """Covariance of the coefficients from (X'X)^-1 and the covariance of X'e: (X'X)^-1 `scores`
-    (X'X)^-1, but along no direction less than (X'X)^-1, what white noise of the stated variances
-    leaves. Scores of a record that is short against their correlation say too little.
-    """
-    root = np.linalg.cholesky(0.5 * (inverse + inverse.T))
-    ratio = root.T @ scores @ root
-    values, vectors = np.linalg.eigh(0.5 * (ratio + ratio.T))
-    half = root @ vectors * np.sqrt(np.maximum(values, 1.0))
-    return half @ half.T
 
 
 def _solved(normal: Array, right: Array) -> tuple[Array, Array]:

@@ -110,6 +110,7 @@ def test_the_record_holds_what_its_documentation_says(ideal, short):
         *(f"e_{i}" for i in ideal.inputs),
         "airspeed",
         "airspeed_command",
+        "acceleration_command",
         *(f"{s}_reference" for s in (*ideal.states, *ideal.inputs)),
     }
     assert set(short.signals) == wanted

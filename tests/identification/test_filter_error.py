@@ -11,7 +11,6 @@ from identification.estimators.block_banded import Whitening
 from identification.estimators.filter_error import (
     Noise,
     Stretch,
-    at_least_white,
     noise_variance,
 )
 from identification.structure.kinematic_arx import increments
@@ -114,18 +113,6 @@ def test_the_banded_factor_is_that_of_the_dense_covariance():
     np.testing.assert_allclose(
         white.adjoint(e).ravel(), np.linalg.solve(factor.T, e.ravel()), rtol=1e-11, atol=1e-12
     )
-
-
-def test_a_covariance_is_that_of_the_scores_but_never_below_white_noise():
-    rng = np.random.default_rng(1)
-    M = rng.normal(size=(5, 5))
-    inverse, scores = np.linalg.inv(M @ M.T), M @ np.diag([0.1, 0.5, 1.0, 2.0, 9.0]) @ M.T
-    found = at_least_white(inverse, scores)
-    sandwich = inverse @ scores @ inverse
-    for below in (inverse, sandwich):
-        assert np.linalg.eigvalsh(found - below).min() > -1e-12 * np.linalg.norm(found)
-    np.testing.assert_allclose(at_least_white(inverse, 3 * M @ M.T), 3 * inverse, rtol=1e-9)
-    assert np.trace(found) < np.trace(inverse + sandwich)
 
 
 def test_without_noise_the_coefficients_are_exact(vehicle):

@@ -11,6 +11,7 @@ import pytest
 
 from studies.processes import Processes
 from symheli.errors import InputError, SymheliError, UnknownNameError
+from symheli.values.signal import indices, signals
 
 
 def test_every_call_is_answered_in_its_place():
@@ -83,28 +84,28 @@ def test_a_script_without_a_guard_may_ask(tmp_path):
     assert said.stdout.split() == ["begin", "9"]
 
 
-def _unknown():
-    raise UnknownNameError("signal", "phy", ("phi", "theta"))
-
-
-class _Unreadable(Exception):
-    def __init__(self, first, second):
-        super().__init__(first)
-
-
-def _unreadable():
-    raise _Unreadable("a", "b")
-
-
 def test_an_error_with_arguments_of_its_own_comes_back_as_it_was():
     with Processes(2) as processes:
+        unknown = partial(indices, ["phy"], signals(("phi", "theta")), "signal")
+        (answer,) = processes.submit([unknown])
         with pytest.raises(UnknownNameError, match="did you mean 'phi'"):
-            processes.submit([_unknown])[0].result(timeout=60)
+            answer.result(timeout=60)
 
 
-def test_an_answer_that_cannot_be_read_is_said_and_does_not_hang():
+def test_an_answer_that_cannot_be_read_is_said_and_does_not_hang(tmp_path, monkeypatch):
+    (tmp_path / "elsewhere.py").write_text(
+        "class Unreadable(Exception):\n"
+        "    def __init__(self, first, second):\n"
+        "        super().__init__(first)\n"
+        "def fail():\n"
+        "    raise Unreadable(1, 2)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    import elsewhere  # type: ignore[import-not-found]
+
     with Processes(2) as processes:
-        bad, good = processes.submit([_unreadable, partial(int, "7")])
+        bad, good = processes.submit([elsewhere.fail, partial(int, "7")])
         with pytest.raises(SymheliError, match="cannot be read here"):
             bad.result(timeout=60)
         assert good.result(timeout=60) == 7
