@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from identification import FilterError, KinematicARX, KinematicModel, Polynomial, Product, fit
 from studies.transition.flights import TOP
 from symheli import FlightRecord, Helicopter, SimulatedFlight
@@ -10,6 +12,9 @@ INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 SCHEDULING = ("airspeed_command", "acceleration_command")
 FASTEST = 4.0
 """Largest commanded acceleration, m/s^2."""
+
+
+CONSTANT, ALONE, BOTH = "constant coefficients", "over airspeed", "over airspeed and acceleration"
 
 
 def structure(servos: bool = False) -> KinematicARX:
@@ -24,8 +29,23 @@ def structure(servos: bool = False) -> KinematicARX:
     return KinematicARX(inputs, SCHEDULING, basis=basis, nb=4 if servos else 2, offset_rate=False)
 
 
+def structures() -> dict[str, KinematicARX]:
+    """The same beside those that are not scheduled on the acceleration, whose trims move with the
+    rate of the airspeed instead, and on nothing.
+    """
+    both = structure()
+    alone = replace(both, scheduling=SCHEDULING[0], basis=Polynomial(3, 0.0, TOP), offset_rate=True)
+    return {CONSTANT: replace(alone, basis=Polynomial(0, 0.0, TOP)), ALONE: alone, BOTH: both}
+
+
 def identified(
-    records: FlightRecord | list[FlightRecord], simulator: Helicopter, servos: bool = False
+    records: FlightRecord | list[FlightRecord],
+    simulator: Helicopter,
+    servos: bool = False,
+    kin: KinematicARX | None = None,
 ) -> KinematicModel:
-    """By the filter error method, its instruments flown in `simulator`."""
-    return fit(structure(servos), records, method=FilterError(SimulatedFlight(simulator)))
+    """By the filter error method, its instruments flown in `simulator`; `kin`: another structure
+    than that of `structure`.
+    """
+    method = FilterError(SimulatedFlight(simulator))
+    return fit(kin or structure(servos), records, method=method)

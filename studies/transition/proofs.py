@@ -11,14 +11,17 @@ from typing import Any
 
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.longitudinal import longitudinal_loop
+from studies.loops.robust_lateral import FEEDBACK
+from studies.marks.guarantee import FORM, robust_loop
 from studies.processes import Processes
 from studies.transition import guarantees
 from studies.transition.axes import LATERAL
 from studies.transition.baseline import Baseline
 from studies.transition.effort import GLANCE, Effort
-from studies.transition.flights import NOISES
-from studies.transition.guarantees import Bound, Proof
+from studies.transition.flights import NOISES, TOP
+from studies.transition.guarantees import PERIOD, Bound, Proof
 from studies.transition.identified import Identification
+from studies.transition.known_kinematics import KnownKinematics
 from symheli import Helicopter
 from synthesis import FrozenGain, frozen_gain
 
@@ -47,6 +50,13 @@ class ServoProofs:
     bounds: tuple[Bound, ...]
     exact_frozen: float
     frozen_peaks: Mapping[str, FrozenGain]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobustProofs:
+    """Of the loop with a margin at 50 Hz."""
+
+    bounds: tuple[Bound, ...]
 
 
 Answer = tuple[float, list[Bound]]
@@ -145,6 +155,32 @@ def servo_questions(
         asked,
         lambda bounds: ServoProofs(bounds=bounds, exact_frozen=exact_frozen, frozen_peaks=peaks),
     )
+
+
+def robust_questions(
+    heli: Helicopter, baseline: Baseline, known: KnownKinematics, effort: Effort
+) -> Questions:
+    """About the estimate, the baseline, with effort the exact models and every model that the
+    flights allow; 50 Hz.
+    """
+    channel, rates = "robust", effort.robust_rates
+    allowed = robust_loop(known.model)
+    loops = {
+        guarantees.ESTIMATE: allowed.nominal,
+        "baseline": guarantees.servo_loop(guarantees.sampled_baseline(baseline.nodes), FEEDBACK),
+    }
+    long: list[Proof] = []
+    if effort.every_model:
+        long = guarantees.allowed_bounds(channel, allowed, rates, FORM)
+    if effort.thorough:
+        exact = ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD, FEEDBACK)
+        loops = {"exact": guarantees.scaled(exact)} | loops
+    asked = [*long]
+    for name, loop in loops.items():
+        asked += guarantees.bounds(name, channel, loop, rates, effort.servo_segments, GLANCE)
+    if effort.thorough:
+        asked += guarantees.lft_bounds("baseline", channel, loops["baseline"])
+    return Questions(asked, lambda bounds: RobustProofs(bounds=bounds), long)
 
 
 def _timed(proof: Proof) -> Answer:
