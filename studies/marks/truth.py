@@ -64,8 +64,10 @@ class Truth:
             models[name] = tuple(sampled(model, axis, servos) for model in exact)
         return cls(models, servos)
 
-    def gaps(self, models: FrozenAxes) -> dict[str, Array]:
-        """nu-gap at each airspeed, by axis, of the axes that `models` have."""
+    def gaps(self, models: FrozenAxes, points: int = 2000) -> dict[str, Array]:
+        """nu-gap at each airspeed, by axis, of the axes that `models` have; `points` as of
+        `nu_gap`.
+        """
         return {
             name: np.array(
                 [
@@ -74,6 +76,7 @@ class Truth:
                         other,
                         input_scale=[SCALES[u] for u in AXES[name].inputs],
                         output_scale=[SCALES[y] for y in AXES[name].outputs],
+                        points=points,
                     )
                     for exact, other in zip(self.models[name], models[name], strict=True)
                 ]
