@@ -118,8 +118,8 @@ def table(truth: str, exact: tuple[float, float], found: Sequence[Guarantee]) ->
     median = float(np.median(ratios))
     return "\n".join(
         [
-            f"Truth {truth}, {len(found)} seeds from {found[0].seed} to {found[-1].seed}; exact loop:"
-            f" proven {exact[0]:.3f}, flown {exact[1]:.3f}.",
+            f"Truth {truth}, {len(found)} seeds from {found[0].seed} to {found[-1].seed};"
+            f" exact loop: proven {exact[0]:.3f}, flown {exact[1]:.3f}.",
             "",
             "| | |",
             "|---|---|",

@@ -73,10 +73,10 @@ def _told(own: list[Bound]) -> Iterator[str]:
 def _scheduling(found: KnownKinematics) -> str:
     constant, alone = (found.of(KNOWN[kind]) for kind in (models.CONSTANT, models.ALONE))
     return (
-        "Moving coefficients instead of constant ones change the 1 s fit by"
-        f" {_differences(alone, constant)} of this helicopter. Where a rotor has no stabilizer bar"
-        " it is tens of points in nearly every output (AH-1S: docs/ah1s.md, python -m studies.ah1s"
-        " --knots 60; not run here)."
+        "Where scheduling pays: moving coefficients instead of constant ones change the 1 s fit of"
+        f" this helicopter by {_differences(alone, constant)}. Where the rotor has no stabilizer"
+        " bar it is tens of points in nearly every output (AH-1S: docs/ah1s.md, python -m"
+        " studies.ah1s --knots 60; not run here)."
     )
 
 
@@ -84,8 +84,8 @@ def _acceleration(found: KnownKinematics) -> str:
     base = _differences(found.of(SPLINE[models.BOTH]), found.of(SPLINE[models.ALONE]))
     own = _differences(found.of(KNOWN[models.BOTH]), found.of(KNOWN[models.ALONE]))
     return (
-        f"Acceleration as second parameter changes the baseline's 1 s fit by {base}; with known"
-        f" kinematics, which carry most of what the acceleration does, by {own}."
+        f"Acceleration as second parameter changes the baseline's 1 s fit by {base}. With known"
+        f" kinematics and the rate of the airspeed in the trim it changes the fit by {own}."
     )
 
 
@@ -113,8 +113,9 @@ def _within(gap: float, hold: float, margin: float) -> str:
 def _recursion(found: KnownKinematics) -> str:
     share = 100 * found.update_time / found.model.dt
     return (
-        "One recursive update of all coefficients with known kinematics took"
+        "What the recursion costs: one update of all coefficients with known kinematics took"
         f" {1e6 * found.update_time:.2g} us of processor time, {share:.2g} % of the sample period."
+        " It is least squares; what noise in the loop does to these only the batch methods undo."
     )
 
 
@@ -146,16 +147,11 @@ def _lft(study: Outcome) -> Iterator[str]:
 
 
 def _differences(one: Rival, other: Rival) -> str:
-    """ "+21 points (v), ...; level (u, p)"."""
+    """ "+21 (v), -4 (r) points, by at most 3 for u, p"."""
     change = {y: one.ahead[y] - other.ahead[y] for y in one.ahead}
-    moved = [
-        f"{change[y]:+.0f} ({y})"
-        for y in sorted(change, key=lambda y: -abs(change[y]))
-        if abs(change[y]) > LEVEL
-    ]
+    ranked = sorted(change, key=lambda y: -abs(change[y]))
+    moved = [f"{change[y]:+.0f} ({y})" for y in ranked if abs(change[y]) > LEVEL]
     level = [y for y in change if abs(change[y]) <= LEVEL]
-    return " points and ".join(
-        part
-        for part in (", ".join(moved), f"none to speak of ({', '.join(level)})" if level else "")
-        if part
-    )
+    parts = [f"{', '.join(moved)} points"] if moved else []
+    parts += [f"at most {LEVEL:g} points for {', '.join(level)}"] if level else []
+    return ", by ".join(parts)

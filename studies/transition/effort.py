@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 from studies.marks.flights import LONGEST as AGGRESSIVE
-from synthesis import Search
+from studies.marks.guarantee import FORM
+from synthesis import Search, Spline
 
 GLANCE = Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000)
 """A short look for bad airspeeds."""
@@ -31,6 +32,7 @@ class Effort:
     gentle_flight: bool = True
     """Whether they are identified from a gentle flight too."""
     robust_rates: tuple[float, ...] = (0.0, 3.0)
+    robust_form: Spline = Spline(segments=(8,))
     """Of the loop with a margin."""
     every_model: bool = True
     """Whether its gain is proven for every model that the flights allow."""
@@ -52,9 +54,10 @@ class Effort:
             exact_rates=(),
             longitudinal_rates=(),
             thorough=False,
-            aggressive=70.0,
+            aggressive=100.0,
             gentle_flight=False,
             robust_rates=(3.0,),
+            robust_form=FORM,
             every_model=False,
             servo_rates=(0.0, math.inf),
             servo_segments=(4,),

@@ -161,7 +161,7 @@ def bounds(
     channel: str,
     lpv: LPVStateSpace,
     rates: Sequence[float],
-    segments: tuple[int, ...],
+    form: Spline,
     search: Search,
 ) -> list[Proof]:
     """One gain a rate (m/s^2), and stability where no gain is proven and no growth was found.
@@ -169,7 +169,6 @@ def bounds(
     `search` sets how hard the lower bound is looked for; among airspeeds that jump, a search that
     spares nothing is quick.
     """
-    form = Spline(segments=segments)
     return [partial(_bound, name, channel, lpv, rate, form, search) for rate in rates]
 
 

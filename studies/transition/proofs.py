@@ -23,7 +23,7 @@ from studies.transition.guarantees import PERIOD, Bound, Proof
 from studies.transition.identified import Identification
 from studies.transition.known_kinematics import KnownKinematics
 from symheli import Helicopter
-from synthesis import FrozenGain, frozen_gain
+from synthesis import FrozenGain, Spline, frozen_gain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,9 +105,9 @@ def _known(answer: Answer) -> Future[Answer]:
 
 def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Questions:
     """About the baseline, and with effort the exact models; continuous time."""
-    loop = guarantees.gust_loop(baseline.nodes)
+    loop, form = guarantees.gust_loop(baseline.nodes), Spline(segments=effort.gust_segments)
     baseline_proofs = guarantees.bounds(
-        "baseline", "gust", loop, effort.gust_rates, effort.gust_segments, effort.search
+        "baseline", "gust", loop, effort.gust_rates, form, effort.search
     )
     asked = [*baseline_proofs, *guarantees.lft_bounds("baseline", "gust", loop)]
     long: list[Proof] = []
@@ -115,9 +115,7 @@ def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Ques
         long = guarantees.memory_bounds("baseline", "gust", loop, effort.gust_rates, effort.search)
         asked += long
         exact = ExactLateral.of(heli).loop("gust")
-        asked += guarantees.bounds(
-            "exact", "gust", exact, effort.exact_rates, effort.gust_segments, effort.search
-        )
+        asked += guarantees.bounds("exact", "gust", exact, effort.exact_rates, form, effort.search)
     exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=False)
     return Questions(
         asked, lambda bounds: GustProofs(bounds=bounds, exact_frozen=exact_frozen), long[::-1]
@@ -127,9 +125,8 @@ def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Ques
 def longitudinal_questions(heli: Helicopter, effort: Effort) -> Questions:
     """About the baseline, continuous time."""
     loop, channel = longitudinal_loop(heli), "longitudinal"
-    asked = guarantees.bounds(
-        "baseline", channel, loop, effort.longitudinal_rates, effort.gust_segments, GLANCE
-    )
+    form = Spline(segments=effort.gust_segments)
+    asked = guarantees.bounds("baseline", channel, loop, effort.longitudinal_rates, form, GLANCE)
     asked += guarantees.lft_bounds("baseline", channel, loop)
     return Questions(asked, lambda bounds: LongitudinalProofs(bounds=bounds))
 
@@ -143,10 +140,9 @@ def servo_questions(
         heli if effort.thorough else None, baseline.nodes, identification.gentle, aggressive
     )
     asked: list[Proof] = []
+    form = Spline(segments=effort.servo_segments)
     for name, loop in loops.items():
-        asked += guarantees.bounds(
-            name, "servo", loop, effort.servo_rates, effort.servo_segments, GLANCE
-        )
+        asked += guarantees.bounds(name, "servo", loop, effort.servo_rates, form, GLANCE)
         if effort.thorough and guarantees.has_lft(loop):
             asked += guarantees.lft_bounds(name, "servo", loop)
     exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=True)
@@ -166,8 +162,8 @@ def robust_questions(
     channel, rates = "robust", effort.robust_rates
     allowed = robust_loop(known.model)
     loops = {
-        guarantees.ESTIMATE: allowed.nominal,
         "baseline": guarantees.servo_loop(guarantees.sampled_baseline(baseline.nodes), FEEDBACK),
+        guarantees.ESTIMATE: allowed.nominal,
     }
     long: list[Proof] = []
     if effort.every_model:
@@ -175,11 +171,12 @@ def robust_questions(
     if effort.thorough:
         exact = ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD, FEEDBACK)
         loops = {"exact": guarantees.scaled(exact)} | loops
-    asked = [*long]
+    asked: list[Proof] = []
     for name, loop in loops.items():
-        asked += guarantees.bounds(name, channel, loop, rates, effort.servo_segments, GLANCE)
+        asked += guarantees.bounds(name, channel, loop, rates, effort.robust_form, GLANCE)
     if effort.thorough:
         asked += guarantees.lft_bounds("baseline", channel, loops["baseline"])
+    asked += long
     return Questions(asked, lambda bounds: RobustProofs(bounds=bounds), long)
 
 
