@@ -32,7 +32,7 @@ class Effort:
     gentle_flight: bool = True
     """Whether they are identified from a gentle flight too."""
     robust_rates: tuple[float, ...] = (0.0, 3.0)
-    robust_form: Spline = Spline(segments=(8,))
+    robust_form: Spline = field(default_factory=lambda: Spline(segments=(8,)))
     """Of the loop with a margin."""
     every_model: bool = True
     """Whether its gain is proven for every model that the flights allow."""

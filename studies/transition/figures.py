@@ -54,8 +54,8 @@ CAPTION = {
         " without a counterpart belong to lags the plant does not need."
     ),
     "gaps": (
-        "nu-gap to the exact model with the airspeed held, from the same noisy flights. Dotted: the"
-        " stability margin of the two lateral loops; a model above it is of no use to that loop."
+        "nu-gap to the exact model with the airspeed held, from the same noisy flights. Thin black:"
+        " the stability margin of either lateral loop; a model above it is of no use to that loop."
     ),
     "gain": (
         "What the rate is worth: L2 gain of the gust loops against permitted acceleration, from"
@@ -357,18 +357,13 @@ def gaps(found: KnownKinematics) -> Figure:
             )
         ax.set_title(f"nu-gap, {axis}")
         ax.set_xlabel("airspeed (m/s)")
-    for loop, margin in found.margins.items():
-        axes[0][0].semilogy(SPEEDS, margin, ":", color=INK, linewidth=1)
-        axes[0][0].annotate(
-            f"margin, {loop}",
-            (SPEEDS[-1], margin[-1]),
-            xytext=(0, 3),
-            textcoords="offset points",
-            ha="right",
-            fontsize=7.5,
+    for style, (loop, margin) in zip((":", "-."), found.margins.items(), strict=True):
+        axes[0][0].semilogy(
+            SPEEDS, margin, style, color=INK, linewidth=1, label=f"margin of the {loop}"
         )
     axes[0][0].set_ylim(1e-3, 1.1)
-    axes[0][1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    legend = axes[0][0].get_legend_handles_labels()
+    axes[0][1].legend(*legend, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 

@@ -287,20 +287,14 @@ def known_kinematics(found: KnownKinematics) -> list[Table]:
     )
     axes, speeds = list(found.rivals[0].gaps), list(found.rivals[0].static)
     held = Table(
-        "Airspeed held at 27 points from hover to 13 m/s: worst nu-gap to the exact model, at how"
-        " many points its stability differs, static gain of the lateral loop over the exact one",
-        [
-            "model",
-            *(f"nu-gap, {axis}" for axis in axes),
-            *(f"stability, {axis}" for axis in axes),
-            *(f"static, {v:g} m/s" for v in speeds),
-        ],
+        "Airspeed held at 27 points from hover to 13 m/s: worst nu-gap to the exact model / at how"
+        " many points its stability differs; static gain of the lateral loop over the exact one",
+        ["model", *axes, *(f"static, {v:g} m/s" for v in speeds)],
     )
     for r in found.rivals:
-        gaps = (f"{r.gaps[axis].max():.3f}" if axis in r.gaps else "" for axis in axes)
-        unlike = (str(r.unlike.get(axis, "")) for axis in axes)
+        gaps = (f"{r.gaps[a].max():.3f} / {r.unlike[a]}" if a in r.gaps else "" for a in axes)
         static = (f"{r.static[v]:.2f}" if v in r.static else "" for v in speeds)
-        held.rows.append([r.name, *gaps, *unlike, *static])
+        held.rows.append([r.name, *gaps, *static])
     held.remarks.append("Blank: the model has no such axis.")
     margins = ", ".join(
         f"{margin.min():.3f} at {SPEEDS[margin.argmin()]:g} m/s ({loop})"
