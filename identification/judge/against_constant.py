@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -34,12 +35,25 @@ Trim = Literal["auto", "moving", "still"]
 
 @dataclass(frozen=True, kw_only=True)
 class Scored:
-    """A model and its scores on the samples it was fitted to and on those held out, if any."""
+    """A model beside the samples it was fitted to and those held out, if any; its scores on either
+    are computed when they are asked for.
+    """
 
     label: str
     model: LPVARXModel
-    in_sample: Scores
-    held_out: Scores | None
+    training: FlightRecord
+    test: FlightRecord | None
+    hold_p: bool
+
+    @cached_property
+    def in_sample(self) -> Scores:
+        """On the samples it was fitted to."""
+        return scores(self.model, self.training, hold_p=self.hold_p)
+
+    @cached_property
+    def held_out(self) -> Scores | None:
+        """On those held out, if any."""
+        return None if self.test is None else scores(self.model, self.test, hold_p=self.hold_p)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,12 +250,7 @@ def against_constant(
         for label, one in structures.items():
             model = fit(one, training, method)
             found.append(
-                Scored(
-                    label=label,
-                    model=model,
-                    in_sample=scores(model, training, hold_p=hold_p),
-                    held_out=None if test is None else scores(model, test, hold_p=hold_p),
-                )
+                Scored(label=label, model=model, training=training, test=test, hold_p=hold_p)
             )
         return found
 

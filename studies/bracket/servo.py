@@ -19,11 +19,12 @@ from studies.transition.flights import TOP, FlightPlan, autopilot_for
 from studies.transition.guarantees import Bound
 from studies.transition.results import bound_to_dict
 from symheli import Helicopter
+from synthesis import Spline
 
 RATES = (0.0, 0.1, 1.0, 3.0, 4.5, 8.0, 20.0, math.inf)
 """Permitted accelerations, m/s^2."""
 
-SEGMENTS = (8,)
+FORM = Spline(segments=(8,))
 
 
 def measure_servo(heli: Helicopter, quick: bool = False) -> list[Bound]:
@@ -41,7 +42,7 @@ def measure_servo(heli: Helicopter, quick: bool = False) -> list[Bound]:
     for name, loop in guarantees.servo_loops(heli, family, gentle, aggressive).items():
         progress(name)
         rates = (0.0, 3.0, math.inf) if quick else RATES
-        asked = guarantees.bounds(name, "servo", loop, rates, SEGMENTS, Effort().search)
+        asked = guarantees.bounds(name, "servo", loop, rates, FORM, Effort().search)
         if guarantees.has_lft(loop):
             asked += guarantees.lft_bounds(name, "servo", loop)
         found += guarantees.answered(asked)

@@ -8,6 +8,8 @@ from 1 to 13 m/s.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from symheli import LinearModel
@@ -23,12 +25,12 @@ SIZES = {"d_lat": 0.01, "d_ped": 0.05, "v": 3.0, "p": 1.0, "r": 1.0, "phi": 0.3}
 """A change of this size (SI) counts as 1 in nu-gaps and in the margin."""
 
 
-def margin(model: LinearModel) -> float:
+def margin(model: LinearModel, gains: Mapping[tuple[str, str], float] = FEEDBACK) -> float:
     """b(P, C) of the loop around a discrete lateral model that has `INPUTS` and `OUTPUTS`."""
     plant = model.select(inputs=INPUTS, outputs=OUTPUTS)
     return stability_margin(
         plant,
-        FEEDBACK,
+        gains,
         input_scale=np.array([SIZES[u] for u in INPUTS]),
         output_scale=np.array([SIZES[y] for y in OUTPUTS]),
     )

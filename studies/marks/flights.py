@@ -57,9 +57,12 @@ def aggressive(
     noise_db: float | None = NOISE_DB,
     servos: bool = False,
     wind: Wind | None = None,
+    longest: float = LONGEST,
 ) -> FlightPlan:
-    """Ramps at 1.5 to 4 m/s^2 between 0 and 13 m/s, multisines on all inputs, at most 150 s."""
-    schedule = _ramps(RAMPS, HOLD, LONGEST)
+    """Ramps at 1.5 to 4 m/s^2 between 0 and 13 m/s, multisines on all inputs, at most `longest`
+    (s).
+    """
+    schedule = _ramps(RAMPS, HOLD, longest)
     return _plan(schedule, seed, autopilot, noise_db, servos, wind)
 
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 import symheli
-from identification import BaselineModel, KinematicModel, fit_percent
+from identification import BaselineModel, fit_percent
 from studies.marks.flights import aggressive, transition
 from studies.marks.models import identified
-from studies.marks.truth import AXES, SPEEDS, Truth, static_gain
+from studies.marks.truth import SPEEDS, Truth, frozen_axes
 from studies.output import as_json, progress
 from studies.processes import Processes
 from studies.stamped_tables import DOCS, keep, parsed, processor
@@ -37,6 +37,9 @@ PAIRS = {"xcell60": "xcell_kahn_hudson", "xcell_kahn_hudson": "xcell60"}
 OUTPUTS = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 HORIZON = 50
 """Samples ahead: one second."""
+
+STATIC_SPEEDS = (0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
+"""Airspeeds at which static gains are compared, m/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,34 +101,24 @@ def of_seed(setting: Setting, seed: int) -> Marks:
     model = identified(training, simulator, setting.servos, setting.turbulent)
     test = symheli.fly(heli, transition(seed, autopilot, servos=setting.servos))
     truth = Truth.of(heli, setting.servos)
+    models = frozen_axes(model, truth)
     gaps = {
         name: (float(gap.max()), float(SPEEDS[gap.argmax()]))
-        for name, gap in truth.gaps(model).items()
+        for name, gap in truth.gaps(models).items()
     }
     clean = states_of(heli, test)
     return Marks(
         seed=seed,
         gaps=gaps,
-        stability=truth.falsely_stable(model),
-        static={} if setting.servos else static_ratios(truth, model),
-        ahead=_fits(clean, model.predict(test, HORIZON)),
-        baseline=_fits(clean, baseline_of(heli, test)),
-        measured=_fits(test.columns(OUTPUTS), model.predict(test, HORIZON)),
-        closed_loop=_fits(clean, model.closed_loop(test)),
+        stability=truth.falsely_stable(models)["all axes"],
+        static=(
+            {} if setting.servos else {v: truth.static_ratio(models, v) for v in STATIC_SPEEDS}
+        ),
+        ahead=fits_of(clean, model.predict(test, HORIZON)),
+        baseline=fits_of(clean, baseline_of(heli, test)),
+        measured=fits_of(test.columns(OUTPUTS), model.predict(test, HORIZON)),
+        closed_loop=fits_of(clean, model.closed_loop(test)),
     )
-
-
-def static_ratios(truth: Truth, model: KinematicModel) -> dict[float, float]:
-    """Identified over exact static gain of the study's lateral loop at some airspeeds."""
-    from studies.marks.truth import frozen
-
-    out = {}
-    for airspeed in (0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 13.0):
-        k = int(np.argmin(np.abs(SPEEDS - airspeed)))
-        exact = truth.models["lateral"][k]
-        found = frozen(model, AXES["lateral"], float(SPEEDS[k]))
-        out[airspeed] = static_gain(found) / static_gain(exact)
-    return out
 
 
 def states_of(heli: Helicopter, record: FlightRecord) -> Array:
@@ -148,7 +141,8 @@ def baseline_of(heli: Helicopter, record: FlightRecord) -> Array:
     return baseline.on(record).predict(OUTPUTS, HORIZON)
 
 
-def _fits(truth: Array, guess: Array) -> dict[str, float]:
+def fits_of(truth: Array, guess: Array) -> dict[str, float]:
+    """In percent, by output."""
     return dict(zip(OUTPUTS, fit_percent(truth, guess).tolist(), strict=True))
 
 
@@ -217,7 +211,7 @@ def seeds_of(text: str) -> list[int]:
 def measure(setting: Setting, seeds: Sequence[int]) -> tuple[list[Marks], dict[str, float]]:
     """Every seed, a process a core; and the simulator's own gaps."""
     heli, simulator = setting.helicopters()
-    own = Truth.of(heli, setting.servos).gaps(Truth.of(simulator, setting.servos))
+    own = Truth.of(heli, setting.servos).gaps(Truth.of(simulator, setting.servos).models)
     with Processes() as processes:
         found = [
             f.result() for f in processes.submit([partial(of_seed, setting, s) for s in seeds])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from identification import FilterError, KinematicARX, KinematicModel, Polynomial, Product, fit
 from studies.transition.flights import TOP
 from symheli import FlightRecord, Helicopter, SimulatedFlight
@@ -14,6 +16,8 @@ FASTEST = 4.0
 
 GUST = 2.0
 """Standard deviation given for what the air may do in light turbulence, m/s."""
+
+CONSTANT, ALONE, BOTH = "constant coefficients", "over airspeed", "over airspeed and acceleration"
 
 
 def structure(servos: bool = False, turbulent: bool = False) -> KinematicARX:
@@ -31,14 +35,24 @@ def structure(servos: bool = False, turbulent: bool = False) -> KinematicARX:
     return KinematicARX(inputs, SCHEDULING, basis=basis, nb=4 if servos else 2, offset_rate=False)
 
 
+def structures() -> dict[str, KinematicARX]:
+    """The same beside those that are not scheduled on the acceleration, whose trims move with the
+    rate of the airspeed instead, and on nothing.
+    """
+    both = structure()
+    alone = replace(both, scheduling=SCHEDULING[0], basis=Polynomial(3, 0.0, TOP), offset_rate=True)
+    return {CONSTANT: replace(alone, basis=Polynomial(0, 0.0, TOP)), ALONE: alone, BOTH: both}
+
+
 def identified(
     records: FlightRecord | list[FlightRecord],
     simulator: Helicopter,
     servos: bool = False,
     turbulent: bool = False,
+    kin: KinematicARX | None = None,
 ) -> KinematicModel:
     """By the filter error method, its instruments flown in `simulator`; the gust a hidden state
-    where the air is `turbulent`.
+    where the air is `turbulent`. `kin`: another structure than that of `structure`.
     """
     method = FilterError(SimulatedFlight(simulator), gust=GUST if turbulent else 0.0)
-    return fit(structure(servos, turbulent), records, method=method)
+    return fit(kin or structure(servos, turbulent), records, method=method)

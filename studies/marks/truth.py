@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,6 +42,10 @@ AXES: Mapping[str, Axis] = {
 }
 
 
+FrozenAxes = Mapping[str, Sequence[LinearModel]]
+"""Models at `SPEEDS` by axis."""
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
     """Linear models at `SPEEDS`, 50 Hz, by axis; from the commands where servos fly."""
@@ -57,39 +61,53 @@ class Truth:
         for name, axis in AXES.items():
             if servos and axis.states is not None:
                 continue
-            models[name] = tuple(_sampled(model, axis, servos) for model in exact)
+            models[name] = tuple(sampled(model, axis, servos) for model in exact)
         return cls(models, servos)
 
-    def gaps(self, other: KinematicModel | Truth) -> dict[str, Array]:
-        """nu-gap at each airspeed, by axis."""
+    def gaps(self, models: FrozenAxes, points: int = 2000) -> dict[str, Array]:
+        """nu-gap at each airspeed, by axis, of the axes that `models` have; `points` as of
+        `nu_gap`.
+        """
         return {
             name: np.array(
                 [
                     nu_gap(
                         exact,
-                        other.models[name][k]
-                        if isinstance(other, Truth)
-                        else frozen(other, AXES[name], float(SPEEDS[k])),
+                        other,
                         input_scale=[SCALES[u] for u in AXES[name].inputs],
                         output_scale=[SCALES[y] for y in AXES[name].outputs],
+                        points=points,
                     )
-                    for k, exact in enumerate(models)
+                    for exact, other in zip(self.models[name], models[name], strict=True)
                 ]
             )
-            for name, models in self.models.items()
+            for name in self.models
+            if name in models
         }
 
-    def falsely_stable(self, model: KinematicModel) -> int:
-        """Airspeeds at which the whole model is unstable and the truth is stable, counted together
-        with the reverse.
+    def falsely_stable(self, models: FrozenAxes) -> dict[str, int]:
+        """By axis: airspeeds at which the model is unstable and the truth is stable, counted
+        together with the reverse.
         """
-        return sum(
-            exact.is_stable() != frozen(model, AXES["all axes"], float(v)).is_stable()
-            for exact, v in zip(self.models["all axes"], SPEEDS, strict=True)
-        )
+        return {
+            name: sum(
+                exact.is_stable() != other.is_stable()
+                for exact, other in zip(self.models[name], models[name], strict=True)
+            )
+            for name in self.models
+            if name in models
+        }
+
+    def static_ratio(self, models: FrozenAxes, airspeed: float) -> float:
+        """Static gain of the study's lateral loop around the model over that around the truth, at
+        the nearest of `SPEEDS`.
+        """
+        k = int(np.argmin(np.abs(SPEEDS - airspeed)))
+        return static_gain(models["lateral"][k]) / static_gain(self.models["lateral"][k])
 
 
-def _sampled(model: LinearModel, axis: Axis, servos: bool) -> LinearModel:
+def sampled(model: LinearModel, axis: Axis, servos: bool = False) -> LinearModel:
+    """The part of a continuous model that is an axis, at 50 Hz."""
     kept = model if axis.states is None else model.select(states=axis.states)
     kept = kept.select(inputs=axis.inputs, outputs=axis.outputs)
     if not servos:
@@ -108,6 +126,13 @@ def delayed(model: LinearModel) -> LinearModel:
     return LinearModel(
         A, B, C, np.zeros_like(model.D), states, model.inputs, model.outputs, dt=model.dt
     )
+
+
+def frozen_axes(model: KinematicModel, truth: Truth) -> FrozenAxes:
+    """An identified model at `SPEEDS`, in the axes of the truth."""
+    return {
+        name: tuple(frozen(model, AXES[name], float(v)) for v in SPEEDS) for name in truth.models
+    }
 
 
 def frozen(model: KinematicModel, axis: Axis, airspeed: float) -> LinearModel:

@@ -147,12 +147,14 @@ def identify(
         )
 
 
-def update_time(axis: Axis, flight: FlightRecord) -> float:
-    """Processor time (s) of one recursive update of the axis's coefficients along a flight, lags
-    and basis included.
+def update_time(structure: LPVARX, flight: FlightRecord) -> float:
+    """Processor time (s) of one recursive update of all coefficients along a flight, lags and basis
+    included.
     """
-    online = RecursiveLeastSquares(axis.structure()).online()
-    rows = flight.columns((*axis.outputs, *axis.inputs, SCHEDULING))
+    online = RecursiveLeastSquares(structure).online()
+    rows = structure.prepared(flight).columns(
+        (*structure.outputs, *structure.inputs, *structure.parameters)
+    )
     online.run(rows, history=False)
     begin = time.thread_time()
     online.run(rows, history=False)

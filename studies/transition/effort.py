@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from synthesis import Search
+from studies.marks.flights import LONGEST as AGGRESSIVE
+from studies.marks.guarantee import FORM
+from synthesis import Search, Spline
 
 GLANCE = Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000)
 """A short look for bad airspeeds."""
@@ -25,6 +27,15 @@ class Effort:
     """Whether a P with a memory, the exact models and the LFT tests of the servo loops are part of
     it.
     """
+    aggressive: float = AGGRESSIVE
+    """Longest aggressive flight of the models that know their kinematics, s."""
+    gentle_flight: bool = True
+    """Whether they are identified from a gentle flight too."""
+    robust_rates: tuple[float, ...] = (0.0, 3.0)
+    robust_form: Spline = field(default_factory=lambda: Spline(segments=(8,)))
+    """Of the loop with a margin."""
+    every_model: bool = True
+    """Whether its gain is proven for every model that the flights allow."""
     servo_rates: tuple[float, ...] = (0.0, 3.0, 8.0, math.inf)
     servo_segments: tuple[int, ...] = (8,)
     search: Search = field(default_factory=Search)
@@ -35,4 +46,20 @@ class Effort:
     @classmethod
     def look(cls) -> Effort:
         """Shorter flights, fewer certificates of a simpler form."""
-        return cls(6, 4, (0.0, 3.0, math.inf), (8,), (), (), False, (0.0, math.inf), (4,), GLANCE)
+        return cls(
+            ramps=6,
+            gentle_ramps=4,
+            gust_rates=(0.0, 3.0, math.inf),
+            gust_segments=(8,),
+            exact_rates=(),
+            longitudinal_rates=(),
+            thorough=False,
+            aggressive=100.0,
+            gentle_flight=False,
+            robust_rates=(3.0,),
+            robust_form=FORM,
+            every_model=False,
+            servo_rates=(0.0, math.inf),
+            servo_segments=(4,),
+            search=GLANCE,
+        )

@@ -10,8 +10,11 @@ import numpy as np
 
 from studies.figures import gain_curve
 from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED
+from studies.marks import models
+from studies.marks.truth import SPEEDS
 from studies.transition.flights import NOISES
 from studies.transition.guarantees import curves
+from studies.transition.known_kinematics import CUBIC, KNOWN, TWO_INPUTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     from studies.figures.gain_curve import GainCurve
     from studies.transition.comparison import ComparedAxis
     from studies.transition.flights import Flights
+    from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import Experiment
 
@@ -48,6 +52,10 @@ CAPTION = {
         " nu-gap to the exact model (1: a mode is stable in one and unstable in the other); dotted:"
         " the chordal distance above {:g} rad/s, where slow modes do not decide. Identified poles"
         " without a counterpart belong to lags the plant does not need."
+    ),
+    "gaps": (
+        "nu-gap to the exact model with the airspeed held, from the same noisy flights. Thin black:"
+        " the stability margin of either lateral loop; a model above it is of no use to that loop."
     ),
     "gain": (
         "What the rate is worth: L2 gain of the gust loops against permitted acceleration, from"
@@ -96,6 +104,8 @@ def figures(study: Outcome) -> Iterator[tuple[str, str, Figure]]:
             for f in study.comparison.frozen:
                 caption = CAPTION["frozen"].format(f.axis.name, f.found.fast)
                 yield f"frozen-{f.axis.name}", caption, frozen(f.found)
+        if study.known_kinematics:
+            yield "gaps", CAPTION["gaps"], gaps(study.known_kinematics)
         if found := curves(study.bounds):
             yield "gain-against-rate", CAPTION["gain"], gain_curves(found)
 
@@ -326,6 +336,34 @@ def frozen(f: FrozenModels) -> Figure:
     axes[0][2].set_title("nu-gap to the exact model")
     axes[0][2].set_xlabel("airspeed (m/s)")
     axes[0][2].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def gaps(found: KnownKinematics) -> Figure:
+    """nu-gap over airspeed, an axis a panel, beside the margins of the lateral loops."""
+    figure, axes = _subplots(1, 2, 11, 3.6, sharey=True)
+    shown = {
+        CUBIC: (ORANGE, "+-"),
+        TWO_INPUTS: (RED, "x-"),
+        KNOWN[models.CONSTANT]: (GREY, "s-"),
+        KNOWN[models.ALONE]: (GREEN, "o-"),
+        KNOWN[models.BOTH]: (BLUE, "o-"),
+        found.rivals[-1].name: (INK, "--"),
+    }
+    for ax, axis in zip(axes[0], ("lateral", "longitudinal"), strict=True):
+        for name, (colour, style) in shown.items():
+            ax.semilogy(
+                SPEEDS, found.of(name).gaps[axis], style, color=colour, label=name, markersize=3
+            )
+        ax.set_title(f"nu-gap, {axis}")
+        ax.set_xlabel("airspeed (m/s)")
+    for style, (loop, margin) in zip((":", "-."), found.margins.items(), strict=True):
+        axes[0][0].semilogy(
+            SPEEDS, margin, style, color=INK, linewidth=1, label=f"margin of the {loop}"
+        )
+    axes[0][0].set_ylim(1e-3, 1.1)
+    legend = axes[0][0].get_legend_handles_labels()
+    axes[0][1].legend(*legend, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 

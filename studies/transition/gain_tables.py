@@ -21,6 +21,10 @@ CHANNELS = {
         "Disturbances at roll cyclic ({d_lat} rad) and pedal ({d_ped} rad) to yaw rate ({r} rad/s)"
         " and roll ({phi} rad), 50 Hz".format(**SIZES)
     ),
+    "robust": (
+        "The same disturbances and outputs in the loop with a margin (sideways velocity and roll to"
+        " roll cyclic, yaw rate to pedal), 50 Hz"
+    ),
 }
 
 

@@ -5,7 +5,7 @@ identified model.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,9 +13,16 @@ import synthesis
 from identification import LPVARXModel
 from studies.figures.gain_curve import GainCurve
 from studies.loops.exact_lateral import ExactLateral
-from studies.loops.lateral import STATES, close
+from studies.loops.lateral import ATTITUDE_HOLD, STATES, close
 from studies.transition.flights import TOP
-from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
+from symheli import (
+    Helicopter,
+    LinearFamily,
+    LinearModel,
+    LPVStateSpace,
+    Scheduling,
+    UncertainStateSpace,
+)
 from symheli.lpv.bases import Polynomial
 from synthesis import Certificate, Memory, Search, Spline
 from synthesis.worst.frozen import norm
@@ -35,6 +42,9 @@ LFT_TESTS = {
     "LFT D": "D",
     "LFT small gain": "small gain",
 }
+ESTIMATE, ALLOWED = "identified, the estimate", "identified, every model allowed"
+"""One model of the flights, and all that their noise leaves possible."""
+
 FORMS = (MEMORY, PLAIN, CONSTANT, *LFT_TESTS)
 """Forms of a proof, the least conservative first; from `CONSTANT` on they let the airspeed jump."""
 
@@ -74,11 +84,13 @@ def gust_loop(family: LinearFamily, degree: int = 3) -> LPVStateSpace:
     return close(family.select(STATES, ["d_lat", "v_w"]).interpolate("polynomial", degree), "gust")
 
 
-def servo_loop(model: LPVStateSpace) -> LPVStateSpace:
+def servo_loop(
+    model: LPVStateSpace, gains: Mapping[tuple[str, str], float] = ATTITUDE_HOLD
+) -> LPVStateSpace:
     """Closed loop from disturbances at d_lat and d_ped to r and phi, each in its size, sampled at
     50 Hz.
     """
-    return scaled(close(model, "inputs"))
+    return scaled(close(model, "inputs", gains))
 
 
 def servo_loops(
@@ -149,7 +161,7 @@ def bounds(
     channel: str,
     lpv: LPVStateSpace,
     rates: Sequence[float],
-    segments: tuple[int, ...],
+    form: Spline,
     search: Search,
 ) -> list[Proof]:
     """One gain a rate (m/s^2), and stability where no gain is proven and no growth was found.
@@ -157,7 +169,6 @@ def bounds(
     `search` sets how hard the lower bound is looked for; among airspeeds that jump, a search that
     spares nothing is quick.
     """
-    form = Spline(segments=segments)
     return [partial(_bound, name, channel, lpv, rate, form, search) for rate in rates]
 
 
@@ -206,6 +217,20 @@ def _lft_bound(name: str, channel: str, lpv: LPVStateSpace, form: str) -> list[B
     return [Bound(name, channel, math.inf, form, gain)]
 
 
+def allowed_bounds(
+    channel: str, loop: UncertainStateSpace, rates: Sequence[float], form: Spline
+) -> list[Proof]:
+    """Gains of every model that the flights allow; no lower bound is looked for."""
+    return [partial(_allowed_bound, channel, loop, rate, form) for rate in rates]
+
+
+def _allowed_bound(
+    channel: str, loop: UncertainStateSpace, rate: float, form: Spline
+) -> list[Bound]:
+    gain = synthesis.l2_gain(loop, rate, form=form, search=None)
+    return [Bound(ALLOWED, channel, rate, PLAIN, gain)]
+
+
 LOOPS = {
     "gust": "Lateral: gust to yaw rate and roll",
     "longitudinal": "Longitudinal: gusts to pitch rate and pitch",
@@ -220,6 +245,11 @@ def curves(found: Sequence[Bound]) -> list[GainCurve]:
         for c, title in LOOPS.items()
         if any(b.channel == c for b in found)
     ]
+
+
+def unit_of(channel: str) -> str:
+    """Of the gain of a channel."""
+    return "1" if channel in ("servo", "robust") else "(rad/s, rad)/(m/s)"
 
 
 def proven(b: Bound) -> float:
@@ -237,7 +267,7 @@ def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> 
         flown[b.rate] = max(b.certificate.lower, flown.get(b.rate, 0.0))
     varying = {form: {b.rate: proven(b) for b in own if b.form == form} for form in (MEMORY, PLAIN)}
     jumping = {b.form: proven(b) for b in own if math.isinf(b.rate)}
-    unit = "1" if channel == "servo" else "(rad/s, rad)/(m/s)"
+    unit = unit_of(channel)
     return GainCurve(
         title,
         unit,

@@ -83,7 +83,7 @@ def identify_axes(heli: Helicopter, flights: Flights) -> Identification:
                 )
             )
     noisy = flights.training[NOISY]
-    times = {axis.name: update_time(axis, noisy) for axis in (*AXES, ALL)}
+    times = {axis.name: update_time(axis.structure(), noisy) for axis in (*AXES, ALL)}
     modes, first_stage = [], {}
     for axis in AXES:
         for method in ("ls", "iv"):

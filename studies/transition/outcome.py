@@ -10,8 +10,9 @@ from studies.transition.comparison import Comparison
 from studies.transition.flights import Flights
 from studies.transition.guarantees import Bound
 from studies.transition.identified import Identification
+from studies.transition.known_kinematics import KnownKinematics
 from studies.transition.paper_experiment import PaperExperiments
-from studies.transition.proofs import GustProofs, LongitudinalProofs, ServoProofs
+from studies.transition.proofs import GustProofs, LongitudinalProofs, RobustProofs, ServoProofs
 from studies.transition.recovery import Recoveries
 from symheli import Helicopter
 
@@ -33,16 +34,18 @@ class Outcome:
     flights: Flights | None = None
     identification: Identification | None = None
     comparison: Comparison | None = None
+    known_kinematics: KnownKinematics | None = None
     gust: GustProofs | None = None
     longitudinal: LongitudinalProofs | None = None
     servo: ServoProofs | None = None
+    robust: RobustProofs | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
     complete: bool = False
 
     @property
     def bounds(self) -> tuple[Bound, ...]:
         """Every certificate, loop by loop."""
-        loops = (self.gust, self.longitudinal, self.servo)
+        loops = (self.gust, self.longitudinal, self.servo, self.robust)
         return tuple(b for loop in loops if loop is not None for b in loop.bounds)
 
     @property

@@ -11,16 +11,19 @@ from typing import Any
 
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.longitudinal import longitudinal_loop
+from studies.loops.robust_lateral import FEEDBACK
+from studies.marks.guarantee import FORM, robust_loop
 from studies.processes import Processes
 from studies.transition import guarantees
 from studies.transition.axes import LATERAL
 from studies.transition.baseline import Baseline
 from studies.transition.effort import GLANCE, Effort
-from studies.transition.flights import NOISES
-from studies.transition.guarantees import Bound, Proof
+from studies.transition.flights import NOISES, TOP
+from studies.transition.guarantees import PERIOD, Bound, Proof
 from studies.transition.identified import Identification
+from studies.transition.known_kinematics import KnownKinematics
 from symheli import Helicopter
-from synthesis import FrozenGain, frozen_gain
+from synthesis import FrozenGain, Spline, frozen_gain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +50,13 @@ class ServoProofs:
     bounds: tuple[Bound, ...]
     exact_frozen: float
     frozen_peaks: Mapping[str, FrozenGain]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobustProofs:
+    """Of the loop with a margin at 50 Hz."""
+
+    bounds: tuple[Bound, ...]
 
 
 Answer = tuple[float, list[Bound]]
@@ -95,9 +105,9 @@ def _known(answer: Answer) -> Future[Answer]:
 
 def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Questions:
     """About the baseline, and with effort the exact models; continuous time."""
-    loop = guarantees.gust_loop(baseline.nodes)
+    loop, form = guarantees.gust_loop(baseline.nodes), Spline(segments=effort.gust_segments)
     baseline_proofs = guarantees.bounds(
-        "baseline", "gust", loop, effort.gust_rates, effort.gust_segments, effort.search
+        "baseline", "gust", loop, effort.gust_rates, form, effort.search
     )
     asked = [*baseline_proofs, *guarantees.lft_bounds("baseline", "gust", loop)]
     long: list[Proof] = []
@@ -105,9 +115,7 @@ def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Ques
         long = guarantees.memory_bounds("baseline", "gust", loop, effort.gust_rates, effort.search)
         asked += long
         exact = ExactLateral.of(heli).loop("gust")
-        asked += guarantees.bounds(
-            "exact", "gust", exact, effort.exact_rates, effort.gust_segments, effort.search
-        )
+        asked += guarantees.bounds("exact", "gust", exact, effort.exact_rates, form, effort.search)
     exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=False)
     return Questions(
         asked, lambda bounds: GustProofs(bounds=bounds, exact_frozen=exact_frozen), long[::-1]
@@ -117,9 +125,8 @@ def gust_questions(heli: Helicopter, baseline: Baseline, effort: Effort) -> Ques
 def longitudinal_questions(heli: Helicopter, effort: Effort) -> Questions:
     """About the baseline, continuous time."""
     loop, channel = longitudinal_loop(heli), "longitudinal"
-    asked = guarantees.bounds(
-        "baseline", channel, loop, effort.longitudinal_rates, effort.gust_segments, GLANCE
-    )
+    form = Spline(segments=effort.gust_segments)
+    asked = guarantees.bounds("baseline", channel, loop, effort.longitudinal_rates, form, GLANCE)
     asked += guarantees.lft_bounds("baseline", channel, loop)
     return Questions(asked, lambda bounds: LongitudinalProofs(bounds=bounds))
 
@@ -133,10 +140,9 @@ def servo_questions(
         heli if effort.thorough else None, baseline.nodes, identification.gentle, aggressive
     )
     asked: list[Proof] = []
+    form = Spline(segments=effort.servo_segments)
     for name, loop in loops.items():
-        asked += guarantees.bounds(
-            name, "servo", loop, effort.servo_rates, effort.servo_segments, GLANCE
-        )
+        asked += guarantees.bounds(name, "servo", loop, effort.servo_rates, form, GLANCE)
         if effort.thorough and guarantees.has_lft(loop):
             asked += guarantees.lft_bounds(name, "servo", loop)
     exact_frozen = guarantees.exact_frozen_gain(baseline.nodes, sampled=True)
@@ -145,6 +151,33 @@ def servo_questions(
         asked,
         lambda bounds: ServoProofs(bounds=bounds, exact_frozen=exact_frozen, frozen_peaks=peaks),
     )
+
+
+def robust_questions(
+    heli: Helicopter, baseline: Baseline, known: KnownKinematics, effort: Effort
+) -> Questions:
+    """About the estimate, the baseline, with effort the exact models and every model that the
+    flights allow; 50 Hz.
+    """
+    channel, rates = "robust", effort.robust_rates
+    allowed = robust_loop(known.model)
+    loops = {
+        "baseline": guarantees.servo_loop(guarantees.sampled_baseline(baseline.nodes), FEEDBACK),
+        guarantees.ESTIMATE: allowed.nominal,
+    }
+    long: list[Proof] = []
+    if effort.every_model:
+        long = guarantees.allowed_bounds(channel, allowed, rates, FORM)
+    if effort.thorough:
+        exact = ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD, FEEDBACK)
+        loops = {"exact": guarantees.scaled(exact)} | loops
+    asked: list[Proof] = []
+    for name, loop in loops.items():
+        asked += guarantees.bounds(name, channel, loop, rates, effort.robust_form, GLANCE)
+    if effort.thorough:
+        asked += guarantees.lft_bounds("baseline", channel, loops["baseline"])
+    asked += long
+    return Questions(asked, lambda bounds: RobustProofs(bounds=bounds), long)
 
 
 def _timed(proof: Proof) -> Answer:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
+from studies.transition.conclusions import certificates, conclusions
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
 from symheli.values.whole_files import write_bytes, write_text
@@ -73,8 +74,10 @@ def _headline(study: Outcome) -> dict[str, object]:
     proven = [b for b in gust if b.certificate.verified]
     hypotheses = list(dict.fromkeys(h for b in proven for h in b.certificate.hypotheses))
     return {
+        "conclusions": conclusions(study),
         "curves": curves(study.bounds),
         "gain_tables": gain_tables.every(study.bounds),
+        "certificates": certificates(study),
         "not_about_the_helicopter": gain_tables.not_about_the_helicopter(study.bounds),
         "frozen_gain": next((b.certificate.frozen for b in gust), None),
         "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),

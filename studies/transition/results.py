@@ -10,7 +10,9 @@ from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from studies.marks.truth import SPEEDS
 from studies.transition.axes import HORIZON
+from studies.transition.guarantees import unit_of
 from studies.transition.paper_experiment import PERIOD
 
 if TYPE_CHECKING:
@@ -20,14 +22,14 @@ if TYPE_CHECKING:
     from studies.transition.flights import Flights
     from studies.transition.guarantees import Bound
     from studies.transition.identified import Identification
+    from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import Channel, Experiment
     from studies.transition.recovery import Recovery
     from symheli import Signal
 
-SCHEMA = "symheli study 2"
+SCHEMA = "symheli study 3"
 LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
-GUST_UNIT = "(rad/s, rad)/(m/s)"
 
 
 def value(number: float, unit: str) -> dict[str, Any]:
@@ -70,6 +72,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         "flights": study.flights and _flights(study.flights),
         "identification": study.identification and _identification(study.identification),
         "comparison": study.comparison and _comparison(study.comparison),
+        "known_kinematics": study.known_kinematics and _known(study.known_kinematics),
         "guarantees": _guarantees(study),
     }
 
@@ -246,10 +249,44 @@ def _both(baseline: Iterable[float], identified: Iterable[float], unit: str) -> 
     return {"baseline": values(baseline, unit), "identified": values(identified, unit)}
 
 
+def _known(found: KnownKinematics) -> dict[str, Any]:
+    return {
+        "training_flights": [
+            {"name": name, "duration": value(seconds, "s")} for name, seconds in found.flown.items()
+        ],
+        "simulator": found.simulator,
+        "airspeed": values(SPEEDS, "m/s"),
+        "models": [
+            {
+                "name": rival.name,
+                "ahead": named(rival.ahead, "%"),
+                "axes": [
+                    {
+                        "axis": axis,
+                        "nu_gap": values(gaps, "1"),
+                        "airspeeds_of_other_stability": value(rival.unlike[axis], "1"),
+                    }
+                    for axis, gaps in rival.gaps.items()
+                ],
+                "static_gain": {
+                    "airspeed": values(rival.static, "m/s"),
+                    "share_of_exact": values(rival.static.values(), "1"),
+                },
+            }
+            for rival in found.rivals
+        ],
+        "margins": [
+            {"loop": loop, "margin": values(margins, "1")}
+            for loop, margins in found.margins.items()
+        ],
+        "update_time": value(found.update_time, "s"),
+    }
+
+
 def _guarantees(study: Outcome) -> dict[str, Any]:
     return {
         "exact_frozen_gain": {
-            channel: value(found, _unit(channel)) for channel, found in study.exact_frozen.items()
+            channel: value(found, unit_of(channel)) for channel, found in study.exact_frozen.items()
         },
         "servo_frozen_peaks": [
             {
@@ -264,13 +301,9 @@ def _guarantees(study: Outcome) -> dict[str, Any]:
     }
 
 
-def _unit(channel: str) -> str:
-    return "1" if channel == "servo" else GUST_UNIT
-
-
 def bound_to_dict(b: Bound) -> dict[str, Any]:
     """One certificate."""
-    c, unit = b.certificate, _unit(b.channel)
+    c, unit = b.certificate, unit_of(b.channel)
     return {
         "model": b.model,
         "channel": b.channel,

@@ -19,6 +19,10 @@ from studies.transition.comparison import Comparison, compare
 from studies.transition.effort import Effort
 from studies.transition.flights import Flights, fly_transitions
 from studies.transition.identified import Identification, identify_axes
+from studies.transition.known_kinematics import (
+    KnownKinematics,
+    identify_with_known_kinematics,
+)
 from studies.transition.outcome import Outcome
 from studies.transition.paper_experiment import PERIOD, PaperExperiments, run_experiments
 from studies.transition.proofs import (
@@ -26,9 +30,11 @@ from studies.transition.proofs import (
     GustProofs,
     LongitudinalProofs,
     Questions,
+    RobustProofs,
     ServoProofs,
     gust_questions,
     longitudinal_questions,
+    robust_questions,
     servo_questions,
 )
 from studies.transition.recovery import Recoveries, recover_at
@@ -209,6 +215,15 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             ),
         ),
         Stage(
+            "known_kinematics",
+            "Identifying with known kinematics",
+            KnownKinematics,
+            ("baseline",),
+            lambda s, effort: identify_with_known_kinematics(
+                _there(s.heli), s.vehicle, _there(s.baseline), s.seed, effort
+            ),
+        ),
+        Stage(
             "gust",
             "Proving gains of the lateral gust loop (baseline and exact, continuous)",
             GustProofs,
@@ -224,6 +239,16 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             ("baseline", "identification"),
             lambda s, effort: servo_questions(
                 _there(s.heli), _there(s.baseline), _there(s.identification), effort
+            ),
+            asks=True,
+        ),
+        Stage(
+            "robust",
+            "Proving gains of the loop with a margin (exact, baseline, identified; 50 Hz)",
+            RobustProofs,
+            ("baseline", "known_kinematics"),
+            lambda s, effort: robust_questions(
+                _there(s.heli), _there(s.baseline), _there(s.known_kinematics), effort
             ),
             asks=True,
         ),

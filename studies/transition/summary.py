@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
+from studies.transition.conclusions import conclusions
 from studies.transition.flights import NOISES
 
 if TYPE_CHECKING:
@@ -27,10 +28,14 @@ def summary(study: Outcome) -> str:
             f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within"
             f" {r.B_error:.0e}"
         )
-    sections = [_marks(study), *(table.text() for table in gain_tables.every(study.bounds))]
+    known = study.known_kinematics
+    sections = [_marks(study)]
+    sections += [table.text() for table in tables.known_kinematics(known)] if known else []
+    sections += [*(table.text() for table in gain_tables.every(study.bounds))]
     sections += [
         "\n".join(gain_tables.not_about_the_helicopter(study.bounds)),
         "\n".join(tables.verdicts(study)),
+        "\n".join(conclusions(study)),
     ]
     return "\n\n".join(["\n".join(lines), *(s for s in sections if s)])
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.marks.truth import SPEEDS
 from studies.transition.axes import (
     ALL,
     AXES,
@@ -22,6 +23,7 @@ from studies.transition.flights import NOISES
 if TYPE_CHECKING:
     from studies.transition.comparison import ComparedAxis
     from studies.transition.identified import Identification
+    from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
 
 
@@ -273,3 +275,33 @@ def _real_time(found: Identification) -> str:
         f" {ALL.structure().n_regressors} regressors each that is {share:.2g} % of the sample"
         " period: the recursion is not too heavy for real time."
     )
+
+
+def known_kinematics(found: KnownKinematics) -> list[Table]:
+    """Who predicts how well, who is how close for feedback."""
+    outputs = list(found.rivals[0].ahead)
+    fits = Table(
+        "1 s ahead on the unseen transition, against its states without noise: fit in percent",
+        ["model", *outputs],
+        [[r.name, *(percent(r.ahead[y]) for y in outputs)] for r in found.rivals if r.ahead],
+    )
+    axes, speeds = list(found.rivals[0].gaps), list(found.rivals[0].static)
+    held = Table(
+        "Airspeed held at 27 points from hover to 13 m/s: worst nu-gap to the exact model / at how"
+        " many points its stability differs; static gain of the lateral loop over the exact one",
+        ["model", *axes, *(f"static, {v:g} m/s" for v in speeds)],
+    )
+    for r in found.rivals:
+        gaps = (f"{r.gaps[a].max():.3f} / {r.unlike[a]}" if a in r.gaps else "" for a in axes)
+        static = (f"{r.static[v]:.2f}" if v in r.static else "" for v in speeds)
+        held.rows.append([r.name, *gaps, *static])
+    held.remarks.append("Blank: the model has no such axis.")
+    margins = ", ".join(
+        f"{margin.min():.3f} at {SPEEDS[margin.argmin()]:g} m/s ({loop})"
+        for loop, margin in found.margins.items()
+    )
+    held.remarks.append(
+        f"Least stability margin b(P, C) of the lateral loops around the exact models: {margins}."
+        " A model is of use to a loop where its nu-gap is well below."
+    )
+    return [fits, held]

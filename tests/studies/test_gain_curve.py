@@ -7,7 +7,7 @@ import pytest
 from studies.figures.gain_curve import GainCurve, plot, save
 from studies.transition import gain_tables, guarantees
 from symheli import LPVStateSpace, Scheduling
-from synthesis import Search
+from synthesis import Search, Spline
 
 NOTHING = {"constant P": math.inf, "LFT D/G": math.inf}
 STEEP = GainCurve(
@@ -55,7 +55,8 @@ def test_the_table_shows_every_form_and_what_a_jumping_airspeed_costs():
         [[[-2.0]], [[1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
     )
     quick = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
-    asked = guarantees.bounds("baseline", "gust", lpv, (0.0, 1.0, math.inf), (2,), quick)
+    form = Spline(segments=(2,))
+    asked = guarantees.bounds("baseline", "gust", lpv, (0.0, 1.0, math.inf), form, quick)
     found = guarantees.answered([*asked, *guarantees.lft_bounds("baseline", "gust", lpv)])
     table = gain_tables.guarantee(found, "gust")
     assert table.columns[5:] == ["P(p)", "constant P", *guarantees.LFT_TESTS]
@@ -80,7 +81,7 @@ def test_a_proof_of_a_model_that_the_exact_one_exceeds_is_said_not_to_hold_for_t
                 "gust",
                 lag(gain),
                 (1.0,),
-                (2,),
+                Spline(segments=(2,)),
                 Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1),
             )
         )

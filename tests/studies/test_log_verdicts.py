@@ -32,11 +32,13 @@ def judged(lpv, lti, *rivals, **over):
         for ahead, free in (lpv, lti, *rivals)
     ]
     labels = ("LPV", "LTI", "LPV, moving trim", "LTI, moving trim")
+    models = []
+    for label, given in zip(labels, scores, strict=False):
+        one = Scored(label=label, model=model, training=record, test=record, hold_p=False)
+        vars(one).update(in_sample=given, held_out=given)  # as if they had been asked for
+        models.append(one)
     return AgainstConstant(
-        models=tuple(
-            Scored(label=n, model=model, in_sample=s, held_out=s)
-            for n, s in zip(labels, scores, strict=False)
-        ),
+        models=tuple(models),
         training=record,
         test=record,
         **over,

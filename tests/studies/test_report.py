@@ -14,12 +14,13 @@ import pytest
 from json_schema import faults
 from matplotlib.figure import Figure
 
+from studies.marks.guarantee import FORM
 from studies.transition import figures, gain_tables, guarantees, report
 from studies.transition import study as stages
 from studies.transition.effort import Effort
 from studies.transition.outcome import Outcome
 from symheli import Helicopter, LPVStateSpace, Scheduling
-from synthesis import Search
+from synthesis import Search, Spline
 
 GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 STAGES = [
@@ -27,7 +28,15 @@ STAGES = [
     for f in fields(Outcome)
     if f.name not in ("vehicle", "quick", "seed", "heli", "seconds", "complete")
 ]
-DRAWN = ("baseline", "paper_experiment", "flights", "comparison", "gust", "longitudinal")
+DRAWN = (
+    "baseline",
+    "paper_experiment",
+    "flights",
+    "comparison",
+    "known_kinematics",
+    "gust",
+    "longitudinal",
+)
 """Those that a figure shows."""
 
 
@@ -35,7 +44,20 @@ DRAWN = ("baseline", "paper_experiment", "flights", "comparison", "gust", "longi
 def full():
     """Every stage, as short as it gets."""
     effort = Effort(
-        6, 4, (0.0, math.inf), (2,), (0.0,), (0.0,), False, (0.0, math.inf), (2,), GLIMPSE
+        ramps=6,
+        gentle_ramps=4,
+        gust_rates=(0.0, math.inf),
+        gust_segments=(2,),
+        exact_rates=(0.0,),
+        longitudinal_rates=(0.0,),
+        thorough=False,
+        aggressive=60.0,
+        gentle_flight=False,
+        robust_rates=(0.0,),
+        robust_form=FORM,
+        servo_rates=(0.0, math.inf),
+        servo_segments=(2,),
+        search=GLIMPSE,
     )
     heli = Helicopter.load("xcell60", governor="ideal")
     study = stages.Study(vehicle="xcell60", quick=True, seed=0, heli=heli)
@@ -71,7 +93,7 @@ def test_the_numbers_of_a_full_outcome_are_what_the_schema_says(full, tmp_path):
 
 def test_an_empty_outcome_says_what_was_not_reached(tmp_path, unpainted):
     text = page(Outcome(vehicle="xcell60", quick=True, seed=0), tmp_path)
-    assert text.count("Not reached") == 6
+    assert text.count("Not reached") == 7
 
 
 def test_any_stage_of_the_outcome_may_be_missing(full, tmp_path, unpainted, monkeypatch):
@@ -80,7 +102,7 @@ def test_any_stage_of_the_outcome_may_be_missing(full, tmp_path, unpainted, monk
         with monkeypatch.context() as undrawn:
             if name not in DRAWN:
                 undrawn.setattr(figures, "figures", lambda _: ())
-            assert "<h2>6" in page(outcome, tmp_path), name
+            assert "<h2>7" in page(outcome, tmp_path), name
         assert outcome.summary(), name
 
 
@@ -105,7 +127,9 @@ def test_a_loop_that_is_unstable_when_frozen_gets_its_report(full, tmp_path, unp
         [[[0.0]]],
         Scheduling("airspeed", "m/s", 0.0, 2.0),
     )
-    asked = guarantees.bounds("baseline", "gust", growing, (0.0, math.inf), (2,), GLIMPSE)
+    asked = guarantees.bounds(
+        "baseline", "gust", growing, (0.0, math.inf), Spline(segments=(2,)), GLIMPSE
+    )
     found = guarantees.answered(asked)
     gust = replace(full.gust, bounds=tuple(found), exact_frozen=math.inf)
     outcome = replace(full, gust=gust)
