@@ -157,7 +157,7 @@ def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, fl
         "|---|---|---|---|---|",
     ]
     limits = (
-        dict.fromkeys(AXES, 0.15)
+        dict.fromkeys(marks[0].gaps, 0.15)
         if setting.servos or setting.turbulent
         else {"lateral": 0.05, "longitudinal": 0.05, "all axes": 0.10}
     )
