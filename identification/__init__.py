@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from identification.judge.scores import Scores, scores
     from identification.judge.slow_modes import SlowMode, SlowModes, slow_modes
     from identification.judge.uncertainty import Band, Uncertainty, uncertainty
+    from identification.judge.unseen_flight import UnseenFlight, unseen_flight
     from identification.model.coefficients import Coefficients, CoefficientValues
     from identification.model.kinematic_model import KinematicModel
     from identification.model.lpvarx_model import LPVARXModel
@@ -122,6 +123,7 @@ _ROOMS = {
     "identification.judge.response_band": "ResponseBand",
     "identification.judge.scores": "Scores scores",
     "identification.judge.slow_modes": "SlowMode SlowModes slow_modes",
+    "identification.judge.unseen_flight": "UnseenFlight unseen_flight",
     "identification.judge.uncertainty": "Band Uncertainty uncertainty",
     "identification.model.coefficients": "Coefficients CoefficientValues",
     "identification.model.kinematic_model": "KinematicModel",
@@ -200,6 +202,7 @@ __all__ = [
     "Theil",
     "Trial",
     "Uncertainty",
+    "UnseenFlight",
     "UserFunctions",
     "Variable",
     "against_constant",
@@ -221,6 +224,7 @@ __all__ = [
     "slow_modes",
     "theil",
     "uncertainty",
+    "unseen_flight",
 ]
 
 __getattr__ = lazily(__name__, _ROOMS)

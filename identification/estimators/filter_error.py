@@ -142,7 +142,7 @@ class FilterError(Method):
             )
         theta, _ = instrumental_variables(arx, records, data, self.simulator)
         flights = [
-            Stretch.of(arx, record, part) for record in records for part in _unbroken(arx, record)
+            Stretch.of(arx, record, part) for record in records for part in unbroken(arx, record)
         ]
         R = self._variances(records)
         Q = np.append(self.misfit * self._unexplained(arx, records), EXACT * R[6:])
@@ -172,6 +172,9 @@ class FilterError(Method):
                 "process_noise": dict(
                     zip(map(str, VELOCITIES), np.sqrt(Q[:6]).tolist(), strict=True)
                 ),
+                "equation_variances": Q.tolist(),
+                "gust": self.gust,
+                "gust_remains": noise.remains,
             },
             remarks=()
             if settled or self.steps == 1
@@ -222,7 +225,7 @@ def noise_variance(signal: Array, segments: Sequence[slice]) -> float:
     return power / weight if weight else 0.0
 
 
-def _unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
+def unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
     """Stretches in which everything was measured, long enough to say something."""
     names = (*STATES, *arx.inputs, *arx.parameters)
     known = np.isfinite(record.columns(dict.fromkeys(names))).all(axis=1)
@@ -334,6 +337,13 @@ class Stretch:
         if noise.gust:
             terms.append(([H], np.full(3, noise.gust * (1 - noise.remains**2))))
         return Linearized(F, left, L, H, Whitening.of(terms))
+
+    def whitened(self, theta: Array, noise: Noise) -> Array:
+        """What the equations leave (m, 8), white and of variance 1 where `noise` is all there
+        is.
+        """
+        _, left, _, _, white = self._linearized(theta, noise)
+        return white.whitened(left)
 
     def normal(self, theta: Array, noise: Noise) -> tuple[Array, Array]:
         """X' X and X' e of the whitened regressors X (.., 6 n), equation by equation."""

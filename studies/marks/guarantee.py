@@ -16,11 +16,11 @@ import numpy as np
 
 import symheli
 import synthesis
-from identification import KinematicModel
+from identification import KinematicModel, unseen_flight
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.robust_lateral import FEEDBACK
 from studies.marks.coverage import coverage
-from studies.marks.flights import aggressive, gentle
+from studies.marks.flights import aggressive, gentle, transition
 from studies.marks.measured import PAIRS, seeds_of
 from studies.marks.models import identified
 from studies.marks.truth import Truth
@@ -95,12 +95,15 @@ def exact_gain(heli: Helicopter) -> Certificate:
 def of_seed(
     truth: str, simulator: str, seed: int, exact: tuple[float, float], with_gentle: bool = True
 ) -> Guarantee:
-    """Fly, identify, prove; `exact`: proven and flown gain of the exact loop."""
+    """Fly, identify, hold against a flight not seen, prove; `exact`: proven and flown gain of the
+    exact loop.
+    """
     heli = Helicopter.load(truth, governor="ideal")
     other = Helicopter.load(simulator, governor="ideal")
     autopilot = autopilot_for(heli)
     plans = [aggressive(seed, autopilot), *([gentle(seed, autopilot)] if with_gentle else [])]
     model = identified([symheli.fly(heli, plan) for plan in plans], other)
+    unseen_flight(model, symheli.fly(heli, transition(seed, autopilot))).require()
     loop = robust_loop(model)
     proof = synthesis.l2_gain(loop, rate=RATE, form=FORM, search=None)
     nominal = synthesis.frozen_gain(loop.nominal).gamma

@@ -1,0 +1,123 @@
+"""Can an identified model, with the noise it was identified with, explain a flight it has not
+seen?
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.estimators.filter_error import Noise, Stretch, unbroken
+from identification.model.kinematic_model import KinematicModel
+from identification.structure.kinematic_arx import STATES
+from symheli.errors import InputError
+from symheli.records import FlightRecord
+
+SURE = 3.0
+"""Standard deviations of chance that a flight may exceed what noise leaves."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnseenFlight:
+    """What a model leaves of a flight, as a share of what its noise would: `power` of all
+    whitened equations together, `largest` that is put up with, `samples` it rests on.
+
+    Examples
+    --------
+    >>> import identification as idn
+    >>> idn.UnseenFlight(power=1.4, largest=1.05, samples=2000).explained
+    False
+    """
+
+    power: float
+    largest: float
+    samples: int
+
+    @property
+    def explained(self) -> bool:
+        """Whether the flight is one the model may have made."""
+        return self.power <= self.largest
+
+    def require(self) -> None:
+        """Raises `InputError` for a flight that the model cannot explain."""
+        if not self.explained:
+            raise InputError(
+                f"the model leaves {self.power:.2f} of what its noise explains on this flight, more"
+                f" than {self.largest:.2f}: no certificate about it holds for this vehicle;"
+                " identify from this flight too, or look for what has changed"
+            )
+
+
+def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
+    """Hold a model against a flight it has not seen: chi-squared of the equations, whitened by the
+    covariance of sensor noise and of what the structure leaves out, with what errors of the
+    coefficients add on this flight.
+
+    Parameters
+    ----------
+    model : KinematicModel
+        Fitted by `FilterError`, which says how large both are.
+    record : FlightRecord
+        With the signals of the model, at its sample period; sensors as in the flights it was
+        identified from.
+
+    Returns
+    -------
+    UnseenFlight
+        `.explained`, or `.require()`.
+
+    Raises
+    ------
+    InputError
+        A model of another method, a record of another sample period or without a complete second.
+
+    References
+    ----------
+    Smith and Doyle (1992), Model validation: a connection between robust control and
+    identification, IEEE Trans. Automatic Control 37, for the question; Ljung (1999), sec. 16.6, for
+    the test.
+
+    Examples
+    --------
+    >>> import identification as idn, symheli
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> wrong = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
+    >>> ramps = symheli.AirspeedSchedule((6.0, 2.0), (1.5, 1.5), (2.0, 2.0), start=2.0)
+    >>> excited = symheli.Excitation(dict.fromkeys(heli.inputs, 0.01))
+    >>> flights = [
+    ...     symheli.fly(vehicle, ramps, noise_db=30.0, seed=seed, excitation=excited)
+    ...     for vehicle, seed in ((heli, 1), (heli, 2), (wrong, 3))]
+    >>> kin = idn.KinematicARX(heli.inputs, "airspeed_command", basis=idn.Polynomial(1, 2.0, 6.0))
+    >>> model = idn.fit(kin, flights[0], method=idn.FilterError(symheli.SimulatedFlight(wrong)))
+    >>> [idn.unseen_flight(model, flight).explained for flight in flights[1:]]
+    [True, False]
+    """
+    details = model.details
+    if "sensor_noise" not in details:
+        raise InputError(
+            f"method {model.method!r} does not say how large the noise is: fit by FilterError"
+        )
+    aero = model.structure.aerodynamics
+    prepared = aero.prepared(record)
+    model.aerodynamics.require_same_kind(prepared)
+    R = np.array([details["sensor_noise"][s] for s in STATES]) ** 2
+    noise = Noise(
+        R, np.array(details["equation_variances"]), details["gust"] ** 2, details["gust_remains"]
+    )
+    covariance = model.coefficient_covariance
+    assert covariance is not None  # noqa: S101  what says its noise says this too
+    C = covariance.reshape(model.theta.size, -1)
+    power, unknown, spread, count, samples = 0.0, 0.0, 0.0, 0, 0
+    for part in unbroken(aero, prepared):
+        s = Stretch.of(aero, prepared, part)
+        white = s.whitened(model.theta, noise)
+        power += float(np.sum(white**2))
+        said = s.normal(model.theta, noise)[0] @ C  # what errors of the coefficients add
+        unknown, spread = unknown + np.trace(said), spread + np.sum(said * said.T)
+        count, samples = count + white.size, samples + len(white)
+    if samples * model.dt < 1.0:
+        raise InputError("the record has no complete second to judge by")
+    chance = SURE * float(np.sqrt(2 * (count + spread)))
+    largest = (count + float(unknown) + chance) / count
+    return UnseenFlight(power=power / count, largest=largest, samples=samples)
