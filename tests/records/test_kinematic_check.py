@@ -131,6 +131,7 @@ def test_faults_of_every_kind_come_back_within_their_errors(seed):
         found.require()
 
 
+@pytest.mark.slow
 def test_faults_put_into_flights_come_back_and_errors_tell_the_scatter(ideal):
     """Three standard errors, as often as a normal number may: of 20 flights x 4 numbers the worst
     below the limit of one in a thousand, the mean square near one (0.6 to 1.6: 80 numbers).
@@ -249,6 +250,7 @@ def test_a_short_record_and_one_without_rates_say_what_they_lack():
         short["d_lon"]
 
 
+@pytest.mark.slow
 def test_a_long_record_is_compared_in_pieces_spread_over_it():
     """An hour at 10 Hz: a bias that comes in the last half is seen, and the time is bounded."""
     record = analytic(n=36000, dt=0.1)
