@@ -17,6 +17,7 @@ from identification.estimators.instrumental_variables import instrumental_variab
 from identification.estimators.instruments import FlightSource, flown_rows
 from identification.estimators.least_squares import least_squares
 from identification.estimators.method import Estimate, Method, not_settled
+from identification.estimators.newey_west import long_run_covariance
 from identification.structure.kinematic_arx import STATES, Aerodynamics, increments
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression, Samples, regressor_rows
@@ -388,21 +389,11 @@ class Stretch:
     def scores(self, theta: Array, noise: Noise) -> Array:
         """Covariance (6 n, 6 n) of X' e, e correlated over `LAGS` samples (Newey and West)."""
         F, left, _, _, white = self._linearized(theta, noise)
-        n, total, tail = 6 * F.shape[1], 0.0, np.zeros((0, 6 * F.shape[1]))
-        out = np.zeros((n, n))
-        for rows in self._whitened(F, left, white):
-            g = np.einsum("kij,ki->kj", rows[:, :, :-1], rows[:, :, -1])
-            whole = np.vstack([tail, g])
-            sums = np.cumsum(np.vstack([np.zeros((1, n)), whole]), axis=0)
-            ends = np.arange(len(tail) + 1, len(whole) + 1)
-            moving = sums[ends] - sums[np.maximum(ends - LAGS - 1, 0)]
-            out += moving.T @ moving
-            tail = whole[-LAGS:]
-            total += len(g)
-        for k in range(1, len(tail) + 1):  # windows that run out at the end
-            rest = tail[k:].sum(axis=0)
-            out += np.outer(rest, rest)
-        return out / (LAGS + 1)
+        parts = (
+            np.einsum("kij,ki->kj", rows[:, :, :-1], rows[:, :, -1])
+            for rows in self._whitened(F, left, white)
+        )
+        return long_run_covariance(parts, LAGS)
 
     def residual(self, theta: Array) -> Array:
         """Covariance (6, 6) of what one step leaves, measured to measured."""

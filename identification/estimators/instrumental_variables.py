@@ -27,6 +27,7 @@ from identification.estimators.instruments import (
 )
 from identification.estimators.least_squares import least_squares, least_squares_by_group
 from identification.estimators.method import Estimate, Method
+from identification.estimators.newey_west import long_run_covariance
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression
 from symheli.errors import DataWarning, ExcitationError, InputError
@@ -35,6 +36,9 @@ from symheli.values.arrays import Array
 
 NOISE_FREE = 1e-6
 """A residual below this part of every output biases no estimate."""
+
+LAGS = 25
+"""Samples over which residuals are taken to be correlated."""
 
 TINY = np.finfo(float).tiny
 
@@ -91,11 +95,38 @@ class InstrumentalVariables(Method):
         theta, weakest = instrumental_variables(arx, records, data, source)
         error = np.mean((data.y - data.phi @ theta) ** 2, axis=0)
         residual = np.sqrt(error / np.mean(data.y**2, axis=0).clip(TINY))
+        covariance = None
+        if isinstance(source, FlightSource) and len(arx.groups) == 1:
+            covariance = _of_flown(arx, records, data, source, theta)
         return Estimate(
             theta=theta,
             details={"first_stage_F": weakest.F, "weakest": weakest.direction},
             remarks=_weakness(weakest) if np.any(residual > NOISE_FREE) else (),
+            covariance=covariance,
         )
+
+
+def _of_flown(
+    arx: LPVARX,
+    records: Sequence[FlightRecord],
+    data: Regression,
+    source: FlightSource,
+    theta: Array,
+) -> Array:
+    """M^-1 S M^-T (ny, n, ny, n) of theta = M^-1 Z' Y, M = Z' Phi, S the covariance of Z' e with e
+    correlated over `LAGS` samples, in time and between equations.
+    """
+    Z = instrument_rows(arx, records, source, arx.input_lags.start)[data.rows]
+    known = np.isfinite(Z).all(axis=1)
+    Z, phi = Z[known], data.phi[known]
+    scale, lengths = column_scale(Z), column_scale(phi)
+    W = np.linalg.inv((Z / scale).T @ (phi / lengths)) / lengths[:, None]
+    n, ny = phi.shape[1], data.y.shape[1]
+    error = data.y[known] - phi @ theta
+    scores = ((error[:, :, None] * (Z / scale)[:, None, :]).reshape(len(Z), -1),)
+    S = long_run_covariance(scores, LAGS).reshape(ny, n, ny, n)
+    out = np.einsum("ab,ibjc,dc->iajd", W, S, W, optimize=True)
+    return 0.5 * (out + out.transpose(2, 3, 0, 1))
 
 
 def _weakness(weakest: FirstStage) -> tuple[Warning, ...]:

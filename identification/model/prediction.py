@@ -166,7 +166,7 @@ def _free_run(run: Recursion, part: slice, out: Array) -> None:
     na, ny = run.na, run.y.shape[1]
     A = run.A.transpose(0, 2, 1, 3).reshape(len(run.y), ny, na * ny)
     past, alive = np.zeros(na * ny), False
-    known = np.isfinite(run.known).all(axis=1)
+    known = np.asarray(np.isfinite(run.known).all(axis=1))
     for k in range(part.start + run.memory, part.stop):
         if not known[k]:
             alive = False
