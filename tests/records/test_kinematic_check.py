@@ -160,6 +160,7 @@ def test_faults_put_into_flights_come_back_and_errors_tell_the_scatter(ideal):
     assert 0.6 < np.mean(np.square(z)) < 1.6
 
 
+@pytest.mark.slow
 def test_sound_flights_are_consistent_with_noise_and_without(ideal):
     for seed in range(20):
         found = flown(ideal, seed, noise_db=30.0 if seed % 4 else None).check_kinematics()

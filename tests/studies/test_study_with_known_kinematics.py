@@ -32,6 +32,9 @@ from symheli import LPVStateSpace, Scheduling
 ALONE, BOTH = "over airspeed", "over airspeed and acceleration"
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def found(ideal):
     """From one short flight."""

@@ -153,6 +153,7 @@ def test_a_smoothed_trapezoid_keeps_range_rate_and_jerk():
     np.testing.assert_allclose(path.at(t[:10] + wave.period)[0], p[:10], atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jerk", [math.inf, pytest.param(3.0, marks=pytest.mark.slow), 0.5])
 def test_sampled_the_error_of_the_step_is_included(jerk):
     alone = l2_gain(stiffening(0.1), form=Spline(degree=2, segments=4), search=None)

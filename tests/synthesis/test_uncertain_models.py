@@ -192,6 +192,7 @@ def kinked(C, E):
     return UncertainStateSpace(model, "d", "v", 0.5, 1.0, "by choice")
 
 
+@pytest.mark.slow
 def test_a_spline_that_holds_no_products_is_certified_too():
     cert = l2_gain(kinked([0.5, 1.0, 0.2], [1.0, 1.0, 1.0]))
     assert cert.lower == pytest.approx(2.0, rel=1e-6)  # 1/(1 - 0.5) at the kink
