@@ -55,6 +55,16 @@ class FlightLostError(SymheliError):
         self.record = record
 
 
+class SynthesisError(SymheliError):
+    """No controller was found; `reasons` are sentences that say which mode, direction or weight
+    decides.
+    """
+
+    def __init__(self, message: str, reasons: tuple[str, ...] = ()):
+        super().__init__(message)
+        self.reasons = reasons
+
+
 class ExcitationError(SymheliError):
     """The data cannot determine what was asked of them; `report` says which direction is
     missing.

@@ -161,7 +161,7 @@ class _Inequalities:
     def __init__(self, blocks: LyapunovBlocks, program: LyapunovProgram):
         self.blocks = blocks
         self.constant = -blocks.constant - program.back_off
-        self.level = program.level
+        self.level = program.level if blocks.level is None else blocks.level
         self.length = 1 + program.sizes.multipliers
         x = blocks.varying
         self.used = [np.flatnonzero(np.any(x[:, j], axis=(0, 2, 3))) for j in range(x.shape[1])]
@@ -173,7 +173,7 @@ class _Inequalities:
 
     def across(self, Z: Array) -> Array:
         out = np.zeros(self.length)
-        out[0] = np.sum(self.level * Z.sum(axis=0))
+        out[0] = np.sum(self.level * Z)
         if self.blocks.supply is not None:
             self.blocks.supply.add_adjoint(-Z, out[1:])
         return out

@@ -64,6 +64,7 @@ class LyapunovBlocks(NamedTuple):
     `columns` (k,) says which coefficients of P are involved; `fixed` (R, n, N) are the same in all
     m blocks, `varying` (m, k, R, n, N) are not; `constant` (m, N, N). `symmetric`: each sum over r
     is, without its transpose. `supply`: what a norm-bounded block adds to F, None without one.
+    `level` (m, N, N) or (N, N): where g stands instead, None for diag(0, I).
     """
 
     columns: Array
@@ -72,6 +73,7 @@ class LyapunovBlocks(NamedTuple):
     constant: Array
     symmetric: bool = False
     supply: Supplied | None = None
+    level: Array | None = None
 
     def linear(self, P: Array) -> Array:
         """The part (m, N, N) linear in P, at the coefficients P (k', n, n) of the whole spline."""

@@ -1,0 +1,196 @@
+"""Gain-scheduled output feedback by two linear matrix inequalities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symheli.errors import InputError, SynthesisError
+from symheli.lpv import LPVStateSpace
+from synthesis.certificate import Attempt
+from synthesis.design.controller import Controller
+from synthesis.design.coordinates import Coordinates
+from synthesis.design.existence import Existence, Found
+from synthesis.design.fitted import fitted
+from synthesis.design.motions import motions, used
+from synthesis.design.recovery import Gains, controller, split
+from synthesis.design.sampled_recovery import joined
+from synthesis.design.search import BACK_OFF, Dependence, Design, least, settled, shapes
+from synthesis.program.cone_program import LYAPUNOV, Solver
+from synthesis.worst.rates import Rate
+from synthesis.worst.rates import asked as limits
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
+
+Array = np.ndarray
+
+ACCURACY = 1e-4
+"""Of the functions of p fitted to the gains, relative."""
+USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
+
+
+def output_feedback(
+    plant: Plant,
+    rate: Rate = None,
+    *,
+    X: Dependence | None = None,
+    Y: Dependence | None = None,
+    back_off: float | Sequence[float] = BACK_OFF,
+    fastest: float = math.inf,
+    divisions: int = 1,
+) -> Controller:
+    """A dynamic controller from the measurements, of as many states as the plant, for every p(t)
+    within its range and rates.
+
+    X(p) belongs to what the measurements tell, Y(p) to what the controls can do. While only one of
+    them moves with a parameter the controller needs no rate of it; both pairs are tried. Both may
+    move with a parameter whose rate is another one (`plant.lagged`), or that stands still.
+
+    Parameters
+    ----------
+    plant : Plant
+        With disturbances, performance, controls and measurements; every control must cost (D12 of
+        full column rank), every measurement be disturbed (D21 of full row rank).
+    rate : float, sequence or mapping, optional
+        Largest |dp/dt|, as for `l2_gain`; by default the plant's own; math.inf: p may jump.
+    X, Y : int, tuple or FunctionSpace, optional
+        Degree in every parameter, one each, or functions; by default 2 for the one that moves.
+    back_off : float or sequence
+        Multiples of the least gamma at which X and Y are settled, tried in turn: at the least
+        itself a controller has poles without limit.
+    fastest : float
+        Largest modulus of a pole of the controller, rad/s (continuous time): a reason to back off
+        further.
+    divisions : int
+        In so many parts every range is cut where the inequalities are imposed.
+
+    Returns
+    -------
+    Controller
+        Its `gamma` is what the inequalities promise; `certify` proves what the controller does.
+
+    Raises
+    ------
+    InputError
+        Signals, ranks, rates or degrees that do not fit, with what to do.
+    SynthesisError
+        There is no such controller, or none was found; `reasons` say which mode, direction or
+        weight decides.
+
+    References
+    ----------
+    Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996); Apkarian and Adams,
+    IEEE Trans. Control Systems Technology 6 (1998).
+    """
+    parameters = limits(plant.parameters, rate)
+    plant = plant.with_scheduling(parameters)
+    check_ranks(plant)
+    attempts: list[Attempt] = []
+    started = []
+    for shape in shapes(parameters, X, Y, plant.dt is not None):
+        start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
+        if math.isfinite(start[2].gamma):
+            started.append((start[0].channel * start[2].gamma, shape, start))
+    if not started:
+        raise failed(plant, attempts)
+    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
+    _, shape, start = min(started, key=lambda s: s[0])
+    best: Controller | None = None
+    for design in settled(start, factors, _recover, USUAL, attempts):
+        made, fast = _made(plant, design, f"output feedback, {shape}")
+        best = made if best is None or fast <= fastest else best
+        if fast <= fastest:
+            break
+    if best is None:
+        raise failed(plant, attempts)
+    return replace(best, attempts=tuple(attempts))
+
+
+def coordinates_of(plant: Plant, channel: float) -> Coordinates:
+    """Coordinates of the plant with performance in units of `channel`."""
+    one = len(plant.parameters) == 1
+    return Coordinates.of(
+        lambda p: plant.matrices(p[:, 0] if one else p), plant.parameters, plant.basis, plant.dt,
+        channel,
+    )  # fmt: skip
+
+
+def check_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
+    """Raises `InputError` where a control costs nothing or a measurement is free of disturbances."""
+
+
+def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
+    """The error that says why."""
+    return SynthesisError("no controller was found:\n  " + "\n  ".join(map(str, attempts)))
+
+
+def _recover(
+    coordinates: Coordinates, existence: Existence, found: Found
+) -> Callable[[Array], Array] | None:
+    X, Y, S = existence.X, existence.Y, existence.S
+    assert X is not None and Y is not None and S is not None  # noqa: S101
+    parameters = coordinates.parameters
+
+    def gains(p: Array) -> Array | None:
+        at = coordinates.at(p)
+        x, y, s = (u.at(found.coefficients, p) for u in (X, Y, S))
+        if coordinates.dt is not None:
+            transformed = joined(at, x, y, s, found.gamma)
+        else:
+            transformed = split(at, x, y, found.gamma)
+        if transformed is None:
+            return None
+        constant_x = not X.moves
+        if X.moves and Y.moves:
+            # dX/dt along the known motion; zero where p stands still
+            known = [m and isinstance(s.rate, str) for m, s in zip(used(X.basis), parameters, strict=True)]
+            (motion,) = motions(parameters, p, coordinates.time, known)
+            moving = X.moving(found.coefficients, p, motion)
+            transformed = transformed._replace(A=transformed.A - moving @ y)
+            constant_x = True
+        return packed(controller(at, x, y, transformed, constant_x=constant_x))
+
+    middle = np.array([[s.middle for s in parameters]])
+    if gains(middle) is None:
+        return None
+    return gains  # type: ignore[return-value]
+
+
+def packed(gains: Gains) -> Array:
+    """[A B; C D] (K, ..)."""
+    top, bottom = (np.concatenate(pair, axis=-1) for pair in (gains[:2], gains[2:]))
+    return np.concatenate([top, bottom], axis=-2)
+
+
+def _made(plant: Plant, design: Design, method: str) -> tuple[Controller, float]:
+    """The controller in the units of the plant, and the modulus of its fastest pole, rad/s."""
+    c, n, m = design.coordinates, design.existence.states, len(plant.parameters)
+    nu, ny = len(plant.controls), len(plant.measurements)
+    if c.dt is None:
+        time = np.concatenate([np.full(n, 1 / np.sqrt(c.time)), np.ones(nu)])
+        into = np.concatenate([np.full(n, 1 / np.sqrt(c.time)), np.ones(ny)])
+    else:
+        time, into = np.ones(n + nu), np.ones(n + ny)
+    rows = time * np.concatenate([np.ones(n), c.controls])
+    columns = into * np.concatenate([np.ones(n), c.measurements])
+
+    def physical(p: Array) -> Array:
+        return rows[:, None] * design.gains(p) * columns
+
+    basis, M, misfit = fitted(physical, plant.parameters, ACCURACY, (rows, 1 / columns))
+    names = tuple(f"k{i + 1}" for i in range(n))
+    model = LPVStateSpace(
+        basis, M[:, :n, :n], M[:, :n, n:], M[:, n:, :n], M[:, n:, n:], plant.parameters, names,  # type: ignore[arg-type]
+        plant.measurements, plant.controls, plant.dt,
+    )  # fmt: skip
+    line = [np.linspace(s.low, s.high, 9) for s in plant.parameters]
+    p = np.stack(line, axis=1)
+    A = model.matrices(p[:, 0] if m == 1 else p).A
+    fast = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)) if plant.dt is None else 0.0
+    made = Controller(model=model, plant=plant, gamma=design.gamma, method=method, misfit=misfit)
+    return made, fast

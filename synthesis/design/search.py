@@ -1,0 +1,181 @@
+"""From a plant to X(p), Y(p) and the gains they promise: which of them moves, how far from the
+least gamma, in a stated order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv import FunctionSpace, Scheduling
+from symheli.lpv.bases.polynomials import polynomials
+from synthesis.certificate import Attempt
+from synthesis.design.coordinates import Coordinates
+from synthesis.design.existence import Existence, Found
+from synthesis.design.motions import used
+from synthesis.program.cone_program import Solver
+
+Array = np.ndarray
+
+Dependence = int | tuple[int, ...] | FunctionSpace
+"""Of X or Y on the parameters: a degree for all, one each, or the functions themselves."""
+
+BACK_OFF = (1.02, 1.05, 1.2, 1.5)
+"""Multiples of the least gamma at which X and Y are settled, tried in turn."""
+USUAL = 2
+"""Degree of the one that moves."""
+FAR = 30.0
+"""A gamma this many times larger or smaller than the unit of performance asks for another unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Functions of X and of Y, either None where the problem has only the other."""
+
+    X: FunctionSpace | None
+    Y: FunctionSpace | None
+
+    def __str__(self) -> str:
+        said = [
+            f"{name} {_said(basis)}"
+            for name, basis in (("X", self.X), ("Y", self.Y))
+            if basis is not None
+        ]
+        return ", ".join(said)
+
+
+def _said(basis: FunctionSpace) -> str:
+    if basis.size == 1:
+        return "constant"
+    return f"of degree {'x'.join(map(str, basis.degrees))}" if basis.degrees else f"in {basis.size}"
+
+
+def functions(given: Dependence, parameters: Sequence[Scheduling], name: str) -> FunctionSpace:
+    """The basis that was asked for; `InputError` for a degree below zero, a wrong number of them, or
+    functions of another range.
+    """
+    box = [(s.low, s.high) for s in parameters]
+    if isinstance(given, FunctionSpace):
+        if given.dimension != len(box):
+            raise InputError(f"{name}: expected functions of {len(box)} parameter(s), got {given}")
+        return given
+    degrees = given if isinstance(given, tuple) else (given,) * len(box)
+    whole = all(isinstance(d, int) and not isinstance(d, bool) and d >= 0 for d in degrees)
+    if len(degrees) != len(box) or not whole:
+        raise InputError(
+            f"{name}: expected a degree >= 0, one for each of"
+            f" {', '.join(s.name for s in parameters)}, or functions of them; got {given!r:.60}"
+        )
+    return polynomials(degrees, box)
+
+
+def limited(basis: FunctionSpace, parameters: Sequence[Scheduling], name: str) -> FunctionSpace:
+    """The basis, checked: what may jump must not be in it."""
+    for s, moves in zip(parameters, used(basis), strict=True):
+        if moves and not isinstance(s.rate, str) and math.isinf(s.rate):
+            raise InputError(
+                f"{name} cannot depend on {s.name}, which may jump: give its rate, or degree 0"
+            )
+    return basis
+
+
+def shapes(
+    parameters: Sequence[Scheduling], X: Dependence | None, Y: Dependence | None, sampled: bool
+) -> list[Shape]:
+    """The pairs that are tried: what was asked for, else one of the two moving, then the other.
+
+    Both may move with a parameter that stands still, and with one whose rate is another parameter:
+    then the controller knows how they move. Raises `InputError` where it would need dp/dt.
+    """
+    free = [isinstance(s.rate, str) or s.rate == 0 for s in parameters]
+    jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
+    both = tuple(USUAL if f else 0 for f in free)
+    one = tuple(0 if j else USUAL for j in jumps)
+    pairs: list[tuple[Dependence, Dependence]] = []
+    if X is not None or Y is not None:
+        pairs = [(both if X is None else X, both if Y is None else Y)]
+    elif sampled and any(isinstance(s.rate, str) or s.rate > 0 for s in parameters):
+        pairs = [(0, one)]
+    elif both == one:
+        pairs = [(one, one)]
+    else:
+        pairs = [(both, one), (one, both)]
+    out = []
+    for x, y in pairs:
+        bases = [limited(functions(d, parameters, n), parameters, n) for d, n in ((x, "X"), (y, "Y"))]
+        for s, in_x, in_y, alone in zip(parameters, *map(used, bases), free, strict=True):
+            if in_x and in_y and not alone:
+                raise InputError(
+                    f"X and Y both depend on {s.name}: the controller would need its rate; let one"
+                    " of them be of degree 0 in it, or give the plant a lagged parameter:"
+                    " plant.lagged(...)"
+                )
+            if sampled and in_x and (isinstance(s.rate, str) or s.rate > 0):
+                raise InputError(
+                    f"in discrete time X cannot depend on {s.name}: the controller would need its"
+                    " next value; let Y depend on it"
+                )
+        out.append(Shape(*bases))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """X and Y with the gamma they hold for, in these coordinates; `gains` at p (K, m), scaled."""
+
+    coordinates: Coordinates
+    existence: Existence
+    found: Found
+    gains: Callable[[Array], Array]
+
+    @property
+    def gamma(self) -> float:
+        """In the units of the plant."""
+        return self.found.gamma * self.coordinates.channel
+
+
+Recover = Callable[[Coordinates, Existence, Found], Callable[[Array], Array] | None]
+
+
+def least(
+    coordinates: Callable[[float], Coordinates],
+    shape: Shape,
+    divisions: int,
+    solver: Solver,
+    attempts: list[Attempt],
+) -> tuple[Coordinates, Existence, Found]:
+    """The least gamma, in a unit of performance that suits it."""
+    channel = 1.0
+    for _ in range(3):
+        own = coordinates(channel)
+        existence = Existence(own, shape.X, shape.Y, divisions)
+        found = existence.least_gamma(solver)
+        gamma = channel * found.gamma
+        attempts.append(Attempt(f"least gamma, {shape}", 0.0, found.message, gamma))
+        if not math.isfinite(found.gamma) or 1 / FAR < found.gamma < FAR:
+            break
+        channel = gamma
+    return own, existence, found
+
+
+def settled(
+    start: tuple[Coordinates, Existence, Found],
+    back_off: Sequence[float],
+    recover: Recover,
+    solver: Solver,
+    attempts: list[Attempt],
+) -> Iterator[Design]:
+    """Designs at ever larger multiples of the least gamma."""
+    coordinates, existence, lowest = start
+    for factor in back_off:
+        found = existence.widest(factor * lowest.gamma, solver)
+        gains = None if math.isinf(found.gamma) else recover(coordinates, existence, found)
+        word = "gains found" if gains is not None else "no gains"
+        gamma = found.gamma * coordinates.channel
+        attempts.append(Attempt(f"back-off {factor:g}", 0.0, f"{found.message}, {word}", gamma))
+        if gains is not None:
+            yield Design(coordinates, existence, found, gains)
