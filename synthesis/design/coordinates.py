@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -60,8 +61,11 @@ class Coordinates:
                  (("x", A.shape[-1]), ("u", B.shape[-1]), ("y", C.shape[-2]))]
         middle = LinearModel(A[4], B[4], C[4], D[4], *names, dt=dt)  # type: ignore[arg-type]
         scale = model_scaling(middle, 1.0, Matrices(A, B, C, D))
-        return cls(matrices, parameters, basis, dt, scale.left, scale.right, scale.time, channel,
-                   controls, measurements)
+        # what enters the states as large as what leaves them
+        enters, leaves = np.linalg.norm(scale.left @ B), np.linalg.norm(C @ scale.right)
+        even = math.sqrt(enters / leaves) if enters > 0 and leaves > 0 else 1.0
+        return cls(matrices, parameters, basis, dt, scale.left / even, scale.right * even,
+                   scale.time, channel, controls, measurements)
 
     def at(self, p: Array) -> Generalized:
         """Matrices (K, ..) at p (K, m)."""

@@ -4,7 +4,7 @@ program for every p of the range.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple, Protocol
 
@@ -24,10 +24,12 @@ from synthesis.program.lyapunov_program import LyapunovBlocks, Sizes
 
 Array = np.ndarray
 
-LARGEST = 1e4
+LARGEST = 1e6
 """X and Y are kept below this multiple of the identity, in scaled coordinates."""
-WIDE = 1e3
-"""The same once g is settled."""
+WIDE = (1e2, 1e3, 1e4, LARGEST)
+"""The same once g is settled, tried in turn."""
+APART = 1.02
+"""X Y is kept away from I by at least this factor squared, where there is a next bound to try."""
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
 
@@ -111,17 +113,20 @@ class Existence:
         """Minimise g."""
         blocks = [
             b for cell in self._cells
-            for b in (*self._halves(cell, None), *self._coupling(cell, apart=False))
+            for b in (*self._halves(cell, None), *self._coupling(cell, False, LARGEST))
         ]
         return self._solved(blocks, 1.0, solver)
 
-    def widest(self, gamma: float, solver: Solver) -> Found:
-        """For this g the X and Y, not beyond `WIDE`, whose product stays farthest from one."""
-        blocks = [
-            b for cell in self._cells
-            for b in (*self._halves(cell, gamma), *self._coupling(cell, apart=True))
-        ]
-        return self._solved(blocks, -1.0, solver)._replace(gamma=gamma)
+    def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
+        """For this g the X and Y, within ever larger bounds, whose product stays farthest from one."""
+        for largest in WIDE:
+            blocks = [
+                b for cell in self._cells
+                for b in (*self._halves(cell, gamma), *self._coupling(cell, True, largest))
+            ]
+            found = self._solved(blocks, -1.0, solver)
+            if found.gamma > APART or largest == LARGEST:
+                yield found._replace(gamma=gamma)
 
     def _solved(self, blocks: list[LyapunovBlocks], cost: float, solver: Solver) -> Found:
         n = self.states
@@ -185,7 +190,7 @@ class Existence:
             out.append(blocks.finished(MARGIN * one, 0.0 * one))
         return out
 
-    def _coupling(self, cell: Cell, *, apart: bool) -> list[LyapunovBlocks]:
+    def _coupling(self, cell: Cell, apart: bool, largest: float) -> list[LyapunovBlocks]:
         """[X I; I Y] > 0, with g in place of I where they are to be `apart`; both below a bound.
 
         Without one of the two the other is positive, or apart from zero by g.
@@ -196,7 +201,7 @@ class Existence:
         for unknown in every:
             f = unknown.values(cell.nodes)
             blocks = Blocks(n, K, cell.to_bernstein).add(unknown, f, one, 0.5 * one)
-            out.append(blocks.finished(-(WIDE if apart else LARGEST) * one, 0 * one))
+            out.append(blocks.finished(-largest * one, 0 * one))
         if self.X is None or self.Y is None:
             for unknown in every:
                 blocks = Blocks(n, K, cell.to_bernstein)

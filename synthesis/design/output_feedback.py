@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symheli.errors import InputError, SynthesisError
+from symheli.errors import SynthesisError
 from symheli.lpv import LPVStateSpace
 from synthesis.certificate import Attempt
+from synthesis.design.cells import degrees_of
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
@@ -19,7 +20,7 @@ from synthesis.design.fitted import fitted
 from synthesis.design.motions import motions, used
 from synthesis.design.recovery import Gains, controller, split
 from synthesis.design.sampled_recovery import joined
-from synthesis.design.search import BACK_OFF, Dependence, Design, least, settled, shapes
+from synthesis.design.search import BACK_OFF, Dependence, least, settled, shapes
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
@@ -89,10 +90,10 @@ def output_feedback(
     """
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)
-    check_ranks(plant)
+    least_ranks(plant)
     attempts: list[Attempt] = []
     started = []
-    for shape in shapes(parameters, X, Y, plant.dt is not None):
+    for shape in shapes(parameters, X, Y, plant.dt is not None, depends(plant)):
         start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
         if math.isfinite(start[2].gamma):
             started.append((start[0].channel * start[2].gamma, shape, start))
@@ -102,7 +103,10 @@ def output_feedback(
     _, shape, start = min(started, key=lambda s: s[0])
     best: Controller | None = None
     for design in settled(start, factors, _recover, USUAL, attempts):
-        made, fast = _made(plant, design, f"output feedback, {shape}")
+        made = as_controller(
+            plant, design.coordinates, design.gains, design.gamma, f"output feedback, {shape}"
+        )
+        fast = _fastest(made.model)
         best = made if best is None or fast <= fastest else best
         if fast <= fastest:
             break
@@ -120,7 +124,13 @@ def coordinates_of(plant: Plant, channel: float) -> Coordinates:
     )  # fmt: skip
 
 
-def check_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
+def depends(plant: Plant) -> list[bool]:
+    """On which parameters."""
+    c = coordinates_of(plant, 1.0)
+    return [d > 0 for d in degrees_of(lambda p: list(c.at(p)), c.breaks)]
+
+
+def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
     """Raises `InputError` where a control costs nothing or a measurement is free of disturbances."""
 
 
@@ -167,20 +177,24 @@ def packed(gains: Gains) -> Array:
     return np.concatenate([top, bottom], axis=-2)
 
 
-def _made(plant: Plant, design: Design, method: str) -> tuple[Controller, float]:
-    """The controller in the units of the plant, and the modulus of its fastest pole, rad/s."""
-    c, n, m = design.coordinates, design.existence.states, len(plant.parameters)
+def as_controller(
+    plant: Plant,
+    c: Coordinates,
+    gains: Callable[[Array], Array],
+    gamma: float,
+    method: str,
+) -> Controller:
+    """The controller in the units of the plant, of `gains` (K, ..) at p (K, m) in the scaled ones,
+    as functions of p.
+    """
     nu, ny = len(plant.controls), len(plant.measurements)
-    if c.dt is None:
-        time = np.concatenate([np.full(n, 1 / np.sqrt(c.time)), np.ones(nu)])
-        into = np.concatenate([np.full(n, 1 / np.sqrt(c.time)), np.ones(ny)])
-    else:
-        time, into = np.ones(n + nu), np.ones(n + ny)
-    rows = time * np.concatenate([np.ones(n), c.controls])
-    columns = into * np.concatenate([np.ones(n), c.measurements])
+    n = gains(np.array([[s.middle for s in plant.parameters]])).shape[-1] - ny
+    pace = np.full(n, 1 / math.sqrt(c.time))
+    rows = np.concatenate([pace, c.controls])
+    columns = np.concatenate([pace, c.measurements])
 
     def physical(p: Array) -> Array:
-        return rows[:, None] * design.gains(p) * columns
+        return rows[:, None] * gains(p) * columns
 
     basis, M, misfit = fitted(physical, plant.parameters, ACCURACY, (rows, 1 / columns))
     names = tuple(f"k{i + 1}" for i in range(n))
@@ -188,9 +202,13 @@ def _made(plant: Plant, design: Design, method: str) -> tuple[Controller, float]
         basis, M[:, :n, :n], M[:, :n, n:], M[:, n:, :n], M[:, n:, n:], plant.parameters, names,  # type: ignore[arg-type]
         plant.measurements, plant.controls, plant.dt,
     )  # fmt: skip
-    line = [np.linspace(s.low, s.high, 9) for s in plant.parameters]
-    p = np.stack(line, axis=1)
-    A = model.matrices(p[:, 0] if m == 1 else p).A
-    fast = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)) if plant.dt is None else 0.0
-    made = Controller(model=model, plant=plant, gamma=design.gamma, method=method, misfit=misfit)
-    return made, fast
+    return Controller(model=model, plant=plant, gamma=gamma, method=method, misfit=misfit)
+
+
+def _fastest(model: LPVStateSpace) -> float:
+    """The largest modulus of a pole, rad/s, of a continuous controller; 0 of another."""
+    if model.dt is not None:
+        return 0.0
+    p = np.stack([np.linspace(s.low, s.high, 9) for s in model.parameters], axis=1)
+    A = model.matrices(p[:, 0] if p.shape[1] == 1 else p).A
+    return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))

@@ -26,6 +26,8 @@ Dependence = int | tuple[int, ...] | FunctionSpace
 
 BACK_OFF = (1.02, 1.05, 1.2, 1.5)
 """Multiples of the least gamma at which X and Y are settled, tried in turn."""
+SLACK = 1e-3
+"""By which the frozen gain of a controller may exceed what was promised: rounding of its formula."""
 USUAL = 2
 """Degree of the one that moves."""
 FAR = 30.0
@@ -84,17 +86,22 @@ def limited(basis: FunctionSpace, parameters: Sequence[Scheduling], name: str) -
 
 
 def shapes(
-    parameters: Sequence[Scheduling], X: Dependence | None, Y: Dependence | None, sampled: bool
+    parameters: Sequence[Scheduling],
+    X: Dependence | None,
+    Y: Dependence | None,
+    sampled: bool,
+    matters: Sequence[bool],
 ) -> list[Shape]:
-    """The pairs that are tried: what was asked for, else one of the two moving, then the other.
+    """The pairs that are tried: what was asked for, else one of the two moving, then the other, with
+    the parameters that the plant depends on.
 
     Both may move with a parameter that stands still, and with one whose rate is another parameter:
     then the controller knows how they move. Raises `InputError` where it would need dp/dt.
     """
     free = [isinstance(s.rate, str) or s.rate == 0 for s in parameters]
     jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
-    both = tuple(USUAL if f else 0 for f in free)
-    one = tuple(0 if j else USUAL for j in jumps)
+    both = tuple(USUAL if f and m else 0 for f, m in zip(free, matters, strict=True))
+    one = tuple(USUAL if m and not j else 0 for j, m in zip(jumps, matters, strict=True))
     pairs: list[tuple[Dependence, Dependence]] = []
     if X is not None or Y is not None:
         pairs = [(both if X is None else X, both if Y is None else Y)]
@@ -172,10 +179,29 @@ def settled(
     """Designs at ever larger multiples of the least gamma."""
     coordinates, existence, lowest = start
     for factor in back_off:
-        found = existence.widest(factor * lowest.gamma, solver)
-        gains = None if math.isinf(found.gamma) else recover(coordinates, existence, found)
-        word = "gains found" if gains is not None else "no gains"
-        gamma = found.gamma * coordinates.channel
-        attempts.append(Attempt(f"back-off {factor:g}", 0.0, f"{found.message}, {word}", gamma))
-        if gains is not None:
-            yield Design(coordinates, existence, found, gains)
+        gamma = factor * lowest.gamma
+        for found in existence.widest(gamma, solver):
+            gains = recover(coordinates, existence, found) if np.any(found.coefficients) else None
+            word = "no gains"
+            if gains is not None:
+                reached = frozen_gain(coordinates, gains)
+                word = f"worst frozen gain {reached / gamma:.4f} of it"
+            attempts.append(
+                Attempt(
+                    f"back-off {factor:g}", 0.0, f"{found.message}, {word}",
+                    gamma * coordinates.channel,
+                )
+            )  # fmt: skip
+            if gains is not None and reached <= gamma * (1 + SLACK):
+                yield Design(coordinates, existence, found, gains)
+                break
+
+
+def frozen_gain(coordinates: Coordinates, gains: Callable[[Array], Array]) -> float:
+    """Of the loop at some frozen p, scaled; inf where one is unstable."""
+    low, high = np.array([(s.low, s.high) for s in coordinates.parameters]).T
+    p = low + np.linspace(0.0, 1.0, 7)[:, None] * (high - low)
+    plants, K = coordinates.at(p), gains(p)
+    k = K.shape[-1] - plants.C2.shape[-2]
+    loops = closed(plants, K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:])
+    return max(norm(*(M[i] for M in loops), coordinates.dt, 1e-6)[0] for i in range(len(p)))

@@ -1,0 +1,95 @@
+"""Fewer states of a controller, by what the loop sees of them.
+
+The Gramians are those of the closed loop, the block of the controller's states: what disturbances
+do to them, and what they do to the performance, averaged over frozen p. One constant projection for
+all p keeps the dependence on p what it was (frequency-weighted truncation with the closed loop as
+the weight: Enns 1984; Anderson and Liu, IEEE Trans. Automatic Control 34 (1989); one projection over
+p: Wood, Goddard and Glover, CDC 1996). Whether it was too much the analysis of the loop says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import linalg
+
+from symheli.errors import InputError, SynthesisError
+from symheli.lpv import LPVStateSpace, Matrices
+from synthesis.design.controller import Controller
+from symheli.lpv.bases.polynomials import lobatto_points
+
+Array = np.ndarray
+
+NODES = {1: 14, 2: 6}
+"""Values of each parameter at which the loop is looked at (more parameters: 4)."""
+
+
+def reduced(controller: Controller, order: int) -> Controller:
+    """The controller with at most `order` states.
+
+    Raises `InputError` for an order below 0, `SynthesisError` where the loop is not stable at some
+    frozen p, before or after.
+    """
+    n = controller.order
+    if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
+        raise InputError(f"order: expected an integer >= 0, got {order!r}")
+    if order >= n:
+        return controller
+    left, right = projection(controller, order)
+    model = controller.model
+    projected = replace(
+        model,
+        A=left @ model.A @ right,
+        B=left @ model.B,
+        C=model.C @ right,
+        states=tuple(f"k{i + 1}" for i in range(order)),  # type: ignore[arg-type]
+        trim=None,
+        residuals=None,
+    )
+    return replace(
+        controller, model=projected, method=f"{controller.method}, {order} of {n} states kept"
+    )
+
+
+def projection(controller: Controller, order: int) -> tuple[Array, Array]:
+    """(left (order, n), right (n, order)), left right = I."""
+    P, Q = gramians(controller)
+    L, R = _root(P), _root(Q)
+    U, s, Vt = np.linalg.svd(R.T @ L)
+    kept = np.sqrt(np.maximum(s[:order], 1e-300))
+    return (U[:, :order] / kept).T @ R.T, L @ Vt[:order].T / kept
+
+
+def gramians(controller: Controller) -> tuple[Array, Array]:
+    """Reachability and observability (n, n) of the controller's states in the loop, the mean over
+    frozen p of each in units of its own size.
+    """
+    closed: LPVStateSpace = controller.closed()
+    m, n = len(closed.parameters), controller.order
+    p = lobatto_points(NODES.get(m, 4), closed.box)
+    A, B, C, _ = closed.matrices(p)
+    P, Q = np.zeros((n, n)), np.zeros((n, n))
+    for each in zip(A, B, C, strict=True):
+        reach, seen = _gramians(Matrices(*each, np.zeros(0)), closed.dt)
+        P += reach[-n:, -n:]
+        Q += seen[-n:, -n:]
+    return P / len(A), Q / len(A)
+
+
+def _gramians(loop: Matrices, dt: float | None) -> tuple[Array, Array]:
+    A, B, C, _ = loop
+    poles = np.linalg.eigvals(A)
+    if np.any(poles.real >= 0 if dt is None else np.abs(poles) >= 1):
+        raise SynthesisError(
+            "the closed loop is not stable at every frozen p, so that nothing says which states of"
+            " the controller matter"
+        )
+    solve = linalg.solve_continuous_lyapunov if dt is None else linalg.solve_discrete_lyapunov
+    sign = -1.0 if dt is None else 1.0
+    return solve(A, sign * B @ B.T), solve(A.T, sign * C.T @ C)
+
+
+def _root(M: Array) -> Array:
+    values, vectors = np.linalg.eigh(0.5 * (M + M.T))
+    return vectors * np.sqrt(np.maximum(values, 1e-14 * values[-1]))

@@ -1,0 +1,142 @@
+"""Gain-scheduled state feedback."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace, Scheduling
+from synthesis.certificate import Attempt
+from synthesis.design.controller import Controller
+from synthesis.design.coordinates import Coordinates
+from synthesis.design.existence import Existence, Found
+from synthesis.design.fitted import fitted
+from synthesis.design.output_feedback import ACCURACY, USUAL, coordinates_of, failed, least_ranks
+from synthesis.design.recovery import control_gain
+from synthesis.design.sampled_recovery import state_gain
+from synthesis.design.search import BACK_OFF, Dependence, Shape, functions, least, limited, settled
+from synthesis.worst.rates import Rate
+from synthesis.worst.rates import asked as limits
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
+
+Array = np.ndarray
+
+
+def state_feedback(
+    plant: Plant,
+    rate: Rate = None,
+    *,
+    Y: Dependence | None = None,
+    back_off: float | Sequence[float] = BACK_OFF,
+    divisions: int = 1,
+) -> Controller:
+    """u = F(p) x for every p(t) within its range and rates; F needs no rate of p.
+
+    Parameters
+    ----------
+    plant : Plant
+        Its measurements are all its states, as many as there are; every control must cost.
+    rate : float, sequence or mapping, optional
+        Largest |dp/dt|, as for `l2_gain`; by default the plant's own; math.inf: p may jump.
+    Y : int, tuple or FunctionSpace, optional
+        Degree of the storage function's inverse in every parameter, one each, or functions.
+    back_off : float or sequence
+        Multiples of the least gamma at which Y is settled, tried in turn.
+    divisions : int
+        In so many parts every range is cut where the inequalities are imposed.
+
+    Returns
+    -------
+    Controller
+        Without states.
+
+    Raises
+    ------
+    InputError
+        Signals, ranks, rates or degrees that do not fit, with what to do.
+    SynthesisError
+        There is no such controller, or none was found; with reasons.
+
+    References
+    ----------
+    Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996), theorem 4.1.
+    """
+    parameters = limits(plant.parameters, rate)
+    plant = plant.with_scheduling(parameters)
+    least_ranks(plant, measurements=False)
+    measured = _whole_state(plant)
+    attempts: list[Attempt] = []
+    shape = Shape(None, _functions(Y, parameters, "Y"))
+    start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
+    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
+    for design in settled(start, factors, _recover, USUAL, attempts):
+        c = design.coordinates
+
+        def gains(p: Array) -> Array:
+            return c.controls[:, None] * design.gains(p) @ c.left @ measured(p)  # noqa: B023
+
+        scale = (c.controls, np.linalg.norm(c.right, axis=1))
+        basis, F, misfit = fitted(gains, parameters, ACCURACY, scale)
+        n, (nu, ny) = len(F), F.shape[1:]
+        model = LPVStateSpace(
+            basis, np.zeros((n, 0, 0)), np.zeros((n, 0, ny)), np.zeros((n, nu, 0)), F, parameters,
+            (), plant.measurements, plant.controls, plant.dt,
+        )  # fmt: skip
+        return Controller(
+            model=model, plant=plant, gamma=design.gamma, method=f"state feedback, {shape}",
+            misfit=misfit, attempts=tuple(attempts),
+        )  # fmt: skip
+    raise failed(plant, attempts)
+
+
+def _functions(given: Dependence | None, parameters: Sequence[Scheduling], name: str):  # noqa: ANN202
+    jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
+    degrees = tuple(0 if j else 2 for j in jumps) if given is None else given
+    return limited(functions(degrees, parameters, name), parameters, name)
+
+
+def _whole_state(plant: Plant) -> Callable[[Array], Array]:
+    """p (K, m) -> C2^-1 (K, n, n)."""
+    n, ny = len(plant.states), len(plant.measurements)
+    message = (
+        f"state feedback needs all {n} states among the measurements, undisturbed, and nothing else"
+        f" ({', '.join(plant.states)}); measured are {', '.join(plant.measurements)}: take"
+        " output_feedback"
+    )
+    if n != ny:
+        raise InputError(message)
+    one = len(plant.parameters) == 1
+
+    def inverse(p: Array) -> Array:
+        return np.linalg.inv(plant.matrices(p[:, 0] if one else p).C2)
+
+    middle = plant.matrices(np.array([s.middle for s in plant.parameters])[0 if one else slice(None)])
+    if np.any(middle.D21) or np.any(middle.D22) or np.linalg.cond(middle.C2) > 1e12:
+        raise InputError(message)
+    return inverse
+
+
+def _recover(
+    coordinates: Coordinates, existence: Existence, found: Found
+) -> Callable[[Array], Array] | None:
+    Y, S = existence.Y, existence.S
+    assert Y is not None and S is not None  # noqa: S101
+
+    def gains(p: Array) -> Array:
+        at, y = coordinates.at(p), Y.at(found.coefficients, p)
+        if coordinates.dt is not None:
+            F = state_gain(at, y, S.at(found.coefficients, p), found.gamma)
+            assert F is not None  # noqa: S101 - found in the middle
+        else:
+            nothing = np.zeros((len(p), at.B2.shape[-1], at.D21.shape[-2]))
+            F = control_gain(at, y, nothing, found.gamma)
+        return F @ np.linalg.inv(y)
+
+    return gains
