@@ -1,0 +1,1 @@
+"""Controllers: the plants they are designed for, and the designs."""
