@@ -1,0 +1,137 @@
+"""H2 output feedback for one model: the least mean square of the performance in white noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import linalg
+
+from symheli.errors import InputError
+from symheli.lpv import LinearModel
+from synthesis.design.diagnosis import reasons
+from synthesis.design.generalized import Channels, Generalized
+from synthesis.design.linear_quadratic import Matrices, given_direct_way, lqg
+from synthesis.design.point_design import (
+    DesignStatus,
+    PointDesign,
+    as_model,
+    named_controller,
+    named_loop,
+)
+
+Array = np.ndarray
+
+DIRECT = 1e-9
+"""Direct gain from disturbances to performance below this part of its terms is none."""
+
+
+def h2(
+    model: LinearModel,
+    controls: Sequence[str],
+    measurements: Sequence[str],
+    *,
+    disturbances: Sequence[str] | None = None,
+    performance: Sequence[str] | None = None,
+) -> PointDesign:
+    """The H2-optimal output-feedback controller of one model, continuous or sampled.
+
+    A linear-quadratic regulator on a Kalman filter. Of a continuous model the direct way from
+    disturbances to performance must be one that a static gain can cancel; a sampled one may have
+    any, and its controller uses the measurement of the same sample.
+
+    Parameters
+    ----------
+    model : LinearModel or system of python-control
+        From disturbances and controls to performance and measurements.
+    controls, measurements : sequence of str
+        Inputs that the controller commands, outputs that it reads.
+    disturbances, performance : sequence of str, optional
+        The inputs and outputs between which the norm counts; default all others.
+
+    Returns
+    -------
+    PointDesign
+        The controller u = K y; `gamma` is the H2 norm of its loop, recomputed, and the `optimum`.
+        Where there is no controller, `reasons`.
+
+    Raises
+    ------
+    InputError
+        Another type of model.
+    UnknownNameError
+        A signal that the model does not have.
+
+    References
+    ----------
+    Zhou, Doyle, Glover (1996), section 14.5; Chen and Francis (1995), Optimal Sampled-Data Control
+    Systems, section 6.6.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LinearModel
+    >>> plant = LinearModel(
+    ...     [[-1.0]], [[1.0, 1.0]], [[1.0], [1.0]], [[0.0, 1.0], [1.0, 0.0]],
+    ...     ["x"], ["w", "u"], ["z", "y"],
+    ... )
+    >>> K = h2(plant, ["u"], ["y"]).controller
+    >>> print(K.A, K.B, K.C, K.D)
+    [[-3.]] [[1.]] [[-1.]] [[0.]]
+    """
+    model = as_model(model)
+    names = Channels.of(model, controls, measurements, disturbances, performance)
+    plant = Generalized.between(model, names)
+    if against := reasons(plant, names, dt=model.dt):
+        return PointDesign.without(DesignStatus.IMPOSSIBLE, against)
+    K = lqg(plant, model.dt) if model.dt is not None else _continuous(plant)
+    if isinstance(K, str):
+        return PointDesign.without(DesignStatus.IMPOSSIBLE, [K])
+    if K is None:
+        return PointDesign.without(DesignStatus.FAILED, ["a Riccati equation was not solved"])
+    controller = named_controller(K, names, model.dt)
+    loop = named_loop(plant, controller, names)
+    size = h2_norm(loop)
+    if not math.isfinite(size):
+        return PointDesign.without(DesignStatus.FAILED, ["the loop is not stable"])
+    return PointDesign(DesignStatus.SOLVED, controller, loop, size, size)
+
+
+def _continuous(P: Generalized) -> Matrices | str | None:
+    """With a static gain that takes away D11 where there is one; a sentence where it cannot."""
+    static = -np.linalg.pinv(P.D12) @ P.D11 @ np.linalg.pinv(P.D21)
+    left = np.abs(P.D11 + P.D12 @ static @ P.D21)
+    if left.max(initial=0.0) > DIRECT * np.abs(P.D11).max(initial=0.0):
+        return (
+            "the performance feels the disturbances directly (D11), in continuous time white noise"
+            " of infinite variance: filter the one or the other"
+        )
+    into = P.B2 @ static
+    shifted = P._replace(
+        A=P.A + into @ P.C2,
+        B1=P.B1 + into @ P.D21,
+        C1=P.C1 + P.D12 @ static @ P.C2,
+        D11=np.zeros(P.D11.shape),
+        D22=np.zeros(P.D22.shape),
+    )
+    K = lqg(shifted, None)
+    if K is None:
+        return None
+    A, B, C, D = K
+    return given_direct_way(P.D22, A, B, C, D + static)
+
+
+def h2_norm(model: LinearModel) -> float:
+    """Root of the variance of the outputs with white noise of unit intensity at the inputs; inf
+    where it is not stable, or continuous with a direct way.
+    """
+    if not model.is_stable():
+        return math.inf
+    A, B, C, D = model.A, model.B, model.C, model.D
+    if model.dt is not None:
+        W = linalg.solve_discrete_lyapunov(A, B @ B.T)
+        return math.sqrt(max(float(np.trace(C @ W @ C.T) + np.sum(D**2)), 0.0))
+    W = linalg.solve_continuous_lyapunov(A, -B @ B.T)
+    size = math.sqrt(max(float(np.trace(C @ W @ C.T)), 0.0))
+    through = float(np.abs(D).max(initial=0.0))
+    return size if through <= DIRECT * np.abs(D).max(initial=1.0) else math.inf

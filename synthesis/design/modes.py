@@ -1,0 +1,84 @@
+"""Modes that cannot be seen or driven, by the test of Popov, Belevitch and Hautus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import linalg
+
+from symheli.lpv.equilibration import equilibrate
+
+Array = np.ndarray
+
+HIDDEN = 1e-9
+"""[A - s I; C] with rows and columns in units of their own loses rank at s where its smallest
+singular value is below this part of A's largest entry.
+"""
+
+BOUNDARY = 1e-9
+"""Beside the size of A, a mode this near to the border of stability is on it."""
+
+SHARE = 0.3
+"""States with this part of the participation of the foremost are named with it."""
+
+
+class Mode(NamedTuple):
+    """An eigenvalue with a part of its eigenvector that a matrix cannot see.
+
+    `participation` (n,): share of each state in it, the largest 1.
+    """
+
+    value: complex
+    participation: Array
+
+    def among(self, states: Sequence[str]) -> str:
+        """The states that take the foremost part, by name."""
+        order = np.argsort(-self.participation)
+        return ", ".join(states[i] for i in order[:4] if self.participation[i] >= SHARE)
+
+
+def hidden_modes(A: Array, C: Array, counts: Callable[[complex, float], bool]) -> list[Mode]:
+    """Eigenvalues of A (n, n), of each complex pair one, with an eigenvector that C (m, n) does not
+    see.
+
+    Only where `counts(value, size)` is true, `size` being that of A. Units of states and outputs
+    play no part. An eigenvalue of a nearly defective cluster is known to a root of the rounding
+    only, so each is improved by Rayleigh quotients first.
+    """
+    n = len(A)
+    if n == 0:
+        return []
+    balanced, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
+    size = float(np.abs(balanced).max()) or 1.0
+    rows, _ = equilibrate(np.abs(C * units)) if len(C) else (np.ones(0), None)
+    seen = rows[:, None] * C * units * size
+    found: list[Mode] = []
+    for value in np.linalg.eigvals(balanced):
+        pencil = np.vstack([balanced - value * np.eye(n), seen])
+        for _ in range(3):
+            vector = np.linalg.svd(pencil)[2][-1].conj()
+            value = vector.conj() @ balanced @ vector
+            pencil = np.vstack([balanced - value * np.eye(n), seen])
+        smallest = np.linalg.svd(pencil, compute_uv=False)[-1]
+        if smallest > HIDDEN * size or not counts(complex(value), size):
+            continue
+        if any(
+            min(abs(value - m.value), abs(value.conjugate() - m.value)) < 1e-6 * size for m in found
+        ):
+            continue
+        share = np.abs(vector) ** 2
+        found.append(Mode(complex(value.real, abs(value.imag)), share / share.max()))
+    return found
+
+
+def unstable(value: complex, size: float, *, sampled: bool) -> bool:
+    """Whether a mode is not strictly stable."""
+    margin = abs(value) - 1 if sampled else value.real / size
+    return margin >= -BOUNDARY
+
+
+def on_the_axis(value: complex, size: float) -> bool:
+    """Whether a mode of a continuous model is on the imaginary axis, to rounding."""
+    return abs(value.real) <= BOUNDARY * size

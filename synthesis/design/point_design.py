@@ -1,0 +1,96 @@
+"""A controller for one frozen model, with the check of its loop; or why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from symheli.errors import InputError
+from symheli.lpv import LinearModel
+from symheli.lpv.linear_model import is_control_system
+from symheli.values.signal import Signal
+from synthesis.design.generalized import Channels, Generalized
+
+Matrices = tuple[Any, Any, Any, Any]
+
+
+class DesignStatus(Enum):
+    """How a design came out; the value is the sentence to print."""
+
+    SOLVED = "solved: the loop was recomputed, it is stable and keeps the level"
+    IMPOSSIBLE = "no design: the problem has no solution, or none that the method can find"
+    TOO_LOW = "no design: no controller reaches this level"
+    FAILED = "no design: no controller passed the check of its loop"
+
+
+@dataclass(frozen=True, eq=False)
+class PointDesign:
+    """A controller u = K y of one model, and what its loop was found to be.
+
+    Parameters
+    ----------
+    status : DesignStatus
+        Whether there is one; `reasons` say why there is none, or what the level is worth.
+    controller : LinearModel or None
+        K from measurements to controls, with positive feedback. Its states estimate those of the
+        model, in the same coordinates: controllers of neighbouring models may be interpolated.
+    loop : LinearModel or None
+        From disturbances to performance.
+    gamma : float
+        Norm of that loop, recomputed from its matrices; inf where there is none.
+    optimum : float
+        What no controller undercuts, to the accuracy asked for; NaN where it was not sought.
+    reasons : tuple of str
+        Sentences.
+    limit : str
+        Which of the conditions keeps a lower level out of reach.
+    """
+
+    status: DesignStatus
+    controller: LinearModel | None
+    loop: LinearModel | None
+    gamma: float
+    optimum: float
+    reasons: tuple[str, ...] = ()
+    limit: str = ""
+
+    @classmethod
+    def without(
+        cls, status: DesignStatus, reasons: Sequence[str], optimum: float = float("nan")
+    ) -> PointDesign:
+        """No controller, and why."""
+        return cls(status, None, None, float("inf"), optimum, tuple(reasons))
+
+    def __str__(self) -> str:
+        head = self.status.value
+        if self.controller is not None:
+            head += f"; gamma = {self.gamma:.6g}"
+        return "\n".join([head, *([self.limit] if self.limit else []), *self.reasons])
+
+
+def as_model(system: object) -> LinearModel:
+    """A LinearModel as it is, a system of python-control as one; `InputError` for anything else."""
+    if isinstance(system, LinearModel):
+        return system
+    if is_control_system(system):
+        return LinearModel.from_control(system)
+    raise InputError(
+        "expected a LinearModel or a system of python-control, got"
+        f" {type(system).__name__}; an LPV model has .at(p)"
+    )
+
+
+def named_controller(K: Matrices, names: Channels, dt: float | None) -> LinearModel:
+    """K with the names of what it estimates, reads and commands."""
+    states = tuple(Signal(f"{s}_estimate", s.unit) for s in names.states[: len(K[0])])
+    return LinearModel(*K, states, names.measurements, names.controls, dt)
+
+
+def named_loop(plant: Generalized, K: LinearModel, names: Channels) -> LinearModel:
+    """The loop of u = K y from disturbances to performance."""
+    closed = plant.closed(K.A, K.B, K.C, K.D)
+    return LinearModel(
+        *closed, (*names.states, *K.states), names.disturbances, names.performance, K.dt
+    )
