@@ -54,13 +54,7 @@ def observed(plant: Generalized) -> Half:
 
 def controlled(plant: Generalized) -> Half:
     """That of Y: what no control changes; the same of the dual plant."""
-    return observed(dual(plant))
-
-
-def dual(plant: Generalized) -> Generalized:
-    """The plant transposed: controls become measurements, disturbances performance."""
-    A, B1, B2, C1, C2, D11, D12, D21, D22 = (_t(M) for M in plant)
-    return Generalized(A, C1, C2, B1, B2, D11, D21, D12, D22)
+    return observed(plant.dual)
 
 
 def _right_inverse(D: Array) -> Array:

@@ -37,7 +37,11 @@ Array = np.ndarray
 
 BACK_OFF = 1.02
 """Every bound is loosened by this factor before X and Y are settled."""
-MARGIN = 1e-7
+NEAR = 3.0
+"""Gains so many times larger or smaller than the units of the program ask for other units."""
+ROUNDS = 3
+"""Most changes of units."""
+MARGIN = 1e-8
 LARGEST = 1e4
 WIDE = 1e3
 
@@ -111,7 +115,7 @@ def multiobjective(
     solver = solver if isinstance(solver, Solver) else Solver(solver)
     problem = _Problem(plant, coordinates_of(plant, 1.0), bases[0], bases[1], gains, every, region, direct)
     attempts: list[Attempt] = []
-    values = problem.least(solver, attempts)
+    values = problem.best(solver, attempts)
     if values is None:
         raise failed(plant, attempts)
     found = problem.settled([back_off * v for v in values], solver, attempts)
@@ -144,7 +148,9 @@ class _Problem:
         self.plant, self.coordinates, self.objectives = plant, coordinates, objectives
         self.region = region and _in_time(region, coordinates.time)
         root = math.sqrt(coordinates.time)  # energies and variances are per unit of time
-        self.units = [1.0 if isinstance(o, L2) else root for o in objectives]
+        self.pace = [1.0 if isinstance(o, L2) else root for o in objectives]
+        self.sizes = [o.bound or 1.0 for o in objectives]
+        """Of the gains in the scaled loop: outputs are measured in them."""
         m = len(plant.parameters)
         breaks = coordinates.breaks
         own = degrees_of(lambda p: list(coordinates.at(p)), breaks)
@@ -169,6 +175,24 @@ class _Problem:
              _places(o.performance, plant.performance, "performance signal"))
             for o in objectives
         ]
+
+    @property
+    def units(self) -> list[float]:
+        """Of every gain of the plant: so much is 1 in the program."""
+        return [pace / size for pace, size in zip(self.pace, self.sizes, strict=True)]
+
+    def best(self, solver: Solver, attempts: list[Attempt]) -> list[float] | None:
+        """`least`, again in units of the gains found while these are far from the first."""
+        values = self.least(solver, attempts)
+        for _ in range(ROUNDS):
+            if values is None:
+                break
+            sizes = [max(v * pace, 1e-9) for v, pace in zip(values, self.pace, strict=True)]
+            if all(1 / NEAR < a / b < NEAR for a, b in zip(sizes, self.sizes, strict=True)):
+                break
+            self.sizes = sizes
+            values = self.least(solver, attempts) or values
+        return values
 
     def least(self, solver: Solver, attempts: list[Attempt]) -> list[float] | None:
         """Gains that minimise the sum; None where there are none."""
@@ -229,11 +253,15 @@ class _Problem:
             yield from _positive(cell, coupled)
             for name, unknowns in (("X", self.X), ("Y", self.Y)):
                 yield from _positive(cell, [widest * one - self._sum(name, unknowns, q) for q in cell.nodes])
-            for o, (columns, rows), bound, slack in zip(
-                self.objectives, self.channels, bounds, slacks, strict=True
+            for o, (columns, rows), bound, slack, size in zip(
+                self.objectives, self.channels, bounds, slacks, self.sizes, strict=True
             ):
                 parts = [
-                    loop._replace(B=loop.B[:, columns], C=loop.C[rows], D=loop.D[rows][:, columns])
+                    loop._replace(
+                        B=loop.B[:, columns],
+                        C=loop.C[rows] / size,
+                        D=loop.D[rows][:, columns] / size,
+                    )
                     for loop in loops
                 ]
                 yield from self._objective(cell, o, parts, bound, slack)

@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synthesis.design.elimination import dual
 from synthesis.design.generalized import Generalized
 
 Array = np.ndarray
@@ -48,7 +47,7 @@ def split(plant: Generalized, X: Array, Y: Array, gamma: float) -> Transformed:
     D = direct(D11, D12, D21, gamma)
     Dcl = D11 + D12 @ D @ D21
     C = control_gain(plant, Y, D, gamma)
-    B = _t(control_gain(dual(plant), X, _t(D), gamma))
+    B = _t(control_gain(plant.dual, X, _t(D), gamma))
     nw, nz = B1.shape[-1], C1.shape[-2]
     M = np.block([[_identity(-gamma, nw, Dcl), _t(Dcl)], [Dcl, _identity(-gamma, nz, Dcl)]])
     loop = A + B2 @ D @ C2

@@ -18,6 +18,7 @@ from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
 from synthesis.design.motions import used
 from synthesis.program.cone_program import Solver
+from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
@@ -203,5 +204,5 @@ def frozen_gain(coordinates: Coordinates, gains: Callable[[Array], Array]) -> fl
     p = low + np.linspace(0.0, 1.0, 7)[:, None] * (high - low)
     plants, K = coordinates.at(p), gains(p)
     k = K.shape[-1] - plants.C2.shape[-2]
-    loops = closed(plants, K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:])
+    loops = plants.closed(K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:])
     return max(norm(*(M[i] for M in loops), coordinates.dt, 1e-6)[0] for i in range(len(p)))
