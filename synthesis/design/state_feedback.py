@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, Scheduling
+from symheli.lpv import FunctionSpace, Scheduling
 from synthesis.certificate import Attempt
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
-from synthesis.design.fitted import fitted
-from synthesis.design.output_feedback import ACCURACY, USUAL, coordinates_of, failed, least_ranks
+from synthesis.design.output_feedback import USUAL, as_controller, coordinates_of, failed, least_ranks
 from synthesis.design.recovery import control_gain
 from synthesis.design.sampled_recovery import state_gain
 from synthesis.design.search import BACK_OFF, Dependence, Shape, functions, least, limited, settled
@@ -27,6 +26,9 @@ if TYPE_CHECKING:
     from synthesis.design.plant import Plant
 
 Array = np.ndarray
+
+WORST = 1e12
+"""Condition of C2 beyond which the measurements do not show the state."""
 
 
 def state_feedback(
@@ -71,56 +73,37 @@ def state_feedback(
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)
     least_ranks(plant, measurements=False)
-    measured = _whole_state(plant)
+    _check_measured(plant)
     attempts: list[Attempt] = []
     shape = Shape(None, _functions(Y, parameters, "Y"))
     start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
     factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts):
-        c = design.coordinates
-
-        def gains(p: Array) -> Array:
-            return c.controls[:, None] * design.gains(p) @ c.left @ measured(p)  # noqa: B023
-
-        scale = (c.controls, np.linalg.norm(c.right, axis=1))
-        basis, F, misfit = fitted(gains, parameters, ACCURACY, scale)
-        n, (nu, ny) = len(F), F.shape[1:]
-        model = LPVStateSpace(
-            basis, np.zeros((n, 0, 0)), np.zeros((n, 0, ny)), np.zeros((n, nu, 0)), F, parameters,
-            (), plant.measurements, plant.controls, plant.dt,
-        )  # fmt: skip
-        return Controller(
-            model=model, plant=plant, gamma=design.gamma, method=f"state feedback, {shape}",
-            misfit=misfit, attempts=tuple(attempts),
-        )  # fmt: skip
+        made = as_controller(
+            plant, design.coordinates, design.gains, design.gamma, f"state feedback, {shape}"
+        )
+        return replace(made, attempts=tuple(attempts))
     raise failed(plant, attempts)
 
 
-def _functions(given: Dependence | None, parameters: Sequence[Scheduling], name: str):  # noqa: ANN202
+def _functions(
+    given: Dependence | None, parameters: Sequence[Scheduling], name: str
+) -> FunctionSpace:
     jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
     degrees = tuple(0 if j else 2 for j in jumps) if given is None else given
     return limited(functions(degrees, parameters, name), parameters, name)
 
 
-def _whole_state(plant: Plant) -> Callable[[Array], Array]:
-    """p (K, m) -> C2^-1 (K, n, n)."""
+def _check_measured(plant: Plant) -> None:
     n, ny = len(plant.states), len(plant.measurements)
-    message = (
-        f"state feedback needs all {n} states among the measurements, undisturbed, and nothing else"
-        f" ({', '.join(plant.states)}); measured are {', '.join(plant.measurements)}: take"
-        " output_feedback"
-    )
-    if n != ny:
-        raise InputError(message)
-    one = len(plant.parameters) == 1
-
-    def inverse(p: Array) -> Array:
-        return np.linalg.inv(plant.matrices(p[:, 0] if one else p).C2)
-
-    middle = plant.matrices(np.array([s.middle for s in plant.parameters])[0 if one else slice(None)])
-    if np.any(middle.D21) or np.any(middle.D22) or np.linalg.cond(middle.C2) > 1e12:
-        raise InputError(message)
-    return inverse
+    middle = plant.matrices(np.array([s.middle for s in plant.parameters]).squeeze())
+    disturbed = np.any(middle.D21) or np.any(middle.D22)
+    if n != ny or disturbed or np.linalg.cond(middle.C2) > WORST:
+        raise InputError(
+            f"state feedback needs all {n} states among the measurements, undisturbed, and nothing"
+            f" else ({', '.join(plant.states)}); measured are {', '.join(plant.measurements)}: take"
+            " output_feedback"
+        )
 
 
 def _recover(
@@ -137,6 +120,6 @@ def _recover(
         else:
             nothing = np.zeros((len(p), at.B2.shape[-1], at.D21.shape[-2]))
             F = control_gain(at, y, nothing, found.gamma)
-        return F @ np.linalg.inv(y)
+        return F @ np.linalg.inv(at.C2 @ y)
 
     return gains

@@ -1,0 +1,203 @@
+"""Gain-scheduled estimation: an observer of the performance from the measurements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symheli.lpv import LPVStateSpace
+from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.values.signal import Signal
+from synthesis.certificate import Attempt, Certificate
+from synthesis.design.coordinates import Coordinates
+from synthesis.design.existence import Existence, Found
+from synthesis.design.fitted import NODES, fitted
+from synthesis.design.output_feedback import (
+    ACCURACY,
+    USUAL,
+    coordinates_of,
+    failed,
+    least_ranks,
+)
+from synthesis.design.recovery import control_gain
+from synthesis.design.sampled_recovery import state_gain
+from synthesis.design.search import BACK_OFF, Dependence, Shape, dependence, least, settled
+from synthesis.worst.rates import Rate
+from synthesis.worst.rates import asked as limits
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Estimator:
+    """x^' = A x^ + B2 u + L (y - C2 x^ - D22 u), z^ = C1 x^ + D12 u, of a plant.
+
+    Attributes
+    ----------
+    model : LPVStateSpace
+        From measurements and controls to `<performance>_estimate`.
+    error : LPVStateSpace
+        From the disturbances to the performance minus its estimate.
+    gamma : float
+        What its synthesis promised; `certify` proves.
+    misfit : float
+        Of the functions of p to the gains that were computed, relative.
+    attempts : tuple of Attempt
+        Every program that was solved.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    >>> lag = LPVStateSpace.polynomial(
+    ...     A=[[[-1.0]], [[-1.0]]], B=[[[1.0, 0.0]]], C=[[[1.0]], [[1.0]]], D=[[[0, 0], [0, 1.0]]],
+    ...     scheduling=p, states=["x"], inputs=["w", "noise"], outputs=["x", "y"])
+    >>> plant = synthesis.Plant(
+    ...     lag, disturbances=["w", "noise"], performance=["x"], controls=[], measurements=["y"])
+    >>> synthesis.estimator(plant).model.outputs
+    ('x_estimate',)
+    """
+
+    model: LPVStateSpace
+    error: LPVStateSpace
+    gamma: float
+    misfit: float
+    attempts: tuple[Attempt, ...] = ()
+
+    def certify(self, rate: Any = None, **options: Any) -> Certificate:
+        """The proven gain of the error: `synthesis.l2_gain`."""
+        from synthesis.analysis.l2_gain import l2_gain
+
+        return l2_gain(self.error, rate, **options)
+
+
+def estimator(
+    plant: Plant,
+    rate: Rate = None,
+    *,
+    X: Dependence | None = None,
+    back_off: float | Sequence[float] = BACK_OFF,
+    divisions: int = 1,
+) -> Estimator:
+    """An observer whose error has the least L2 gain, for every p(t) within its range and rates.
+
+    The plant may be unstable: what is estimated is seen through the error alone. L needs no rate
+    of p.
+
+    Parameters
+    ----------
+    plant : Plant
+        Its performance is estimated from its measurements; its controls, if any, are known.
+        Every measurement must be disturbed (D21 of full row rank).
+    rate : float, sequence or mapping, optional
+        Largest |dp/dt|, as for `l2_gain`; by default the plant's own; math.inf: p may jump.
+    X : int, tuple or FunctionSpace, optional
+        Degree of the storage function in every parameter, one each, or functions; in discrete time
+        constant while p moves.
+    back_off : float or sequence
+        Multiples of the least gamma at which X is settled, tried in turn.
+    divisions : int
+        In so many parts every range is cut where the inequalities are imposed.
+
+    Returns
+    -------
+    Estimator
+        With its model and that of its error.
+
+    Raises
+    ------
+    InputError, SynthesisError
+        As `output_feedback`.
+
+    References
+    ----------
+    The dual of Wu, Yang, Packard and Becker (1996), theorem 4.1.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    >>> lag = LPVStateSpace.polynomial(
+    ...     A=[[[-1.0]], [[-1.0]]], B=[[[1.0, 0.0]]], C=[[[1.0]], [[1.0]]], D=[[[0, 0], [0, 1.0]]],
+    ...     scheduling=p, states=["x"], inputs=["w", "noise"], outputs=["x", "y"])
+    >>> plant = synthesis.Plant(
+    ...     lag, disturbances=["w", "noise"], performance=["x"], controls=[], measurements=["y"])
+    >>> made = synthesis.estimator(plant)
+    >>> bool(made.certify(search=None).gamma <= made.gamma)
+    True
+    """
+    parameters = limits(plant.parameters, rate)
+    plant = plant.with_scheduling(parameters)
+    least_ranks(plant, controls=False)
+    attempts: list[Attempt] = []
+    shape = Shape(dependence(X, parameters, "X", sampled=plant.dt is not None), None)
+    start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
+    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
+    for design in settled(start, factors, _recover, USUAL, attempts, check=_error_gain):
+        model, error, misfit = _observer(plant, design.coordinates, design.gains)
+        return Estimator(
+            model=model, error=error, gamma=design.gamma, misfit=misfit, attempts=tuple(attempts)
+        )
+    raise failed(plant, attempts)
+
+
+def _recover(
+    coordinates: Coordinates, existence: Existence, found: Found
+) -> Callable[[Array], Array] | None:
+    X = existence.X
+    assert X is not None  # noqa: S101
+
+    def gains(p: Array) -> Array:
+        """L (K, n, ny)."""
+        at, x = coordinates.at(p).dual, X.at(found.coefficients, p)
+        if coordinates.dt is not None:
+            F = state_gain(at, x, x, found.gamma)
+            assert F is not None  # noqa: S101 - it exists where the inequalities hold
+        else:
+            nothing = np.zeros((len(p), at.B2.shape[-1], at.D21.shape[-2]))
+            F = control_gain(at, x, nothing, found.gamma)
+        return -np.linalg.solve(x, np.swapaxes(F, 1, 2))
+
+    return gains
+
+
+def _error_gain(coordinates: Coordinates, gains: Callable[[Array], Array], p: Array) -> Any:
+    at, L = coordinates.at(p), gains(p)
+    return at.A - L @ at.C2, at.B1 - L @ at.D21, at.C1, at.D11
+
+
+def _observer(
+    plant: Plant, c: Coordinates, gains: Callable[[Array], Array]
+) -> tuple[LPVStateSpace, LPVStateSpace, float]:
+    rows, columns = 1 / math.sqrt(c.time) * c.right, c.measurements
+
+    def physical(p: Array) -> Array:
+        return rows @ gains(p) * columns
+
+    scale = (np.linalg.norm(rows, axis=1), 1 / columns)
+    basis, L, misfit = fitted(physical, plant.parameters, ACCURACY, scale)
+    m = len(plant.parameters)
+    p = lobatto_points(NODES.get(m, 7), [(s.low, s.high) for s in plant.parameters])
+    at, gain = plant.matrices(p), np.tensordot(basis(p), L, axes=1)
+    A, u = at.A - gain @ at.C2, at.B2 - gain @ at.D22
+    estimates = tuple(Signal(f"{z}_estimate", z.unit) for z in plant.performance)
+    wide = plant.product(basis)
+
+    def model(B: Array, C: Array, D: Array, inputs: Any, outputs: Any) -> LPVStateSpace:
+        return LPVStateSpace(
+            wide, *(wide.fit(p, M) for M in (A, B, C, D)), plant.parameters, plant.states, inputs,
+            outputs, plant.dt,
+        )  # fmt: skip
+
+    into = np.concatenate([gain, u], axis=-1)
+    direct = np.concatenate([np.zeros((*at.D12.shape[:2], gain.shape[-1])), at.D12], axis=-1)
+    observer = model(into, at.C1, direct, (*plant.measurements, *plant.controls), estimates)
+    error = model(at.B1 - gain @ at.D21, at.C1, at.D11, plant.disturbances, plant.performance)
+    return observer, error, misfit
