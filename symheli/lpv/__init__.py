@@ -26,7 +26,7 @@ from symheli.lpv.bases import (
     Spline,
     UserFunctions,
 )
-from symheli.lpv.delay import pade_delay
+from symheli.lpv.delay import pade_delay, sample_delay
 from symheli.lpv.lft import (
     LFT,
     Block,
@@ -89,6 +89,7 @@ __all__ = [
     "nu_gaps",
     "pade_delay",
     "parallel",
+    "sample_delay",
     "series",
     "simulate",
     "stability_margin",

@@ -323,6 +323,26 @@ class LPVStateSpace:
 
         return close(self, feedback_matrix(gains, self.inputs, self.outputs))
 
+    def driven_by(self, parts: Mapping[str, LinearModel | LPVStateSpace]) -> LPVStateSpace:
+        """This model behind single-input single-output `parts` {input: part}, such as actuators;
+        the inputs keep their names and get the unit of what drives the part.
+
+        The states of the parts come last, with the name of the input before those that the model
+        has too; parts may be scheduled. Raises `InputError` for a part of several inputs or
+        outputs or of another sample period.
+        """
+        from symheli.lpv.in_series import driven_by
+
+        return driven_by(self, parts)
+
+    def filtered_by(self, parts: Mapping[str, LinearModel | LPVStateSpace]) -> LPVStateSpace:
+        """This model in front of single-input single-output `parts` {output: part}, such as
+        filters; the outputs keep their names and get the unit of the part's. See `driven_by`.
+        """
+        from symheli.lpv.in_series import filtered_by
+
+        return filtered_by(self, parts)
+
     def scaled(
         self, inputs: Mapping[str, float] | None = None, outputs: Mapping[str, float] | None = None
     ) -> LPVStateSpace:
