@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
 
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
@@ -26,59 +25,52 @@ connected.
 def driven_by(lpv: LPVStateSpace, parts: Mapping[str, Part]) -> LPVStateSpace:
     """The model behind `parts` {input: part}; see `LPVStateSpace.driven_by`."""
     for name, part in parts.items():
-        (i,) = indices([name], lpv.inputs, "input")
+        indices([name], lpv.inputs, "input")
         ahead, behind = Signal(AHEAD + name), Signal(BEHIND + name)
-        inputs = {**itself(lpv.inputs), behind: {name: 1.0}}
-        del inputs[lpv.inputs[i]]
-        new = Signal(name, _checked(part, name, lpv, "input").inputs[0].unit)
-        order = [*(new if u == name else u for u in lpv.inputs), behind]
+        inputs = {u: {} if u == name else {u: 1.0} for u in lpv.inputs}
         wide = mixed(
             lpv,
-            {u: inputs.get(u, {}) for u in order},
+            {**inputs, behind: {name: 1.0}},
             {**itself(lpv.outputs), ahead: {}},
-            {ahead: {new: 1.0}},
+            {ahead: {name: 1.0}},
         )
-        lpv = _connected(wide, part, ahead, behind, f"{name}_")
+        lpv = _connected(wide, part, ahead, behind, "input", name)
     return lpv
 
 
 def filtered_by(lpv: LPVStateSpace, parts: Mapping[str, Part]) -> LPVStateSpace:
     """The model in front of `parts` {output: part}; see `LPVStateSpace.filtered_by`."""
     for name, part in parts.items():
-        indices([name], lpv.outputs, "output")
+        (i,) = indices([name], lpv.outputs, "output")
         ahead, behind = Signal(AHEAD + name), Signal(BEHIND + name)
-        new = Signal(name, _checked(part, name, lpv, "output").outputs[0].unit)
-        outputs = {new if y == name else y: {} if y == name else {y: 1.0} for y in lpv.outputs}
+        outputs = {y: {} if y == name else {y: 1.0} for y in lpv.outputs}
         wide = mixed(
             lpv,
             {**itself(lpv.inputs), behind: {}},
             {**outputs, ahead: {name: 1.0}},
-            {new: {behind: 1.0}},
+            {lpv.outputs[i]: {behind: 1.0}},
         )
-        lpv = _connected(wide, part, ahead, behind, f"{name}_")
+        lpv = _connected(wide, part, ahead, behind, "output", name)
     return lpv
 
 
-def _checked(part: Part, name: str, lpv: LPVStateSpace, kind: Literal["input", "output"]) -> Part:
+def _connected(
+    wide: LPVStateSpace, part: Part, ahead: Signal, behind: Signal, kind: str, name: str
+) -> LPVStateSpace:
+    """The loop that puts a part between the output `ahead` and the input `behind`."""
     if not isinstance(part, LinearModel | LPVStateSpace):
         raise InputError(
             f"the {kind} {name}: expected a LinearModel or an LPVStateSpace in series, got"
             f" {type(part).__name__}"
         )
-    rates = same_period(part.dt, lpv.dt) or not part.states
-    if not rates or len(part.inputs) != 1 or len(part.outputs) != 1:
+    together = same_period(part.dt, wide.dt) or not part.states
+    if not together or len(part.inputs) != 1 or len(part.outputs) != 1:
         raise InputError(
-            f"what is in series with the {kind} {name} needs one input, one output and dt ="
-            f" {lpv.dt}; got {len(part.inputs)}, {len(part.outputs)} and {part.dt}"
+            f"what is in series with the {kind} {name} needs one input, one output and dt = {wide.dt};"
+            f" got {len(part.inputs)}, {len(part.outputs)} and {part.dt}; sample what is"
+            " continuous, .discretize(dt)"
         )
-    return part
-
-
-def _connected(
-    wide: LPVStateSpace, part: Part, ahead: Signal, behind: Signal, prefix: str
-) -> LPVStateSpace:
-    names = apart(part.states, wide.states, prefix)
-    renamed = replace(part, states=names, inputs=(ahead,), outputs=(behind,))
-    closed = lower_feedback(wide, renamed)
+    names = apart(part.states, wide.states, f"{name}_")
+    closed = lower_feedback(wide, replace(part, states=names, inputs=(ahead,), outputs=(behind,)))
     assert isinstance(closed, LPVStateSpace)  # noqa: S101  (as `wide`)
     return closed

@@ -50,22 +50,29 @@ class ControllerMatrices(NamedTuple):
 
 
 def lower_feedback(
-    plant: LPVStateSpace | UncertainStateSpace | LinearModel, controller: Any
+    plant: Any,
+    controller: Any,
+    *,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
 ) -> LPVStateSpace | UncertainStateSpace:
     """The plant with u = K y closed, from its other inputs to its other outputs.
 
     The feedback is positive, and by names: the controller's inputs are outputs y of the plant, its
-    outputs inputs u. All other signals stay. Exact: matrices that do not multiply one another keep
+    outputs inputs u. Exact: matrices that do not multiply one another keep
     their basis, products of polynomials are polynomials, of other piecewise polynomials `Patches`
     over the breaks of both. A constant loop through the feedthrough of both is solved.
 
     Parameters
     ----------
-    plant : LPVStateSpace, UncertainStateSpace or LinearModel
+    plant : LPVStateSpace, UncertainStateSpace, LinearModel or a system of python-control
         Of an uncertain one every model of the set is closed.
     controller : LPVStateSpace, LinearModel or a system of python-control
         Constant, or over parameters of the same names and units as the plant's: fewer, more, or in
         another order. Its range must hold the plant's; how fast they move is the plant's to say.
+    inputs, outputs : sequence of str, optional
+        Of the closed loop, by default all that are not connected. A u among the inputs is what is
+        added to the controller's; a y among the outputs is read by the controller and stays.
 
     Returns
     -------
@@ -94,31 +101,53 @@ def lower_feedback(
     >>> print(stiff.inputs, stiff.outputs, stiff.at(1.0).A[1].round(6))
     ('u1',) () [-6.5 -1. ]
     """
+    given = _model(controller, "controller")
     if isinstance(plant, UncertainStateSpace):
-        own = [*plant.perturbation_inputs, *plant.perturbation_outputs]
-        given = _controller(controller)
-        for name in (*given.inputs, *given.outputs):
-            if name in own:
-                raise InputError(f"{name} is a channel of the block of the uncertain plant")
-        return replace(plant, model=lower_feedback(plant.model, given))
-    given, of = _controller(controller), _plant(plant)
-    if not of.states:
-        of = replace(of, dt=given.dt)
-    if given.states and not same_period(of.dt, given.dt):
+        return replace(plant, model=_around_every(plant, given, inputs, outputs))
+    return _around(_model(plant, "plant"), given, inputs, outputs)
+
+
+def _around_every(
+    plant: UncertainStateSpace,
+    controller: LPVStateSpace,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+) -> LPVStateSpace:
+    """The model of the closed set: the channels of the block stay, and last."""
+    indices((*controller.outputs, *(inputs or ())), plant.inputs, "input")
+    indices((*controller.inputs, *(outputs or ())), plant.outputs, "output")
+    if inputs is not None:
+        inputs = [*inputs, *plant.perturbation_inputs]
+    if outputs is not None:
+        outputs = [*outputs, *plant.perturbation_outputs]
+    return _around(plant.model, controller, inputs, outputs)
+
+
+def _around(
+    plant: LPVStateSpace,
+    controller: LPVStateSpace,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+) -> LPVStateSpace:
+    if not plant.states:
+        plant = replace(plant, dt=controller.dt)
+    if controller.states and not same_period(plant.dt, controller.dt):
         raise InputError(
-            f"the plant is {_time(of.dt)} and the controller {_time(given.dt)}: sample both with"
-            " one period, .discretize(dt)"
+            f"the plant is {_time(plant.dt)} and the controller {_time(controller.dt)}: sample both"
+            " with one period, .discretize(dt)"
         )
-    of, given = _over_the_same(of, given)
-    u, y = indices(given.outputs, of.inputs, "input"), indices(given.inputs, of.outputs, "output")
-    channels = Channels(
-        [i for i in range(len(of.inputs)) if i not in u],
-        u,
-        [i for i in range(len(of.outputs)) if i not in y],
-        y,
-    )
-    K = ControllerMatrices(*(replace(M, box=of.box) for M in functions_of(given)))
-    return closed(of, channels, K, apart(given.states, of.states, PREFIX))
+    plant, controller = _over_the_same(plant, controller)
+    u = indices(controller.outputs, plant.inputs, "input")
+    y = indices(controller.inputs, plant.outputs, "output")
+    w = _rest(plant.inputs, u) if inputs is None else indices(inputs, plant.inputs, "input")
+    z = _rest(plant.outputs, y) if outputs is None else indices(outputs, plant.outputs, "output")
+    K = ControllerMatrices(*(replace(M, box=plant.box) for M in functions_of(controller)))
+    states = apart(controller.states, plant.states, PREFIX)
+    return closed(plant, Channels(w, u, z, y), K, states)
+
+
+def _rest(names: Sequence[str], connected: Sequence[int]) -> list[int]:
+    return [i for i in range(len(names)) if i not in connected]
 
 
 def closed(
@@ -245,25 +274,14 @@ def apart(names: Sequence[Signal], taken: Sequence[str], prefix: str) -> tuple[S
     return tuple(out)
 
 
-def _controller(given: Any) -> LPVStateSpace:
+def _model(given: Any, what: str) -> LPVStateSpace:
     if is_control_system(given):
         given = LinearModel.from_control(given)
     if isinstance(given, LinearModel):
         given = LPVStateSpace.constant(given)
     if not isinstance(given, LPVStateSpace):
         raise InputError(
-            "controller: expected an LPVStateSpace, a LinearModel or a system of python-control,"
-            f" got {type(given).__name__}"
-        )
-    return given
-
-
-def _plant(given: Any) -> LPVStateSpace:
-    if isinstance(given, LinearModel):
-        given = LPVStateSpace.constant(given)
-    if not isinstance(given, LPVStateSpace):
-        raise InputError(
-            "plant: expected an LPVStateSpace, an UncertainStateSpace or a LinearModel, got"
+            f"{what}: expected an LPVStateSpace, a LinearModel or a system of python-control, got"
             f" {type(given).__name__}"
         )
     return given

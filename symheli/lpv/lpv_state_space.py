@@ -325,7 +325,7 @@ class LPVStateSpace:
 
     def driven_by(self, parts: Mapping[str, LinearModel | LPVStateSpace]) -> LPVStateSpace:
         """This model behind single-input single-output `parts` {input: part}, such as actuators;
-        the inputs keep their names and get the unit of what drives the part.
+        the inputs keep their names and units.
 
         The states of the parts come last, with the name of the input before those that the model
         has too; parts may be scheduled. Raises `InputError` for a part of several inputs or
@@ -337,7 +337,7 @@ class LPVStateSpace:
 
     def filtered_by(self, parts: Mapping[str, LinearModel | LPVStateSpace]) -> LPVStateSpace:
         """This model in front of single-input single-output `parts` {output: part}, such as
-        filters; the outputs keep their names and get the unit of the part's. See `driven_by`.
+        filters; the outputs keep their names and units. See `driven_by`.
         """
         from symheli.lpv.in_series import filtered_by
 
