@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
-from symheli.lpv.lower_feedback import apart, lower_feedback
+from symheli.lpv.lower_feedback import apart, around
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.mixing import itself, mixed
 from symheli.values.sample_period import same_period
@@ -66,11 +66,12 @@ def _connected(
     together = same_period(part.dt, wide.dt) or not part.states
     if not together or len(part.inputs) != 1 or len(part.outputs) != 1:
         raise InputError(
-            f"what is in series with the {kind} {name} needs one input, one output and dt = {wide.dt};"
-            f" got {len(part.inputs)}, {len(part.outputs)} and {part.dt}; sample what is"
+            f"what is in series with the {kind} {name} needs one input, one output and dt ="
+            f" {wide.dt}; got {len(part.inputs)}, {len(part.outputs)} and {part.dt}; sample what is"
             " continuous, .discretize(dt)"
         )
     names = apart(part.states, wide.states, f"{name}_")
-    closed = lower_feedback(wide, replace(part, states=names, inputs=(ahead,), outputs=(behind,)))
-    assert isinstance(closed, LPVStateSpace)  # noqa: S101  (as `wide`)
-    return closed
+    renamed = replace(part, states=names, inputs=(ahead,), outputs=(behind,))
+    return around(
+        wide, LPVStateSpace.constant(renamed) if isinstance(renamed, LinearModel) else renamed
+    )

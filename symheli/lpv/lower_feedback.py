@@ -104,7 +104,7 @@ def lower_feedback(
     given = _model(controller, "controller")
     if isinstance(plant, UncertainStateSpace):
         return replace(plant, model=_around_every(plant, given, inputs, outputs))
-    return _around(_model(plant, "plant"), given, inputs, outputs)
+    return around(_model(plant, "plant"), given, inputs, outputs)
 
 
 def _around_every(
@@ -120,15 +120,16 @@ def _around_every(
         inputs = [*inputs, *plant.perturbation_inputs]
     if outputs is not None:
         outputs = [*outputs, *plant.perturbation_outputs]
-    return _around(plant.model, controller, inputs, outputs)
+    return around(plant.model, controller, inputs, outputs)
 
 
-def _around(
+def around(
     plant: LPVStateSpace,
     controller: LPVStateSpace,
-    inputs: Sequence[str] | None,
-    outputs: Sequence[str] | None,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
 ) -> LPVStateSpace:
+    """See `lower_feedback`."""
     if not plant.states:
         plant = replace(plant, dt=controller.dt)
     if controller.states and not same_period(plant.dt, controller.dt):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 
-Sum = Mapping[str, float]
+Sum = Mapping[Any, float]
 """{signal: gain}."""
 
 
@@ -46,7 +47,7 @@ def mixed(
     return model.with_residuals(origin.nodes, exact._replace(D=exact.D + through))
 
 
-def itself(names: Iterable[Signal]) -> dict[Signal, dict[str, float]]:
+def itself(names: Iterable[Signal]) -> dict[Signal, Sum]:
     """Every signal as it is, for `mixed`."""
     return {name: {name: 1.0} for name in names}
 
