@@ -1,0 +1,1 @@
+"""Controllers: the plant they are designed for."""
