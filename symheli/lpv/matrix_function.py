@@ -108,7 +108,7 @@ class MatrixFunction:
         ]
         if np.any(both):
             parts.append(_multiplied(self[every, both], other[both, every]))
-        return reduce(MatrixFunction.__add__, [part._simplest for part in parts])
+        return reduce(MatrixFunction.__add__, [part.simplest for part in parts])
 
     def __rmatmul__(self, other: Array) -> MatrixFunction:
         """A constant times this."""
@@ -124,7 +124,8 @@ class MatrixFunction:
         return coefficients_in(space, self)
 
     @property
-    def _simplest(self) -> MatrixFunction:
+    def simplest(self) -> MatrixFunction:
+        """The same, without a basis where it is constant."""
         return MatrixFunction.constant(self.value, self.box) if self.is_constant else self
 
     def _like(self, other: MatrixFunction | Array) -> MatrixFunction:
@@ -133,7 +134,8 @@ class MatrixFunction:
 
 def functions_of(lpv: LPVStateSpace) -> list[MatrixFunction]:
     """A, B, C, D of a model."""
-    return [MatrixFunction(lpv.basis, M, lpv.box) for M in (lpv.A, lpv.B, lpv.C, lpv.D)]
+    every = (lpv.A, lpv.B, lpv.C, lpv.D)
+    return [MatrixFunction(lpv.basis, M, lpv.box).simplest for M in every]
 
 
 def block(rows: Sequence[Sequence[MatrixFunction]]) -> MatrixFunction:

@@ -45,7 +45,7 @@ def coefficients_in(space: FunctionSpace, function: Callable[[Array], Array]) ->
     tensor = values.reshape(*(len(nodes) for nodes in axes), *values.shape[1:])
     for i, (factor, nodes) in enumerate(zip(factors, axes, strict=True)):
         tensor = np.moveaxis(factor.fit(nodes, np.moveaxis(tensor, i, 0)), 0, i)
-    return tensor.reshape(-1, *values.shape[1:])
+    return tensor.reshape(space.size, *values.shape[1:])
 
 
 def _combined(
