@@ -27,6 +27,8 @@ ROTOR = signals(("Om", "om_i"))
 TOLD = (*MEASURED, *ROTOR)
 SCHEDULING = (Signal("airspeed", "m/s"), Signal("acceleration", "m/s^2"))
 """What a controller can be scheduled by."""
+EVERY_SPEED = Scheduling("airspeed", "m/s", 0.0, 1.0)
+"""Of a controller that does not depend on it."""
 Follow = Literal["command", "reading"]
 
 
@@ -251,7 +253,9 @@ def controller_of(given: object, dt: float) -> ScheduledController | Controller:
     if isinstance(given, LinearModel | LPVStateSpace):
         sampled = given.discretize(dt) if given.dt is None else given
         return ScheduledController(
-            _constant(sampled) if isinstance(sampled, LinearModel) else sampled
+            LPVStateSpace.constant(sampled, EVERY_SPEED)
+            if isinstance(sampled, LinearModel)
+            else sampled
         )
     if isinstance(given, Controller) and not isinstance(given, type):
         return given
@@ -259,20 +263,4 @@ def controller_of(given: object, dt: float) -> ScheduledController | Controller:
         f"controller: expected gains over airspeed (Autopilot), a LinearModel, an LPVStateSpace, a"
         " system of python-control, or an object with dt, reset() and step(measured, reference, p);"
         f" got {type(given).__name__}"
-    )
-
-
-def _constant(model: LinearModel) -> LPVStateSpace:
-    """The same matrices at every airspeed."""
-    airspeed = Scheduling("airspeed", "m/s", 0.0, 1.0)
-    return LPVStateSpace.polynomial(
-        [model.A],
-        [model.B],
-        [model.C],
-        [model.D],
-        airspeed,
-        states=model.states,
-        inputs=model.inputs,
-        outputs=model.outputs,
-        dt=model.dt,
     )

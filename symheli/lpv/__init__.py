@@ -26,7 +26,7 @@ from symheli.lpv.bases import (
     Spline,
     UserFunctions,
 )
-from symheli.lpv.delay import pade_delay
+from symheli.lpv.delay import pade_delay, sample_delay
 from symheli.lpv.lft import (
     LFT,
     Block,
@@ -43,6 +43,7 @@ from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.linear_models import LinearModels
+from symheli.lpv.lower_feedback import lower_feedback
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.nu_gap import chordal_distance, nu_gap
 from symheli.lpv.nu_gaps import nu_gaps
@@ -83,10 +84,12 @@ __all__ = [
     "chordal_distance",
     "connect",
     "feedback",
+    "lower_feedback",
     "nu_gap",
     "nu_gaps",
     "pade_delay",
     "parallel",
+    "sample_delay",
     "series",
     "simulate",
     "stability_margin",

@@ -1,4 +1,4 @@
-"""A pure delay as a linear model."""
+"""A pure delay as a linear model: Pade's in continuous time, exact in whole samples."""
 
 from __future__ import annotations
 
@@ -65,4 +65,48 @@ def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:
     model_in = Signal(f"{name}_command", Signal(name).unit)
     return LinearModel(
         A / seconds, B / seconds, C, np.full((1, 1), direct), states, (model_in,), (Signal(name),)
+    )
+
+
+def sample_delay(name: str, samples: int, dt: float) -> LinearModel:
+    """z^-samples from `<name>_command` to `name`: a shift register, exact.
+
+    Parameters
+    ----------
+    name : str
+        Of the delayed signal.
+    samples : int
+        Number of states, >= 1.
+    dt : float
+        Sample period, s.
+
+    Returns
+    -------
+    LinearModel
+        One input, one output.
+
+    Raises
+    ------
+    InputError
+        A number that is not positive.
+
+    Examples
+    --------
+    >>> late = lpv.sample_delay("d_lat", 2, dt=0.02)
+    >>> s = np.exp(0.02j * 5.0)
+    >>> bool(np.isclose(late.frequency_response([5.0])[0, 0, 0], s**-2))
+    True
+    """
+    if isinstance(samples, bool) or int(samples) != samples or samples < 1:
+        raise InputError(f"samples: expected an integer >= 1, got {samples!r:.60}")
+    n, unit = int(samples), Signal(name).unit
+    return LinearModel(
+        np.eye(n, k=1),
+        np.eye(n)[:, [-1]],
+        np.eye(1, n),
+        np.zeros((1, 1)),
+        tuple(Signal(f"{name}_delay{i + 1}", unit) for i in range(n)),
+        (Signal(f"{name}_command", unit),),
+        (Signal(name, unit),),
+        dt,
     )

@@ -1,16 +1,18 @@
-"""One more scheduling parameter, on which nothing depends."""
+"""The same model over other parameters besides its own, on which nothing depends."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from symheli.lpv.bases.function_space import FunctionSpace
+from symheli.lpv.bases.function_space import FunctionSpace, tensor_grid
 from symheli.lpv.bases.polynomial import Polynomial
+from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.bases.product import Product
-from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices, Residuals
-from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.lpv_state_space import LPVStateSpace, Residuals
+from symheli.lpv.scheduling import Scheduling, parameters
 
 
 def with_parameter(lpv: LPVStateSpace, scheduling: Scheduling) -> LPVStateSpace:
@@ -18,27 +20,57 @@ def with_parameter(lpv: LPVStateSpace, scheduling: Scheduling) -> LPVStateSpace:
 
     Raises `InputError` for a name that repeats, and a basis that cannot be a factor of a product.
     """
-    one = Polynomial(0, scheduling.low, scheduling.high)
+    return over(lpv, (*lpv.parameters, scheduling))
+
+
+def over(lpv: LPVStateSpace, given: Sequence[Scheduling]) -> LPVStateSpace:
+    """The same matrices and trim over the parameters `given`: those of `lpv`, by name and in any
+    order, and others.
+    """
+    given = parameters(given)
+    if [s.name for s in given] == [s.name for s in lpv.parameters]:
+        return replace(lpv, parameters=given)
+    basis, order = _over(lpv.basis, lpv.parameters, given)
     trim, residuals = lpv.trim, lpv.residuals
+    if trim is not None:
+        other, own = _over(trim.basis, lpv.parameters, given)
+        rates = None if trim.xdot is None else trim.xdot[own]
+        trim = replace(trim, basis=other, x=trim.x[own], u=trim.u[own], xdot=rates)
     return replace(
         lpv,
-        basis=_times(lpv.basis, one),
-        parameters=(*lpv.parameters, scheduling),
-        trim=trim and replace(trim, basis=_times(trim.basis, one)),
-        residuals=residuals and _at_the_ends(residuals, scheduling),
+        basis=basis,
+        **{name: getattr(lpv, name)[order] for name in "ABCD"},
+        parameters=given,
+        trim=trim,
+        residuals=residuals and _everywhere(residuals, lpv.parameters, given),
     )
 
 
-def _times(basis: FunctionSpace, one: Polynomial) -> Product:
-    """Every function times 1, in the same order."""
-    if isinstance(basis, Product):
-        return replace(basis, factors=(*basis.factors, one))
-    return Product((basis, one))  # type: ignore[arg-type]  # a Product refuses what is no factor
+def _over(
+    basis: FunctionSpace, own: Sequence[Scheduling], given: Sequence[Scheduling]
+) -> tuple[Product, list[int]]:
+    """Every function times 1, and which function of `basis` each is."""
+    factor = dict(zip([s.name for s in own], factors_of(basis), strict=True))
+    factors = tuple(factor.get(s.name) or Polynomial(0, s.low, s.high) for s in given)
+    total = basis.total_degree if isinstance(basis, Product) else None
+    wider = Product(factors, total)  # type: ignore[arg-type]  # a Product refuses what is no factor
+    names = [s.name for s in given]
+    at = [names.index(s.name) for s in own]
+    known = basis.indices if isinstance(basis, Product) else [(j,) for j in range(basis.size)]
+    where = {index: j for j, index in enumerate(known)}
+    return wider, [where[tuple(index[i] for i in at)] for index in wider.indices]
 
 
-def _at_the_ends(residuals: Residuals, s: Scheduling) -> Residuals:
-    """The same misfit at both ends of the new range."""
+def _everywhere(
+    residuals: Residuals, own: Sequence[Scheduling], given: Sequence[Scheduling]
+) -> Residuals:
+    """The same misfit at both ends of every new range."""
     nodes = residuals.nodes.reshape(len(residuals.nodes), -1)
-    ends = np.tile([s.low, s.high], len(nodes))
-    twice = Matrices(*(np.repeat(M, 2, axis=0) for M in residuals.matrices))
-    return Residuals(np.column_stack([np.repeat(nodes, 2, axis=0), ends]), *twice)
+    known = {s.name: column for s, column in zip(own, nodes.T, strict=True)}
+    new = [s for s in given if s.name not in known]
+    ends = tensor_grid([np.array([s.low, s.high]) for s in new]) if new else np.zeros((1, 0))
+    count = len(ends)
+    columns = {name: np.repeat(column, count) for name, column in known.items()}
+    columns |= {s.name: np.tile(end, len(nodes)) for s, end in zip(new, ends.T, strict=True)}
+    repeated = (np.repeat(M, count, axis=0) for M in residuals.matrices)
+    return Residuals(np.column_stack([columns[s.name] for s in given]), *repeated)

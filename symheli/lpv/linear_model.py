@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from symheli.errors import InputError
+from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.equilibration import is_singular, loop_inverse
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
@@ -112,13 +112,18 @@ class LinearModel:
             outputs=tuple(self.outputs[i] for i in rows),
         )
 
-    def discretize(self, dt: float) -> LinearModel:
-        """Zero-order-hold equivalent at sample period `dt` (s); exact at the samples."""
+    def discretize(self, dt: float, method: Literal["hold", "tustin"] = "hold") -> LinearModel:
+        """Equivalent at sample period `dt` (s): "hold", with inputs held between the samples, exact
+        at these; "tustin", s = (2/dt) (z - 1)/(z + 1), which keeps stability and the largest gain.
+        """
         if self.dt is not None:
             raise InputError(f"the model is already discrete (dt = {self.dt} s)")
+        if method not in (names := {"hold": "zoh", "tustin": "bilinear"}):
+            raise UnknownNameError("method", method, names)
         from scipy.signal import cont2discrete
 
-        A, B, C, D = cont2discrete((self.A, self.B, self.C, self.D), dt)[:4]  # type: ignore[index]
+        system = self.A, self.B, self.C, self.D
+        A, B, C, D = cont2discrete(system, dt, names[method])[:4]  # type: ignore[index]
         return replace(self, A=A, B=B, C=C, D=D, dt=dt)
 
     def driven_by(self, actuators: Mapping[str, LinearModel]) -> LinearModel:

@@ -16,7 +16,7 @@ from symheli.lpv.bases.restricted import Restricted
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.monomials import as_blocks
 from symheli.lpv.recentred import centre, recentred
-from symheli.lpv.scheduling import Rates, Scheduling, check_all, parameters, with_rates
+from symheli.lpv.scheduling import UNSCHEDULED, Rates, Scheduling, check_all, parameters, with_rates
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
@@ -177,6 +177,27 @@ class LPVStateSpace:
             dt,
         )
 
+    @classmethod
+    def constant(
+        cls, model: LinearModel, scheduling: Scheduling | Sequence[Scheduling] = UNSCHEDULED
+    ) -> LPVStateSpace:
+        """The matrices of `model` at every value of the parameters; without any, of one called
+        "constant" from 0 to 1.
+        """
+        given = parameters(scheduling)
+        return cls(
+            polynomials([0] * len(given), [(s.low, s.high) for s in given]),
+            model.A[None],
+            model.B[None],
+            model.C[None],
+            model.D[None],
+            given,
+            model.states,
+            model.inputs,
+            model.outputs,
+            model.dt,
+        )
+
     @property
     def scheduling(self) -> Scheduling:
         """The scheduling parameter; raises `InputError` where there are several."""
@@ -292,7 +313,8 @@ class LPVStateSpace:
         `LPVStateSpace`, exact.
 
         Outputs that depend on p multiply inputs that do: a polynomial model then has up to twice
-        the degree, in another basis `InputError`. A loop through constant feedthrough is solved;
+        the degree, a piecewise polynomial one gets `Patches`, in another basis `InputError`. A
+        loop through constant feedthrough is solved;
         through feedthrough D(p) that depends on p, from an input that is driven to an output that
         is fed back, the closed loop is rational and `InputError` says so:
         `to_lft().feedback(gains)` closes it exactly, as an `LFT`.
@@ -300,6 +322,26 @@ class LPVStateSpace:
         from symheli.lpv.output_feedback import close
 
         return close(self, feedback_matrix(gains, self.inputs, self.outputs))
+
+    def driven_by(self, parts: Mapping[str, LinearModel | LPVStateSpace]) -> LPVStateSpace:
+        """This model behind single-input single-output `parts` {input: part}, such as actuators;
+        the inputs keep their names and units.
+
+        The states of the parts come last, with the name of the input before those that the model
+        has too; parts may be scheduled. Raises `InputError` for a part of several inputs or
+        outputs or of another sample period.
+        """
+        from symheli.lpv.in_series import driven_by
+
+        return driven_by(self, parts)
+
+    def filtered_by(self, parts: Mapping[str, LinearModel | LPVStateSpace]) -> LPVStateSpace:
+        """This model in front of single-input single-output `parts` {output: part}, such as
+        filters; the outputs keep their names and units. See `driven_by`.
+        """
+        from symheli.lpv.in_series import filtered_by
+
+        return filtered_by(self, parts)
 
     def scaled(
         self, inputs: Mapping[str, float] | None = None, outputs: Mapping[str, float] | None = None

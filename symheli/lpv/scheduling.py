@@ -113,6 +113,10 @@ class Scheduling:
         return p
 
 
+UNSCHEDULED = Scheduling("constant", "1", 0.0, 1.0)
+"""The parameter of a model on which nothing depends."""
+
+
 def parameters(given: Scheduling | Sequence[Scheduling]) -> tuple[Scheduling, ...]:
     """One or several parameters as a tuple; raises `InputError` for names that repeat or a rate
     that is none of them, or of another unit.

@@ -12,7 +12,6 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.linear_model import feedback_matrix
 from symheli.lpv.lpv_state_space import LPVStateSpace
-from symheli.lpv.output_feedback import close
 from symheli.lpv.scheduling import Rates, Scheduling
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
@@ -143,6 +142,8 @@ class UncertainStateSpace:
         Raises `InputError` for a Delta of another shape or beyond the bound, a basis that cannot
         hold the products, and a block that is not well posed.
         """
+        from symheli.lpv.output_feedback import close
+
         delta = frozen(delta, "delta", self.shape)
         size = float(np.linalg.norm(delta, 2))
         if size > self.bound * (1 + ROUNDING):

@@ -1,1 +1,1 @@
-"""Controllers: the plants they are designed for, and the designs."""
+"""Controllers: plants, their synthesis, and what is left of a design once it flies."""

@@ -246,3 +246,18 @@ def test_patches_give_back_polynomials_that_jump():
     # Bernstein coefficients begin and end with the values at the ends: 2 on one side of the jump, 6
     # on the other
     assert (sides[0][-1], sides[1][0]) == pytest.approx((2.0, 6.0))
+
+
+@pytest.mark.parametrize(
+    "basis",
+    [
+        Polynomial(2, 0.0, 13.0),
+        PiecewiseLinear((0.0, 4.0, 13.0)),
+        Spline((0.0, 2.0, 5.0, 13.0)),
+        BSpline(2, (0.0, 4.0, 13.0)),
+        Patches(3, (0.0, 4.0, 13.0)),
+    ],
+)
+def test_the_constant_of_every_basis_is_one_everywhere(basis):
+    p = np.linspace(0.0, 13.0, 41)
+    np.testing.assert_allclose(basis(p) @ basis.constant(), 1.0, atol=1e-13)

@@ -8,7 +8,14 @@ from families import SPEED, random_lpv, stacked
 from scipy.integrate import solve_ivp
 
 from symheli.errors import InputError
-from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, simulate
+from symheli.lpv import (
+    LPVStateSpace,
+    Patches,
+    PiecewiseLinear,
+    Scheduling,
+    UserFunctions,
+    simulate,
+)
 
 
 def stable(dt=None):
@@ -103,9 +110,17 @@ def test_a_spline_is_closed_where_its_products_stay_splines():
         np.testing.assert_allclose(
             stacked(closed.at(p)), stacked(lpv.at(p).feedback({("u1", "y1"): 2.0})), atol=1e-14
         )
+    assert closed.basis == lpv.basis
     moving = replace(lpv, B=rng.standard_normal((4, 2, 1)))
-    with pytest.raises(InputError, match="leaves this basis"):
-        moving.feedback({("u1", "y1"): 2.0})
+    squares = moving.feedback({("u1", "y1"): 2.0})  # B(p) C(p) between the nodes
+    assert squares.basis == Patches(2, nodes)
+    for p in (0.0, 2.9, 4.1, 13.0):
+        np.testing.assert_allclose(
+            stacked(squares.at(p)), stacked(moving.at(p).feedback({("u1", "y1"): 2.0})), atol=1e-13
+        )
+    brought = UserFunctions((np.ones_like, np.sin, np.cos, np.sqrt), 0.0, 13.0)
+    with pytest.raises(InputError, match="no basis in common"):
+        replace(moving, basis=brought).feedback({("u1", "y1"): 2.0})
 
 
 def test_sampled_model_is_the_hold_equivalent_at_the_nodes_up_to_its_residuals():

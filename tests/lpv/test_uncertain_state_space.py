@@ -108,7 +108,7 @@ def test_draws_of_the_ball_are_uniform_and_those_of_the_boundary_on_it():
         assert isinstance(lpv, LPVStateSpace)
 
 
-def test_a_spline_holds_products_with_constants_only():
+def test_a_spline_holds_products_with_constants_others_are_patches():
     basis = PiecewiseLinear((0.0, 5.0, 13.0))
     one = np.ones((3, 1, 1))
     varying = np.array([1.0, 2.0, 4.0])[:, None, None]
@@ -122,8 +122,9 @@ def test_a_spline_holds_products_with_constants_only():
         return UncertainStateSpace(model, "d", "v", 0.1, 1.0, "by choice")
 
     assert with_v(2 * one).perturbed([[0.1]]).at(13.0).A == pytest.approx(-1 + 4 * 0.1 * 2)
-    with pytest.raises(InputError, match="products are polynomials"):
-        with_v(varying).perturbed([[0.1]])
+    assert with_v(2 * one).perturbed([[0.1]]).basis == basis
+    squared = with_v(varying).perturbed([[0.1]])
+    assert squared.at(2.5).A == pytest.approx(-1 + 0.1 * 1.5**2)  # of values half way, not half
 
 
 @pytest.mark.parametrize(

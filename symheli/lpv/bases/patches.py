@@ -48,6 +48,10 @@ class Patches(PiecewisePolynomial):
         """degree + 1 in every interval."""
         return self.size
 
+    def constant(self) -> Array:
+        """The power 0 of every interval."""
+        return np.tile(np.eye(self.degree + 1)[-1], len(self.breaks) - 1)
+
     def points(self, count: int) -> Array:
         """`count` Chebyshev points inside every interval, in order."""
         unit = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)

@@ -24,7 +24,7 @@ class PiecewisePolynomial(Basis):
         """All functions side by side."""
 
     def constant(self) -> Array:
-        """Ones: the functions of every such basis add up to 1."""
+        """Ones: the functions of such a basis add up to 1."""
         return np.ones(self.size)
 
     @cached_property

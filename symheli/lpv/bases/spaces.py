@@ -1,0 +1,103 @@
+"""Sums and products of function spaces: where the sum and the product of two functions live, and
+the coefficients of a function there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv.bases.basis import Basis
+from symheli.lpv.bases.function_space import FunctionSpace, tensor_grid
+from symheli.lpv.bases.patches import Patches
+from symheli.lpv.bases.polynomial import Polynomial
+from symheli.lpv.bases.polynomials import factors_of
+from symheli.lpv.bases.product import Product
+from symheli.values.arrays import Array
+
+SAME_BREAK = 1e-9
+"""Breaks nearer to one another than this fraction of the range are one."""
+
+
+def sum_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
+    """A space that holds every f + g, f of `a` and g of `b`, factor by factor.
+
+    Polynomials stay polynomials, other piecewise polynomials become `Patches` over the breaks of
+    both. Raises `InputError` for functions that are neither, unless the other is a constant.
+    """
+    return a if a == b else _combined(a, b, _sum)
+
+
+def product_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
+    """A space that holds every f g, f of `a` and g of `b`: as `sum_space`, the degrees added."""
+    return _combined(a, b, _product)
+
+
+def coefficients_in(space: FunctionSpace, function: Callable[[Array], Array]) -> Array:
+    """Coefficients (n, ...) of a `function` of the space, p -> (K, ...): exact to rounding, by as
+    many values as each factor needs.
+    """
+    factors = factors_of(space)
+    axes = [_nodes(f) for f in factors]
+    values = function(axes[0] if len(axes) == 1 else tensor_grid(axes))
+    tensor = values.reshape(*(len(nodes) for nodes in axes), *values.shape[1:])
+    for i, (factor, nodes) in enumerate(zip(factors, axes, strict=True)):
+        tensor = np.moveaxis(factor.fit(nodes, np.moveaxis(tensor, i, 0)), 0, i)
+    return tensor.reshape(space.size, *values.shape[1:])
+
+
+def _combined(
+    a: FunctionSpace, b: FunctionSpace, rule: Callable[[FunctionSpace, FunctionSpace], Basis]
+) -> FunctionSpace:
+    factors = [rule(f, g) for f, g in zip(factors_of(a), factors_of(b), strict=True)]
+    return factors[0] if len(factors) == 1 else Product(tuple(factors))
+
+
+def _sum(f: FunctionSpace, g: FunctionSpace) -> Basis:
+    return _basis(f) if f == g else _either(f, g, max)
+
+
+def _product(f: FunctionSpace, g: FunctionSpace) -> Basis:
+    return _either(f, g, int.__add__)
+
+
+def _either(f: FunctionSpace, g: FunctionSpace, degree: Callable[[int, int], int]) -> Basis:
+    """The factor for both, its degree that of the two degrees."""
+    for one, other in ((f, g), (g, f)):
+        if one.degrees == (0,):
+            return _basis(other)
+    (low_f, high_f), (low_g, high_g) = f.ranges[0], g.ranges[0]
+    low, high = max(low_f, low_g), min(high_f, high_g)
+    if f.degrees is not None and g.degrees is not None:
+        return Polynomial(degree(f.degrees[0], g.degrees[0]), low, high)
+    try:
+        pieces = f.pieces(), g.pieces()
+    except InputError as error:
+        raise InputError(
+            f"functions of {type(f).__name__} and of {type(g).__name__} have no basis in common,"
+            " nor for their products: both must be polynomials or piecewise polynomials;"
+            " interpolate with kind='polynomial' or 'spline'"
+        ) from error
+    first, second = (max(p.bernstein.shape[1] - 1 for p in each) for each in pieces)
+    breaks = [low]
+    for at in sorted(p.low for each in pieces for p in each):
+        if at - breaks[-1] > SAME_BREAK * (high - low) and high - at > SAME_BREAK * (high - low):
+            breaks.append(at)
+    return Patches(degree(first, second), (*breaks, high))
+
+
+def _basis(factor: FunctionSpace) -> Basis:
+    assert isinstance(factor, Basis)  # noqa: S101  (factors are bases of one parameter)
+    return factor
+
+
+def _nodes(factor: FunctionSpace) -> Array:
+    """Points of one parameter at which the functions are told apart without loss of digits, none on
+    a break that they may jump at.
+    """
+    if isinstance(factor, Polynomial):
+        x = np.polynomial.legendre.leggauss(factor.size)[0]
+        return 0.5 * (factor.low + factor.high) + 0.5 * (factor.high - factor.low) * x
+    return factor.points(factor.degree + 1) if isinstance(factor, Patches) else factor.samples()

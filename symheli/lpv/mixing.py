@@ -1,0 +1,60 @@
+"""Inputs and outputs of an LPV model as constant combinations of others, exact in every basis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.values.arrays import Array
+from symheli.values.signal import Signal, indices
+
+Sum = Mapping[Any, float]
+"""{signal: gain}."""
+
+
+def mixed(
+    lpv: LPVStateSpace,
+    inputs: Mapping[Signal, Sum],
+    outputs: Mapping[Signal, Sum],
+    across: Mapping[Signal, Sum] | None = None,
+) -> LPVStateSpace:
+    """The model with new inputs and outputs, in this order; the trim is left out.
+
+    `inputs` {new: {old: gain}} says what each drives, `outputs` {new: {old: gain}} of which it is
+    the sum, `across` {new output: {new input: gain}} what goes straight from the new inputs to the
+    new outputs. Raises `UnknownNameError`.
+    """
+    into = _matrix(inputs, lpv.inputs, "input").T
+    out = _matrix(outputs, lpv.outputs, "output")
+    straight = {name: (across or {}).get(name, {}) for name in outputs}
+    through = _matrix(straight, list(inputs), "input")
+
+    def between(A: Array, B: Array, C: Array, D: Array) -> Matrices:
+        return Matrices(A, B @ into, out @ C, out @ D @ into)
+
+    A, B, C, D = between(lpv.A, lpv.B, lpv.C, lpv.D)
+    if np.any(through):
+        D = D + np.multiply.outer(lpv.basis.constant(), through)
+    names = {"inputs": tuple(inputs), "outputs": tuple(outputs)}
+    model = replace(lpv, A=A, B=B, C=C, D=D, trim=None, residuals=None, **names)
+    if (origin := lpv.fitted_to) is None:
+        return model
+    exact = between(*origin.matrices)
+    return model.with_residuals(origin.nodes, exact._replace(D=exact.D + through))
+
+
+def itself(names: Iterable[Signal]) -> dict[Signal, Sum]:
+    """Every signal as it is, for `mixed`."""
+    return {name: {name: 1.0} for name in names}
+
+
+def _matrix(sums: Mapping[Signal, Sum], known: Sequence[str], kind: str) -> Array:
+    """One row a sum, one column a known name."""
+    out = np.zeros((len(sums), len(known)))
+    for row, terms in zip(out, sums.values(), strict=True):
+        row[indices(terms, known, kind)] = list(terms.values())
+    return out

@@ -1,0 +1,526 @@
+"""The plant of a design: a model that knows its disturbances, performance, controls and
+measurements, and what stands between it and the controller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.lpv import (
+    FunctionSpace,
+    LinearModel,
+    LPVStateSpace,
+    Scheduling,
+    UncertainStateSpace,
+    lower_feedback,
+)
+from symheli.lpv.linear_model import feedback_matrix, is_control_system
+from symheli.lpv.lower_feedback import Channels, Generalized
+from symheli.lpv.mixing import itself, mixed
+from symheli.lpv.scheduling import Rates
+from symheli.values.arrays import frozen
+from symheli.values.signal import Signal, indices, signals
+from symheli.values.units import quotient
+from synthesis.design import parts
+
+Model = LPVStateSpace | UncertainStateSpace
+Some = TypeVar("Some", LPVStateSpace, UncertainStateSpace)
+
+TRUE, WEIGHTED = "true_", "weighted_"
+"""Before the name of a performance signal of which the measurement is another: without its noise
+and filter, or without the weight.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """dx/dt = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u; or sampled.
+
+    w are the disturbances, u the controls, z the performance and y the measurements; all matrices
+    are functions of the scheduling parameters. Each method gives a new plant; in the order of the
+    calls the parts come to stand between the model and the controller. States come (model, parts in
+    order of the calls).
+
+    Parameters
+    ----------
+    model : LPVStateSpace, UncertainStateSpace, LinearModel or a system of python-control
+        What does not depend on a parameter becomes a model over one called "constant". Afterwards
+        `model` has the inputs (disturbances, controls) and the outputs (performance, measurements
+        that are not among those), then the channels of an uncertain one's block.
+    disturbances, controls : sequence of str
+        Inputs of the model, none in both.
+    performance : sequence of str
+        Outputs of the model; or disturbances and controls, which then are performance as they are:
+        of a control behind a servo or a delay that is the command.
+    measurements : sequence of str
+        Outputs of the model. A signal may be performance too.
+
+    Raises
+    ------
+    InputError
+        A model of another kind, an input that is disturbance and control, a name that repeats.
+    UnknownNameError
+        A signal that the model does not have.
+
+    Examples
+    --------
+    >>> import symheli
+    >>> roll = symheli.LinearModel(
+    ...     [[-8.0, 0.0], [1.0, 0.0]], [[120.0, 1.0], [0.0, 0.0]], np.eye(2), np.zeros((2, 2)),
+    ...     ("p", "phi"), ("d_lat", "gust"), ("p", "phi"))
+    >>> plant = (
+    ...     Plant(roll, disturbances=["gust"], performance=["phi", "d_lat"], controls=["d_lat"],
+    ...           measurements=["phi", "p"])
+    ...     .with_delay(0.02, order=2)
+    ...     .weighted({"phi": 2.0, "d_lat": 10.0}))
+    >>> print(plant.states, plant.performance)
+    ('p', 'phi', 'd_lat_delay1', 'd_lat_delay2') ('weighted_phi', 'weighted_d_lat')
+    >>> loop = plant.close({("d_lat", "phi"): -0.1, ("d_lat", "p"): -0.02})
+    >>> print(loop.inputs, loop.outputs, loop.at(0.0).is_stable())
+    ('gust',) ('weighted_phi', 'weighted_d_lat') True
+    """
+
+    model: Model
+    disturbances: tuple[Signal, ...] = ()
+    performance: tuple[Signal, ...] = ()
+    controls: tuple[Signal, ...] = ()
+    measurements: tuple[Signal, ...] = ()
+
+    def __post_init__(self) -> None:
+        model = _scheduled(self.model)
+        groups = {
+            "disturbances": _named(self.disturbances, model.inputs, "disturbance"),
+            "controls": _named(self.controls, model.inputs, "control"),
+            "measurements": _named(self.measurements, model.outputs, "measurement"),
+        }
+        w, u = groups["disturbances"], groups["controls"]
+        for name in w:
+            if name in u:
+                raise InputError(f"{name} is a disturbance and a control: name it in one only")
+        known = (*model.outputs, *(s for s in (*w, *u) if s not in model.outputs))
+        z = _named(self.performance, known, "performance signal")
+        groups["performance"] = z
+        model = _on(model, _passing([name for name in z if name in (*w, *u)]))
+        y = [name for name in groups["measurements"] if name not in z]
+        object.__setattr__(self, "model", model.select(inputs=[*w, *u], outputs=[*z, *y]))
+        for name, value in groups.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def nominal(self) -> LPVStateSpace:
+        """The model; of an uncertain one that of Delta = 0."""
+        return self.model.nominal if isinstance(self.model, UncertainStateSpace) else self.model
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """Names of the states."""
+        return self.model.states
+
+    @property
+    def parameters(self) -> tuple[Scheduling, ...]:
+        """The scheduling parameters."""
+        return self.model.parameters
+
+    @property
+    def dt(self) -> float | None:
+        """Sample period, s; None in continuous time."""
+        return self.model.dt
+
+    @property
+    def basis(self) -> FunctionSpace:
+        """The functions of the parameters that the matrices are sums of."""
+        return self.nominal.basis
+
+    def matrices(self, p: object) -> Generalized:
+        """The nine matrices at p; see `LPVStateSpace.matrices`. Of an uncertain plant those of
+        Delta = 0.
+        """
+        return Generalized.of(self.nominal.matrices(p), self._channels)
+
+    def at(self, *p: float) -> Generalized:
+        """The nine matrices frozen at p, one value a parameter."""
+        model = self.nominal.at(*p)
+        return Generalized.of((model.A, model.B, model.C, model.D), self._channels)
+
+    @property
+    def _channels(self) -> Channels:
+        inputs, outputs = self.nominal.inputs, self.nominal.outputs
+        return Channels(
+            indices(self.disturbances, inputs, "input"),
+            indices(self.controls, inputs, "input"),
+            indices(self.performance, outputs, "output"),
+            indices(self.measurements, outputs, "output"),
+        )
+
+    def weighted(self, weights: Mapping[str, object]) -> Plant:
+        """With `weights` {disturbance or performance signal: weight}, a number > 0, a LinearModel
+        or python-control system of one input and output, or an LPVStateSpace over the same
+        parameters.
+
+        A disturbance drives its weight and keeps its name; a performance signal is weighted, and
+        called `weighted_<name>` where the name itself stays that of a measurement, disturbance or
+        control. Both then have unit "1". A name that is both a disturbance and performance means
+        the disturbance. On a sampled plant continuous weights are sampled by Tustin's rule, an
+        LPVStateSpace must be. Raises `InputError` for another weight or sample period.
+        """
+        plant = self
+        for name, given in weights.items():
+            part = parts.weight(given, name, self.dt)
+            if name in plant.disturbances:
+                plant = plant._weighted_disturbance(name, part)
+            else:
+                plant = plant._weighted_performance(name, part)
+        return plant
+
+    def with_servo(self, servos: Mapping[str, object]) -> Plant:
+        """With actuators {control: Servo, LinearModel or python-control system}; the controls keep
+        their names and are the commands.
+
+        A sampled plant takes them with their output held between the samples: put them before
+        `sampled` for the hold at the command alone. Raises `InputError` where the control is
+        weighted already.
+        """
+        return self._driven({name: parts.actuator(s, name, self.dt) for name, s in servos.items()})
+
+    def with_delay(
+        self, seconds: float, signals: Sequence[str] | None = None, order: int = 4
+    ) -> Plant:
+        """With a delay at all or at these controls: exact in a sampled plant, Pade's approximation
+        of `order` states in a continuous one.
+
+        Raises `InputError` for a delay that is no whole number of samples, and where the control is
+        weighted already.
+        """
+        names = self.controls if signals is None else _tuple(signals)
+        return self._driven({name: parts.delay(seconds, name, order, self.dt) for name in names})
+
+    def with_filter(self, filters: Mapping[str, object]) -> Plant:
+        """With filters {measurement: LinearModel, python-control system, or the bandwidth of a
+        first-order lag in rad/s}, on a sampled plant by Tustin's rule.
+
+        The performance stays unfiltered, as `true_<name>` where it had the name of the
+        measurement.
+        """
+        plant = self
+        for name, given in filters.items():
+            part = parts.sensor_filter(given, name, self.dt)
+            plant = plant._with_own_measurement(name)
+            plant = plant._changed(lambda m, at=name, by=part: m.filtered_by({at: by}))
+        return plant
+
+    def with_noise(self, sizes: Mapping[str, float]) -> Plant:
+        """With a disturbance `<measurement>_noise` (unit "1") of {measurement: size} in the unit of
+        each.
+
+        The performance stays without noise, as `true_<name>` where it had the name of the
+        measurement.
+        """
+        plant = self
+        for name, size in sizes.items():
+            if not (isinstance(size, int | float | np.number) and 0 < size < np.inf):
+                raise InputError(f"the noise of {name}: expected a size > 0, got {size!r:.60}")
+            noise = Signal(f"{name}_noise", "1")
+            plant = plant._with_own_measurement(name)._with_disturbance(noise, {name: float(size)})
+        return plant
+
+    def with_reference(self, signals: Sequence[str] | None = None) -> Plant:
+        """With a disturbance `<name>_reference` for each of these performance signals and
+        measurements (None: those that are both); they become `<name>_error` = reference - signal.
+
+        Raises `InputError` where no signal is both and none is given.
+        """
+        if signals is None:
+            signals = [name for name in self.measurements if name in self.performance]
+            if not signals:
+                raise InputError(
+                    "no measurement is performance too: say which signals follow a reference"
+                )
+        plant = self
+        for name in _tuple(signals):
+            plant = plant._with_reference(name)
+        return plant
+
+    def velocity_form(
+        self, controls: Sequence[str] | None = None, *, measured: bool = False
+    ) -> Plant:
+        """With integrators in front of all or of these controls: the new controls are their rates
+        `<name>_rate`, per second, the states that they move `<name>_command`.
+
+        In discrete time u(k+1) = u(k) + dt v(k). Where the control was performance, its command is.
+        With `measured` the commands are measurements too, `<name>_command`.
+        """
+        plant = self
+        for name in self.controls if controls is None else _tuple(controls):
+            plant = plant._integrated(name, measured)
+        return plant
+
+    def sampled(self, dt: float, degree: int | Sequence[int] | None = None) -> Plant:
+        """Every `dt` s with the inputs held between; see `LPVStateSpace.discretize`, whose
+        `.residuals` the model has. Raises `InputError` for an uncertain plant.
+        """
+        if isinstance(self.model, UncertainStateSpace):
+            raise InputError(
+                "an uncertain plant is not sampled: what its block returns is not held between the"
+                " samples; start from an uncertain model that is sampled"
+            )
+        return self._changed(lambda model: model.discretize(dt, degree=degree))
+
+    def with_rate(self, rate: Rates) -> Plant:
+        """The same plant with |dp/dt| <= rate; see `LPVStateSpace.with_rate`."""
+        return replace(self, model=self.model.with_rate(rate))
+
+    def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> Plant:
+        """The same plant over narrower ranges or with other rate limits."""
+        return replace(self, model=self.model.with_scheduling(scheduling))
+
+    def close(self, controller: Any) -> Model:
+        """The loop of u = K y from the disturbances to the performance; see
+        `symheli.lpv.lower_feedback`.
+
+        `controller`: {(control, measurement): gain}, an array (controls, measurements) of gains, a
+        LinearModel, an LPVStateSpace, a python-control system (in the order of the plant where its
+        signals have no names), or what has such a `model`. Controls that it does not drive stay
+        zero. An `UncertainStateSpace` of an uncertain plant.
+        """
+        return lower_feedback(
+            self.model,
+            self._controller(controller),
+            inputs=self.disturbances,
+            outputs=self.performance,
+        )
+
+    def _controller(self, given: Any) -> LinearModel | LPVStateSpace:
+        inner = getattr(given, "model", None)
+        if isinstance(inner, LPVStateSpace) and not isinstance(given, UncertainStateSpace):
+            given = inner
+        u, y = self.controls, self.measurements
+        if is_control_system(given):
+            given = LinearModel.from_control(_renamed(given, u, y))
+        elif isinstance(given, Mapping):
+            given = LinearModel.gain(feedback_matrix(given, u, y), y, u)
+        elif isinstance(given, np.ndarray | list):
+            given = LinearModel.gain(frozen(given, "controller", (len(u), len(y))), y, u)
+        if not isinstance(given, LinearModel | LPVStateSpace):
+            raise InputError(
+                "controller: expected {(control, measurement): gain}, an array of gains, a"
+                " LinearModel, an LPVStateSpace, a system of python-control or an object with such"
+                f" a .model, got {type(given).__name__}"
+            )
+        indices(given.inputs, y, "measurement")
+        indices(given.outputs, u, "control")
+        return given
+
+    def _changed(self, change: Callable[[LPVStateSpace], LPVStateSpace], **groups: Any) -> Plant:
+        """With another model, to which inputs that are performance are added anew."""
+        inputs = (*self.disturbances, *self.controls)
+        own = self.model.select(outputs=[y for y in self.model.outputs if y not in inputs])
+        return replace(self, model=_on(own, change), **groups)
+
+    def _driven(self, by: Mapping[str, parts.Part]) -> Plant:
+        indices(by, self.controls, "control")
+        for name in by:
+            if WEIGHTED + name in self.performance:
+                raise InputError(
+                    f"{WEIGHTED}{name} weights {name} as it is: add servos and delays first, then"
+                    " the weights of the commands"
+                )
+        return self._changed(lambda model: model.driven_by(by))
+
+    def _weighted_disturbance(self, name: str, part: parts.Part) -> Plant:
+        unit = Signal(name, "1")
+
+        def change(model: LPVStateSpace) -> LPVStateSpace:
+            behind = model.driven_by({name: part})
+            inputs = tuple(unit if u == name else u for u in behind.inputs)
+            return replace(behind, inputs=inputs)
+
+        return self._changed(change, disturbances=_with(self.disturbances, name, unit))
+
+    def _weighted_performance(self, name: str, part: parts.Part) -> Plant:
+        if name not in self.performance and TRUE + name in self.performance:
+            name = TRUE + name
+        if name not in self.performance:
+            known = (*self.disturbances, *self.performance)
+            raise UnknownNameError("disturbance or performance signal", name, known)
+        stays = name in (*self.measurements, *self.controls)
+        new = Signal(WEIGHTED + name.removeprefix(TRUE) if stays else name, "1")
+
+        def change(model: LPVStateSpace) -> LPVStateSpace:
+            if name in self.controls:
+                model = _with_row(model, new, {}, {name: 1.0})
+            elif stays:
+                model = _with_row(model, new, {name: 1.0})
+            filtered = model.filtered_by({new: part})
+            return replace(
+                filtered, outputs=tuple(new if y == new else y for y in filtered.outputs)
+            )
+
+        return self._changed(change, performance=_with(self.performance, name, new))
+
+    def _with_own_measurement(self, name: str) -> Plant:
+        """A measurement that is not performance too: that becomes `true_<name>`."""
+        (i,) = indices([name], self.measurements, "measurement")
+        if name not in self.performance:
+            return self
+        true = Signal(TRUE + name, self.measurements[i].unit)
+        return self._changed(
+            lambda model: _with_row(model, true, {name: 1.0}),
+            performance=_with(self.performance, name, true),
+        )
+
+    def _with_disturbance(self, new: Signal, enters: Mapping[str, float]) -> Plant:
+        """One more disturbance, which adds {output: gain} to outputs."""
+
+        def change(model: LPVStateSpace) -> LPVStateSpace:
+            across = {Signal(y): {new: gain} for y, gain in enters.items()}
+            inputs = {**itself(model.inputs), **_new(new, model.inputs, "input")}
+            return mixed(model, inputs, itself(model.outputs), across)
+
+        return self._changed(change, disturbances=(*self.disturbances, new))
+
+    def _with_reference(self, name: str) -> Plant:
+        passing = (*self.disturbances, *self.controls)
+        known = dict.fromkeys((*self.performance, *self.measurements))
+        known = [s for s in known if s not in passing]
+        (i,) = indices([name], known, "performance signal or measurement")
+        unit = known[i].unit
+        reference, error = Signal(f"{name}_reference", unit), Signal(f"{name}_error", unit)
+
+        def change(model: LPVStateSpace) -> LPVStateSpace:
+            outputs = {
+                error if y == name else y: {y: 1.0 - 2.0 * (y == name)} for y in model.outputs
+            }
+            inputs = {**itself(model.inputs), **_new(reference, model.inputs, "input")}
+            return mixed(model, inputs, outputs, {error: {reference: 1.0}})
+
+        return self._changed(
+            change,
+            disturbances=(*self.disturbances, reference),
+            performance=_with(self.performance, name, error),
+            measurements=_with(self.measurements, name, error),
+        )
+
+    def _integrated(self, name: str, measured: bool) -> Plant:
+        (i,) = indices([name], self.controls, "control")
+        unit = self.controls[i].unit
+        rate, command = Signal(f"{name}_rate", quotient(unit, "s")), Signal(f"{name}_command", unit)
+        part = parts.integrator(self.controls[i], self.dt)
+        commands = (command,) if measured else ()
+        rows = (*commands, self.controls[i]) if name in self.performance else commands
+
+        def change(model: LPVStateSpace) -> LPVStateSpace:
+            for row in rows:
+                model = _with_row(model, row, {}, {name: 1.0})
+            behind = model.driven_by({name: part})
+            return replace(behind, inputs=tuple(rate if u == name else u for u in behind.inputs))
+
+        return self._changed(
+            change,
+            controls=_with(self.controls, name, rate),
+            measurements=(*self.measurements, *commands),
+        )
+
+
+def _scheduled(given: Any) -> Model:
+    if is_control_system(given):
+        given = LinearModel.from_control(given)
+    if isinstance(given, LinearModel):
+        given = LPVStateSpace.constant(given)
+    if not isinstance(given, LPVStateSpace | UncertainStateSpace):
+        raise InputError(
+            "model: expected an LPVStateSpace, an UncertainStateSpace, a LinearModel or a system of"
+            f" python-control, got {type(given).__name__}"
+        )
+    return given
+
+
+def _named(given: Iterable[str], known: Sequence[Signal], kind: str) -> tuple[Signal, ...]:
+    """These of the known signals, with their units; raises `InputError` for a name that repeats."""
+    return signals(tuple(known[i] for i in indices(_tuple(given), known, kind)))
+
+
+def _tuple(given: Iterable[str]) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def _on(model: Model, change: Callable[[LPVStateSpace], LPVStateSpace]) -> Model:
+    if isinstance(model, UncertainStateSpace):
+        return replace(model, model=change(model.model))
+    return change(model)
+
+
+def _passing(names: Sequence[Signal]) -> Callable[[LPVStateSpace], LPVStateSpace]:
+    """The model with outputs that pass these inputs; `InputError` where it has another output of
+    that name.
+    """
+
+    def add(model: LPVStateSpace) -> LPVStateSpace:
+        for name in names:
+            if name not in model.outputs:
+                model = _with_row(model, name, {}, {name: 1.0})
+            elif not _passes(model, name):
+                raise InputError(
+                    f"{name} is an input of the plant and an output of its model that is not that"
+                    " input: rename one of the two"
+                )
+        return model
+
+    return add
+
+
+def _passes(model: LPVStateSpace, name: Signal) -> bool:
+    """Whether the output is the input of that name."""
+    row = model.select(outputs=[name]).matrices(model.basis.samples(model.box))
+    unit = np.array([float(u == name) for u in model.inputs])
+    return not np.any(row.C) and bool(np.allclose(row.D, unit, rtol=0.0, atol=1e-12))
+
+
+def _with_row(
+    model: LPVStateSpace,
+    new: Signal,
+    of: Mapping[str, float],
+    across: Mapping[str, float] | None = None,
+) -> LPVStateSpace:
+    """One more output: a sum `of` outputs, and of inputs `across`."""
+    outputs = {**itself(model.outputs), **_new(new, model.outputs, "output", of)}
+    return mixed(model, itself(model.inputs), outputs, {new: across or {}})
+
+
+def _new(
+    name: Signal, known: Sequence[str], kind: str, of: Mapping[str, float] | None = None
+) -> dict[Signal, Mapping[str, float]]:
+    if name in known:
+        raise InputError(f"the plant has an {kind} {name} already: rename that one")
+    return {name: of or {}}
+
+
+def _with(names: Sequence[Signal], old: str, new: Signal) -> tuple[Signal, ...]:
+    return tuple(new if name == old else name for name in names)
+
+
+def _renamed(system: Any, controls: Sequence[str], measurements: Sequence[str]) -> Any:
+    """A copy of a python-control system whose signals have the names of the plant, in order, where
+    it has none of its own.
+    """
+    import control
+
+    system = control.ss(system)
+    for letter, labels, names, kind in (
+        ("u", "input_labels", measurements, "inputs"),
+        ("y", "output_labels", controls, "outputs"),
+    ):
+        own = getattr(system, labels)
+        if list(own) != [f"{letter}[{i}]" for i in range(len(own))]:
+            continue
+        if len(own) != len(names):
+            raise InputError(
+                f"the controller has {len(own)} {kind} without names, the plant"
+                f" {len(names)}: {', '.join(names)}"
+            )
+        system = control.ss(system, **{kind: [str(name) for name in names]})
+    return system
