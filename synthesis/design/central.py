@@ -9,8 +9,8 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
+from symheli.lpv.equilibration import is_singular
 from synthesis.design.generalized import Generalized
 from synthesis.design.linear_quadratic import given_direct_way
 from synthesis.design.riccati import is_semidefinite, stabilising
@@ -61,8 +61,8 @@ class Normalised(NamedTuple):
         disturbances, scales controls and measurements, leaves the states alone.
         """
         nu, ny = plant.B2.shape[1], plant.C2.shape[0]
-        Q, R = linalg.qr(plant.D12)
-        P, S = linalg.qr(plant.D21.T)
+        Q, R = np.linalg.qr(plant.D12, mode="complete")
+        P, S = np.linalg.qr(plant.D21.T, mode="complete")
         rows = np.concatenate([Q[:, nu:], Q[:, :nu]], axis=1).T  # of z
         columns = np.concatenate([P[:, ny:], P[:, :ny]], axis=1)  # of w
         into, out = np.linalg.inv(R[:nu]), np.linalg.inv(S[:ny].T)
@@ -82,14 +82,8 @@ class Normalised(NamedTuple):
     def least(self) -> float:
         """No level below this can be reached: Parrott's bound of D11."""
         D, nu, ny = self.plant.D11, len(self.into), len(self.out)
-        return max(
-            (
-                np.linalg.norm(part, 2)
-                for part in (D[: len(D) - nu], D[:, : D.shape[1] - ny])
-                if part.size
-            ),
-            default=0.0,
-        )
+        parts = D[: len(D) - nu], D[:, : D.shape[1] - ny]
+        return max((float(np.linalg.norm(part, 2)) for part in parts if part.size), default=0.0)
 
     def trial(self, gamma: float) -> Trial:
         """Whether a controller with a norm below `gamma` exists."""
@@ -111,7 +105,8 @@ class Normalised(NamedTuple):
         """
         P, gamma = self.plant, trial.gamma
         X, F, Y, L = trial.X, trial.F, trial.Y, trial.L
-        assert X is not None and Y is not None and F is not None and L is not None  # noqa: S101
+        assert X is not None and Y is not None  # noqa: PT018, S101
+        assert F is not None and L is not None  # noqa: PT018, S101
         nu, ny = len(self.into), len(self.out)
         z1, w1 = len(P.D11) - nu, P.D11.shape[1] - ny
         D1111, D1112 = P.D11[:z1, :w1], P.D11[:z1, w1:]
@@ -140,6 +135,8 @@ def _half(P: Generalized, gamma: float) -> tuple[Array | None, Array | None]:
     weight = D.T @ D
     w = P.B1.shape[1]
     weight[:w, :w] -= gamma**2 * np.eye(w)
+    if is_singular(weight):
+        return None, None
     inverse = np.linalg.inv(weight)
     DC = D.T @ P.C1
     Q = P.C1.T @ P.C1 - DC.T @ inverse @ DC

@@ -204,8 +204,9 @@ def decided_by(P: Generalized, names: Channels, gamma: float, dt: float | None =
         out.append(f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}")
     elif gamma <= floor.gamma * (1 + CLOSE):
         out.append(
-            f"gamma = {gamma:.6g} says nothing about the loop: {_floor(floor, names)}; scale that"
-            " weight, or give the controls a lower price"
+            f"gamma = {gamma:.6g} is decided by what no controller can change and tells nothing of"
+            f" the rest of the loop: {_floor(floor, names)}; scale those signals or their weights,"
+            " or give the controls a lower price"
         )
     A, B, C, D = P.A, P.B1, P.C1, P.D11
     idle = norm(A, B, C, D, dt)[0]
@@ -226,10 +227,13 @@ def _floor(floor: Unreachable, names: Channels) -> str:
         where = "by the direct way (D11)"
     else:
         where = f"at {floor.omega:.4g} rad/s"
-    return f"whatever the controller does, {w} reaches {z} with gain {floor.gamma:.6g} {where}"
+    return (
+        f"whatever the controller does, {w} comes through to {z} with gain {floor.gamma:.6g}"
+        f" {where}"
+    )
 
 
-def _foremost(sizes: Array, names: Sequence[str]) -> str:
+def _foremost(sizes: Array, names: tuple[str, ...]) -> str:
     order = np.argsort(-sizes)
     return _listed([names[i] for i in order if sizes[i] >= PART * sizes.max()])
 

@@ -172,21 +172,33 @@ def _optimal(levels: _Levels, plant: Generalized, names: Channels, back_off: flo
     """The central controller a little above the smallest level."""
     K = lqg(plant, levels.dt)
     simple = None if K is None else checked(plant, K, names, levels.dt)
-    start = simple.gamma if simple is not None else math.inf
-    found = _smallest(levels.normal, start if math.isfinite(start) else 1.0)
+    if simple is not None and simple.gamma <= NOTHING * _untouched(plant, simple):
+        return replace(simple, optimum=0.0, reasons=(NO_LEAST,))
+    found = _smallest(levels.normal, 1.0 if simple is None else simple.gamma)
     if found is None:
         return PointDesign.without(DesignStatus.FAILED, [NO_LEVEL])
     optimum, obstacle = found
-    if optimum == 0.0 and simple is not None and simple.controller is not None:
+    if optimum == 0.0 and simple is not None:
         return replace(simple, optimum=0.0, reasons=(NO_LEAST,))
     limit = "" if obstacle is None else f"a lower level is out of reach: {obstacle.value}"
     for more in BACK_OFFS:
         design = _kept(levels, plant, names, optimum * back_off * more)
         if design is not None:
             about = decided_by(plant, names, optimum, levels.dt)
+            optimum = min(optimum, design.gamma)  # within rounding, where the norm cannot move
             return replace(design, optimum=optimum, limit=limit, reasons=tuple(about))
     level = optimum * back_off * BACK_OFFS[-1]
     return PointDesign.without(DesignStatus.FAILED, [NOT_KEPT.format(level), limit], optimum)
+
+
+def _untouched(plant: Generalized, design: PointDesign) -> float:
+    """The gain of a loop were the controls not felt in the performance, beside which rounding is
+    nothing.
+    """
+    assert design.loop is not None  # noqa: S101
+    A, B, C = design.loop.A, design.loop.B, np.zeros(design.loop.C.shape)
+    C[:, : len(plant.A)] = plant.C1
+    return norm(A, B, C, plant.D11, design.loop.dt)[0]
 
 
 def _kept(levels: _Levels, plant: Generalized, names: Channels, gamma: float) -> PointDesign | None:
@@ -248,5 +260,5 @@ def _smallest(normal: Normalised, start: float) -> tuple[float, Obstacle | None]
             bad = trial
         return min(trial.slack, 1.0)
 
-    optimize.brentq(slack, math.log(low), math.log(high), xtol=ACCURACY, rtol=1e-15)
+    optimize.brentq(slack, math.log(low), math.log(high), xtol=ACCURACY)
     return good, bad.obstacle

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +33,7 @@ class Mode(NamedTuple):
     value: complex
     participation: Array
 
-    def among(self, states: Sequence[str]) -> str:
+    def among(self, states: tuple[str, ...]) -> str:
         """The states that take the foremost part, by name."""
         order = np.argsort(-self.participation)
         return ", ".join(states[i] for i in order[:4] if self.participation[i] >= SHARE)

@@ -40,7 +40,10 @@ def stabilising(A: Array, R: Array, Q: Array) -> Array | None:
     exponents = np.log2(factors)
     units = 2.0 ** np.round(0.5 * (exponents[:n] - exponents[n:]))
     scale = np.concatenate([units, 1 / units])
-    _, vectors, stable = linalg.schur(H * scale / scale[:, None], sort="lhp")  # type: ignore[misc]
+    try:
+        _, vectors, stable = linalg.schur(H * scale / scale[:, None], sort="lhp")  # type: ignore[misc]
+    except np.linalg.LinAlgError:
+        return None  # eigenvalues on the axis change sides as they are sorted
     if stable != n:
         return None
     X1, X2 = vectors[:n, :n], vectors[n:, :n]

@@ -14,6 +14,12 @@ Array = np.ndarray
 ABSENT = 1e-11
 """A direction of a response is zero where what is left of its terms is below this part of them."""
 
+NEAR = 1e13
+"""Condition of s I - A above which s is on a pole."""
+
+ASIDE = 1e-9
+"""So far is such an s moved, beside the size of A."""
+
 GRID = 400
 """Frequencies to begin with."""
 
@@ -78,10 +84,11 @@ def _largest(plant: Generalized, omega: Array, dt: float | None) -> tuple[Unreac
     """The highest of these frequencies, and the gain of each."""
     A, B, C, D = plant.joined
     s = 1j * omega if dt is None else np.exp(1j * omega * dt)
+    on_a_pole = np.linalg.cond(s[:, None, None] * np.eye(len(A)) - A) > NEAR if len(A) else False
+    # into the unstable side, where the bound holds by the maximum principle as well
+    step = ASIDE * (float(np.abs(A).max(initial=0.0)) or 1.0) if dt is None else ASIDE * s
+    s = np.where(on_a_pole, s + step, s)
     pencil = s[:, None, None] * np.eye(len(A)) - A
-    if len(A):
-        near = np.linalg.cond(pencil) > 1e13  # a pole is here
-        pencil[near] += 1e-9 * np.abs(A).max() * np.eye(len(A))
     X = np.linalg.solve(pencil, np.broadcast_to(B, (len(omega), *B.shape)))
     G, terms = C @ X + D, np.abs(C) @ np.abs(X) + np.abs(D)
     nz, nw = plant.D11.shape
