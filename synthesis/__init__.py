@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from synthesis.analysis.l2_gain import l2_gain
     from synthesis.analysis.stability import stability
     from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
-    from synthesis.design.plant import Generalized, Plant
+    from synthesis.design.generalized import Generalized
+    from synthesis.design.plant import Plant
     from synthesis.forms import HigherOrder, Memory, Spline
     from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
     from synthesis.lft.gain import lft_gain, lft_stability
@@ -38,7 +39,8 @@ _ROOMS = {
     "synthesis.analysis.l2_gain": "l2_gain",
     "synthesis.analysis.stability": "stability",
     "synthesis.certificate": "Attempt Certificate Proof Seconds Status",
-    "synthesis.design.plant": "Generalized Plant",
+    "synthesis.design.generalized": "Generalized",
+    "synthesis.design.plant": "Plant",
     "synthesis.forms": "HigherOrder Memory Spline",
     "synthesis.impose": "Bernstein Grid SumOfSquares Vertices",
     "synthesis.lft.gain": "lft_gain lft_stability",

@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symheli.lpv import LPVStateSpace
-from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
 from symheli.values.signal import Signal
 from synthesis.certificate import Attempt, Certificate
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
-from synthesis.design.fitted import NODES, fitted
+from synthesis.design.fitted import fitted
 from synthesis.design.output_feedback import (
     ACCURACY,
     USUAL,
     coordinates_of,
+    depends,
     failed,
     least_ranks,
 )
 from synthesis.design.recovery import control_gain
 from synthesis.design.sampled_recovery import state_gain
-from synthesis.design.search import BACK_OFF, Dependence, Shape, dependence, least, settled
+from synthesis.design.search import BACK_OFF, Dependence, Gains, Shape, dependence, least, settled
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
@@ -137,10 +138,10 @@ def estimator(
     plant = plant.with_scheduling(parameters)
     least_ranks(plant, controls=False)
     attempts: list[Attempt] = []
-    shape = Shape(dependence(X, parameters, "X", sampled=plant.dt is not None), None)
+    shape = Shape(dependence(X, parameters, "X", depends(plant), still=plant.dt is not None), None)
     start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
     factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
-    for design in settled(start, factors, _recover, USUAL, attempts, check=_error_gain):
+    for design in settled(start, factors, _recover, USUAL, attempts, _error):
         model, error, misfit = _observer(plant, design.coordinates, design.gains)
         return Estimator(
             model=model, error=error, gamma=design.gamma, misfit=misfit, attempts=tuple(attempts)
@@ -150,7 +151,7 @@ def estimator(
 
 def _recover(
     coordinates: Coordinates, existence: Existence, found: Found
-) -> Callable[[Array], Array] | None:
+) -> Gains | None:
     X = existence.X
     assert X is not None  # noqa: S101
 
@@ -168,36 +169,42 @@ def _recover(
     return gains
 
 
-def _error_gain(coordinates: Coordinates, gains: Callable[[Array], Array], p: Array) -> Any:
+def _error(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:
+    """Of the estimate."""
     at, L = coordinates.at(p), gains(p)
     return at.A - L @ at.C2, at.B1 - L @ at.D21, at.C1, at.D11
 
 
 def _observer(
-    plant: Plant, c: Coordinates, gains: Callable[[Array], Array]
+    plant: Plant, c: Coordinates, gains: Gains
 ) -> tuple[LPVStateSpace, LPVStateSpace, float]:
-    rows, columns = 1 / math.sqrt(c.time) * c.right, c.measurements
+    """The observer, its error, and how far its gain is from what was computed."""
+    rows, columns = c.right / math.sqrt(c.time), c.measurements
 
     def physical(p: Array) -> Array:
         return rows @ gains(p) * columns
 
     scale = (np.linalg.norm(rows, axis=1), 1 / columns)
-    basis, L, misfit = fitted(physical, plant.parameters, ACCURACY, scale)
-    m = len(plant.parameters)
-    p = lobatto_points(NODES.get(m, 7), [(s.low, s.high) for s in plant.parameters])
-    at, gain = plant.matrices(p), np.tensordot(basis(p), L, axes=1)
-    A, u = at.A - gain @ at.C2, at.B2 - gain @ at.D22
+    basis, coefficients, misfit = fitted(physical, plant.parameters, ACCURACY, scale)
+    at, box = plant.functions(), plant.nominal.box
+    L = MatrixFunction(basis, -coefficients, box)
+    zero = MatrixFunction.constant(np.zeros((at.C1.shape[0], at.C2.shape[0])), box)
+    A = at.A + L @ at.C2
+    minus = MatrixFunction(basis, coefficients, box)
     estimates = tuple(Signal(f"{z}_estimate", z.unit) for z in plant.performance)
-    wide = plant.product(basis)
-
-    def model(B: Array, C: Array, D: Array, inputs: Any, outputs: Any) -> LPVStateSpace:
-        return LPVStateSpace(
-            wide, *(wide.fit(p, M) for M in (A, B, C, D)), plant.parameters, plant.states, inputs,
-            outputs, plant.dt,
-        )  # fmt: skip
-
-    into = np.concatenate([gain, u], axis=-1)
-    direct = np.concatenate([np.zeros((*at.D12.shape[:2], gain.shape[-1])), at.D12], axis=-1)
-    observer = model(into, at.C1, direct, (*plant.measurements, *plant.controls), estimates)
-    error = model(at.B1 - gain @ at.D21, at.C1, at.D11, plant.disturbances, plant.performance)
+    known = (*plant.measurements, *plant.controls)
+    into = block(((minus, at.B2 + L @ at.D22),))
+    observer = _model(plant, (A, into, at.C1, block(((zero, at.D12),))), known, estimates)
+    error = _model(
+        plant, (A, at.B1 + L @ at.D21, at.C1, at.D11), plant.disturbances, plant.performance
+    )
     return observer, error, misfit
+
+
+def _model(
+    plant: Plant, functions: Sequence[MatrixFunction], inputs: Any, outputs: Any
+) -> LPVStateSpace:
+    basis, coefficients = in_one_basis(list(functions), plant.basis.ranges)
+    return LPVStateSpace(
+        basis, *coefficients, plant.parameters, plant.states, inputs, outputs, plant.dt
+    )

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symheli.errors import SynthesisError
+from symheli.errors import InputError, SynthesisError
 from symheli.lpv import LPVStateSpace
+from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certificate import Attempt
 from synthesis.design.cells import degrees_of
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates
+from synthesis.design.diagnosis import reasons, unpriced
 from synthesis.design.existence import Existence, Found
 from synthesis.design.fitted import fitted
 from synthesis.design.motions import motions, used
@@ -131,12 +133,50 @@ def depends(plant: Plant) -> list[bool]:
 
 
 def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
-    """Raises `InputError` where a control costs nothing or a measurement is free of disturbances."""
+    """Raises `InputError` where a control costs nothing or a measurement is free of disturbances at
+    some p, and where the plant has none.
+    """
+    named = plant.channels
+    for wanted, group in (
+        (True, "disturbances"), (True, "performance"), (controls, "controls"),
+        (measurements, "measurements"),
+    ):  # fmt: skip
+        if wanted and not getattr(named, group):
+            raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
+    at = plant.matrices(scattered(plant))
+    found: list[str] = []
+    if controls:
+        found += unpriced(at.D12, named.controls)
+    if measurements:
+        found += unpriced(np.swapaxes(at.D21, 1, 2), named.measurements, dual=True)
+    if found:
+        raise InputError("; ".join(found))
+
+
+def scattered(plant: Plant) -> Array:
+    """Some p all over the box, as `Plant.matrices` takes them."""
+    return lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.nominal.box)
 
 
 def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
-    """The error that says why."""
-    return SynthesisError("no controller was found:\n  " + "\n  ".join(map(str, attempts)))
+    """The error that says why: modes, directions and weights, and every program that was tried."""
+    p = scattered(plant)
+    names = [s.name for s in plant.parameters]
+    said = [
+        ", ".join(f"{n} = {v:g}" for n, v in zip(names, np.atleast_1d(q), strict=True)) for q in p
+    ]
+    least = min((a.bound for a in attempts), default=math.inf)
+    why = reasons(
+        plant.matrices(p), plant.channels, dt=plant.dt, at=said,
+        gamma=least if math.isfinite(least) else None,
+    )  # fmt: skip
+    lines = why or (
+        "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"
+        " more divisions may help",
+    )
+    return SynthesisError(
+        "no controller was found:\n  " + "\n  ".join([*lines, *map(str, attempts)]), tuple(lines)
+    )
 
 
 def _recover(

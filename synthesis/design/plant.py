@@ -20,13 +20,16 @@ from symheli.lpv import (
     lower_feedback,
 )
 from symheli.lpv.linear_model import feedback_matrix, is_control_system
-from symheli.lpv.lower_feedback import Channels, Generalized
+from symheli.lpv.lower_feedback import Channels as Positions
+from symheli.lpv.lower_feedback import Generalized as Blocks
+from symheli.lpv.matrix_function import functions_of
 from symheli.lpv.mixing import itself, mixed
 from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import frozen
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.units import quotient
 from synthesis.design import parts
+from synthesis.design.generalized import Channels, Generalized
 
 Model = LPVStateSpace | UncertainStateSpace
 Some = TypeVar("Some", LPVStateSpace, UncertainStateSpace)
@@ -140,17 +143,28 @@ class Plant:
         """The nine matrices at p; see `LPVStateSpace.matrices`. Of an uncertain plant those of
         Delta = 0.
         """
-        return Generalized.of(self.nominal.matrices(p), self._channels)
+        return Generalized(*Blocks.of(self.nominal.matrices(p), self._positions))
 
     def at(self, *p: float) -> Generalized:
         """The nine matrices frozen at p, one value a parameter."""
         model = self.nominal.at(*p)
-        return Generalized.of((model.A, model.B, model.C, model.D), self._channels)
+        return Generalized(*Blocks.of((model.A, model.B, model.C, model.D), self._positions))
+
+    def functions(self) -> Generalized:
+        """The nine matrices as functions of p, `symheli.lpv.MatrixFunction`."""
+        return Generalized(*Blocks.of(functions_of(self.nominal), self._positions))  # type: ignore[arg-type]
 
     @property
-    def _channels(self) -> Channels:
-        inputs, outputs = self.nominal.inputs, self.nominal.outputs
+    def channels(self) -> Channels:
+        """The names of all signals."""
         return Channels(
+            self.states, self.disturbances, self.controls, self.performance, self.measurements
+        )
+
+    @property
+    def _positions(self) -> Positions:
+        inputs, outputs = self.nominal.inputs, self.nominal.outputs
+        return Positions(
             indices(self.disturbances, inputs, "input"),
             indices(self.controls, inputs, "input"),
             indices(self.performance, outputs, "output"),

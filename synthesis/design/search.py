@@ -131,6 +131,10 @@ def shapes(
     return out
 
 
+Gains = Callable[[Array], Array]
+Loop = Callable[[Coordinates, Gains, Array], tuple[Array, ...]]
+"""A, B, C, D (K, ..) of what is judged, at p (K, m)."""
+
 @dataclass(frozen=True, eq=False)
 class Design:
     """X and Y with the gamma they hold for, in these coordinates; `gains` at p (K, m), scaled."""
@@ -138,7 +142,7 @@ class Design:
     coordinates: Coordinates
     existence: Existence
     found: Found
-    gains: Callable[[Array], Array]
+    gains: Gains
 
     @property
     def gamma(self) -> float:
@@ -146,7 +150,7 @@ class Design:
         return self.found.gamma * self.coordinates.channel
 
 
-Recover = Callable[[Coordinates, Existence, Found], Callable[[Array], Array] | None]
+Recover = Callable[[Coordinates, Existence, Found], Gains | None]
 
 
 def least(
@@ -176,8 +180,9 @@ def settled(
     recover: Recover,
     solver: Solver,
     attempts: list[Attempt],
+    loop: Loop | None = None,
 ) -> Iterator[Design]:
-    """Designs at ever larger multiples of the least gamma."""
+    """Designs at ever larger multiples of the least gamma, whose frozen `loop` keeps it."""
     coordinates, existence, lowest = start
     for factor in back_off:
         gamma = factor * lowest.gamma
@@ -185,7 +190,7 @@ def settled(
             gains = recover(coordinates, existence, found) if np.any(found.coefficients) else None
             word = "no gains"
             if gains is not None:
-                reached = frozen_gain(coordinates, gains)
+                reached = frozen_gain(coordinates, gains, loop or closed)
                 word = f"worst frozen gain {reached / gamma:.4f} of it"
             attempts.append(
                 Attempt(
@@ -198,11 +203,41 @@ def settled(
                 break
 
 
-def frozen_gain(coordinates: Coordinates, gains: Callable[[Array], Array]) -> float:
+def frozen_gain(coordinates: Coordinates, gains: Gains, loop: Loop) -> float:
     """Of the loop at some frozen p, scaled; inf where one is unstable."""
     low, high = np.array([(s.low, s.high) for s in coordinates.parameters]).T
     p = low + np.linspace(0.0, 1.0, 7)[:, None] * (high - low)
+    every = loop(coordinates, gains, p)
+    return max(norm(*(M[i] for M in every), coordinates.dt, 1e-6)[0] for i in range(len(p)))
+
+
+def closed(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:
+    """The plant under [A B; C D]."""
     plants, K = coordinates.at(p), gains(p)
     k = K.shape[-1] - plants.C2.shape[-2]
-    loops = plants.closed(K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:])
-    return max(norm(*(M[i] for M in loops), coordinates.dt, 1e-6)[0] for i in range(len(p)))
+    return plants.closed(K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:])
+
+
+def dependence(
+    given: Dependence | None,
+    parameters: Sequence[Scheduling],
+    name: str,
+    matters: Sequence[bool],
+    *,
+    still: bool = False,
+) -> FunctionSpace:
+    """Functions of X or Y where there is only one of them: by default of degree `USUAL` in what the
+    plant depends on and may not jump; `still`: nor move.
+    """
+    degrees = tuple(
+        USUAL if m and (s.rate == 0 if still else s.rate != math.inf) else 0
+        for s, m in zip(parameters, matters, strict=True)
+    )
+    basis = limited(functions(degrees if given is None else given, parameters, name), parameters, name)
+    for s, moves in zip(parameters, used(basis), strict=True):
+        if still and moves and s.rate != 0:
+            raise InputError(
+                f"in discrete time {name} cannot depend on {s.name}: the gains would need its next"
+                " value"
+            )
+    return basis

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -10,15 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, Scheduling
 from synthesis.certificate import Attempt
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
-from synthesis.design.output_feedback import USUAL, as_controller, coordinates_of, failed, least_ranks
+from synthesis.design.output_feedback import USUAL, as_controller, coordinates_of, depends, failed, least_ranks
 from synthesis.design.recovery import control_gain
 from synthesis.design.sampled_recovery import state_gain
-from synthesis.design.search import BACK_OFF, Dependence, Shape, functions, least, limited, settled
+from synthesis.design.search import BACK_OFF, Dependence, Shape, dependence, least, settled
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
@@ -75,7 +73,7 @@ def state_feedback(
     least_ranks(plant, measurements=False)
     _check_measured(plant)
     attempts: list[Attempt] = []
-    shape = Shape(None, _functions(Y, parameters, "Y"))
+    shape = Shape(None, dependence(Y, parameters, "Y", depends(plant)))
     start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
     factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts):
@@ -84,14 +82,6 @@ def state_feedback(
         )
         return replace(made, attempts=tuple(attempts))
     raise failed(plant, attempts)
-
-
-def _functions(
-    given: Dependence | None, parameters: Sequence[Scheduling], name: str
-) -> FunctionSpace:
-    jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
-    degrees = tuple(0 if j else 2 for j in jumps) if given is None else given
-    return limited(functions(degrees, parameters, name), parameters, name)
 
 
 def _check_measured(plant: Plant) -> None:

@@ -1,0 +1,60 @@
+"""Gain scheduling for parameters that may jump: controllers as linear fractional transformations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from synthesis.design.controller import Controller
+from synthesis.design.output_feedback import output_feedback
+from synthesis.design.search import BACK_OFF
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
+
+
+def lft_feedback(
+    plant: Plant,
+    *,
+    back_off: float | Sequence[float] = BACK_OFF,
+    fastest: float = math.inf,
+    divisions: int = 1,
+) -> Controller:
+    """Output feedback for parameters that change as fast as they like, as an LFT in them.
+
+    With constant X and Y the conditions of `output_feedback` need hold at every p alone. The full
+    block S-procedure turns them into conditions on multipliers without losing anything (Scherer
+    2001, theorem 8); here they are imposed on p itself, by Bernstein coefficients. The controller
+    is polynomial in p: `controller.model.to_lft().reduce()`.
+
+    Parameters
+    ----------
+    plant : Plant
+        As for `output_feedback`.
+    back_off, fastest, divisions
+        As for `output_feedback`.
+
+    Returns
+    -------
+    Controller
+        `certify(math.inf)` or `lft_gain(controller.closed().to_lft().reduce())` prove its gain.
+
+    Raises
+    ------
+    InputError, SynthesisError
+        As `output_feedback`; where p may jump there often is no controller.
+
+    References
+    ----------
+    Scherer, "LPV control and full block multipliers", Automatica 37 (2001).
+
+    Examples
+    --------
+    >>> made = synthesis.lft_feedback(lag)
+    >>> bool(made.certify(np.inf, search=None).gamma <= made.gamma)
+    True
+    """
+    return output_feedback(
+        plant, math.inf, back_off=back_off, fastest=fastest, divisions=divisions
+    )
