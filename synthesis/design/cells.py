@@ -56,8 +56,10 @@ def degrees_of(
     sides = [max(pairwise(b), key=lambda side: side[1] - side[0]) for b in breaks]
     found = []
     for i, side in enumerate(sides):
-        axes = [np.array([0.5 * (a + b)]) if k != i else _nodes(a, b, MOST)
-                for k, (a, b) in enumerate(sides)]
+        axes = [
+            np.array([0.5 * (a + b)]) if k != i else _nodes(a, b, MOST)
+            for k, (a, b) in enumerate(sides)
+        ]
         x = 2 * _unit(MOST) - 1
         degree = 0
         for values in data(tensor_grid(axes)):

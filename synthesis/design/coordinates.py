@@ -57,15 +57,27 @@ class Coordinates:
         B = np.concatenate([B1, B2 * controls], axis=-1)
         C = np.concatenate([C1 / channel, measurements[:, None] * C2], axis=-2)
         D = np.zeros((len(line), C.shape[-2], B.shape[-1]))
-        names = [tuple(f"{k}{i}" for i in range(n)) for k, n in
-                 (("x", A.shape[-1]), ("u", B.shape[-1]), ("y", C.shape[-2]))]
+        names = [
+            tuple(f"{k}{i}" for i in range(n))
+            for k, n in (("x", A.shape[-1]), ("u", B.shape[-1]), ("y", C.shape[-2]))
+        ]
         middle = LinearModel(A[4], B[4], C[4], D[4], *names, dt=dt)  # type: ignore[arg-type]
         scale = model_scaling(middle, 1.0, Matrices(A, B, C, D))
         # what enters the states as large as what leaves them
         enters, leaves = np.linalg.norm(scale.left @ B), np.linalg.norm(C @ scale.right)
         even = math.sqrt(enters / leaves) if enters > 0 and leaves > 0 else 1.0
-        return cls(matrices, parameters, basis, dt, scale.left / even, scale.right * even,
-                   scale.time, channel, controls, measurements)
+        return cls(
+            matrices,
+            parameters,
+            basis,
+            dt,
+            scale.left / even,
+            scale.right * even,
+            scale.time,
+            channel,
+            controls,
+            measurements,
+        )
 
     def at(self, p: Array) -> Generalized:
         """Matrices (K, ..) at p (K, m)."""
@@ -88,7 +100,9 @@ class Coordinates:
             except InputError:
                 ends = set()
             slack = 1e-9 * (s.high - s.low)
-            out.append([s.low, *sorted(q for q in ends if s.low + slack < q < s.high - slack), s.high])
+            out.append(
+                [s.low, *sorted(q for q in ends if s.low + slack < q < s.high - slack), s.high]
+            )
         return out
 
 

@@ -149,9 +149,7 @@ def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
     return out
 
 
-def unpriced(
-    D12: Array, names: Sequence[str], where: str = "", *, dual: bool = False
-) -> list[str]:
+def unpriced(D12: Array, names: Sequence[str], where: str = "", *, dual: bool = False) -> list[str]:
     """Directions of the controls `names` that D12 (.., nz, nu) does not see; of the dual plant, of
     measurements that no disturbance enters. One sentence each.
     """

@@ -149,9 +149,7 @@ def estimator(
     raise failed(plant, attempts)
 
 
-def _recover(
-    coordinates: Coordinates, existence: Existence, found: Found
-) -> Gains | None:
+def _recover(coordinates: Coordinates, existence: Existence, found: Found) -> Gains | None:
     X = existence.X
     assert X is not None  # noqa: S101
 

@@ -28,8 +28,8 @@ LARGEST = 1e6
 """X and Y are kept below this multiple of the identity, in scaled coordinates."""
 WIDE = (1e2, 1e3, 1e4, LARGEST)
 """The same once g is settled, tried in turn."""
-APART = 1.02
-"""X Y is kept away from I by at least this factor squared, where there is a next bound to try."""
+APART = 1.5
+"""The eigenvalues of X Y are at least the square of this, where there is a next bound to try."""
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
 
@@ -75,8 +75,13 @@ class Found(NamedTuple):
 class Existence:
     """The program of a plant with X and Y of these bases, |dp/dt| <= rates (per scaled time)."""
 
-    def __init__(self, plant: ScaledPlant, X: FunctionSpace | None, Y: FunctionSpace | None,
-                 divisions: int = 1):
+    def __init__(
+        self,
+        plant: ScaledPlant,
+        X: FunctionSpace | None,
+        Y: FunctionSpace | None,
+        divisions: int = 1,
+    ):
         self.plant, self.divisions = plant, divisions
         both = [b for b in (X, Y) if b is not None]
         if plant.dt is not None and Y is not None and Y.size > 1 and moves(plant.parameters):
@@ -112,7 +117,8 @@ class Existence:
     def least_gamma(self, solver: Solver) -> Found:
         """Minimise g."""
         blocks = [
-            b for cell in self._cells
+            b
+            for cell in self._cells
             for b in (*self._halves(cell, None), *self._coupling(cell, False, LARGEST))
         ]
         return self._solved(blocks, 1.0, solver)
@@ -121,7 +127,8 @@ class Existence:
         """For this g the X and Y, within ever larger bounds, whose product stays farthest from one."""
         for largest in WIDE:
             blocks = [
-                b for cell in self._cells
+                b
+                for cell in self._cells
                 for b in (*self._halves(cell, gamma), *self._coupling(cell, True, largest))
             ]
             found = self._solved(blocks, -1.0, solver)
@@ -133,9 +140,21 @@ class Existence:
         program = Program(tuple(blocks), Sizes(n, 1, self.count), cost)
         candidate = interior_point.minimise(program, solver)
         if candidate.x is None:
-            return Found(np.inf, np.zeros((self.count, n, n)), candidate.answer, candidate.message, candidate.seconds)
+            return Found(
+                np.inf,
+                np.zeros((self.count, n, n)),
+                candidate.answer,
+                candidate.message,
+                candidate.seconds,
+            )
         coefficients = smat(candidate.x[: self.count * length(n)].reshape(self.count, -1), n)
-        return Found(float(candidate.x[-1]), coefficients, candidate.answer, candidate.message, candidate.seconds)
+        return Found(
+            float(candidate.x[-1]),
+            coefficients,
+            candidate.answer,
+            candidate.message,
+            candidate.seconds,
+        )
 
     def _halves(self, cell: Cell, gamma: float | None) -> list[LyapunovBlocks]:
         plant = self.plant.at(cell.nodes)
@@ -148,8 +167,9 @@ class Existence:
             out += self._next(cell)
         return out
 
-    def _half(self, cell: Cell, half: Half, ahead: Unknown, now: Unknown, sign: float,
-              gamma: float | None) -> list[LyapunovBlocks]:
+    def _half(
+        self, cell: Cell, half: Half, ahead: Unknown, now: Unknown, sign: float, gamma: float | None
+    ) -> list[LyapunovBlocks]:
         n, N = half.flow.shape[1:]
         constant, level = half.constant, half.level
         if gamma is not None:
@@ -159,7 +179,9 @@ class Existence:
             L, own = selector(n, 0, n + N), selector(n, n, n + N)
             flow = np.concatenate([np.zeros((len(f), n, n)), half.flow], axis=-1)
             blocks = Blocks(n + N, len(f), cell.to_bernstein)
-            blocks.add(ahead, f, L, flow - 0.5 * L).add(now, now.values(cell.nodes), own, -0.5 * own)
+            blocks.add(ahead, f, L, flow - 0.5 * L).add(
+                now, now.values(cell.nodes), own, -0.5 * own
+            )
             return [blocks.finished(_below(constant, n) + MARGIN * np.eye(n + N), _below(level, n))]
         L = selector(n, 0, N)
         out = []

@@ -55,6 +55,4 @@ def lft_feedback(
     >>> bool(made.certify(np.inf, search=None).gamma <= made.gamma)
     True
     """
-    return output_feedback(
-        plant, math.inf, back_off=back_off, fastest=fastest, divisions=divisions
-    )
+    return output_feedback(plant, math.inf, back_off=back_off, fastest=fastest, divisions=divisions)

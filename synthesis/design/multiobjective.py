@@ -113,7 +113,9 @@ def multiobjective(
                 " them be of degree 0 (in discrete time both)"
             )
     solver = solver if isinstance(solver, Solver) else Solver(solver)
-    problem = _Problem(plant, coordinates_of(plant, 1.0), bases[0], bases[1], gains, every, region, direct)
+    problem = _Problem(
+        plant, coordinates_of(plant, 1.0), bases[0], bases[1], gains, every, region, direct
+    )
     attempts: list[Attempt] = []
     values = problem.best(solver, attempts)
     if values is None:
@@ -140,9 +142,17 @@ class _Loop(NamedTuple):
 class _Problem:
     """The inequalities, with their unknowns."""
 
-    def __init__(self, plant: Plant, coordinates: Coordinates, X: FunctionSpace, Y: FunctionSpace,
-                 gains: Dependence | None, objectives: Sequence[Objective],
-                 region: PoleRegion | None, direct: bool):
+    def __init__(
+        self,
+        plant: Plant,
+        coordinates: Coordinates,
+        X: FunctionSpace,
+        Y: FunctionSpace,
+        gains: Dependence | None,
+        objectives: Sequence[Objective],
+        region: PoleRegion | None,
+        direct: bool,
+    ):
         import cvxpy as cp
 
         self.plant, self.coordinates, self.objectives = plant, coordinates, objectives
@@ -171,8 +181,10 @@ class _Problem:
         nothing = np.zeros((self.nu, self.ny))
         self.D = [cp.Variable((self.nu, self.ny)) if direct else nothing for _ in range(count)]
         self.channels = [
-            (_places(o.disturbances, plant.disturbances, "disturbance"),
-             _places(o.performance, plant.performance, "performance signal"))
+            (
+                _places(o.disturbances, plant.disturbances, "disturbance"),
+                _places(o.performance, plant.performance, "performance signal"),
+            )
             for o in objectives
         ]
 
@@ -221,7 +233,9 @@ class _Problem:
 
         fixed = [(v * unit) ** 2 for v, unit in zip(values, self.units, strict=True)]
         apart = cp.Variable()
-        word, value = _solve(cp.Problem(cp.Maximize(apart), list(self._constraints(fixed, apart))), solver)
+        word, value = _solve(
+            cp.Problem(cp.Maximize(apart), list(self._constraints(fixed, apart))), solver
+        )
         attempts += [
             Attempt(f"{type(o).__name__} settled", 0.0, word, v)
             for o, v in zip(self.objectives, values, strict=True)
@@ -232,7 +246,9 @@ class _Problem:
         def gains(p: Array) -> Any:
             at, q = self.coordinates.at(p), p[:, 0] if p.shape[1] == 1 else p
             X, Y = (_value(self.basis[k](q), v) for k, v in (("X", self.X), ("Y", self.Y)))
-            K = Transformed(*(_value(self.basis["K"](q), v) for v in (self.A, self.B, self.C, self.D)))
+            K = Transformed(
+                *(_value(self.basis["K"](q), v) for v in (self.A, self.B, self.C, self.D))
+            )
             return packed(controller(at, X, Y, K, constant_x=not any(used(self.basis["X"]))))
 
         return gains
@@ -244,7 +260,9 @@ class _Problem:
         widest = LARGEST if apart is None else WIDE
         slacks: list[Any] = []
         for o, (_, rows) in zip(self.objectives, self.channels, strict=True):
-            slacks.append(cp.Variable((len(rows), len(rows)), symmetric=True) if isinstance(o, H2) else None)
+            slacks.append(
+                cp.Variable((len(rows), len(rows)), symmetric=True) if isinstance(o, H2) else None
+            )
         for cell in self.cells:
             plants = self.coordinates.at(cell.nodes)
             each = [Generalized(*(M[k] for M in plants)) for k in range(len(cell.nodes))]
@@ -252,7 +270,9 @@ class _Problem:
             coupled = [self._coupled(q, 1.0 if apart is None else apart) for q in cell.nodes]
             yield from _positive(cell, coupled)
             for name, unknowns in (("X", self.X), ("Y", self.Y)):
-                yield from _positive(cell, [widest * one - self._sum(name, unknowns, q) for q in cell.nodes])
+                yield from _positive(
+                    cell, [widest * one - self._sum(name, unknowns, q) for q in cell.nodes]
+                )
             for o, (columns, rows), bound, slack, size in zip(
                 self.objectives, self.channels, bounds, slacks, self.sizes, strict=True
             ):
@@ -272,7 +292,9 @@ class _Problem:
             if slack is not None:
                 yield cp.trace(slack) <= bound
 
-    def _objective(self, cell: Cell, o: Objective, loops: Sequence[_Loop], bound: Any, slack: Any) -> Iterator[Any]:
+    def _objective(
+        self, cell: Cell, o: Objective, loops: Sequence[_Loop], bound: Any, slack: Any
+    ) -> Iterator[Any]:
         import cvxpy as cp
 
         w, z = loops[0].B.shape[1], loops[0].C.shape[0]
@@ -289,7 +311,9 @@ class _Problem:
             ])  # fmt: skip
         top = bound * np.eye(z) if slack is None else slack
         if self.coordinates.dt is None:
-            yield from _positive(cell, [cp.bmat([[loop.P, loop.C.T], [loop.C, top]]) for loop in loops])
+            yield from _positive(
+                cell, [cp.bmat([[loop.P, loop.C.T], [loop.C, top]]) for loop in loops]
+            )
             yield from (loop.D == 0 for loop in loops if not _is_zero(loop.D))
         else:
             yield from _positive(cell, [
@@ -311,7 +335,12 @@ class _Problem:
                  [loop.B.T, np.zeros((w, N)), -gw]]  # fmt: skip
             if gz is not None:
                 zero = np.zeros((gz.shape[0], N))
-                F = [[*F[0], zero.T], [*F[1], loop.C.T], [*F[2], loop.D.T], [zero, loop.C, loop.D, -gz]]
+                F = [
+                    [*F[0], zero.T],
+                    [*F[1], loop.C.T],
+                    [*F[2], loop.D.T],
+                    [zero, loop.C, loop.D, -gz],
+                ]
         return cp.bmat(F)
 
     def _drifts(self, cell: Cell) -> Iterator[list[Any]]:

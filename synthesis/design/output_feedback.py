@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli.errors import InputError, SynthesisError
-from symheli.lpv import LPVStateSpace
+from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certificate import Attempt
 from synthesis.design.cells import degrees_of
@@ -21,8 +21,9 @@ from synthesis.design.existence import Existence, Found
 from synthesis.design.fitted import fitted
 from synthesis.design.motions import motions, used
 from synthesis.design.recovery import Gains, controller, split
+from synthesis.design.robust import scaled_plant
 from synthesis.design.sampled_recovery import joined
-from synthesis.design.search import BACK_OFF, Dependence, least, settled, shapes
+from synthesis.design.search import BACK_OFF, Dependence, Shape, least, settled, shapes
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
@@ -93,16 +94,48 @@ def output_feedback(
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)
     least_ranks(plant)
+    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
     attempts: list[Attempt] = []
-    started = []
-    for shape in shapes(parameters, X, Y, plant.dt is not None, depends(plant)):
-        start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
-        if math.isfinite(start[2].gamma):
-            started.append((start[0].channel * start[2].gamma, shape, start))
+    every = shapes(parameters, X, Y, plant.dt is not None, depends(plant))
+    if isinstance(plant.model, UncertainStateSpace):
+        return _robust(plant, every, factors, fastest, divisions, attempts)
+    return _nominal(plant, every, factors, fastest, divisions, attempts)
+
+
+def _robust(
+    plant: Plant, every: Sequence[Shape], factors: Sequence[float], fastest: float, divisions: int,
+    attempts: list[Attempt],
+) -> Controller:  # fmt: skip
+    """For all models of the set, by the one of the shapes that serves the nominal one best."""
+    gammas = [(_start(plant, shape, divisions, attempts), shape) for shape in every]
+    best = min(gammas, key=lambda each: _gamma(each[0]))[1]
+    found = scaled_plant(plant, lambda p: _gamma(_start(p, best, divisions, attempts)))
+    if found is None:
+        raise failed(plant, attempts)
+    made = _nominal(found[0], [best], factors, fastest, divisions, attempts)
+    return replace(made, plant=plant, method=f"robust {made.method}")
+
+
+def _start(
+    plant: Plant, shape: Shape, divisions: int, attempts: list[Attempt]
+) -> tuple[Coordinates, Existence, Found]:
+    return least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
+
+
+def _gamma(start: tuple[Coordinates, Existence, Found]) -> float:
+    return start[0].channel * start[2].gamma
+
+
+def _nominal(
+    plant: Plant, every: Sequence[Shape], factors: Sequence[float], fastest: float, divisions: int,
+    attempts: list[Attempt],
+) -> Controller:  # fmt: skip
+    """For one model, by the best of the shapes."""
+    started = [(_start(plant, shape, divisions, attempts), shape) for shape in every]
+    started = [each for each in started if math.isfinite(_gamma(each[0]))]
     if not started:
         raise failed(plant, attempts)
-    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
-    _, shape, start = min(started, key=lambda s: s[0])
+    start, shape = min(started, key=lambda each: _gamma(each[0]))
     best: Controller | None = None
     for design in settled(start, factors, _recover, USUAL, attempts):
         made = as_controller(
@@ -198,7 +231,10 @@ def _recover(
         constant_x = not X.moves
         if X.moves and Y.moves:
             # dX/dt along the known motion; zero where p stands still
-            known = [m and isinstance(s.rate, str) for m, s in zip(used(X.basis), parameters, strict=True)]
+            known = [
+                m and isinstance(s.rate, str)
+                for m, s in zip(used(X.basis), parameters, strict=True)
+            ]
             (motion,) = motions(parameters, p, coordinates.time, known)
             moving = X.moving(found.coefficients, p, motion)
             transformed = transformed._replace(A=transformed.A - moving @ y)

@@ -84,10 +84,18 @@ def direct(D11: Array, D12: Array, D21: Array, gamma: float) -> Array:
     b, c, d = inner[:, :nu, ny:], inner[:, nu:, :ny], inner[:, nu:, ny:]
     best = -b @ np.linalg.solve(_identity(gamma**2, d.shape[-1], d) - _t(d) @ d, _t(d) @ c)
     del s, t
-    return np.linalg.pinv(D12) @ U[:, :, :nu] @ (best - inner[:, :nu, :ny]) @ V[:, :ny] @ np.linalg.pinv(D21)
+    return (
+        np.linalg.pinv(D12)
+        @ U[:, :, :nu]
+        @ (best - inner[:, :nu, :ny])
+        @ V[:, :ny]
+        @ np.linalg.pinv(D21)
+    )
 
 
-def controller(plant: Generalized, X: Array, Y: Array, found: Transformed, *, constant_x: bool) -> Gains:
+def controller(
+    plant: Generalized, X: Array, Y: Array, found: Transformed, *, constant_x: bool
+) -> Gains:
     """Its matrices, with N = I where X is constant, M = I where Y is."""
     A, _, B2, _, C2, *_ = plant
     At, Bt, Ct, D = found

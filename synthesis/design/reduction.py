@@ -16,8 +16,8 @@ from scipy import linalg
 
 from symheli.errors import InputError, SynthesisError
 from symheli.lpv import LPVStateSpace, Matrices
-from synthesis.design.controller import Controller
 from symheli.lpv.bases.polynomials import lobatto_points
+from synthesis.design.controller import Controller
 
 Array = np.ndarray
 

@@ -114,7 +114,9 @@ def shapes(
         pairs = [(both, one), (one, both)]
     out = []
     for x, y in pairs:
-        bases = [limited(functions(d, parameters, n), parameters, n) for d, n in ((x, "X"), (y, "Y"))]
+        bases = [
+            limited(functions(d, parameters, n), parameters, n) for d, n in ((x, "X"), (y, "Y"))
+        ]
         for s, in_x, in_y, alone in zip(parameters, *map(used, bases), free, strict=True):
             if in_x and in_y and not alone:
                 raise InputError(
@@ -134,6 +136,7 @@ def shapes(
 Gains = Callable[[Array], Array]
 Loop = Callable[[Coordinates, Gains, Array], tuple[Array, ...]]
 """A, B, C, D (K, ..) of what is judged, at p (K, m)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Design:
@@ -233,7 +236,9 @@ def dependence(
         USUAL if m and (s.rate == 0 if still else s.rate != math.inf) else 0
         for s, m in zip(parameters, matters, strict=True)
     )
-    basis = limited(functions(degrees if given is None else given, parameters, name), parameters, name)
+    basis = limited(
+        functions(degrees if given is None else given, parameters, name), parameters, name
+    )
     for s, moves in zip(parameters, used(basis), strict=True):
         if still and moves and s.rate != 0:
             raise InputError(

@@ -13,7 +13,14 @@ from synthesis.certificate import Attempt
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
-from synthesis.design.output_feedback import USUAL, as_controller, coordinates_of, depends, failed, least_ranks
+from synthesis.design.output_feedback import (
+    USUAL,
+    as_controller,
+    coordinates_of,
+    depends,
+    failed,
+    least_ranks,
+)
 from synthesis.design.recovery import control_gain
 from synthesis.design.sampled_recovery import state_gain
 from synthesis.design.search import BACK_OFF, Dependence, Shape, dependence, least, settled

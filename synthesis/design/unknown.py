@@ -40,7 +40,9 @@ class Unknown:
         """Their derivatives (K, k) along the motion dp/dt = `rates` (m,) or (K, m)."""
         if not self.moves:
             return np.zeros((len(p), 1))
-        return np.einsum("kmj,km->kj", self.basis.gradient(_own(p)), np.broadcast_to(rates, p.shape))
+        return np.einsum(
+            "kmj,km->kj", self.basis.gradient(_own(p)), np.broadcast_to(rates, p.shape)
+        )
 
     def at(self, coefficients: Array, p: Array) -> Array:
         """X (K, n, n) at p (K, m) from all coefficients of the program."""
@@ -80,7 +82,9 @@ class Blocks:
         def spread(M: Array | float) -> Array:
             return np.tensordot(T, np.broadcast_to(M, self.shape), axes=1)
 
-        return LyapunovBlocks(columns, np.stack(lefts), varying, spread(constant), level=spread(level))
+        return LyapunovBlocks(
+            columns, np.stack(lefts), varying, spread(constant), level=spread(level)
+        )
 
 
 def _place(lefts: list[Array], left: Array) -> int:
