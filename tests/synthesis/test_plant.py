@@ -278,7 +278,7 @@ def test_noise_enters_the_measurement_and_not_the_performance():
         np.testing.assert_allclose(G.D21, [[0, 0.01, 0], [0, 0, 0.2]], atol=1e-15)
         np.testing.assert_allclose(G.D11, 0.0, atol=1e-15)
         np.testing.assert_allclose(G.C1[0], [0, 1], atol=1e-15)
-    with pytest.raises(InputError, match="the noise of phi: expected a size > 0"):
+    with pytest.raises(InputError, match="the noise of phi: expected a number > 0"):
         plant().with_noise({"phi": 0.0})
     with pytest.raises(InputError, match="has an input phi_noise already"):
         own.with_noise({"phi": 0.1})
