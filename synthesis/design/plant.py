@@ -224,12 +224,17 @@ class Plant:
 
     def with_reference(self, signals: Sequence[str] | None = None) -> Plant:
         """With a disturbance `<name>_reference` for each of these performance signals and
-        measurements (None: those that are both); they become `<name>_error` = reference - signal.
+        measurements (None: those that are both); they become `<name>_error` = reference - signal,
+        and a performance signal `true_<name>` becomes `true_<name>_error`.
 
         Raises `InputError` where no signal is both and none is given.
         """
         if signals is None:
-            signals = [name for name in self.measurements if name in self.performance]
+            signals = [
+                name
+                for name in self.measurements
+                if name in self.performance or TRUE + name in self.performance
+            ]
             if not signals:
                 raise InputError(
                     "no measurement is performance too: say which signals follow a reference"
@@ -362,20 +367,20 @@ class Plant:
         known = [s for s in known if s not in passing]
         (i,) = indices([name], known, "performance signal or measurement")
         unit = known[i].unit
-        reference, error = Signal(f"{name}_reference", unit), Signal(f"{name}_error", unit)
+        reference = Signal(f"{name}_reference", unit)
+        errors = {y: Signal(f"{y}_error", unit) for y in (name, TRUE + name) if y in known}
 
         def change(model: LPVStateSpace) -> LPVStateSpace:
-            outputs = {
-                error if y == name else y: {y: 1.0 - 2.0 * (y == name)} for y in model.outputs
-            }
+            outputs = {errors.get(y, y): {y: -1.0 if y in errors else 1.0} for y in model.outputs}
             inputs = {**itself(model.inputs), **new_name(reference, model.inputs, "input")}
-            return mixed(model, inputs, outputs, {error: {reference: 1.0}})
+            across = {error: {reference: 1.0} for error in errors.values()}
+            return mixed(model, inputs, outputs, across)
 
         return self._changed(
             change,
             disturbances=(*self.disturbances, reference),
-            performance=_with(self.performance, name, error),
-            measurements=_with(self.measurements, name, error),
+            performance=tuple(errors.get(y, y) for y in self.performance),
+            measurements=tuple(errors.get(y, y) for y in self.measurements),
         )
 
     def _integrated(self, name: str, measured: bool) -> Plant:

@@ -293,7 +293,15 @@ def test_a_reference_makes_errors_of_signals():
         same(transfer(own, p, "phi_error", "phi_reference"), 1.0)
         same(transfer(own, p, "phi_error", "gust"), -transfer(plant(), p, "phi", "gust"))
     noisy = plant().with_noise({"phi": 0.1}).with_reference(["phi"])
-    assert noisy.performance == ("true_phi", "d_lat")
+    assert noisy.performance == ("true_phi_error", "d_lat")
+    other = plant().with_reference().with_noise({"phi_error": 0.1})
+    assert (other.performance, other.measurements) == (noisy.performance, noisy.measurements)
+    for p in SPEEDS:  # the error that counts is that of the signal, not of its reading
+        G, H = noisy.at(p), other.at(p)
+        np.testing.assert_allclose(G.D11[0], [0.0, 0.0, 1.0], atol=1e-15)  # gust, noise, reference
+        np.testing.assert_allclose(G.D21[0], [0.0, -0.1, 1.0], atol=1e-15)
+        np.testing.assert_allclose(H.D11[0], [0.0, 1.0, 0.0], atol=1e-15)  # gust, reference, noise
+        np.testing.assert_allclose(H.D21[0], [0.0, 1.0, 0.1], atol=1e-15)
     assert noisy.with_reference("p").measurements == ("phi_error", "p_error")
     with pytest.raises(InputError, match="say which signals follow a reference"):
         Plant(roll(), performance=["phi"], measurements=["p"]).with_reference()
@@ -501,6 +509,18 @@ def test_the_steps_and_the_loop_of_an_uncertain_plant_are_those_of_each_of_its_m
         own.sampled(0.02)
     with pytest.raises(UnknownNameError, match="unknown control 'd'"):
         Plant(unc, controls=["d"])
+
+
+def test_a_constant_plant_takes_a_scheduled_controller_over_its_parameters():
+    """Whatever rate the parameter was given on which nothing depends."""
+    own = plant(roll().at(5.0)).with_rate(0.0)
+    given = scheduled(Polynomial(1, 0.0, 13.0), None)
+    loop = own.close(given)
+    assert loop.parameters == (SPEED,)
+    C = given.at(9.0).select(inputs=["phi", "p"])
+    G = own.at(0.5)
+    whole = np.block([[G.A + G.B2 @ C.D @ G.C2, G.B2 @ C.C], [C.B @ G.C2, C.A]])
+    np.testing.assert_allclose(loop.at(9.0).A, whole, atol=1e-10)
 
 
 def test_wrong_controllers_say_what_was_expected():
