@@ -39,6 +39,7 @@ from symheli.lpv.lft import (
     parallel,
     series,
 )
+from symheli.lpv.lagged import lagged
 from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel

@@ -48,8 +48,10 @@ def over(lpv: LPVStateSpace, given: Sequence[Scheduling]) -> LPVStateSpace:
 
 def _over(
     basis: FunctionSpace, own: Sequence[Scheduling], given: Sequence[Scheduling]
-) -> tuple[Product, list[int]]:
-    """Every function times 1, and which function of `basis` each is."""
+) -> tuple[Product, list[int] | slice]:
+    """Every function times 1, and which function of `basis` each is: a slice, which leaves arrays
+    as they are to the last bit, where they keep their order.
+    """
     factor = dict(zip([s.name for s in own], factors_of(basis), strict=True))
     factors = tuple(factor.get(s.name) or Polynomial(0, s.low, s.high) for s in given)
     total = basis.total_degree if isinstance(basis, Product) else None
@@ -58,7 +60,8 @@ def _over(
     at = [names.index(s.name) for s in own]
     known = basis.indices if isinstance(basis, Product) else [(j,) for j in range(basis.size)]
     where = {index: j for j, index in enumerate(known)}
-    return wider, [where[tuple(index[i] for i in at)] for index in wider.indices]
+    order = [where[tuple(index[i] for i in at)] for index in wider.indices]
+    return wider, slice(None) if order == list(range(basis.size)) else order
 
 
 def _everywhere(

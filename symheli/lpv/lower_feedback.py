@@ -59,9 +59,9 @@ def lower_feedback(
     """The plant with u = K y closed, from its other inputs to its other outputs.
 
     The feedback is positive, and by names: the controller's inputs are outputs y of the plant, its
-    outputs inputs u. Exact: matrices that do not multiply one another keep
-    their basis, products of polynomials are polynomials, of other piecewise polynomials `Patches`
-    over the breaks of both. A constant loop through the feedthrough of both is solved.
+    outputs inputs u. Exact: what is multiplied by constants keeps its basis, products of
+    polynomials are polynomials, of other piecewise polynomials `Patches` over the breaks of both.
+    A constant loop through the feedthrough of both is solved.
 
     Parameters
     ----------
@@ -292,13 +292,18 @@ def _time(dt: float | None) -> str:
     return "continuous" if dt is None else f"sampled every {dt:g} s"
 
 
+def _is_unscheduled(lpv: LPVStateSpace) -> bool:
+    """Whether the parameter is the one on which nothing depends, at whatever rate."""
+    return [s.with_rate(UNSCHEDULED.rate) for s in lpv.parameters] == [UNSCHEDULED]
+
+
 def _over_the_same(
     plant: LPVStateSpace, controller: LPVStateSpace
 ) -> tuple[LPVStateSpace, LPVStateSpace]:
     """Both over the parameters of the plant and those that only the controller has."""
     plant, controller = (
         LPVStateSpace.constant(one.at(UNSCHEDULED.middle), other.parameters)
-        if one.parameters == (UNSCHEDULED,)
+        if _is_unscheduled(one)
         else one
         for one, other in ((plant, controller), (controller, plant))
     )

@@ -52,6 +52,14 @@ class Residuals(NamedTuple):
         """Without the nodes."""
         return Matrices(*self[1:])
 
+    def within(self, box: Sequence[Scheduling]) -> Residuals | None:
+        """Those at the nodes in these ranges; None where there are none."""
+        columns = self.nodes.reshape(len(self.nodes), -1).T
+        inside = np.all(
+            [(s.low <= at) & (at <= s.high) for s, at in zip(box, columns, strict=False)], axis=0
+        )
+        return Residuals(*(each[inside] for each in self)) if np.any(inside) else None
+
 
 @dataclass(frozen=True, eq=False)
 class LPVStateSpace:
@@ -232,8 +240,13 @@ class LPVStateSpace:
         return LinearModel(*frozen_at, self.states, self.inputs, self.outputs, dt=self.dt)
 
     def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> LPVStateSpace:
-        """The same model over narrower ranges or with other rate limits."""
-        return replace(self, parameters=parameters(scheduling))
+        """The same model over narrower ranges, with the residuals there, or with other rate
+        limits.
+        """
+        given = parameters(scheduling)
+        return replace(
+            self, parameters=given, residuals=self.residuals and self.residuals.within(given)
+        )
 
     def with_rate(self, rate: Rates) -> LPVStateSpace:
         """The same model with |dp/dt| <= rate: one for all parameters, one each or by name; the

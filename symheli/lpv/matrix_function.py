@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,7 +56,7 @@ class MatrixFunction:
         """Which entries (rows, columns) depend on p, each judged by its own size alone."""
         if self.basis is None:
             return np.zeros(self.shape, dtype=bool)
-        values = np.tensordot(self.basis(self.basis.samples(self.box)), self.coefficients, axes=1)
+        values = np.tensordot(_samples(self.basis, self.box), self.coefficients, axes=1)
         return np.ptp(values, axis=0) > ROUNDING * np.abs(values).max(axis=0, initial=0.0)
 
     @cached_property
@@ -64,8 +64,7 @@ class MatrixFunction:
         """The matrix (rows, columns) at one p: everywhere, of entries that do not vary."""
         if self.basis is None:
             return self.coefficients[0]
-        one = self.basis(self.basis.samples(self.box)[:1])
-        return np.tensordot(one, self.coefficients, axes=1)[0]
+        return np.tensordot(_samples(self.basis, self.box)[0], self.coefficients, axes=1)
 
     @property
     def is_constant(self) -> bool:
@@ -155,6 +154,12 @@ def in_one_basis(
     """
     space = _common(matrices) or polynomials([0] * len(ranges), ranges)
     return space, [M.written_in(space) for M in matrices]
+
+
+@lru_cache(maxsize=8)
+def _samples(basis: FunctionSpace, box: Box) -> Array:
+    """Values (K, n) of the functions where those that differ in the box can be told apart."""
+    return basis(basis.samples(box))
 
 
 def _common(matrices: Sequence[MatrixFunction]) -> FunctionSpace | None:

@@ -23,7 +23,7 @@ from synthesis.design.coordinates import Coordinates
 from synthesis.design.generalized import Generalized
 from synthesis.design.motions import motions, used
 from synthesis.design.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
-from synthesis.design.output_feedback import as_controller, coordinates_of, failed, packed
+from synthesis.design.output_feedback import in_plant_units, coordinates_of, failed, packed
 from synthesis.design.recovery import Transformed, controller
 from synthesis.design.search import Dependence, functions, limited
 from synthesis.program.cone_program import Solver
@@ -125,7 +125,7 @@ def multiobjective(
         raise failed(plant, attempts)
     total = math.sqrt(sum(o.soft * v * v for o, v in zip(every, values, strict=True)))
     words = ", ".join(type(o).__name__ for o in every)
-    made = as_controller(plant, problem.coordinates, found, total, f"output feedback for {words}")
+    made = in_plant_units(plant, problem.coordinates, found, total, f"output feedback for {words}")
     return replace(made, attempts=tuple(attempts))
 
 

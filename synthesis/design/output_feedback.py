@@ -138,7 +138,7 @@ def _nominal(
     start, shape = min(started, key=lambda each: _gamma(each[0]))
     best: Controller | None = None
     for design in settled(start, factors, _recover, USUAL, attempts):
-        made = as_controller(
+        made = in_plant_units(
             plant, design.coordinates, design.gains, design.gamma, f"output feedback, {shape}"
         )
         fast = _fastest(made.model)
@@ -253,7 +253,7 @@ def packed(gains: Gains) -> Array:
     return np.concatenate([top, bottom], axis=-2)
 
 
-def as_controller(
+def in_plant_units(
     plant: Plant,
     c: Coordinates,
     gains: Callable[[Array], Array],

@@ -27,10 +27,17 @@ class Actuator(Protocol):
         ...
 
 
+def positive(given: Any, what: str) -> float:
+    """The number; raises `InputError` where it is none, or not > 0 and finite."""
+    if not (_is_number(given) and 0 < float(given) < math.inf):
+        raise InputError(f"{what}: expected a number > 0, got {given!r:.60}")
+    return float(given)
+
+
 def weight(given: object, name: str, dt: float | None) -> Part:
     """A weight as a part: a number > 0, or a filter, on a sampled plant by Tustin's rule."""
     if _is_number(given):
-        return _gain(_positive(given, f"the weight of {name}"), name)
+        return _gain(positive(given, f"the weight of {name}"), name)
     return _filter(given, f"the weight of {name}", "a number > 0", dt, "tustin")
 
 
@@ -46,7 +53,7 @@ def sensor_filter(given: object, name: str, dt: float | None) -> Part:
     by Tustin's rule.
     """
     if _is_number(given):
-        omega = _positive(given, f"the bandwidth of the filter of {name}")
+        omega = positive(given, f"the bandwidth of the filter of {name}")
         given = _first_order(-omega, omega, f"{name}_filter", name, None)
     return _filter(given, f"the filter of {name}", "a bandwidth in rad/s", dt, "tustin")
 
@@ -55,7 +62,7 @@ def delay(seconds: float, name: str, order: int, dt: float | None) -> LinearMode
     """Whole samples on a sampled plant, Pade's approximation on a continuous one."""
     if dt is None:
         return pade_delay(name, seconds, order)
-    samples = _positive(seconds, "the delay") / dt
+    samples = positive(seconds, "the delay") / dt
     whole = round(samples)
     if whole < 1 or abs(samples - whole) > SAME * samples:
         below = math.floor(samples)
@@ -101,9 +108,3 @@ def _gain(size: float, name: str) -> LinearModel:
 
 def _is_number(given: object) -> bool:
     return isinstance(given, int | float | np.number) and not isinstance(given, bool)
-
-
-def _positive(given: Any, what: str) -> float:
-    if not (_is_number(given) and 0 < float(given) < math.inf):
-        raise InputError(f"{what}: expected a number > 0, got {given!r:.60}")
-    return float(given)

@@ -6,9 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import Any
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import (
@@ -17,22 +15,21 @@ from symheli.lpv import (
     LPVStateSpace,
     Scheduling,
     UncertainStateSpace,
+    lagged,
     lower_feedback,
 )
-from symheli.lpv.linear_model import feedback_matrix, is_control_system
+from symheli.lpv.linear_model import is_control_system
 from symheli.lpv.lower_feedback import Channels as Positions
 from symheli.lpv.lower_feedback import Generalized as Blocks
 from symheli.lpv.matrix_function import functions_of
 from symheli.lpv.mixing import itself, mixed
 from symheli.lpv.scheduling import Rates
-from symheli.values.arrays import frozen
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.units import quotient
 from synthesis.design import parts
+from synthesis.design.as_controller import as_controller
 from synthesis.design.generalized import Channels, Generalized
-
-Model = LPVStateSpace | UncertainStateSpace
-Some = TypeVar("Some", LPVStateSpace, UncertainStateSpace)
+from synthesis.design.rows import Model, new_name, on, passing, with_row
 
 TRUE, WEIGHTED = "true_", "weighted_"
 """Before the name of a performance signal of which the measurement is another: without its noise
@@ -72,13 +69,13 @@ class Plant:
 
     Examples
     --------
-    >>> import symheli
+    >>> import numpy as np, symheli, synthesis
     >>> roll = symheli.LinearModel(
     ...     [[-8.0, 0.0], [1.0, 0.0]], [[120.0, 1.0], [0.0, 0.0]], np.eye(2), np.zeros((2, 2)),
     ...     ("p", "phi"), ("d_lat", "gust"), ("p", "phi"))
     >>> plant = (
-    ...     Plant(roll, disturbances=["gust"], performance=["phi", "d_lat"], controls=["d_lat"],
-    ...           measurements=["phi", "p"])
+    ...     synthesis.Plant(roll, disturbances=["gust"], performance=["phi", "d_lat"],
+    ...                     controls=["d_lat"], measurements=["phi", "p"])
     ...     .with_delay(0.02, order=2)
     ...     .weighted({"phi": 2.0, "d_lat": 10.0}))
     >>> print(plant.states, plant.performance)
@@ -108,7 +105,7 @@ class Plant:
         known = (*model.outputs, *(s for s in (*w, *u) if s not in model.outputs))
         z = _named(self.performance, known, "performance signal")
         groups["performance"] = z
-        model = _on(model, _passing([name for name in z if name in (*w, *u)]))
+        model = on(model, passing([name for name in z if name in (*w, *u)]))
         y = [name for name in groups["measurements"] if name not in z]
         object.__setattr__(self, "model", model.select(inputs=[*w, *u], outputs=[*z, *y]))
         for name, value in groups.items():
@@ -236,20 +233,23 @@ class Plant:
         """
         plant = self
         for name, size in sizes.items():
-            if not (isinstance(size, int | float | np.number) and 0 < size < np.inf):
-                raise InputError(f"the noise of {name}: expected a size > 0, got {size!r:.60}")
-            noise = Signal(f"{name}_noise", "1")
-            plant = plant._with_own_measurement(name)._with_disturbance(noise, {name: float(size)})
+            noise, size = Signal(f"{name}_noise", "1"), parts.positive(size, f"the noise of {name}")
+            plant = plant._with_own_measurement(name)._with_disturbance(noise, {name: size})
         return plant
 
     def with_reference(self, signals: Sequence[str] | None = None) -> Plant:
         """With a disturbance `<name>_reference` for each of these performance signals and
-        measurements (None: those that are both); they become `<name>_error` = reference - signal.
+        measurements (None: those that are both); they become `<name>_error` = reference - signal,
+        and a performance signal `true_<name>` becomes `true_<name>_error`.
 
         Raises `InputError` where no signal is both and none is given.
         """
         if signals is None:
-            signals = [name for name in self.measurements if name in self.performance]
+            signals = [
+                name
+                for name in self.measurements
+                if name in self.performance or TRUE + name in self.performance
+            ]
             if not signals:
                 raise InputError(
                     "no measurement is performance too: say which signals follow a reference"
@@ -284,6 +284,14 @@ class Plant:
             )
         return self._changed(lambda model: model.discretize(dt, degree=degree))
 
+    def lagged(self, seconds: float) -> Plant:
+        """The plant over its parameter seen through a lag and the rate of that, both known to a
+        controller: X and Y may then move with the first; see `symheli.lpv.lagged`.
+        """
+        if isinstance(self.model, UncertainStateSpace):
+            raise InputError("an uncertain plant has no lagged parameter: take its .nominal")
+        return self._changed(lambda model: lagged(model, seconds))
+
     def with_rate(self, rate: Rates) -> Plant:
         """The same plant with |dp/dt| <= rate; see `LPVStateSpace.with_rate`."""
         return replace(self, model=self.model.with_rate(rate))
@@ -303,37 +311,16 @@ class Plant:
         """
         return lower_feedback(
             self.model,
-            self._controller(controller),
+            as_controller(controller, self.controls, self.measurements),
             inputs=self.disturbances,
             outputs=self.performance,
         )
-
-    def _controller(self, given: Any) -> LinearModel | LPVStateSpace:
-        inner = getattr(given, "model", None)
-        if isinstance(inner, LPVStateSpace) and not isinstance(given, UncertainStateSpace):
-            given = inner
-        u, y = self.controls, self.measurements
-        if is_control_system(given):
-            given = LinearModel.from_control(_renamed(given, u, y))
-        elif isinstance(given, Mapping):
-            given = LinearModel.gain(feedback_matrix(given, u, y), y, u)
-        elif isinstance(given, np.ndarray | list):
-            given = LinearModel.gain(frozen(given, "controller", (len(u), len(y))), y, u)
-        if not isinstance(given, LinearModel | LPVStateSpace):
-            raise InputError(
-                "controller: expected {(control, measurement): gain}, an array of gains, a"
-                " LinearModel, an LPVStateSpace, a system of python-control or an object with such"
-                f" a .model, got {type(given).__name__}"
-            )
-        indices(given.inputs, y, "measurement")
-        indices(given.outputs, u, "control")
-        return given
 
     def _changed(self, change: Callable[[LPVStateSpace], LPVStateSpace], **groups: Any) -> Plant:
         """With another model, to which inputs that are performance are added anew."""
         inputs = (*self.disturbances, *self.controls)
         own = self.model.select(outputs=[y for y in self.model.outputs if y not in inputs])
-        return replace(self, model=_on(own, change), **groups)
+        return replace(self, model=on(own, change), **groups)
 
     def _driven(self, by: Mapping[str, parts.Part]) -> Plant:
         indices(by, self.controls, "control")
@@ -366,9 +353,9 @@ class Plant:
 
         def change(model: LPVStateSpace) -> LPVStateSpace:
             if name in self.controls:
-                model = _with_row(model, new, {}, {name: 1.0})
+                model = with_row(model, new, {}, {name: 1.0})
             elif stays:
-                model = _with_row(model, new, {name: 1.0})
+                model = with_row(model, new, {name: 1.0})
             filtered = model.filtered_by({new: part})
             return replace(
                 filtered, outputs=tuple(new if y == new else y for y in filtered.outputs)
@@ -383,7 +370,7 @@ class Plant:
             return self
         true = Signal(TRUE + name, self.measurements[i].unit)
         return self._changed(
-            lambda model: _with_row(model, true, {name: 1.0}),
+            lambda model: with_row(model, true, {name: 1.0}),
             performance=_with(self.performance, name, true),
         )
 
@@ -392,7 +379,7 @@ class Plant:
 
         def change(model: LPVStateSpace) -> LPVStateSpace:
             across = {Signal(y): {new: gain} for y, gain in enters.items()}
-            inputs = {**itself(model.inputs), **_new(new, model.inputs, "input")}
+            inputs = {**itself(model.inputs), **new_name(new, model.inputs, "input")}
             return mixed(model, inputs, itself(model.outputs), across)
 
         return self._changed(change, disturbances=(*self.disturbances, new))
@@ -403,20 +390,20 @@ class Plant:
         known = [s for s in known if s not in passing]
         (i,) = indices([name], known, "performance signal or measurement")
         unit = known[i].unit
-        reference, error = Signal(f"{name}_reference", unit), Signal(f"{name}_error", unit)
+        reference = Signal(f"{name}_reference", unit)
+        errors = {y: Signal(f"{y}_error", unit) for y in (name, TRUE + name) if y in known}
 
         def change(model: LPVStateSpace) -> LPVStateSpace:
-            outputs = {
-                error if y == name else y: {y: 1.0 - 2.0 * (y == name)} for y in model.outputs
-            }
-            inputs = {**itself(model.inputs), **_new(reference, model.inputs, "input")}
-            return mixed(model, inputs, outputs, {error: {reference: 1.0}})
+            outputs = {errors.get(y, y): {y: -1.0 if y in errors else 1.0} for y in model.outputs}
+            inputs = {**itself(model.inputs), **new_name(reference, model.inputs, "input")}
+            across = {error: {reference: 1.0} for error in errors.values()}
+            return mixed(model, inputs, outputs, across)
 
         return self._changed(
             change,
             disturbances=(*self.disturbances, reference),
-            performance=_with(self.performance, name, error),
-            measurements=_with(self.measurements, name, error),
+            performance=tuple(errors.get(y, y) for y in self.performance),
+            measurements=tuple(errors.get(y, y) for y in self.measurements),
         )
 
     def _integrated(self, name: str, measured: bool) -> Plant:
@@ -429,7 +416,7 @@ class Plant:
 
         def change(model: LPVStateSpace) -> LPVStateSpace:
             for row in rows:
-                model = _with_row(model, row, {}, {name: 1.0})
+                model = with_row(model, row, {}, {name: 1.0})
             behind = model.driven_by({name: part})
             return replace(behind, inputs=tuple(rate if u == name else u for u in behind.inputs))
 
@@ -462,79 +449,5 @@ def _tuple(given: Iterable[str]) -> tuple[str, ...]:
     return (given,) if isinstance(given, str) else tuple(given)
 
 
-def _on(model: Model, change: Callable[[LPVStateSpace], LPVStateSpace]) -> Model:
-    if isinstance(model, UncertainStateSpace):
-        return replace(model, model=change(model.model))
-    return change(model)
-
-
-def _passing(names: Sequence[Signal]) -> Callable[[LPVStateSpace], LPVStateSpace]:
-    """The model with outputs that pass these inputs; `InputError` where it has another output of
-    that name.
-    """
-
-    def add(model: LPVStateSpace) -> LPVStateSpace:
-        for name in names:
-            if name not in model.outputs:
-                model = _with_row(model, name, {}, {name: 1.0})
-            elif not _passes(model, name):
-                raise InputError(
-                    f"{name} is an input of the plant and an output of its model that is not that"
-                    " input: rename one of the two"
-                )
-        return model
-
-    return add
-
-
-def _passes(model: LPVStateSpace, name: Signal) -> bool:
-    """Whether the output is the input of that name."""
-    row = model.select(outputs=[name]).matrices(model.basis.samples(model.box))
-    unit = np.array([float(u == name) for u in model.inputs])
-    return not np.any(row.C) and bool(np.allclose(row.D, unit, rtol=0.0, atol=1e-12))
-
-
-def _with_row(
-    model: LPVStateSpace,
-    new: Signal,
-    of: Mapping[str, float],
-    across: Mapping[str, float] | None = None,
-) -> LPVStateSpace:
-    """One more output: a sum `of` outputs, and of inputs `across`."""
-    outputs = {**itself(model.outputs), **_new(new, model.outputs, "output", of)}
-    return mixed(model, itself(model.inputs), outputs, {new: across or {}})
-
-
-def _new(
-    name: Signal, known: Sequence[str], kind: str, of: Mapping[str, float] | None = None
-) -> dict[Signal, Mapping[str, float]]:
-    if name in known:
-        raise InputError(f"the plant has an {kind} {name} already: rename that one")
-    return {name: of or {}}
-
-
 def _with(names: Sequence[Signal], old: str, new: Signal) -> tuple[Signal, ...]:
     return tuple(new if name == old else name for name in names)
-
-
-def _renamed(system: Any, controls: Sequence[str], measurements: Sequence[str]) -> Any:
-    """A copy of a python-control system whose signals have the names of the plant, in order, where
-    it has none of its own.
-    """
-    import control
-
-    system = control.ss(system)
-    for letter, labels, names, kind in (
-        ("u", "input_labels", measurements, "inputs"),
-        ("y", "output_labels", controls, "outputs"),
-    ):
-        own = getattr(system, labels)
-        if list(own) != [f"{letter}[{i}]" for i in range(len(own))]:
-            continue
-        if len(own) != len(names):
-            raise InputError(
-                f"the controller has {len(own)} {kind} without names, the plant"
-                f" {len(names)}: {', '.join(names)}"
-            )
-        system = control.ss(system, **{kind: [str(name) for name in names]})
-    return system

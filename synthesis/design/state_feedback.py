@@ -15,7 +15,7 @@ from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
 from synthesis.design.output_feedback import (
     USUAL,
-    as_controller,
+    in_plant_units,
     coordinates_of,
     depends,
     failed,
@@ -84,7 +84,7 @@ def state_feedback(
     start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
     factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts):
-        made = as_controller(
+        made = in_plant_units(
             plant, design.coordinates, design.gains, design.gamma, f"state feedback, {shape}"
         )
         return replace(made, attempts=tuple(attempts))

@@ -195,3 +195,29 @@ def test_matrices_of_unequal_shape_are_refused():
         )
     with pytest.raises(InputError, match="positive number of seconds"):
         stable(dt=-0.1)
+
+
+def test_a_loop_closes_around_a_fitted_model_on_a_part_of_its_range():
+    """The residuals of the narrower model are those inside: what the fit missed elsewhere is no
+    business of its loops.
+    """
+    narrow = replace(SPEED, low=2.0, high=8.0)
+    lpv = stable().discretize(0.02, degree=3, nodes=14)
+    part = lpv.with_scheduling(narrow)
+    nodes = lpv.residuals.nodes
+    inside = (nodes >= 2.0) & (nodes <= 8.0)
+    np.testing.assert_array_equal(part.residuals.nodes, nodes[inside])
+    closed = part.feedback({("u1", "y1"): -1.0})
+    whole = lpv.feedback({("u1", "y1"): -1.0})
+    np.testing.assert_allclose(closed.residuals.A, whole.residuals.A[inside], atol=1e-13)
+    between = replace(SPEED, low=nodes[3] + 1e-3, high=nodes[4] - 1e-3)
+    assert lpv.with_scheduling(between).residuals is None
+
+
+def test_a_constant_model_is_the_same_everywhere():
+    model = stable().at(4.0)
+    box = (SPEED, Scheduling("a", "m/s^2", -3.0, 3.0))
+    np.testing.assert_array_equal(LPVStateSpace.constant(model, box).at(3.0, -1.0).A, model.A)
+    alone = LPVStateSpace.constant(model)
+    assert [s.name for s in alone.parameters] == ["constant"]
+    np.testing.assert_array_equal(alone.at(0.7).A, model.A)

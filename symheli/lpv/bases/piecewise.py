@@ -13,7 +13,7 @@ from scipy.interpolate import PPoly
 
 from symheli.lpv.bases.basis import Basis
 from symheli.lpv.bases.function_space import Piece
-from symheli.values.arrays import Array
+from symheli.values.arrays import Array, frozen
 
 
 class PiecewisePolynomial(Basis):
@@ -36,6 +36,10 @@ class PiecewisePolynomial(Basis):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One piece between every two breakpoints."""
+        return self._pieces
+
+    @cached_property
+    def _pieces(self) -> tuple[Piece, ...]:
         power = self._functions.c[
             ::-1
         ]  # (degree + 1, segments, functions), ascending powers of p - breakpoint
@@ -49,5 +53,5 @@ class PiecewisePolynomial(Basis):
                     for k in range(d + 1)
                 ]
             )
-            out.append(Piece(low, high, bernstein.T))
+            out.append(Piece(low, high, frozen(bernstein.T, "pieces")))
         return tuple(out)

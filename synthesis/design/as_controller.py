@@ -1,0 +1,65 @@
+"""What may be closed around a design plant, as a model with the names of its signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli.lpv.linear_model import feedback_matrix, is_control_system
+from symheli.values.arrays import frozen
+from symheli.values.signal import Signal, indices
+
+
+def as_controller(
+    given: Any, controls: Sequence[Signal], measurements: Sequence[Signal]
+) -> LinearModel | LPVStateSpace:
+    """The controller that is `given` in one of the ways of `Plant.close`; raises `InputError` for
+    anything else, `UnknownNameError` for signals that are not the plant's.
+    """
+    inner = getattr(given, "model", None)
+    if isinstance(inner, LPVStateSpace) and not isinstance(given, UncertainStateSpace):
+        given = inner
+    if is_control_system(given):
+        given = LinearModel.from_control(_named(given, controls, measurements))
+    elif isinstance(given, Mapping):
+        K = feedback_matrix(given, controls, measurements)
+        given = LinearModel.gain(K, measurements, controls)
+    elif isinstance(given, np.ndarray | list):
+        K = frozen(given, "controller", (len(controls), len(measurements)))
+        given = LinearModel.gain(K, measurements, controls)
+    if not isinstance(given, LinearModel | LPVStateSpace):
+        raise InputError(
+            "controller: expected {(control, measurement): gain}, an array of gains, a"
+            " LinearModel, an LPVStateSpace, a system of python-control or an object with such"
+            f" a .model, got {type(given).__name__}"
+        )
+    indices(given.inputs, measurements, "measurement")
+    indices(given.outputs, controls, "control")
+    return given
+
+
+def _named(system: Any, controls: Sequence[str], measurements: Sequence[str]) -> Any:
+    """A copy of a python-control system whose signals have the names of the plant, in order, where
+    it has none of its own.
+    """
+    import control
+
+    system = control.ss(system)
+    for letter, labels, names, kind in (
+        ("u", "input_labels", measurements, "inputs"),
+        ("y", "output_labels", controls, "outputs"),
+    ):
+        own = getattr(system, labels)
+        if list(own) != [f"{letter}[{i}]" for i in range(len(own))]:
+            continue
+        if len(own) != len(names):
+            raise InputError(
+                f"the controller has {len(own)} {kind} without names, the plant"
+                f" {len(names)}: {', '.join(names)}"
+            )
+        system = control.ss(system, **{kind: [str(name) for name in names]})
+    return system
