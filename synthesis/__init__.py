@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from synthesis.analysis.l2_gain import l2_gain
     from synthesis.analysis.stability import stability
     from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
+    from synthesis.design.h2 import h2
+    from synthesis.design.hinf import hinf
+    from synthesis.design.loop_shaping import ncf
+    from synthesis.design.mixed_sensitivity import mixed_sensitivity
+    from synthesis.design.point_design import DesignStatus, PointDesign
     from synthesis.forms import HigherOrder, Memory, Spline
     from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
     from synthesis.lft.gain import lft_gain, lft_stability
@@ -37,6 +42,11 @@ _ROOMS = {
     "synthesis.analysis.l2_gain": "l2_gain",
     "synthesis.analysis.stability": "stability",
     "synthesis.certificate": "Attempt Certificate Proof Seconds Status",
+    "synthesis.design.h2": "h2",
+    "synthesis.design.hinf": "hinf",
+    "synthesis.design.loop_shaping": "ncf",
+    "synthesis.design.mixed_sensitivity": "mixed_sensitivity",
+    "synthesis.design.point_design": "DesignStatus PointDesign",
     "synthesis.forms": "HigherOrder Memory Spline",
     "synthesis.impose": "Bernstein Grid SumOfSquares Vertices",
     "synthesis.lft.gain": "lft_gain lft_stability",
@@ -61,6 +71,7 @@ __all__ = [
     "BoxGain",
     "BoxLyapunov",
     "Certificate",
+    "DesignStatus",
     "FrozenGain",
     "Grid",
     "HigherOrder",
@@ -69,6 +80,7 @@ __all__ = [
     "Memory",
     "MemoryLyapunov",
     "Multiplier",
+    "PointDesign",
     "PolynomialMatrix",
     "Proof",
     "Search",
@@ -86,6 +98,8 @@ __all__ = [
     "frozen_box_gain",
     "frozen_gain",
     "generalized_h2",
+    "h2",
+    "hinf",
     "installed_solvers",
     "l2_gain",
     "lft_gain",
@@ -93,6 +107,8 @@ __all__ = [
     "loop",
     "lower_bound",
     "margins",
+    "mixed_sensitivity",
+    "ncf",
     "stability",
 ]
 

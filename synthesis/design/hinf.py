@@ -36,7 +36,7 @@ ACCURACY = 1e-10
 NOTHING = 1e-9
 """A level below this part of that of the LQG controller counts as zero."""
 
-BACK_OFFS = 1.0, 1.02, 1.05, 1.2, 2.0
+BACK_OFFS = 1.0, 1.02, 1.05, 1.2, 2.0, 10.0, 100.0, 1000.0
 """Where a controller does not keep its level in the check, the level is raised by these in turn."""
 
 KEPT = 1e-6
@@ -65,10 +65,10 @@ def hinf(
 ) -> PointDesign:
     """The H-infinity output-feedback controller of one model, continuous or sampled.
 
-    Two Riccati equations decide whether a level can be reached; the smallest is found to ten
-    digits, and the central controller is that of a level `back_off` times higher, where it has no
-    pole at infinity. D11 and D22 may be anything; a sampled model is taken through the bilinear
-    transformation, which keeps the norm.
+    Two Riccati equations decide whether a level can be reached; the smallest is found to
+    eight digits, and the central controller is that of a level `back_off` times higher, where it
+    has no pole at infinity. D11 and D22 may be anything; a sampled model is taken through the
+    bilinear transformation, which keeps the norm.
 
     Parameters
     ----------
