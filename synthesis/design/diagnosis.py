@@ -74,9 +74,9 @@ def reasons(
     ...     ("z1", "z2", "y"),
     ... )
     >>> of = ["d_col"], ["y"]
-    >>> print(*reasons(Generalized.of(heave, *of), Channels.of(heave, *of)))
-    the mode at 0.5 rad/s (mostly w) is not stable, and d_col cannot stabilise it: add a control
-    that drives it, or leave it out
+    >>> found = reasons(Generalized.of(heave, *of), Channels.of(heave, *of))
+    >>> print(*[sentence.split(":")[0] for sentence in found])
+    the mode at 0.5 rad/s (mostly w) is not stable, and d_col cannot stabilise it
     """
     if plant.A.ndim == 2:
         return tuple(_reasons(plant, channels, dt, gamma))
@@ -121,15 +121,12 @@ def _modes(P: Generalized, names: Channels, dt: float | None, *, dual: bool = Fa
 
 def _place(mode: Mode, dt: float | None) -> str:
     value = mode.value
-    if dt is not None:
-        at = f"z = {value.real:.4g}"
-        return at + (f" +- {value.imag:.4g}j" if value.imag > 1e-9 else "")
-    small = 1e-12
-    if abs(value) < small:
-        return "at 0 rad/s"
-    if value.imag <= 1e-9 * abs(value):
-        return f"at {value.real:.4g} rad/s"
-    return f"at {value.real:.4g} +- {value.imag:.4g}j rad/s"
+    imaginary = f" +- {value.imag:.4g}j" if value.imag else ""
+    return (
+        f"at {value.real:.4g}{imaginary} rad/s"
+        if dt is None
+        else f"z = {value.real:.4g}{imaginary}"
+    )
 
 
 def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
@@ -228,7 +225,7 @@ def _floor(floor: Unreachable, names: Channels) -> str:
     else:
         where = f"at {floor.omega:.4g} rad/s"
     return (
-        f"whatever the controller does, {w} comes through to {z} with gain {floor.gamma:.6g}"
+        f"whatever the controller does, the gain from {w} to {z} is at least {floor.gamma:.6g}"
         f" {where}"
     )
 

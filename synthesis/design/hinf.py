@@ -113,7 +113,7 @@ def hinf(
     ... )
     >>> design = hinf(plant, ["u"], ["y"])
     >>> print(f"{design.optimum:.7f} {design.gamma:.3f}", design.controller.is_stable())
-    0.6009252 0.606 True
+    0.6009252 0.607 True
     """
     model = as_model(model)
     if gamma is not None and not (math.isfinite(gamma) and gamma > 0):

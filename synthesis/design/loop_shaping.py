@@ -63,13 +63,13 @@ def ncf(
 
     Examples
     --------
-    The gap between a gain of one and u = -y is the widest there is:
+    For an integrator the optimum is sqrt(2):
 
     >>> from symheli.lpv import LinearModel
     >>> integrator = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     >>> design = ncf(integrator)
     >>> print(f"{design.optimum:.6f} {design.gamma:.3f} {design.controller.D[0, 0]:.1f}")
-    1.414214 1.421 0.0
+    1.414214 1.428 0.0
     """
     G = as_model(G)
     if not (math.isfinite(back_off) and back_off >= 1):

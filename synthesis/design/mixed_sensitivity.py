@@ -65,7 +65,7 @@ def mixed_sensitivity(
     >>> weight = LinearModel([[-0.001]], [[1.0]], [[1.0]], [[0.5]], ["e"], ["y"], ["S"])
     >>> design = mixed_sensitivity(lag, weight, 0.1)  # at least 0.5 of S at high frequency
     >>> print(f"{design.optimum:.4f}", design.controller.inputs, design.controller.outputs)
-    0.6053 ('y',) ('u',)
+    0.5350 ('y',) ('u',)
     """
     G = as_model(G)
     if all(W is None for W in (W1, W2, W3)):

@@ -20,6 +20,9 @@ NEAR = 1e13
 ASIDE = 1e-9
 """So far is such an s moved, beside the size of A."""
 
+FLAT = 1e-9
+"""Gains as near to each other are one: the first frequency of a plateau is named."""
+
 GRID = 400
 """Frequencies to begin with."""
 
@@ -58,7 +61,7 @@ def unreachable_gain(plant: Generalized, dt: float | None = None) -> Unreachable
     best = _direct(plant) if dt is None else Unreachable(0.0, 0.0, np.zeros(0), np.zeros(0))
     for _ in range(8):
         found, sizes = _largest(plant, omega, dt)
-        if found.gamma > best.gamma:
+        if found.gamma > best.gamma * (1 + FLAT):
             best = found
         top = int(np.argmax(sizes))
         omega = np.linspace(omega[max(top - 1, 0)], omega[min(top + 1, len(omega) - 1)], 21)
@@ -100,7 +103,7 @@ def _largest(plant: Generalized, omega: Array, dt: float | None) -> tuple[Unreac
 def _of(P11: Array, left: Array, right: Array, omega: Array) -> tuple[Unreachable, Array]:
     unreached, unmeasured = left @ P11, P11 @ right
     sizes = np.stack([_norms(unreached), _norms(unmeasured)])
-    which, k = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
+    which, k = np.argwhere(sizes >= sizes.max() * (1 - FLAT))[0]
     U, values, V = np.linalg.svd((unreached, unmeasured)[which][k])
     return (
         Unreachable(float(values[0]), float(omega[k]), np.abs(U[:, 0]), np.abs(V[0])),
