@@ -78,13 +78,14 @@ def reasons(
     >>> print(*[sentence.split(":")[0] for sentence in found])
     the mode at 0.5 rad/s (mostly w) is not stable, and d_col cannot stabilise it
     """
-    if plant.A.ndim == 2:
+    leading = np.broadcast_shapes(*(M.shape[:-2] for M in plant))
+    if not leading:
         return tuple(_reasons(plant, channels, dt, gamma))
+    family = [np.broadcast_to(M, (*leading, *M.shape[-2:])) for M in plant]
     first: dict[str, list[str]] = {}
-    for k in np.ndindex(plant.A.shape[:-2]):
+    for k in np.ndindex(leading):
         label = str(at[k[0]]) if at is not None else f"model {k[0] if len(k) == 1 else k}"
-        frozen = Generalized(*(M[k] if M.ndim > 2 else M for M in plant))
-        for sentence in _reasons(frozen, channels, dt, gamma):
+        for sentence in _reasons(Generalized(*(M[k] for M in family)), channels, dt, gamma):
             first.setdefault(sentence, []).append(label)
     return tuple(f"{_where(labels)}: {sentence}" for sentence, labels in first.items())
 
