@@ -201,11 +201,17 @@ def decided_by(P: Generalized, names: Channels, gamma: float, dt: float | None =
     if gamma < floor.gamma * (1 - 1e-9):
         out.append(f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}")
     elif gamma <= floor.gamma * (1 + CLOSE):
-        out.append(
-            f"gamma = {gamma:.6g} is decided by what no controller can change and tells nothing of"
-            f" the rest of the loop: {_floor(floor, names)}; scale those signals or their weights,"
-            " or give the controls a lower price"
-        )
+        if floor.at_rest <= floor.gamma * (1 + CLOSE):
+            out.append(
+                f"gamma = {gamma:.6g} proves nothing: {_floor(floor, names)}, as it is with the"
+                " controls at rest; scale those signals or their weights, or give the"
+                " controls a lower price"
+            )
+        else:
+            out.append(
+                f"gamma = {gamma:.6g} is decided at one frequency: {_floor(floor, names)}; of the"
+                " loop elsewhere it says little"
+            )
     A, B, C, D = P.A, P.B1, P.C1, P.D11
     idle = norm(A, B, C, D, dt)[0]
     if idle <= gamma * (1 + CLOSE):

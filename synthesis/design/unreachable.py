@@ -30,12 +30,14 @@ GRID = 400
 class Unreachable(NamedTuple):
     """The largest gain over frequency that remains whatever the controller does.
 
-    `omega` (rad/s; inf: of the direct way) is where, `performance` (nz,) and `disturbances` (nw,)
-    are the sizes, from 0 to 1, of the signals in it there.
+    `omega` (rad/s; inf: of the direct way) is where, `at_rest` the gain there with the controls at
+    rest, `performance` (nz,) and `disturbances` (nw,) are the sizes, from 0 to 1, of the signals in
+    it.
     """
 
     gamma: float
     omega: float
+    at_rest: float
     performance: Array
     disturbances: Array
 
@@ -58,7 +60,7 @@ def unreachable_gain(plant: Generalized, dt: float | None = None) -> Unreachable
     omega = np.unique(np.concatenate([[0.0], np.geomspace(1e-3 * slow, 1e3 * fast, GRID), poles]))
     if dt is not None:
         omega = np.append(omega[omega < math.pi / dt], math.pi / dt)
-    best = _direct(plant) if dt is None else Unreachable(0.0, 0.0, np.zeros(0), np.zeros(0))
+    best = _direct(plant) if dt is None else Unreachable(0.0, 0.0, 0.0, np.zeros(0), np.zeros(0))
     for _ in range(8):
         found, sizes = _largest(plant, omega, dt)
         if found.gamma > best.gamma * (1 + FLAT):
@@ -105,10 +107,9 @@ def _of(P11: Array, left: Array, right: Array, omega: Array) -> tuple[Unreachabl
     sizes = np.stack([_norms(unreached), _norms(unmeasured)])
     which, k = np.argwhere(sizes >= sizes.max() * (1 - FLAT))[0]
     U, values, V = np.linalg.svd((unreached, unmeasured)[which][k])
-    return (
-        Unreachable(float(values[0]), float(omega[k]), np.abs(U[:, 0]), np.abs(V[0])),
-        sizes.max(axis=0),
-    )
+    at_rest = float(np.linalg.norm(P11[k], 2))
+    found = Unreachable(float(values[0]), float(omega[k]), at_rest, np.abs(U[:, 0]), np.abs(V[0]))
+    return found, sizes.max(axis=0)
 
 
 def _norms(M: Array) -> Array:

@@ -65,8 +65,8 @@ def test_slicot_has_the_same_controller(seed):
 
 
 def test_sampled_fast_the_norm_is_that_of_the_continuous_plant():
-    """White noise of unit intensity is noise of variance 1/dt held for dt; the rest vanishes with
-    dt.
+    """White noise of unit intensity is noise of variance 1/dt held for dt; the bilinear rule is
+    of second order.
     """
     A, C = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[1.0, 0], [0, 0], [0, 1.0]])
     D = np.array([[0, 0, 0], [0, 0, 1.0], [0, 0.5, 0]])
@@ -80,8 +80,7 @@ def test_sampled_fast_the_norm_is_that_of_the_continuous_plant():
         noise = np.array([dt**-0.5, dt**-0.5, 1.0])
         sampled = named(step, into * noise, C, D * noise, 1, 1, dt)
         errors.append(abs(h2(*sampled).gamma / continuous.gamma - 1))
-    print(errors)
-    assert errors[2] < 0.3 * errors[0]
+    assert errors[2] < 0.1 * errors[0]
 
 
 def test_a_static_gain_takes_away_the_direct_way():
