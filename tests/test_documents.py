@@ -33,7 +33,9 @@ def printed_and_written(page):
         yield code, out.getvalue(), text if after == "text" else None
 
 
-@pytest.mark.parametrize("page", ["flying.md", "identification.md", "results.md", "uncertain.md"])
+@pytest.mark.parametrize(
+    "page", ["flying.md", "identification.md", "points.md", "results.md", "uncertain.md"]
+)
 def test_the_blocks_of_a_page_run_and_print_what_it_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for code, printed, written in printed_and_written(page):

@@ -139,3 +139,13 @@ def test_mcfarlane_glover_loop_shaping_by_two_routes():
         )
     )
     assert general.optimum == pytest.approx(design.optimum, rel=1e-7)
+
+
+def test_a_plant_without_states_has_a_static_controller():
+    """z = (w + u, u), y = w + n: the least gain of [1 + k, k; k, k], found by trying every k."""
+    model = LinearModel.gain([[1, 0, 1], [0, 0, 1], [1, 1, 0]], ["w", "n", "u"], ["z", "z_u", "y"])
+    design = hinf(model, ["u"], ["y"])
+    gains = [np.linalg.norm([[1 + k, k], [k, k]], 2) for k in np.linspace(-1, 0, 10001)]
+    least = min(gains)
+    assert design.optimum == pytest.approx(least, rel=1e-4)  # the spacing
+    assert design.controller.A.shape == (0, 0)
