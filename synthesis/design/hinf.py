@@ -23,8 +23,7 @@ from synthesis.design.point_design import (
     DesignStatus,
     PointDesign,
     as_model,
-    named_controller,
-    named_loop,
+    checked,
 )
 from synthesis.worst.frozen import norm
 
@@ -209,25 +208,6 @@ def _kept(levels: _Levels, plant: Generalized, names: Channels, gamma: float) ->
         return None
     design = checked(plant, K, names, levels.dt)
     return design if design is not None and design.gamma <= gamma * (1 + KEPT) else None
-
-
-def checked(
-    plant: Generalized, K: Matrices, names: Channels, dt: float | None
-) -> PointDesign | None:
-    """The controller with the H-infinity norm of its loop, recomputed; None where the loop is not
-    well posed or not stable.
-    """
-    if not all(np.all(np.isfinite(M)) for M in K):
-        return None
-    controller = named_controller(K, names, dt)
-    try:
-        loop = named_loop(plant, controller, names)
-    except InputError:
-        return None
-    gamma = norm(loop.A, loop.B, loop.C, loop.D, dt)[0]
-    if not math.isfinite(gamma):
-        return None
-    return PointDesign(DesignStatus.SOLVED, controller, loop, gamma, math.nan)
 
 
 def _smallest(normal: Normalised, start: float) -> tuple[float, Obstacle | None] | None:

@@ -15,8 +15,7 @@ from symheli.values.signal import Signal
 from synthesis.design.bilinear import sampled_controller
 from synthesis.design.diagnosis import reasons
 from synthesis.design.generalized import Channels, Generalized
-from synthesis.design.hinf import checked
-from synthesis.design.point_design import DesignStatus, PointDesign, as_model
+from synthesis.design.point_design import DesignStatus, PointDesign, as_model, checked
 from synthesis.design.riccati import stabilising
 from synthesis.design.weights import Weight, as_weight, series
 from synthesis.worst.frozen import to_continuous
