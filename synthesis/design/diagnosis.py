@@ -22,6 +22,9 @@ SINGULAR = 1e-9
 CLOSE = 0.01
 """A gamma within this part of what no controller can lower is decided by it."""
 
+BELOW = 1e-6
+"""A gamma is below that by more than this part: what ill-conditioned plants leave of its digits."""
+
 PART = 0.3
 """Signals with at least this part of a direction are named."""
 
@@ -198,7 +201,7 @@ def decided_by(P: Generalized, names: Channels, gamma: float, dt: float | None =
     """What of a level `gamma` no controller can lower, where that is all of it or more."""
     out = []
     floor = unreachable_gain(P, dt)
-    if gamma < floor.gamma * (1 - 1e-9):
+    if gamma < floor.gamma * (1 - BELOW):
         out.append(f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}")
     elif gamma <= floor.gamma * (1 + CLOSE):
         if floor.at_rest <= floor.gamma * (1 + CLOSE):

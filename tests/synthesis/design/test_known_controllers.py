@@ -6,6 +6,8 @@ import pytest
 from design_plants import (
     all_ones,
     first_order,
+    he1,
+    he5,
     matrices,
     named,
     scherer_gahinet_chilali,
@@ -85,6 +87,17 @@ def test_slicot_example_with_every_direct_way():
     omega = np.geomspace(0.1, 100, 30)
     ours, theirs = K.frequency_response(omega), printed.frequency_response(omega)
     assert np.abs(ours - theirs).max() < 3e-4 * np.abs(ours).max()  # four printed decimals
+
+
+def test_helicopters_of_compleib():
+    """Optima over all controllers, computed by two routes. That of HE1 is an infimum, its
+    measurement has no noise: it is approached in proportion to the noise that is put there.
+    """
+    assert hinf(*he5()).optimum == pytest.approx(1.76504, abs=5e-6)
+    far, near = (hinf(*he1(noise)).optimum for noise in (1e-4, 1e-5))
+    assert near < far
+    assert near - (far - near) / 9 == pytest.approx(0.07362, abs=5e-6)
+    assert "y1 has no noise" in hinf(*he1(0.0)).reasons[0]
 
 
 def test_a_controller_that_can_be_written_down():
