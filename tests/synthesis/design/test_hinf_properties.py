@@ -190,9 +190,11 @@ def test_slicot_reaches_no_lower_level(seed):
 
 
 def test_python_control_finds_a_controller_no_better():
-    """`hinfsyn` through SLICOT searches the level by itself."""
+    """`hinfsyn` judged by the loop it makes: the level it reports here is one that no controller
+    reaches, its own included.
+    """
     pytest.importorskip("slycot")
-    model, u, y = random_plant(4)
+    model, u, y = random_plant(8)
     P = generalized((model, u, y))
-    gamma = control.hinfsyn(control.ss(*P.joined), len(y), len(u))[2]
-    assert hinf(model, u, y).optimum <= gamma * (1 + 1e-6)
+    K = control.hinfsyn(control.ss(*P.joined), len(y), len(u))[0]
+    assert norm(*P.closed(K.A, K.B, K.C, K.D))[0] >= hinf(model, u, y).optimum * (1 - 1e-7)
