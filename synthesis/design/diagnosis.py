@@ -141,21 +141,31 @@ def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
         P = continuous_plant(P)
     out = []
     for plant, dual in ((P, False), (P.dual, True)):
-        free = free_directions(plant.D12)
         signals = names.measurements if dual else names.controls
         at_nyquist = "" if dt is None else " at half the sample frequency"
-        for direction in free.T:
-            what = _direction(direction, signals)
-            out.append(
-                f"{what} has no noise{at_nyquist} (D21 loses row rank): add a disturbance, however"
-                " small, that acts on it alone"
-                if dual
-                else f"{what} is not in the performance{at_nyquist} (D12 loses column rank): add it"
-                " with a weight, however small"
-            )
-        if not free.size:
+        free = unpriced(plant.D12, signals, at_nyquist, dual=dual)
+        out += free
+        if not free:
             out += [_zero(mode, names, dt, dual=dual) for mode in axis_zeros(plant)]
     return out
+
+
+def unpriced(D12: Array, names: Sequence[str], where: str = "", *, dual: bool = False) -> list[str]:
+    """Directions of the controls `names` that D12 (.., nz, nu) does not see; of the dual plant, of
+    measurements that no disturbance enters. One sentence each.
+    """
+    found: dict[str, None] = {}
+    for each in D12.reshape(-1, *D12.shape[-2:]):
+        for direction in free_directions(each).T:
+            what = _direction(direction, names)
+            found[
+                f"{what} has no noise{where} (D21 loses row rank): add a disturbance, however"
+                " small, that acts on it alone"
+                if dual
+                else f"{what} is not in the performance{where} (D12 loses column rank): add it"
+                " with a weight, however small"
+            ] = None
+    return list(found)
 
 
 def free_directions(D12: Array) -> Array:
