@@ -16,8 +16,20 @@ if TYPE_CHECKING:
     from synthesis.analysis.l2_gain import l2_gain
     from synthesis.analysis.stability import stability
     from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
+    from synthesis.design.controller import Controller
+    from synthesis.design.estimator import Estimator, estimator
     from synthesis.design.generalized import Generalized
+    from synthesis.design.h2 import h2
+    from synthesis.design.hinf import hinf
+    from synthesis.design.lft_feedback import lft_feedback
+    from synthesis.design.loop_shaping import ncf
+    from synthesis.design.mixed_sensitivity import mixed_sensitivity
+    from synthesis.design.multiobjective import multiobjective
+    from synthesis.design.objectives import H2, L2, EnergyToPeak, PoleRegion
+    from synthesis.design.output_feedback import output_feedback
     from synthesis.design.plant import Plant
+    from synthesis.design.point_design import DesignStatus, PointDesign
+    from synthesis.design.state_feedback import state_feedback
     from synthesis.forms import HigherOrder, Memory, Spline
     from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
     from synthesis.lft.gain import lft_gain, lft_stability
@@ -39,8 +51,20 @@ _ROOMS = {
     "synthesis.analysis.l2_gain": "l2_gain",
     "synthesis.analysis.stability": "stability",
     "synthesis.certificate": "Attempt Certificate Proof Seconds Status",
+    "synthesis.design.controller": "Controller",
+    "synthesis.design.estimator": "Estimator estimator",
+    "synthesis.design.lft_feedback": "lft_feedback",
+    "synthesis.design.multiobjective": "multiobjective",
+    "synthesis.design.objectives": "H2 L2 EnergyToPeak PoleRegion",
+    "synthesis.design.output_feedback": "output_feedback",
+    "synthesis.design.state_feedback": "state_feedback",
     "synthesis.design.generalized": "Generalized",
     "synthesis.design.plant": "Plant",
+    "synthesis.design.h2": "h2",
+    "synthesis.design.hinf": "hinf",
+    "synthesis.design.loop_shaping": "ncf",
+    "synthesis.design.mixed_sensitivity": "mixed_sensitivity",
+    "synthesis.design.point_design": "DesignStatus PointDesign",
     "synthesis.forms": "HigherOrder Memory Spline",
     "synthesis.impose": "Bernstein Grid SumOfSquares Vertices",
     "synthesis.lft.gain": "lft_gain lft_stability",
@@ -58,6 +82,8 @@ _ROOMS = {
 }
 
 __all__ = [
+    "H2",
+    "L2",
     "SCALINGS",
     "Attempt",
     "Bandwidth",
@@ -65,6 +91,10 @@ __all__ = [
     "BoxGain",
     "BoxLyapunov",
     "Certificate",
+    "Controller",
+    "DesignStatus",
+    "EnergyToPeak",
+    "Estimator",
     "FrozenGain",
     "Generalized",
     "Grid",
@@ -75,6 +105,8 @@ __all__ = [
     "MemoryLyapunov",
     "Multiplier",
     "Plant",
+    "PointDesign",
+    "PoleRegion",
     "PolynomialMatrix",
     "Proof",
     "Search",
@@ -89,17 +121,26 @@ __all__ = [
     "bandwidth",
     "decay_rate",
     "disk_margin",
+    "estimator",
     "frozen_box_gain",
     "frozen_gain",
     "generalized_h2",
+    "h2",
+    "hinf",
     "installed_solvers",
     "l2_gain",
+    "lft_feedback",
     "lft_gain",
     "lft_stability",
     "loop",
     "lower_bound",
     "margins",
+    "mixed_sensitivity",
+    "multiobjective",
+    "ncf",
+    "output_feedback",
     "stability",
+    "state_feedback",
 ]
 
 __getattr__ = lazily(__name__, _ROOMS)

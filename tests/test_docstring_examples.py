@@ -66,6 +66,7 @@ WITHOUT = {
         *("Attempt", "Bandwidth", "BoxGain", "FrozenGain", "LowerBound", "Margins", "Proof"),
         *("Seconds", "Trajectory", "Status", "Multiplier", "Generalized"),
         *("BoxLyapunov", "MemoryLyapunov", "SplineLyapunov"),
+        *("DesignStatus", "PointDesign"),
     },
 }
 """Names without an example, by package."""

@@ -34,7 +34,15 @@ def printed_and_written(page):
 
 
 @pytest.mark.parametrize(
-    "page", ["flying.md", "identification.md", "plant.md", "results.md", "uncertain.md"]
+    "page",
+    [
+        "flying.md",
+        "identification.md",
+        "plant.md",
+        "points.md",
+        "results.md",
+        "uncertain.md",
+    ],
 )
 def test_the_blocks_of_a_page_run_and_print_what_it_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -27,6 +27,7 @@ from symheli.lpv.bases import (
     UserFunctions,
 )
 from symheli.lpv.delay import pade_delay, sample_delay
+from symheli.lpv.lagged import lagged
 from symheli.lpv.lft import (
     LFT,
     Block,
@@ -39,7 +40,6 @@ from symheli.lpv.lft import (
     parallel,
     series,
 )
-from symheli.lpv.lagged import lagged
 from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel

@@ -13,7 +13,7 @@ import numpy as np
 from symheli.lpv.equilibration import is_singular
 from synthesis.design.generalized import Generalized
 from synthesis.design.linear_quadratic import given_direct_way
-from synthesis.design.riccati import is_semidefinite, stabilising
+from synthesis.design.riccati import stabilising, without_rounding
 
 Array = np.ndarray
 
@@ -139,9 +139,12 @@ def _half(P: Generalized, gamma: float) -> tuple[Array | None, Array | None]:
         return None, None
     inverse = np.linalg.inv(weight)
     DC = D.T @ P.C1
-    Q = P.C1.T @ P.C1 - DC.T @ inverse @ DC
-    R = -B @ inverse @ B.T
-    X = stabilising(P.A - B @ inverse @ DC, 0.5 * (R + R.T), 0.5 * (Q + Q.T))
-    if X is None or not is_semidefinite(X):
+    seen, crossed, size = np.abs(P.C1), np.abs(DC), np.abs(inverse)
+    Q = without_rounding(
+        P.C1.T @ P.C1 - DC.T @ inverse @ DC, seen.T @ seen + crossed.T @ size @ crossed
+    )
+    R = without_rounding(-B @ inverse @ B.T, np.abs(B) @ size @ np.abs(B).T)
+    X = stabilising(P.A - B @ inverse @ DC, R, Q)
+    if X is None:
         return None, None
     return X, -inverse @ (DC + B.T @ X)

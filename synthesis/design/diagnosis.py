@@ -22,6 +22,9 @@ SINGULAR = 1e-9
 CLOSE = 0.01
 """A gamma within this part of what no controller can lower is decided by it."""
 
+BELOW = 1e-6
+"""A gamma is below that by more than this part: what ill-conditioned plants leave of its digits."""
+
 PART = 0.3
 """Signals with at least this part of a direction are named."""
 
@@ -74,17 +77,18 @@ def reasons(
     ...     ("z1", "z2", "y"),
     ... )
     >>> of = ["d_col"], ["y"]
-    >>> print(*reasons(Generalized.of(heave, *of), Channels.of(heave, *of)))
-    the mode at 0.5 rad/s (mostly w) is not stable, and d_col cannot stabilise it: add a control
-    that drives it, or leave it out
+    >>> found = reasons(Generalized.of(heave, *of), Channels.of(heave, *of))
+    >>> print(*[sentence.split(":")[0] for sentence in found])
+    the mode at 0.5 rad/s (mostly w) is not stable, and d_col cannot stabilise it
     """
-    if plant.A.ndim == 2:
+    leading = np.broadcast_shapes(*(M.shape[:-2] for M in plant))
+    if not leading:
         return tuple(_reasons(plant, channels, dt, gamma))
+    family = [np.broadcast_to(M, (*leading, *M.shape[-2:])) for M in plant]
     first: dict[str, list[str]] = {}
-    for k in np.ndindex(plant.A.shape[:-2]):
+    for k in np.ndindex(leading):
         label = str(at[k[0]]) if at is not None else f"model {k[0] if len(k) == 1 else k}"
-        frozen = Generalized(*(M[k] if M.ndim > 2 else M for M in plant))
-        for sentence in _reasons(frozen, channels, dt, gamma):
+        for sentence in _reasons(Generalized(*(M[k] for M in family)), channels, dt, gamma):
             first.setdefault(sentence, []).append(label)
     return tuple(f"{_where(labels)}: {sentence}" for sentence, labels in first.items())
 
@@ -121,15 +125,12 @@ def _modes(P: Generalized, names: Channels, dt: float | None, *, dual: bool = Fa
 
 def _place(mode: Mode, dt: float | None) -> str:
     value = mode.value
-    if dt is not None:
-        at = f"z = {value.real:.4g}"
-        return at + (f" +- {value.imag:.4g}j" if value.imag > 1e-9 else "")
-    small = 1e-12
-    if abs(value) < small:
-        return "at 0 rad/s"
-    if value.imag <= 1e-9 * abs(value):
-        return f"at {value.real:.4g} rad/s"
-    return f"at {value.real:.4g} +- {value.imag:.4g}j rad/s"
+    imaginary = f" +- {value.imag:.4g}j" if value.imag else ""
+    return (
+        f"at {value.real:.4g}{imaginary} rad/s"
+        if dt is None
+        else f"z = {value.real:.4g}{imaginary}"
+    )
 
 
 def _singular(P: Generalized, names: Channels, dt: float | None) -> list[str]:
@@ -210,14 +211,20 @@ def decided_by(P: Generalized, names: Channels, gamma: float, dt: float | None =
     """What of a level `gamma` no controller can lower, where that is all of it or more."""
     out = []
     floor = unreachable_gain(P, dt)
-    if gamma < floor.gamma * (1 - 1e-9):
+    if gamma < floor.gamma * (1 - BELOW):
         out.append(f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}")
     elif gamma <= floor.gamma * (1 + CLOSE):
-        out.append(
-            f"gamma = {gamma:.6g} is decided by what no controller can change and tells nothing of"
-            f" the rest of the loop: {_floor(floor, names)}; scale those signals or their weights,"
-            " or give the controls a lower price"
-        )
+        if floor.at_rest <= floor.gamma * (1 + CLOSE):
+            out.append(
+                f"gamma = {gamma:.6g} proves nothing: {_floor(floor, names)}, as it is with the"
+                " controls at rest; scale those signals or their weights, or give the"
+                " controls a lower price"
+            )
+        else:
+            out.append(
+                f"gamma = {gamma:.6g} is decided at one frequency: {_floor(floor, names)}; of the"
+                " loop elsewhere it says little"
+            )
     A, B, C, D = P.A, P.B1, P.C1, P.D11
     idle = norm(A, B, C, D, dt)[0]
     if idle <= gamma * (1 + CLOSE):
@@ -238,7 +245,7 @@ def _floor(floor: Unreachable, names: Channels) -> str:
     else:
         where = f"at {floor.omega:.4g} rad/s"
     return (
-        f"whatever the controller does, {w} comes through to {z} with gain {floor.gamma:.6g}"
+        f"whatever the controller does, the gain from {w} to {z} is at least {floor.gamma:.6g}"
         f" {where}"
     )
 

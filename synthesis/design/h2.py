@@ -26,6 +26,11 @@ Array = np.ndarray
 DIRECT = 1e-9
 """Direct gain from disturbances to performance below this part of its terms is none."""
 
+DIRECT_NOISE = (
+    "the performance feels the disturbances directly (D11), in continuous time white noise of"
+    " infinite variance: filter the one or the other"
+)
+
 
 def h2(
     model: LinearModel,
@@ -84,9 +89,10 @@ def h2(
     plant = Generalized.between(model, names)
     if against := reasons(plant, names, dt=model.dt):
         return PointDesign.without(DesignStatus.IMPOSSIBLE, against)
-    K = lqg(plant, model.dt) if model.dt is not None else _continuous(plant)
-    if isinstance(K, str):
-        return PointDesign.without(DesignStatus.IMPOSSIBLE, [K])
+    static = _cancelling(plant) if model.dt is None else np.zeros(plant.D22.T.shape)
+    if static is None:
+        return PointDesign.without(DesignStatus.IMPOSSIBLE, [DIRECT_NOISE])
+    K = _around(plant, static, model.dt)
     if K is None:
         return PointDesign.without(DesignStatus.FAILED, ["a Riccati equation was not solved"])
     controller = named_controller(K, names, model.dt)
@@ -99,24 +105,26 @@ def h2(
     return PointDesign(DesignStatus.SOLVED, controller, loop, size, size)
 
 
-def _continuous(P: Generalized) -> Matrices | str | None:
-    """With a static gain that takes away D11 where there is one; a sentence where it cannot."""
+def _cancelling(P: Generalized) -> Array | None:
+    """The static gain (nu, ny) that takes away D11, to rounding; None where there is none."""
     static = -np.linalg.pinv(P.D12) @ P.D11 @ np.linalg.pinv(P.D21)
-    left = np.abs(P.D11 + P.D12 @ static @ P.D21)
-    if left.max(initial=0.0) > DIRECT * np.abs(P.D11).max(initial=0.0):
-        return (
-            "the performance feels the disturbances directly (D11), in continuous time white noise"
-            " of infinite variance: filter the one or the other"
-        )
-    into = P.B2 @ static
-    shifted = P._replace(
-        A=P.A + into @ P.C2,
-        B1=P.B1 + into @ P.D21,
-        C1=P.C1 + P.D12 @ static @ P.C2,
-        D11=np.zeros(P.D11.shape),
-        D22=np.zeros(P.D22.shape),
+    left = np.abs(P.D11 + P.D12 @ static @ P.D21).max(initial=0.0)
+    return static if left <= DIRECT * np.abs(P.D11).max(initial=0.0) else None
+
+
+def _around(P: Generalized, static: Array, dt: float | None) -> Matrices | None:
+    """The best controller beside a static gain, with it."""
+    into, out = P.B2 @ static, P.D12 @ static
+    K = lqg(
+        P._replace(
+            A=P.A + into @ P.C2,
+            B1=P.B1 + into @ P.D21,
+            C1=P.C1 + out @ P.C2,
+            D11=P.D11 + out @ P.D21,
+            D22=np.zeros(P.D22.shape),
+        ),
+        dt,
     )
-    K = lqg(shifted, None)
     if K is None:
         return None
     A, B, C, D = K

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import linalg
 
 from synthesis.design.generalized import Generalized
-from synthesis.design.riccati import stabilising
+from synthesis.design.riccati import stabilising, without_rounding
 
 Array = np.ndarray
 Matrices = tuple[Array, Array, Array, Array]
@@ -39,8 +39,11 @@ def _continuous(P: Generalized) -> Gains | None:
     R = P.D12.T @ P.D12
     S = P.D12.T @ P.C1
     inverse = np.linalg.inv(R)
-    Q = P.C1.T @ P.C1 - S.T @ inverse @ S
-    X = stabilising(P.A - P.B2 @ inverse @ S, -P.B2 @ inverse @ P.B2.T, 0.5 * (Q + Q.T))
+    seen, crossed = np.abs(P.C1), np.abs(S)
+    Q = without_rounding(
+        P.C1.T @ P.C1 - S.T @ inverse @ S, seen.T @ seen + crossed.T @ np.abs(inverse) @ crossed
+    )
+    X = stabilising(P.A - P.B2 @ inverse @ S, -P.B2 @ inverse @ P.B2.T, Q)
     if X is None:
         return None
     return Gains(-inverse @ (S + P.B2.T @ X), np.zeros((len(R), P.B1.shape[1])), X, R)

@@ -20,6 +20,9 @@ singular value is below this part of A's largest entry.
 BOUNDARY = 1e-9
 """Beside the size of A, a mode this near to the border of stability is on it."""
 
+ROUNDING = 1e-7
+"""Beside the size of A: an eigenvalue of a cluster is not known better."""
+
 SHARE = 0.3
 """States with this part of the participation of the foremost are named with it."""
 
@@ -69,8 +72,14 @@ def hidden_modes(A: Array, C: Array, counts: Callable[[complex, float], bool]) -
         ):
             continue
         share = np.abs(vector) ** 2
-        found.append(Mode(complex(value.real, abs(value.imag)), share / share.max()))
+        found.append(Mode(_rounded(complex(value), size), share / share.max()))
     return found
+
+
+def _rounded(value: complex, size: float) -> complex:
+    """Without what is rounding, in the upper half plane."""
+    real, imaginary = (x if abs(x) > ROUNDING * size else 0.0 for x in (value.real, value.imag))
+    return complex(real, abs(imaginary))
 
 
 def unstable(value: complex, size: float, *, sampled: bool) -> bool:

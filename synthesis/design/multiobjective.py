@@ -23,7 +23,7 @@ from synthesis.design.coordinates import Coordinates
 from synthesis.design.generalized import Generalized
 from synthesis.design.motions import motions, used
 from synthesis.design.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
-from synthesis.design.output_feedback import in_plant_units, coordinates_of, failed, packed
+from synthesis.design.output_feedback import coordinates_of, failed, in_plant_units, packed
 from synthesis.design.recovery import Transformed, controller
 from synthesis.design.search import Dependence, functions, limited
 from synthesis.program.cone_program import Solver

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
+
+import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.lpv.linear_model import is_control_system
 from symheli.values.signal import Signal
 from synthesis.design.generalized import Channels, Generalized
+from synthesis.worst.frozen import norm
 
 Matrices = tuple[Any, Any, Any, Any]
 
@@ -94,3 +98,22 @@ def named_loop(plant: Generalized, K: LinearModel, names: Channels) -> LinearMod
     return LinearModel(
         *closed, (*names.states, *K.states), names.disturbances, names.performance, K.dt
     )
+
+
+def checked(
+    plant: Generalized, K: Matrices, names: Channels, dt: float | None
+) -> PointDesign | None:
+    """The controller with the H-infinity norm of its loop, recomputed; None where the loop is not
+    well posed or not stable.
+    """
+    if not all(np.all(np.isfinite(M)) for M in K):
+        return None
+    controller = named_controller(K, names, dt)
+    try:
+        loop = named_loop(plant, controller, names)
+    except InputError:
+        return None
+    gamma = norm(loop.A, loop.B, loop.C, loop.D, dt)[0]
+    if not math.isfinite(gamma):
+        return None
+    return PointDesign(DesignStatus.SOLVED, controller, loop, gamma, math.nan)

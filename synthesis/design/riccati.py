@@ -9,17 +9,31 @@ from scipy import linalg
 
 Array = np.ndarray
 
-SYMMETRIC = 1e-6
-"""How far from symmetric, beside its size, a solution may come out: rounding leaves less, a
-subspace that is not the stable one far more.
+ISOTROPIC = 1e-6
+"""How far the stable subspace V, with orthonormal columns, may be from V'JV = 0: rounding leaves
+less, one that took an eigenvalue on the axis for a stable one far more.
 """
 
 SEMIDEFINITE = 1e-8
-"""Negative eigenvalues below this part of the largest are zero."""
+"""Negative eigenvalues below this part of the largest, or of one, are zero, in units in which the
+Hamiltonian matrix is balanced.
+"""
+
+
+ROUNDING = 1e-13
+"""What is left of a difference below this part of its terms is none."""
+
+
+def without_rounding(value: Array, terms: Array) -> Array:
+    """A symmetric matrix that was computed from sums of this size: entries that are rounding are
+    zero. They would come out as solutions of either sign once balancing has raised them.
+    """
+    symmetric = 0.5 * (value + value.T)
+    return np.where(np.abs(symmetric) > ROUNDING * np.maximum(terms, terms.T), symmetric, 0.0)
 
 
 def stabilising(A: Array, R: Array, Q: Array) -> Array | None:
-    """X = X' of A'X + XA + XRX + Q = 0 with A + RX stable, or None where there is none.
+    """X = X' >= 0 of A'X + XA + XRX + Q = 0 with A + RX stable, or None where there is none.
 
     From the stable invariant subspace of the Hamiltonian matrix [A R; -Q -A'], balanced by a
     symplectic scaling, so that the units of the states play no part. R and Q may be indefinite.
@@ -47,19 +61,17 @@ def stabilising(A: Array, R: Array, Q: Array) -> Array | None:
     if stable != n:
         return None
     X1, X2 = vectors[:n, :n], vectors[n:, :n]
-    if np.linalg.norm(X1.T @ X2 - X2.T @ X1, 2) > SYMMETRIC * np.linalg.norm(X1.T @ X2, 2):
-        return None  # not isotropic: eigenvalues on the axis were split
+    if np.abs(X1.T @ X2 - X2.T @ X1).max() > ISOTROPIC:
+        return None
     try:
         X = np.linalg.solve(X1.T, X2.T)
     except np.linalg.LinAlgError:
         return None
-    X = 0.5 * (X + X.T) / np.multiply.outer(units, units)
-    if not np.all(np.isfinite(X)) or np.linalg.eigvals(A + R @ X).real.max() >= 0:
+    X = 0.5 * (X + X.T)
+    if not np.all(np.isfinite(X)):
         return None
-    return X
-
-
-def is_semidefinite(X: Array) -> bool:
-    """Whether a symmetric matrix is positive semidefinite, to rounding."""
     values = np.linalg.eigvalsh(X)
-    return not len(values) or bool(values[0] >= -SEMIDEFINITE * np.abs(values).max())
+    if values[0] < -SEMIDEFINITE * max(1.0, float(np.abs(values).max())):
+        return None
+    X = X / np.multiply.outer(units, units)
+    return X if np.linalg.eigvals(A + R @ X).real.max() < 0 else None

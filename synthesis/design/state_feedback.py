@@ -15,10 +15,10 @@ from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
 from synthesis.design.output_feedback import (
     USUAL,
-    in_plant_units,
     coordinates_of,
     depends,
     failed,
+    in_plant_units,
     least_ranks,
 )
 from synthesis.design.recovery import control_gain

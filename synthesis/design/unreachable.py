@@ -20,6 +20,9 @@ NEAR = 1e13
 ASIDE = 1e-9
 """So far is such an s moved, beside the size of A."""
 
+FLAT = 1e-9
+"""Gains as near to each other are one: the first frequency of a plateau is named."""
+
 GRID = 400
 """Frequencies to begin with."""
 
@@ -27,12 +30,14 @@ GRID = 400
 class Unreachable(NamedTuple):
     """The largest gain over frequency that remains whatever the controller does.
 
-    `omega` (rad/s; inf: of the direct way) is where, `performance` (nz,) and `disturbances` (nw,)
-    are the sizes, from 0 to 1, of the signals in it there.
+    `omega` (rad/s; inf: of the direct way) is where, `at_rest` the gain there with the controls at
+    rest, `performance` (nz,) and `disturbances` (nw,) are the sizes, from 0 to 1, of the signals in
+    it.
     """
 
     gamma: float
     omega: float
+    at_rest: float
     performance: Array
     disturbances: Array
 
@@ -55,10 +60,10 @@ def unreachable_gain(plant: Generalized, dt: float | None = None) -> Unreachable
     omega = np.unique(np.concatenate([[0.0], np.geomspace(1e-3 * slow, 1e3 * fast, GRID), poles]))
     if dt is not None:
         omega = np.append(omega[omega < math.pi / dt], math.pi / dt)
-    best = _direct(plant) if dt is None else Unreachable(0.0, 0.0, np.zeros(0), np.zeros(0))
+    best = _direct(plant) if dt is None else Unreachable(0.0, 0.0, 0.0, np.zeros(0), np.zeros(0))
     for _ in range(8):
         found, sizes = _largest(plant, omega, dt)
-        if found.gamma > best.gamma:
+        if found.gamma > best.gamma * (1 + FLAT):
             best = found
         top = int(np.argmax(sizes))
         omega = np.linspace(omega[max(top - 1, 0)], omega[min(top + 1, len(omega) - 1)], 21)
@@ -100,12 +105,11 @@ def _largest(plant: Generalized, omega: Array, dt: float | None) -> tuple[Unreac
 def _of(P11: Array, left: Array, right: Array, omega: Array) -> tuple[Unreachable, Array]:
     unreached, unmeasured = left @ P11, P11 @ right
     sizes = np.stack([_norms(unreached), _norms(unmeasured)])
-    which, k = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
+    which, k = np.argwhere(sizes >= sizes.max() * (1 - FLAT))[0]
     U, values, V = np.linalg.svd((unreached, unmeasured)[which][k])
-    return (
-        Unreachable(float(values[0]), float(omega[k]), np.abs(U[:, 0]), np.abs(V[0])),
-        sizes.max(axis=0),
-    )
+    at_rest = float(np.linalg.norm(P11[k], 2))
+    found = Unreachable(float(values[0]), float(omega[k]), at_rest, np.abs(U[:, 0]), np.abs(V[0]))
+    return found, sizes.max(axis=0)
 
 
 def _norms(M: Array) -> Array:

@@ -88,6 +88,8 @@ def norm(
     """
     if min(B.shape[1], C.shape[0]) == 0:
         return 0.0, 0.0
+    if len(A) == 0:
+        return float(np.linalg.norm(D, 2)), 0.0
     poles = np.linalg.eigvals(A)
     if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
         return math.inf, math.nan

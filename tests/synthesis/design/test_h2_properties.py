@@ -1,0 +1,98 @@
+"""H2 designs: the norm by other routes, and that no other controller has a smaller one."""
+
+import control
+import numpy as np
+import pytest
+from design_plants import matrices, named, random_plant
+from scipy import linalg
+
+from synthesis import DesignStatus, h2
+from synthesis.design.generalized import Generalized
+
+SEEDS = range(10)
+
+
+def size(P, K, dt):
+    """Norm of the loop by its impulse response's energy: the observability Gramian, where the code
+    takes the other.
+    """
+    A, B, C, D = P.closed(*K)
+    if dt is None:
+        W = linalg.solve_continuous_lyapunov(A.T, -C.T @ C)
+        return np.sqrt(np.trace(B.T @ W @ B))
+    W = linalg.solve_discrete_lyapunov(A.T, C.T @ C)
+    return np.sqrt(np.trace(B.T @ W @ B) + np.sum(D**2))
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_controller_nearby_has_a_smaller_norm(seed, dt):
+    model, u, y = random_plant(seed, dt, direct=dt is not None)
+    design, P = h2(model, u, y), Generalized.of(model, u, y)
+    K = matrices(design.controller)
+    assert size(P, K, dt) == pytest.approx(design.gamma, rel=1e-7)
+    rng = np.random.default_rng(seed)
+    for spread in np.repeat([1e-5, 1e-3, 1e-1], 20):
+        near = [M + spread * np.abs(M).max(initial=0.1) * rng.standard_normal(M.shape) for M in K]
+        if dt is None:
+            near[3] = K[3]  # another one makes the norm infinite
+        poles = np.linalg.eigvals(P.closed(*near)[0])
+        if np.all(poles.real < 0) if dt is None else np.all(np.abs(poles) < 1):
+            assert size(P, near, dt) >= design.gamma * (1 - 1e-7)
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_transposed_plant_has_the_same_norm(seed, dt):
+    model, u, y = random_plant(seed, dt, direct=dt is not None)
+    dual = named(*Generalized.of(model, u, y).dual.joined, len(y), len(u), dt)
+    assert h2(*dual).gamma == pytest.approx(h2(model, u, y).gamma, rel=1e-7)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_slicot_has_the_same_controller(seed):
+    pytest.importorskip("slycot")
+    model, u, y = random_plant(seed, direct=False)
+    P = Generalized.of(model, u, y)
+    K = control.h2syn(control.ss(*P.joined), len(y), len(u))
+    ours = h2(model, u, y)
+    omega = np.geomspace(0.01, 100, 30)
+    np.testing.assert_allclose(
+        np.moveaxis(K(1j * omega, squeeze=False), -1, 0),
+        ours.controller.frequency_response(omega),
+        atol=1e-6 * np.abs(ours.controller.frequency_response(omega)).max(),
+    )
+
+
+def test_sampled_fast_the_norm_is_that_of_the_continuous_plant():
+    """White noise of unit intensity is noise of variance 1/dt held for dt; the bilinear rule is
+    of second order.
+    """
+    A, C = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[1.0, 0], [0, 0], [0, 1.0]])
+    D = np.array([[0, 0, 0], [0, 0, 1.0], [0, 0.5, 0]])
+    plant = named(A, [[0, 0, 0], [1.0, 0, 1.0]], C, D, 1, 1)
+    continuous = h2(*plant)
+    errors = []
+    for dt in (2e-2, 1e-2, 5e-3):
+        eye = np.eye(2)
+        step = np.linalg.solve(eye - A * dt / 2, eye + A * dt / 2)
+        into = np.linalg.solve(eye - A * dt / 2, np.array([[0, 0, 0], [1.0, 0, 1.0]]) * dt)
+        noise = np.array([dt**-0.5, dt**-0.5, 1.0])
+        sampled = named(step, into * noise, C, D * noise, 1, 1, dt)
+        errors.append(abs(h2(*sampled).gamma / continuous.gamma - 1))
+    assert errors[2] < 0.1 * errors[0]
+
+
+def test_a_static_gain_takes_away_the_direct_way():
+    """z = u + w, y = x + w: u = -y leaves z = -x + ..., any other gain leaves white noise."""
+    design = h2(*named([[-1]], [[1, 1]], [[0], [1]], [[1, 1], [1, 0]], 1, 1))
+    assert design.controller.D[0, 0] == pytest.approx(-1)
+    assert np.isfinite(design.gamma)
+
+
+def test_white_noise_that_comes_through_is_said():
+    plant = named([[-1]], [[1, 0, 1]], [[1], [0], [1]], [[1, 0, 0], [0, 0, 1], [0, 1, 0]], 1, 1)
+    design = h2(*plant)
+    assert design.status is DesignStatus.IMPOSSIBLE
+    assert design.controller is None
+    assert "infinite variance" in design.reasons[0]
