@@ -73,13 +73,15 @@ def _kalman(A: Array, B: Array, C: Array, trust: float) -> Array:
     R = trust * np.diag(np.maximum(size, 1e-6 * max(size.max(), np.finfo(float).tiny)))
     try:
         P = solve_discrete_are(A.T, C.T, Q, R)
-    except (np.linalg.LinAlgError, ValueError) as error:
+        L = np.linalg.solve(C @ P @ C.T + R, C @ P @ A.T).T
+    except (np.linalg.LinAlgError, ValueError):
+        L = np.zeros((n, len(C)))
+    if not _radius(A - L @ C) < 1.0:
         raise InputError(
             "no anti-windup gain: a state of the controller neither decays nor shows in a command"
-            f" that it could be read from ({error}); reduce the controller, or give"
-            " correction=0"
-        ) from error
-    return np.linalg.solve(C @ P @ C.T + R, C @ P @ A.T).T
+            " that it could be read from; reduce the controller, or give correction=0"
+        )
+    return L
 
 
 def _radius(M: Array) -> float:
