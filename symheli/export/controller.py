@@ -92,6 +92,7 @@ def _header(controller: TableController, up: str) -> dict[str, object]:
         define(f"{up}NX", controller.order, "states"),
         define(f"{up}NU", len(controller.inputs)),
         define(f"{up}NY", len(controller.outputs)),
+        define(f"{up}DT", f"{controller.dt:.9g}f", "s between two samples"),
     ]
     blocks = [
         sizes,

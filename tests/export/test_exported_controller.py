@@ -211,6 +211,7 @@ def test_the_header_says_what_it_is(tmp_path):
     header = write_controller(controller, tmp_path, "own")[0].read_text()
     for said in (
         "#define OWN_NX 5 /* states */",
+        "#define OWN_DT 0.02f /* s between two samples */",
         "#define OWN_U_phi 6 /* rad */",
         "#define OWN_Y_d_lon 0 /* rad, -0.2 to 0.2, integrates */",
         "#define OWN_Y_d_lat 1 /* rad, -0.2 to 0.2 */",
