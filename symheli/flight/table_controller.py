@@ -371,12 +371,11 @@ class TableController:
         others : (ny,), optional
             Commands applied on the axes that are not flown, rad; default the trim.
         """
-        n, s = self.numbers, self._state
-        nu, ny = len(self.inputs), len(self.outputs)
-        seen, held = _single("measured", measured, nu), _single("reference", reference, nu)
-        at = _single("trim", trim, ny)
-        elsewhere = at if others is None else _single("others", others, ny)
-        with np.errstate(all="ignore"):
+        n, s, nu, ny = self.numbers, self._state, len(self.inputs), len(self.outputs)
+        with np.errstate(all="ignore"):  # numbers that are none are met below
+            seen, held = _single("measured", measured, nu), _single("reference", reference, nu)
+            at = _single("trim", trim, ny)
+            elsewhere = at if others is None else _single("others", others, ny)
             s.status = follow_airspeed(n, s, NUMBER(airspeed), valid)
             s.status |= commands(n, s, seen - held, at, elsewhere)
         return s.command.copy()

@@ -3,9 +3,11 @@ flight.
 """
 
 import ctypes
+import re
 import shutil
 import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -191,6 +193,50 @@ def test_it_is_not_compiled_with_arithmetic_that_knows_no_nan(tmp_path):
     )
     assert done.returncode != 0
     assert "without -ffast-math" in done.stderr
+
+
+ARDUPILOT = """
+#include <cstdint>
+#include "controller.h"
+struct Vector3f { float x, y, z; Vector3f(float a, float b, float c) : x(a), y(b), z(c) {} };
+struct AP_Motors {
+    enum class SpoolState { SHUT_DOWN, GROUND_IDLE, SPOOLING_UP, THROTTLE_UNLIMITED };
+    SpoolState get_spool_state() const { return SpoolState::THROTTLE_UNLIMITED; }
+    float get_roll() const { return 0; }
+    float get_pitch() const { return 0; }
+    float get_yaw() const { return 0; }
+    float get_throttle() const { return 0; }
+};
+struct AP_AHRS { bool airspeed_TAS(float &speed) const { speed = 5; return true; } };
+namespace AP { AP_AHRS &ahrs() { static AP_AHRS own; return own; } }
+namespace AP_HAL { uint32_t micros() { return 0; } }
+struct AC_CustomControl_LPV {
+    void reset();
+    Vector3f update();
+    void read_states(float *) {}
+    void read_trim(float *, float *) {}
+    uint32_t flown() { return 7; }
+    float collective(float throttle) { return throttle; }
+    float cyclic_travel = 0.1f, tail_travel = 0.3f;
+    AP_Motors *_motors;
+    controller_state _own;
+    float _command[CONTROLLER_NY];
+    uint32_t _last;
+    bool _enter;
+};
+"""
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
+def test_the_backend_of_the_page_compiles_around_it(tmp_path):
+    """Against declarations as ArduPilot has them."""
+    write_controller(TABLES["position"](), tmp_path)
+    page = (Path(__file__).resolve().parents[2] / "docs" / "autopilot.md").read_text()
+    (code,) = re.findall(r"```cpp\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "backend.cpp").write_text(ARDUPILOT + code)
+    command = ["g++", "-std=c++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "backend.cpp"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_writing_leaves_the_controller_as_it_flies(tmp_path):
