@@ -1,5 +1,5 @@
-/* Does the controller command what Python computed? Exit status 0: every command to TOLERANCE of the
-   largest of its axis, and every status. */
+/* Does the controller command what Python computed? Exit status 0: every command to TOLERANCE of
+   the largest of its axis, and every status. */
 #include <math.h>
 #include <stdio.h>
 #include "controller.h"
