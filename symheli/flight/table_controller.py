@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import get_args
@@ -16,8 +16,15 @@ from numpy.typing import ArrayLike
 from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
 from symheli.flight.airspeed_monitor import AirspeedMonitor
-from symheli.flight.anti_windup import observer_gains
 from symheli.flight.controller import TOLD, Follow, ScheduledController, require_names
+from symheli.flight.single_precision import (
+    LARGEST,
+    NUMBER,
+    as_told,
+    increasing,
+    inward,
+    rounded,
+)
 from symheli.flight.table_arithmetic import (
     NEVER,
     Numbers,
@@ -26,18 +33,13 @@ from symheli.flight.table_arithmetic import (
     commands,
     follow_airspeed,
 )
+from symheli.flight.tabulated import Tabulated
 from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Scheduling
-from symheli.values.arrays import Array, frozen
+from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
-
-RATE = "_rate"
-"""Ends the name of an output that is the rate of a command."""
-BETWEEN = 4
-"""Points between two knots at which a table is compared with what it is of."""
-NUMBER = np.float32
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,12 +120,12 @@ class TableController:
         require_names("helicopter input", self.outputs, INPUTS)
         indices(self.integrates, self.outputs, "output that integrates")
         object.__setattr__(self, "integrates", tuple(map(str, self.integrates)))
-        object.__setattr__(self, "knots", _knots(self.knots))
+        object.__setattr__(self, "knots", increasing(self.knots, "knots"))
         n, nu, ny = self.order, len(self.inputs), len(self.outputs)
         object.__setattr__(
             self,
             "matrices",
-            _rounded(self.matrices, "matrices", (len(self.knots), n + ny, n + nu + ny)),
+            rounded(self.matrices, "matrices", (len(self.knots), n + ny, n + nu + ny)),
         )
         if not (math.isfinite(self.dt) and self.dt > 0):
             raise InputError(f"dt must be a positive number of seconds, got {self.dt}")
@@ -173,59 +175,23 @@ class TableController:
             A continuous model or one over other parameters, knots beyond its range, numbers beyond
             those of 32 bits.
         """
-        if not isinstance(model, LPVStateSpace):
-            raise InputError(f"a table is made of an LPVStateSpace, got {type(model).__name__}")
-        if model.dt is None:
-            raise InputError("the controller is continuous: sample it with .discretize(dt)")
-        names = [s.name for s in model.parameters]
-        if names != ["airspeed"]:
-            raise InputError(
-                f"a table is one over airspeed alone; this model is scheduled by {', '.join(names)}"
-            )
-        outputs = tuple(Signal(str(y).removesuffix(RATE), "rad") for y in model.outputs)
-        integrates = tuple(
-            str(own) for own, y in zip(outputs, model.outputs, strict=True) if own != y
-        )
-        low, high = model.scheduling.low, model.scheduling.high
-        at = np.linspace(low, high, _count(knots)) if isinstance(knots, int) else knots
-        at = _knots(at).astype(float)
-        slack = 1e-6 * (high - low)
-        if at[0] < low - slack or at[-1] > high + slack:
-            raise InputError(
-                f"knots: expected airspeeds within {low:g} to {high:g} m/s, the range of the"
-                f" model, got {at[0]:g} to {at[-1]:g}"
-            )
-        rates = np.array([y in integrates for y in outputs])
-        own = np.where(rates, model.dt, 1.0)[:, None]  # what a rate changes in a sample
-
-        def blocks(p: Array) -> tuple[Array, ...]:
-            A, B, C, D = model.matrices(np.clip(p, low, high))
-            return A, B, own * C, own * D
-
-        A, B, C, D = blocks(at)
-        L = _corrections(correction, A, B, C, rates)
+        source = Tabulated(model)
+        at = source.knots(knots)
         table = cls(
             at,
-            np.concatenate(
-                [
-                    np.concatenate([A, B, L], axis=2),
-                    np.concatenate([C, D, np.zeros((*C.shape[:2], len(outputs)))], axis=2),
-                ],
-                axis=1,
-            ),
+            source.matrices(at, correction),
             model.states,
             model.inputs,
-            outputs,
-            model.dt,
-            integrates,
+            source.outputs,
+            source.dt,
+            tuple(str(y) for y, rate in zip(source.outputs, source.rates, strict=True) if rate),
             limits or {},
             model.scheduling.limit,
             fade,
             airspeed or AirspeedMonitor(),
             follow,
         )
-        object.__setattr__(table, "misfit", table._departure(blocks))
-        return table
+        return replace(table, misfit=source.misfit(table.knots, table.matrices))
 
     # --- what it is ------------------------------------------------------------------------------
 
@@ -245,13 +211,13 @@ class TableController:
             order=self.order,
             knots=self.knots,
             matrices=self.matrices,
-            low=np.array([_inward(e, math.inf) for e, _ in ends], NUMBER),
-            high=np.array([_inward(e, -math.inf) for _, e in ends], NUMBER),
+            low=np.array([inward(e, math.inf) for e, _ in ends], NUMBER),
+            high=np.array([inward(e, -math.inf) for _, e in ends], NUMBER),
             integrates=np.array([y in self.integrates for y in self.outputs]),
             fade=NUMBER(math.exp(-self.dt / self.fade)),
             step=self._largest_step(),
             gain=NUMBER(-math.expm1(-self.dt / a.lag) if a.lag > 0 else 1.0),
-            plausible=(_inward(plausible[0], math.inf), _inward(plausible[1], -math.inf)),
+            plausible=(inward(plausible[0], math.inf), inward(plausible[1], -math.inf)),
             fallback=np.clip(NUMBER(fallback), self.knots[0], self.knots[-1]),
             frozen=self._samples(math.inf if self.follow == "command" else a.frozen, 1),
             hold=self._samples(a.hold, 0),
@@ -265,7 +231,8 @@ class TableController:
     @cached_property
     def model(self) -> LPVStateSpace:
         """What flies within its limits, for an analysis: outputs added to the trim, the
-        coefficients the 32-bit numbers of the table, straight between the knots.
+        coefficients the 32-bit numbers of the table, straight between the knots. Only the rounding
+        of sums and products in flight is left out.
 
         A command that integrates is a state more, <name>_held, its deviation from the trim; that
         the trim moves under it is left out.
@@ -336,7 +303,7 @@ class TableController:
         """
         state = State.ground(self.numbers, self._state.flown)
         if command is not None:
-            state.enter(_rounded(command, "command", (len(self.outputs),)))
+            state.enter(rounded(command, "command", (len(self.outputs),)))
         vars(self)["_flight"] = state
 
     def fly_axes(self, axes: Collection[str]) -> None:
@@ -373,9 +340,9 @@ class TableController:
         """
         n, s, nu, ny = self.numbers, self._state, len(self.inputs), len(self.outputs)
         with np.errstate(all="ignore"):  # numbers that are none are met below
-            seen, held = _single("measured", measured, nu), _single("reference", reference, nu)
-            at = _single("trim", trim, ny)
-            elsewhere = at if others is None else _single("others", others, ny)
+            seen, held = as_told("measured", measured, nu), as_told("reference", reference, nu)
+            at = as_told("trim", trim, ny)
+            elsewhere = at if others is None else as_told("others", others, ny)
             s.status = follow_airspeed(n, s, NUMBER(airspeed), valid)
             s.status |= commands(n, s, seen - held, at, elsewhere)
         return s.command.copy()
@@ -426,61 +393,17 @@ class TableController:
         """
         most = self._rate * self.dt
         if most == 0.0 or math.isinf(most):
-            return min(NUMBER(most), np.finfo(NUMBER).max)
+            return min(NUMBER(most), LARGEST)
         rounding = float(np.spacing(np.abs(self.knots).max()))
         if most <= 2 * rounding:
             raise InputError(
                 f"rate: {self._rate:g} m/s^2 moves the airspeed by less in a sample than 32 bits"
                 " resolve; sample more slowly, or give rate=0"
             )
-        return _inward(most - rounding, -math.inf)
+        return inward(most - rounding, -math.inf)
 
     def _samples(self, seconds: float, least: int) -> int:
         return int(max(min(math.floor(min(seconds / self.dt, NEVER) + 1e-9), NEVER), least))
-
-    def _departure(self, blocks: Callable[[Array], tuple[Array, ...]]) -> float:
-        """The misfit to a model whose A B C D (N, ...) at N airspeeds are given by `blocks`."""
-        at = self.knots.astype(float)
-        steps = np.arange(BETWEEN + 1) / (BETWEEN + 1)
-        p = np.append((at[:-1, None] + np.diff(at)[:, None] * steps).ravel(), at[-1])
-        n, own = self.order, self.order + len(self.inputs)
-        M = np.einsum("pk,kij->pij", PiecewiseLinear(tuple(at.tolist()))(p), self.matrices)
-        table = M[:, :n, :n], M[:, :n, n:own], M[:, n:, :n], M[:, n:, n:own]
-        return max(
-            float(np.abs(mine - true).max(initial=0.0) / (np.abs(true).max(initial=0.0) or 1.0))
-            for mine, true in zip(table, blocks(p), strict=True)
-        )
-
-
-def _count(knots: int) -> int:
-    if isinstance(knots, bool) or knots < 2:
-        raise InputError(f"knots: expected at least 2, got {knots}")
-    return knots
-
-
-def _knots(given: object) -> Array:
-    knots = _rounded(given, "knots", (None,))
-    if len(knots) < 2 or (np.diff(knots) <= 0).any():
-        raise InputError(
-            "knots: expected two airspeeds or more that increase, in 32 bits too, got"
-            f" {np.asarray(given).tolist()!r:.80}"
-        )
-    return knots
-
-
-def _rounded(given: object, name: str, shape: tuple[int | None, ...]) -> Array:
-    """A read-only float32 copy; raises `InputError` where that cannot hold a number."""
-    exact = frozen(given, name, shape)
-    with np.errstate(over="ignore"):
-        rounded = exact.astype(NUMBER)
-    if not np.isfinite(rounded).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(rounded))[0])
-        raise InputError(
-            f"{name}: entry {where} is {exact[where]:g}, beyond the largest number of 32 bits"
-            " (3.4e38): scale the states or the signals"
-        )
-    rounded.flags.writeable = False
-    return rounded
 
 
 def _limits(given: object, outputs: Sequence[str]) -> Mapping[str, tuple[float, float]]:
@@ -496,35 +419,4 @@ def _limits(given: object, outputs: Sequence[str]) -> Mapping[str, tuple[float, 
         if not low < high:
             raise InputError(f"limits[{name!r}]: expected (low, high) in rad, got {ends!r:.80}")
         out[str(name)] = (low, high)
-    return out
-
-
-def _corrections(given: object | None, A: Array, B: Array, C: Array, rates: Array) -> Array:
-    """L (K, n, ny): designed, or as given, once or at each of K knots."""
-    shape = (*A.shape[:2], C.shape[1])
-    if given is None:
-        L = np.zeros(shape)
-        L[:, :, ~rates] = observer_gains(A, B, C[:, ~rates])
-        return L
-    try:
-        return np.broadcast_to(np.asarray(given, float), shape)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"correction: expected (states, outputs) {shape[1:]}, one at each knot {shape}, or 0,"
-            f" got {given!r:.80}"
-        ) from error
-
-
-def _inward(value: float, towards: float) -> np.float32:
-    """The next number of 32 bits in this direction, the largest of them for infinity."""
-    largest = np.finfo(NUMBER).max
-    number = np.clip(NUMBER(np.clip(value, -float(largest), float(largest))), -largest, largest)
-    beyond = float(number) < value if towards > 0 else float(number) > value
-    return np.nextafter(number, NUMBER(towards)) if beyond and math.isfinite(value) else number
-
-
-def _single(name: str, given: ArrayLike, count: int) -> Array:
-    out = np.asarray(given, NUMBER)
-    if out.shape != (count,):
-        raise InputError(f"{name}: expected {count} numbers, got shape {out.shape}")
     return out
