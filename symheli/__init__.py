@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         UnknownNameError,
     )
     from symheli.flight import (
+        AirspeedMonitor,
         AirspeedSchedule,
         Autopilot,
         Controller,
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
         Sensor,
         Servo,
         SimulatedFlight,
+        TableController,
         fly,
         fly_batch,
         fly_campaign,
@@ -104,9 +106,9 @@ _ROOMS = {
         "Batch CashKarp DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
     ),
     "symheli.flight": (
-        "AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightDataset"
-        " FlightPlan ScheduledController Sensor Servo SimulatedFlight fly fly_batch fly_campaign"
-        " gain_scheduled_lqr"
+        "AirspeedMonitor AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightDataset"
+        " FlightPlan ScheduledController Sensor Servo SimulatedFlight TableController fly"
+        " fly_batch fly_campaign gain_scheduled_lqr"
     ),
     "symheli.flight.stitched_model": "StitchedModel",
     "symheli.environment": "Air Dryden Gust Wind standard_atmosphere",
@@ -125,6 +127,7 @@ __all__ = [
     "LFT",
     "AccuracyError",
     "Air",
+    "AirspeedMonitor",
     "AirspeedSchedule",
     "Autopilot",
     "Batch",
@@ -167,6 +170,7 @@ __all__ = [
     "SolverError",
     "StitchedModel",
     "SymheliError",
+    "TableController",
     "Trajectory",
     "TrimBatch",
     "TrimError",

@@ -24,7 +24,7 @@ from symheli.values.c_text import (
     rows,
     table,
 )
-from symheli.values.template import filled
+from symheli.values.template import filled, filled_module
 from symheli.values.whole_files import write_own, write_text
 
 HERE = Path(__file__).parent
@@ -99,17 +99,15 @@ def write_estimator(
             " basis"
         )
     up = f"{name.upper()}_"
-    names = {"estimator_": f"{name}_", "ESTIMATOR_": up}
-    own = names | {"estimator.": f"{name}."}
     files = {
         "rls.h": _rls_header(rls.precision),
         "rls.c": (KERNEL / "rls.c").read_text(encoding="utf-8"),
-        f"{name}.h": filled(HERE / "estimator.h", _header(rls, units, up), names),
-        f"{name}.c": filled(HERE / "estimator.c", {"configuration": _configuration(rls, up)}, own),
-        f"{name}_check.c": filled(
-            HERE / "estimator_check.c",
+        **filled_module(
+            HERE / "estimator",
+            name,
+            _header(rls, units, up),
+            {"configuration": _configuration(rls, up)},
             {"cases": _cases(rls, up)},
-            own | {"estimator:": f"{name}:"},
         ),
     }
     written = [write_text(folder / file, content) for file, content in files.items()]

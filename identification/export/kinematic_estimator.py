@@ -17,9 +17,10 @@ from identification.export.rigid_body import rigid_body_files
 from identification.recursive.recursive_least_squares import RecursiveLeastSquares
 from identification.structure.kinematic_arx import INCREMENTS, KinematicARX
 from symheli.errors import InputError
-from symheli.values.c_text import define, identifier, rows
+from symheli.values.c_text import define, index_macros, rows
 from symheli.values.kinematics import RIGID_BODY
-from symheli.values.template import filled
+from symheli.values.signal import signals
+from symheli.values.template import filled_module
 from symheli.values.whole_files import write_text
 
 HERE = Path(__file__).parent
@@ -88,19 +89,13 @@ def write_kinematic_estimator(
     regression = replace(rls, structure=kin.aerodynamics)
     inner = write_estimator(regression, {**units, **known}, folder, f"{name}_aero")
     folder, up = Path(folder), f"{name.upper()}_"
-    names = {"estimator_": f"{name}_", "ESTIMATOR_": up}
-    own = names | {"estimator.": f"{name}."}
-    states = [define(f"{up}Y_{identifier(s)}", i, s.unit) for i, s in enumerate(RIGID_BODY)]
-    inputs = [define(f"{up}U_{identifier(s)}", i, units[s]) for i, s in enumerate(kin.inputs)]
+    states = index_macros(f"{up}Y_", RIGID_BODY)
+    inputs = index_macros(f"{up}U_", signals(kin.inputs, units))
     sizes = [define(f"{up}NY", len(RIGID_BODY)), define(f"{up}NU", len(kin.inputs))]
     header = {"dt": f"{dt:.9g}", "sizes": "\n".join([*sizes, "", *states, "", *inputs])}
     files = {
-        f"{name}.h": filled(HERE / "kinematic_estimator.h", header, names),
-        f"{name}.c": filled(HERE / "kinematic_estimator.c", {}, own),
-        f"{name}_check.c": filled(
-            HERE / "kinematic_estimator_check.c",
-            {"cases": _cases(rls, kin, dt, up)},
-            own | {"estimator:": f"{name}:"},
+        **filled_module(
+            HERE / "kinematic_estimator", name, header, {}, {"cases": _cases(rls, kin, dt, up)}
         ),
         **rigid_body_files(name, dt, rls.precision),
     }

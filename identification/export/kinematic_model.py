@@ -15,8 +15,8 @@ from identification.export.model import write_model
 from identification.export.rigid_body import rigid_body_files
 from identification.model.kinematic_model import KinematicModel
 from symheli.records import FlightRecord
-from symheli.values.c_text import define, identifier, rows
-from symheli.values.template import filled
+from symheli.values.c_text import define, index_macros, rows
+from symheli.values.template import filled_module
 from symheli.values.whole_files import write_text
 
 HERE = Path(__file__).parent
@@ -79,16 +79,10 @@ def write_kinematic_model(
     >>> folder.cleanup()
     """
     inner = write_model(model.aerodynamics, folder, f"{name}_aero", precision)
-    folder, up = Path(folder), f"{name.upper()}_"
-    names = {"model_": f"{name}_", "MODEL_": up}
-    own = names | {"model.": f"{name}."}
+    folder, cases = Path(folder), {"cases": _cases(model, name, precision)}
     files = {
-        f"{name}.h": filled(HERE / "kinematic_model.h", _header(model, up), names),
-        f"{name}.c": filled(HERE / "kinematic_model.c", {}, own),
-        f"{name}_check.c": filled(
-            HERE / "kinematic_model_check.c",
-            {"cases": _cases(model, name, precision)},
-            own | {"model:": f"{name}:"},
+        **filled_module(
+            HERE / "kinematic_model", name, _header(model, f"{name.upper()}_"), {}, cases
         ),
         **rigid_body_files(name, model.dt, precision),
     }
@@ -96,7 +90,7 @@ def write_kinematic_model(
 
 
 def _header(model: KinematicModel, up: str) -> dict[str, object]:
-    ranges = zip(model.parameters, model.structure.basis.ranges, strict=True)
+    ranges = [f"{low:g} to {high:g}" for low, high in model.structure.basis.ranges]
     blocks = [
         [
             define(f"{up}NY", len(model.outputs)),
@@ -104,12 +98,9 @@ def _header(model: KinematicModel, up: str) -> dict[str, object]:
             define(f"{up}NP", len(model.parameters)),
             define(f"{up}MEMORY", model.structure.memory, "samples the model reaches back"),
         ],
-        [define(f"{up}Y_{identifier(s)}", i, s.unit) for i, s in enumerate(model.outputs)],
-        [define(f"{up}U_{identifier(s)}", i, s.unit) for i, s in enumerate(model.inputs)],
-        [
-            define(f"{up}P_{identifier(s)}", i, f"{s.unit}, {low:g} to {high:g}")
-            for i, (s, (low, high)) in enumerate(ranges)
-        ],
+        index_macros(f"{up}Y_", model.outputs),
+        index_macros(f"{up}U_", model.inputs),
+        index_macros(f"{up}P_", model.parameters, ranges),
     ]
     return {
         "dt": f"{model.dt:.9g}",

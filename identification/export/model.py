@@ -20,13 +20,13 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.c_text import (
     define,
-    identifier,
+    index_macros,
     literals,
     require_identifier,
     rows,
     table,
 )
-from symheli.values.template import filled
+from symheli.values.template import filled_module
 from symheli.values.whole_files import write_text
 
 HERE = Path(__file__).parent
@@ -94,25 +94,20 @@ def write_model(
             "functions brought along cannot be written in C; identify with a polynomial or spline"
             " basis"
         )
-    folder, up = Path(folder), f"{name.upper()}_"
-    names = {"model_": f"{name}_", "MODEL_": up}
-    own = names | {"model.": f"{name}."}
-    files = {
-        f"{name}.h": filled(HERE / "model.h", _header(model, c, name), names),
-        f"{name}.c": filled(HERE / "model.c", {"tables": _tables(model, c, up)}, own),
-        f"{name}_check.c": filled(
-            HERE / "model_check.c",
-            {"cases": _cases(model, c, name, precision)},
-            own | {"model:": f"{name}:"},
-        ),
-    }
-    return tuple(write_text(folder / file, content) for file, content in files.items())
+    files = filled_module(
+        HERE / "model",
+        name,
+        _header(model, c, name),
+        {"tables": _tables(model, c, f"{name.upper()}_")},
+        {"cases": _cases(model, c, name, precision)},
+    )
+    return tuple(write_text(Path(folder) / file, content) for file, content in files.items())
 
 
 def _header(model: LPVARXModel, c: Configuration, name: str) -> dict[str, object]:
     """Sizes, the index of every signal with its unit, and what the model is in words."""
     arx, up = model.structure, f"{name.upper()}_"
-    ranges = zip(model.parameters, arx.basis.ranges, strict=True)
+    ranges = [f"{low:g} to {high:g}" for low, high in arx.basis.ranges]
     blocks = [
         [f"typedef {'float' if c.dtype is np.float32 else 'double'} {name}_real;"],
         [
@@ -122,12 +117,9 @@ def _header(model: LPVARXModel, c: Configuration, name: str) -> dict[str, object
             define(f"{up}NF", arx.basis.size, "functions of p"),
             define(f"{up}MEMORY", arx.memory, "samples the model reaches back"),
         ],
-        [define(f"{up}Y_{identifier(s)}", i, s.unit) for i, s in enumerate(model.outputs)],
-        [define(f"{up}U_{identifier(s)}", i, s.unit) for i, s in enumerate(model.inputs)],
-        [
-            define(f"{up}P_{identifier(s)}", i, f"{s.unit}, {low:g} to {high:g}")
-            for i, (s, (low, high)) in enumerate(ranges)
-        ],
+        index_macros(f"{up}Y_", model.outputs),
+        index_macros(f"{up}U_", model.inputs),
+        index_macros(f"{up}P_", model.parameters, ranges),
     ]
     return {
         "dt": f"{model.dt:.9g}",

@@ -1,12 +1,8 @@
-"""Identified models as files: JSON with a schema and a digest, every number exact; and the parts of
-MATLAB files that they share.
-"""
+"""Bases and signals as plain values, and the parts of MATLAB files that identified models share."""
 
 from __future__ import annotations
 
-import hashlib
 import io
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -25,60 +21,12 @@ from symheli.lpv import (
     Spline,
     UserFunctions,
 )
-from symheli.values import Signal
+from symheli.values import Signal, plain_file
 from symheli.values.arrays import Array
-from symheli.values.whole_files import write_bytes, write_text
+from symheli.values.whole_files import write_bytes
 
-VERSION = 1
 BASES = {kind.__name__: kind for kind in (BSpline, PiecewiseLinear, Polynomial, Spline)}
 """Bases that are their fields."""
-
-
-def write(path: str | os.PathLike[str], schema: str, content: dict[str, Any]) -> Path:
-    """Write plain values; a reader sees the old file or the new one, never half of it.
-
-    Raises `InputError` for anything but plain finite values, `SymheliError` where the file cannot
-    be written.
-    """
-    try:
-        content = json.loads(_canonical(content))
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"a model file holds plain finite numbers, texts and lists: {error}"
-        ) from error
-    whole = {"schema": schema, "version": VERSION, **content, "digest": _digest(content)}
-    return write_text(path, json.dumps(whole, indent=1, allow_nan=False) + "\n")
-
-
-def read(path: str | os.PathLike[str], schema: str) -> dict[str, Any]:
-    """What `write` wrote; raises `InputError` unless the file is whole and of this schema."""
-    try:
-        whole = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
-    except ValueError as error:
-        raise InputError(
-            f"{path}: not a whole file of {schema!r} ({error}); take an older copy"
-        ) from error
-    if not isinstance(whole, dict) or whole.get("schema") != schema:
-        found = whole.get("schema") if isinstance(whole, dict) else type(whole).__name__
-        raise InputError(f"{path}: expected a file of {schema!r}, got {found!r}")
-    if whole.get("version") != VERSION:
-        raise InputError(
-            f"{path}: version {whole.get('version')!r} of the format, this program reads {VERSION}"
-        )
-    content = {k: v for k, v in whole.items() if k not in ("schema", "version", "digest")}
-    if whole.get("digest") != _digest(content):
-        raise InputError(
-            f"{path}: the content does not match its digest, the file was damaged or edited; take"
-            " an older copy"
-        )
-    return content
-
-
-def incomplete(path: str | os.PathLike[str], error: Exception) -> InputError:
-    """What to raise where a whole file lacks a part."""
-    return InputError(f"{path}: a part of the model is missing or of the wrong kind ({error})")
 
 
 def described_basis(basis: FunctionSpace) -> dict[str, Any]:
@@ -107,7 +55,7 @@ def basis_of(
     are not in the file.
     """
     if given is not None:
-        if json.loads(_canonical(described_basis(given))) != described:
+        if plain_file.as_read(described_basis(given)) != described:
             raise InputError(
                 f"{path}: the model belongs to another basis than the one given: {described}"
             )
@@ -160,14 +108,6 @@ def powers_of(basis: FunctionSpace) -> Array | None:
     if isinstance(basis, Product) and all(isinstance(f, Polynomial) for f in basis.factors):
         return np.array(basis.indices, dtype=float)
     return None
-
-
-def _canonical(content: Any) -> str:
-    return json.dumps(content, sort_keys=True, allow_nan=False)
-
-
-def _digest(content: dict[str, Any]) -> str:
-    return hashlib.sha256(_canonical(content).encode()).hexdigest()
 
 
 def tuples(value: Any) -> Any:

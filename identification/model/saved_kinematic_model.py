@@ -11,6 +11,7 @@ from identification.model import model_file, saved_model
 from identification.model.kinematic_model import KinematicModel
 from identification.structure.kinematic_arx import MOVING, KinematicARX
 from symheli.lpv import FunctionSpace
+from symheli.values import plain_file
 from symheli.values.kinematics import GRAVITY
 
 SCHEMA = "symheli model with known kinematics"
@@ -24,7 +25,7 @@ def save(model: KinematicModel, path: str | os.PathLike[str]) -> Path:
     cannot be written.
     """
     covariance = model.coefficient_covariance
-    return model_file.write(
+    return plain_file.write(
         path,
         SCHEMA,
         {
@@ -40,7 +41,7 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> Ki
     """The model in `path`, equal to the last bit; raises `InputError` unless the file is whole and
     of this kind. One with `UserFunctions` needs its `basis`.
     """
-    content = model_file.read(path, SCHEMA)
+    content = plain_file.read(path, SCHEMA)
     try:
         given = saved_model.fields_of_structure(content, basis, path)
         given["na"] = dict(zip(MOVING, given["na"], strict=True))
@@ -52,7 +53,7 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> Ki
             coefficient_covariance=content["coefficient_covariance"],
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise model_file.incomplete(path, error) from error
+        raise plain_file.incomplete(path, error) from error
 
 
 def save_mat(model: KinematicModel, path: str | os.PathLike[str]) -> Path:

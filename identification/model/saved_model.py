@@ -13,6 +13,7 @@ from identification.model import model_file
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
 from symheli.lpv import FunctionSpace
+from symheli.values import plain_file
 
 SCHEMA = "symheli LPV-ARX model"
 
@@ -25,7 +26,7 @@ def save(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:
     cannot be written.
     """
     structure = described_structure(model.structure)
-    return model_file.write(path, SCHEMA, {"structure": structure, **described(model)})
+    return plain_file.write(path, SCHEMA, {"structure": structure, **described(model)})
 
 
 def described_structure(structure: Any) -> dict[str, Any]:
@@ -57,12 +58,12 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> LP
     A model with `UserFunctions` needs the `basis` it was identified with: functions are not written
     to files.
     """
-    content = model_file.read(path, SCHEMA)
+    content = plain_file.read(path, SCHEMA)
     try:
         structure = LPVARX(**fields_of_structure(content, basis, path))
         return model_of(structure, content)
     except (KeyError, TypeError, AttributeError) as error:
-        raise model_file.incomplete(path, error) from error
+        raise plain_file.incomplete(path, error) from error
 
 
 def fields_of_structure(

@@ -1,4 +1,6 @@
-"""symheli export: the model for other programs, as C code, a MATLAB file, or equations in print."""
+"""symheli export: models and controllers for other programs, as C code, a MATLAB file, or
+equations in print.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,8 @@ from studies.output import Output
 from symheli.errors import InputError
 
 HELP = (
-    "C code of the equations of motion, of the recursive estimator or of an identified model, a"
-    " MATLAB file, or equations in print"
+    "C code of the equations of motion, of the recursive estimator, of an identified model or of a"
+    " controller, a MATLAB file, or equations in print"
 )
 
 
@@ -19,11 +21,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """What, of which helicopter, to where."""
     parser.add_argument(
         "format",
-        choices=("c", "estimator", "model", "mat", "latex", "markdown"),
+        choices=("c", "estimator", "model", "controller", "mat", "latex", "markdown"),
         help=(
             "c: equations of motion and header; estimator: recursive identification as C for an"
-            " autopilot; model: an identified model (--model) as C; mat: linear models along"
-            " airspeed; latex, markdown: every component's equations to read"
+            " autopilot; model: an identified model (--model) as C; controller: one in a table"
+            " over airspeed (--model) as C; mat: linear models along airspeed; latex, markdown:"
+            " every component's equations to read"
         ),
     )
     options.vehicle(parser)
@@ -33,7 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         help=(
             "file (default: NAME_rhs.c, NAME_family.mat, NAME_equations.tex or .md) or folder"
-            " (estimator, model)"
+            " (estimator, model, controller)"
         ),
     )
     parser.add_argument(
@@ -53,16 +56,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     estimator.configure(parser)
     group = parser.add_argument_group(
-        "model",
-        "C code that predicts and simulates what symheli identify --save kept; --single applies",
+        "model, controller",
+        "C code that predicts and simulates what symheli identify --save kept (--single applies),"
+        " or that flies what TableController.save kept",
     )
-    group.add_argument("--model", type=Path, metavar="FILE.json", help="the identified model")
+    group.add_argument(
+        "--model", type=Path, metavar="FILE.json", help="the identified model, or the controller"
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
     """Write the file(s) and say which."""
     if arguments.format == "model":
         return _said(_model(arguments))
+    if arguments.format == "controller":
+        return _said(_controller(arguments))
     heli = options.helicopter(arguments)
     name = Path(arguments.vehicle).stem
     if arguments.format == "c":
@@ -97,15 +105,26 @@ def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
     from identification import LPVARXModel
     from identification.export import write_model
 
-    if arguments.model is None:
-        raise InputError(
-            "name the model: --model FILE.json, as symheli identify LOG --save FILE.json writes it"
-        )
     return write_model(
-        LPVARXModel.load(arguments.model),
+        LPVARXModel.load(_named(arguments, "as symheli identify LOG --save FILE.json writes it")),
         arguments.out or Path("model"),
         precision="single" if arguments.single else "double",
     )
+
+
+def _controller(arguments: argparse.Namespace) -> tuple[Path, ...]:
+    from symheli.export import write_controller
+    from symheli.flight import TableController
+
+    controller = TableController.load(_named(arguments, "as TableController.save writes it"))
+    return write_controller(controller, arguments.out or Path("controller"))
+
+
+def _named(arguments: argparse.Namespace, how: str) -> Path:
+    """The file of --model."""
+    if arguments.model is None:
+        raise InputError(f"name the {arguments.format}: --model FILE.json, {how}")
+    return arguments.model
 
 
 def _said(written: tuple[Path, ...]) -> Output:

@@ -13,7 +13,7 @@ from symheli.errors import InputError
 from symheli.export.c_check import cases
 from symheli.helicopter import Helicopter
 from symheli.values import Signal
-from symheli.values.c_text import define
+from symheli.values.c_text import define, index_macros
 from symheli.values.signal import signals
 from symheli.values.template import filled
 from symheli.values.whole_files import write_own, write_text
@@ -115,8 +115,6 @@ def _title(heli: Helicopter) -> str:
 
 
 def _indices(prefix: str, names: Sequence[Signal], travel: Sequence[float] | None = None) -> str:
-    lines = [
-        define(f"RHS_{prefix}_{s}", i, f"{s.unit}{f', +-{travel[i]:g}' if travel else ''}")
-        for i, s in enumerate(names)
-    ]
+    notes = [f"+-{size:g}" for size in travel or ()]
+    lines = index_macros(f"RHS_{prefix}_", names, notes)
     return "\n".join([*lines, define(f"RHS_N_{prefix}", len(names))])

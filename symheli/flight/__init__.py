@@ -1,5 +1,6 @@
 """Closed-loop flights of the nonlinear model."""
 
+from symheli.flight.airspeed_monitor import AirspeedMonitor
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
 from symheli.flight.batch import FlightBatch, fly_batch
 from symheli.flight.campaign import fly_campaign
@@ -12,9 +13,12 @@ from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import XCELL_SERVOS, Servo, ServoBank
 from symheli.flight.simulated_flight import SimulatedFlight
+from symheli.flight.table_arithmetic import Status
+from symheli.flight.table_controller import TableController
 
 __all__ = [
     "XCELL_SERVOS",
+    "AirspeedMonitor",
     "AirspeedSchedule",
     "Autopilot",
     "Controller",
@@ -27,6 +31,8 @@ __all__ = [
     "Servo",
     "ServoBank",
     "SimulatedFlight",
+    "Status",
+    "TableController",
     "fly",
     "fly_batch",
     "fly_campaign",

@@ -4,6 +4,7 @@ controllers scheduled by airspeed and acceleration.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
@@ -126,8 +127,8 @@ class ScheduledController:
             raise InputError("the controller is continuous: sample it with .discretize(dt)")
         if self.follow not in get_args(Follow):
             raise UnknownNameError("way to schedule", self.follow, get_args(Follow))
-        _named("measured signal", self.model.inputs, TOLD)
-        _named("helicopter input", self.model.outputs, INPUTS)
+        require_names("measured signal", self.model.inputs, TOLD)
+        require_names("helicopter input", self.model.outputs, INPUTS)
         names = tuple(s.name for s in self.model.parameters)
         indices(names, SCHEDULING, "scheduling parameter of a controller")
         if self.follow == "reading" and (names != ("airspeed",) or self.pieces is None):
@@ -216,7 +217,8 @@ class ScheduledController:
         return vars(self)["_state"]
 
 
-def _named(kind: str, given: tuple[Signal, ...], known: tuple[Signal, ...]) -> None:
+def require_names(kind: str, given: Sequence[str], known: Sequence[str]) -> None:
+    """Raises `InputError` for a signal of a controller that is none of these."""
     try:
         indices(given, known, kind)
     except UnknownNameError as error:

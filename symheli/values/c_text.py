@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array
+from symheli.values.signal import Signal
 
 WIDTH = 100
 
@@ -49,6 +50,14 @@ def rows(
 def define(name: str, value: object, comment: str = "") -> str:
     """A macro, with what it is."""
     return f"#define {name} {value}" + (f" /* {comment} */" if comment else "")
+
+
+def index_macros(prefix: str, names: Sequence[Signal], notes: Sequence[str] = ()) -> list[str]:
+    """The index of every signal, with its unit and what `notes`, one each, say of it."""
+    return [
+        define(f"{prefix}{identifier(s)}", i, f"{s.unit}, {note}" if note else s.unit)
+        for i, (s, note) in enumerate(zip(names, notes or [""] * len(names), strict=True))
+    ]
 
 
 def _wrapped(words: Iterable[str], indent: str) -> str:

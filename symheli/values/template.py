@@ -29,3 +29,25 @@ def filled(path: Path, places: Mapping[str, object], names: Mapping[str, str] | 
         if not count:
             raise ValueError(f"{path.name}: {old} is not in it")
     return _MARK.sub(lambda match: str(places[match[1] or match[2]]), text)
+
+
+def filled_module(
+    stem: Path,
+    name: str,
+    header: Mapping[str, object],
+    source: Mapping[str, object],
+    check: Mapping[str, object],
+) -> dict[str, str]:
+    """{NAME.h, NAME.c, NAME_check.c}: the texts of STEM.h, STEM.c and STEM_check.c with their
+    marked places filled, and NAME for the last word of STEM in every name of theirs.
+    """
+    word = stem.name.rpartition("_")[2]
+    names = {f"{word}_": f"{name}_", f"{word.upper()}_": f"{name.upper()}_"}
+    own = names | {f"{word}.": f"{name}."}
+    return {
+        f"{name}.h": filled(stem.with_name(f"{stem.name}.h"), header, names),
+        f"{name}.c": filled(stem.with_name(f"{stem.name}.c"), source, own),
+        f"{name}_check.c": filled(
+            stem.with_name(f"{stem.name}_check.c"), check, own | {f"{word}:": f"{name}:"}
+        ),
+    }

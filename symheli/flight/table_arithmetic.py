@@ -1,0 +1,199 @@
+"""One step of a controller in a table, in single precision: controller.c line by line.
+
+Every operation and its order are written out, so that the C code gives the same bits: sums run
+along a row from the first column, and nothing is left to a library of linear algebra.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum, IntFlag
+from typing import Any
+
+import numpy as np
+
+from symheli.values.arrays import Array
+
+NEVER = 2**30
+"""A count of samples that is not reached."""
+
+
+class Status(IntFlag):
+    """What a step of a `TableController` met with.
+
+    `SATURATED`: a command stands at its limit. `AIRSPEED`: the airspeed was bad and not followed.
+    `FALLBACK`: it was so for too long, and the controller moves to that of its fallback. `HELD`: a
+    number that is none came in or out; the commands in force stay, and nothing else changed.
+
+    Examples
+    --------
+    >>> from symheli.flight import Status
+    >>> Status.AIRSPEED in Status.AIRSPEED | Status.FALLBACK
+    True
+    """
+
+    FINE = 0
+    SATURATED = 1
+    AIRSPEED = 2
+    FALLBACK = 4
+    HELD = 8
+
+
+class Entry(IntEnum):
+    """How a command begins: at its trim, at the command in force, or it is under way."""
+
+    GROUND = 0
+    IN_FORCE = 1
+    UNDER_WAY = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """What the arithmetic reads: `knots` (K,), `matrices` (K, n + ny, n + nu + ny) with
+    [A B L; C D 0] and, one an output, the ends of its command `low`, `high`, whether it
+    `integrates`; float32.
+
+    `fade` is the part of an offset that is left after a sample, `step` the most that the airspeed
+    in use moves in one, `gain` that of the filter before (1: none), `frozen` and `hold` count
+    samples.
+    """
+
+    order: int
+    knots: Array
+    matrices: Array
+    low: Array
+    high: Array
+    integrates: Array
+    fade: np.float32
+    step: np.float32
+    gain: np.float32
+    plausible: tuple[np.float32, np.float32]
+    fallback: np.float32
+    frozen: int
+    hold: int
+
+    @property
+    def searches(self) -> int:
+        """Halvings that find the interval of any airspeed."""
+        return int(np.ceil(np.log2(len(self.knots) - 1)))
+
+
+@dataclass(eq=False)
+class State:
+    """What the arithmetic keeps: which axes are `flown` (ny,), `x` (n,), `command` and `offset`
+    (ny,), `entry` (ny,) of `Entry`, and of the airspeed the last `reading` and its repetitions
+    `same`, `bad` ones in a row, `target`, `filtered`, `used`.
+    """
+
+    flown: Array
+    x: Array
+    command: Array
+    offset: Array
+    entry: Array
+    started: bool = False
+    reading: np.float32 = field(default=np.float32(np.nan))
+    target: np.float32 = field(default=np.float32(0))
+    filtered: np.float32 = field(default=np.float32(0))
+    used: np.float32 = field(default=np.float32(0))
+    same: int = 0
+    bad: int = 0
+    status: Status = Status.FINE
+
+    @classmethod
+    def ground(cls, n: Numbers, flown: Array) -> State:
+        """Filters and integrators at zero; commands begin at their trim."""
+        zeros = np.zeros(len(n.low), np.float32)
+        return cls(flown, np.zeros(n.order, np.float32), zeros, zeros, zeros.astype(int))
+
+    def enter(self, command: Array) -> None:
+        """Begin at the command in force (ny,)."""
+        self.command = command
+        self.entry = np.full(len(command), Entry.IN_FORCE)
+
+
+def follow_airspeed(n: Numbers, s: State, reading: np.float32, valid: bool) -> Status:
+    """Move the airspeed in use towards a reading, or what stands for a bad one."""
+    status = Status.FINE
+    s.same = min(s.same + 1, NEVER - 1) if reading == s.reading else 0
+    s.reading = reading
+    if valid and n.plausible[0] <= reading <= n.plausible[1] and s.same < n.frozen:
+        s.bad = 0
+        s.target = _clip(reading, n.knots[0], n.knots[-1])
+    else:
+        status |= Status.AIRSPEED
+        s.bad = min(s.bad + 1, NEVER)
+        if not s.started or s.bad > n.hold:
+            status |= Status.FALLBACK
+            s.target = n.fallback
+    if not s.started:
+        s.started = True
+        s.filtered = s.used = s.target
+        return status
+    if n.gain < 1:
+        s.filtered = s.filtered + n.gain * (s.target - s.filtered)
+    else:
+        s.filtered = s.target
+    change = _clip(s.filtered - s.used, -n.step, n.step)
+    s.used = _clip(s.used + change, n.knots[0], n.knots[-1])
+    return status
+
+
+def matrices_at(n: Numbers, p: np.float32) -> Array:
+    """[A B L; C D 0], straight between the knots, p in their range."""
+    below, above = 0, len(n.knots) - 1
+    for _ in range(n.searches):
+        middle = (below + above) // 2
+        if middle > below and p >= n.knots[middle]:
+            below = middle
+        elif middle > below:
+            above = middle
+    weight = (p - n.knots[below]) / (n.knots[below + 1] - n.knots[below])
+    return n.matrices[below] + weight * (n.matrices[below + 1] - n.matrices[below])
+
+
+def commands(n: Numbers, s: State, error: Array, trim: Array, others: Array) -> Status:
+    """One step at the airspeed in use; the commands are then `s.command`.
+
+    Parameters
+    ----------
+    n, s : Numbers, State
+        The controller.
+    error : array (nu,)
+        Measured minus reference.
+    trim, others : array (ny,)
+        Commands of the trim, and those in force on the axes it does not fly.
+    """
+    flown = s.flown
+    M, order, own = matrices_at(n, s.used), n.order, n.order + len(error)
+    answer = _times(M[:, :own], np.concatenate([s.x, error]))
+    before = np.where((s.entry == Entry.GROUND) & np.isfinite(trim), trim, s.command)
+    plain = np.where(n.integrates, before, trim) + answer[order:]
+    wanted = plain + s.offset
+    applied = _clip(wanted, n.low, n.high)
+    entering = flown & (s.entry == Entry.IN_FORCE)
+    applied = np.where(entering, _clip(before, n.low, n.high), applied)
+    applied = np.where(flown, applied, np.where(np.isfinite(others), others, before))
+    wanted = np.where(entering, applied, wanted)
+    excess = applied - wanted
+    x = answer[:order]
+    if order and (excess != 0).any():
+        x = x + _times(M[:order, own:], excess)
+    s.entry = np.where(flown, s.entry, Entry.IN_FORCE)
+    if not (np.isfinite(wanted).all() and np.isfinite(x).all()):
+        s.command = np.where(flown, before, applied)
+        return Status.HELD
+    kept = np.where(entering, applied - plain, s.offset)
+    s.x, s.command = x, applied
+    s.offset = n.fade * np.where(flown & ~n.integrates, kept, np.float32(0))
+    s.entry = np.where(flown, Entry.UNDER_WAY, Entry.IN_FORCE)
+    return Status.SATURATED if (flown & (excess != 0)).any() else Status.FINE
+
+
+def _times(M: Array, v: Array) -> Array:
+    """M v, each sum from the first column to the last."""
+    return np.add.accumulate(M * v, axis=1)[:, -1]
+
+
+def _clip(value: Any, low: Any, high: Any) -> Any:
+    """Between the ends; NaN stays."""
+    return np.where(value < low, low, np.where(value > high, high, value))[()]

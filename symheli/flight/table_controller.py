@@ -1,0 +1,422 @@
+"""A controller as it flies: a table over airspeed, in single precision."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symheli.dynamics import INPUTS
+from symheli.errors import InputError, UnknownNameError
+from symheli.flight.airspeed_monitor import AirspeedMonitor
+from symheli.flight.controller import TOLD, Follow, ScheduledController, require_names
+from symheli.flight.single_precision import (
+    LARGEST,
+    NUMBER,
+    as_told,
+    increasing,
+    inward,
+    rounded,
+)
+from symheli.flight.table_arithmetic import (
+    NEVER,
+    Numbers,
+    State,
+    Status,
+    commands,
+    follow_airspeed,
+)
+from symheli.flight.tabulated import Tabulated
+from symheli.lpv.bases.interpolating import PiecewiseLinear
+from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.scheduling import Scheduling
+from symheli.values.arrays import Array
+from symheli.values.named_vector import NamedVector
+from symheli.values.signal import Signal, indices, signals
+
+
+@dataclass(frozen=True, eq=False)
+class TableController:
+    """x(k+1) = A(p) x + B(p) e + L(p) (u - w), w = u0 + C(p) x + D(p) e, u = w within its limits,
+    e = measured - reference, all in 32-bit arithmetic.
+
+    A .. L stand in a table over airspeed, straight between its knots. `model` holds the same
+    numbers: what an analysis certifies is what `fly` flies and what `write_controller` writes in C,
+    which gives the same bits. u0 is the trim of the flight at each moment. A command that
+    integrates starts there and is then u(k) = u(k-1) + C x + D e within its limits, at which the
+    integration stops. The airspeed in use moves at the certified rate at most, whatever is read:
+    see `AirspeedMonitor`.
+
+    Parameters
+    ----------
+    knots : array (K,)
+        Airspeeds, m/s, increasing, K >= 2.
+    matrices : array (K, n + ny, n + nu + ny)
+        [A B L; C D 0] at the knots; rounded to 32 bits. Rows of a command that integrates are what
+        it changes by in a sample.
+    states, inputs, outputs : sequence of str
+        n names; of nu measured states; of ny inputs of the helicopter.
+    dt : float
+        Sample period, s.
+    integrates : sequence of str
+        The outputs that integrate.
+    limits : mapping of str to (float, float)
+        Ends of the commands, rad; none where nothing is given.
+    rate : float
+        Certified rate of the airspeed, m/s^2.
+    fade : float
+        Time constant, s, of the offset that joins the first command to the one in force before.
+    airspeed : AirspeedMonitor
+        What is done with the airspeed.
+    follow : {"command", "reading"}
+        Whether it is scheduled by the airspeed that is commanded, or as its sensor reads it.
+    misfit : float
+        Largest departure from the model that the table was made of; see `of`.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not fit, knots that do not increase, names of no such signal, numbers that
+        are not finite in 32 bits.
+
+    Examples
+    --------
+    >>> lqr = symheli.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
+    >>> limits = {name: (-t, t) for name, t in zip(heli.inputs, heli.travel)}
+    >>> table = symheli.TableController.of(lqr.scheduled_controller.model, 17, limits=limits)
+    >>> hover = symheli.AirspeedSchedule((2.0,), (1.0,), (0.0,), lead=0.2)
+    >>> record = symheli.fly(heli, hover, controller=table)
+    >>> table.misfit < 1e-6, round(table.airspeed_used, 2)
+    (True, 2.0)
+    """
+
+    knots: Array
+    matrices: Array
+    states: tuple[Signal, ...]
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    dt: float
+    integrates: tuple[str, ...] = ()
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    rate: float = math.inf
+    fade: float = 1.0
+    airspeed: AirspeedMonitor = field(default_factory=AirspeedMonitor)
+    follow: Follow = "command"
+    misfit: float = 0.0
+
+    def __post_init__(self) -> None:
+        for group in ("states", "inputs", "outputs"):
+            object.__setattr__(self, group, signals(getattr(self, group)))
+        if not self.inputs or not self.outputs:
+            raise InputError("a controller needs at least one input and one output")
+        require_names("measured signal", self.inputs, TOLD)
+        require_names("helicopter input", self.outputs, INPUTS)
+        indices(self.integrates, self.outputs, "output that integrates")
+        object.__setattr__(self, "integrates", tuple(map(str, self.integrates)))
+        object.__setattr__(self, "knots", increasing(self.knots, "knots"))
+        n, nu, ny = self.order, len(self.inputs), len(self.outputs)
+        object.__setattr__(
+            self,
+            "matrices",
+            rounded(self.matrices, "matrices", (len(self.knots), n + ny, n + nu + ny)),
+        )
+        if not (math.isfinite(self.dt) and self.dt > 0):
+            raise InputError(f"dt must be a positive number of seconds, got {self.dt}")
+        if not self.fade > 0:
+            raise InputError(f"fade: expected a time constant in s > 0, got {self.fade}")
+        if not self.rate >= 0:
+            raise InputError(f"rate: expected a number of m/s^2 >= 0, got {self.rate}")
+        if self.follow not in get_args(Follow):
+            raise UnknownNameError("way to schedule", self.follow, get_args(Follow))
+        object.__setattr__(self, "limits", _limits(self.limits, self.outputs))
+        vars(self)["_flight"] = State.ground(self.numbers, np.ones(len(self.outputs), bool))
+
+    @classmethod
+    def of(
+        cls,
+        model: LPVStateSpace,
+        knots: int | Sequence[float] = 33,
+        *,
+        correction: object | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
+        fade: float = 1.0,
+        airspeed: AirspeedMonitor | None = None,
+        follow: Follow = "command",
+    ) -> TableController:
+        """The table of a sampled model over airspeed.
+
+        Its `misfit` is the largest entry of table minus model, at the knots and at four points
+        between every two, over the largest of the model: in A, B, C or D, where it is worst.
+
+        Parameters
+        ----------
+        model : LPVStateSpace
+            As a `ScheduledController` takes it; an output may also be the rate of a command, as
+            d_lon_rate (rad/s), which then integrates.
+        knots : int or sequence of float
+            So many at equal distances over the range of the model, or the airspeeds, m/s.
+        correction : array_like, optional
+            L, rad to states, (n, ny) or one at each knot (K, n, ny); 0: none. Default: gains of
+            Kalman filters that read the states from the commands applied, none for those that
+            integrate (see `symheli.flight.anti_windup`).
+        limits, fade, airspeed, follow
+            See above.
+
+        Raises
+        ------
+        InputError
+            A continuous model or one over other parameters, knots beyond its range, numbers beyond
+            those of 32 bits.
+        """
+        source = Tabulated(model)
+        at = source.knots(knots)
+        table = cls(
+            at,
+            source.matrices(at, correction),
+            model.states,
+            model.inputs,
+            source.outputs,
+            source.dt,
+            tuple(str(y) for y, rate in zip(source.outputs, source.rates, strict=True) if rate),
+            limits or {},
+            model.scheduling.limit,
+            fade,
+            airspeed or AirspeedMonitor(),
+            follow,
+        )
+        return replace(table, misfit=source.misfit(table.knots, table.matrices))
+
+    # --- what it is ------------------------------------------------------------------------------
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        """What the arithmetic reads, here and in C."""
+        a, (low, high) = self.airspeed, self._ends
+        fallback = 0.5 * (low + high) if a.fallback is None else a.fallback
+        if not low <= fallback <= high:
+            raise InputError(
+                f"fallback: expected an airspeed of the table, {low:g} to {high:g} m/s, got"
+                f" {fallback:g}"
+            )
+        plausible = a.plausible or (2 * low - high, 2 * high - low)
+        ends = [self.limits.get(str(y), (-math.inf, math.inf)) for y in self.outputs]
+        return Numbers(
+            order=self.order,
+            knots=self.knots,
+            matrices=self.matrices,
+            low=np.array([inward(e, math.inf) for e, _ in ends], NUMBER),
+            high=np.array([inward(e, -math.inf) for _, e in ends], NUMBER),
+            integrates=np.array([y in self.integrates for y in self.outputs]),
+            fade=NUMBER(math.exp(-self.dt / self.fade)),
+            step=self._largest_step(),
+            gain=NUMBER(-math.expm1(-self.dt / a.lag) if a.lag > 0 else 1.0),
+            plausible=(inward(plausible[0], math.inf), inward(plausible[1], -math.inf)),
+            fallback=np.clip(NUMBER(fallback), self.knots[0], self.knots[-1]),
+            frozen=self._samples(math.inf if self.follow == "command" else a.frozen, 1),
+            hold=self._samples(a.hold, 0),
+        )
+
+    @property
+    def order(self) -> int:
+        """Number of states, without the commands that integrate."""
+        return len(self.states)
+
+    @cached_property
+    def model(self) -> LPVStateSpace:
+        """What flies within its limits, for an analysis: outputs added to the trim, the
+        coefficients the 32-bit numbers of the table, straight between the knots. Only the rounding
+        of sums and products in flight is left out.
+
+        A command that integrates is a state more, <name>_held, its deviation from the trim; that
+        the trim moves under it is left out.
+        """
+        n, own = self.order, self.order + len(self.inputs)
+        M = self.matrices[:, :, :own].astype(float)
+        held = [i for i, y in enumerate(self.outputs) if y in self.integrates]
+        count, m, ny = len(self.knots), len(held), len(self.outputs)
+        keep = np.zeros((count, ny, m))
+        keep[:, held, range(m)] = 1.0
+        A = np.zeros((count, n + m, n + m))
+        A[:, :n, :n] = M[:, :n, :n]
+        A[:, n:, :n] = M[:, n:, :n][:, held]
+        A[:, n:, n:] = np.eye(m)
+        return LPVStateSpace(
+            PiecewiseLinear(tuple(self.knots.astype(float).tolist())),
+            A,
+            np.concatenate([M[:, :n, n:], M[:, n:, n:][:, held]], axis=1),
+            np.concatenate([M[:, n:, :n], keep], axis=2),
+            M[:, n:, n:],
+            (Scheduling("airspeed", "m/s", *self._ends, self._rate),),
+            (*self.states, *(Signal(f"{self.outputs[i]}_held", "rad") for i in held)),
+            self.inputs,
+            self.outputs,
+            self.dt,
+        )
+
+    @property
+    def in_double_precision(self) -> ScheduledController:
+        """`model` in 64-bit arithmetic, compiled: for many flights within the limits, with an
+        airspeed that keeps to its rate and is always good.
+
+        Raises `InputError` where a command integrates.
+        """
+        if self.integrates:
+            raise InputError(
+                f"{', '.join(self.integrates)} integrate from a command on, not about the trim:"
+                " fly the table itself"
+            )
+        return ScheduledController(self.model, self.follow)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write it as JSON, every number exact; a reader sees the old file or the new one. Raises
+        `SymheliError` where the file cannot be written.
+        """
+        from symheli.flight.table_file import save
+
+        return save(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> TableController:
+        """The one in `path`, equal to the last bit; raises `InputError` unless the file is whole
+        and of this kind.
+        """
+        from symheli.flight.table_file import load
+
+        return load(path)
+
+    # --- how it flies ----------------------------------------------------------------------------
+
+    def reset(self, command: ArrayLike | None = None) -> None:
+        """States, filters and integrators to those on the ground; the airspeed in use starts at
+        the next good reading.
+
+        With `command` (ny,), rad, the one in force now: the next step answers just that, whatever
+        is measured then, and what it differs by from the controller's own fades away (or stays,
+        where a command integrates). Which axes are flown is left alone.
+        """
+        state = State.ground(self.numbers, self._state.flown)
+        if command is not None:
+            state.enter(rounded(command, "command", (len(self.outputs),)))
+        vars(self)["_flight"] = state
+
+    def fly_axes(self, axes: Collection[str]) -> None:
+        """Fly these outputs alone. The others stay at what is applied there, to which the states
+        follow; when they are flown again they begin at it.
+        """
+        indices(axes, self.outputs, "output")
+        self._state.flown = np.array([y in axes for y in self.outputs])
+
+    def update(
+        self,
+        measured: ArrayLike,
+        reference: ArrayLike,
+        trim: ArrayLike,
+        airspeed: float,
+        *,
+        valid: bool = True,
+        others: ArrayLike | None = None,
+    ) -> Array:
+        """Commands (ny,), float32, in rad, at one sample; `status` says what was met with.
+
+        Parameters
+        ----------
+        measured, reference : (nu,)
+            Of the inputs, in their units.
+        trim : (ny,)
+            Of the outputs, rad.
+        airspeed : float
+            As it is read, or commanded, m/s; anything where it is bad.
+        valid : bool
+            Whether who read it trusts it.
+        others : (ny,), optional
+            Commands applied on the axes that are not flown, rad; default the trim.
+        """
+        n, s, nu, ny = self.numbers, self._state, len(self.inputs), len(self.outputs)
+        with np.errstate(all="ignore"):  # numbers that are none are met below
+            seen, held = as_told("measured", measured, nu), as_told("reference", reference, nu)
+            at = as_told("trim", trim, ny)
+            elsewhere = at if others is None else as_told("others", others, ny)
+            s.status = follow_airspeed(n, s, NUMBER(airspeed), valid)
+            s.status |= commands(n, s, seen - held, at, elsewhere)
+        return s.command.copy()
+
+    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> Array:
+        """Commands (4,), rad; see `Controller`. Inputs it does not name stay at their trim."""
+        told = measured if self.follow == "reading" else p
+        u = np.array([reference[s] for s in INPUTS])
+        u[self._rows] = self.update(
+            [measured[s] for s in self.inputs],
+            [reference[s] for s in self.inputs],
+            u[self._rows],
+            told["airspeed"],
+        )
+        return u
+
+    @property
+    def status(self) -> Status:
+        """What the last step met with."""
+        return self._state.status
+
+    @property
+    def airspeed_used(self) -> float:
+        """Where in the table the last step was, m/s."""
+        return float(self._state.used)
+
+    # --- inside ----------------------------------------------------------------------------------
+
+    @property
+    def _state(self) -> State:
+        return vars(self)["_flight"]
+
+    @cached_property
+    def _rows(self) -> list[int]:
+        return indices(self.outputs, INPUTS, "helicopter input")
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        return float(self.knots[0]), float(self.knots[-1])
+
+    @property
+    def _rate(self) -> float:
+        return self.rate if self.airspeed.rate is None else self.airspeed.rate
+
+    def _largest_step(self) -> np.float32:
+        """What the airspeed in use may move by in a sample: rounding its sum takes it no farther
+        than the rate allows.
+        """
+        most = self._rate * self.dt
+        if most == 0.0 or math.isinf(most):
+            return min(NUMBER(most), LARGEST)
+        rounding = float(np.spacing(np.abs(self.knots).max()))
+        if most <= 2 * rounding:
+            raise InputError(
+                f"rate: {self._rate:g} m/s^2 moves the airspeed by less in a sample than 32 bits"
+                " resolve; sample more slowly, or give rate=0"
+            )
+        return inward(most - rounding, -math.inf)
+
+    def _samples(self, seconds: float, least: int) -> int:
+        return int(max(min(math.floor(min(seconds / self.dt, NEVER) + 1e-9), NEVER), least))
+
+
+def _limits(given: object, outputs: Sequence[str]) -> Mapping[str, tuple[float, float]]:
+    if not isinstance(given, Mapping):
+        raise InputError(f"limits: expected {{output: (low, high)}} in rad, got {given!r:.80}")
+    out = {}
+    for name, ends in given.items():
+        indices([name], outputs, "output with a limit")
+        try:
+            low, high = map(float, ends)
+        except (TypeError, ValueError):
+            low = high = math.nan
+        if not low < high:
+            raise InputError(f"limits[{name!r}]: expected (low, high) in rad, got {ends!r:.80}")
+        out[str(name)] = (low, high)
+    return out

@@ -1,0 +1,118 @@
+"""A sampled model over airspeed as a table for single precision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.flight.anti_windup import observer_gains
+from symheli.flight.single_precision import increasing
+from symheli.lpv.bases.interpolating import PiecewiseLinear
+from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
+from symheli.values.arrays import Array
+from symheli.values.signal import Signal
+
+RATE = "_rate"
+"""Ends the name of an output that is the rate of a command."""
+BETWEEN = 4
+"""Points between two knots at which a table is compared with what it is of."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tabulated:
+    """The sampled `model` over airspeed of a `TableController`; raises `InputError` for any
+    other.
+    """
+
+    model: LPVStateSpace
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.model, LPVStateSpace):
+            raise InputError(
+                f"a table is made of an LPVStateSpace, got {type(self.model).__name__}"
+            )
+        if self.model.dt is None:
+            raise InputError("the controller is continuous: sample it with .discretize(dt)")
+        names = [s.name for s in self.model.parameters]
+        if names != ["airspeed"]:
+            raise InputError(
+                f"a table is one over airspeed alone; this model is scheduled by {', '.join(names)}"
+            )
+
+    @property
+    def dt(self) -> float:
+        """Sample period, s."""
+        assert self.model.dt is not None  # noqa: S101
+        return self.model.dt
+
+    @property
+    def outputs(self) -> tuple[Signal, ...]:
+        """The commands, or those whose rates are given."""
+        return tuple(Signal(str(y).removesuffix(RATE), "rad") for y in self.model.outputs)
+
+    @property
+    def rates(self) -> Array:
+        """(ny,) of bool: which outputs are rates of commands."""
+        return np.array([str(y).endswith(RATE) for y in self.model.outputs], bool)
+
+    def knots(self, given: int | Sequence[float]) -> Array:
+        """So many at equal distances, or those given, in the range of the model; float32."""
+        low, high = self.model.scheduling.low, self.model.scheduling.high
+        if isinstance(given, int):
+            if isinstance(given, bool) or given < 2:
+                raise InputError(f"knots: expected at least 2, got {given}")
+            given = np.linspace(low, high, given).tolist()
+        at = increasing(given, "knots")
+        slack = 1e-6 * (high - low)
+        if at[0] < low - slack or at[-1] > high + slack:
+            raise InputError(
+                f"knots: expected airspeeds within {low:g} to {high:g} m/s, the range of the"
+                f" model, got {at[0]:g} to {at[-1]:g}"
+            )
+        return at
+
+    def at(self, airspeeds: Array) -> Matrices:
+        """A, B, C, D (N, ...), rates as what they change in a sample."""
+        s = self.model.scheduling
+        A, B, C, D = self.model.matrices(np.clip(airspeeds, s.low, s.high))
+        each = np.where(self.rates, self.dt, 1.0)[:, None]
+        return Matrices(A, B, each * C, each * D)
+
+    def matrices(self, knots: Array, correction: object | None) -> Array:
+        """[A B L; C D 0] (K, n + ny, n + nu + ny), L designed or as given."""
+        A, B, C, D = self.at(knots.astype(float))
+        none = np.zeros((len(knots), len(self.outputs), len(self.outputs)))
+        return np.block([[A, B, self._corrections(correction, A, B, C)], [C, D, none]])
+
+    def misfit(self, knots: Array, matrices: Array) -> float:
+        """Largest entry of table minus model, at the knots and between, over the largest of the
+        model: of A, B, C, D the worst.
+        """
+        at = knots.astype(float)
+        steps = np.arange(BETWEEN + 1) / (BETWEEN + 1)
+        p = np.append((at[:-1, None] + np.diff(at)[:, None] * steps).ravel(), at[-1])
+        n = len(self.model.states)
+        own = n + len(self.model.inputs)
+        M = np.tensordot(PiecewiseLinear(tuple(at.tolist()))(p), matrices.astype(float), axes=1)
+        table = M[:, :n, :n], M[:, :n, n:own], M[:, n:, :n], M[:, n:, n:own]
+        return max(
+            float(np.abs(mine - true).max(initial=0.0) / (np.abs(true).max(initial=0.0) or 1.0))
+            for mine, true in zip(table, self.at(p), strict=True)
+        )
+
+    def _corrections(self, given: object | None, A: Array, B: Array, C: Array) -> Array:
+        shape = (*A.shape[:2], C.shape[1])
+        if given is None:
+            L, positions = np.zeros(shape), ~self.rates
+            L[:, :, positions] = observer_gains(A, B, C[:, positions])
+            return L
+        try:
+            return np.broadcast_to(np.asarray(given, float), shape)
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"correction: expected (states, outputs) {shape[1:]}, one at each knot {shape}, or"
+                f" 0, got {given!r:.80}"
+            ) from error

@@ -1,0 +1,499 @@
+"""What flies is what is certified: tables in 32 bits, their entry, limits, a wrong airspeed."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flight.flown import SHORT, STORM, differences, dynamic
+from flight.tables import DT, INPUTS, OUTPUTS, sampled, static, table
+
+import symheli
+from symheli import AirspeedMonitor, InputError, TableController, fly
+from symheli.flight import Status
+from symheli.flight.anti_windup import saturated_radius
+
+ROUNDING = float(np.finfo(np.float32).eps)
+
+
+def run(controller, errors, airspeed, trim=0.0):
+    """Commands (N, ny) along errors (N, nu) at an airspeed."""
+    ny = len(controller.outputs)
+    zeros, at = np.zeros(errors.shape[1]), np.full(ny, trim)
+    return np.array([controller.update(e, zeros, at, airspeed) for e in errors])
+
+
+# --- the numbers ---------------------------------------------------------------------------------
+
+
+def test_the_model_holds_the_very_numbers_of_the_table():
+    t = table()
+    n, own = t.order, t.order + len(t.inputs)
+    at = t.model.matrices(t.knots.astype(float))
+    for mine, block in zip(
+        at,
+        (
+            t.matrices[:, :n, :n],
+            t.matrices[:, :n, n:own],
+            t.matrices[:, n:, :n],
+            t.matrices[:, n:, n:own],
+        ),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(mine, block.astype(float))
+    assert t.matrices.dtype == np.float32
+    assert t.model.scheduling.rate == 3.0
+    middle = 0.5 * (t.knots[2] + t.knots[3]).astype(float)
+    # straight between two knots
+    np.testing.assert_allclose(t.model.at(middle).D, at.D[2:4].mean(axis=0), rtol=1e-14)
+
+
+@pytest.mark.parametrize("knots", [5, (0.0, 0.1, 0.5, 0.6, 1.0)])
+def test_the_misfit_is_that_of_a_chord_under_a_parabola(knots):
+    """D = p^2 over 0 to 1: between knots h apart, two fifths of the way, .24 h^2 too much."""
+    speed = symheli.Scheduling("airspeed", "m/s", 0.0, 1.0)
+    none = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0))
+    D = [np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1))]
+    model = symheli.LPVStateSpace.polynomial(
+        *([m] for m in none), D, speed, dt=DT, inputs=("phi",), outputs=("d_lat",)
+    )
+    widest = 0.25 if knots == 5 else 0.4
+    assert TableController.of(model, knots).misfit == pytest.approx(
+        0.24 * widest**2, abs=2 * ROUNDING
+    )
+
+
+def test_a_table_of_a_table_is_the_same_and_its_misfit_rounding():
+    first = table(limit=None)
+    again = TableController.of(first.model, first.knots.tolist(), correction=0)
+    np.testing.assert_array_equal(again.matrices[:, :, :14], first.matrices[:, :, :14])
+    assert again.misfit < 1e-15  # differences of doubles
+
+
+@pytest.mark.parametrize("knots", [2, 3, 4, 33, (0.0, 0.01, 0.5, 7.0, 7.5, 13.0)])
+def test_any_airspeed_is_looked_up_between_its_knots(knots):
+    t = table(order=2, knots=knots, limit=None, correction=0)
+    static_gain = [0.0, *np.random.default_rng(3).uniform(-1, 14, 50), *t.knots, 13.0]
+    e = np.random.default_rng(1).standard_normal(8)
+    for p in static_gain:
+        t.reset()
+        first = t.update(e, np.zeros(8), np.zeros(4), p)
+        held = np.clip(p, 0.0, 13.0)
+        # eight products of numbers of size 1 in 32 bits
+        np.testing.assert_allclose(first, t.model.at(held).D @ e, atol=8 * ROUNDING)
+        assert t.airspeed_used == np.float32(held)
+
+
+# --- beside 64-bit arithmetic --------------------------------------------------------------------
+
+
+def test_within_its_limits_a_table_runs_as_its_model_in_double_precision():
+    t = table(order=6, limit=None)
+    rng = np.random.default_rng(0)
+    errors, p = 0.1 * rng.standard_normal((400, 8)), 6.0 + 5.0 * np.sin(0.008 * np.arange(400))
+    monitor = AirspeedMonitor(rate=math.inf)
+    free = replace(t, airspeed=monitor)
+    zeros, trim = np.zeros(8), np.zeros(4)
+    mine = np.array([free.update(e, zeros, trim, at) for e, at in zip(errors, p, strict=True)])
+    _, exact = free.model.simulate(p, errors)
+    # eigenvalues up to .9 add up ten samples of rounding, of sums of 14 products each
+    assert np.abs(mine - exact).max() < 140 * ROUNDING * np.abs(exact).max()
+    assert np.abs(mine - exact).max() > 0.0  # it is another arithmetic
+
+
+def test_a_table_flies_as_its_model_does(heli):
+    t = TableController.of(dynamic(heli).model)
+    calm = {"wind": STORM, "delay": 0.02}  # a sensor that rounds would double any difference
+    single, double = (fly(heli, SHORT, controller=c, **calm) for c in (t, t.in_double_precision))
+    # rounding of 6e-8 in a stable loop of unit gain, through eleven signals and an integral
+    assert 0.0 < differences(single, double) < 1e-4
+    again = fly(heli, SHORT, controller=t, **calm)
+    np.testing.assert_array_equal(again.values, single.values)
+
+
+# --- commands that integrate ---------------------------------------------------------------------
+
+RATES = tuple(f"{y}_rate" for y in OUTPUTS)
+
+
+@pytest.mark.parametrize("outputs", [RATES, ("d_lon", "d_lat_rate", "d_col", "d_ped_rate")])
+def test_rates_are_integrated_from_the_trim(outputs):
+    t = table(order=3, outputs=outputs, limit=None)
+    integrates = [y.endswith("_rate") for y in outputs]
+    assert t.integrates == tuple(y for y, so in zip(OUTPUTS, integrates, strict=True) if so)
+    source, errors = sampled(3, outputs=outputs), 0.1 * np.ones((50, 8))
+    errors[25:] *= -1.0
+    knot = float(t.knots[3])
+    _, answer = source.simulate(np.full(50, knot), errors)
+    expected = 0.05 + np.where(integrates, DT * np.cumsum(answer, axis=0), answer)
+    trim = 0.05
+    np.testing.assert_allclose(run(t, errors, knot, trim), expected, rtol=1e-5)
+    _, certified = t.model.simulate(np.full(50, knot), errors)
+    np.testing.assert_allclose(trim + certified, expected, rtol=1e-5)
+
+
+def test_at_its_limit_a_command_that_integrates_waits_there():
+    t = static(1.0, output="d_lat_rate", limits={"d_lat": (-0.1, 0.1)})
+    up = run(t, np.full((500, 1), 1.0), 5.0)  # 10 s, five times what reaches the limit
+    assert up.max() == np.float32(0.1) or up.max() == np.nextafter(np.float32(0.1), np.float32(0))
+    assert t.status == Status.SATURATED
+    down = run(t, np.full((1, 1), -1.0), 5.0)
+    assert down[0, 0] == pytest.approx(0.1 - DT, abs=1e-7)
+
+
+# --- anti-windup ---------------------------------------------------------------------------------
+
+
+def integral(correction=None):
+    """PI on phi with its integral among the states."""
+    model = symheli.LPVStateSpace(
+        symheli.lpv.PiecewiseLinear((0.0, 10.0)),
+        np.ones((2, 1, 1)),
+        np.full((2, 1, 1), DT),
+        np.ones((2, 1, 1)),
+        np.full((2, 1, 1), 0.2),
+        symheli.Scheduling("airspeed", "m/s", 0.0, 10.0, 3.0),
+        ("integral",),
+        ("phi",),
+        ("d_lat",),
+        DT,
+    )
+    limits = {"d_lat": (-0.1, 0.1)}
+    return TableController.of(model, 3, correction=correction, limits=limits)
+
+
+def test_a_saturated_integral_turns_at_once_with_anti_windup_and_late_without():
+    """250 samples of an error of 1 up, then of -0.3."""
+    up, back = np.full((250, 1), 1.0), np.full((600, 1), -0.3)
+    flown = {}
+    for name, correction in (("with", None), ("without", 0)):
+        t = integral(correction)
+        run(t, up, 5.0)
+        flown[name] = run(t, back, 5.0)[:, 0]
+    assert flown["with"][1] < 0.0
+    assert flown["without"].min() == flown["without"].max()  # at the limit: 5 up, 3.6 back, - 0.06
+
+
+def test_the_states_follow_saturated_commands_stably_whichever_saturate(heli):
+    for t in (table(), TableController.of(dynamic(heli).model, 5)):
+        n, own = t.order, t.order + len(t.inputs)
+        M = t.matrices.astype(float)
+        A, L, C = M[:, :n, :n], M[:, :n, own:], M[:, n:, :n]
+        alone = np.abs(np.linalg.eigvals(A)).max(axis=1)
+        together = np.abs(np.linalg.eigvals(A - L @ C)).max(axis=1)
+        assert (together < 0.9).all()
+        # an eigenvalue of magnitude 1 is so to rounding of 32 bits
+        assert (saturated_radius(A, L, C) <= np.maximum(alone, 1.0) + 1e-5).all()
+
+
+# --- entry ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("p", [0.0, 3.3, 13.0, 40.0])
+def test_the_first_command_is_the_one_in_force_and_the_difference_fades(p):
+    t = replace(table(limit=None), fade=0.5)
+    rng = np.random.default_rng(0)
+    errors, now = rng.standard_normal((60, 8)), np.array([0.15, -0.1, 0.05, 0.19])
+    own = run(t, errors, p, trim=0.02)
+    t.reset(now)
+    entered = run(t, errors, p, trim=0.02)
+    np.testing.assert_array_equal(entered[0], now.astype(np.float32))
+    faded = np.exp(-DT / 0.5 * np.arange(60))[:, None] * (now - own[0])
+    # sums of numbers up to 1, in 32 bits, sixty times
+    np.testing.assert_allclose(entered - own, faded, atol=60 * ROUNDING)
+
+
+def test_an_entered_command_that_integrates_goes_on_from_there():
+    t = table(order=3, outputs=RATES, limit=None)
+    now = np.array([0.1, 0.2, -0.1, 0.0])
+    t.reset(now)
+    errors = 0.1 * np.ones((3, 8))
+    entered = run(t, errors, 5.0)
+    np.testing.assert_array_equal(entered[0], now.astype(np.float32))
+    t.reset()
+    np.testing.assert_allclose(
+        np.diff(entered, axis=0), np.diff(run(t, errors, 5.0), axis=0), atol=4 * ROUNDING
+    )
+
+
+def test_a_flight_is_handed_over_without_a_bump(ideal):
+    """From an LQR to the table in the middle of a transition, nine states as they then are."""
+    t, pilot = TableController.of(dynamic(ideal).model), dynamic(ideal)
+
+    class Handed:
+        dt, switch = DT, 120
+
+        def reset(self):
+            pilot.reset()
+            self.k, self.commands = 0, []
+
+        def step(self, measured, reference, p):
+            if self.k < self.switch:
+                u = 0.97 * pilot.step(measured, reference, p)
+            else:
+                if self.k == self.switch:
+                    t.reset(self.commands[-1])
+                u = t.step(measured, reference, p)
+            self.k += 1
+            self.commands.append(u)
+            return u
+
+    handed = Handed()
+    fly(ideal, SHORT, controller=handed)
+    before, at, after = handed.commands[119:122]
+    np.testing.assert_allclose(at, before, atol=1e-7)  # 32 bits of 64
+    usual = np.abs(np.diff(handed.commands[100:119], axis=0)).max(axis=0)
+    assert (np.abs(after - at) < 3 * usual + 1e-3).all()
+
+
+def test_on_the_ground_it_is_as_new():
+    t, errors = table(), np.random.default_rng(0).standard_normal((40, 8))
+    first = run(t, errors, 5.0)
+    t.update(errors[0], np.zeros(8), np.zeros(4), math.nan)
+    t.reset()
+    np.testing.assert_array_equal(run(t, errors, 5.0), first)
+
+
+# --- axes ----------------------------------------------------------------------------------------
+
+
+def test_an_axis_flown_by_another_stays_and_begins_where_it_was():
+    for outputs in (OUTPUTS, RATES):
+        t = table(order=3, outputs=outputs, limit=0.5)
+        errors, trim = 0.1 * np.ones((300, 8)), np.full(4, 0.05)
+        t.fly_axes(("d_lon", "d_ped"))
+        for e in errors:
+            elsewhere = np.array([9.0, 0.31, -0.02, 9.0])
+            u = t.update(e, np.zeros(8), trim, 5.0 + 0.01 * e[0], others=elsewhere)
+            np.testing.assert_array_equal(u[1:3], elsewhere[1:3].astype(np.float32))
+        assert abs(u[0]) <= 0.5 >= abs(u[3])
+        t.fly_axes(OUTPUTS)
+        back = t.update(errors[0], np.zeros(8), trim, 5.0)
+        np.testing.assert_array_equal(back[1:3], elsewhere[1:3].astype(np.float32))
+        t.fly_axes(())
+        np.testing.assert_array_equal(
+            t.update(errors[0], np.zeros(8), trim, 5.0), trim.astype(np.float32)
+        )
+
+
+def test_an_integral_does_not_wind_up_while_another_flies():
+    t = integral()
+    t.fly_axes(())
+    run(t, np.full((500, 1), 1.0), 5.0)
+    t.fly_axes(("d_lat",))
+    after = run(t, np.full((400, 1), -0.1), 5.0)[:, 0]
+    assert after[0] == 0.0
+    # its own integral alone moves it, -0.1 DT a sample; what it was off by fades in seconds
+    assert after[-1] < 0.0
+    assert np.abs(after).max() <= 0.1
+
+
+# --- airspeed ------------------------------------------------------------------------------------
+
+
+def used_along(t, readings, valid=None):
+    out = []
+    for k, p in enumerate(readings):
+        t.update(
+            np.zeros(len(t.inputs)),
+            np.zeros(len(t.inputs)),
+            np.zeros(len(t.outputs)),
+            p,
+            valid=True if valid is None else bool(valid[k]),
+        )
+        out.append((t.airspeed_used, t.status))
+    used, status = zip(*out, strict=True)
+    return np.array(used), list(status)
+
+
+def gain(**monitor):
+    return static(1.0, follow="reading", airspeed=AirspeedMonitor(**monitor))
+
+
+def test_whatever_is_read_the_airspeed_in_use_keeps_to_the_certified_rate():
+    rng = np.random.default_rng(0)
+    for seed in range(3):
+        readings = rng.choice([0.0, 3.0, 9.99, 10.0, 12.0, 50.0, math.nan, -math.inf], 2000)
+        readings[::7] = rng.uniform(0, 10, len(readings[::7]))
+        t = gain(lag=0.05 * seed, hold=0.1, frozen=0.2)
+        used, _ = used_along(t, readings, rng.random(2000) > 0.1)
+        assert np.abs(np.diff(used)).max() <= 3.0 * DT  # exactly: of 32-bit numbers in 64 bits
+        assert np.abs(np.diff(used)).max() > 0.99 * 3.0 * DT
+        assert used.min() >= 0.0
+        assert used.max() <= 10.0
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, 21.0, -11.0, "invalid", "frozen"])
+def test_a_bad_airspeed_is_held_and_then_left_for_the_fallback(wrong):
+    good = np.linspace(5.5, 6.0, 50)
+    bad = np.full(400, 6.0 if isinstance(wrong, str) else wrong)
+    if wrong == "invalid":
+        bad = bad + 1e-3 * np.arange(400)
+    t = gain(hold=1.0, fallback=2.0, frozen=0.5)
+    valid = np.r_[np.ones(50), np.full(400, wrong != "invalid")]
+    used, status = used_along(t, [*good, *bad], valid)
+    assert not any(status[:50])
+    late = 24 if wrong == "frozen" else 0  # the 25th repetition is half a second's
+    held = used[50 + late : 50 + late + 50]
+    np.testing.assert_array_equal(held, np.float32(6.0))
+    assert set(status[50 + late : 50 + late + 50]) == {Status.AIRSPEED}
+    moving = used[50 + late + 50 :]
+    np.testing.assert_allclose(
+        moving, np.maximum(6.0 - 3.0 * DT * np.arange(1, len(moving) + 1), 2.0), atol=2e-4
+    )
+    assert moving[-1] == 2.0
+    assert status[-1] == Status.AIRSPEED | Status.FALLBACK
+    back, _ = used_along(t, np.linspace(6.1, 6.2, 100))
+    assert back[0] == pytest.approx(2.06, abs=1e-5)
+
+
+def test_an_entry_with_a_bad_airspeed_begins_at_the_fallback():
+    t = gain(fallback=3.0)
+    used, status = used_along(t, [math.nan, 8.0, 8.0])
+    np.testing.assert_allclose(used, [3.0, 3.06, 3.12], rtol=1e-5)
+    assert status[0] == Status.AIRSPEED | Status.FALLBACK
+
+
+def test_the_filter_before_the_limit_lags_by_its_time_constant():
+    t = gain(rate=1000.0, lag=0.4, frozen=math.inf)
+    used, _ = used_along(t, [2.0, *np.full(100, 3.0)])
+    np.testing.assert_allclose(
+        used, 3.0 - np.exp(-DT / 0.4 * np.arange(101)), atol=100 * 3 * ROUNDING
+    )
+
+
+def test_a_constant_command_is_no_frozen_reading():
+    t = static(1.0, airspeed=AirspeedMonitor(frozen=0.1))
+    used, status = used_along(t, np.full(100, 7.0))
+    assert set(used) == {7.0}
+    assert not any(status)
+
+
+def test_numbers_that_are_none_hold_the_commands_and_harm_nothing():
+    clean, t = table(), table()
+    errors = 0.1 * np.random.default_rng(0).standard_normal((50, 8))
+    run(clean, errors, 5.0), run(t, errors, 5.0)
+    before = run(t, errors[:1], 5.0)[0]
+    run(clean, errors[:1], 5.0)
+    hurt = errors[1].copy()
+    hurt[3] = math.nan
+    np.testing.assert_array_equal(t.update(hurt, np.zeros(8), np.zeros(4), 5.0), before)
+    assert t.status & Status.HELD
+    huge = np.full(8, 3e38)
+    np.testing.assert_array_equal(t.update(huge, np.zeros(8), np.zeros(4), 5.0), before)
+    np.testing.assert_array_equal(run(t, errors, 6.0), run(clean, errors, 6.0))
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("order", [0, 5])
+def test_a_table_comes_back_from_its_file_to_the_last_bit(tmp_path, order):
+    t = table(order=order, limit=None, outputs=("d_lon", "d_lat_rate", "d_col", "d_ped"))
+    t = replace(t, limits={"d_lat": (-math.inf, 0.1)}, airspeed=AirspeedMonitor(hold=math.inf))
+    back = TableController.load(t.save(tmp_path / "t.json"))
+    for name in ("knots", "matrices"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(t, name))
+    for name in (
+        "states",
+        "inputs",
+        "outputs",
+        "dt",
+        "integrates",
+        "limits",
+        "rate",
+        "fade",
+        "airspeed",
+        "follow",
+        "misfit",
+    ):
+        assert getattr(back, name) == getattr(t, name), name
+    assert back.inputs[0].unit == "m/s"
+    errors = np.random.default_rng(0).standard_normal((30, 8))
+    np.testing.assert_array_equal(run(back, errors, 5.0), run(t, errors, 5.0))
+
+
+def test_a_damaged_file_says_so(tmp_path):
+    path = table(order=1).save(tmp_path / "t.json")
+    whole = path.read_text()
+    path.write_text(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="not a whole file of 'symheli table controller'"):
+        TableController.load(path)
+    path.write_text(whole.replace('"dt": 0.02', '"dt": 0.03'))
+    with pytest.raises(InputError, match="does not match its digest"):
+        TableController.load(path)
+    path.write_text(json.dumps({"schema": "symheli LPV-ARX model"}))
+    with pytest.raises(InputError, match="expected a file of 'symheli table controller'"):
+        TableController.load(path)
+    with pytest.raises(InputError, match=r"none\.json"):
+        TableController.load(tmp_path / "none.json")
+
+
+# --- bad input -----------------------------------------------------------------------------------
+
+
+def test_what_is_no_table_is_refused():
+    good = sampled(2)
+    height = symheli.Scheduling("height", "m", 0.0, 13.0)
+
+    def bad(**change):
+        return replace(good, **change)
+
+    for model, knots, said in (
+        (3.0, 5, "made of an LPVStateSpace, got float"),
+        (bad(dt=None), 5, "is continuous"),
+        (bad(parameters=(height,)), 5, "over airspeed alone; this model is scheduled by height"),
+        (bad(inputs=("bank", *INPUTS[1:])), 5, "unknown measured signal 'bank'"),
+        (bad(outputs=("roll", *OUTPUTS[1:])), 5, "unknown helicopter input 'roll'"),
+        (good, 1, "at least 2"),
+        (good, (0.0, 5.0, 4.0), "that increase"),
+        (good, (0.0, 5.0, 5.0 + 1e-9), "in 32 bits too"),
+        (good, (0.0, math.nan), r"entry \(1,\) is nan"),
+        (good, (0.0, 14.0), "within 0 to 13 m/s"),
+        (bad(D=1e41 * good.D), 5, "beyond the largest number of 32 bits"),
+    ):
+        with pytest.raises(InputError, match=said):
+            TableController.of(model, knots)
+    for options, said in (
+        ({"limits": {"d_lon": (0.1, -0.1)}}, r"limits\['d_lon'\]: expected \(low, high\)"),
+        ({"limits": {"roll": (0.1, 0.2)}}, "unknown output with a limit 'roll'"),
+        ({"limits": 0.1}, "limits: expected"),
+        ({"fade": 0.0}, "fade"),
+        ({"follow": "wind"}, "unknown way to schedule 'wind'"),
+        ({"correction": np.zeros((3, 3))}, r"correction: expected \(states, outputs\) \(2, 4\)"),
+        ({"correction": np.full((2, 4), math.nan)}, "matrices: entry"),
+        ({"airspeed": AirspeedMonitor(fallback=20.0)}, "fallback: expected an airspeed of the"),
+        ({"airspeed": AirspeedMonitor(rate=1e-6)}, "than 32 bits resolve"),
+    ):
+        with pytest.raises(InputError, match=said):
+            TableController.of(good, 5, **options)
+    undecaying = bad(A=np.eye(2)[None] * good.basis.constant()[:, None, None], C=0.0 * good.C)
+    with pytest.raises(InputError, match="neither decays nor shows in a command"):
+        TableController.of(undecaying, 5)
+    t = TableController.of(good, 5)
+    with pytest.raises(InputError, match="measured: expected 8 numbers"):
+        t.update([0.0], np.zeros(8), np.zeros(4), 5.0)
+    with pytest.raises(InputError, match="unknown output 'roll'"):
+        t.fly_axes(("roll",))
+    with pytest.raises(InputError, match="command: expected shape"):
+        t.reset([0.0])
+    with pytest.raises(InputError, match="integrate from a command on"):
+        _ = table(outputs=RATES).in_double_precision
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"rate": -1.0}, "rate: expected a number >= 0"),
+        ({"lag": math.nan}, "lag"),
+        ({"lag": math.inf}, "lag: expected a finite"),
+        ({"hold": "long"}, "hold"),
+        ({"fallback": math.inf}, "fallback"),
+        ({"plausible": (3.0, 3.0)}, "plausible"),
+        ({"plausible": 3.0}, "plausible"),
+    ],
+)
+def test_a_monitor_of_nonsense_is_refused(options, said):
+    with pytest.raises(InputError, match=said):
+        AirspeedMonitor(**options)
