@@ -79,7 +79,7 @@ class Controller:
         return l2_gain(self.closed(), rate, **options)
 
     def discretize(self, dt: float) -> Controller:
-        """Sampled by Tustin's rule at every frozen p, functions of the same degree fitted to that."""
+        """Sampled by Tustin's rule at every frozen p, by functions of the same degree."""
         from synthesis.design.sampling import tustin
 
         model = tustin(self.model, dt)

@@ -5,16 +5,17 @@ program for every p of the range.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import FunctionSpace, Scheduling
+from symheli.lpv import FunctionSpace
 from symheli.lpv.bases.polynomials import factors_of
 from synthesis.design.cells import Cell, cells, degrees_of
+from synthesis.design.coordinates import Coordinates
 from synthesis.design.elimination import Half, controlled, observed
-from synthesis.design.generalized import Generalized
 from synthesis.design.motions import motions, moves, used
 from synthesis.design.unknown import Blocks, Unknown, selector, unknowns
 from synthesis.polynomial.symmetric import length, smat
@@ -34,31 +35,15 @@ MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
 
 
-class ScaledPlant(Protocol):
-    """What is asked of a plant here."""
-
-    dt: float | None
-    parameters: tuple[Scheduling, ...]
-    time: float
-
-    def at(self, p: Array) -> Generalized:
-        """Matrices (K, ..) at p (K, m)."""
-        ...
-
-    @property
-    def breaks(self) -> list[list[float]]:
-        """Where the plant is not one polynomial, ends included, of each parameter."""
-        ...
-
-
-class Program(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Conditions:
     """minimise cost g subject to blocks <= 0, for `interior_point.minimise`."""
 
     blocks: tuple[LyapunovBlocks, ...]
     sizes: Sizes
     cost: float
-    level: float = 0.0
-    back_off: float = 0.0
+    level: Array = field(default_factory=lambda: np.zeros(()))
+    back_off: Array = field(default_factory=lambda: np.zeros(()))
     bounds: tuple[tuple[float, float], ...] = ()
 
 
@@ -77,7 +62,7 @@ class Existence:
 
     def __init__(
         self,
-        plant: ScaledPlant,
+        plant: Coordinates,
         X: FunctionSpace | None,
         Y: FunctionSpace | None,
         divisions: int = 1,
@@ -96,7 +81,6 @@ class Existence:
 
     def _over_cells(self) -> list[Cell]:
         breaks = [sorted(set(b)) for b in self.plant.breaks]
-        own = [u.basis for u in (self.X, self.Y) if u is not None]
         most = np.zeros(len(breaks), int)
         for basis in (u.basis for u in (self.X, self.Y) if u is not None):
             for i, factor in enumerate(factors_of(basis)):
@@ -124,7 +108,7 @@ class Existence:
         return self._solved(blocks, 1.0, solver)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
-        """For this g the X and Y, within ever larger bounds, whose product stays farthest from one."""
+        """For this g the X and Y, within ever larger bounds, whose product is farthest from one."""
         for largest in WIDE:
             blocks = [
                 b
@@ -137,7 +121,7 @@ class Existence:
 
     def _solved(self, blocks: list[LyapunovBlocks], cost: float, solver: Solver) -> Found:
         n = self.states
-        program = Program(tuple(blocks), Sizes(n, 1, self.count), cost)
+        program = Conditions(tuple(blocks), Sizes(n, 1, self.count), cost)
         candidate = interior_point.minimise(program, solver)
         if candidate.x is None:
             return Found(
@@ -200,7 +184,8 @@ class Existence:
 
     def _next(self, cell: Cell) -> list[LyapunovBlocks]:
         """S(p) <= Y(p(k+1)), at the ends of where that may be."""
-        assert self.S is not None and self.Y is not None  # noqa: S101
+        assert self.S is not None  # noqa: S101 - see `_halves`
+        assert self.Y is not None  # noqa: S101
         n, out = self.states, []
         one = np.eye(n)
         low, high = np.array([(s.low, s.high) for s in self.plant.parameters]).T

@@ -53,10 +53,18 @@ def state_gain(plant: Generalized, Y: Array, S: Array, gamma: float) -> Array | 
 
 
 def _central(
-    A: Array, B: Array, C: Array, D: Array,
-    left: Array, left_z: Array, right: Array, right_w: Array,
-    now: Array, after: Array, gamma: float,
-) -> Array | None:  # fmt: skip
+    A: Array,
+    B: Array,
+    C: Array,
+    D: Array,
+    left: Array,
+    left_z: Array,
+    right: Array,
+    right_w: Array,
+    now: Array,
+    after: Array,
+    gamma: float,
+) -> Array | None:
     """K of the loop A + left K right, B + left K right_w, C + left_z K right, D + left_z K right_w;
     of `left` the last columns are those of `left_z`, of `right` the last rows those of `right_w`.
     """
