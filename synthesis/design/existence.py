@@ -29,8 +29,8 @@ LARGEST = 1e6
 """X and Y are kept below this multiple of the identity, in scaled coordinates."""
 WIDE = (1e2, 1e3, 1e4, LARGEST)
 """The same once g is settled, tried in turn."""
-APART = 1.5
-"""The eigenvalues of X Y are at least the square of this, where there is a next bound to try."""
+GROWS = 1.03
+"""A larger bound that separates X Y from I by less than this factor more is not worth it."""
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
 
@@ -108,16 +108,23 @@ class Existence:
         return self._solved(blocks, 1.0, solver)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
-        """For this g the X and Y, within ever larger bounds, whose product is farthest from one."""
+        """For this g the X and Y whose product is farthest from one: first within the least bound
+        beyond which that hardly grows, then within larger ones.
+        """
+        found: list[Found] = []
         for largest in WIDE:
             blocks = [
                 b
                 for cell in self._cells
                 for b in (*self._halves(cell, gamma), *self._coupling(cell, True, largest))
             ]
-            found = self._solved(blocks, -1.0, solver)
-            if found.gamma > APART or largest == LARGEST:
-                yield found._replace(gamma=gamma)
+            answer = self._solved(blocks, -1.0, solver)
+            if not np.any(answer.coefficients):
+                continue
+            found.append(answer)
+            if len(found) > 1 and answer.gamma < GROWS * found[-2].gamma:
+                yield found[-2]._replace(gamma=gamma)
+        yield (found[-1] if found else answer)._replace(gamma=gamma)
 
     def _solved(self, blocks: list[LyapunovBlocks], cost: float, solver: Solver) -> Found:
         n = self.states
