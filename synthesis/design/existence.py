@@ -33,6 +33,8 @@ GROWS = 1.03
 """A larger bound that separates X Y from I by less than this factor more is not worth it."""
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
+SETTLED = (1e-5, 1e-8)
+"""The same once g is settled, tried in turn: at a block that is singular gains have no bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,7 @@ class Existence:
         Y: FunctionSpace | None,
         divisions: int = 1,
     ):
-        self.plant, self.divisions = plant, divisions
+        self.plant, self.divisions, self.margin = plant, divisions, MARGIN
         both = [b for b in (X, Y) if b is not None]
         if plant.dt is not None and Y is not None and Y.size > 1 and moves(plant.parameters):
             both.append(Y)  # the bound of Y at the next sample
@@ -111,6 +113,11 @@ class Existence:
         """For this g the X and Y whose product is farthest from one: first within the least bound
         beyond which that hardly grows, then within larger ones.
         """
+        for self.margin in SETTLED:
+            yield from self._within(gamma, solver)
+        self.margin = MARGIN
+
+    def _within(self, gamma: float, solver: Solver) -> Iterator[Found]:
         found: list[Found] = []
         for largest in WIDE:
             blocks = [
@@ -124,7 +131,8 @@ class Existence:
             found.append(answer)
             if len(found) > 1 and answer.gamma < GROWS * found[-2].gamma:
                 yield found[-2]._replace(gamma=gamma)
-        yield (found[-1] if found else answer)._replace(gamma=gamma)
+        if found:
+            yield found[-1]._replace(gamma=gamma)
 
     def _solved(self, blocks: list[LyapunovBlocks], cost: float, solver: Solver) -> Found:
         n = self.states
@@ -173,14 +181,16 @@ class Existence:
             blocks.add(ahead, f, L, flow - 0.5 * L).add(
                 now, now.values(cell.nodes), own, -0.5 * own
             )
-            return [blocks.finished(_below(constant, n) + MARGIN * np.eye(n + N), _below(level, n))]
+            return [
+                blocks.finished(_below(constant, n) + self.margin * np.eye(n + N), _below(level, n))
+            ]
         L = selector(n, 0, N)
         out = []
         for motion in self._motions(ahead, cell):
             blocks = Blocks(N, len(f), cell.to_bernstein).add(ahead, f, L, half.flow)
             if np.any(motion):
                 blocks.add(ahead, sign * ahead.slopes(cell.nodes, motion), L, 0.5 * L)
-            out.append(blocks.finished(constant + MARGIN * np.eye(N), level))
+            out.append(blocks.finished(constant + self.margin * np.eye(N), level))
         return out
 
     def _motions(self, unknown: Unknown, cell: Cell) -> list[Array]:
@@ -190,18 +200,17 @@ class Existence:
         return motions(self.plant.parameters, cell.nodes, self.plant.time, used(unknown.basis))
 
     def _next(self, cell: Cell) -> list[LyapunovBlocks]:
-        """S(p) <= Y(p(k+1)), at the ends of where that may be."""
+        """S(p) <= Y(p(k+1)) to first order in the step, at its ends."""
         assert self.S is not None  # noqa: S101 - see `_halves`
         assert self.Y is not None  # noqa: S101
-        n, out = self.states, []
-        one = np.eye(n)
-        low, high = np.array([(s.low, s.high) for s in self.plant.parameters]).T
+        out, one = [], np.eye(self.states)
         for motion in self._motions(self.Y, cell):
-            there = np.clip(cell.nodes + motion * (self.plant.dt or 0.0), low, high)
-            blocks = Blocks(n, len(there), cell.to_bernstein)
+            step = motion * (self.plant.dt or 0.0)
+            there = self.Y.values(cell.nodes) + self.Y.slopes(cell.nodes, step)
+            blocks = Blocks(self.states, len(there), cell.to_bernstein)
             blocks.add(self.S, self.S.values(cell.nodes), one, 0.5 * one)
-            blocks.add(self.Y, self.Y.values(there), one, -0.5 * one)
-            out.append(blocks.finished(MARGIN * one, 0.0 * one))
+            blocks.add(self.Y, there, one, -0.5 * one)
+            out.append(blocks.finished(self.margin * one, 0.0 * one))
         return out
 
     def _coupling(self, cell: Cell, apart: bool, largest: float) -> list[LyapunovBlocks]:

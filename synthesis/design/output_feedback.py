@@ -259,8 +259,8 @@ def _recover(
             constant_x = True
         return packed(controller(at, x, y, transformed, constant_x=constant_x))
 
-    middle = np.array([[s.middle for s in parameters]])
-    if gains(middle) is None:
+    low, high = np.array([(s.low, s.high) for s in parameters]).T
+    if gains(low + np.linspace(0.0, 1.0, 13)[:, None] * (high - low)) is None:
         return None
     return gains  # type: ignore[return-value]
 
