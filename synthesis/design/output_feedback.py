@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-ACCURACY = 1e-4
+ACCURACY = 1e-3
 """Of the functions of p fitted to the gains, relative."""
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
 
