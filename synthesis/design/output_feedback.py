@@ -214,21 +214,18 @@ def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
 
 def _recover(
     coordinates: Coordinates, existence: Existence, found: Found
-) -> Callable[[Array], Array] | None:
+) -> Callable[[Array], Array]:
     X, Y, S = existence.X, existence.Y, existence.S
     assert X is not None and Y is not None and S is not None  # noqa: S101
     parameters = coordinates.parameters
 
-    def gains(p: Array) -> Array | None:
+    def gains(p: Array) -> Array:
         at = coordinates.at(p)
         x, y, s = (u.at(found.coefficients, p) for u in (X, Y, S))
         if coordinates.dt is not None:
-            transformed = joined(at, x, y, s, found.gamma)
-        else:
-            transformed = split(at, x, y, found.gamma)
-        if transformed is None:
-            return None
-        constant_x = not X.moves
+            return packed(joined(at, x, y, s, found.gamma))
+        transformed = split(at, x, y, found.gamma)
+        moving = None
         if X.moves and Y.moves:
             # dX/dt along the known motion; zero where p stands still
             known = [
@@ -237,14 +234,9 @@ def _recover(
             ]
             (motion,) = motions(parameters, p, coordinates.time, known)
             moving = X.moving(found.coefficients, p, motion)
-            transformed = transformed._replace(A=transformed.A - moving @ y)
-            constant_x = True
-        return packed(controller(at, x, y, transformed, constant_x=constant_x))
+        return packed(controller(at, x, y, transformed, constant_x=not X.moves, moving_x=moving))
 
-    middle = np.array([[s.middle for s in parameters]])
-    if gains(middle) is None:
-        return None
-    return gains  # type: ignore[return-value]
+    return gains
 
 
 def packed(gains: Gains) -> Array:

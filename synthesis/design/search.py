@@ -153,7 +153,7 @@ class Design:
         return self.found.gamma * self.coordinates.channel
 
 
-Recover = Callable[[Coordinates, Existence, Found], Gains | None]
+Recover = Callable[[Coordinates, Existence, Found], Gains]
 
 
 def least(
@@ -207,9 +207,14 @@ def settled(
 
 
 def frozen_gain(coordinates: Coordinates, gains: Gains, loop: Loop) -> float:
-    """Of the loop at some frozen p, scaled; inf where one is unstable."""
-    low, high = np.array([(s.low, s.high) for s in coordinates.parameters]).T
+    """Of the loop at some frozen p, scaled, where a parameter that is the rate of another is zero;
+    inf where one is unstable.
+    """
+    parameters = coordinates.parameters
+    low, high = np.array([(s.low, s.high) for s in parameters]).T
     p = low + np.linspace(0.0, 1.0, 7)[:, None] * (high - low)
+    rates = [s.name in {other.rate for other in parameters} for s in parameters]
+    p[:, rates] = np.clip(0.0, low, high)[rates]
     every = loop(coordinates, gains, p)
     return max(norm(*(M[i] for M in every), coordinates.dt, 1e-6)[0] for i in range(len(p)))
 

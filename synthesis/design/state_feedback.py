@@ -105,7 +105,7 @@ def _check_measured(plant: Plant) -> None:
 
 def _recover(
     coordinates: Coordinates, existence: Existence, found: Found
-) -> Callable[[Array], Array] | None:
+) -> Callable[[Array], Array]:
     Y, S = existence.Y, existence.S
     assert Y is not None and S is not None  # noqa: S101
 
@@ -113,10 +113,9 @@ def _recover(
         at, y = coordinates.at(p), Y.at(found.coefficients, p)
         if coordinates.dt is not None:
             F = state_gain(at, y, S.at(found.coefficients, p), found.gamma)
-            assert F is not None  # noqa: S101 - found in the middle
         else:
             nothing = np.zeros((len(p), at.B2.shape[-1], at.D21.shape[-2]))
-            F = control_gain(at, y, nothing, found.gamma)
-        return F @ np.linalg.inv(at.C2 @ y)
+            F = control_gain(at, y, nothing, found.gamma) @ np.linalg.inv(y)
+        return F @ np.linalg.inv(at.C2)
 
     return gains
