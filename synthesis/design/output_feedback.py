@@ -11,9 +11,9 @@ import numpy as np
 
 from symheli.errors import InputError, SynthesisError
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
-from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certificate import Attempt
 from synthesis.design.cells import degrees_of
+from synthesis.design.conditions import conditions
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.diagnosis import reasons, unpriced
@@ -147,7 +147,7 @@ def _nominal(
             break
     if best is None:
         raise failed(plant, attempts)
-    return replace(best, attempts=tuple(attempts))
+    return replace(best, optimum=_gamma(start), attempts=tuple(attempts))
 
 
 def coordinates_of(plant: Plant, channel: float) -> Coordinates:
@@ -176,7 +176,7 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
     ):  # fmt: skip
         if wanted and not getattr(named, group):
             raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
-    at = plant.matrices(scattered(plant))
+    at = plant.matrices(conditions(plant)[0])
     found: list[str] = []
     if controls:
         found += unpriced(at.D12, named.controls)
@@ -186,18 +186,9 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
         raise InputError("; ".join(found))
 
 
-def scattered(plant: Plant) -> Array:
-    """Some p all over the box, as `Plant.matrices` takes them."""
-    return lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.nominal.box)
-
-
 def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
     """The error that says why: modes, directions and weights, and every program that was tried."""
-    p = scattered(plant)
-    names = [s.name for s in plant.parameters]
-    said = [
-        ", ".join(f"{n} = {v:g}" for n, v in zip(names, np.atleast_1d(q), strict=True)) for q in p
-    ]
+    p, said = conditions(plant)
     least = min((a.bound for a in attempts), default=math.inf)
     why = reasons(
         plant.matrices(p), plant.channels, dt=plant.dt, at=said,

@@ -187,6 +187,8 @@ def settled(
 ) -> Iterator[Design]:
     """Designs at ever larger multiples of the least gamma, whose frozen `loop` keeps it."""
     coordinates, existence, lowest = start
+    if not math.isfinite(lowest.gamma):
+        return
     for factor in back_off:
         gamma = factor * lowest.gamma
         for found in existence.widest(gamma, solver):

@@ -87,7 +87,8 @@ def state_feedback(
         made = in_plant_units(
             plant, design.coordinates, design.gains, design.gamma, f"state feedback, {shape}"
         )
-        return replace(made, attempts=tuple(attempts))
+        optimum = start[0].channel * start[2].gamma
+        return replace(made, optimum=optimum, attempts=tuple(attempts))
     raise failed(plant, attempts)
 
 
