@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symheli.lpv import LinearModel, LPVStateSpace
+from symheli.values.named_vector import NamedVector
 from synthesis.certificate import Attempt, Certificate
+from synthesis.design.conditions import conditions
+from synthesis.design.diagnosis import decided
 
 if TYPE_CHECKING:
     from symheli.flight import ScheduledController
@@ -30,6 +34,8 @@ class Controller:
         compare with, no proof. `certify` proves.
     method : str
         By which it was made, in some words.
+    optimum : float or None
+        The least gamma of its inequalities; None where gamma is not one gain.
     misfit : float
         Of the functions of p in the model to the gains that were computed, relative.
     attempts : tuple of Attempt
@@ -37,18 +43,21 @@ class Controller:
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
-    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
-    >>> lag = LPVStateSpace.polynomial(
-    ...     A=[[[-1.0]], [[2.0]]], B=[[[1.0, 0.0, 1.0]]], C=[[[1.0]], [[0.0]], [[1.0]]],
-    ...     D=[[[0, 0, 0], [0, 0, 1], [0, 0.1, 0]]], scheduling=p,
-    ...     inputs=("w", "noise", "u"), outputs=("x", "effort", "y"))
+    >>> made = synthesis.output_feedback(plant)
+    >>> print(made.order, made.dt, made.discretize(0.02).dt)
+    1 None 0.02
+    >>> print(made.at(0.5).inputs, made.at(0.5).outputs)
+    ('y',) ('u',)
+    >>> proof = made.certify(search=None)
+    >>> proof.verified, proof.gamma < made.gamma * (1 + 1e-6)
+    (True, True)
     """
 
     model: LPVStateSpace
     plant: Plant
     gamma: float
     method: str
+    optimum: float | None = None
     misfit: float = 0.0
     attempts: tuple[Attempt, ...] = ()
 
@@ -79,7 +88,10 @@ class Controller:
         return l2_gain(self.closed(), rate, **options)
 
     def discretize(self, dt: float) -> Controller:
-        """Sampled by Tustin's rule at every frozen p, by functions of the same degree."""
+        """Sampled by Tustin's rule at every frozen p, functions of the same degree fitted to that.
+
+        Raises `InputError` for a controller that is sampled, or a period that is not positive.
+        """
         from synthesis.design.sampling import tustin
 
         model = tustin(self.model, dt)
@@ -93,9 +105,24 @@ class Controller:
 
         return reduced(self, order)
 
-    @property
+    @cached_property
+    def reasons(self) -> tuple[str, ...]:
+        """Why `optimum` says little of the controller, a sentence each: what no controller can lower,
+        at some frozen p, is all of it. Empty where nothing was found.
+        """
+        if self.optimum is None:
+            return ()
+        p, said = conditions(self.plant)
+        return decided(
+            self.plant.matrices(p), self.plant.channels, self.optimum, said, self.plant.dt
+        )
+
+    @cached_property
     def scheduled_controller(self) -> ScheduledController:
-        """For `symheli.fly`: a sampled controller from measured states to helicopter inputs."""
+        """What `symheli.fly` flies, where measurements and controls are signals of the helicopter.
+
+        Raises `InputError` for a continuous controller and for other signals and parameters.
+        """
         from symheli.flight import ScheduledController
 
         return ScheduledController(self.model)
@@ -104,14 +131,14 @@ class Controller:
         """States to zero, before a flight."""
         self.scheduled_controller.reset()
 
+    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> np.ndarray:
+        """Commands (4,), rad, at one sample; see `symheli.Controller`."""
+        return self.scheduled_controller.step(measured, reference, p)
+
     def __str__(self) -> str:
         names = ", ".join(s.name for s in self.model.parameters)
-        return (
+        first = (
             f"{self.method}: {self.order} states, {', '.join(self.model.inputs)} ->"
             f" {', '.join(self.model.outputs)} over {names}; gamma {self.gamma:.6g} in synthesis"
         )
-
-
-def gains_of(model: LPVStateSpace, p: np.ndarray) -> tuple[np.ndarray, ...]:
-    """A, B, C, D (K, ..) at p (K, m)."""
-    return tuple(model.matrices(p[:, 0] if len(model.parameters) == 1 else p))
+        return "\n".join([first, *self.reasons])

@@ -207,32 +207,56 @@ def _zero(mode: Mode, names: Channels, dt: float | None, *, dual: bool) -> str:
     )
 
 
+def decided(
+    family: Generalized, names: Channels, gamma: float, at: Sequence[str], dt: float | None = None
+) -> tuple[str, ...]:
+    """What of a level that a scheduled controller keeps no controller can lower at one of the frozen
+    models (leading axis), called `at`; and whether all of them keep it with the controls at rest.
+    """
+    each = [Generalized(*M) for M in zip(*family, strict=True)]
+    out: dict[str, list[str]] = {}
+    for P, label in zip(each, at, strict=True):
+        for sentence in _unreachable(P, names, gamma, dt):
+            out.setdefault(sentence, []).append(label)
+    said = [f"{_where(labels)}: {sentence}" for sentence, labels in out.items()]
+    idle = max(_at_rest(P, dt) for P in each)
+    return (*said, *_idle(idle, gamma))
+
+
 def decided_by(P: Generalized, names: Channels, gamma: float, dt: float | None = None) -> list[str]:
     """What of a level `gamma` no controller can lower, where that is all of it or more."""
-    out = []
+    return [*_unreachable(P, names, gamma, dt), *_idle(_at_rest(P, dt), gamma)]
+
+
+def _unreachable(P: Generalized, names: Channels, gamma: float, dt: float | None) -> list[str]:
     floor = unreachable_gain(P, dt)
     if gamma < floor.gamma * (1 - BELOW):
-        out.append(f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}")
-    elif gamma <= floor.gamma * (1 + CLOSE):
-        if floor.at_rest <= floor.gamma * (1 + CLOSE):
-            out.append(
-                f"gamma = {gamma:.6g} proves nothing: {_floor(floor, names)}, as it is with the"
-                " controls at rest; scale those signals or their weights, or give the"
-                " controls a lower price"
-            )
-        else:
-            out.append(
-                f"gamma = {gamma:.6g} is decided at one frequency: {_floor(floor, names)}; of the"
-                " loop elsewhere it says little"
-            )
-    A, B, C, D = P.A, P.B1, P.C1, P.D11
-    idle = norm(A, B, C, D, dt)[0]
-    if idle <= gamma * (1 + CLOSE):
-        out.append(
-            f"the gain is {idle:.6g} with the controls at rest: a controller for gamma ="
-            f" {gamma:.6g} need not do anything; scale performance and disturbances"
-        )
-    return out
+        return [f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}"]
+    if gamma > floor.gamma * (1 + CLOSE):
+        return []
+    if floor.at_rest <= floor.gamma * (1 + CLOSE):
+        return [
+            f"gamma = {gamma:.6g} proves nothing: {_floor(floor, names)}, as it is with the"
+            " controls at rest; scale those signals or their weights, or give the"
+            " controls a lower price"
+        ]
+    return [
+        f"gamma = {gamma:.6g} is decided at one frequency: {_floor(floor, names)}; of the"
+        " loop elsewhere it says little"
+    ]
+
+
+def _at_rest(P: Generalized, dt: float | None) -> float:
+    return norm(P.A, P.B1, P.C1, P.D11, dt)[0]
+
+
+def _idle(idle: float, gamma: float) -> list[str]:
+    if idle > gamma * (1 + CLOSE):
+        return []
+    return [
+        f"the gain is {idle:.6g} with the controls at rest: a controller for gamma ="
+        f" {gamma:.6g} need not do anything; scale performance and disturbances"
+    ]
 
 
 def _floor(floor: Unreachable, names: Channels) -> str:

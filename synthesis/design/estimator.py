@@ -149,7 +149,7 @@ def estimator(
     raise failed(plant, attempts)
 
 
-def _recover(coordinates: Coordinates, existence: Existence, found: Found) -> Gains | None:
+def _recover(coordinates: Coordinates, existence: Existence, found: Found) -> Gains:
     X = existence.X
     assert X is not None  # noqa: S101
 
@@ -158,11 +158,10 @@ def _recover(coordinates: Coordinates, existence: Existence, found: Found) -> Ga
         at, x = coordinates.at(p).dual, X.at(found.coefficients, p)
         if coordinates.dt is not None:
             F = state_gain(at, x, x, found.gamma)
-            assert F is not None  # noqa: S101 - it exists where the inequalities hold
         else:
             nothing = np.zeros((len(p), at.B2.shape[-1], at.D21.shape[-2]))
-            F = control_gain(at, x, nothing, found.gamma)
-        return -np.linalg.solve(x, np.swapaxes(F, 1, 2))
+            F = control_gain(at, x, nothing, found.gamma) @ np.linalg.inv(x)
+        return -np.swapaxes(F, 1, 2)
 
     return gains
 

@@ -88,6 +88,6 @@ def lqg(P: Generalized, dt: float | None) -> Matrices | None:
 
 def given_direct_way(D22: Array, A: Array, B: Array, C: Array, D: Array) -> Matrices:
     """The controller of a plant with D22 from that of the plant without: it works on y - D22 u."""
-    N = np.linalg.inv(np.eye(len(D)) + D @ D22)
+    N = np.linalg.inv(np.eye(D.shape[-2]) + D @ D22)
     NC, ND = N @ C, N @ D
     return A - B @ D22 @ NC, B - B @ D22 @ ND, NC, ND

@@ -7,6 +7,7 @@ than it need be. Every inequality is written as in the paper and imposed by Bern
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -439,7 +440,9 @@ def _solve(problem: Any, solver: Solver) -> tuple[str, float]:
     from cvxpy.error import SolverError as CvxpyError
 
     try:
-        problem.solve(solver=solver.name, **solver.options)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # the status says that it is inaccurate
+            problem.solve(solver=solver.name, **solver.options)
     except CvxpyError as error:
         return str(error), math.inf
     solved = problem.status in ("optimal", "optimal_inaccurate")

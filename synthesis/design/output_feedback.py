@@ -11,9 +11,9 @@ import numpy as np
 
 from symheli.errors import InputError, SynthesisError
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
-from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certificate import Attempt
 from synthesis.design.cells import degrees_of
+from synthesis.design.conditions import conditions
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.diagnosis import reasons, unpriced
@@ -155,7 +155,7 @@ def _nominal(
             break
     if best is None:
         raise failed(plant, attempts)
-    return replace(best, attempts=tuple(attempts))
+    return replace(best, optimum=_gamma(start), attempts=tuple(attempts))
 
 
 def coordinates_of(plant: Plant, channel: float) -> Coordinates:
@@ -189,7 +189,7 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
     ):
         if wanted and not getattr(named, group):
             raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
-    at = plant.matrices(scattered(plant))
+    at = plant.matrices(conditions(plant)[0])
     found: list[str] = []
     if controls:
         found += unpriced(at.D12, named.controls)
@@ -199,18 +199,9 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
         raise InputError("; ".join(found))
 
 
-def scattered(plant: Plant) -> Array:
-    """Some p all over the box, as `Plant.matrices` takes them."""
-    return lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.nominal.box)
-
-
 def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
     """The error that says why: modes, directions and weights, and every program that was tried."""
-    p = scattered(plant)
-    names = [s.name for s in plant.parameters]
-    said = [
-        ", ".join(f"{n} = {v:g}" for n, v in zip(names, np.atleast_1d(q), strict=True)) for q in p
-    ]
+    p, said = conditions(plant)
     least = min((a.bound for a in attempts), default=math.inf)
     why = reasons(
         plant.matrices(p),
@@ -230,23 +221,20 @@ def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
 
 def _recover(
     coordinates: Coordinates, existence: Existence, found: Found
-) -> Callable[[Array], Array] | None:
+) -> Callable[[Array], Array]:
     X, Y, S = existence.X, existence.Y, existence.S
     assert X is not None  # noqa: S101 - all were asked for
     assert Y is not None  # noqa: S101
     assert S is not None  # noqa: S101
     parameters = coordinates.parameters
 
-    def gains(p: Array) -> Array | None:
+    def gains(p: Array) -> Array:
         at = coordinates.at(p)
         x, y, s = (u.at(found.coefficients, p) for u in (X, Y, S))
         if coordinates.dt is not None:
-            transformed = joined(at, x, y, s, found.gamma)
-        else:
-            transformed = split(at, x, y, found.gamma)
-        if transformed is None:
-            return None
-        constant_x = not X.moves
+            return packed(joined(at, x, y, s, found.gamma))
+        transformed = split(at, x, y, found.gamma)
+        moving = None
         if X.moves and Y.moves:
             # dX/dt along the known motion; zero where p stands still
             known = [
@@ -255,14 +243,9 @@ def _recover(
             ]
             (motion,) = motions(parameters, p, coordinates.time, known)
             moving = X.moving(found.coefficients, p, motion)
-            transformed = transformed._replace(A=transformed.A - moving @ y)
-            constant_x = True
-        return packed(controller(at, x, y, transformed, constant_x=constant_x))
+        return packed(controller(at, x, y, transformed, constant_x=not X.moves, moving_x=moving))
 
-    low, high = np.array([(s.low, s.high) for s in parameters]).T
-    if gains(low + np.linspace(0.0, 1.0, 13)[:, None] * (high - low)) is None:
-        return None
-    return gains  # type: ignore[return-value]
+    return gains
 
 
 def packed(gains: Gains) -> Array:

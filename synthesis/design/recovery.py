@@ -3,13 +3,15 @@
 In the variables A~, B~, C~ of Scherer, Gahinet and Chilali (1997) the inequality of the closed loop
 splits into that of Y and that of X once its corner is made zero. C~ minimises the one and B~ the
 other, whatever dY/dt or dX/dt is, so that the gains know p alone (Gahinet 1996; Apkarian and Adams
-1998, sec. IV). In discrete time the central solution of the whole inequality is taken (Iwasaki and
-Skelton 1994). Then with N M' = I - X Y
+1998, sec. IV). Then with N M' = I - X Y
 
     C_k = (C~ - D_k C2 Y) M'^-1,  B_k = N^-1 (B~ - X B2 D_k),
-    A_k = N^-1 (A~ - X (A - B2 D_k C2) Y - B~ C2 Y - X B2 C~ + X dY/dt + N dM'/dt) M'^-1,
+    A_k = N^-1 (A~ - X (A - B2 D_k C2) Y - B~ C2 Y - X B2 C~ + X dY/dt + N dM'/dt) M'^-1.
 
-where the last two terms cancel if X is constant and N is, or Y is and M is.
+The state of the controller is an estimate of the plant's, in whose coordinates its matrices stay of
+the size of the plant's even where X or Y tend to infinity, as X does where the measurements tell the
+disturbance: N = -X with M' = Y - X^-1, or M' = Y with N = Y^-1 - X. The last two terms cancel in the
+first case if X is constant, in the second if Y is.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from synthesis.design.contraction import contraction
 from synthesis.design.generalized import Generalized
+from synthesis.design.linear_quadratic import given_direct_way
 
 Array = np.ndarray
 
@@ -75,38 +79,39 @@ def control_gain(plant: Generalized, Y: Array, D: Array, gamma: float) -> Array:
 
 
 def direct(D11: Array, D12: Array, D21: Array, gamma: float) -> Array:
-    """D (K, nu, ny) with |D11 + D12 D D21| < gamma; zero where that is enough (Parrott 1978)."""
+    """D (K, nu, ny) with |D11 + D12 D D21| < gamma; zero where that is enough."""
     nothing = np.zeros((len(D11), D12.shape[-1], D21.shape[-2]))
     if float(np.linalg.norm(D11, 2, axis=(1, 2)).max()) < 0.9 * gamma:
         return nothing
-    U, s, _ = np.linalg.svd(D12)
-    _, t, V = np.linalg.svd(D21)
-    nu, ny = D12.shape[-1], D21.shape[-2]
-    inner = _t(U) @ D11 @ _t(V)
-    b, c, d = inner[:, :nu, ny:], inner[:, nu:, :ny], inner[:, nu:, ny:]
-    best = -b @ np.linalg.solve(_identity(gamma**2, d.shape[-1], d) - _t(d) @ d, _t(d) @ c)
-    del s, t
-    return (
-        np.linalg.pinv(D12)
-        @ U[:, :, :nu]
-        @ (best - inner[:, :nu, :ny])
-        @ V[:, :ny]
-        @ np.linalg.pinv(D21)
-    )
+    return contraction(D11, D12, D21, gamma)
 
 
 def controller(
-    plant: Generalized, X: Array, Y: Array, found: Transformed, *, constant_x: bool
+    plant: Generalized,
+    X: Array,
+    Y: Array,
+    found: Transformed,
+    *,
+    constant_x: bool,
+    moving_x: Array | None = None,
 ) -> Gains:
-    """Its matrices, with N = I where X is constant, M = I where Y is."""
+    """Its matrices, by N = -X where X is `constant_x`, else by M' = Y; with D22 in the loop.
+
+    With the first X may also move, if `moving_x` (K, n, n), dX/dt, is known.
+    """
     A, _, B2, _, C2, *_ = plant
     At, Bt, Ct, D = found
     inner = At - X @ (A - B2 @ D @ C2) @ Y - Bt @ C2 @ Y - X @ B2 @ Ct
-    inverse = np.linalg.inv(np.eye(A.shape[-1]) - X @ Y)
     into, out = Bt - X @ B2 @ D, Ct - D @ C2 @ Y
-    if constant_x:
-        return Gains(inner @ inverse, into, out @ inverse, D)
-    return Gains(inverse @ inner, inverse @ into, out, D)
+    if constant_x or moving_x is not None:
+        N, M = -X, Y - np.linalg.inv(X)
+        if moving_x is not None:
+            inner = inner - moving_x @ np.linalg.inv(X)
+    else:
+        N, M = np.linalg.inv(Y) - X, Y
+    back = np.linalg.inv(M)
+    gains = np.linalg.solve(N, inner @ back), np.linalg.solve(N, into), out @ back, D
+    return Gains(*given_direct_way(plant.D22, *gains))
 
 
 def _identity(factor: float, n: int, like: Array) -> Array:

@@ -1,55 +1,54 @@
 """The controller that X and Y promise in discrete time, at given p.
 
-With the state of plant and controller in the variables of Scherer, Gahinet and Chilali (1997), and
-S <= Y(p(k+1)) for every next p, the inequality of the closed loop is Theta + Gamma K Lambda + its
-transpose < 0, whose central solution (Iwasaki and Skelton 1994) is
-
-    K = -r Gamma' Phi Lambda' (Lambda Phi Lambda')^-1,  Phi = (r Gamma Gamma' - Theta)^-1 > 0.
+Its state is an estimate of the plant's, as in `recovery`: in the coordinates (x - x_k, x_k) the
+storage function is that of X and of W^-1, W = Y - X^-1. Where these are identities, with S <=
+Y(p(k+1)) in place of Y after the step, and gains in units of gamma, the inequality of the closed
+loop says that [A B; C D] of the loop, which is known but for left K right, is a contraction.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from synthesis.design.contraction import contraction
 from synthesis.design.generalized import Generalized
-from synthesis.design.recovery import Transformed
+from synthesis.design.linear_quadratic import given_direct_way
+from synthesis.design.recovery import Gains
 
 Array = np.ndarray
 
-CENTRED = 2.0
-"""r is this much larger than the least that will do."""
 
-
-def joined(plant: Generalized, X: Array, Y: Array, S: Array, gamma: float) -> Transformed | None:
-    """Of the whole inequality; None where no r is large enough."""
-    A, B1, B2, C1, C2, D11, D12, D21, _ = plant
+def joined(plant: Generalized, X: Array, Y: Array, S: Array, gamma: float) -> Gains:
+    """Of the whole inequality."""
+    A, B1, B2, C1, C2, D11, D12, D21, D22 = plant
     K, n = len(A), A.shape[-1]
-    nu, ny = B2.shape[-1], C2.shape[-2]
-    one, zero = np.broadcast_to(np.eye(n), (K, n, n)), np.zeros((K, n, n))
+    inverse = np.linalg.inv(X)
+    root = np.linalg.cholesky(X)
+    now, after = (np.linalg.cholesky(Z - inverse) for Z in (Y, S))
+    error, ahead = _t(root), np.linalg.inv(after)  # of x - x_k and of x_k after the step
+    before = np.concatenate([np.linalg.inv(error), now], axis=-1)  # x of both before it
+    zero, none = np.zeros((K, n, n)), np.zeros((K, n, B2.shape[-1]))
     found = _central(
-        np.block([[A @ Y, A], [zero, X @ A]]),
-        np.concatenate([B1, X @ B1], axis=-2),
-        np.concatenate([C1 @ Y, C1], axis=-1),
+        np.concatenate([error @ A @ before, np.zeros((K, n, 2 * n))], axis=-2),
+        np.concatenate([error @ B1, np.zeros((K, n, B1.shape[-1]))], axis=-2),
+        C1 @ before,
         D11,
-        np.block([[zero, B2], [one, np.zeros((K, n, nu))]]),
-        D12,
-        np.block([[one, zero], [np.zeros((K, ny, n)), C2]]),
-        D21,
-        np.block([[Y, one], [one, X]]),
-        np.block([[S, one], [one, X]]),
+        np.block([[-error, error @ B2], [ahead, none]]),
+        np.concatenate([np.zeros((K, C1.shape[-2], n)), D12], axis=-1),
+        np.concatenate([np.concatenate([zero, now], axis=-1), C2 @ before], axis=-2),
+        np.concatenate([np.zeros((K, n, B1.shape[-1])), D21], axis=-2),
         gamma,
     )
-    if found is None:
-        return None
-    return Transformed(found[:, :n, :n], found[:, :n, n:], found[:, n:, :n], found[:, n:, n:])
+    gains = found[:, :n, :n], found[:, :n, n:], found[:, n:, :n], found[:, n:, n:]
+    return Gains(*given_direct_way(D22, *gains))
 
 
-def state_gain(plant: Generalized, Y: Array, S: Array, gamma: float) -> Array | None:
-    """C~ (K, nu, n) of u = C~ Y^-1 x."""
+def state_gain(plant: Generalized, Y: Array, S: Array, gamma: float) -> Array:
+    """F (K, nu, n) of u = F x."""
     A, B1, B2, C1, _, D11, D12, *_ = plant
-    K, n = len(A), A.shape[-1]
-    one, blind = np.broadcast_to(np.eye(n), (K, n, n)), np.zeros((K, n, B1.shape[-1]))
-    return _central(A @ Y, B1, C1 @ Y, D11, B2, D12, one, blind, Y, S, gamma)
+    now, ahead = np.linalg.cholesky(Y), np.linalg.inv(np.linalg.cholesky(S))
+    blind = np.zeros((len(A), A.shape[-1], B1.shape[-1]))
+    return _central(ahead @ A @ now, ahead @ B1, C1 @ now, D11, ahead @ B2, D12, now, blind, gamma)
 
 
 def _central(
@@ -61,28 +60,19 @@ def _central(
     left_z: Array,
     right: Array,
     right_w: Array,
-    now: Array,
-    after: Array,
     gamma: float,
-) -> Array | None:
-    """K of the loop A + left K right, B + left K right_w, C + left_z K right, D + left_z K right_w;
-    of `left` the last columns are those of `left_z`, of `right` the last rows those of `right_w`.
+) -> Array:
+    """K of the loop A + left K right, B + left K right_w, C + left_z K right, D + left_z K right_w,
+    the storage before and after the step the identity.
     """
-    K, m, nw, nz = len(A), A.shape[-1], B.shape[-1], C.shape[-2]
-    a, x = slice(0, m), slice(m, 2 * m)
-    w, z = slice(2 * m, 2 * m + nw), slice(2 * m + nw, 2 * m + nw + nz)
-    Theta = np.zeros((K, z.stop, z.stop))
-    for rows, columns, block in ((a, x, A), (a, w, B), (z, x, C), (z, w, D)):
-        Theta[:, rows, columns], Theta[:, columns, rows] = block, np.swapaxes(block, 1, 2)
-    Theta[:, a, a], Theta[:, x, x] = -after, -now
-    Theta[:, w, w], Theta[:, z, z] = -gamma * np.eye(nw), -gamma * np.eye(nz)
-    Gamma, Lambda = np.zeros((K, z.stop, left.shape[-1])), np.zeros((K, right.shape[-2], z.stop))
-    Gamma[:, a], Gamma[:, z, left.shape[-1] - left_z.shape[-1] :] = left, left_z
-    Lambda[:, :, x], Lambda[:, right.shape[-2] - right_w.shape[-2] :, w] = right, right_w
-    spread, turned = Gamma @ np.swapaxes(Gamma, 1, 2), np.swapaxes(Lambda, 1, 2)
-    for r in float(np.abs(Theta).max()) * 2.0 ** np.arange(-6, 40):
-        if float(np.linalg.eigvalsh(r * spread - Theta).min()) > 0:
-            back = np.linalg.solve(CENTRED * r * spread - Theta, turned)
-            gain = np.swapaxes(Gamma, 1, 2) @ back @ np.linalg.inv(Lambda @ back)
-            return -CENTRED * r * gain
-    return None
+    root = np.sqrt(gamma)
+    return contraction(
+        np.block([[A, B / root], [C / root, D / gamma]]),
+        np.concatenate([left, left_z / root], axis=-2),
+        np.concatenate([right, right_w / root], axis=-1),
+        1.0,
+    )
+
+
+def _t(M: Array) -> Array:
+    return np.swapaxes(M, -1, -2)

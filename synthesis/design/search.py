@@ -153,7 +153,7 @@ class Design:
         return self.found.gamma * self.coordinates.channel
 
 
-Recover = Callable[[Coordinates, Existence, Found], Gains | None]
+Recover = Callable[[Coordinates, Existence, Found], Gains]
 
 
 def least(
@@ -187,6 +187,8 @@ def settled(
 ) -> Iterator[Design]:
     """Designs at ever larger multiples of the least gamma, whose frozen `loop` keeps it."""
     coordinates, existence, lowest = start
+    if not math.isfinite(lowest.gamma):
+        return
     for factor in back_off:
         gamma = factor * lowest.gamma
         for found in existence.widest(gamma, solver):
@@ -209,9 +211,14 @@ def settled(
 
 
 def frozen_gain(coordinates: Coordinates, gains: Gains, loop: Loop) -> float:
-    """Of the loop at some frozen p, scaled; inf where one is unstable."""
-    low, high = np.array([(s.low, s.high) for s in coordinates.parameters]).T
+    """Of the loop at some frozen p, scaled, where a parameter that is the rate of another is zero;
+    inf where one is unstable.
+    """
+    parameters = coordinates.parameters
+    low, high = np.array([(s.low, s.high) for s in parameters]).T
     p = low + np.linspace(0.0, 1.0, 7)[:, None] * (high - low)
+    rates = [s.name in {other.rate for other in parameters} for s in parameters]
+    p[:, rates] = np.clip(0.0, low, high)[rates]
     A, B, C, D = loop(coordinates, gains, p)
     return max(norm(A[i], B[i], C[i], D[i], coordinates.dt, 1e-6)[0] for i in range(len(p)))
 

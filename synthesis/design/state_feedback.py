@@ -87,7 +87,8 @@ def state_feedback(
         made = in_plant_units(
             plant, design.coordinates, design.gains, design.gamma, f"state feedback, {shape}"
         )
-        return replace(made, attempts=tuple(attempts))
+        optimum = start[0].channel * start[2].gamma
+        return replace(made, optimum=optimum, attempts=tuple(attempts))
     raise failed(plant, attempts)
 
 
@@ -105,7 +106,7 @@ def _check_measured(plant: Plant) -> None:
 
 def _recover(
     coordinates: Coordinates, existence: Existence, found: Found
-) -> Callable[[Array], Array] | None:
+) -> Callable[[Array], Array]:
     Y, S = existence.Y, existence.S
     assert Y is not None  # noqa: S101 - it was asked for
     assert S is not None  # noqa: S101
@@ -114,10 +115,9 @@ def _recover(
         at, y = coordinates.at(p), Y.at(found.coefficients, p)
         if coordinates.dt is not None:
             F = state_gain(at, y, S.at(found.coefficients, p), found.gamma)
-            assert F is not None  # noqa: S101 - found in the middle
         else:
             nothing = np.zeros((len(p), at.B2.shape[-1], at.D21.shape[-2]))
-            F = control_gain(at, y, nothing, found.gamma)
-        return F @ np.linalg.inv(at.C2 @ y)
+            F = control_gain(at, y, nothing, found.gamma) @ np.linalg.inv(y)
+        return F @ np.linalg.inv(at.C2)
 
     return gains

@@ -1,0 +1,81 @@
+"""Controllers with fewer states."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scheduled_plants import spring
+
+from symheli import LPVStateSpace
+from symheli.errors import InputError, SynthesisError
+from synthesis import output_feedback
+
+
+@pytest.fixture(scope="module")
+def made():
+    return output_feedback(spring())
+
+
+def extended(made, turned):
+    """With a third state that the measurements do not move, in turned coordinates."""
+    m = made.model
+    one = np.zeros((m.basis.size, 3, 3))
+    one[:, :2, :2] = m.A
+    one[0, 2, 2] = -1.0
+    one[0, 1, 2] = 0.5
+    B = np.concatenate([m.B, np.zeros((m.basis.size, 1, m.B.shape[2]))], axis=1)
+    C = np.concatenate([m.C, np.ones((m.basis.size, m.C.shape[1], 1))], axis=2)
+    T, back = turned, np.linalg.inv(turned)
+    model = LPVStateSpace(
+        m.basis,
+        back @ one @ T,
+        back @ B,
+        C @ T,
+        m.D,
+        m.parameters,
+        ("k1", "k2", "k3"),
+        m.inputs,
+        m.outputs,
+    )
+    return replace(made, model=model)
+
+
+def test_states_that_nothing_moves_are_left_out_exactly(made):
+    """The transfer function stays what it was, in whatever coordinates."""
+    turned = np.random.default_rng(0).standard_normal((3, 3))
+    more = extended(made, turned)
+    less = more.reduce(2)
+    assert less.order == 2
+    assert "2 of 3 states kept" in less.method
+    omega = np.geomspace(0.1, 30, 9)
+    for p in (0.0, 0.35, 1.0):
+        K = made.at(p).frequency_response(omega)
+        # the Gramian of what is not moved is rounding of one, and its root is taken
+        np.testing.assert_allclose(
+            less.at(p).frequency_response(omega), K, atol=1e-5 * np.abs(K).max()
+        )
+
+
+def test_one_state_less_still_holds_every_frozen_loop(made):
+    less = made.reduce(1)
+    assert less.order == 1
+    for p in np.linspace(0, 1, 7):
+        assert less.closed().at(p).is_stable()
+    assert less.certify(search=None).gamma >= made.optimum * (1 - 1e-6)
+
+
+def test_as_many_states_as_there_are_is_the_same_controller(made):
+    assert made.reduce(2) is made
+    assert made.reduce(7) is made
+
+
+@pytest.mark.parametrize("order", [-1, 1.5, True, "1"])
+def test_an_order_is_a_whole_number(made, order):
+    with pytest.raises(InputError, match="order: expected an integer >= 0"):
+        made.reduce(order)
+
+
+def test_a_loop_that_is_not_stable_is_not_reduced(made):
+    wrong = replace(made, model=replace(made.model, C=-40 * made.model.C))
+    with pytest.raises(SynthesisError, match="not stable at every frozen p"):
+        wrong.reduce(1)

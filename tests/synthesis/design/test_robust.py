@@ -1,0 +1,61 @@
+"""Output feedback for every model of a set."""
+
+import numpy as np
+import pytest
+from scheduled_plants import RATE, spring
+
+from symheli import LPVStateSpace, Scheduling, UncertainStateSpace
+from synthesis import Plant, l2_gain, output_feedback
+from synthesis.worst.frozen import norm
+
+BACK_OFF = 1.02
+
+
+def uncertain(bound):
+    """The spring with damping that is known up to `bound`: v' gains d, |d| <= bound |v|."""
+    model = LPVStateSpace.polynomial(
+        [[[0, 1], [-1, -0.4]], [[0, 0], [-2, 0.6]]],
+        [[[0, 0, 0, 0], [1, 0, 1, 1]]],
+        [[[1, 0], [0, 0], [1, 0], [0, 1]]],
+        [[[0, 0, 0, 0], [0, 0, 0.3, 0], [0, 0.1, 0, 0], [0, 0, 0, 0]]],
+        Scheduling("p", "1", 0.0, 1.0, rate=RATE),
+        states=["x", "v"],
+        inputs=["w", "n", "u", "d"],
+        outputs=["z", "z_u", "y", "v_d"],
+    )
+    return Plant(
+        UncertainStateSpace(model, ["d"], ["v_d"], bound, 1.0, "by choice"),
+        disturbances=["w", "n"],
+        performance=["z", "z_u"],
+        controls=["u"],
+        measurements=["y"],
+    )
+
+
+def test_a_set_of_one_model_is_that_model():
+    alone = output_feedback(spring(), X=0, Y=2, back_off=BACK_OFF).gamma
+    assert output_feedback(uncertain(0.0), X=0, Y=2, back_off=BACK_OFF).gamma == pytest.approx(
+        alone, rel=1e-4
+    )
+
+
+@pytest.mark.slow
+def test_every_model_of_the_set_keeps_the_gain():
+    made = output_feedback(uncertain(0.1), X=0, Y=2, back_off=BACK_OFF)
+    loop = made.closed()
+    assert isinstance(loop, UncertainStateSpace)
+    proof = l2_gain(loop, search=None)
+    assert proof.verified
+    assert proof.gamma <= made.gamma * (1 + 1e-3)  # of functions fitted to the gains
+    for delta in loop.perturbations(20, seed=0):
+        one = loop.perturbed(delta)
+        for p in (0.0, 0.5, 1.0):
+            assert norm(*one.matrices(p))[0] <= proof.gamma * (1 + 1e-9)
+
+
+def test_the_larger_the_set_the_larger_the_gain():
+    gains = [
+        output_feedback(uncertain(b), X=0, Y=2, back_off=BACK_OFF).gamma for b in (0.0, 0.05, 0.15)
+    ]
+    assert gains == sorted(gains)
+    assert np.all(np.diff(gains) > 0)
