@@ -380,6 +380,33 @@ class LPVStateSpace:
             return model
         return model.with_residuals(origin.nodes, measured(*origin.matrices))
 
+    def adjoint(self) -> LPVStateSpace:
+        """dx/dt = A(p)' x + C(p)' u, y = B(p)' x + D(p)' u: outputs become inputs.
+
+        Run backwards in time it is the adjoint of the model as an operator: over all p(t) within
+        the range and rates, which are the same backwards, both have the same L2 gain. What p is
+        frozen at has the same frequency response, transposed. Raises `InputError` where the rate of
+        a parameter is another one, which backwards it is not.
+        """
+        for s in self.parameters:
+            if isinstance(s.rate, str):
+                raise InputError(
+                    f"backwards the rate of {s.name} is not {s.rate}: give a number,"
+                    " .with_rate(...)"
+                )
+
+        def turned(A: Array, B: Array, C: Array, D: Array) -> Matrices:
+            return Matrices(*(np.swapaxes(M, -1, -2) for M in (A, C, B, D)))
+
+        own = turned(self.A, self.B, self.C, self.D)
+        outputs, inputs = self.outputs, self.inputs
+        model = replace(
+            self, **own._asdict(), inputs=outputs, outputs=inputs, trim=None, residuals=None
+        )
+        if (origin := self.fitted_to) is None:
+            return model
+        return model.with_residuals(origin.nodes, turned(*origin.matrices))
+
     def discretize(
         self, dt: float, *, degree: int | Sequence[int] | None = None, nodes: int | None = None
     ) -> LPVStateSpace:

@@ -11,7 +11,7 @@ ROUNDING = 1e-6
 
 
 def contraction(M: Array, left: Array, right: Array, level: float) -> Array:
-    """K (N, k, l) with |M + left K right| <= level, or, where none is, nearly the least that can be;
+    """K (N, k, l) with |M + left K right| <= level, or, where none is, nearly the least there is;
     `left` (N, r, k) of full column, `right` (N, l, c) of full row rank.
 
     References

@@ -8,15 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symheli.lpv import LinearModel, LPVStateSpace
+from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.named_vector import NamedVector
 from synthesis.certificate import Attempt, Certificate
 from synthesis.design.conditions import conditions
 from synthesis.design.diagnosis import decided
+from synthesis.forms import Spline
+from synthesis.program.cone_program import LYAPUNOV
 
 if TYPE_CHECKING:
     from symheli.flight import ScheduledController
     from synthesis.design.plant import Plant
+
+
+ADJOINT = (
+    "proven of the adjoint of the loop, A(p)', C(p)', B(p)', D(p)': over all motions of p within its"
+    " range and rates, which are the same backwards, its gain is that of the loop"
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -40,6 +48,8 @@ class Controller:
         Of the functions of p in the model to the gains that were computed, relative.
     attempts : tuple of Attempt
         Every program that was solved.
+    by_adjoint : bool
+        Whether `certify` looks at the adjoint of the loop.
 
     Examples
     --------
@@ -60,6 +70,7 @@ class Controller:
     optimum: float | None = None
     misfit: float = 0.0
     attempts: tuple[Attempt, ...] = ()
+    by_adjoint: bool = False
 
     def at(self, *p: float) -> LinearModel:
         """The controller frozen at p, one value a parameter."""
@@ -80,12 +91,21 @@ class Controller:
         return self.plant.close(self.model)
 
     def certify(self, rate: Any = None, **options: Any) -> Certificate:
-        """Its proven gain: `synthesis.l2_gain` of the closed loop, which knows nothing of how the
-        controller was made.
+        """Its proven gain: `synthesis.l2_gain` of the closed loop, or of the adjoint of that, which
+        knows nothing of how the controller was made.
+
+        Where Y(p) moved in the synthesis the inverse of P(p) is a polynomial as simple as Y, and
+        not P: then the adjoint is analysed, which has the same gain.
         """
         from synthesis.analysis.l2_gain import l2_gain
 
-        return l2_gain(self.closed(), rate, **options)
+        loop = self.closed()
+        tied = any(isinstance(s.rate, str) for s in loop.parameters)
+        if not self.by_adjoint or tied or isinstance(loop, UncertainStateSpace):
+            return l2_gain(loop, rate, **options)
+        if len(loop.parameters) == 1:
+            options = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV} | options
+        return l2_gain(loop.adjoint(), rate, **options).resting_on([ADJOINT])
 
     def discretize(self, dt: float) -> Controller:
         """Sampled by Tustin's rule at every frozen p, functions of the same degree fitted to that.
@@ -107,8 +127,8 @@ class Controller:
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
-        """Why `optimum` says little of the controller, a sentence each: what no controller can lower,
-        at some frozen p, is all of it. Empty where nothing was found.
+        """Why `optimum` says little of the controller, a sentence each: what no controller can
+        lower, at some frozen p, is all of it. Empty where nothing was found.
         """
         if self.optimum is None:
             return ()

@@ -33,7 +33,7 @@ GROWS = 1.03
 """A larger bound that separates X Y from I by less than this factor more is not worth it."""
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
-SETTLED = (1e-5, 1e-8)
+SETTLED = (1e-3, 1e-5, 1e-8)
 """The same once g is settled, tried in turn: at a block that is singular gains have no bound."""
 
 
