@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 
 ADJOINT = (
-    "proven of the adjoint of the loop, A(p)', C(p)', B(p)', D(p)': over all motions of p within its"
-    " range and rates, which are the same backwards, its gain is that of the loop"
+    "proven of the adjoint of the loop, A(p)', C(p)', B(p)', D(p)': over all motions of p within"
+    " its range and rates, which are the same backwards, its gain is that of the loop"
 )
 
 
