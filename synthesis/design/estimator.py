@@ -178,11 +178,8 @@ def _observer(
     """The observer, its error, and how far its gain is from what was computed."""
     rows, columns = c.right / math.sqrt(c.time), c.measurements
 
-    def physical(p: Array) -> Array:
-        return rows @ gains(p) * columns
-
-    scale = (np.linalg.norm(rows, axis=1), 1 / columns)
-    basis, coefficients, misfit = fitted(physical, plant.parameters, ACCURACY, scale)
+    basis, scaled, misfit = fitted(gains, plant.parameters, ACCURACY)
+    coefficients = rows @ scaled * columns
     at: Any = plant.functions()
     box = plant.nominal.box
     L = MatrixFunction(basis, -coefficients, box)
