@@ -85,6 +85,7 @@ __all__ = [
     "chordal_distance",
     "connect",
     "feedback",
+    "lagged",
     "lower_feedback",
     "nu_gap",
     "nu_gaps",

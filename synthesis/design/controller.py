@@ -49,7 +49,7 @@ class Controller:
     >>> print(made.at(0.5).inputs, made.at(0.5).outputs)
     ('y',) ('u',)
     >>> proof = made.certify(search=None)
-    >>> proof.verified, proof.gamma < made.gamma * (1 + 1e-6)
+    >>> proof.verified, bool(proof.gamma < made.gamma * (1 + 1e-6))
     (True, True)
     """
 

@@ -104,7 +104,9 @@ def test_of_a_constant_plant_the_gain_is_known():
     """x' = -x + w1, y = x + w2, z = x: with F for x the least gain g solves a Riccati equation whose
     solution stays positive down to g = 1/sqrt(2).
     """
-    model = LinearModel([[-1.0]], [[1, 0]], [[1], [1]], [[0, 0], [0, 1]], ["x"], ["w1", "w2"], ["z", "y"])
+    model = LinearModel(
+        [[-1.0]], [[1, 0]], [[1], [1]], [[0, 0], [0, 1]], ["x"], ["w1", "w2"], ["z", "y"]
+    )
     plant = Plant(model, disturbances=["w1", "w2"], performance=["z"], measurements=["y"])
     # 1 + c^2 - 1/g^2 >= 0 with a = c = 1: sqrt(a^2 + 1 - 1/g^2) is real
     assert estimator(plant, back_off=BACK_OFF).gamma / BACK_OFF == pytest.approx(
