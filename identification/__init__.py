@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     )
     from identification.judge.criterion import Criterion
     from identification.judge.dependence import DependenceReport, dependence_report
+    from identification.judge.design_model import design_model
     from identification.judge.fit_for_control import FitForControl, fit_for_control
     from identification.judge.frequency_response import FrequencyResponse, frequency_response
     from identification.judge.frozen_models import FrozenModels, frozen_models, pole_miss
@@ -114,6 +115,7 @@ _ROOMS = {
     ),
     "identification.judge.criterion": "Criterion",
     "identification.judge.dependence": "DependenceReport dependence_report",
+    "identification.judge.design_model": "design_model",
     "identification.judge.fit_for_control": "FitForControl fit_for_control",
     "identification.judge.frequency_response": "FrequencyResponse frequency_response",
     "identification.judge.frozen_models": "FrozenModels frozen_models pole_miss",
@@ -210,6 +212,7 @@ __all__ = [
     "choose_experiments",
     "compare_experiments",
     "dependence_report",
+    "design_model",
     "excitation_report",
     "fit",
     "fit_for_control",

@@ -65,6 +65,16 @@ class SynthesisError(SymheliError):
         self.reasons = reasons
 
 
+class NotFitError(SymheliError):
+    """An identified model must not carry a design; `reasons` are the criteria that decide it."""
+
+    def __init__(self, message: str, reasons: tuple[str, ...] = ()):
+        super().__init__(
+            "\n  ".join([f"{message}:", *reasons]) + "\nforce=True designs on it nevertheless"
+        )
+        self.reasons = reasons
+
+
 class ExcitationError(SymheliError):
     """The data cannot determine what was asked of them; `report` says which direction is
     missing.

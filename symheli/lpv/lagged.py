@@ -1,4 +1,4 @@
-"""A parameter seen through a lag: how fast it is followed is then known, and nothing differentiated."""
+"""A parameter seen through a lag: how fast that moves is known, and nothing is differentiated."""
 
 from __future__ import annotations
 

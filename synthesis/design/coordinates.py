@@ -85,10 +85,16 @@ class Coordinates:
         root, L, R = np.sqrt(self.time), self.left, self.right
         u, y = self.controls, self.measurements[:, None]
         return Generalized(
-            self.time * L @ A @ R, root * L @ B1, root * L @ B2 * u,
-            root * C1 @ R / self.channel, root * y * C2 @ R,
-            D11 / self.channel, D12 * u / self.channel, y * D21, y * D22 * u,
-        )  # fmt: skip
+            self.time * L @ A @ R,
+            root * L @ B1,
+            root * L @ B2 * u,
+            root * C1 @ R / self.channel,
+            root * y * C2 @ R,
+            D11 / self.channel,
+            D12 * u / self.channel,
+            y * D21,
+            y * D22 * u,
+        )
 
     @property
     def breaks(self) -> list[list[float]]:

@@ -171,7 +171,8 @@ def _observer(
 
     scale = (np.linalg.norm(rows, axis=1), 1 / columns)
     basis, coefficients, misfit = fitted(physical, plant.parameters, ACCURACY, scale)
-    at, box = plant.functions(), plant.nominal.box
+    at: Any = plant.functions()
+    box = plant.nominal.box
     L = MatrixFunction(basis, -coefficients, box)
     zero = MatrixFunction.constant(np.zeros((at.C1.shape[0], at.C2.shape[0])), box)
     A = at.A + L @ at.C2
@@ -189,7 +190,7 @@ def _observer(
 def _model(
     plant: Plant, functions: Sequence[MatrixFunction], inputs: Any, outputs: Any
 ) -> LPVStateSpace:
-    basis, coefficients = in_one_basis(list(functions), plant.basis.ranges)
+    basis, (A, B, C, D) = in_one_basis(list(functions), plant.basis.ranges)
     return LPVStateSpace(
-        basis, *coefficients, plant.parameters, plant.states, inputs, outputs, plant.dt
+        basis, A, B, C, D, plant.parameters, plant.states, inputs, outputs, plant.dt
     )

@@ -5,16 +5,17 @@ program for every p of the range.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import FunctionSpace, Scheduling
+from symheli.lpv import FunctionSpace
 from symheli.lpv.bases.polynomials import factors_of
 from synthesis.design.cells import Cell, cells, degrees_of
+from synthesis.design.coordinates import Coordinates
 from synthesis.design.elimination import Half, controlled, observed
-from synthesis.design.generalized import Generalized
 from synthesis.design.motions import motions, moves, used
 from synthesis.design.unknown import Blocks, Unknown, selector, unknowns
 from synthesis.polynomial.symmetric import length, smat
@@ -28,37 +29,23 @@ LARGEST = 1e6
 """X and Y are kept below this multiple of the identity, in scaled coordinates."""
 WIDE = (1e2, 1e3, 1e4, LARGEST)
 """The same once g is settled, tried in turn."""
-APART = 1.5
-"""The eigenvalues of X Y are at least the square of this, where there is a next bound to try."""
+GROWS = 1.03
+"""A larger bound that separates X Y from I by less than this factor more is not worth it."""
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
+SETTLED = (1e-5, 1e-8)
+"""The same once g is settled, tried in turn: at a block that is singular gains have no bound."""
 
 
-class ScaledPlant(Protocol):
-    """What is asked of a plant here."""
-
-    dt: float | None
-    parameters: tuple[Scheduling, ...]
-    time: float
-
-    def at(self, p: Array) -> Generalized:
-        """Matrices (K, ..) at p (K, m)."""
-        ...
-
-    @property
-    def breaks(self) -> list[list[float]]:
-        """Where the plant is not one polynomial, ends included, of each parameter."""
-        ...
-
-
-class Program(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Conditions:
     """minimise cost g subject to blocks <= 0, for `interior_point.minimise`."""
 
     blocks: tuple[LyapunovBlocks, ...]
     sizes: Sizes
     cost: float
-    level: float = 0.0
-    back_off: float = 0.0
+    level: Array = field(default_factory=lambda: np.zeros(()))
+    back_off: Array = field(default_factory=lambda: np.zeros(()))
     bounds: tuple[tuple[float, float], ...] = ()
 
 
@@ -77,12 +64,12 @@ class Existence:
 
     def __init__(
         self,
-        plant: ScaledPlant,
+        plant: Coordinates,
         X: FunctionSpace | None,
         Y: FunctionSpace | None,
         divisions: int = 1,
     ):
-        self.plant, self.divisions = plant, divisions
+        self.plant, self.divisions, self.margin = plant, divisions, MARGIN
         both = [b for b in (X, Y) if b is not None]
         if plant.dt is not None and Y is not None and Y.size > 1 and moves(plant.parameters):
             both.append(Y)  # the bound of Y at the next sample
@@ -96,7 +83,6 @@ class Existence:
 
     def _over_cells(self) -> list[Cell]:
         breaks = [sorted(set(b)) for b in self.plant.breaks]
-        own = [u.basis for u in (self.X, self.Y) if u is not None]
         most = np.zeros(len(breaks), int)
         for basis in (u.basis for u in (self.X, self.Y) if u is not None):
             for i, factor in enumerate(factors_of(basis)):
@@ -124,20 +110,33 @@ class Existence:
         return self._solved(blocks, 1.0, solver)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
-        """For this g the X and Y, within ever larger bounds, whose product stays farthest from one."""
+        """For this g the X and Y whose product is farthest from one: first within the least bound
+        beyond which that hardly grows, then within larger ones.
+        """
+        for self.margin in SETTLED:
+            yield from self._within(gamma, solver)
+        self.margin = MARGIN
+
+    def _within(self, gamma: float, solver: Solver) -> Iterator[Found]:
+        found: list[Found] = []
         for largest in WIDE:
             blocks = [
                 b
                 for cell in self._cells
                 for b in (*self._halves(cell, gamma), *self._coupling(cell, True, largest))
             ]
-            found = self._solved(blocks, -1.0, solver)
-            if found.gamma > APART or largest == LARGEST:
-                yield found._replace(gamma=gamma)
+            answer = self._solved(blocks, -1.0, solver)
+            if not np.any(answer.coefficients):
+                continue
+            found.append(answer)
+            if len(found) > 1 and answer.gamma < GROWS * found[-2].gamma:
+                yield found[-2]._replace(gamma=gamma)
+        if found:
+            yield found[-1]._replace(gamma=gamma)
 
     def _solved(self, blocks: list[LyapunovBlocks], cost: float, solver: Solver) -> Found:
         n = self.states
-        program = Program(tuple(blocks), Sizes(n, 1, self.count), cost)
+        program = Conditions(tuple(blocks), Sizes(n, 1, self.count), cost)
         candidate = interior_point.minimise(program, solver)
         if candidate.x is None:
             return Found(
@@ -182,14 +181,16 @@ class Existence:
             blocks.add(ahead, f, L, flow - 0.5 * L).add(
                 now, now.values(cell.nodes), own, -0.5 * own
             )
-            return [blocks.finished(_below(constant, n) + MARGIN * np.eye(n + N), _below(level, n))]
+            return [
+                blocks.finished(_below(constant, n) + self.margin * np.eye(n + N), _below(level, n))
+            ]
         L = selector(n, 0, N)
         out = []
         for motion in self._motions(ahead, cell):
             blocks = Blocks(N, len(f), cell.to_bernstein).add(ahead, f, L, half.flow)
             if np.any(motion):
                 blocks.add(ahead, sign * ahead.slopes(cell.nodes, motion), L, 0.5 * L)
-            out.append(blocks.finished(constant + MARGIN * np.eye(N), level))
+            out.append(blocks.finished(constant + self.margin * np.eye(N), level))
         return out
 
     def _motions(self, unknown: Unknown, cell: Cell) -> list[Array]:
@@ -199,17 +200,17 @@ class Existence:
         return motions(self.plant.parameters, cell.nodes, self.plant.time, used(unknown.basis))
 
     def _next(self, cell: Cell) -> list[LyapunovBlocks]:
-        """S(p) <= Y(p(k+1)), at the ends of where that may be."""
-        assert self.S is not None and self.Y is not None  # noqa: S101
-        n, out = self.states, []
-        one = np.eye(n)
-        low, high = np.array([(s.low, s.high) for s in self.plant.parameters]).T
+        """S(p) <= Y(p(k+1)) to first order in the step, at its ends."""
+        assert self.S is not None  # noqa: S101 - see `_halves`
+        assert self.Y is not None  # noqa: S101
+        out, one = [], np.eye(self.states)
         for motion in self._motions(self.Y, cell):
-            there = np.clip(cell.nodes + motion * (self.plant.dt or 0.0), low, high)
-            blocks = Blocks(n, len(there), cell.to_bernstein)
+            step = motion * (self.plant.dt or 0.0)
+            there = self.Y.values(cell.nodes) + self.Y.slopes(cell.nodes, step)
+            blocks = Blocks(self.states, len(there), cell.to_bernstein)
             blocks.add(self.S, self.S.values(cell.nodes), one, 0.5 * one)
-            blocks.add(self.Y, self.Y.values(there), one, -0.5 * one)
-            out.append(blocks.finished(MARGIN * one, 0.0 * one))
+            blocks.add(self.Y, there, one, -0.5 * one)
+            out.append(blocks.finished(self.margin * one, 0.0 * one))
         return out
 
     def _coupling(self, cell: Cell, apart: bool, largest: float) -> list[LyapunovBlocks]:

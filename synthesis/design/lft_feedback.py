@@ -1,4 +1,4 @@
-"""Gain scheduling for parameters that may jump: controllers as LFTs."""
+"""Gain scheduling for parameters that may jump, as linear fractional transformations."""
 
 from __future__ import annotations
 

@@ -233,7 +233,7 @@ class _Problem:
         if squares[0].value is None or not math.isfinite(value):
             return None
         return [
-            math.sqrt(max(float(v.value), 0.0)) / unit
+            math.sqrt(max(float(np.asarray(v.value)), 0.0)) / unit
             for v, unit in zip(squares, self.units, strict=True)
         ]
 
@@ -310,15 +310,22 @@ class _Problem:
         w, z = loops[0].B.shape[1], loops[0].C.shape[0]
         if isinstance(o, L2):
             for drift in self._drifts(cell):
-                yield from _positive(cell, [
-                    -self._bounded_real(loop, d, np.eye(w), bound * np.eye(z))
-                    for loop, d in zip(loops, drift, strict=True)
-                ])  # fmt: skip
+                yield from _positive(
+                    cell,
+                    [
+                        -self._bounded_real(loop, d, np.eye(w), bound * np.eye(z))
+                        for loop, d in zip(loops, drift, strict=True)
+                    ],
+                )
             return
         for drift in self._drifts(cell):
-            yield from _positive(cell, [
-                -self._bounded_real(loop, d, np.eye(w), None) for loop, d in zip(loops, drift, strict=True)
-            ])  # fmt: skip
+            yield from _positive(
+                cell,
+                [
+                    -self._bounded_real(loop, d, np.eye(w), None)
+                    for loop, d in zip(loops, drift, strict=True)
+                ],
+            )
         top = bound * np.eye(z) if slack is None else slack
         if self.coordinates.dt is None:
             yield from _positive(
@@ -326,11 +333,19 @@ class _Problem:
             )
             yield from (loop.D == 0 for loop in loops if not _is_zero(loop.D))
         else:
-            yield from _positive(cell, [
-                cp.bmat([[loop.P, np.zeros((2 * self.n, w)), loop.C.T],
-                         [np.zeros((w, 2 * self.n)), np.eye(w), loop.D.T], [loop.C, loop.D, top]])
-                for loop in loops
-            ])  # fmt: skip
+            yield from _positive(
+                cell,
+                [
+                    cp.bmat(
+                        [
+                            [loop.P, np.zeros((2 * self.n, w)), loop.C.T],
+                            [np.zeros((w, 2 * self.n)), np.eye(w), loop.D.T],
+                            [loop.C, loop.D, top],
+                        ]
+                    )
+                    for loop in loops
+                ],
+            )
 
     def _bounded_real(self, loop: _Loop, drift: Any, gw: Any, gz: Any) -> Any:
         import cvxpy as cp
@@ -341,8 +356,11 @@ class _Problem:
             if gz is not None:
                 F = [[*F[0], loop.C.T], [*F[1], loop.D.T], [loop.C, loop.D, -gz]]
         else:
-            F = [[-loop.P, loop.A, loop.B], [loop.A.T, -loop.P, np.zeros((N, w))],
-                 [loop.B.T, np.zeros((w, N)), -gw]]  # fmt: skip
+            F = [
+                [-loop.P, loop.A, loop.B],
+                [loop.A.T, -loop.P, np.zeros((N, w))],
+                [loop.B.T, np.zeros((w, N)), -gw],
+            ]
             if gz is not None:
                 zero = np.zeros((gz.shape[0], N))
                 F = [
@@ -423,7 +441,7 @@ def _positive(cell: Cell, F: Sequence[Any]) -> Iterator[Any]:
     """F(p) >= margin on the cell, by its Bernstein coefficients."""
     n = F[0].shape[0]
     for row in cell.to_bernstein:
-        total = sum((float(t) * f for t, f in zip(row, F, strict=True)), np.zeros((n, n)))
+        total: Any = sum((float(t) * f for t, f in zip(row, F, strict=True)), np.zeros((n, n)))
         yield 0.5 * (total + total.T) >> MARGIN * np.eye(n)
 
 

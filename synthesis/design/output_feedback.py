@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-ACCURACY = 1e-4
+ACCURACY = 1e-3
 """Of the functions of p fitted to the gains, relative."""
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
 
@@ -111,9 +111,13 @@ def output_feedback(
 
 
 def _robust(
-    plant: Plant, every: Sequence[Shape], factors: Sequence[float], fastest: float, divisions: int,
+    plant: Plant,
+    every: Sequence[Shape],
+    factors: Sequence[float],
+    fastest: float,
+    divisions: int,
     attempts: list[Attempt],
-) -> Controller:  # fmt: skip
+) -> Controller:
     """For all models of the set, by the one of the shapes that serves the nominal one best."""
     gammas = [(_start(plant, shape, divisions, attempts), shape) for shape in every]
     best = min(gammas, key=lambda each: _gamma(each[0]))[1]
@@ -135,9 +139,13 @@ def _gamma(start: tuple[Coordinates, Existence, Found]) -> float:
 
 
 def _nominal(
-    plant: Plant, every: Sequence[Shape], factors: Sequence[float], fastest: float, divisions: int,
+    plant: Plant,
+    every: Sequence[Shape],
+    factors: Sequence[float],
+    fastest: float,
+    divisions: int,
     attempts: list[Attempt],
-) -> Controller:  # fmt: skip
+) -> Controller:
     """For one model, by the best of the shapes."""
     started = [(_start(plant, shape, divisions, attempts), shape) for shape in every]
     started = [each for each in started if math.isfinite(_gamma(each[0]))]
@@ -162,9 +170,12 @@ def coordinates_of(plant: Plant, channel: float) -> Coordinates:
     """Coordinates of the plant with performance in units of `channel`."""
     one = len(plant.parameters) == 1
     return Coordinates.of(
-        lambda p: plant.matrices(p[:, 0] if one else p), plant.parameters, plant.basis, plant.dt,
+        lambda p: plant.matrices(p[:, 0] if one else p),
+        plant.parameters,
+        plant.basis,
+        plant.dt,
         channel,
-    )  # fmt: skip
+    )
 
 
 def depends(plant: Plant) -> list[bool]:
@@ -179,9 +190,11 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
     """
     named = plant.channels
     for wanted, group in (
-        (True, "disturbances"), (True, "performance"), (controls, "controls"),
+        (True, "disturbances"),
+        (True, "performance"),
+        (controls, "controls"),
         (measurements, "measurements"),
-    ):  # fmt: skip
+    ):
         if wanted and not getattr(named, group):
             raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
     at = plant.matrices(conditions(plant)[0])
@@ -199,9 +212,12 @@ def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
     p, said = conditions(plant)
     least = min((a.bound for a in attempts), default=math.inf)
     why = reasons(
-        plant.matrices(p), plant.channels, dt=plant.dt, at=said,
+        plant.matrices(p),
+        plant.channels,
+        dt=plant.dt,
+        at=said,
         gamma=least if math.isfinite(least) else None,
-    )  # fmt: skip
+    )
     lines = why or (
         "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"
         " more divisions may help",
@@ -215,7 +231,9 @@ def _recover(
     coordinates: Coordinates, existence: Existence, found: Found
 ) -> Callable[[Array], Array]:
     X, Y, S = existence.X, existence.Y, existence.S
-    assert X is not None and Y is not None and S is not None  # noqa: S101
+    assert X is not None  # noqa: S101 - all were asked for
+    assert Y is not None  # noqa: S101
+    assert S is not None  # noqa: S101
     parameters = coordinates.parameters
 
     def gains(p: Array) -> Array:
@@ -254,7 +272,7 @@ def in_plant_units(
     """The controller in the units of the plant, of `gains` (K, ..) at p (K, m) in the scaled ones,
     as functions of p.
     """
-    nu, ny = len(plant.controls), len(plant.measurements)
+    ny = len(plant.measurements)
     n = gains(np.array([[s.middle for s in plant.parameters]])).shape[-1] - ny
     pace = np.full(n, 1 / math.sqrt(c.time))
     rows = np.concatenate([pace, c.controls])
@@ -266,9 +284,17 @@ def in_plant_units(
     basis, M, misfit = fitted(physical, plant.parameters, ACCURACY, (rows, 1 / columns))
     names = tuple(f"k{i + 1}" for i in range(n))
     model = LPVStateSpace(
-        basis, M[:, :n, :n], M[:, :n, n:], M[:, n:, :n], M[:, n:, n:], plant.parameters, names,  # type: ignore[arg-type]
-        plant.measurements, plant.controls, plant.dt,
-    )  # fmt: skip
+        basis,
+        M[:, :n, :n],
+        M[:, :n, n:],
+        M[:, n:, :n],
+        M[:, n:, n:],
+        plant.parameters,
+        names,  # type: ignore[arg-type]
+        plant.measurements,
+        plant.controls,
+        plant.dt,
+    )
     return Controller(model=model, plant=plant, gamma=gamma, method=method, misfit=misfit)
 
 

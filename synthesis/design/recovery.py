@@ -67,11 +67,13 @@ def control_gain(plant: Generalized, Y: Array, D: Array, gamma: float) -> Array:
     nu, nz, nw = B2.shape[-1], C1.shape[-2], B1.shape[-1]
     K = len(Y)
     zero = np.zeros
-    M = np.block([
-        [zero((K, nu, nu)), _t(D12), zero((K, nu, nw))],
-        [D12, _identity(-gamma, nz, Dcl), Dcl],
-        [zero((K, nw, nu)), _t(Dcl), _identity(-gamma, nw, Dcl)],
-    ])  # fmt: skip
+    M = np.block(
+        [
+            [zero((K, nu, nu)), _t(D12), zero((K, nu, nw))],
+            [D12, _identity(-gamma, nz, Dcl), Dcl],
+            [zero((K, nw, nu)), _t(Dcl), _identity(-gamma, nw, Dcl)],
+        ]
+    )
     known = np.concatenate([_t(B2), C1 @ Y, _t(B1 + B2 @ D @ D21)], axis=-2)
     return -np.linalg.solve(M, known)[:, :nu]
 

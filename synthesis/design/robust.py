@@ -102,7 +102,9 @@ def _even(plant: Plant) -> float:
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     middle = model.model.at(*(s.middle for s in model.parameters))
     outputs = [str(y) for y in middle.outputs]
-    rows = [np.concatenate([middle.C, middle.D], axis=1)[[outputs.index(str(y)) for y in group]]
-            for group in (plant.performance, model.perturbation_outputs)]  # fmt: skip
+    rows = [
+        np.concatenate([middle.C, middle.D], axis=1)[[outputs.index(str(y)) for y in group]]
+        for group in (plant.performance, model.perturbation_outputs)
+    ]
     z, v = (float(np.linalg.norm(M)) for M in rows)
     return z / v if z > 0 and v > 0 else 1.0

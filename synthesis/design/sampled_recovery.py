@@ -48,15 +48,20 @@ def state_gain(plant: Generalized, Y: Array, S: Array, gamma: float) -> Array:
     A, B1, B2, C1, _, D11, D12, *_ = plant
     now, ahead = np.linalg.cholesky(Y), np.linalg.inv(np.linalg.cholesky(S))
     blind = np.zeros((len(A), A.shape[-1], B1.shape[-1]))
-    return _central(
-        ahead @ A @ now, ahead @ B1, C1 @ now, D11, ahead @ B2, D12, now, blind, gamma
-    )  # fmt: skip
+    return _central(ahead @ A @ now, ahead @ B1, C1 @ now, D11, ahead @ B2, D12, now, blind, gamma)
 
 
 def _central(
-    A: Array, B: Array, C: Array, D: Array,
-    left: Array, left_z: Array, right: Array, right_w: Array, gamma: float,
-) -> Array:  # fmt: skip
+    A: Array,
+    B: Array,
+    C: Array,
+    D: Array,
+    left: Array,
+    left_z: Array,
+    right: Array,
+    right_w: Array,
+    gamma: float,
+) -> Array:
     """K of the loop A + left K right, B + left K right_w, C + left_z K right, D + left_z K right_w,
     the storage before and after the step the identity.
     """

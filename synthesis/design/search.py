@@ -28,7 +28,7 @@ Dependence = int | tuple[int, ...] | FunctionSpace
 BACK_OFF = (1.02, 1.05, 1.2, 1.5)
 """Multiples of the least gamma at which X and Y are settled, tried in turn."""
 SLACK = 1e-3
-"""By which the frozen gain of a controller may exceed what was promised: rounding of its formula."""
+"""By which the frozen gain of a controller may exceed what was promised: rounding."""
 USUAL = 2
 """Degree of the one that moves."""
 FAR = 30.0
@@ -58,8 +58,8 @@ def _said(basis: FunctionSpace) -> str:
 
 
 def functions(given: Dependence, parameters: Sequence[Scheduling], name: str) -> FunctionSpace:
-    """The basis that was asked for; `InputError` for a degree below zero, a wrong number of them, or
-    functions of another range.
+    """The basis that was asked for; `InputError` for a degree below zero, a wrong number of them,
+    or functions of another range.
     """
     box = [(s.low, s.high) for s in parameters]
     if isinstance(given, FunctionSpace):
@@ -93,8 +93,8 @@ def shapes(
     sampled: bool,
     matters: Sequence[bool],
 ) -> list[Shape]:
-    """The pairs that are tried: what was asked for, else one of the two moving, then the other, with
-    the parameters that the plant depends on.
+    """The pairs that are tried: what was asked for, else one of the two moving, then the other,
+    with the parameters that the plant depends on.
 
     Both may move with a parameter that stands still, and with one whose rate is another parameter:
     then the controller knows how they move. Raises `InputError` where it would need dp/dt.
@@ -199,10 +199,12 @@ def settled(
                 word = f"worst frozen gain {reached / gamma:.4f} of it"
             attempts.append(
                 Attempt(
-                    f"back-off {factor:g}", 0.0, f"{found.message}, {word}",
+                    f"back-off {factor:g}",
+                    0.0,
+                    f"{found.message}, {word}",
                     gamma * coordinates.channel,
                 )
-            )  # fmt: skip
+            )
             if gains is not None and reached <= gamma * (1 + SLACK):
                 yield Design(coordinates, existence, found, gains)
                 break
@@ -217,8 +219,8 @@ def frozen_gain(coordinates: Coordinates, gains: Gains, loop: Loop) -> float:
     p = low + np.linspace(0.0, 1.0, 7)[:, None] * (high - low)
     rates = [s.name in {other.rate for other in parameters} for s in parameters]
     p[:, rates] = np.clip(0.0, low, high)[rates]
-    every = loop(coordinates, gains, p)
-    return max(norm(*(M[i] for M in every), coordinates.dt, 1e-6)[0] for i in range(len(p)))
+    A, B, C, D = loop(coordinates, gains, p)
+    return max(norm(A[i], B[i], C[i], D[i], coordinates.dt, 1e-6)[0] for i in range(len(p)))
 
 
 def closed(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:

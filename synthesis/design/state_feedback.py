@@ -116,7 +116,8 @@ def _recover(
     coordinates: Coordinates, existence: Existence, found: Found
 ) -> Callable[[Array], Array]:
     Y, S = existence.Y, existence.S
-    assert Y is not None and S is not None  # noqa: S101
+    assert Y is not None  # noqa: S101 - it was asked for
+    assert S is not None  # noqa: S101
 
     def gains(p: Array) -> Array:
         at, y = coordinates.at(p), Y.at(found.coefficients, p)

@@ -30,7 +30,7 @@ import numpy as np
 from synthesis.polynomial.symmetric import indices, smat, svec, symmetrized
 from synthesis.program.block_cholesky import BlockCholesky
 from synthesis.program.cone_program import Answer, Candidate, Solver
-from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
+from synthesis.program.lyapunov_program import LyapunovBlocks, Program, Sizes
 
 Array = np.ndarray
 Normal = dict[tuple[int, int], Array]
@@ -59,7 +59,7 @@ IMPOSSIBLE = 1e-7
 """Residual of multipliers, of what they show to be contradictory, that prove that there is no P."""
 
 
-def minimise(program: LyapunovProgram, solver: Solver) -> Candidate:
+def minimise(program: Program, solver: Solver) -> Candidate:
     """The least level, to the tolerance of the solver or as near as rounding, iterations and time
     allow.
 
@@ -158,7 +158,7 @@ class _Cone(Protocol):
 class _Inequalities:
     """The blocks F < 0."""
 
-    def __init__(self, blocks: LyapunovBlocks, program: LyapunovProgram):
+    def __init__(self, blocks: LyapunovBlocks, program: Program):
         self.blocks = blocks
         self.constant = -blocks.constant - program.back_off
         self.level = program.level if blocks.level is None else blocks.level
@@ -281,7 +281,7 @@ def _on_vectors(K: Array, n: int) -> Array:
 class _Cones:
     """All cones of the program."""
 
-    def __init__(self, program: LyapunovProgram):
+    def __init__(self, program: Program):
         self.program = program
         self.each: list[_Cone] = [_Inequalities(b, program) for b in program.blocks]
         self.sizes = program.sizes

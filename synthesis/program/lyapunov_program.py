@@ -8,7 +8,7 @@ N^2/4, and all that an interior-point method asks of it is a few products of mat
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -94,6 +94,43 @@ class LyapunovBlocks(NamedTuple):
             constant=W.T @ self.constant @ W,
             supply=self.supply and self.supply._replace(each=W.T @ self.supply.each @ W),
         )
+
+
+class Program(Protocol):
+    """minimise cost g subject to every block F <= -back_off, F with g `level` where a block has no
+    level of its own, and sign P + constant I >= 0 for every coefficient of P and every (sign,
+    constant) of the `bounds`.
+    """
+
+    @property
+    def blocks(self) -> tuple[LyapunovBlocks, ...]:
+        """The inequalities."""
+        ...
+
+    @property
+    def sizes(self) -> Sizes:
+        """Of the program."""
+        ...
+
+    @property
+    def cost(self) -> float:
+        """Of the level in what is minimised."""
+        ...
+
+    @property
+    def level(self) -> Array:
+        """What one unit of g relaxes a block by, where it has no level of its own."""
+        ...
+
+    @property
+    def back_off(self) -> Array:
+        """By which a block stays below zero."""
+        ...
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """(sign, constant) of every sign P + constant I >= 0."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
