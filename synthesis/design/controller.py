@@ -107,8 +107,8 @@ class Controller:
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
-        """Why `optimum` says little of the controller, a sentence each: what no controller can lower,
-        at some frozen p, is all of it. Empty where nothing was found.
+        """Why `optimum` says little of the controller, a sentence each: what no controller can
+        lower, at some frozen p, is all of it. Empty where it earns its gamma.
         """
         if self.optimum is None:
             return ()

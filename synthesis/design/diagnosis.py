@@ -210,8 +210,8 @@ def _zero(mode: Mode, names: Channels, dt: float | None, *, dual: bool) -> str:
 def decided(
     family: Generalized, names: Channels, gamma: float, at: Sequence[str], dt: float | None = None
 ) -> tuple[str, ...]:
-    """What of a level that a scheduled controller keeps no controller can lower at one of the frozen
-    models (leading axis), called `at`; and whether all of them keep it with the controls at rest.
+    """What of a level that a scheduled controller keeps no controller can lower, at which of the
+    frozen models (leading axis, called `at`); and whether all keep it with the controls at rest.
     """
     each = [Generalized(*M) for M in zip(*family, strict=True)]
     out: dict[str, list[str]] = {}

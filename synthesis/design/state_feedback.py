@@ -78,7 +78,8 @@ def state_feedback(
     Examples
     --------
     >>> shown = synthesis.Plant(
-    ...     plant.model, disturbances=["w"], performance=["z_x", "z_u"], controls=["u"], measurements=["z_x"])
+    ...     plant.model, disturbances=["w"], performance=["z_x", "z_u"],
+    ...     controls=["u"], measurements=["z_x"])
     >>> made = synthesis.state_feedback(shown)
     >>> made.order, bool(made.gamma < synthesis.output_feedback(plant).gamma)
     (0, True)

@@ -96,7 +96,7 @@ def test_energy_to_peak_is_kept():
 @pytest.mark.parametrize(
     "region",
     [
-        PoleRegion(decay=0.5),
+        pytest.param(PoleRegion(decay=0.5), marks=pytest.mark.slow),
         pytest.param(PoleRegion(radius=6.0), marks=pytest.mark.slow),
         pytest.param(PoleRegion(decay=0.3, radius=8.0, damping=0.7), marks=pytest.mark.slow),
     ],
@@ -111,6 +111,15 @@ def test_poles_lie_in_their_region_at_every_condition(region):
         assert np.all(poles.real <= -region.decay / slack)
         assert np.all(np.abs(poles) <= region.radius * slack)
         assert np.all(-poles.real >= region.damping * np.abs(poles) / slack)
+
+
+def test_poles_of_a_frozen_plant_lie_in_every_region():
+    region = PoleRegion(decay=0.3, radius=8.0, damping=0.7)
+    made = multiobjective(of(spring().model.at(0.3), ["u"], ["y"]), L2(), region=region)
+    poles = made.closed().at(0.0).poles()
+    assert np.all(poles.real <= -0.3)
+    assert np.all(np.abs(poles) <= 8.0)
+    assert np.all(-poles.real >= 0.7 * np.abs(poles))
 
 
 def test_one_gain_alone_is_that_of_the_inequalities_without_the_controller():

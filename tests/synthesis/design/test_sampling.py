@@ -25,7 +25,7 @@ def test_sampling_by_tustin_keeps_the_norm_at_every_condition(made):
     assert sampled.dt == 0.05
     for p in (0.0, 0.3, 0.8, 1.0):
         before, after = (c.model.matrices(p) for c in (made, sampled))
-        assert norm(*after, 0.05)[0] == pytest.approx(norm(*before)[0], rel=1e-4)
+        assert norm(*after, 0.05)[0] == pytest.approx(norm(*before)[0], rel=1e-3)
 
 
 def test_responses_agree_at_warped_frequencies(made):
@@ -33,17 +33,18 @@ def test_responses_agree_at_warped_frequencies(made):
     omega = np.array([0.5, 3.0, 12.0])
     sampled = made.discretize(dt).at(p).frequency_response(omega)
     warped = made.at(p).frequency_response(2 / dt * np.tan(omega * dt / 2))
-    np.testing.assert_allclose(sampled, warped, rtol=1e-4)
+    # of functions of p fitted to what is sampled: see model.residuals
+    np.testing.assert_allclose(sampled, warped, rtol=1e-3)
 
 
 def test_what_cannot_be_sampled(made):
     with pytest.raises(InputError, match=r"already sampled \(dt = 0.02 s\)"):
         made.discretize(0.02).discretize(0.02)
-    with pytest.raises(InputError, match="dt: expected a positive number of seconds"):
+    with pytest.raises(InputError, match="dt must be a positive number of seconds"):
         made.discretize(0.0)
 
 
-# --- on the helicopter ----------------------------------------------------------------------------
+# --- on the helicopter -------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
