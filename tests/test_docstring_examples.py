@@ -80,12 +80,14 @@ EXPLAINED = [
 
 
 @pytest.mark.parametrize(("package", "name"), EXPLAINED)
-def test_an_example_needs_nothing_but_its_imports(package, name, tmp_path, monkeypatch):
+def test_an_example_needs_nothing_but_its_imports(package, name, start, tmp_path, monkeypatch):
+    """And what the docstring of its package makes."""
     monkeypatch.chdir(tmp_path)
     thing = getattr(importlib.import_module(package), name)
     text = inspect.getdoc(thing) or ""
     assert ">>> " in text, f"{package}.{name} has no example"
-    names = {**vars(sys.modules[thing.__module__]), **vars(importlib.import_module(package))}
+    modules = sys.modules[thing.__module__], importlib.import_module(package)
+    names = {**vars(modules[0]), **vars(modules[1]), **start(package)}
     test = doctest.DocTestParser().get_doctest(text, names, f"{package}.{name}", None, 0)
     told: list[str] = []
     with warnings.catch_warnings():

@@ -36,6 +36,7 @@ def printed_and_written(page):
 @pytest.mark.parametrize(
     "page",
     [
+        "controllers.md",
         "flying.md",
         "identification.md",
         "plant.md",

@@ -11,8 +11,8 @@ ROUNDING = 1e-6
 
 
 def contraction(M: Array, left: Array, right: Array, level: float) -> Array:
-    """K (N, k, l) with |M + left K right| <= level, or, where none is, nearly the least there is;
-    `left` (N, r, k) of full column, `right` (N, l, c) of full row rank.
+    """K (N, k, l) with |M + left K right| <= level, or nearly the least that can be, if that is
+    more; `left` (N, r, k) of full column, `right` (N, l, c) of full row rank.
 
     References
     ----------

@@ -59,7 +59,7 @@ class Controller:
     >>> print(made.at(0.5).inputs, made.at(0.5).outputs)
     ('y',) ('u',)
     >>> proof = made.certify(search=None)
-    >>> proof.verified, proof.gamma < made.gamma * (1 + 1e-6)
+    >>> proof.verified, bool(proof.gamma < made.gamma * (1 + 1e-6))
     (True, True)
     """
 
@@ -128,7 +128,7 @@ class Controller:
     @cached_property
     def reasons(self) -> tuple[str, ...]:
         """Why `optimum` says little of the controller, a sentence each: what no controller can
-        lower, at some frozen p, is all of it. Empty where nothing was found.
+        lower, at some frozen p, is all of it. Empty where it earns its gamma.
         """
         if self.optimum is None:
             return ()

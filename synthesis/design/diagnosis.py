@@ -210,26 +210,26 @@ def _zero(mode: Mode, names: Channels, dt: float | None, *, dual: bool) -> str:
 def decided(
     family: Generalized, names: Channels, gamma: float, at: Sequence[str], dt: float | None = None
 ) -> tuple[str, ...]:
-    """What of a level that a scheduled controller keeps no controller can lower at one of the frozen
-    models (leading axis), called `at`; and whether all of them keep it with the controls at rest.
+    """What of a level that a scheduled controller keeps no controller can lower, at which of the
+    frozen models (leading axis, called `at`); and whether all keep it with the controls at rest.
     """
     each = [Generalized(*M) for M in zip(*family, strict=True)]
-    out: dict[str, list[str]] = {}
-    for P, label in zip(each, at, strict=True):
-        for sentence in _unreachable(P, names, gamma, dt):
-            out.setdefault(sentence, []).append(label)
-    said = [f"{_where(labels)}: {sentence}" for sentence, labels in out.items()]
-    idle = max(_at_rest(P, dt) for P in each)
-    return (*said, *_idle(idle, gamma))
+    floors = [unreachable_gain(P, dt) for P in each]
+    close = [k for k, floor in enumerate(floors) if gamma <= floor.gamma * (1 + CLOSE)]
+    close.sort(key=lambda k: -floors[k].gamma)
+    out = []
+    if close:
+        (sentence,) = _unreachable(floors[close[0]], names, gamma)
+        out.append(f"{_where([at[k] for k in close])}: {sentence}")
+    return (*out, *_idle(max(_at_rest(P, dt) for P in each), gamma))
 
 
 def decided_by(P: Generalized, names: Channels, gamma: float, dt: float | None = None) -> list[str]:
     """What of a level `gamma` no controller can lower, where that is all of it or more."""
-    return [*_unreachable(P, names, gamma, dt), *_idle(_at_rest(P, dt), gamma)]
+    return [*_unreachable(unreachable_gain(P, dt), names, gamma), *_idle(_at_rest(P, dt), gamma)]
 
 
-def _unreachable(P: Generalized, names: Channels, gamma: float, dt: float | None) -> list[str]:
-    floor = unreachable_gain(P, dt)
+def _unreachable(floor: Unreachable, names: Channels, gamma: float) -> list[str]:
     if gamma < floor.gamma * (1 - BELOW):
         return [f"gamma = {gamma:.6g} cannot be reached: {_floor(floor, names)}"]
     if gamma > floor.gamma * (1 + CLOSE):

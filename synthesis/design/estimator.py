@@ -55,15 +55,9 @@ class Estimator:
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
-    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
-    >>> lag = LPVStateSpace.polynomial(
-    ...     A=[[[-1.0]], [[-1.0]]], B=[[[1.0, 0.0]]], C=[[[1.0]], [[1.0]]], D=[[[0, 0], [0, 1.0]]],
-    ...     scheduling=p, states=["x"], inputs=["w", "noise"], outputs=["x", "y"])
-    >>> plant = synthesis.Plant(
-    ...     lag, disturbances=["w", "noise"], performance=["x"], controls=[], measurements=["y"])
-    >>> synthesis.estimator(plant).model.outputs
-    ('x_estimate',)
+    >>> made = synthesis.estimator(plant)
+    >>> print(made.model.inputs, made.model.outputs)
+    ('y', 'u') ('z_x_estimate', 'z_u_estimate')
     """
 
     model: LPVStateSpace
@@ -123,16 +117,10 @@ def estimator(
 
     Examples
     --------
-    >>> from symheli.lpv import LPVStateSpace, Scheduling
-    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
-    >>> lag = LPVStateSpace.polynomial(
-    ...     A=[[[-1.0]], [[-1.0]]], B=[[[1.0, 0.0]]], C=[[[1.0]], [[1.0]]], D=[[[0, 0], [0, 1.0]]],
-    ...     scheduling=p, states=["x"], inputs=["w", "noise"], outputs=["x", "y"])
-    >>> plant = synthesis.Plant(
-    ...     lag, disturbances=["w", "noise"], performance=["x"], controls=[], measurements=["y"])
     >>> made = synthesis.estimator(plant)
-    >>> bool(made.certify(search=None).gamma <= made.gamma)
-    True
+    >>> proof = made.certify(search=None)
+    >>> proof.verified, bool(proof.gamma <= made.gamma)
+    (True, True)
     """
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)

@@ -97,6 +97,15 @@ def multiobjective(
     ----------
     Scherer, Gahinet and Chilali, IEEE Trans. Automatic Control 42 (1997); with X(p) or Y(p):
     Apkarian and Adams (1998).
+
+    Examples
+    --------
+    >>> from synthesis import H2, L2, PoleRegion
+    >>> made = synthesis.multiobjective(
+    ...     plant, [L2(bound=1.5), H2(performance=["z_x"], disturbances=["w"])],
+    ...     region=PoleRegion(decay=1.2))
+    >>> bool(made.closed().at(0.5).poles().real.max() <= -1.2)
+    True
     """
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)

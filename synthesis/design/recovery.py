@@ -8,10 +8,10 @@ other, whatever dY/dt or dX/dt is, so that the gains know p alone (Gahinet 1996;
     C_k = (C~ - D_k C2 Y) M'^-1,  B_k = N^-1 (B~ - X B2 D_k),
     A_k = N^-1 (A~ - X (A - B2 D_k C2) Y - B~ C2 Y - X B2 C~ + X dY/dt + N dM'/dt) M'^-1.
 
-The state of the controller is an estimate of the plant's, in whose coordinates its matrices stay of
-the size of the plant's even where X or Y tend to infinity, as X does where the measurements tell the
-disturbance: N = -X with M' = Y - X^-1, or M' = Y with N = Y^-1 - X. The last two terms cancel in the
-first case if X is constant, in the second if Y is.
+The state of the controller is an estimate of the plant's, in whose coordinates its matrices stay
+of the size of the plant's even where X or Y tend to infinity, as X does where the measurements
+tell the disturbance: N = -X with M' = Y - X^-1, or M' = Y with N = Y^-1 - X. The last two terms
+cancel in the first case if X is constant, in the second if Y is.
 """
 
 from __future__ import annotations

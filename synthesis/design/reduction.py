@@ -47,9 +47,16 @@ def reduced(controller: Controller, order: int) -> Controller:
         trim=None,
         residuals=None,
     )
-    return replace(
+    made = replace(
         controller, model=projected, method=f"{controller.method}, {order} of {n} states kept"
     )
+    loop: LPVStateSpace = made.closed()
+    A = loop.matrices(_conditions(loop)).A
+    if any(_unstable(each, loop.dt) for each in A):
+        raise SynthesisError(
+            f"with {order} of {n} states the closed loop is not stable at every frozen p: keep more"
+        )
+    return made
 
 
 def projection(controller: Controller, order: int) -> tuple[Array, Array]:
@@ -66,9 +73,8 @@ def gramians(controller: Controller) -> tuple[Array, Array]:
     frozen p of each in units of its own size.
     """
     closed: LPVStateSpace = controller.closed()
-    m, n = len(closed.parameters), controller.order
-    p = lobatto_points(NODES.get(m, 4), closed.box)
-    A, B, C, _ = closed.matrices(p)
+    n = controller.order
+    A, B, C, _ = closed.matrices(_conditions(closed))
     P, Q = np.zeros((n, n)), np.zeros((n, n))
     for each in zip(A, B, C, strict=True):
         reach, seen = _gramians(Matrices(*each, np.zeros(0)), closed.dt)
@@ -79,8 +85,7 @@ def gramians(controller: Controller) -> tuple[Array, Array]:
 
 def _gramians(loop: Matrices, dt: float | None) -> tuple[Array, Array]:
     A, B, C, _ = loop
-    poles = np.linalg.eigvals(A)
-    if np.any(poles.real >= 0 if dt is None else np.abs(poles) >= 1):
+    if _unstable(A, dt):
         raise SynthesisError(
             "the closed loop is not stable at every frozen p, so that nothing says which states of"
             " the controller matter"
@@ -88,6 +93,15 @@ def _gramians(loop: Matrices, dt: float | None) -> tuple[Array, Array]:
     solve = linalg.solve_continuous_lyapunov if dt is None else linalg.solve_discrete_lyapunov
     sign = -1.0 if dt is None else 1.0
     return solve(A, sign * B @ B.T), solve(A.T, sign * C.T @ C)
+
+
+def _conditions(loop: LPVStateSpace) -> Array:
+    return lobatto_points(NODES.get(len(loop.parameters), 4), loop.box)
+
+
+def _unstable(A: Array, dt: float | None) -> bool:
+    poles = np.linalg.eigvals(A)
+    return bool(np.any(poles.real >= 0 if dt is None else np.abs(poles) >= 1))
 
 
 def _root(M: Array) -> Array:

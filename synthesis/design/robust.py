@@ -35,7 +35,14 @@ def scaled_plant(plant: Plant, least: Callable[[Plant], float]) -> tuple[Plant, 
     model = plant.model
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     if model.bound == 0:
-        return opened(plant, 1.0, 0.0), least(plant)
+        nominal = type(plant)(
+            plant.nominal,
+            disturbances=plant.disturbances,
+            performance=plant.performance,
+            controls=plant.controls,
+            measurements=plant.measurements,
+        )
+        return nominal, least(nominal)
     start = least(plant)
     if not math.isfinite(start):
         return None

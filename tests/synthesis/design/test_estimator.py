@@ -12,7 +12,7 @@ BACK_OFF = 1.02
 
 
 def heave(pole=0.5, rate=0.5, noise=0.1):
-    """w' = (pole + .3p) w + gust + 2 d_col, estimated from a reading with noise; beside it a lag."""
+    """w' = (pole + .3p) w + gust + 2 d_col, estimated from a noisy reading of it and of a lag."""
     model = LPVStateSpace.polynomial(
         [[[pole, 0], [1.0, -1]], [[0.3, 0], [0, 0]]],
         [[[1, 0, 2], [0, 0, 0]]],
@@ -101,14 +101,13 @@ def test_the_error_does_not_depend_on_the_control():
 
 
 def test_of_a_constant_plant_the_gain_is_known():
-    """x' = -x + w1, y = x + w2, z = x: with F for x the least gain g solves a Riccati equation whose
-    solution stays positive down to g = 1/sqrt(2).
+    """x' = -x + w1, y = x + w2, z = x: the Riccati equation of the least gain g has a solution as
+    long as a^2 + c^2 >= 1/g^2 with a = -1, c = 1.
     """
     model = LinearModel(
         [[-1.0]], [[1, 0]], [[1], [1]], [[0, 0], [0, 1]], ["x"], ["w1", "w2"], ["z", "y"]
     )
     plant = Plant(model, disturbances=["w1", "w2"], performance=["z"], measurements=["y"])
-    # 1 + c^2 - 1/g^2 >= 0 with a = c = 1: sqrt(a^2 + 1 - 1/g^2) is real
     assert estimator(plant, back_off=BACK_OFF).gamma / BACK_OFF == pytest.approx(
         1 / np.sqrt(2), rel=1e-5
     )

@@ -9,9 +9,10 @@ from scheduled_plants import frozen, spring
 from synthesis import hinf, lft_feedback, lft_gain, output_feedback
 
 
+@pytest.mark.slow
 def test_the_lft_of_the_loop_proves_what_the_inequalities_promise():
-    """Two analyses that share nothing: constant Lyapunov matrices over p, and multipliers of a block
-    that may be anything.
+    """Two analyses that share nothing: constant Lyapunov matrices over p, and multipliers of a
+    block.
     """
     made = lft_feedback(spring())
     slack = 1 + 1e-3  # of functions fitted to the gains

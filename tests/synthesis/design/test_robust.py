@@ -53,6 +53,7 @@ def test_every_model_of_the_set_keeps_the_gain():
             assert norm(*one.matrices(p))[0] <= proof.gamma * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_the_larger_the_set_the_larger_the_gain():
     gains = [
         output_feedback(uncertain(b), X=0, Y=2, back_off=BACK_OFF).gamma for b in (0.0, 0.05, 0.15)

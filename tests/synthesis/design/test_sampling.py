@@ -6,6 +6,8 @@ from scheduled_plants import spring
 
 import symheli
 from symheli.errors import InputError
+from symheli.flight.controller import SCHEDULING
+from symheli.values.named_vector import NamedVector
 from synthesis import Plant, output_feedback, state_feedback
 from synthesis.worst.frozen import norm
 
@@ -23,7 +25,7 @@ def test_sampling_by_tustin_keeps_the_norm_at_every_condition(made):
     assert sampled.dt == 0.05
     for p in (0.0, 0.3, 0.8, 1.0):
         before, after = (c.model.matrices(p) for c in (made, sampled))
-        assert norm(*after, 0.05)[0] == pytest.approx(norm(*before)[0], rel=1e-4)
+        assert norm(*after, 0.05)[0] == pytest.approx(norm(*before)[0], rel=1e-3)
 
 
 def test_responses_agree_at_warped_frequencies(made):
@@ -31,41 +33,87 @@ def test_responses_agree_at_warped_frequencies(made):
     omega = np.array([0.5, 3.0, 12.0])
     sampled = made.discretize(dt).at(p).frequency_response(omega)
     warped = made.at(p).frequency_response(2 / dt * np.tan(omega * dt / 2))
-    np.testing.assert_allclose(sampled, warped, rtol=1e-4)
+    # of functions of p fitted to what is sampled: see model.residuals
+    np.testing.assert_allclose(sampled, warped, rtol=1e-3)
 
 
 def test_what_cannot_be_sampled(made):
     with pytest.raises(InputError, match=r"already sampled \(dt = 0.02 s\)"):
         made.discretize(0.02).discretize(0.02)
-    with pytest.raises(InputError, match="dt: expected a positive number of seconds"):
+    with pytest.raises(InputError, match="dt must be a positive number of seconds"):
         made.discretize(0.0)
 
 
-# --- on the helicopter -----------------------------------------------------------------------------
+# --- on the helicopter -------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
-def roll(ideal):
-    """Static feedback of roll attitude and rate of the lateral axis, hover to 6 m/s."""
-    family = symheli.sweep(ideal, [0.0, 3.0, 6.0])
-    lateral = family.select(["p", "phi", "b1"], ["d_lat"]).interpolate(degree=2)
-    A, gain = lateral.A, lateral.B
-    model = symheli.LPVStateSpace(
-        lateral.basis,
-        A,
-        np.concatenate([gain, gain], axis=2),
-        np.eye(1, len(A)).T[:, :, None] * np.vstack([[0, 1, 0], [0, 0, 0], np.eye(3)]),
-        np.eye(1, len(A)).T[:, :, None] * np.array([[0, 0], [0, 5.0], *[[0, 0]] * 3]),
-        lateral.parameters,
-        lateral.states,
-        ("gust", "d_lat"),
-        ("z_phi", "z_lat", "p", "phi", "b1"),
+def roll():
+    """Gains from roll rate and attitude, for a roll axis that gets livelier with airspeed."""
+    model = symheli.LPVStateSpace.polynomial(
+        [[[-8.0, 0], [1, 0]], [[-0.4, 0], [0, 0]]],
+        [[[1, 120.0], [0, 0]]],
+        [[[0, 1], [0, 0], [1, 0], [0, 1]]],
+        [[[0, 0], [0, 20.0], [0, 0], [0, 0]]],
+        symheli.Scheduling("airspeed", "m/s", 0.0, 6.0, rate=3.0),
+        states=["p", "phi"],
+        inputs=["gust", "d_lat"],
+        outputs=["z_phi", "z_lat", "p", "phi"],
     )
-    plant = Plant(
-        model,
-        disturbances=["gust"],
-        performance=["z_phi", "z_lat"],
-        controls=["d_lat"],
-        measurements=["p", "phi", "b1"],
+    return state_feedback(
+        Plant(
+            model,
+            disturbances=["gust"],
+            performance=["z_phi", "z_lat"],
+            controls=["d_lat"],
+            measurements=["p", "phi"],
+        )
     )
-    return state_feedback(plant, rate=1.0)
+
+
+def test_a_sampled_controller_flies(ideal, roll):
+    """What was commanded in the record is the trim and the gains at each airspeed, within the
+    travel.
+    """
+    made = roll.discretize(0.02)
+    assert isinstance(made, symheli.Controller)
+    schedule = symheli.AirspeedSchedule.transition(2.0, 3.0, acceleration=1.0, hold=0.3)
+    record = symheli.fly(ideal, schedule, controller=made)
+    error = np.stack([record[x] - record[f"{x}_reference"] for x in ("p", "phi")], axis=1)
+    D = made.model.matrices(record["airspeed_command"]).D
+    travel = dict(zip(ideal.inputs, ideal.travel, strict=True))["d_lat"]
+    expected = record["d_lat_reference"] + np.einsum("kij,kj->k", D, error)
+    expected = np.clip(expected, -travel, travel)
+    assert np.abs(error).max() > 1e-4
+    # the machine adds the same products in another order
+    np.testing.assert_allclose(record["d_lat"], expected, atol=1e-12)
+
+
+def test_its_states_begin_at_zero_after_a_reset(roll):
+    """Step by step, twice: a controller with states, from noisy readings."""
+    noisy = roll.plant.with_noise({"p": 0.02, "phi": 0.02})
+    made = output_feedback(noisy).discretize(0.02)
+    assert made.order > 0
+    rng = np.random.default_rng(0)
+    zero = dict.fromkeys(("d_lon", "d_lat", "d_col", "d_ped", "p", "phi"), 0.0)
+    readings = [{"p": p, "phi": phi, "airspeed": 3.0} for p, phi in rng.normal(size=(5, 2))]
+    at = NamedVector(SCHEDULING, np.array([3.0, 0.0]))
+
+    def answers():
+        made.reset()
+        return np.array([made.step(y, zero, at) for y in readings])
+
+    first = answers()
+    np.testing.assert_array_equal(first, answers())
+    A, B, C, D = made.model.matrices(3.0)
+    x = np.zeros(made.order)
+    for y, u in zip(readings, first, strict=True):
+        e = np.array([y[name] for name in made.model.inputs])
+        np.testing.assert_allclose(u, [0.0, *(C @ x + D @ e), 0.0, 0.0], atol=1e-12)
+        x = A @ x + B @ e
+
+
+def test_a_continuous_controller_says_how_to_fly(ideal, roll):
+    hover = symheli.AirspeedSchedule((2.0,), (1.0,), (0.0,), lead=0.2)
+    with pytest.raises(InputError, match=r"sample it with .discretize\(dt\)"):
+        symheli.fly(ideal, hover, controller=roll)
