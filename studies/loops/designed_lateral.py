@@ -22,6 +22,8 @@ Array = np.ndarray
 CONTROLS = ("d_lat", "d_ped")
 MEASURED = ("v", "p", "r", "phi")
 GUST, DRIFT = "v_w", "drift_airspeed"
+BACK_OFF = 1.3
+"""Nearer to the least gamma the controller has poles that no sample of `DT` follows."""
 DT = 0.02
 ACCELERATION = 3.0
 """Largest |dV/dt|, m/s^2: the limit of the rate, and the size of the drift's input."""
@@ -51,7 +53,7 @@ def design_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plan
 
 def designed(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Controller:
     """Output feedback of seven states for |dV/dt| <= `ACCELERATION`."""
-    return output_feedback(design_plant(heli, low, high), back_off=1.1)
+    return output_feedback(design_plant(heli, low, high), back_off=BACK_OFF)
 
 
 def flying_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plant:
