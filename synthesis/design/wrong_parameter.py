@@ -2,13 +2,14 @@
 
 It is at K(p + b) where the plant is at p, and K(p + b) = K(p) + b K[p, p + b] with the divided
 difference K[p, q], the mean of the slopes of K between p and q. On a short interval of p that mean
-lies in the convex hull of the Bernstein coefficients of the slope wherever p + b may be; a centre
-S(p), constant on each interval, leaves a remainder of which a norm is known:
+lies in the convex hull of the Bernstein coefficients of the slope wherever p + b may be, and so in
+S_0(p) + sum_i m_i S_i(p), |m_i| <= 1, with matrices S that are constant on each interval:
 
-    [x_K(k+1); u] = K(p) y~ + d,    y~ = (x_K, y),    d = b S(p) y~ + b (K[p, p + b] - S(p)) y~.
+    [x_K(k+1); u] = K(p) y~ + d,    y~ = (x_K, y),    d = b S_0(p) y~ + sum_i b m_i S_i(p) y~.
 
-Both terms are blocks of bounded norm, b I by the largest error and the remainder by what it can be
-times that: an `UncertainStateSpace` holds every motion of b, and more. Nothing is linearized.
+All are repeated scalars within the largest error: an `UncertainStateSpace` holds every motion of b,
+and more. Nothing is linearized. Between two knots of a table the slope is one; where p + b may pass
+a knot one S_i holds the slopes of both sides.
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ from symheli.lpv.lower_feedback import Channels, Generalized
 from symheli.lpv.matrix_function import MatrixFunction, block, functions_of, in_one_basis
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, signals
-from synthesis.cover import Remainder
 from synthesis.design.as_controller import as_controller
 from synthesis.design.balanced_block import balanced
 from synthesis.polynomial.bernstein import restriction
@@ -38,7 +38,7 @@ Array = np.ndarray
 JUMP = 1e-9
 """A controller that changes by more than this fraction of its size at one p has no slope there."""
 RANK = 1e-12
-"""Directions that the slope reaches by less than this fraction are left to the remainder."""
+"""Directions that the slope reaches by less than this fraction are those of rounding."""
 
 
 def with_wrong_parameter(
@@ -102,21 +102,15 @@ def with_wrong_parameter(
         )
     K = _scheduled(as_controller(controller, plant.controls, plant.measurements), plant)
     loop = _Opened.of(plant, K)
-    S, rest = _slopes(K, plant.parameters[0], error, divisions)
-    U = _reached(S.coefficients)
-    seen = MatrixFunction(S.basis, U.T @ S.coefficients, S.box)
-    enters, leaves = [error * U], [seen]
-    if rest is not None:
-        enters.append(np.diag(rest.rows))
-        leaves.append(rest.columns)
-    T, alpha = balanced(loop.response(enters, leaves), U.shape[1])
-    scales = (T, np.linalg.inv(T)), (alpha, 1 / alpha)
-    enters = [d * a if np.isscalar(a) else d @ a for d, (a, _) in zip(enters, scales)]
-    leaves = [
-        MatrixFunction(v.basis, b * v.coefficients if np.isscalar(b) else b @ v.coefficients, v.box)
-        for v, (_, b) in zip(leaves, scales)
-    ]
-    return loop.closed(enters, leaves, error)
+    S = _slopes(K, plant.parameters[0], error, divisions)
+    U = _reached([each.coefficients for each in S])
+    seen = [MatrixFunction(each.basis, U.T @ each.coefficients, each.box) for each in S]
+    enter = np.hstack([error * U] * len(seen))
+    rows = np.concatenate([each.coefficients for each in seen], axis=1)
+    leave = MatrixFunction(seen[0].basis, rows, seen[0].box)
+    T, _ = balanced(loop.response(enter, leave), U.shape[1])
+    back = MatrixFunction(leave.basis, np.linalg.solve(T, leave.coefficients), leave.box)
+    return loop.closed(enter @ T, back, error)
 
 
 class _Opened:
@@ -165,70 +159,51 @@ class _Opened:
         }  # fmt: skip
         return cls(plant, K, parts)
 
-    def response(self, enters: list[Array], leaves: list[MatrixFunction]) -> list[Array]:
-        """From what enters to what leaves(p) show of y~, at frozen p and some frequencies."""
+    def response(self, enter: Array, leave: MatrixFunction) -> Array:
+        """From d = enter d_1 to leave(p) y~ at frozen p and some frequencies, (K, n, n)."""
         model, f = self.plant.nominal, self.parts
-        (low, high), dt = model.box[0], model.dt
-        p = low + (high - low) * (np.arange(12) + 0.5) / 12
-        shown = np.concatenate([v(p) for v in leaves], axis=1)
-        A, B, C = f["A"](p), f["Bd"](p) @ np.hstack(enters), shown @ f["Cy"](p)
+        assert isinstance(leave.basis, Patches)  # noqa: S101
+        dt, p = model.dt, leave.basis.points(3)
+        A, B, C = f["A"](p), f["Bd"](p) @ enter, leave(p) @ f["Cy"](p)
         fastest = np.abs(np.linalg.eigvals(A)).max() if dt is None else np.pi / dt
         omega = np.geomspace(1e-3 * fastest, fastest, 24)
         s = 1j * omega if dt is None else np.exp(1j * omega * dt)
         one = np.eye(A.shape[-1])
-        return [C @ np.linalg.solve(at * one - A, B) for at in s]
+        return np.concatenate([C @ np.linalg.solve(at * one - A, B) for at in s])
 
-    def closed(
-        self, enters: list[Array], leaves: list[MatrixFunction], error: float
-    ) -> UncertainStateSpace:
-        """With d = sum of enters d_i, v_i = leaves(p) y~, all blocks one of norm 1."""
+    def closed(self, enter: Array, leave: MatrixFunction, error: float) -> UncertainStateSpace:
+        """With d = enter d_1, v_1 = leave(p) y~ and d_1 = Delta v_1, |Delta| <= 1; with the plant's
+        own block the two are one.
+        """
         f, plant, own = self.parts, self.plant, self.plant.model
-        w, z = len(plant.disturbances), len(plant.performance)
-        bound = own.bound if isinstance(own, UncertainStateSpace) else 1.0
-        size = np.full(f["B"].shape[1], bound)
-        size[:w] = 1.0
-        d = np.concatenate(enters, axis=1)
-        B = block([[f["B"] @ np.diag(size), f["Bd"] @ d]])
-        C = block([[f["C"]], *([M @ f["Cy"]] for M in leaves)])
-        through = block([[f["D"] @ np.diag(size), f["Dd"] @ d]])
-        seen = block(
+        w = len(plant.disturbances)
+        size = np.ones(f["B"].shape[1])
+        said, probability, inside, outside = "", 1.0, (), ()
+        if isinstance(own, UncertainStateSpace):
+            size[w:] = own.bound
+            said, probability = f"{own.source}; ", own.probability
+            inside, outside = own.perturbation_inputs, own.perturbation_outputs
+        scale = np.diag(size)
+        blind = _constant(np.zeros((leave.shape[0], enter.shape[1])), f["A"])
+        basis, (A, B, C, D) = in_one_basis(
             [
-                [M @ f["Dy"] @ np.diag(size), _constant(np.zeros((M.shape[0], d.shape[1])), f["A"])]
-                for M in leaves
-            ]
+                f["A"],
+                block([[f["B"] @ scale, f["Bd"] @ enter]]),
+                block([[f["C"]], [leave @ f["Cy"]]]),
+                block([[f["D"] @ scale, f["Dd"] @ enter], [leave @ f["Dy"] @ scale, blind]]),
+            ],
+            plant.basis.ranges,
         )
-        D = block([[through], [seen]])
-        basis, (a, b, c, e) = in_one_basis([f["A"], B, C, D], plant.basis.ranges)
-        ins = (*_own(own, "inputs"), *(f"d_{i + 1}" for i in range(d.shape[1])))
-        outs = (
-            *_own(own, "outputs"),
-            *(f"v_{i + 1}" for i in range(sum(M.shape[0] for M in leaves))),
-        )
+        inside = signals((*inside, *(f"wrong_{i + 1}" for i in range(enter.shape[1]))))
+        outside = signals((*outside, *(f"slope_{i + 1}" for i in range(leave.shape[0]))))
+        states = (*plant.states, *(f"controller_{s}" for s in self.K.states))
         model = LPVStateSpace(
-            basis, a, b, c, e, plant.parameters,
-            (*plant.states, *(Signal(f"controller_{s}", s.unit) for s in self.K.states)),
-            (*plant.disturbances, *signals(ins)), (*plant.performance, *signals(outs)), plant.dt,
+            basis, A, B, C, D, plant.parameters, signals(states), (*plant.disturbances, *inside),
+            (*plant.performance, *outside), plant.dt,
         )  # fmt: skip
         s = plant.parameters[0]
-        said = f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"
-        probability = 1.0
-        if isinstance(own, UncertainStateSpace):
-            said, probability = f"{own.source}; {said}", own.probability
-        assert model.inputs[w:] == signals(ins)  # noqa: S101
-        assert model.outputs[z:] == signals(outs)  # noqa: S101
-        return UncertainStateSpace(model, signals(ins), signals(outs), 1.0, probability, said)
-
-
-class _Rest:
-    """What the divided difference may miss S(p) by, times the error: diag(rows) Delta columns(p)."""
-
-    def __init__(self, rows: Array, columns: MatrixFunction) -> None:
-        self.rows, self.columns = rows, columns
-
-
-def _own(model: Any, group: str) -> tuple[Signal, ...]:
-    found = getattr(model, f"perturbation_{group}", ())
-    return tuple(Signal(f"own_{s}", s.unit) for s in found)
+        said += f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"
+        return UncertainStateSpace(model, inside, outside, 1.0, probability, said)
 
 
 def _constant(M: Array, like: MatrixFunction) -> MatrixFunction:
@@ -263,47 +238,46 @@ def _scheduled(given: LinearModel | LPVStateSpace, plant: Plant) -> LPVStateSpac
     return given
 
 
-def _slopes(
-    K: LPVStateSpace, s: Scheduling, error: float, divisions: int
-) -> tuple[MatrixFunction, _Rest | None]:
-    """S(p), constant on intervals, and the remainder times the error."""
+def _slopes(K: LPVStateSpace, s: Scheduling, error: float, divisions: int) -> list[MatrixFunction]:
+    """S_0, S_1 .. , each constant on the same intervals."""
     M = np.block([[K.A, K.B], [K.C, K.D]])
     cuts, slopes = _derivative(K, M, s)
-    ends = {s.low, s.high, *cuts}
-    if len(slopes) == 1 and len(slopes[0]) > 1 or any(len(c) > 1 for c in slopes):
-        ends |= {float(p) for p in np.linspace(s.low, s.high, divisions + 1)}
-    ends |= {k + side * error for k in cuts[1:-1] for side in (-1.0, 1.0)}
     least = 1e-6 * (s.high - s.low)
+    ends = {k + side * (error + 2 * least) for k in cuts[1:-1] for side in (-1.0, 1.0)} | set(cuts)
+    if any(len(slope) > 1 for slope in slopes):
+        ends |= set(np.linspace(s.low, s.high, divisions + 1).tolist())
     breaks = [s.low]
     for p in sorted(e for e in ends if s.low < e < s.high):
         if p - breaks[-1] > least and s.high - p > least:
             breaks.append(p)
     breaks.append(s.high)
-    centres, reach = [], []
-    for a, b in pairwise(breaks):
-        # a little more than the error, for breaks that were joined
-        hull = _hull(cuts, slopes, a - error - least, b + error + least)
-        centre = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
-        centres.append(centre)
-        reach.append(hull - centre)
-    box = ((s.low, s.high),)
+    # breaks nearer than `least` were joined
+    hulls = [_hull(cuts, slopes, a - error - least, b + error + least) for a, b in pairwise(breaks)]
+    found = [_box(hull) for hull in hulls]
+    count = max(len(box) for box in found) if error else 1
     intervals = Patches(0, tuple(breaks))
-    S = MatrixFunction(intervals, np.array(centres), box)
-    every = np.concatenate(reach)
-    size = np.abs(np.concatenate(centres)).max(initial=0.0)
-    if error == 0 or np.abs(every).max(initial=0.0) <= RANK * size:
-        return S, None
-    rest = Remainder.of(every)
-    norms = np.array(
-        [
-            np.linalg.norm(r / (rest.rows[:, None] * rest.columns), 2, axis=(1, 2)).max()
-            for r in reach
-        ]
-    )
-    columns = MatrixFunction(
-        intervals, error * norms[:, None, None] * np.diag(rest.columns)[None], box
-    )
-    return S, _Rest(rest.rows, columns)
+    nothing = np.zeros_like(hulls[0][0])
+    return [
+        MatrixFunction(
+            intervals,
+            np.array([box[i] if i < len(box) else nothing for box in found]),
+            ((s.low, s.high),),
+        )
+        for i in range(count)
+    ]
+
+
+def _box(hull: Array) -> list[Array]:
+    """S_0, S_1 .. of which S_0 + sum_i m_i S_i, |m_i| <= 1, holds all of the hull: its principal
+    directions, each as long as the hull reaches that way.
+    """
+    centre = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
+    flat = (hull - centre).reshape(len(hull), -1)
+    _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
+    largest = np.linalg.norm(hull.reshape(len(hull), -1), axis=1).max()
+    kept = directions[sizes > RANK * max(largest, sizes[0])]
+    reach = np.abs(flat @ kept.T).max(axis=0, initial=0.0)
+    return [centre, *(r * d.reshape(centre.shape) for r, d in zip(reach, kept, strict=True))]
 
 
 def _derivative(K: LPVStateSpace, M: Array, s: Scheduling) -> tuple[list[float], list[Array]]:
@@ -336,8 +310,8 @@ def _hull(cuts: list[float], slopes: list[Array], low: float, high: float) -> Ar
     return np.concatenate(found)
 
 
-def _reached(S: Array) -> Array:
+def _reached(S: list[Array]) -> Array:
     """An orthonormal basis (rows, r) of all that the slopes reach, r >= 1."""
-    side_by_side = np.concatenate(list(S), axis=1)
+    side_by_side = np.concatenate(list(np.concatenate(S)), axis=1)
     U, values, _ = np.linalg.svd(side_by_side, full_matrices=False)
     return U[:, : max(1, int(np.sum(values > RANK * values[0])))]
