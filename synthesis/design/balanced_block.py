@@ -1,14 +1,12 @@
 """Coordinates in which repeated scalar blocks b_i I cost least as one block of bounded norm.
 
-T^-1 (b I) T = b I for every invertible T, so that a block diag(b_1 I, b_2 I, ...) may be seen in the
+T^-1 (b I) T = b I for every invertible T: a block diag(b_1 I, b_2 I, ...) may be seen in
 coordinates T = diag(T_1, T_2, ...) where the largest singular value of T^-1 H(p, jw) T is least. T
 is sought by balancing what the worst responses return against what they take, which is the
 stationary point of the sum of their squares.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 

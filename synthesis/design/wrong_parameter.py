@@ -25,7 +25,7 @@ from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lower_feedback import Channels, Generalized
 from symheli.lpv.matrix_function import MatrixFunction, block, functions_of, in_one_basis
 from symheli.values.sample_period import same_period
-from symheli.values.signal import Signal, signals
+from symheli.values.signal import signals
 from synthesis.design.as_controller import as_controller
 from synthesis.design.balanced_block import balanced
 from synthesis.polynomial.bernstein import restriction
