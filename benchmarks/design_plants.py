@@ -22,13 +22,21 @@ BANDWIDTH = 15.0
 
 GUST = 2.0
 SIZES = {
-    "u": 2.0, "v": 2.0, "w": 2.0, "p": 2.0, "q": 2.0, "r": 0.3, "phi": 0.2, "theta": 0.2,
-    "d_lat": 0.009, "d_ped": 0.03, "d_lon": 0.009, "d_col": 0.009,
-}  # fmt: skip
+    "u": 2.0,
+    "v": 2.0,
+    "w": 2.0,
+    "p": 2.0,
+    "q": 2.0,
+    "r": 0.3,
+    "phi": 0.2,
+    "theta": 0.2,
+    "d_lat": 0.009,
+    "d_ped": 0.03,
+    "d_lon": 0.009,
+    "d_col": 0.009,
+}
 """What counts as 1, SI."""
-NOISE = {
-    "u": 0.9, "v": 0.9, "w": 0.9, "p": 0.09, "q": 0.09, "r": 0.09, "phi": 0.03, "theta": 0.03
-}  # fmt: skip
+NOISE = {"u": 0.9, "v": 0.9, "w": 0.9, "p": 0.09, "q": 0.09, "r": 0.09, "phi": 0.03, "theta": 0.03}
 
 
 class Axes(NamedTuple):
@@ -79,9 +87,12 @@ def _bare(axes: Axes, degree: int) -> Plant:
     family = symheli.sweep(heli, np.linspace(LOW, HIGH, POINTS), inputs=inputs)  # type: ignore[arg-type]
     model = family.select(axes.states, inputs).interpolate("polynomial", degree, rate=RATE)
     return Plant(
-        model, disturbances=axes.gusts, performance=(*axes.measured, *axes.controls),
-        controls=axes.controls, measurements=axes.measured,
-    )  # fmt: skip
+        model,
+        disturbances=axes.gusts,
+        performance=(*axes.measured, *axes.controls),
+        controls=axes.controls,
+        measurements=axes.measured,
+    )
 
 
 def _weighted(plant: Plant, axes: Axes) -> Plant:

@@ -108,17 +108,32 @@ def flown(states: int, kept: int, prove: bool) -> Flight:
         frozen = frozen_gain(loop, points=14).gamma
         spent = time.perf_counter() - begin
         return Flight(
-            small.order, len(loop.states), controller.gamma, full, less, frozen, np.nan, np.nan,
-            spent, with_children(),
-        )  # fmt: skip
+            small.order,
+            len(loop.states),
+            controller.gamma,
+            full,
+            less,
+            frozen,
+            np.nan,
+            np.nan,
+            spent,
+            with_children(),
+        )
     found = certify_flown(
         flies, plant, RATE, synthesized=controller.gamma, cover=False, form=SAMPLED, search=None
     )
     return Flight(
-        small.order, len(found.loop.states), controller.gamma, full, less,
-        found.certificate.frozen, found.gamma, found.loss, time.perf_counter() - begin,
+        small.order,
+        len(found.loop.states),
+        controller.gamma,
+        full,
+        less,
+        found.certificate.frozen,
+        found.gamma,
+        found.loss,
+        time.perf_counter() - begin,
         with_children(),
-    )  # fmt: skip
+    )
 
 
 def gridded(states: int) -> Made:
@@ -147,7 +162,7 @@ def points(states: int, seconds: float) -> list[tuple[str, float, float, float]]
         names = [f"w{i}" for i in range(B.shape[1] - nu)] + list(axes.controls)
         shown = [f"z{i}" for i in range(len(C) - ny)] + list(axes.measured)
         model = LinearModel(A, B, C, D, [f"x{i}" for i in range(len(A))], names, shown)
-        own = hinf(model, list(axes.measured), list(axes.controls))
+        own = hinf(model, axes.controls, axes.measured)
 
         def theirs(blocks: Any = (A, B, C, D, nu, ny)) -> float:
             import control
@@ -157,7 +172,7 @@ def points(states: int, seconds: float) -> list[tuple[str, float, float, float]]
 
         times = medians(
             {
-                "own": lambda m=model: hinf(m, list(axes.measured), list(axes.controls)),
+                "own": lambda m=model: hinf(m, axes.controls, axes.measured),
                 "slicot": theirs,
             },
             seconds,
@@ -166,109 +181,92 @@ def points(states: int, seconds: float) -> list[tuple[str, float, float, float]]
     return rows
 
 
-def main() -> None:
-    options = arguments(__doc__, write=True)
-    sizes = (7, 14) if options.quick else tuple(DESIGNS)
-    cases = [(n, 3, 2, 1) for n in sizes]
-    if not options.quick:
-        cases += [(7, 3, 1, 1), (7, 3, 3, 1), (7, 2, 2, 1), (7, 3, 2, 2), (7, 3, 2, 4)]
-    designs = {case: alone(made, *case) for case in cases}
-    others = {n: alone(gridded, n) for n in GRIDDED[options.quick]}
-    if options.quick:
-        flights = {7: alone(flown, 7, 7, False)}
-    else:
-        flights = {7: alone(flown, 7, 7, True), LARGE: alone(flown, LARGE, KEPT, True)}
-    beside = points(7, 0.5 if options.quick else 5.0)
-    ratios = []
-    for n in others:
-        own = designs[n, 3, 2, 1]
-        ratios.append(
-            Ratio(f"{n} states: cvxpy on 11 points / own, time", others[n].seconds / own.seconds)
-        )
-        ratios.append(
-            Ratio(
-                f"{n} states: own gamma / {BACK_OFF:g} / that of the grid",
-                own.gamma / BACK_OFF / others[n].gamma,
-            )
-        )
-    if LARGE in sizes:
-        spent = designs[LARGE, 3, 2, 1]
-        seconds = spent.seconds if np.isfinite(spent.gamma) else np.inf
-        ratios.append(
-            Ratio(
-                f"{LARGE} states: seconds of the design / {DESIGN_GOAL:g}",
-                seconds / DESIGN_GOAL,
-                1,
-                True,
-            )
-        )
-    for n, f in flights.items():
-        ratios.append(
-            Ratio(
-                f"{n} states: frozen gain, {f.order} states of the controller / all",
-                f.reduced / f.full,
-            )
-        )
-        ratios.append(
-            Ratio(
-                f"{n} states: frozen gain as it flies / gamma of the synthesis", f.frozen / f.design
-            )
-        )
-        if n == LARGE:
-            seconds = f.seconds if np.isfinite(f.proven) else np.inf
-            ratios.append(
+Case = tuple[int, int, int, int]
+"""States of the plant, degrees of its entries and of Y, divisions."""
+
+
+def usual(states: int) -> Case:
+    """The case of so many states that sizes are compared by."""
+    return states, 3, 2, 1
+
+
+class Results(NamedTuple):
+    """Of all that was made, by case or by states."""
+
+    designs: dict[Case, Made]
+    others: dict[int, Made]
+    flights: dict[int, Flight]
+    beside: list[tuple[str, float, float, float]]
+
+    @property
+    def ratios(self) -> list[Ratio]:
+        """With their goals."""
+        found = []
+        for n, other in self.others.items():
+            own = self.designs[usual(n)]
+            found += [
+                Ratio(f"{n} states: cvxpy on 11 points / own, time", other.seconds / own.seconds),
                 Ratio(
-                    f"{f.states} states as they fly: seconds proven in / {PROOF_GOAL:g}",
-                    seconds / PROOF_GOAL,
-                    1,
-                    True,
-                )
+                    f"{n} states: own least gamma / that on the grid",
+                    own.gamma / BACK_OFF / other.gamma,
+                ),
+            ]
+        if (large := self.designs.get(usual(LARGE))) is not None:
+            name = f"{LARGE} states: seconds of the design / {DESIGN_GOAL:g}"
+            seconds = large.seconds if np.isfinite(large.gamma) else np.inf
+            found.append(Ratio(name, seconds / DESIGN_GOAL, 1, at_most=True))
+        for n, f in self.flights.items():
+            if f.order < n:
+                name = f"{n} states: frozen gain with {f.order} states of the controller / all"
+                found.append(Ratio(name, f.reduced / f.full))
+            name = f"{n} states: frozen gain as it flies / gamma of the synthesis"
+            found.append(Ratio(name, f.frozen / f.design))
+            if n == LARGE:
+                name = f"{f.states} states as they fly: seconds proven in / {PROOF_GOAL:g}"
+                seconds = f.seconds if np.isfinite(f.proven) else np.inf
+                found.append(Ratio(name, seconds / PROOF_GOAL, 1, at_most=True))
+        gamma = max(gamma for _, gamma, _, _ in self.beside)
+        found.append(Ratio("point designs: own gamma / SLICOT's, the largest", gamma))
+        times = statistics.median(theirs / own for _, _, own, theirs in self.beside)
+        found.append(Ratio("point designs: SLICOT's time / own, median", times))
+        sizes = sorted({n for n, *_ in self.designs})
+        spent = [self.designs[usual(n)].seconds for n in sizes]
+        slope = np.polyfit(np.log(sizes), np.log(spent), 1)[0]
+        found.append(Ratio("exponent of time against states", float(slope)))
+        return found
+
+    @property
+    def tables(self) -> list[str]:
+        """Designs, flights, point designs."""
+        rows = [
+            (
+                f"{n} states, entries of degree {degree}, Y of {moving}, {divisions} divisions",
+                *(f"{m.gamma:.4f}", readable(m.seconds), f"{m.memory:.0f} MiB"),
+                *(f"{m.fastest:.0f} rad/s", f"{m.misfit:.1g}"),
             )
-    ratios.append(
-        Ratio("point designs: own gamma / SLICOT's, the largest", max(g for _, g, _, _ in beside))
-    )
-    ratios.append(
-        Ratio(
-            "point designs: SLICOT's time / own, median",
-            statistics.median(t / o for _, _, o, t in beside),
-        )
-    )
-    exponent = np.polyfit(np.log(sizes), np.log([designs[n, 3, 2, 1].seconds for n in sizes]), 1)[0]
-    ratios.append(Ratio("exponent of time against states", float(exponent)))
-    rows = [
-        (
-            f"{n} states, entries of degree {degree}, Y of degree {moving}, {divisions} divisions",
-            f"{m.gamma:.4f}", readable(m.seconds), f"{m.memory:.0f} MiB", f"{m.fastest:.0f} rad/s",
-            f"{m.misfit:.1g}",
-        )
-        for (n, degree, moving, divisions), m in designs.items()
-    ]  # fmt: skip
-    rows += [
-        (
-            f"{n} states, cvxpy on 11 points",
-            f"{m.gamma:.4f}",
-            readable(m.seconds),
-            f"{m.memory:.0f} MiB",
-            "no controller",
-            "",
-        )
-        for n, m in others.items()
-    ]
-    loops = [
-        (
-            f"{n} states designed for, {f.order} kept", f"{f.states}", f"{f.design:.4f}",
-            f"{f.full:.4f}", f"{f.reduced:.4f}", f"{f.frozen:.4f}",
-            "not tried" if np.isnan(f.proven) else f"{f.proven:.4f}", readable(f.seconds),
-            f"{f.memory:.0f} MiB",
-        )
-        for n, f in flights.items()
-    ]  # fmt: skip
-    present(
-        "synthesis",
-        options,
-        [
+            for (n, degree, moving, divisions), m in self.designs.items()
+        ]
+        rows += [
+            (
+                f"{n} states, cvxpy on 11 points",
+                *(f"{m.gamma:.4f}", readable(m.seconds), f"{m.memory:.0f} MiB"),
+                *("no controller", ""),
+            )
+            for n, m in self.others.items()
+        ]
+        loops = [
+            (
+                f"{n} states designed for, {f.order} kept",
+                *(f"{f.states}", f"{f.design:.4f}", f"{f.full:.4f}", f"{f.reduced:.4f}"),
+                *(f"{f.frozen:.4f}", "not tried" if np.isnan(f.proven) else f"{f.proven:.4f}"),
+                *(readable(f.seconds), f"{f.memory:.0f} MiB"),
+            )
+            for n, f in self.flights.items()
+        ]
+        at = [(at, f"{g:.6f}", readable(o), readable(t)) for at, g, o, t in self.beside]
+        return [
             table(
-                "### Output feedback for every acceleration within 3 m/s^2",
+                f"### Output feedback for every acceleration within {RATE:g} m/s^2",
                 rows,
                 ("", "gamma", "time", "memory", "fastest pole", "misfit"),
             ),
@@ -276,26 +274,30 @@ def main() -> None:
                 "### As they fly: tables of 32 bits at 50 Hz, true servos, one sample of delay",
                 loops,
                 (
-                    "",
-                    "states of the loop",
-                    "gamma promised",
-                    "frozen, whole",
-                    "frozen, reduced",
-                    "frozen, flown",
-                    "proven, flown",
-                    "time",
-                    "memory",
+                    *("", "states of the loop", "gamma promised", "frozen, whole"),
+                    *("frozen, reduced", "frozen, flown", "proven, flown", "time", "memory"),
                 ),
             ),
             table(
-                "### Point designs of 7 states",
-                [(at, f"{g:.6f}", readable(o), readable(t)) for at, g, o, t in beside],
-                ("", "own gamma / SLICOT's", "own time", "SLICOT's"),
+                "### Point designs of 7 states", at, ("", "own gamma / SLICOT's", "own", "SLICOT's")
             ),
-        ],
-        ratios,
-        [f"gamma is {BACK_OFF:g} times the least, where the controllers have no fast poles"],
+        ]
+
+
+def main() -> None:
+    options = arguments(__doc__, write=True)
+    cases = [usual(n) for n in ((7, 14) if options.quick else DESIGNS)]
+    if not options.quick:
+        cases += [(7, 3, 1, 1), (7, 3, 3, 1), (7, 2, 2, 1), (7, 3, 2, 2), (7, 3, 2, 4)]
+    flights = {7: (7, False)} if options.quick else {7: (7, True), LARGE: (KEPT, True)}
+    results = Results(
+        {case: alone(made, *case) for case in cases},
+        {n: alone(gridded, n) for n in GRIDDED[options.quick]},
+        {n: alone(flown, n, *how) for n, how in flights.items()},
+        points(7, 0.5 if options.quick else 5.0),
     )
+    note = f"gamma is {BACK_OFF:g} times the least, where the controllers have no fast poles"
+    present("synthesis", options, results.tables, results.ratios, [note])
 
 
 if __name__ == "__main__":

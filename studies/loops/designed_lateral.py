@@ -29,9 +29,15 @@ ACCELERATION = 3.0
 """Largest |dV/dt|, m/s^2: the limit of the rate, and the size of the drift's input."""
 
 WEIGHTS = {
-    GUST: 2.0, DRIFT: ACCELERATION, "v": 1 / 2.0, "p": 1 / 2.0, "r": 1 / 0.3, "phi": 1 / 0.2,
-    "d_lat": 1 / 0.01, "d_ped": 1 / 0.03,
-}  # fmt: skip
+    GUST: 2.0,
+    DRIFT: ACCELERATION,
+    "v": 1 / 2.0,
+    "p": 1 / 2.0,
+    "r": 1 / 0.3,
+    "phi": 1 / 0.2,
+    "d_lat": 1 / 0.01,
+    "d_ped": 1 / 0.03,
+}
 """A gust of 2 m/s; m/s, rad/s and rad that count as much as 1 of another."""
 NOISE = {"v": 0.9, "p": 0.1, "r": 0.1, "phi": 0.03}
 BANDWIDTH = 15.0
@@ -45,7 +51,7 @@ def design_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plan
     servos = {
         u: LinearModel(
             [[-BANDWIDTH]], [[BANDWIDTH]], [[1.0]], [[0.0]], (f"{u}_lag",), (f"{u}_command",), (u,)
-        )  # fmt: skip
+        )
         for u in CONTROLS
     }
     return _weighted(_plant(lateral.with_trim_drift()).with_servo(servos))
@@ -66,9 +72,14 @@ def flying_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plan
     nodes, between = (_sampled(family, exact) for family in (exact.nodes, exact.between))
     fitted = Matrices(*(exact.basis.fit(nodes.airspeeds, getattr(nodes, M)) for M in "ABCD"))
     model = LPVStateSpace(
-        exact.basis, *fitted, (Scheduling("airspeed", "m/s", low, high, ACCELERATION),),
-        nodes.states, nodes.inputs, nodes.outputs, DT,
-    )  # fmt: skip
+        exact.basis,
+        *fitted,
+        (Scheduling("airspeed", "m/s", low, high, ACCELERATION),),
+        nodes.states,
+        nodes.inputs,
+        nodes.outputs,
+        DT,
+    )
     model = model.with_residuals(
         between.airspeeds, Matrices(*(getattr(between, M) for M in "ABCD"))
     )
@@ -77,9 +88,12 @@ def flying_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plan
 
 def _plant(model: LPVStateSpace) -> Plant:
     return Plant(
-        model, disturbances=(GUST, DRIFT), performance=(*MEASURED, *CONTROLS), controls=CONTROLS,
+        model,
+        disturbances=(GUST, DRIFT),
+        performance=(*MEASURED, *CONTROLS),
+        controls=CONTROLS,
         measurements=MEASURED,
-    )  # fmt: skip
+    )
 
 
 def _weighted(plant: Plant) -> Plant:
@@ -92,12 +106,18 @@ def _sampled(family: LinearFamily, exact: ExactLateral) -> LinearFamily:
     servos = {u: XCELL_SERVOS[u].linear(u) for u in CONTROLS}
     models = [
         LinearModel(
-            model.A, np.column_stack([model.B, -slope]), model.C,
-            np.column_stack([model.D, np.zeros(len(model.D))]), model.states,
-            (*model.inputs, Signal(DRIFT, "m/s^2")), model.outputs,
-        ).driven_by(servos).discretize(DT)
+            model.A,
+            np.column_stack([model.B, -slope]),
+            model.C,
+            np.column_stack([model.D, np.zeros(len(model.D))]),
+            model.states,
+            (*model.inputs, Signal(DRIFT, "m/s^2")),
+            model.outputs,
+        )
+        .driven_by(servos)
+        .discretize(DT)
         for model, slope in zip(family.models, slopes, strict=True)
-    ]  # fmt: skip
+    ]
     return LinearFamily.from_models(family.airspeeds, models)
 
 

@@ -19,9 +19,14 @@ if TYPE_CHECKING:
 
 
 def proven_around(
-    plant: Plant, controller: Any, at: float, rate: Rate = None, *, tolerance: float = 0.05,
+    plant: Plant,
+    controller: Any,
+    at: float,
+    rate: Rate = None,
+    *,
+    tolerance: float = 0.05,
     **options: Any,
-) -> tuple[float, float]:  # fmt: skip
+) -> tuple[float, float]:
     """The interval of the parameter around `at` on which the loop of the constant controller K(at)
     is proven stable while the parameter moves there.
 

@@ -148,15 +148,29 @@ class _Opened:
         B1, D21 = _corner(P.B1, n, 0), _corner(P.D21, n, 0, first=True)
         C1 = _corner(P.C1, 0, n)
         nx, ny, nz = len(model.states), len(K.inputs), len(z)
-        B2 = block([[_constant(zero((nx, n)), P.A), P.B2], [_constant(np.eye(n), P.A),
-                    _constant(zero((n, len(K.outputs))), P.A)]])  # fmt: skip
-        C2 = block([[_constant(zero((n, nx)), P.A), _constant(np.eye(n), P.A)],
-                    [P.C2, _constant(zero((ny, n)), P.A)]])  # fmt: skip
+        B2 = block(
+            [
+                [_constant(zero((nx, n)), P.A), P.B2],
+                [_constant(np.eye(n), P.A), _constant(zero((n, len(K.outputs))), P.A)],
+            ]
+        )
+        C2 = block(
+            [
+                [_constant(zero((n, nx)), P.A), _constant(np.eye(n), P.A)],
+                [P.C2, _constant(zero((ny, n)), P.A)],
+            ]
+        )
         D12 = block([[_constant(zero((nz, n)), P.A), P.D12]])
         parts = {
-            "A": A + B2 @ M @ C2, "B": B1 + B2 @ M @ D21, "Bd": B2, "C": C1 + D12 @ M @ C2,
-            "D": P.D11 + D12 @ M @ D21, "Dd": D12, "Cy": C2, "Dy": D21,
-        }  # fmt: skip
+            "A": A + B2 @ M @ C2,
+            "B": B1 + B2 @ M @ D21,
+            "Bd": B2,
+            "C": C1 + D12 @ M @ C2,
+            "D": P.D11 + D12 @ M @ D21,
+            "Dd": D12,
+            "Cy": C2,
+            "Dy": D21,
+        }
         return cls(plant, K, parts)
 
     def response(self, enter: Array, leave: MatrixFunction) -> Array:
@@ -198,9 +212,17 @@ class _Opened:
         outside = signals((*outside, *(f"slope_{i + 1}" for i in range(leave.shape[0]))))
         states = (*plant.states, *(f"controller_{s}" for s in self.K.states))
         model = LPVStateSpace(
-            basis, A, B, C, D, plant.parameters, signals(states), (*plant.disturbances, *inside),
-            (*plant.performance, *outside), plant.dt,
-        )  # fmt: skip
+            basis,
+            A,
+            B,
+            C,
+            D,
+            plant.parameters,
+            signals(states),
+            (*plant.disturbances, *inside),
+            (*plant.performance, *outside),
+            plant.dt,
+        )
         s = plant.parameters[0]
         said += f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"
         return UncertainStateSpace(model, inside, outside, 1.0, probability, said)
