@@ -1,0 +1,208 @@
+"""The controllers of the study, each sampled and of few states, by name; or why there is none."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification import KinematicModel
+from studies.controllers.identified_plant import identified_model
+from studies.controllers.in_airspeed import of_degree
+from studies.controllers.plant import (
+    CONTROLS,
+    MEASUREMENTS,
+    PERIOD,
+    RATE,
+    TOP,
+    baseline,
+    design_plant,
+    flown_plant,
+)
+from symheli import Helicopter, LinearModel, LPVStateSpace
+from symheli.errors import SymheliError, SynthesisError
+from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
+from symheli.lpv.bases import PiecewiseLinear
+from synthesis import Plant, frozen_gain
+from synthesis.design.controller import Controller
+from synthesis.design.hinf import hinf
+from synthesis.design.lft_feedback import lft_feedback
+from synthesis.design.output_feedback import output_feedback
+
+LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
+BASELINE, IDENTIFIED = "LPV from the baseline", "LPV from the identified model"
+NAMES = (LQR, HINF, LFT, BASELINE, IDENTIFIED)
+
+BACK_OFF = 1.3
+"""Levels are this much above the least, where controllers are slower than the servos."""
+
+AIRSPEEDS = 14
+"""Points of the schedules, evenly over the range."""
+
+ORDERS = (8, 9, 10, 12, 14, 16)
+DEGREES = (2, 3, 4, 6)
+NEAR = 1.03
+"""Orders and degrees in airspeed that are tried in turn, and how much larger the frozen gain of the
+loop may become by the reduction.
+"""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Design:
+    """A controller under its name.
+
+    `controller` is what flies: sampled, from measured deviations to commanded ones; None where
+    there is none, for `reason`. `promised`: the gain of the synthesis, on the plant of the design
+    (of point designs the largest; NaN without one); `frozen`: that of the loop which flies, largest
+    over frozen airspeeds, inf where one is unstable; `seconds` of the design; `remark`: what has
+    to be said beside it.
+    """
+
+    name: str
+    controller: LPVStateSpace | None
+    promised: float = math.nan
+    frozen: float = math.inf
+    seconds: float = 0.0
+    reason: str = ""
+    remark: str = ""
+
+    @property
+    def order(self) -> int:
+        """States of the controller."""
+        return 0 if self.controller is None else len(self.controller.states)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Designs:
+    """Every design, and the baseline sampled as it is flown and certified."""
+
+    designs: tuple[Design, ...]
+    plant: Plant
+
+    def of(self, name: str) -> Design:
+        """One of them."""
+        return next(design for design in self.designs if design.name == name)
+
+
+def design_all(heli: Helicopter, identified: KinematicModel) -> Designs:
+    """Every design of `NAMES`, in that order."""
+    base = baseline(heli)
+    own, flown = design_plant(base), flown_plant(base)
+
+    def from_the_model() -> Controller:
+        return output_feedback(design_plant(identified_model(identified), held=0.0), RATE, back_off=BACK_OFF)
+
+    ways: dict[str, Callable[[], Controller | LPVStateSpace]] = {
+        LQR: lambda: lqr_schedule(heli),
+        HINF: lambda: hinf_schedule(own),
+        LFT: lambda: lft_feedback(own, back_off=BACK_OFF),
+        BASELINE: lambda: output_feedback(own, RATE, back_off=BACK_OFF),
+        IDENTIFIED: from_the_model,
+    }
+    return Designs(
+        designs=tuple(design(name, make, flown) for name, make in ways.items()), plant=flown
+    )
+
+
+def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Plant) -> Design:
+    """One design, in the form that flies; without a controller where the synthesis found none."""
+    begin = time.perf_counter()
+    try:
+        made = make()
+    except SynthesisError as error:
+        return Design(
+            name=name, controller=None, seconds=time.perf_counter() - begin, reason=str(error)
+        )
+    controller, frozen = simplest(made, plant)
+    return Design(
+        name=name,
+        controller=controller,
+        promised=made.gamma if isinstance(made, Controller) else math.nan,
+        frozen=frozen,
+        seconds=time.perf_counter() - begin,
+    )
+
+
+def lqr_schedule(heli: Helicopter) -> LPVStateSpace:
+    """The gain-scheduled LQR of the study's flights, checked behind its servos."""
+    autopilot = gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS)
+    return autopilot.scheduled_controller.model
+
+
+def hinf_schedule(plant: Plant) -> Controller:
+    """Point designs, their entries straight between the airspeeds: their states estimate those of
+    the plant in its own coordinates.
+
+    Raises `SynthesisError` where a point has no design.
+    """
+    speeds = np.linspace(0.0, TOP, AIRSPEEDS)
+    found = []
+    for speed in speeds:
+        at = plant.nominal.at(float(speed))
+        one = hinf(
+            at,
+            CONTROLS,
+            MEASUREMENTS,
+            disturbances=plant.disturbances,
+            performance=plant.performance,
+            back_off=BACK_OFF,
+        )
+        if one.controller is None:
+            raise SynthesisError(f"no H-infinity design at {speed:g} m/s: {'; '.join(one.reasons)}")
+        found.append(one)
+    points: list[LinearModel] = [one.controller for one in found if one.controller is not None]
+    A, B, C, D = (np.stack([getattr(one, part) for one in points]) for part in "ABCD")
+    model = LPVStateSpace(
+        PiecewiseLinear(tuple(speeds.tolist())),
+        A,
+        B,
+        C,
+        D,
+        plant.parameters,
+        points[0].states,
+        points[0].inputs,
+        points[0].outputs,
+    )
+    return Controller(
+        model=model,
+        plant=plant,
+        gamma=max(one.gamma for one in found),
+        method=f"H-infinity at {AIRSPEEDS} airspeeds",
+    )
+
+
+def simplest(made: Controller | LPVStateSpace, plant: Plant) -> tuple[LPVStateSpace, float]:
+    """The sampled controller of fewest states and, of that, least degree in airspeed whose frozen
+    gain on the plant is `NEAR` that of all states; with that gain.
+    """
+
+    def gain(model: LPVStateSpace) -> float:
+        return frozen_gain(plant.close(model), points=AIRSPEEDS).gamma
+
+    def sampled(order: int) -> LPVStateSpace:
+        assert isinstance(made, Controller)  # noqa: S101
+        return made.reduce(order).discretize(PERIOD).model
+
+    whole = made.discretize(PERIOD).model if isinstance(made, Controller) else made
+    best, limit = whole, NEAR * gain(whole)
+    for order in ORDERS if isinstance(made, Controller) and math.isfinite(limit) else ():
+        fewer = _tried(lambda order=order: sampled(order))
+        if fewer is not None and gain(fewer) <= limit:
+            best = fewer
+            break
+    for degree in DEGREES if math.isfinite(limit) else ():
+        simpler = of_degree(best, degree)
+        if gain(simpler) <= limit:
+            best = simpler
+            break
+    return best, frozen_gain(plant.close(best)).gamma
+
+
+def _tried(make: Callable[[], LPVStateSpace]) -> LPVStateSpace | None:
+    try:
+        return make()
+    except SymheliError:
+        return None
