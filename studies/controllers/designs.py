@@ -26,11 +26,12 @@ from symheli import Helicopter, LinearModel, LPVStateSpace
 from symheli.errors import SymheliError, SynthesisError
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from symheli.lpv.bases import PiecewiseLinear
-from synthesis import Plant, frozen_gain
+from synthesis import Plant
 from synthesis.design.controller import Controller
 from synthesis.design.hinf import hinf
 from synthesis.design.lft_feedback import lft_feedback
 from synthesis.design.output_feedback import output_feedback
+from synthesis.worst.frozen import norm
 
 LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
 BASELINE, IDENTIFIED = "LPV from the baseline", "LPV from the identified model"
@@ -50,6 +51,10 @@ loop may become by the reduction.
 """
 
 
+LOOKED_AT = np.linspace(0.0, TOP, AIRSPEEDS)
+"""Airspeeds, m/s, at which that is."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Design:
     """A controller under its name.
@@ -57,7 +62,7 @@ class Design:
     `controller` is what flies: sampled, from measured deviations to commanded ones; None where
     there is none, for `reason`. `promised`: the gain of the synthesis, on the plant of the design
     (of point designs the largest; NaN without one); `frozen`: that of the loop which flies, largest
-    over frozen airspeeds, inf where one is unstable; `seconds` of the design; `remark`: what has
+    over `LOOKED_AT`, inf where one is unstable; `seconds` of the design; `remark`: what has
     to be said beside it.
     """
 
@@ -180,7 +185,8 @@ def simplest(made: Controller | LPVStateSpace, plant: Plant) -> tuple[LPVStateSp
     """
 
     def gain(model: LPVStateSpace) -> float:
-        return frozen_gain(plant.close(model), points=AIRSPEEDS).gamma
+        loop = plant.close(model)
+        return max(norm(*loop.matrices(float(v)), loop.dt)[0] for v in LOOKED_AT)
 
     def sampled(order: int) -> LPVStateSpace:
         assert isinstance(made, Controller)  # noqa: S101
@@ -198,7 +204,7 @@ def simplest(made: Controller | LPVStateSpace, plant: Plant) -> tuple[LPVStateSp
         if gain(simpler) <= limit:
             best = simpler
             break
-    return best, frozen_gain(plant.close(best)).gamma
+    return best, gain(best)
 
 
 def _tried(make: Callable[[], LPVStateSpace]) -> LPVStateSpace | None:

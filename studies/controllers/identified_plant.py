@@ -23,7 +23,7 @@ DEGREE = 4
 
 def identified_model(model: KinematicModel) -> LPVStateSpace:
     """Continuous over airspeed, with controls and gusts, at no commanded acceleration."""
-    moves = {s.name: 0.0 for s in model.parameters if s.name == ACCELERATION}
+    moves = {str(s): 0.0 for s in model.parameters if s == ACCELERATION}
     sampled = model.to_state_space(held=moves)
     airspeed = Scheduling("airspeed", "m/s", 0.0, TOP, rate=RATE)
     return of_degree(continuous(with_gusts(sampled)), DEGREE).with_scheduling(airspeed)
