@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import KinematicModel
+import symheli
+from identification import KinematicModel, fit_for_control
 from studies.controllers.identified_plant import identified_model
 from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import (
@@ -17,11 +18,15 @@ from studies.controllers.plant import (
     MEASUREMENTS,
     PERIOD,
     RATE,
+    SIZES,
     TOP,
     baseline,
     design_plant,
     flown_plant,
 )
+from studies.marks import flights
+from studies.transition.effort import Effort
+from studies.transition.flights import autopilot_for
 from symheli import Helicopter, LinearModel, LPVStateSpace
 from symheli.errors import SymheliError, SynthesisError
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
@@ -51,7 +56,10 @@ loop may become by the reduction.
 """
 
 
-LOOKED_AT = np.linspace(0.0, TOP, AIRSPEEDS)
+JUDGED_AT, DRAWS = (0.0, 6.5, 13.0), 50
+"""Airspeeds (m/s) at which an identified model is judged, and draws from what its data allow."""
+
+LOOKED_AT = np.linspace(0.0, TOP, 9)
 """Airspeeds, m/s, at which that is."""
 
 
@@ -62,8 +70,8 @@ class Design:
     `controller` is what flies: sampled, from measured deviations to commanded ones; None where
     there is none, for `reason`. `promised`: the gain of the synthesis, on the plant of the design
     (of point designs the largest; NaN without one); `frozen`: that of the loop which flies, largest
-    over `LOOKED_AT`, inf where one is unstable; `seconds` of the design; `remark`: what has
-    to be said beside it.
+    over `LOOKED_AT`, inf where one is unstable; `seconds` of the design; `remark`: what
+    the data say of the model that it was designed on, where they were asked.
     """
 
     name: str
@@ -92,24 +100,26 @@ class Designs:
         return next(design for design in self.designs if design.name == name)
 
 
-def design_all(heli: Helicopter, identified: KinematicModel) -> Designs:
-    """Every design of `NAMES`, in that order."""
+def design_all(heli: Helicopter, identified: KinematicModel, seed: int, effort: Effort) -> Designs:
+    """Every design of `NAMES`, in that order; `seed` is that of the flight by which the identified
+    model is judged.
+    """
     base = baseline(heli)
     own, flown = design_plant(base), flown_plant(base)
-
-    def from_the_model() -> Controller:
-        return output_feedback(design_plant(identified_model(identified), held=0.0), RATE, back_off=BACK_OFF)
-
+    theirs = design_plant(identified_model(identified), held=0.0)
     ways: dict[str, Callable[[], Controller | LPVStateSpace]] = {
         LQR: lambda: lqr_schedule(heli),
-        HINF: lambda: hinf_schedule(own),
+        HINF: lambda: hinf_schedule(own, effort.design_points),
         LFT: lambda: lft_feedback(own, back_off=BACK_OFF),
         BASELINE: lambda: output_feedback(own, RATE, back_off=BACK_OFF),
-        IDENTIFIED: from_the_model,
+        IDENTIFIED: lambda: output_feedback(theirs, RATE, back_off=BACK_OFF),
     }
-    return Designs(
-        designs=tuple(design(name, make, flown) for name, make in ways.items()), plant=flown
-    )
+    made = {name: design(name, make, flown) for name, make in ways.items()}
+    controller = made[IDENTIFIED].controller
+    if effort.certified_controllers and controller is not None:
+        said = verdict(heli, identified, controller, seed)
+        made[IDENTIFIED] = replace(made[IDENTIFIED], remark=said)
+    return Designs(designs=tuple(made.values()), plant=flown)
 
 
 def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Plant) -> Design:
@@ -131,19 +141,39 @@ def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Pla
     )
 
 
+def verdict(
+    heli: Helicopter, identified: KinematicModel, controller: LPVStateSpace, seed: int
+) -> str:
+    """Whether the identified model is fit for a loop with this controller, in a sentence, by the
+    flight that it was identified from.
+    """
+    record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
+    rest = (0.0,) * (len(identified.parameters) - 1)
+    found = fit_for_control(
+        identified,
+        record,
+        lambda p: controller.at(p[0] if rest else p),
+        scales=SIZES,
+        points=[(v, *rest) if rest else v for v in JUDGED_AT],
+        draws=DRAWS,
+    )
+    doubts = [row.name for row in found.criteria if row.decides and row.verdict != "fit"]
+    return f"{found.verdict}{': ' + ', '.join(doubts) if doubts else ''}"
+
+
 def lqr_schedule(heli: Helicopter) -> LPVStateSpace:
     """The gain-scheduled LQR of the study's flights, checked behind its servos."""
     autopilot = gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS)
     return autopilot.scheduled_controller.model
 
 
-def hinf_schedule(plant: Plant) -> Controller:
+def hinf_schedule(plant: Plant, points: int = AIRSPEEDS) -> Controller:
     """Point designs, their entries straight between the airspeeds: their states estimate those of
     the plant in its own coordinates.
 
     Raises `SynthesisError` where a point has no design.
     """
-    speeds = np.linspace(0.0, TOP, AIRSPEEDS)
+    speeds = np.linspace(0.0, TOP, points)
     found = []
     for speed in speeds:
         at = plant.nominal.at(float(speed))
@@ -158,8 +188,8 @@ def hinf_schedule(plant: Plant) -> Controller:
         if one.controller is None:
             raise SynthesisError(f"no H-infinity design at {speed:g} m/s: {'; '.join(one.reasons)}")
         found.append(one)
-    points: list[LinearModel] = [one.controller for one in found if one.controller is not None]
-    A, B, C, D = (np.stack([getattr(one, part) for one in points]) for part in "ABCD")
+    each: list[LinearModel] = [one.controller for one in found if one.controller is not None]
+    A, B, C, D = (np.stack([getattr(one, part) for one in each]) for part in "ABCD")
     model = LPVStateSpace(
         PiecewiseLinear(tuple(speeds.tolist())),
         A,
@@ -167,15 +197,15 @@ def hinf_schedule(plant: Plant) -> Controller:
         C,
         D,
         plant.parameters,
-        points[0].states,
-        points[0].inputs,
-        points[0].outputs,
+        each[0].states,
+        each[0].inputs,
+        each[0].outputs,
     )
     return Controller(
         model=model,
         plant=plant,
         gamma=max(one.gamma for one in found),
-        method=f"H-infinity at {AIRSPEEDS} airspeeds",
+        method=f"H-infinity at {points} airspeeds",
     )
 
 

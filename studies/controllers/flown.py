@@ -10,8 +10,15 @@ import numpy as np
 from studies.controllers.designs import Designs
 from studies.controllers.measures import Measures, measured
 from studies.controllers.plant import CONTROLS, DELAY, MEASUREMENTS, NOISE, PERIOD, RATE
-from symheli import AirspeedSchedule, Dryden, FlightPlan, Helicopter, ScheduledController, Wind
-from symheli import fly_batch
+from symheli import (
+    AirspeedSchedule,
+    Dryden,
+    FlightPlan,
+    Helicopter,
+    ScheduledController,
+    Wind,
+    fly_batch,
+)
 from symheli.flight import XCELL_SERVOS, Sensor
 
 LOW, HIGH = 0.5, 12.0
@@ -23,8 +30,13 @@ SERVO_RATE = 3.0
 STEADY, ALTITUDE = (-2.0, 1.0, 0.0), 20.0
 """The steady wind (north, east, down, m/s), and the height of the turbulence, m."""
 
-WINDS = (3.85, 7.7, 15.4)
-"""Sizes of the turbulence, as mean winds at 20 ft, m/s: half of light, light, moderate."""
+WINDS = (7.7, 15.4, 23.2)
+"""Sizes of the turbulence, as mean winds at 20 ft, m/s: light, moderate, severe."""
+
+BEYOND = (0.0, 1.9, 3.9, 34.8, 52.2)
+"""Further sizes at which the proven gains are tried: from still air, where noise is all that
+disturbs, to more than any weather.
+"""
 
 NOISE_SHARE = 1 / 3
 """Of the noise that counts as 1, the standard deviation that is flown."""
@@ -75,6 +87,13 @@ class FlownControllers:
         """Of all controllers, in turbulence of one size."""
         return [one for one in self.flown if one.wind == wind]
 
+    def exceeded(self, name: str, gain: float) -> Flown | None:
+        """The flights in the least turbulence in which one of them has an energy ratio above a
+        gain.
+        """
+        above = (f for f in self.of(name) if f.of(lambda flight: flight.ratio)[1] > gain)
+        return min(above, key=lambda f: f.wind, default=None)
+
     def ranked(self, wind: float) -> list[Flown]:
         """Those that lost no flight, the least median energy ratio first."""
         return sorted((f for f in self.at(wind) if not f.lost), key=lambda f: f.ratio)
@@ -93,7 +112,7 @@ def plans(designs: Designs) -> Iterator[tuple[str, float, FlightPlan]]:
         if design.controller is None:
             continue
         controller = ScheduledController(design.controller)
-        for wind in WINDS:
+        for wind in sorted((*WINDS, *BEYOND)):
             yield (
                 design.name,
                 wind,

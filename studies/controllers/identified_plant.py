@@ -59,6 +59,11 @@ def continuous(model: LPVStateSpace) -> LPVStateSpace:
     def change(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, ...]:
         inverse = np.linalg.inv(A + np.eye(A.shape[-1]))
         shifted = A - np.eye(A.shape[-1])
-        return 2 / dt * inverse @ shifted, 2 / dt * inverse @ B, 2 * C @ inverse, D - C @ inverse @ B
+        return (
+            2 / dt * inverse @ shifted,
+            2 / dt * inverse @ B,
+            2 * C @ inverse,
+            D - C @ inverse @ B,
+        )
 
     return resampled(model, change, None)

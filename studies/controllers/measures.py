@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.controllers.plant import CONTROLS, GUST, MEASUREMENTS, NOISE, RATE, SIZES, TOP
-from symheli.flight import FlightBatch
+from symheli.flight import FlightBatch, FlightPlan
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Readings
 from symheli.flight.flight_data import WIND, FlightData
@@ -21,11 +21,11 @@ AT_THE_STOP = 0.999
 class Measures:
     """One flight, until it was lost where it was.
 
-    `speed`: rms of forward airspeed minus the commanded one, m/s; `deviation`: rms of the performance
-    signals, 1 as large as `SIZES`, all together, and of each in `deviations`; `attitude`: largest
-    bank or pitch, rad; `stops`: share of the time with a command at a stop; `ratio`: energy of the
-    performance over that of gusts and noise, its root; `outside`, `faster`: share of the time
-    with a forward airspeed outside the range and with a change of it above the permitted rate.
+    `speed`: rms of forward airspeed minus the commanded one, m/s; `deviation`: rms of the
+    performance signals, 1 as large as `SIZES`, all together, and of each in `deviations`;
+    `attitude`: largest bank or pitch, rad; `stops`: share of the time with a command at a stop;
+    `ratio`: see `energy_ratio`; `outside`, `faster`: share of the time with a forward airspeed
+    outside the range and with a change of it above the permitted rate.
     """
 
     lost: bool
@@ -49,7 +49,7 @@ def of_flight(flown: FlightData) -> Measures:
     column, travel = flown.columns(), flown.heli.travel
     noise = noise_of(flown)
     true = {y: column[y] - noise[:, i] for i, y in enumerate(MEASUREMENTS)}
-    gusts, forward = air(column, true, flown.plan.wind.steady)
+    gusts, forward = air(column, true, flown.plan)
     z = performance(column, true)
     w = np.column_stack([gusts / GUST, noise / [NOISE[y] for y in MEASUREMENTS]])
     commands = np.column_stack([column[f"{u}_command"] for u in CONTROLS])
@@ -83,22 +83,29 @@ def noise_of(flown: FlightData) -> Array:
     return white[0, :: flown.clock.every][: flown.kept] * readings.noise[: len(MEASUREMENTS)]
 
 
-def air(
-    column: dict[str, Array], true: dict[str, Array], steady: tuple[float, float, float]
-) -> tuple[Array, Array]:
+def air(column: dict[str, Array], true: dict[str, Array], plan: FlightPlan) -> tuple[Array, Array]:
     """Gusts along the axes of the helicopter (n, 3), and its forward airspeed (n,) in the steady
     wind alone, m/s.
 
     A gust is the wind along the axes, less the steady one along those of the reference: a heading
     that drifts turns the steady wind into one.
     """
-    wind = np.column_stack([column[name] for name in WIND])
-    own = to_body(true["phi"], true["theta"], column["psi"])
-    held = to_body(*(column[f"{s}_reference"] for s in ("phi", "theta", "psi")))
-    gusts = np.einsum("nij,nj->ni", own, wind) - held @ np.array(steady)
-    through = np.column_stack([true[s] for s in ("u", "v", "w")]) - own @ np.array(steady)
+    wind, steady = np.column_stack([column[name] for name in WIND]), np.array(plan.wind.steady)
+    own = to_body(true["phi"], true["theta"], heading(true, plan.dt))
+    level = np.zeros(len(wind))
+    held = to_body(column["phi_reference"], column["theta_reference"], level)
+    gusts = np.einsum("nij,nj->ni", own, wind) - held @ steady
+    through = np.column_stack([true[s] for s in ("u", "v", "w")]) - own @ steady
     forward = np.cos(true["theta"]) * through[:, 0] + np.sin(true["theta"]) * through[:, 2]
     return gusts, forward
+
+
+def heading(true: dict[str, Array], dt: float) -> Array:
+    """From north (n,), rad, by the trapezoidal rule from the rates: no flight measures it."""
+    turn = (true["q"] * np.sin(true["phi"]) + true["r"] * np.cos(true["phi"])) / np.cos(
+        true["theta"]
+    )
+    return np.concatenate([[0.0], np.cumsum(0.5 * dt * (turn[1:] + turn[:-1]))])
 
 
 def to_body(phi: Array, theta: Array, psi: Array) -> Array:

@@ -34,7 +34,7 @@ SIZES = {
     **dict.fromkeys(("d_lon", "d_lat", "d_col"), 0.009),
     "d_ped": 0.03,
 }
-"""A deviation of this size (m/s, rad/s, rad) counts as 1; of a control it is that of the command."""
+"""A deviation of this size (m/s, rad/s, rad) counts as 1; of a control that of the command."""
 
 GUST = 2.0
 """A gust of this size (m/s) counts as 1."""
