@@ -21,6 +21,7 @@ from studies.controllers.plant import (
     SIZES,
     TOP,
     baseline,
+    closed,
     design_plant,
     flown_plant,
 )
@@ -215,7 +216,7 @@ def simplest(made: Controller | LPVStateSpace, plant: Plant) -> tuple[LPVStateSp
     """
 
     def gain(model: LPVStateSpace) -> float:
-        loop = plant.close(model)
+        loop = closed(plant, model)
         return max(norm(*loop.matrices(float(v)), loop.dt)[0] for v in LOOKED_AT)
 
     def sampled(order: int) -> LPVStateSpace:

@@ -13,6 +13,7 @@ import symheli
 from symheli import Helicopter, LinearModel, LPVStateSpace
 from symheli.flight import XCELL_SERVOS, Servo
 from symheli.lpv import balanced_truncation
+from symheli.values.signal import signals
 from synthesis import Plant
 from synthesis.design import parts
 
@@ -79,10 +80,10 @@ def unweighted(model: LPVStateSpace) -> Plant:
     """With gusts, controls, and the measured states and commands as performance."""
     return Plant(
         model,
-        disturbances=GUSTS,
-        performance=[*MEASUREMENTS, *CONTROLS],
-        controls=CONTROLS,
-        measurements=MEASUREMENTS,
+        disturbances=signals(GUSTS),
+        performance=signals((*MEASUREMENTS, *CONTROLS)),
+        controls=signals(CONTROLS),
+        measurements=signals(MEASUREMENTS),
     )
 
 
@@ -105,3 +106,10 @@ def flown_plant(model: LPVStateSpace) -> Plant:
     servos = {u: XCELL_SERVOS[u] for u in CONTROLS}
     sampled = unweighted(model).with_servo(servos).sampled(PERIOD, degree=SAMPLED_DEGREE)
     return weighted(sampled.with_delay(DELAY))
+
+
+def closed(plant: Plant, controller: LPVStateSpace) -> LPVStateSpace:
+    """The loop, from gusts and noise to performance."""
+    loop = plant.close(controller)
+    assert isinstance(loop, LPVStateSpace)  # noqa: S101
+    return loop
