@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -28,7 +29,8 @@ from studies.controllers.plant import (
 from studies.marks import flights
 from studies.transition.effort import Effort
 from studies.transition.flights import autopilot_for
-from symheli import Helicopter, LinearModel, LPVStateSpace
+from studies.transition.proofs import Questions
+from symheli import FlightRecord, Helicopter, LinearModel, LPVStateSpace
 from symheli.errors import SymheliError, SynthesisError
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from symheli.lpv.bases import PiecewiseLinear
@@ -101,54 +103,70 @@ class Designs:
         return next(design for design in self.designs if design.name == name)
 
 
-def design_all(heli: Helicopter, identified: KinematicModel, seed: int, effort: Effort) -> Designs:
+def design_questions(
+    heli: Helicopter, identified: KinematicModel, seed: int, effort: Effort
+) -> Questions:
     """Every design of `NAMES`, in that order; `seed` is that of the flight by which the identified
     model is judged.
     """
     base = baseline(heli)
     own, flown = design_plant(base), flown_plant(base)
     theirs = design_plant(identified_model(identified), held=0.0)
+    record = None
+    if effort.certified_controllers:
+        record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
+    from_the_model = partial(output_feedback, theirs, RATE, back_off=BACK_OFF)
+    last = partial(from_flights, from_the_model, flown, identified, record)
     ways: dict[str, Callable[[], Controller | LPVStateSpace]] = {
-        LQR: lambda: lqr_schedule(heli),
-        HINF: lambda: hinf_schedule(own, effort.design_points),
-        LFT: lambda: lft_feedback(own, back_off=BACK_OFF),
-        BASELINE: lambda: output_feedback(own, RATE, back_off=BACK_OFF),
-        IDENTIFIED: lambda: output_feedback(theirs, RATE, back_off=BACK_OFF),
+        LQR: partial(lqr_schedule, heli),
+        HINF: partial(hinf_schedule, own, effort.design_points),
+        LFT: partial(lft_feedback, own, back_off=BACK_OFF),
+        BASELINE: partial(output_feedback, own, RATE, back_off=BACK_OFF),
     }
-    made = {name: design(name, make, flown) for name, make in ways.items()}
-    controller = made[IDENTIFIED].controller
-    if effort.certified_controllers and controller is not None:
-        said = verdict(heli, identified, controller, seed)
-        made[IDENTIFIED] = replace(made[IDENTIFIED], remark=said)
-    return Designs(designs=tuple(made.values()), plant=flown)
+    asked = [partial(design, name, make, flown) for name, make in ways.items()]
+    return Questions([*asked, last], lambda designs: Designs(designs=designs, plant=flown), [last])
 
 
-def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Plant) -> Design:
+def from_flights(
+    make: Callable[[], Controller],
+    plant: Plant,
+    identified: KinematicModel,
+    record: FlightRecord | None,
+) -> list[Design]:
+    """The design from the identified model, with the verdict on that where there is a record to
+    judge it by.
+    """
+    (found,) = design(IDENTIFIED, make, plant)
+    if record is None or found.controller is None:
+        return [found]
+    return [replace(found, remark=verdict(identified, found.controller, record))]
+
+
+def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Plant) -> list[Design]:
     """One design, in the form that flies; without a controller where the synthesis found none."""
     begin = time.perf_counter()
     try:
         made = make()
     except SynthesisError as error:
-        return Design(
-            name=name, controller=None, seconds=time.perf_counter() - begin, reason=str(error)
-        )
+        seconds = time.perf_counter() - begin
+        return [Design(name=name, controller=None, seconds=seconds, reason=str(error))]
     controller, frozen = simplest(made, plant)
-    return Design(
-        name=name,
-        controller=controller,
-        promised=made.gamma if isinstance(made, Controller) else math.nan,
-        frozen=frozen,
-        seconds=time.perf_counter() - begin,
-    )
+    promised = made.gamma if isinstance(made, Controller) else math.nan
+    return [
+        Design(
+            name=name,
+            controller=controller,
+            promised=promised,
+            frozen=frozen,
+            seconds=time.perf_counter() - begin,
+        )
+    ]
 
 
-def verdict(
-    heli: Helicopter, identified: KinematicModel, controller: LPVStateSpace, seed: int
-) -> str:
-    """Whether the identified model is fit for a loop with this controller, in a sentence, by the
-    flight that it was identified from.
+def verdict(identified: KinematicModel, controller: LPVStateSpace, record: FlightRecord) -> str:
+    """Whether the identified model is fit for a loop with this controller, by the flight that it
+    was identified from, and what stands against it.
     """
-    record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
     rest = (0.0,) * (len(identified.parameters) - 1)
     found = fit_for_control(
         identified,

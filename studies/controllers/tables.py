@@ -148,28 +148,23 @@ def _worst(one: Flown) -> float:
 
 
 def _hypotheses(found: FlownControllers) -> str:
+    outside, faster = "outside the range (%)", "faster than the rate (%)"
     parts = []
     for wind in WINDS:
         some = found.at(wind)
-        outside, faster = (
-            max(some, key=lambda one, of=of: one.of(of)[0])
-            for of in (MEASURES["outside the range (%)"], MEASURES["faster than the rate (%)"])
-        )
+        shares = [
+            ", ".join(f"{one.of(MEASURES[column])[0]:.0f} % ({one.name})" for one in some)
+            for column in (outside, faster)
+        ]
         parts.append(
-            f"in gusts of {some[0].gust:.1f} m/s airspeed was outside 0 to {TOP:g} m/s for up to"
-            f" {outside.of(MEASURES['outside the range (%)'])[0]:.0f} % of a median flight"
-            f" ({outside.name}) and changed faster than {RATE:g} m/s^2 for up to"
-            f" {faster.of(MEASURES['faster than the rate (%)'])[0]:.0f} % ({faster.name})"
+            f"in gusts of {some[0].gust:.1f} m/s airspeed was outside 0 to {TOP:g} m/s for"
+            f" {shares[0]} of the time and changed faster than {RATE:g} m/s^2 for {shares[1]}"
         )
+    every = all(_broke(one) for wind in WINDS for one in found.at(wind))
+    which = "every certificate" if every else "certificates"
     return (
-        (
-            "Hypotheses of the certificates broke for every controller: the command keeps to range and"
-            " rate, but "
-            if all(_broke(one) for wind in WINDS for one in found.at(wind))
-            else "Where hypotheses of the certificates broke: "
-        )
-        + "; ".join(parts)
-        + "."
+        f"The command keeps to range and rate, the helicopter does not: hypotheses of {which} broke"
+        f" (medians); {'; '.join(parts)}."
     )
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from studies.controllers.certified import CertifiedControllers, controller_questions
-from studies.controllers.designs import Designs, design_all
+from studies.controllers.designs import Designs, design_questions
 from studies.controllers.flown import FlownControllers, fly_controllers
 from studies.processes import Processes
 from studies.transition.baseline import Baseline, build_baseline
@@ -260,9 +260,10 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             "Designing controllers from the baseline and from the identified model",
             Designs,
             ("known_kinematics",),
-            lambda s, effort: design_all(
+            lambda s, effort: design_questions(
                 _there(s.heli), _there(s.known_kinematics).model, s.seed, effort
             ),
+            asks=True,
         ),
         Stage(
             "flown_controllers",
