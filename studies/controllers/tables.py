@@ -67,7 +67,7 @@ def designed(found: Designs, proofs: CertifiedControllers | None) -> Table:
     table.remarks.append(
         "By synthesis: on the plant of the design, of point designs the largest. As flown: around"
         " the baseline with the servos and a delay of one sample, 50 Hz. None: nothing proven;"
-        " blank: not tried."
+        " blank: not tried, or not needed because more is proven."
     )
     if said := found.of(IDENTIFIED).remark:
         table.remarks.append(f"Is the identified model fit for that loop? {said}.")
