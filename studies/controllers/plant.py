@@ -5,17 +5,13 @@ All signals are deviations from the trim of the commanded airspeed.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 import symheli
 from symheli import Helicopter, LinearModel, LPVStateSpace
 from symheli.flight import XCELL_SERVOS, Servo
-from symheli.lpv import balanced_truncation
 from symheli.values.signal import signals
 from synthesis import Plant
-from synthesis.design import parts
 
 TOP, RATE = 13.0, 3.0
 """Of the airspeed, m/s, and of its change, m/s^2."""
@@ -54,9 +50,6 @@ DEGREE = 3
 SAMPLED_DEGREE = 3
 """Airspeeds linearized; degree in airspeed of the model and of the sampled one."""
 
-ACTUATOR_ORDER, PADE = 2, 4
-"""States of an actuator, and of the delay in it before it is truncated."""
-
 
 def baseline(heli: Helicopter) -> LPVStateSpace:
     """The helicopter over airspeed with its controls and gusts, element-wise cubic."""
@@ -65,15 +58,30 @@ def baseline(heli: Helicopter) -> LPVStateSpace:
     return family.interpolate("polynomial", DEGREE, rate=RATE)
 
 
-def actuator(servo: Servo, name: str, late: float, order: int = ACTUATOR_ORDER) -> LinearModel:
-    """Command to blade pitch `late` seconds later and through the servo, truncated to `order`
-    states, of gain 1 when steady.
+def actuator(servo: Servo, name: str, late: float) -> LinearModel:
+    """Command to blade pitch `late` seconds later and through the servo, as 1/(1 + a s + b s^2)
+    that agrees with it to the second power of s.
+
+    The loops cross well below the servos. A balanced truncation to two states has half the lag
+    there.
     """
-    delay = parts.delay(late, name, PADE, None)
-    whole = servo.linear(name).driven_by({f"{name}_command": delay})
-    short = balanced_truncation(whole, order).model
-    steady = float((short.D - short.C @ np.linalg.solve(short.A, short.B))[0, 0])
-    return replace(short, C=short.C / steady, D=short.D / steady)
+    w, z = servo.natural_frequency, servo.damping
+    expansion = np.array([1.0, late, late**2 / 2]), np.array([1.0, 2 * z / w, 1 / w**2])
+    inverse = np.convolve(*expansion)[:3]
+    if servo.zero is not None and servo.pole is not None:
+        lead = 1 / servo.zero
+        lag = np.array([1.0, 1 / servo.pole - lead, -lead * (1 / servo.pole - lead)])
+        inverse = np.convolve(inverse, lag)[:3]
+    _, a, b = inverse
+    return LinearModel(
+        [[0.0, 1.0], [-1 / b, -a / b]],
+        [[0.0], [1 / b]],
+        [[1.0, 0.0]],
+        [[0.0]],
+        (f"{name}_lag1", f"{name}_lag2"),
+        (f"{name}_command",),
+        (name,),
+    )
 
 
 def unweighted(model: LPVStateSpace) -> Plant:
