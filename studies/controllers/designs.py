@@ -98,10 +98,6 @@ class Designs:
     designs: tuple[Design, ...]
     plant: Plant
 
-    def of(self, name: str) -> Design:
-        """One of them."""
-        return next(design for design in self.designs if design.name == name)
-
 
 def design_questions(
     heli: Helicopter, identified: KinematicModel, seed: int, effort: Effort
@@ -143,14 +139,16 @@ def from_flights(
 
 
 def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Plant) -> list[Design]:
-    """One design, in the form that flies; without a controller where the synthesis found none."""
+    """One design, in the form that flies; without a controller where none was found, or no loop of
+    it is stable.
+    """
     begin = time.perf_counter()
     try:
         made = make()
-    except SynthesisError as error:
+        controller, frozen = simplest(made, plant)
+    except SymheliError as error:
         seconds = time.perf_counter() - begin
         return [Design(name=name, controller=None, seconds=seconds, reason=str(error))]
-    controller, frozen = simplest(made, plant)
     promised = made.gamma if isinstance(made, Controller) else math.nan
     return [
         Design(

@@ -25,7 +25,7 @@ LOW, HIGH = 0.5, 12.0
 """Ends of the transition, m/s; at the permitted acceleration between."""
 
 SERVO_RATE = 3.0
-"""Rate limit of every servo, rad/s of blade pitch: about 60 degrees of its lever in 0.1 s."""
+"""Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
 
 STEADY, ALTITUDE = (-2.0, 1.0, 0.0), 20.0
 """The steady wind (north, east, down, m/s), and the height of the turbulence, m."""
@@ -132,8 +132,7 @@ def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> Flo
     """Every controller and size with every seed: the same gusts and noise for all of them."""
     heli = Helicopter.load(vehicle, governor="pi")
     asked = list(plans(designs))
-    batch = fly_batch(heli, [plan for _, _, plan in asked], seeds=seeds)
-    each = measured(batch)
+    each = measured(fly_batch(heli, [plan for *_, plan in asked], seeds=seeds)) if asked else []
     n = len(seeds)
     return FlownControllers(
         flown=tuple(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from studies.controllers.designs import IDENTIFIED, LQR
+from studies.controllers.designs import LQR
 from studies.controllers.flown import WINDS
 from studies.controllers.plant import RATE, TOP
 from studies.transition.guarantees import CONSTANT, PLAIN, proven
@@ -69,8 +69,10 @@ def designed(found: Designs, proofs: CertifiedControllers | None) -> Table:
         " the baseline with the servos and a delay of one sample, 50 Hz. None: nothing proven;"
         " blank: not tried, or not needed because more is proven."
     )
-    if said := found.of(IDENTIFIED).remark:
-        table.remarks.append(f"Is the identified model fit for that loop? {said}.")
+    for design in found.designs:
+        if design.remark:
+            said = f"{design.name}: is that model fit for this loop? {design.remark}."
+            table.remarks.append(said)
     return table
 
 
@@ -102,7 +104,7 @@ def flown(found: FlownControllers, proofs: CertifiedControllers | None) -> Table
 def conclusions(study: Outcome) -> list[str]:
     """Who won and by how much, and where hypotheses of the certificates broke."""
     found, proofs = study.flown_controllers, study.certified_controllers
-    if found is None:
+    if found is None or not found.flown:
         return []
     out = [_won(found, wind) for wind in WINDS]
     out += list(_bounds(found, proofs)) if proofs is not None and proofs.bounds else []

@@ -1,5 +1,5 @@
 """What the study says, in sentences: where scheduling pays, what recursion costs, what the LFT
-loses, what a certificate from flights is worth.
+loses, what a certificate from flights is worth, which controller flies best.
 """
 
 from __future__ import annotations

@@ -154,6 +154,7 @@ def test_the_schedule_of_point_designs_keeps_their_gain_at_each_point(base):
         assert norm(*loop.matrices(speed), None)[0] <= made.gamma * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_what_flies_has_fewer_states_and_hardly_more_gain(base):
     plant, made = flown_plant(base), hinf_schedule(design_plant(base), points=4)
     controller, frozen = simplest(made, plant)
