@@ -10,7 +10,7 @@ import numpy as np
 import symheli
 from symheli import Helicopter, LinearModel, LPVStateSpace
 from symheli.flight import XCELL_SERVOS, Servo
-from symheli.values.signal import signals
+from symheli.values.signal import Signal, signals
 from synthesis import Plant
 
 TOP, RATE = 13.0, 3.0
@@ -74,13 +74,13 @@ def actuator(servo: Servo, name: str, late: float) -> LinearModel:
         inverse = np.convolve(inverse, lag)[:3]
     _, a, b = inverse
     return LinearModel(
-        [[0.0, 1.0], [-1 / b, -a / b]],
-        [[0.0], [1 / b]],
-        [[1.0, 0.0]],
-        [[0.0]],
-        (f"{name}_lag1", f"{name}_lag2"),
-        (f"{name}_command",),
-        (name,),
+        np.array([[0.0, 1.0], [-1 / b, -a / b]]),
+        np.array([[0.0], [1 / b]]),
+        np.array([[1.0, 0.0]]),
+        np.zeros((1, 1)),
+        (Signal(f"{name}_lag1", "rad"), Signal(f"{name}_lag2", "rad/s")),
+        (Signal(f"{name}_command", "rad"),),
+        (Signal(name, "rad"),),
     )
 
 
