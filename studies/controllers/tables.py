@@ -121,8 +121,12 @@ def _won(found: FlownControllers, wind: float) -> str:
     first, *rest = ranked
     behind = ", ".join(f"{100 * (f.ratio / first.ratio - 1):.0f} % ({f.name})" for f in rest)
     others = f"; larger by {behind}" if rest else ""
-    simple = " No synthesis was worth it." if first.name == LQR else ""
+    simple = " No synthesis was worth it there." if first.name == LQR else ""
     won = f"{first.name} won: a median energy ratio of {first.ratio:.2f}{others}."
+    if rest:
+        pairs = zip(first.flights, rest[0].flights, strict=True)
+        better = sum(one.ratio < other.ratio for one, other in pairs)
+        won += f" It was better than the next with {better} of {found.seeds} seeds."
     return f"{where} {won}{simple}{fell}"
 
 

@@ -288,6 +288,7 @@ def test_a_controller_that_lost_a_flight_never_wins(campaign):
     assert {table.rows[row][0] for row, _ in table.bold} == {"steady"}
     said = tables.conclusions(Outcome(vehicle="x", quick=True, seed=0, flown_controllers=campaign))
     assert "steady won" in said[0]
+    assert "better than the next with 2 of 2 seeds" in said[0]
     assert "reckless (1 of 2)" in said[0]
 
 
