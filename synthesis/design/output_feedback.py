@@ -157,7 +157,7 @@ def _nominal(
         made = in_plant_units(
             plant, design.coordinates, design.gains, design.gamma, f"output feedback, {shape}"
         )
-        made = replace(made, by_adjoint=not any(used(shape.X)) and any(used(shape.Y)))
+        made = replace(made, by_adjoint=shape.by_y)
         # rough gains of p, or fast ones, are those of a block that is nearly singular
         good = made.misfit <= ACCURACY and _fastest(made.model) <= fastest
         best = made if best is None or good or made.misfit < best.misfit else best

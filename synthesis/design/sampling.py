@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Matrices
 from symheli.lpv.bases.polynomials import lobatto_points
+
+Array = np.ndarray
 
 NODES = {1: 41, 2: 13}
 """Values of each parameter at which the rule is applied (more parameters: 7)."""
@@ -20,12 +24,25 @@ def tustin(model: LPVStateSpace, dt: float) -> LPVStateSpace:
     """
     if model.dt is not None:
         raise InputError(f"the controller is already sampled (dt = {model.dt} s)")
+
+    def rule(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, ...]:
+        each = [
+            LinearModel(*M, model.states, model.inputs, model.outputs).discretize(dt, "tustin")
+            for M in zip(A, B, C, D, strict=True)
+        ]
+        return tuple(np.stack([getattr(m, name) for m in each]) for name in "ABCD")
+
+    return resampled(model, rule, dt)
+
+
+def resampled(
+    model: LPVStateSpace,
+    change: Callable[[Array, Array, Array, Array], tuple[Array, ...]],
+    dt: float | None,
+) -> LPVStateSpace:
+    """The model with its matrices (K, ..) changed at every p, by the same functions of p."""
     p = lobatto_points(NODES.get(len(model.parameters), 7), model.box)
-    each = [
-        LinearModel(*M, model.states, model.inputs, model.outputs).discretize(dt, "tustin")
-        for M in zip(*model.matrices(p), strict=True)
-    ]
-    exact = Matrices(*(np.stack([getattr(m, name) for m in each]) for name in "ABCD"))
+    exact = Matrices(*change(*model.matrices(p)))
     A, B, C, D = (model.basis.fit(p, M) for M in exact)
     sampled = LPVStateSpace(
         model.basis, A, B, C, D, model.parameters, model.states, model.inputs, model.outputs, dt

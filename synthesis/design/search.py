@@ -43,6 +43,12 @@ class Shape:
     X: FunctionSpace | None
     Y: FunctionSpace | None
 
+    @property
+    def by_y(self) -> bool:
+        """Whether Y alone depends on p."""
+        moving = [basis is not None and basis.size > 1 for basis in (self.X, self.Y)]
+        return moving == [False, True]
+
     def __str__(self) -> str:
         said = [
             f"{name} {_said(basis)}"
