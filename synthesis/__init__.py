@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
     from synthesis.design.controller import Controller
     from synthesis.design.estimator import Estimator, estimator
+    from synthesis.design.flown import Flown, certify_flown
+    from synthesis.design.frozen_reading import proven_around
     from synthesis.design.generalized import Generalized
     from synthesis.design.h2 import h2
     from synthesis.design.hinf import hinf
@@ -53,6 +55,7 @@ if TYPE_CHECKING:
     from synthesis.design.plant import Plant
     from synthesis.design.point_design import DesignStatus, PointDesign
     from synthesis.design.state_feedback import state_feedback
+    from synthesis.design.wrong_parameter import with_wrong_parameter
     from synthesis.forms import HigherOrder, Memory, Spline
     from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
     from synthesis.lft.gain import lft_gain, lft_stability
@@ -81,6 +84,8 @@ _ROOMS = {
     "synthesis.design.objectives": "H2 L2 EnergyToPeak PoleRegion",
     "synthesis.design.output_feedback": "output_feedback",
     "synthesis.design.state_feedback": "state_feedback",
+    "synthesis.design.flown": "Flown certify_flown",
+    "synthesis.design.frozen_reading": "proven_around",
     "synthesis.design.generalized": "Generalized",
     "synthesis.design.plant": "Plant",
     "synthesis.design.h2": "h2",
@@ -88,6 +93,7 @@ _ROOMS = {
     "synthesis.design.loop_shaping": "ncf",
     "synthesis.design.mixed_sensitivity": "mixed_sensitivity",
     "synthesis.design.point_design": "DesignStatus PointDesign",
+    "synthesis.design.wrong_parameter": "with_wrong_parameter",
     "synthesis.forms": "HigherOrder Memory Spline",
     "synthesis.impose": "Bernstein Grid SumOfSquares Vertices",
     "synthesis.lft.gain": "lft_gain lft_stability",
@@ -118,6 +124,7 @@ __all__ = [
     "DesignStatus",
     "EnergyToPeak",
     "Estimator",
+    "Flown",
     "FrozenGain",
     "Generalized",
     "Grid",
@@ -142,6 +149,7 @@ __all__ = [
     "Trajectory",
     "Vertices",
     "bandwidth",
+    "certify_flown",
     "decay_rate",
     "disk_margin",
     "estimator",
@@ -162,8 +170,10 @@ __all__ = [
     "multiobjective",
     "ncf",
     "output_feedback",
+    "proven_around",
     "stability",
     "state_feedback",
+    "with_wrong_parameter",
 ]
 
 __getattr__ = lazily(__name__, _ROOMS)

@@ -14,10 +14,10 @@ from studies.figures.gain_curve import GainCurve
 from studies.output import progress
 from studies.transition import axes, gain_tables, guarantees
 from studies.transition.axes import LATERAL
+from studies.transition.certificates import bound_to_dict
 from studies.transition.effort import Effort
 from studies.transition.flights import TOP, FlightPlan, autopilot_for
 from studies.transition.guarantees import Bound
-from studies.transition.results import bound_to_dict
 from symheli import Helicopter
 from synthesis import Spline
 

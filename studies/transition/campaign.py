@@ -12,7 +12,7 @@ from studies.transition import accelerating_baseline, axes
 from studies.transition.accelerating_baseline import BOTH, MARKS, SCATTER
 from studies.transition.axes import AXES
 from studies.transition.flights import NOISE_DB, FlightPlan, autopilot_for
-from studies.transition.results import value
+from studies.transition.quantities import value
 from symheli import Helicopter
 
 MODE_MARK = 3.0

@@ -1,5 +1,5 @@
 """What the study says, in sentences: where scheduling pays, what recursion costs, what the LFT
-loses, what a certificate from flights is worth.
+loses, what a certificate from flights is worth, which controller flies best.
 """
 
 from __future__ import annotations
@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from studies.controllers.tables import conclusions as flown
 from studies.marks import models
 from studies.marks.guarantee import PROBABILITY, verdict
 from studies.transition.guarantees import ALLOWED, CONSTANT, ESTIMATE, LFT_TESTS, proven, rate_text
@@ -29,7 +30,7 @@ def conclusions(study: Outcome) -> list[str]:
     out: list[str] = []
     if (found := study.known_kinematics) is not None:
         out += [_scheduling(found), _acceleration(found), _feedback(found), _recursion(found)]
-    return [*out, *_lft(study), *certificates(study)]
+    return [*out, *_lft(study), *certificates(study), *flown(study)]
 
 
 def certificates(study: Outcome) -> list[str]:

@@ -38,6 +38,14 @@ class Effort:
     """Whether its gain is proven for every model that the flights allow."""
     servo_rates: tuple[float, ...] = (0.0, 3.0, 8.0, math.inf)
     servo_segments: tuple[int, ...] = (8,)
+    design_points: int = 14
+    """Airspeeds of a schedule of point designs."""
+    certified_controllers: bool = True
+    """Whether gains of the loops that fly are proven, and the verdict on the identified model is
+    asked for.
+    """
+    controller_seeds: int = 20
+    """Flights of each controller in turbulence of each size."""
     search: Search = field(default_factory=Search)
     """For the lateral gust, whose gain grows with the rate; elsewhere a glance finds the growth
     there is, and nothing above frozen.
@@ -61,5 +69,8 @@ class Effort:
             every_model=False,
             servo_rates=(0.0, math.inf),
             servo_segments=(4,),
+            design_points=5,
+            certified_controllers=False,
+            controller_seeds=4,
             search=GLANCE,
         )

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.controllers.figure import CAPTION as RATIOS
+from studies.controllers.figure import energy_ratios
 from studies.figures import gain_curve
 from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED
 from studies.marks import models
@@ -108,6 +110,9 @@ def figures(study: Outcome) -> Iterator[tuple[str, str, Figure]]:
             yield "gaps", CAPTION["gaps"], gaps(study.known_kinematics)
         if found := curves(study.bounds):
             yield "gain-against-rate", CAPTION["gain"], gain_curves(found)
+        if study.flown_controllers:
+            picture = energy_ratios(study.flown_controllers, study.certified_controllers)
+            yield "energy-ratios", RATIOS, picture
 
 
 def _subplots(

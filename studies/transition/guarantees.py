@@ -249,7 +249,7 @@ def curves(found: Sequence[Bound]) -> list[GainCurve]:
 
 def unit_of(channel: str) -> str:
     """Of the gain of a channel."""
-    return "1" if channel in ("servo", "robust") else "(rad/s, rad)/(m/s)"
+    return "1" if channel in ("servo", "robust", "controllers") else "(rad/s, rad)/(m/s)"
 
 
 def proven(b: Bound) -> float:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from studies.controllers.certified import CertifiedControllers
+from studies.controllers.designs import Designs
+from studies.controllers.flown import FlownControllers
 from studies.transition.baseline import Baseline
 from studies.transition.comparison import Comparison
 from studies.transition.flights import Flights
@@ -39,6 +42,9 @@ class Outcome:
     longitudinal: LongitudinalProofs | None = None
     servo: ServoProofs | None = None
     robust: RobustProofs | None = None
+    controllers: Designs | None = None
+    certified_controllers: CertifiedControllers | None = None
+    flown_controllers: FlownControllers | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
     complete: bool = False
 

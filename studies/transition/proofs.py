@@ -59,19 +59,22 @@ class RobustProofs:
     bounds: tuple[Bound, ...]
 
 
-Answer = tuple[float, list[Bound]]
+Answer = tuple[float, list[Any]]
 """What was found, after the seconds it took."""
+
+Question = Callable[[], list[Any]]
+"""What a process can answer: a `functools.partial`; of a proof the answers are bounds."""
 
 
 @dataclass(frozen=True)
 class Questions:
-    """Proofs that need nothing of each other, and what their answers become together; those of
-    `long` take longest and go first.
+    """Proofs or designs that need nothing of each other, and what their answers become together;
+    those of `long` take longest and go first.
     """
 
-    proofs: Sequence[Proof]
-    together: Callable[[tuple[Bound, ...]], Any]
-    long: Sequence[Proof] = ()
+    proofs: Sequence[Question]
+    together: Callable[[tuple[Any, ...]], Any]
+    long: Sequence[Question] = ()
 
     def asked(
         self,

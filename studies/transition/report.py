@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from studies.controllers import tables as controllers
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
 from studies.transition.conclusions import certificates, conclusions
@@ -78,6 +79,8 @@ def _headline(study: Outcome) -> dict[str, object]:
         "curves": curves(study.bounds),
         "gain_tables": gain_tables.every(study.bounds),
         "certificates": certificates(study),
+        "controller_tables": controllers.every(study),
+        "flown_conclusions": controllers.conclusions(study),
         "not_about_the_helicopter": gain_tables.not_about_the_helicopter(study.bounds),
         "frozen_gain": next((b.certificate.frozen for b in gust), None),
         "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),

@@ -4,23 +4,24 @@ what is where.
 
 from __future__ import annotations
 
-import math
 import platform
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from studies.controllers.written import controllers_to_dict
 from studies.marks.truth import SPEEDS
 from studies.transition.axes import HORIZON
+from studies.transition.certificates import bound_to_dict
 from studies.transition.guarantees import unit_of
 from studies.transition.paper_experiment import PERIOD
+from studies.transition.quantities import named, value, values
 
 if TYPE_CHECKING:
     from identification import FrozenModels, Scores
     from studies.transition.baseline import Baseline
     from studies.transition.comparison import Comparison
     from studies.transition.flights import Flights
-    from studies.transition.guarantees import Bound
     from studies.transition.identified import Identification
     from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
@@ -28,25 +29,8 @@ if TYPE_CHECKING:
     from studies.transition.recovery import Recovery
     from symheli import Signal
 
-SCHEMA = "symheli study 3"
+SCHEMA = "symheli study 4"
 LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
-
-
-def value(number: float, unit: str) -> dict[str, Any]:
-    """{"value", "unit"}; infinite and undefined numbers as the strings "inf", "-inf", "nan" (JSON
-    has none).
-    """
-    return {"value": _number(number), "unit": unit}
-
-
-def values(numbers: Iterable[float], unit: str) -> dict[str, Any]:
-    """{"value", "unit"} of many."""
-    return {"value": [_number(number) for number in numbers], "unit": unit}
-
-
-def named(numbers: Mapping[Any, float], unit: str) -> dict[str, Any]:
-    """One `value` a signal."""
-    return {str(name): value(number, unit) for name, number in numbers.items()}
 
 
 def to_dict(study: Outcome) -> dict[str, Any]:
@@ -74,12 +58,8 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         "comparison": study.comparison and _comparison(study.comparison),
         "known_kinematics": study.known_kinematics and _known(study.known_kinematics),
         "guarantees": _guarantees(study),
+        "controllers": controllers_to_dict(study),
     }
-
-
-def _number(number: float) -> float | str:
-    number = float(number)
-    return number if math.isfinite(number) else str(number)
 
 
 def _scores(scores: Scores) -> dict[str, Any]:
@@ -298,24 +278,4 @@ def _guarantees(study: Outcome) -> dict[str, Any]:
             for name, peak in (study.servo.frozen_peaks.items() if study.servo else ())
         ],
         "bounds": [bound_to_dict(b) for b in study.bounds],
-    }
-
-
-def bound_to_dict(b: Bound) -> dict[str, Any]:
-    """One certificate."""
-    c, unit = b.certificate, unit_of(b.channel)
-    return {
-        "model": b.model,
-        "channel": b.channel,
-        "kind": c.kind,
-        "form": b.form,
-        "permitted_acceleration": value(b.rate, "m/s^2"),
-        "proven_gain": value(c.gamma, unit),
-        "lower_bound": value(c.lower, unit),
-        "frozen_gain": value(c.frozen, unit),
-        "status": c.status.value,
-        "verified": c.verified,
-        "solver": c.solver,
-        "time": value(sum(c.seconds), "s"),
-        "hypotheses": list(c.hypotheses),
     }

@@ -13,6 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from studies.controllers.certified import CertifiedControllers, controller_questions
+from studies.controllers.designs import Designs, design_questions
+from studies.controllers.flown import FlownControllers, fly_controllers
 from studies.processes import Processes
 from studies.transition.baseline import Baseline, build_baseline
 from studies.transition.comparison import Comparison, compare
@@ -250,6 +253,33 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             lambda s, effort: robust_questions(
                 _there(s.heli), _there(s.baseline), _there(s.known_kinematics), effort
             ),
+            asks=True,
+        ),
+        Stage(
+            "controllers",
+            "Designing controllers from the baseline and from the identified model",
+            Designs,
+            ("known_kinematics",),
+            lambda s, effort: design_questions(
+                _there(s.heli), _there(s.known_kinematics).model, s.seed, effort
+            ),
+            asks=True,
+        ),
+        Stage(
+            "flown_controllers",
+            "Flying the controllers",
+            FlownControllers,
+            ("controllers",),
+            lambda s, effort: fly_controllers(
+                s.vehicle, _there(s.controllers), range(effort.controller_seeds)
+            ),
+        ),
+        Stage(
+            "certified_controllers",
+            "Proving gains of the loops that flew (baseline, servos, delay; 50 Hz)",
+            CertifiedControllers,
+            ("controllers",),
+            lambda s, effort: controller_questions(_there(s.controllers), effort),
             asks=True,
         ),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from studies.controllers import tables as controllers
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
 from studies.transition.conclusions import conclusions
@@ -35,6 +36,7 @@ def summary(study: Outcome) -> str:
     sections += [
         "\n".join(gain_tables.not_about_the_helicopter(study.bounds)),
         "\n".join(tables.verdicts(study)),
+        *(table.text() for table in controllers.every(study)),
         "\n".join(conclusions(study)),
     ]
     return "\n\n".join(["\n".join(lines), *(s for s in sections if s)])

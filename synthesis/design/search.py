@@ -4,6 +4,7 @@ least gamma, in a stated order.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -193,15 +194,17 @@ def settled(
         gamma = factor * lowest.gamma
         for found in existence.widest(gamma, solver):
             gains = recover(coordinates, existence, found) if np.any(found.coefficients) else None
-            word = "no gains"
+            reached = math.inf
             if gains is not None:
-                reached = frozen_gain(coordinates, gains, loop or closed)
-                word = f"worst frozen gain {reached / gamma:.4f} of it"
+                # X and Y of a solver that stopped short may not be positive
+                with contextlib.suppress(np.linalg.LinAlgError):
+                    reached = frozen_gain(coordinates, gains, loop or closed)
+            kept = "none" if math.isinf(reached) else f"worst frozen gain {reached / gamma:.4f}"
             attempts.append(
                 Attempt(
                     f"back-off {factor:g}",
                     0.0,
-                    f"{found.message}, {word}",
+                    f"{found.message}, {kept} of it",
                     gamma * coordinates.channel,
                 )
             )

@@ -36,6 +36,8 @@ DRAWN = (
     "known_kinematics",
     "gust",
     "longitudinal",
+    "certified_controllers",
+    "flown_controllers",
 )
 """Those that a figure shows."""
 
@@ -57,6 +59,9 @@ def full():
         robust_form=FORM,
         servo_rates=(0.0, math.inf),
         servo_segments=(2,),
+        design_points=4,
+        certified_controllers=False,
+        controller_seeds=2,
         search=GLIMPSE,
     )
     heli = Helicopter.load("xcell60", governor="ideal")
@@ -93,7 +98,7 @@ def test_the_numbers_of_a_full_outcome_are_what_the_schema_says(full, tmp_path):
 
 def test_an_empty_outcome_says_what_was_not_reached(tmp_path, unpainted):
     text = page(Outcome(vehicle="xcell60", quick=True, seed=0), tmp_path)
-    assert text.count("Not reached") == 7
+    assert text.count("Not reached") == 8
 
 
 def test_any_stage_of_the_outcome_may_be_missing(full, tmp_path, unpainted, monkeypatch):
@@ -102,7 +107,7 @@ def test_any_stage_of_the_outcome_may_be_missing(full, tmp_path, unpainted, monk
         with monkeypatch.context() as undrawn:
             if name not in DRAWN:
                 undrawn.setattr(figures, "figures", lambda _: ())
-            assert "<h2>7" in page(outcome, tmp_path), name
+            assert "<h2>8" in page(outcome, tmp_path), name
         assert outcome.summary(), name
 
 

@@ -1,0 +1,1 @@
+"""Controllers designed, certified and flown along the transition."""

@@ -1,0 +1,79 @@
+"""What is proven of each controller that flies: the gain of its loop with the baseline, servos and
+delay, sampled.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import synthesis
+from studies.controllers.designs import LFT, Designs
+from studies.controllers.plant import RATE, closed
+from studies.transition.effort import Effort
+from studies.transition.guarantees import CONSTANT, PLAIN, Bound
+from studies.transition.proofs import Questions
+from symheli import LPVStateSpace
+from synthesis import Solver, Spline
+
+CHANNEL = "controllers"
+
+FORM, SOLVER = Spline(degree=1, segments=1, accept=10.0), Solver("LYAPUNOV", tolerance=1e-3)
+"""P(p) straight in airspeed, and when the solver stops. These loops have 25 to 35 states; four
+segments, or two more digits, move a proven gain by a thousandth of it for several times the work.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CertifiedControllers:
+    """The proofs, `model` of each the name of the controller; none where none was asked for."""
+
+    bounds: tuple[Bound, ...]
+
+    def of(self, name: str) -> Bound | None:
+        """The least bound of a controller for the permitted acceleration, of any for an airspeed
+        that jumps too; one that failed where none is proven, None where none was asked.
+        """
+        own = [b for b in self.bounds if b.model == name]
+        return min(own, key=lambda b: b.certificate.gamma, default=None)
+
+    def gain(self, name: str) -> float:
+        """Proven, inf where nothing is."""
+        bound = self.of(name)
+        return (
+            bound.certificate.gamma
+            if bound is not None and bound.certificate.verified
+            else math.inf
+        )
+
+
+def controller_questions(designs: Designs, effort: Effort) -> Questions:
+    """One proof a controller at the permitted acceleration, of the LFT at an airspeed that jumps;
+    none without effort.
+    """
+    asked = [
+        partial(
+            jumping if design.name == LFT else bounded,
+            design.name,
+            closed(designs.plant, design.controller),
+        )
+        for design in designs.designs
+        if effort.certified_controllers and design.controller is not None
+    ]
+    return Questions(asked, lambda bounds: CertifiedControllers(bounds=bounds))
+
+
+def bounded(name: str, loop: LPVStateSpace) -> list[Bound]:
+    """The gain of a loop at the permitted acceleration; no lower bound but the frozen gain is
+    looked for.
+    """
+    found = synthesis.l2_gain(loop, RATE, form=FORM, solver=SOLVER, search=None)
+    return [Bound(name, CHANNEL, RATE, PLAIN, found)]
+
+
+def jumping(name: str, loop: LPVStateSpace) -> list[Bound]:
+    """The gain of a loop when airspeed may jump, and where none is proven that of `bounded`."""
+    found = synthesis.l2_gain(loop, math.inf, solver=SOLVER, search=None)
+    own = [Bound(name, CHANNEL, math.inf, CONSTANT, found)]
+    return own if found.verified else [*own, *bounded(name, loop)]

@@ -1,0 +1,261 @@
+"""The controllers of the study, each sampled and of few states, by name; or why there is none."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+import symheli
+from identification import KinematicModel, fit_for_control
+from studies.controllers.identified_plant import identified_model
+from studies.controllers.in_airspeed import of_degree
+from studies.controllers.plant import (
+    CONTROLS,
+    MEASUREMENTS,
+    PERIOD,
+    RATE,
+    SIZES,
+    TOP,
+    baseline,
+    closed,
+    design_plant,
+    flown_plant,
+)
+from studies.marks import flights
+from studies.transition.effort import Effort
+from studies.transition.flights import autopilot_for
+from studies.transition.proofs import Questions
+from symheli import FlightRecord, Helicopter, LinearModel, LPVStateSpace
+from symheli.errors import SymheliError, SynthesisError
+from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
+from symheli.lpv.bases import PiecewiseLinear
+from synthesis import Plant
+from synthesis.design.controller import Controller
+from synthesis.design.hinf import hinf
+from synthesis.design.lft_feedback import lft_feedback
+from synthesis.design.output_feedback import output_feedback
+from synthesis.worst.frozen import norm
+
+LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
+BASELINE, IDENTIFIED = "LPV from the baseline", "LPV from the identified model"
+NAMES = (LQR, HINF, LFT, BASELINE, IDENTIFIED)
+
+BACK_OFF = 1.3
+"""Levels are this much above the least, where controllers are slower than the servos."""
+
+AIRSPEEDS = 14
+"""Points of the schedules, evenly over the range."""
+
+ORDERS = (8, 9, 10, 12, 14, 16)
+DEGREES = (2, 3, 4, 6)
+NEAR = 1.03
+"""Orders and degrees in airspeed that are tried in turn, and how much larger the frozen gain of the
+loop may become by the reduction.
+"""
+
+
+JUDGED_AT, DRAWS = (0.0, 6.5, 13.0), 50
+"""Airspeeds (m/s) at which an identified model is judged, and draws from what its data allow."""
+
+LOOKED_AT = np.linspace(0.0, TOP, 9)
+"""Airspeeds, m/s, at which that is."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Design:
+    """A controller under its name.
+
+    `controller` is what flies: sampled, from measured deviations to commanded ones; None where
+    there is none, for `reason`. `promised`: the gain of the synthesis, on the plant of the design
+    (of point designs the largest; NaN without one); `frozen`: that of the loop which flies, largest
+    over `LOOKED_AT`, inf where one is unstable; `seconds` of the design; `remark`: what
+    the data say of the model that it was designed on, where they were asked.
+    """
+
+    name: str
+    controller: LPVStateSpace | None
+    promised: float = math.nan
+    frozen: float = math.inf
+    seconds: float = 0.0
+    reason: str = ""
+    remark: str = ""
+
+    @property
+    def order(self) -> int:
+        """States of the controller."""
+        return 0 if self.controller is None else len(self.controller.states)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Designs:
+    """Every design, and the baseline sampled as it is flown and certified."""
+
+    designs: tuple[Design, ...]
+    plant: Plant
+
+
+def design_questions(
+    heli: Helicopter, identified: KinematicModel, seed: int, effort: Effort
+) -> Questions:
+    """Every design of `NAMES`, in that order; `seed` is that of the flight by which the identified
+    model is judged.
+    """
+    base = baseline(heli)
+    own, flown = design_plant(base), flown_plant(base)
+    theirs = design_plant(identified_model(identified), held=0.0)
+    record = None
+    if effort.certified_controllers:
+        record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
+    from_the_model = partial(output_feedback, theirs, RATE, back_off=BACK_OFF)
+    last = partial(from_flights, from_the_model, flown, identified, record)
+    ways: dict[str, Callable[[], Controller | LPVStateSpace]] = {
+        LQR: partial(lqr_schedule, heli),
+        HINF: partial(hinf_schedule, own, effort.design_points),
+        LFT: partial(lft_feedback, own, back_off=BACK_OFF),
+        BASELINE: partial(output_feedback, own, RATE, back_off=BACK_OFF),
+    }
+    asked = [partial(design, name, make, flown) for name, make in ways.items()]
+    return Questions([*asked, last], lambda designs: Designs(designs=designs, plant=flown), [last])
+
+
+def from_flights(
+    make: Callable[[], Controller],
+    plant: Plant,
+    identified: KinematicModel,
+    record: FlightRecord | None,
+) -> list[Design]:
+    """The design from the identified model, with the verdict on that where there is a record to
+    judge it by.
+    """
+    (found,) = design(IDENTIFIED, make, plant)
+    if record is None or found.controller is None:
+        return [found]
+    return [replace(found, remark=verdict(identified, found.controller, record))]
+
+
+def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Plant) -> list[Design]:
+    """One design, in the form that flies; without a controller where none was found, or no loop of
+    it is stable.
+    """
+    begin = time.perf_counter()
+    try:
+        made = make()
+        controller, frozen = simplest(made, plant)
+    except SymheliError as error:
+        seconds = time.perf_counter() - begin
+        return [Design(name=name, controller=None, seconds=seconds, reason=str(error))]
+    promised = made.gamma if isinstance(made, Controller) else math.nan
+    return [
+        Design(
+            name=name,
+            controller=controller,
+            promised=promised,
+            frozen=frozen,
+            seconds=time.perf_counter() - begin,
+        )
+    ]
+
+
+def verdict(identified: KinematicModel, controller: LPVStateSpace, record: FlightRecord) -> str:
+    """Whether the identified model is fit for a loop with this controller, by the flight that it
+    was identified from, and what stands against it.
+    """
+    rest = (0.0,) * (len(identified.parameters) - 1)
+    found = fit_for_control(
+        identified,
+        record,
+        lambda p: controller.at(p[0] if rest else p),
+        scales=SIZES,
+        points=[(v, *rest) if rest else v for v in JUDGED_AT],
+        draws=DRAWS,
+    )
+    doubts = [row.name for row in found.criteria if row.decides and row.verdict != "fit"]
+    return f"{found.verdict}{': ' + ', '.join(doubts) if doubts else ''}"
+
+
+def lqr_schedule(heli: Helicopter) -> LPVStateSpace:
+    """The gain-scheduled LQR of the study's flights, checked behind its servos."""
+    autopilot = gain_scheduled_lqr(heli, 0.0, TOP, PERIOD, AIRSPEEDS, XCELL_SERVOS)
+    return autopilot.scheduled_controller.model
+
+
+def hinf_schedule(plant: Plant, points: int = AIRSPEEDS) -> Controller:
+    """Point designs, their entries straight between the airspeeds: their states estimate those of
+    the plant in its own coordinates.
+
+    Raises `SynthesisError` where a point has no design.
+    """
+    speeds = np.linspace(0.0, TOP, points)
+    found = []
+    for speed in speeds:
+        at = plant.nominal.at(float(speed))
+        one = hinf(
+            at,
+            CONTROLS,
+            MEASUREMENTS,
+            disturbances=plant.disturbances,
+            performance=plant.performance,
+            back_off=BACK_OFF,
+        )
+        if one.controller is None:
+            raise SynthesisError(f"no H-infinity design at {speed:g} m/s: {'; '.join(one.reasons)}")
+        found.append(one)
+    each: list[LinearModel] = [one.controller for one in found if one.controller is not None]
+    A, B, C, D = (np.stack([getattr(one, part) for one in each]) for part in "ABCD")
+    model = LPVStateSpace(
+        PiecewiseLinear(tuple(speeds.tolist())),
+        A,
+        B,
+        C,
+        D,
+        plant.parameters,
+        each[0].states,
+        each[0].inputs,
+        each[0].outputs,
+    )
+    return Controller(
+        model=model,
+        plant=plant,
+        gamma=max(one.gamma for one in found),
+        method=f"H-infinity at {points} airspeeds",
+    )
+
+
+def simplest(made: Controller | LPVStateSpace, plant: Plant) -> tuple[LPVStateSpace, float]:
+    """The sampled controller of fewest states and, of that, least degree in airspeed whose frozen
+    gain on the plant is `NEAR` that of all states; with that gain.
+    """
+
+    def gain(model: LPVStateSpace) -> float:
+        loop = closed(plant, model)
+        return max(norm(*loop.matrices(float(v)), loop.dt)[0] for v in LOOKED_AT)
+
+    def sampled(order: int) -> LPVStateSpace:
+        assert isinstance(made, Controller)  # noqa: S101
+        return made.reduce(order).discretize(PERIOD).model
+
+    whole = made.discretize(PERIOD).model if isinstance(made, Controller) else made
+    best, limit = whole, NEAR * gain(whole)
+    for order in ORDERS if isinstance(made, Controller) and math.isfinite(limit) else ():
+        fewer = _tried(lambda order=order: sampled(order))
+        if fewer is not None and gain(fewer) <= limit:
+            best = fewer
+            break
+    for degree in DEGREES if math.isfinite(limit) else ():
+        simpler = of_degree(best, degree)
+        if gain(simpler) <= limit:
+            best = simpler
+            break
+    return best, gain(best)
+
+
+def _tried(make: Callable[[], LPVStateSpace]) -> LPVStateSpace | None:
+    try:
+        return make()
+    except SymheliError:
+        return None

@@ -1,0 +1,149 @@
+"""Every controller flown through the same gusts in the nonlinear helicopter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.controllers.designs import Designs
+from studies.controllers.measures import Measures, measured
+from studies.controllers.plant import CONTROLS, DELAY, MEASUREMENTS, NOISE, PERIOD, RATE
+from symheli import (
+    AirspeedSchedule,
+    Dryden,
+    FlightPlan,
+    Helicopter,
+    ScheduledController,
+    Wind,
+    fly_batch,
+)
+from symheli.flight import XCELL_SERVOS, Sensor
+
+LOW, HIGH = 0.5, 12.0
+"""Ends of the transition, m/s; at the permitted acceleration between."""
+
+SERVO_RATE = 3.0
+"""Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
+
+STEADY, ALTITUDE = (-2.0, 1.0, 0.0), 20.0
+"""The steady wind (north, east, down, m/s), and the height of the turbulence, m."""
+
+WINDS = (7.7, 15.4, 23.2)
+"""Sizes of the turbulence, as mean winds at 20 ft, m/s: light, moderate, severe."""
+
+BEYOND = (0.0, 1.9, 3.9, 34.8, 52.2)
+"""Further sizes at which the proven gains are tried: from still air, where noise is all that
+disturbs, to more than any weather.
+"""
+
+NOISE_SHARE = 1 / 3
+"""Of the noise that counts as 1, the standard deviation that is flown."""
+
+SEEDS, FEW_SEEDS = 20, 4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flown:
+    """One controller in turbulence of one size: `gust` is the standard deviation of its level
+    components, m/s; one of `flights` a seed.
+    """
+
+    name: str
+    wind: float
+    gust: float
+    flights: tuple[Measures, ...]
+
+    @property
+    def lost(self) -> int:
+        """How many flights were lost."""
+        return sum(flight.lost for flight in self.flights)
+
+    def of(self, measure: Callable[[Measures], float]) -> tuple[float, float]:
+        """Median and largest of a measure."""
+        values = [measure(flight) for flight in self.flights]
+        return float(np.median(values)), float(np.max(values))
+
+    @property
+    def ratio(self) -> float:
+        """The median of the energy ratio."""
+        return self.of(lambda flight: flight.ratio)[0]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FlownControllers:
+    """What was flown, by controller and within that by size."""
+
+    flown: tuple[Flown, ...]
+    seeds: int
+    duration: float
+
+    def of(self, name: str) -> list[Flown]:
+        """Of one controller, by size."""
+        return [one for one in self.flown if one.name == name]
+
+    def at(self, wind: float) -> list[Flown]:
+        """Of all controllers, in turbulence of one size."""
+        return [one for one in self.flown if one.wind == wind]
+
+    def exceeded(self, name: str, gain: float) -> Flown | None:
+        """The flights in the least turbulence in which one of them has an energy ratio above a
+        gain.
+        """
+        above = (f for f in self.of(name) if f.of(lambda flight: flight.ratio)[1] > gain)
+        return min(above, key=lambda f: f.wind, default=None)
+
+    def ranked(self, wind: float) -> list[Flown]:
+        """Those that lost no flight, the least median energy ratio first."""
+        return sorted((f for f in self.at(wind) if not f.lost), key=lambda f: f.ratio)
+
+
+def transition() -> AirspeedSchedule:
+    """There and back at the acceleration that the certificates permit."""
+    return AirspeedSchedule.transition(LOW, HIGH, acceleration=RATE, hold=3.0)
+
+
+def plans(designs: Designs) -> Iterator[tuple[str, float, FlightPlan]]:
+    """(controller, wind, plan) of every controller that exists, for every size."""
+    servos = {u: replace(XCELL_SERVOS[u], rate=SERVO_RATE) for u in CONTROLS}
+    sensors = {y: Sensor(noise=NOISE_SHARE * NOISE[y]) for y in MEASUREMENTS}
+    for design in designs.designs:
+        if design.controller is None:
+            continue
+        controller = ScheduledController(design.controller)
+        for wind in sorted((*WINDS, *BEYOND)):
+            yield (
+                design.name,
+                wind,
+                FlightPlan(
+                    transition(),
+                    dt=PERIOD,
+                    controller=controller,
+                    wind=Wind(STEADY, turbulence=Dryden(wind, ALTITUDE)),
+                    servos=servos,
+                    sensors=sensors,
+                    delay=DELAY,
+                ),
+            )
+
+
+def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> FlownControllers:
+    """Every controller and size with every seed: the same gusts and noise for all of them."""
+    heli = Helicopter.load(vehicle, governor="pi")
+    asked = list(plans(designs))
+    each = measured(fly_batch(heli, [plan for *_, plan in asked], seeds=seeds)) if asked else []
+    n = len(seeds)
+    return FlownControllers(
+        flown=tuple(
+            Flown(
+                name=name,
+                wind=wind,
+                gust=float(Dryden(wind, ALTITUDE).intensities[0]),
+                flights=tuple(each[i * n : (i + 1) * n]),
+            )
+            for i, (name, wind, _) in enumerate(asked)
+        ),
+        seeds=n,
+        duration=transition().duration,
+    )

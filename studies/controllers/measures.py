@@ -1,0 +1,129 @@
+"""What a flight was like: errors, limits, and the energy ratio that a proven gain speaks of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.controllers.plant import CONTROLS, GUST, MEASUREMENTS, NOISE, RATE, SIZES, TOP
+from symheli.flight import FlightBatch, FlightPlan
+from symheli.flight.disturbance import Disturbances
+from symheli.flight.equipment import Readings
+from symheli.flight.flight_data import WIND, FlightData
+from symheli.values.arrays import Array
+
+AT_THE_STOP = 0.999
+"""Of the travel."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measures:
+    """One flight, until it was lost where it was.
+
+    `speed`: rms of forward airspeed minus the commanded one, m/s; `deviation`: rms of the
+    performance signals, 1 as large as `SIZES`, all together, and of each in `deviations`;
+    `attitude`: largest bank or pitch, rad; `stops`: share of the time with a command at a stop;
+    `ratio`: see `energy_ratio`; `outside`, `faster`: share of the time with a forward airspeed
+    outside the range and with a change of it above the permitted rate.
+    """
+
+    lost: bool
+    speed: float
+    deviation: float
+    deviations: dict[str, float]
+    attitude: float
+    stops: float
+    ratio: float
+    outside: float
+    faster: float
+
+
+def measured(batch: FlightBatch) -> list[Measures]:
+    """Of every flight."""
+    return [of_flight(flown) for flown in batch.data]
+
+
+def of_flight(flown: FlightData) -> Measures:
+    """Of one flight."""
+    column, travel = flown.columns(), flown.heli.travel
+    noise = noise_of(flown)
+    true = {y: column[y] - noise[:, i] for i, y in enumerate(MEASUREMENTS)}
+    gusts, forward = air(column, true, flown.plan)
+    z = performance(column, true)
+    w = np.column_stack([gusts / GUST, noise / [NOISE[y] for y in MEASUREMENTS]])
+    commands = np.column_stack([column[f"{u}_command"] for u in CONTROLS])
+    change = np.gradient(forward, flown.plan.dt) if len(forward) > 1 else np.zeros(len(forward))
+    return Measures(
+        lost=flown.lost >= 0,
+        speed=rms(forward - column["airspeed_command"]),
+        deviation=rms(np.linalg.norm(z, axis=1)),
+        deviations={name: rms(z[:, i]) for i, name in enumerate((*MEASUREMENTS, *CONTROLS))},
+        attitude=float(max(np.abs(true["phi"]).max(), np.abs(true["theta"]).max())),
+        stops=float(np.any(np.abs(commands) >= AT_THE_STOP * travel, axis=1).mean()),
+        ratio=energy_ratio(z, w),
+        outside=float(np.mean((forward < 0.0) | (forward > TOP))),
+        faster=float(np.mean(np.abs(change) > RATE)),
+    )
+
+
+def performance(column: dict[str, Array], true: dict[str, Array]) -> Array:
+    """Deviations from the reference (n, 12), each in its size: states, then commands."""
+    parts = [(true[y] - column[f"{y}_reference"]) / SIZES[y] for y in MEASUREMENTS]
+    parts += [(column[f"{u}_command"] - column[f"{u}_reference"]) / SIZES[u] for u in CONTROLS]
+    return np.column_stack(parts)
+
+
+def noise_of(flown: FlightData) -> Array:
+    """What the sensors added to the measured states (n, 8)."""
+    readings = Readings.of(flown.plan.sensors or {}, flown.clock.dt)
+    white = Disturbances.of([flown.plan], [flown.course], readings).white
+    if white is None:
+        return np.zeros((flown.kept, len(MEASUREMENTS)))
+    return white[0, :: flown.clock.every][: flown.kept] * readings.noise[: len(MEASUREMENTS)]
+
+
+def air(column: dict[str, Array], true: dict[str, Array], plan: FlightPlan) -> tuple[Array, Array]:
+    """Gusts along the axes of the helicopter (n, 3), and its forward airspeed (n,) in the steady
+    wind alone, m/s.
+
+    A gust is the wind along the axes, less the steady one along those of the reference: a heading
+    that drifts turns the steady wind into one.
+    """
+    wind, steady = np.column_stack([column[name] for name in WIND]), np.array(plan.wind.steady)
+    own = to_body(true["phi"], true["theta"], heading(true, plan.dt))
+    level = np.zeros(len(wind))
+    held = to_body(column["phi_reference"], column["theta_reference"], level)
+    gusts = np.einsum("nij,nj->ni", own, wind) - held @ steady
+    through = np.column_stack([true[s] for s in ("u", "v", "w")]) - own @ steady
+    forward = np.cos(true["theta"]) * through[:, 0] + np.sin(true["theta"]) * through[:, 2]
+    return gusts, forward
+
+
+def heading(true: dict[str, Array], dt: float) -> Array:
+    """From north (n,), rad, by the trapezoidal rule from the rates: no flight measures it."""
+    turn = (true["q"] * np.sin(true["phi"]) + true["r"] * np.cos(true["phi"])) / np.cos(
+        true["theta"]
+    )
+    return np.concatenate([[0.0], np.cumsum(0.5 * dt * (turn[1:] + turn[:-1]))])
+
+
+def to_body(phi: Array, theta: Array, psi: Array) -> Array:
+    """Rotations (n, 3, 3) from north, east, down to the axes of the helicopter."""
+    (cf, sf), (ct, st), (cp, sp) = ((np.cos(a), np.sin(a)) for a in (phi, theta, psi))
+    rows = [
+        [ct * cp, ct * sp, -st],
+        [sf * st * cp - cf * sp, sf * st * sp + cf * cp, sf * ct],
+        [cf * st * cp + sf * sp, cf * st * sp - sf * cp, cf * ct],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def energy_ratio(z: Array, w: Array) -> float:
+    """sqrt(sum |z|^2 / sum |w|^2): no flight that keeps to the hypotheses of a gain exceeds it."""
+    return float(np.sqrt((z**2).sum() / (w**2).sum()))
+
+
+def rms(values: Array) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,58 @@
+"""Controllers, proofs and flights for results.json."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from studies.controllers.tables import conclusions
+from studies.transition.certificates import bound_to_dict
+from studies.transition.quantities import named, value, values
+
+if TYPE_CHECKING:
+    from studies.controllers.designs import Design
+    from studies.controllers.flown import Flown
+    from studies.transition.outcome import Outcome
+
+
+def controllers_to_dict(study: Outcome) -> dict[str, Any]:
+    """What the study has reached of them; null where it has not."""
+    proofs, flown = study.certified_controllers, study.flown_controllers
+    return {
+        "designs": study.controllers and [_design(d) for d in study.controllers.designs],
+        "bounds": proofs and [bound_to_dict(b) for b in proofs.bounds],
+        "flights": flown and [_flown(one) for one in flown.flown],
+        "conclusions": conclusions(study),
+    }
+
+
+def _design(design: Design) -> dict[str, Any]:
+    return {
+        "name": design.name,
+        "exists": design.controller is not None,
+        "states": value(design.order, "1"),
+        "gain_by_synthesis": value(design.promised, "1"),
+        "frozen_gain": value(design.frozen, "1"),
+        "time": value(design.seconds, "s"),
+        "reason": design.reason,
+        "remark": design.remark,
+    }
+
+
+def _flown(one: Flown) -> dict[str, Any]:
+    each = one.flights
+    return {
+        "controller": one.name,
+        "mean_wind_at_20ft": value(one.wind, "m/s"),
+        "gusts": value(one.gust, "m/s"),
+        "lost": value(one.lost, "1"),
+        "energy_ratio": values((f.ratio for f in each), "1"),
+        "airspeed_error": values((f.speed for f in each), "m/s"),
+        "deviation": values((f.deviation for f in each), "1"),
+        "deviation_by_signal": named(
+            {y: one.of(lambda f, y=y: f.deviations[y])[0] for y in each[0].deviations}, "1"
+        ),
+        "largest_attitude": values((f.attitude for f in each), "rad"),
+        "at_a_stop": values((100 * f.stops for f in each), "%"),
+        "outside_the_range": values((100 * f.outside for f in each), "%"),
+        "faster_than_the_rate": values((100 * f.faster for f in each), "%"),
+    }

@@ -1,0 +1,169 @@
+"""The proof of a loop as it flies: the controller's own numbers, sampled, around the sampled plant.
+
+How a controller was made plays no part in it: synthesis may be as rough as it likes, and what
+sampling, tabulating, rounding and delay take is the distance between two gains.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace, UncertainStateSpace
+from synthesis.analysis.l2_gain import l2_gain
+from synthesis.certificate import Certificate
+from synthesis.cover import Remainder, covering
+from synthesis.design.controller import Controller
+from synthesis.worst.rates import Rate
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
+
+ROUNDING = 1e-10
+"""A misfit of the performance below this fraction of its largest entry is one of rounding."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Flown:
+    """What is left of a design once it flies.
+
+    Attributes
+    ----------
+    loop : LPVStateSpace or UncertainStateSpace
+        What was analysed: the sampled plant under the numbers that fly; where the plant is a fit,
+        with every model that it was fitted to.
+    certificate : Certificate
+        Of its gain from the disturbances to the performance.
+    synthesized : float
+        The gain that the synthesis promised, for its own plant; NaN where none is known.
+    misfit : float
+        Largest entry of [A B] by which the loop misses what its plant was fitted to; 0 of a plant
+        that was given as it is.
+
+    Examples
+    --------
+    >>> import numpy as np, symheli, synthesis
+    >>> p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.1)
+    >>> lag = symheli.LPVStateSpace.polynomial(
+    ...     [[[0.9]], [[0.05]]], [[[0.1, 0.1]]], [[[1.0]]], [[[0.0, 0.0]]], p, dt=0.1,
+    ...     inputs=("w", "u"), outputs=("y",))
+    >>> plant = synthesis.Plant(lag, disturbances=["w"], performance=["y"], controls=["u"],
+    ...                         measurements=["y"])
+    >>> flown = synthesis.certify_flown({("u", "y"): -0.5}, plant, synthesized=0.9, search=None)
+    >>> print(flown)
+    synthesis promised 0.9; the loop as it flies is proven for 1 (frozen 1): 11.1 % more
+    """
+
+    loop: LPVStateSpace | UncertainStateSpace
+    certificate: Certificate
+    synthesized: float = math.nan
+    misfit: float = 0.0
+
+    @property
+    def gamma(self) -> float:
+        """The proven gain, inf where nothing is proven."""
+        return self.certificate.gamma
+
+    @property
+    def loss(self) -> float:
+        """Proven gain over the promised one, minus 1: from all that stands between design and
+        flight; inf where nothing is proven, NaN where nothing was promised.
+        """
+        return self.gamma / self.synthesized - 1.0
+
+    def __str__(self) -> str:
+        promised = "" if math.isnan(self.synthesized) else f"promised {self.synthesized:.4g}"
+        begin = f"synthesis {promised}; " if promised else ""
+        frozen = f"frozen {self.certificate.frozen:.4g}"
+        if not self.certificate.verified:
+            return f"{begin}of the loop as it flies nothing is proven ({frozen}):" + (
+                f" {self.certificate.status}"
+            )
+        told = f"{begin}the loop as it flies is proven for {self.gamma:.4g} ({frozen})"
+        if not promised:
+            return told
+        return f"{told}: {abs(100 * self.loss):.3g} % {'more' if self.loss >= 0 else 'less'}"
+
+
+def certify_flown(
+    controller: Any,
+    plant: Plant,
+    rate: Rate = None,
+    *,
+    synthesized: float | None = None,
+    cover: bool = True,
+    **options: Any,
+) -> Flown:
+    """The proven gain of a sampled plant under the controller that flies.
+
+    Parameters
+    ----------
+    controller : Controller, TableController, LPVStateSpace or what else `Plant.close` takes
+        Sampled as the plant is, a table with its numbers of 32 bits; a `Controller` in continuous
+        time is sampled first, by Tustin's rule.
+    plant : Plant
+        Sampled, its delay exact: `plant.with_servo(...).sampled(dt).with_delay(dt)`.
+    rate : float, sequence or mapping, optional
+        Largest |dp/dt|, as for `l2_gain`; by default the plant's own.
+    synthesized : float, optional
+        The promised gain to compare with; by default that of a `Controller`.
+    cover : bool
+        Whether the proof holds for every model within twice the distance that the plant misses
+        what it was fitted to by (its `.residuals`); otherwise for the fit alone.
+    **options
+        Of `l2_gain`.
+
+    Returns
+    -------
+    Flown
+        With the certificate and the loss from the promised to the proven gain.
+
+    Raises
+    ------
+    InputError
+        A plant or a controller in continuous time, a fit whose performance is missed too.
+
+    Examples
+    --------
+    See `Flown`.
+    """
+    if plant.dt is None:
+        raise InputError(
+            "what flies is sampled, and the plant is continuous:"
+            " plant.with_servo(...).sampled(dt).with_delay(dt) is what the controller meets"
+        )
+    if isinstance(controller, Controller):
+        synthesized = controller.gamma if synthesized is None else synthesized
+        controller = controller if controller.dt else controller.discretize(plant.dt)
+    loop = plant.close(controller)
+    misfit = 0.0
+    if cover and isinstance(loop, LPVStateSpace) and loop.residuals is not None:
+        loop, misfit = _covered(loop)
+    certificate = l2_gain(loop, rate, **options)
+    return Flown(
+        loop=loop,
+        certificate=certificate,
+        synthesized=math.nan if synthesized is None else float(synthesized),
+        misfit=misfit,
+    )
+
+
+def _covered(loop: LPVStateSpace) -> tuple[LPVStateSpace | UncertainStateSpace, float]:
+    """The set of models around a fit, and the largest entry of [A B] that is missed."""
+    assert loop.residuals is not None  # noqa: S101
+    _, A, B, C, D = loop.residuals
+    for missed, of in ((C, loop.C), (D, loop.D)):
+        if np.abs(missed).max(initial=0.0) > ROUNDING * np.abs(of).max(initial=1.0):
+            raise InputError(
+                "the performance of the plant is a fit too, by"
+                f" {np.abs(missed).max():.2g}: put what varies behind a state (a servo, a filter),"
+                " or give cover=False for a proof of the fit alone"
+            )
+    missed = np.concatenate([A, B], axis=2)
+    largest = float(np.abs(missed).max(initial=0.0))
+    bare = replace(loop, residuals=None)
+    return (covering(bare, Remainder.of(missed)), largest) if largest > 0 else (bare, 0.0)

@@ -1,0 +1,339 @@
+"""A controller that reads a wrong parameter: its loop for every error within a bound.
+
+It is at K(p + b) where the plant is at p, and K(p + b) = K(p) + b K[p, p + b] with the divided
+difference K[p, q], the mean of the slopes of K between p and q. On a short interval of p that mean
+lies in the convex hull of the Bernstein coefficients of the slope wherever p + b may be, and so in
+S_0(p) + sum_i m_i S_i(p), |m_i| <= 1, with matrices S that are constant on each interval:
+
+    [x_K(k+1); u] = K(p) y~ + d,    y~ = (x_K, y),    d = b S_0(p) y~ + sum_i b m_i S_i(p) y~.
+
+All are repeated scalars within the largest error: an `UncertainStateSpace` holds every motion of b,
+and more. Nothing is linearized. Between two knots of a table the slope is one; where p + b may pass
+a knot one S_i holds the slopes of both sides.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace, Patches, Scheduling, UncertainStateSpace
+from symheli.lpv.linear_model import LinearModel
+from symheli.lpv.lower_feedback import Channels, Generalized
+from symheli.lpv.matrix_function import MatrixFunction, block, functions_of, in_one_basis
+from symheli.values.sample_period import same_period
+from symheli.values.signal import signals
+from synthesis.design.as_controller import as_controller
+from synthesis.design.balanced_block import balanced
+from synthesis.polynomial.bernstein import restriction
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
+
+Array = np.ndarray
+
+JUMP = 1e-9
+"""A controller that changes by more than this fraction of its size at one p has no slope there."""
+RANK = 1e-12
+"""Directions that the slope reaches by less than this fraction are those of rounding."""
+
+
+def with_wrong_parameter(
+    plant: Plant, controller: Any, error: float, *, divisions: int = 8
+) -> UncertainStateSpace:
+    """The loop of a controller that reads p + b instead of p, for every b(t) with |b| <= `error`.
+
+    A reading beyond the range of the parameter counts as its end. A bias of b0 and a lag of T s at
+    rates |dp/dt| <= r together are within `error` = b0 + T r, whatever their motion.
+
+    Parameters
+    ----------
+    plant : Plant
+        Over one parameter, without feedthrough from controls to measurements (a servo or a delay
+        takes it away).
+    controller : TableController, Controller, LPVStateSpace or what else `Plant.close` takes
+        Over the same parameter, continuous in it.
+    error : float
+        Largest |b|, in the unit of the parameter.
+    divisions : int
+        Intervals on which a controller that is no table is given one slope each; a table has its
+        own, and one around each knot.
+
+    Returns
+    -------
+    UncertainStateSpace
+        For `l2_gain` and `stability`; with `error` 0 the loop itself, whose block is zero.
+
+    Raises
+    ------
+    InputError
+        A negative error, several parameters, feedthrough, a controller that jumps or that is no
+        piecewise polynomial.
+
+    Examples
+    --------
+    >>> import synthesis
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.1)
+    >>> lag = LPVStateSpace.polynomial(
+    ...     [[[0.9]], [[0.3]]], [[[0.1, 0.1]]], [[[1.0]]], [[[0.0, 0.0]]], p, dt=0.1,
+    ...     inputs=("w", "u"), outputs=("y",))
+    >>> plant = synthesis.Plant(lag, disturbances=["w"], performance=["y"], controls=["u"],
+    ...                         measurements=["y"])
+    >>> nothing, through = [np.zeros((0, 0))], [np.zeros((0, 1))]
+    >>> gain = LPVStateSpace.polynomial(  # u = -(1 + 3 p) y: the pole stays at 0.8
+    ...     nothing, through, [np.zeros((1, 0))], [[[-1.0]], [[-3.0]]], p,
+    ...     inputs=("y",), outputs=("u",))
+    >>> wrong = synthesis.with_wrong_parameter(plant, gain, 0.1)  # the pole within .77 and .83
+    >>> print(round(synthesis.l2_gain(wrong, 0.1, search=None).gamma, 3), round(0.1 / 0.17, 3))
+    0.588 0.588
+    """
+    if not (np.isfinite(error) and error >= 0):
+        raise InputError(f"error: expected a number >= 0 in the unit of p, got {error!r}")
+    if isinstance(divisions, bool) or not isinstance(divisions, int) or divisions < 1:
+        raise InputError(f"divisions: expected an integer >= 1, got {divisions!r}")
+    if len(plant.parameters) != 1:
+        raise InputError(
+            "a wrong reading is that of one parameter; the plant has"
+            f" {', '.join(s.name for s in plant.parameters)}"
+        )
+    K = _scheduled(as_controller(controller, plant.controls, plant.measurements), plant)
+    loop = _Opened.of(plant, K)
+    S = _slopes(K, plant.parameters[0], error, divisions)
+    U = _reached([each.coefficients for each in S])
+    seen = [MatrixFunction(each.basis, U.T @ each.coefficients, each.box) for each in S]
+    enter = np.hstack([error * U] * len(seen))
+    rows = np.concatenate([each.coefficients for each in seen], axis=1)
+    leave = MatrixFunction(seen[0].basis, rows, seen[0].box)
+    T, _ = balanced(loop.response(enter, leave), U.shape[1])
+    back = MatrixFunction(leave.basis, np.linalg.solve(T, leave.coefficients), leave.box)
+    return loop.closed(enter @ T, back, error)
+
+
+class _Opened:
+    """The loop under K(p), to whose [x_K(k+1); u] d is added, and that shows y~ = (x_K, y).
+
+    A .. D of it as functions of p, with the inputs (w, d) and the outputs (z, y~); w and z hold the
+    channels of the plant's own block, if it has one.
+    """
+
+    def __init__(self, plant: Plant, K: LPVStateSpace, parts: dict[str, MatrixFunction]) -> None:
+        self.plant, self.K, self.parts = plant, K, parts
+
+    @classmethod
+    def of(cls, plant: Plant, K: LPVStateSpace) -> _Opened:
+        own = plant.model
+        model = own.model if isinstance(own, UncertainStateSpace) else own
+        w, z = list(plant.disturbances), list(plant.performance)
+        if isinstance(own, UncertainStateSpace):
+            w += own.perturbation_inputs
+            z += own.perturbation_outputs
+        at = Channels(
+            *([model.inputs.index(s) for s in group] for group in (w, K.outputs)),
+            *([model.outputs.index(s) for s in group] for group in (z, K.inputs)),
+        )
+        P = Generalized.of(functions_of(model), at)
+        if not (P.D22.is_constant and not np.any(P.D22.value)):
+            raise InputError(
+                "the controls act on the measurements at once, so that a wrong reading enters"
+                " twice: put a servo or a delay between"
+            )
+        M = MatrixFunction(K.basis, np.block([[K.A, K.B], [K.C, K.D]]), plant.nominal.box).simplest
+        n = len(K.states)
+        zero = np.zeros
+        A = _corner(P.A, n, n)
+        B1, D21 = _corner(P.B1, n, 0), _corner(P.D21, n, 0, first=True)
+        C1 = _corner(P.C1, 0, n)
+        nx, ny, nz = len(model.states), len(K.inputs), len(z)
+        B2 = block(
+            [
+                [_constant(zero((nx, n)), P.A), P.B2],
+                [_constant(np.eye(n), P.A), _constant(zero((n, len(K.outputs))), P.A)],
+            ]
+        )
+        C2 = block(
+            [
+                [_constant(zero((n, nx)), P.A), _constant(np.eye(n), P.A)],
+                [P.C2, _constant(zero((ny, n)), P.A)],
+            ]
+        )
+        D12 = block([[_constant(zero((nz, n)), P.A), P.D12]])
+        parts = {
+            "A": A + B2 @ M @ C2,
+            "B": B1 + B2 @ M @ D21,
+            "Bd": B2,
+            "C": C1 + D12 @ M @ C2,
+            "D": P.D11 + D12 @ M @ D21,
+            "Dd": D12,
+            "Cy": C2,
+            "Dy": D21,
+        }
+        return cls(plant, K, parts)
+
+    def response(self, enter: Array, leave: MatrixFunction) -> Array:
+        """From d = enter d_1 to leave(p) y~ at frozen p and some frequencies, (K, n, n)."""
+        model, f = self.plant.nominal, self.parts
+        assert isinstance(leave.basis, Patches)  # noqa: S101
+        dt, p = model.dt, leave.basis.points(3)
+        A, B, C = f["A"](p), f["Bd"](p) @ enter, leave(p) @ f["Cy"](p)
+        fastest = np.abs(np.linalg.eigvals(A)).max() if dt is None else np.pi / dt
+        omega = np.geomspace(1e-3 * fastest, fastest, 24)
+        s = 1j * omega if dt is None else np.exp(1j * omega * dt)
+        one = np.eye(A.shape[-1])
+        return np.concatenate([C @ np.linalg.solve(at * one - A, B) for at in s])
+
+    def closed(self, enter: Array, leave: MatrixFunction, error: float) -> UncertainStateSpace:
+        """With d = enter d_1, v_1 = leave(p) y~ and d_1 = Delta v_1, |Delta| <= 1; with the plant's
+        own block the two are one.
+        """
+        f, plant, own = self.parts, self.plant, self.plant.model
+        w = len(plant.disturbances)
+        size = np.ones(f["B"].shape[1])
+        said, probability, inside, outside = "", 1.0, (), ()
+        if isinstance(own, UncertainStateSpace):
+            size[w:] = own.bound
+            said, probability = f"{own.source}; ", own.probability
+            inside, outside = own.perturbation_inputs, own.perturbation_outputs
+        scale = np.diag(size)
+        blind = _constant(np.zeros((leave.shape[0], enter.shape[1])), f["A"])
+        basis, (A, B, C, D) = in_one_basis(
+            [
+                f["A"],
+                block([[f["B"] @ scale, f["Bd"] @ enter]]),
+                block([[f["C"]], [leave @ f["Cy"]]]),
+                block([[f["D"] @ scale, f["Dd"] @ enter], [leave @ f["Dy"] @ scale, blind]]),
+            ],
+            plant.basis.ranges,
+        )
+        inside = signals((*inside, *(f"wrong_{i + 1}" for i in range(enter.shape[1]))))
+        outside = signals((*outside, *(f"slope_{i + 1}" for i in range(leave.shape[0]))))
+        states = (*plant.states, *(f"controller_{s}" for s in self.K.states))
+        model = LPVStateSpace(
+            basis,
+            A,
+            B,
+            C,
+            D,
+            plant.parameters,
+            signals(states),
+            (*plant.disturbances, *inside),
+            (*plant.performance, *outside),
+            plant.dt,
+        )
+        s = plant.parameters[0]
+        said += f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"
+        return UncertainStateSpace(model, inside, outside, 1.0, probability, said)
+
+
+def _constant(M: Array, like: MatrixFunction) -> MatrixFunction:
+    return MatrixFunction.constant(M, like.box)
+
+
+def _corner(M: MatrixFunction, rows: int, columns: int, *, first: bool = False) -> MatrixFunction:
+    """M with so many rows and columns of zeros more, after it or (rows) before it."""
+    before, after = (rows, 0) if first else (0, rows)
+    padded = np.pad(M.coefficients, ((0, 0), (before, after), (0, columns)))
+    return MatrixFunction(M.basis, padded, M.box)
+
+
+def _scheduled(given: LinearModel | LPVStateSpace, plant: Plant) -> LPVStateSpace:
+    """K over the parameter of the plant, in its sample period."""
+    if isinstance(given, LinearModel):
+        given = LPVStateSpace.constant(given, plant.parameters)
+    mine, own = given.parameters, plant.parameters[0]
+    if len(mine) != 1 or mine[0].name != own.name or mine[0].unit != own.unit:
+        raise InputError(
+            f"the controller reads {', '.join(s.name for s in mine)}, the plant moves with"
+            f" {own.name}: both must be over the same one parameter"
+        )
+    slack = 1e-9 * (own.high - own.low)
+    if mine[0].low > own.low + slack or mine[0].high < own.high - slack:
+        raise InputError(
+            f"the controller is known on [{mine[0].low:g}, {mine[0].high:g}] {own.unit}, the plant"
+            f" on [{own.low:g}, {own.high:g}]: narrow the plant, .with_scheduling(...)"
+        )
+    if given.states and not same_period(plant.dt, given.dt):
+        raise InputError("plant and controller must have one sample period, .discretize(dt)")
+    return given
+
+
+def _slopes(K: LPVStateSpace, s: Scheduling, error: float, divisions: int) -> list[MatrixFunction]:
+    """S_0, S_1 .. , each constant on the same intervals."""
+    M = np.block([[K.A, K.B], [K.C, K.D]])
+    cuts, slopes = _derivative(K, M, s)
+    least = 1e-6 * (s.high - s.low)
+    ends = {k + side * (error + 2 * least) for k in cuts[1:-1] for side in (-1.0, 1.0)} | set(cuts)
+    if any(len(slope) > 1 for slope in slopes):
+        ends |= set(np.linspace(s.low, s.high, divisions + 1).tolist())
+    breaks = [s.low]
+    for p in sorted(e for e in ends if s.low < e < s.high):
+        if p - breaks[-1] > least and s.high - p > least:
+            breaks.append(p)
+    breaks.append(s.high)
+    # breaks nearer than `least` were joined
+    hulls = [_hull(cuts, slopes, a - error - least, b + error + least) for a, b in pairwise(breaks)]
+    found = [_box(hull) for hull in hulls]
+    count = max(len(box) for box in found) if error else 1
+    intervals = Patches(0, tuple(breaks))
+    nothing = np.zeros_like(hulls[0][0])
+    return [
+        MatrixFunction(
+            intervals,
+            np.array([box[i] if i < len(box) else nothing for box in found]),
+            ((s.low, s.high),),
+        )
+        for i in range(count)
+    ]
+
+
+def _box(hull: Array) -> list[Array]:
+    """S_0, S_1 .. of which S_0 + sum_i m_i S_i, |m_i| <= 1, holds all of the hull: its principal
+    directions, each as long as the hull reaches that way.
+    """
+    centre = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
+    flat = (hull - centre).reshape(len(hull), -1)
+    _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
+    largest = np.linalg.norm(hull.reshape(len(hull), -1), axis=1).max()
+    kept = directions[sizes > RANK * max(largest, sizes[0])]
+    reach = np.abs(flat @ kept.T).max(axis=0, initial=0.0)
+    return [centre, *(r * d.reshape(centre.shape) for r, d in zip(reach, kept, strict=True))]
+
+
+def _derivative(K: LPVStateSpace, M: Array, s: Scheduling) -> tuple[list[float], list[Array]]:
+    """Ends of the pieces of K, and the Bernstein coefficients (degree, ..) of its slope on each."""
+    cuts, slopes, end = [], [], None
+    size = np.abs(M).max(initial=0.0)
+    for piece in K.basis.pieces():
+        values = np.tensordot(piece.bernstein.T, M, axes=1)
+        if end is not None and np.abs(values[0] - end).max(initial=0.0) > JUMP * size:
+            raise InputError(
+                f"the controller jumps at {s.name} = {piece.low:g} {s.unit}: a wrong reading there"
+                " changes it at once; make a table of it, or give it a continuous basis"
+            )
+        end = values[-1]
+        degree = len(values) - 1
+        slope = degree * np.diff(values, axis=0) if degree else np.zeros_like(values)
+        slopes.append(slope / (piece.high - piece.low))
+        cuts.append(piece.low)
+    return [*cuts, K.basis.pieces()[-1].high], slopes
+
+
+def _hull(cuts: list[float], slopes: list[Array], low: float, high: float) -> Array:
+    """Matrices (N, ..) in whose convex hull the slope is for p from `low` to `high`."""
+    found = []
+    for (a, b), slope in zip(pairwise(cuts), slopes, strict=True):
+        start, stop = max(a, low), min(b, high)
+        if start < stop:
+            local = restriction(len(slope) - 1, (start - a) / (b - a), (stop - a) / (b - a))
+            found.append(np.tensordot(local, slope, axes=1))
+    return np.concatenate(found)
+
+
+def _reached(S: list[Array]) -> Array:
+    """An orthonormal basis (rows, r) of all that the slopes reach, r >= 1."""
+    side_by_side = np.concatenate(list(np.concatenate(S)), axis=1)
+    U, values, _ = np.linalg.svd(side_by_side, full_matrices=False)
+    return U[:, : max(1, int(np.sum(values > RANK * values[0])))]

@@ -1,0 +1,267 @@
+"""A loop whose controller reads a wrong parameter: bounds hold for every error, and come close."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import symheli
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace, Patches, PiecewiseLinear, Polynomial, Scheduling
+from synthesis import Plant, Spline, frozen_gain, l2_gain, proven_around, with_wrong_parameter
+from synthesis.cover import Remainder, covering
+from synthesis.design.balanced_block import balanced
+from synthesis.design.largest import largest
+from synthesis.design.wrong_parameter import _slopes
+
+P = Scheduling("p", "1", 0.0, 1.0, rate=0.1)
+CLOSE = 1e-4
+"""The solver's tolerance on a squared gain, and the room left for rounding."""
+
+
+def lag():
+    """x(k+1) = (0.9 + 0.3 p) x + 0.1 (w + u), y = x."""
+    model = LPVStateSpace.polynomial(
+        [[[0.9]], [[0.3]]],
+        [[[0.1, 0.1]]],
+        [[[1.0]]],
+        [[[0.0, 0.0]]],
+        P,
+        0.1,
+        inputs=("w", "u"),
+        outputs=("y",),
+    )
+    return _plant(model)
+
+
+def pendulum():
+    """Two states, whose stiffness grows with p."""
+    model = LPVStateSpace.polynomial(
+        [[[1.0, 0.1], [-0.1, 0.9]], [[0.0, 0.0], [-0.3, 0.0]]],
+        [[[0.0, 0.0], [0.1, 0.1]]],
+        [[[1.0, 0.0]]],
+        [[[0.0, 0.0]]],
+        P,
+        0.1,
+        inputs=("w", "u"),
+        outputs=("y",),
+    )
+    return _plant(model)
+
+
+def _plant(model):
+    return Plant(model, disturbances=["w"], performance=["y"], controls=["u"], measurements=["y"])
+
+
+def gain(*coefficients):
+    """u = (c0 + c1 p + ..) y."""
+    return LPVStateSpace.polynomial(
+        [np.zeros((0, 0))],
+        [np.zeros((0, 1))],
+        [np.zeros((1, 0))],
+        [[[c]] for c in coefficients],
+        P,
+        inputs=("y",),
+        outputs=("u",),
+    )
+
+
+def scheduled(basis, seed=0, order=2):
+    """A random controller over the basis."""
+    rng = np.random.default_rng(seed)
+    n = basis.size
+    return LPVStateSpace(
+        basis,
+        0.2 * rng.standard_normal((n, order, order)),
+        rng.standard_normal((n, order, 1)),
+        0.1 * rng.standard_normal((n, 1, order)),
+        rng.standard_normal((n, 1, 1)),
+        (P,),
+        tuple(f"k{i}" for i in range(order)),
+        ("y",),
+        ("u",),
+        0.1,
+    )
+
+
+@pytest.mark.parametrize("error", [0.0, 0.1, 0.3, 0.6])
+def test_of_an_affine_gain_on_one_state_the_bound_is_the_gain_of_the_worst_error(error):
+    wrong = with_wrong_parameter(lag(), gain(-1.0, -3.0), error)
+    certificate = l2_gain(wrong, search=None)
+    assert certificate.gamma == pytest.approx(0.1 / (0.2 - 0.3 * error), rel=CLOSE)
+    assert certificate.verified
+
+
+@pytest.mark.parametrize(
+    "basis",
+    [
+        PiecewiseLinear((0.0, 0.3, 0.55, 1.0)),
+        Polynomial(3, 0.0, 1.0),
+        PiecewiseLinear(tuple(np.linspace(0.0, 1.0, 9).tolist())),
+    ],
+)
+@pytest.mark.parametrize("error", [0.05, 0.4])
+def test_every_divided_difference_is_within_the_slopes(basis, error):
+    K = scheduled(basis)
+    S = _slopes(K, P, error, 8)
+    rng = np.random.default_rng(1)
+    p = rng.uniform(0.0, 1.0, 400)
+    q = np.clip(p + error * rng.choice([-1.0, 1.0, *rng.uniform(-1, 1, 6)], 400), 0.0, 1.0)
+    there, here = (np.block([[M.A, M.B], [M.C, M.D]]) for M in (K.matrices(q), K.matrices(p)))
+    far = np.abs(q - p) > 1e-3
+    slope = (there - here)[far] / (q - p)[far, None, None]
+    rest = slope - S[0](p[far])
+    for each in S[1:]:
+        direction = each(p[far])
+        square = (direction**2).sum(axis=(1, 2))
+        known = np.where(square > 0, square, 1.0)
+        m = (rest * direction).sum(axis=(1, 2)) / known
+        assert np.abs(m).max() <= 1 + 1e-9
+        rest = rest - m[:, None, None] * direction
+    # the directions left out are those of rounding, which a quotient by 1e-3 makes larger
+    assert np.abs(rest).max() < 1e-9 * np.abs(slope).max()
+
+
+@pytest.mark.parametrize("basis", [Polynomial(2, 0.0, 1.0), PiecewiseLinear((0.0, 0.4, 1.0))])
+def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis):
+    K = replace(scheduled(basis, seed=3), D=-1.0 - scheduled(basis, seed=4).D ** 2 / 8)
+    error, plant = 0.1, pendulum()
+    certificate = l2_gain(with_wrong_parameter(plant, K, error), search=None)
+    assert certificate.verified
+    worst = 0.0
+    for q in np.linspace(0.0, 1.0, 11):
+        frozen = plant.close(K.at(q))
+        near = frozen.with_scheduling(
+            Scheduling("p", "1", max(0.0, q - error), min(1.0, q + error), 0.1)
+        )
+        worst = max(worst, frozen_gain(near).gamma)
+    assert worst <= certificate.gamma
+    right = frozen_gain(plant.close(K)).gamma
+    assert right < worst
+
+
+def test_the_bound_is_that_of_the_exact_analysis_over_parameter_and_error():
+    """K(p + b) of an affine K is a model over p and b, where b may jump."""
+    error, c0, c1, plant = 0.1, -1.0, 1.0, pendulum()
+    wrong = l2_gain(with_wrong_parameter(plant, gain(c0, c1), error), search=None)
+    b = Scheduling("b", "1", -error, error)
+    zero = np.zeros((2, 2))
+    exact = LPVStateSpace.polynomial(
+        {
+            (0, 0): [[1.0, 0.1], [-0.1 + 0.1 * c0, 0.9]],
+            (1, 0): zero + [[0.0, 0.0], [-0.3 + 0.1 * c1, 0.0]],
+            (0, 1): zero + [[0.0, 0.0], [0.1 * c1, 0.0]],
+        },
+        {(0, 0): [[0.0], [0.1]]},
+        {(0, 0): [[1.0, 0.0]]},
+        {(0, 0): [[0.0]]},
+        (P, b),
+        0.1,
+    )
+    form = Spline(degree=(2, 0), segments=(1, 1))
+    both = l2_gain(exact, form=form, search=None)
+    assert wrong.verified
+    assert both.verified
+    # one channel: a block of 1 x 1 is b itself
+    assert wrong.gamma == pytest.approx(both.gamma, rel=2e-2)
+    assert wrong.frozen <= both.gamma
+
+
+def test_an_error_of_zero_leaves_the_loop():
+    K = scheduled(PiecewiseLinear((0.0, 0.4, 1.0)), seed=3)
+    K = replace(K, D=np.full_like(K.D, -1.0))
+    plain = l2_gain(pendulum().close(K), search=None)
+    wrong = l2_gain(with_wrong_parameter(pendulum(), K, 0.0), search=None)
+    assert wrong.gamma == pytest.approx(plain.gamma, rel=1e-3)
+
+
+def test_the_block_of_an_uncertain_plant_is_kept():
+    plant = lag()
+    rest = Remainder.of(np.array([[[0.01, 0.0, 0.0]]]))
+    uncertain = _plant(covering(plant.model, rest))
+    wrong = l2_gain(with_wrong_parameter(uncertain, gain(-1.0, -3.0), 0.1), search=None)
+    # pole 0.8, of which the plant leaves 0.02 open and the reading 0.03; the entry of the input
+    # is open by a millionth
+    truth = 0.1 / (0.2 - 0.03 - 0.02)
+    assert truth * (1 - CLOSE) <= wrong.gamma < 1.001 * truth
+
+
+def test_a_controller_that_jumps_is_refused():
+    jumps = scheduled(Patches(1, (0.0, 0.5, 1.0)))
+    with pytest.raises(InputError, match="jumps at p = 0.5"):
+        with_wrong_parameter(pendulum(), jumps, 0.1)
+
+
+def test_a_wrong_error_or_controller_is_refused():
+    with pytest.raises(InputError, match="error: expected a number >= 0"):
+        with_wrong_parameter(lag(), gain(-1.0), -0.1)
+    other = replace(gain(-1.0, -1.0), parameters=(Scheduling("q", "1", 0.0, 1.0),))
+    with pytest.raises(InputError, match="the same one parameter"):
+        with_wrong_parameter(lag(), other, 0.1)
+    through = replace(lag().model, D=lag().model.D + np.array([[[0.0, 1.0]]] * 2))
+    with pytest.raises(InputError, match="enters twice|enters\\s+twice"):
+        with_wrong_parameter(_plant(through), gain(-1.0), 0.1)
+
+
+def test_balancing_never_costs_and_finds_the_spectral_radius_of_one_matrix():
+    rng = np.random.default_rng(0)
+    H = rng.standard_normal((40, 4, 4)) * np.array([1.0, 1e3, 1.0, 1e-3])
+    T, least = balanced(H, 2)
+    assert least <= np.linalg.norm(H, 2, axis=(1, 2)).max()
+    assert least == pytest.approx(np.linalg.norm(np.linalg.solve(T, H @ T), 2, axis=(1, 2)).max())
+    assert not np.any(T[:2, 2:])
+    assert not np.any(T[2:, :2])
+    one = np.diag([1.0, 2.0, 3.0]) + np.triu(rng.standard_normal((3, 3)), 1)
+    # no similarity goes below the spectral radius; balancing comes near it
+    assert 3.0 <= balanced(one[None], 3)[1] < 3.3
+
+
+def test_a_frozen_reading_is_proven_up_to_where_the_loop_turns_unstable():
+    # u = -1.2 y: the pole 0.9 + 0.3 p - 0.12 reaches 1 at p = 0.7333
+    low, high = proven_around(lag(), {("u", "y"): -1.2}, 0.5, tolerance=0.02)
+    assert low == 0.0
+    assert 0.7333 - 0.02 * 0.5 <= high < 0.73334
+
+
+def test_a_frozen_reading_holds_the_numbers_of_the_place_where_it_froze():
+    # K(0.2) = -1.6: stable up to p = 0.8667; K(p) itself everywhere
+    low, high = proven_around(lag(), gain(-1.0, -3.0), 0.2, tolerance=0.02)
+    assert low == 0.0
+    assert 0.8666 - 0.02 * 0.8 <= high < 0.86667
+    with pytest.raises(InputError, match="expected p within"):
+        proven_around(lag(), gain(-1.0), 1.5)
+
+
+@pytest.mark.parametrize("truth", [0.037, 0.5, 2.9])
+def test_bisection_ends_on_both_sides_of_the_truth(truth):
+    asked = []
+
+    def proves(value):
+        asked.append(value)
+        return value <= truth
+
+    found = largest(proves, 3.0, 0.01)
+    assert found.proven <= truth < found.failed
+    assert found.failed - found.proven <= 0.03
+    assert found.proven in asked
+
+
+def test_bisection_refuses_what_is_not_positive():
+    with pytest.raises(InputError, match="most > 0"):
+        largest(lambda b: True, 0.0)
+
+
+@pytest.mark.slow
+def test_the_lateral_loop_is_stable_however_its_airspeed_is_misread(ideal):
+    """2.5 m/s: a bias of 1 m/s and a lag of .5 s at 3 m/s^2 together, from 8 to 11 m/s."""
+    from studies.loops.designed_lateral import DT, designed, flying_plant
+    from synthesis import stability
+
+    controller = designed(ideal, 8.0, 11.0)
+    flies = symheli.TableController.of(controller.discretize(DT).model, 2)
+    plant = flying_plant(ideal, 8.0, 11.0)
+    wrong = with_wrong_parameter(plant, flies, 2.5)
+    assert stability(wrong, form=Spline(degree=0), search=None).verified
+    for q in np.linspace(8.0, 11.0, 4):
+        poles = np.linalg.eigvals(plant.close(flies.model.at(q)).matrices(np.linspace(8, 11, 9)).A)
+        assert np.abs(poles).max() < 1
