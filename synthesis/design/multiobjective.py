@@ -103,7 +103,7 @@ def multiobjective(
     >>> from synthesis import H2, L2, PoleRegion
     >>> made = synthesis.multiobjective(
     ...     plant, [L2(bound=1.5), H2(performance=["z_x"], disturbances=["w"])],
-    ...     region=PoleRegion(decay=1.2))
+    ...     region=PoleRegion(decay=1.2), gains=0)
     >>> bool(made.closed().at(0.5).poles().real.max() <= -1.2)
     True
     """
