@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,10 @@ BASELINE, IDENTIFIED = "LPV from the baseline", "LPV from the identified model"
 NAMES = (LQR, HINF, LFT, BASELINE, IDENTIFIED)
 
 BACK_OFF = 1.3
-"""Levels are this much above the least, where controllers are slower than the servos."""
+BACK_OFFS, FASTEST = (BACK_OFF, 1.6, 2.0), np.pi / PERIOD
+"""Levels are so much above the least, tried in turn until no pole of the controller is faster
+(rad/s) than half the sample frequency: polynomials in airspeed do not follow those that are.
+"""
 
 AIRSPEEDS = 14
 """Points of the schedules, evenly over the range."""
@@ -111,13 +115,14 @@ def design_questions(
     record = None
     if effort.certified_controllers:
         record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
-    from_the_model = partial(output_feedback, theirs, RATE, back_off=BACK_OFF)
+    slow: Any = {"back_off": BACK_OFFS, "fastest": FASTEST}
+    from_the_model = partial(output_feedback, theirs, RATE, **slow)
     last = partial(from_flights, from_the_model, flown, identified, record)
     ways: dict[str, Callable[[], Controller | LPVStateSpace]] = {
         LQR: partial(lqr_schedule, heli),
         HINF: partial(hinf_schedule, own, effort.design_points),
-        LFT: partial(lft_feedback, own, back_off=BACK_OFF),
-        BASELINE: partial(output_feedback, own, RATE, back_off=BACK_OFF),
+        LFT: partial(lft_feedback, own, **slow),
+        BASELINE: partial(output_feedback, own, RATE, **slow),
     }
     asked = [partial(design, name, make, flown) for name, make in ways.items()]
     return Questions([*asked, last], lambda designs: Designs(designs=designs, plant=flown), [last])
