@@ -8,7 +8,7 @@ import pytest
 import symheli
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Matrices, Scheduling
-from synthesis import Plant, Spline, certify_flown, l2_gain
+from synthesis import Plant, Spline, certify_flown
 from synthesis.cover import SAFETY
 
 P = Scheduling("airspeed", "m/s", 0.0, 10.0, rate=1.0)
