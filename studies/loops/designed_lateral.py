@@ -46,10 +46,16 @@ BANDWIDTH = 15.0
 
 def design_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plant:
     """Cubic element-wise fits in continuous time behind first-order servos."""
-    family = symheli.sweep(heli, np.linspace(low, high, 27), inputs=INPUTS)  # type: ignore[arg-type]
-    lateral = family.select(STATES, INPUTS).interpolate("polynomial", 3, rate=ACCELERATION)
-    servos = {u: _first_order(u) for u in CONTROLS}
-    return _weighted(_plant(lateral.with_trim_drift()).with_servo(servos))
+    return _weighted(_fitted(heli, low, high).with_servo({u: _first_order(u) for u in CONTROLS}))
+
+
+def sampled_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plant:
+    """The same fits behind the true servos every `DT` s, the commands one sample late: one
+    polynomial, for many proofs.
+    """
+    servos = {u: XCELL_SERVOS[u] for u in CONTROLS}
+    sampled = _fitted(heli, low, high).with_servo(servos).sampled(DT, degree=4)
+    return _weighted(sampled.with_delay(DT))
 
 
 def designed(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Controller:
@@ -79,6 +85,12 @@ def flying_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plan
         between.airspeeds, Matrices(*(getattr(between, M) for M in "ABCD"))
     )
     return _weighted(_plant(model).with_delay(DT))
+
+
+def _fitted(heli: Helicopter, low: float, high: float) -> Plant:
+    family = symheli.sweep(heli, np.linspace(low, high, 27), inputs=INPUTS)  # type: ignore[arg-type]
+    lateral = family.select(STATES, INPUTS).interpolate("polynomial", 3, rate=ACCELERATION)
+    return _plant(lateral.with_trim_drift())
 
 
 def _first_order(control: str) -> LinearModel:
