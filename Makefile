@@ -47,6 +47,7 @@ bench: $(STAMP)
 	$(BIN)/python benchmarks/identification.py --write
 	$(BIN)/python benchmarks/analysis.py --write
 	$(BIN)/python benchmarks/closed_loop_certificates.py --write
+	$(BIN)/python benchmarks/synthesis.py --write
 
 clean:
 	rm -rf $(VENV) study build *.egg-info

@@ -14,7 +14,7 @@ from studies.loops.exact_lateral import DEGREE, INPUTS, STATES, ExactLateral
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace, Scheduling
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv import Matrices, Patches
-from symheli.values import Signal
+from symheli.values.signal import Signal, signals
 from synthesis import Controller, Plant, output_feedback
 
 Array = np.ndarray
@@ -46,15 +46,16 @@ BANDWIDTH = 15.0
 
 def design_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plant:
     """Cubic element-wise fits in continuous time behind first-order servos."""
-    family = symheli.sweep(heli, np.linspace(low, high, 27), inputs=INPUTS)  # type: ignore[arg-type]
-    lateral = family.select(STATES, INPUTS).interpolate("polynomial", 3, rate=ACCELERATION)
-    servos = {
-        u: LinearModel(
-            [[-BANDWIDTH]], [[BANDWIDTH]], [[1.0]], [[0.0]], (f"{u}_lag",), (f"{u}_command",), (u,)
-        )
-        for u in CONTROLS
-    }
-    return _weighted(_plant(lateral.with_trim_drift()).with_servo(servos))
+    return _weighted(_fitted(heli, low, high).with_servo({u: _first_order(u) for u in CONTROLS}))
+
+
+def sampled_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plant:
+    """The same fits behind the true servos every `DT` s, the commands one sample late: one
+    polynomial, for many proofs.
+    """
+    servos = {u: XCELL_SERVOS[u] for u in CONTROLS}
+    sampled = _fitted(heli, low, high).with_servo(servos).sampled(DT, degree=4)
+    return _weighted(sampled.with_delay(DT))
 
 
 def designed(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Controller:
@@ -86,13 +87,28 @@ def flying_plant(heli: Helicopter, low: float = 0.0, high: float = 13.0) -> Plan
     return _weighted(_plant(model).with_delay(DT))
 
 
+def _fitted(heli: Helicopter, low: float, high: float) -> Plant:
+    family = symheli.sweep(heli, np.linspace(low, high, 27), inputs=INPUTS)  # type: ignore[arg-type]
+    lateral = family.select(STATES, INPUTS).interpolate("polynomial", 3, rate=ACCELERATION)
+    return _plant(lateral.with_trim_drift())
+
+
+def _first_order(control: str) -> LinearModel:
+    """From the command to a control."""
+    one = np.ones((1, 1))
+    return LinearModel(
+        *(-BANDWIDTH * one, BANDWIDTH * one, one, 0.0 * one),
+        *(signals([f"{control}_lag"]), signals([f"{control}_command"]), signals([control])),
+    )
+
+
 def _plant(model: LPVStateSpace) -> Plant:
     return Plant(
         model,
-        disturbances=(GUST, DRIFT),
-        performance=(*MEASURED, *CONTROLS),
-        controls=CONTROLS,
-        measurements=MEASURED,
+        disturbances=signals([GUST, DRIFT]),
+        performance=signals([*MEASURED, *CONTROLS]),
+        controls=signals(CONTROLS),
+        measurements=signals(MEASURED),
     )
 
 

@@ -16,36 +16,52 @@ ROUNDS, SHARPNESS = 60, 6.0
 """Rounds of balancing; how much more the worst responses count."""
 
 
-def balanced(responses: Array, size: int) -> tuple[Array, float]:
-    """T (n, n) of blocks of `size` for `responses` H (K, n, n), and the largest norm of T^-1 H T.
+def balanced(responses: Array, size: int, count: int = 1) -> tuple[Array, Array, float]:
+    """T for the `count` blocks of `size`, alpha for the block of all other channels, and the
+    largest norm that is left; of `responses` H (K, rows, columns).
+
+    Returns
+    -------
+    T_v (rows, rows), T_d (columns, columns), norm of T_v^-1 H T_d
+        diag(T, alpha I) both, where the channels of the other block may differ in number.
 
     Examples
     --------
     >>> H = np.array([[[0.0, 100.0], [0.01, 0.0]]])
-    >>> print([round(balanced(H, size)[1], 3) for size in (1, 2)])
-    [1.0, 1.0]
+    >>> print(round(balanced(H, 2)[2], 3), round(balanced(H, 1, 2)[2], 3))
+    1.0 1.0
     """
-    n = responses.shape[-1]
-    T = best = np.eye(n)
-    least = np.inf
+    rows, columns = responses.shape[1:]
+    own, alpha = size * count, 1.0
+    T = np.eye(own)
+    best, least = (T, alpha), np.inf
     for _ in range(ROUNDS):
-        seen = np.linalg.solve(T, responses @ T)
+        left, right = _whole(T, alpha, rows), _whole(T, alpha, columns)
+        seen = np.linalg.solve(left, responses @ right)
         norms = np.linalg.norm(seen, 2, axis=(1, 2))
         worst = float(norms.max())
         if worst < least:
-            least, best = worst, T
+            least, best = worst, (T, alpha)
         if not np.isfinite(worst) or worst == 0:
             break
         weights = (norms / worst) ** SHARPNESS
         adjoint = np.conj(np.swapaxes(seen, 1, 2))
         out = _regular(np.real(np.tensordot(weights, seen @ adjoint, axes=1)))
         into = _regular(np.real(np.tensordot(weights, adjoint @ seen, axes=1)))
-        step = np.zeros((n, n))
-        for i in range(0, n, size):
-            own = slice(i, i + size)
-            step[own, own] = _power(_mean(out[own, own], np.linalg.inv(into[own, own])), 0.25)
+        step = np.zeros_like(T)
+        for i in range(0, own, size):
+            at = slice(i, i + size)
+            step[at, at] = _power(_mean(out[at, at], np.linalg.inv(into[at, at])), 0.25)
         T = T @ step
-    return best, least
+        if rows > own:
+            alpha *= float(np.trace(out[own:, own:]) / np.trace(into[own:, own:])) ** 0.125
+    return _whole(*best, rows), _whole(*best, columns), least
+
+
+def _whole(T: Array, alpha: float, size: int) -> Array:
+    whole = alpha * np.eye(size)
+    whole[: len(T), : len(T)] = T
+    return whole
 
 
 def _regular(M: Array) -> Array:

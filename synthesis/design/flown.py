@@ -129,7 +129,14 @@ def certify_flown(
 
     Examples
     --------
-    See `Flown`.
+    >>> import synthesis
+    >>> from symheli.lpv import LinearModel
+    >>> lag = LinearModel([[0.9]], [[0.1, 0.1]], [[1.0]], [[0.0, 0.0]], ("x",), ("w", "u"), ("y",),
+    ...                   dt=0.1)
+    >>> plant = synthesis.Plant(lag, disturbances=["w"], performance=["y"], controls=["u"],
+    ...                         measurements=["y"])
+    >>> print(certify_flown({("u", "y"): -1.0}, plant, search=None))
+    the loop as it flies is proven for 0.5 (frozen 0.5)
     """
     if plant.dt is None:
         raise InputError(

@@ -14,10 +14,12 @@ a knot one S_i holds the slopes of both sides.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import linalg
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Patches, Scheduling, UncertainStateSpace
@@ -108,9 +110,16 @@ def with_wrong_parameter(
     enter = np.hstack([error * U] * len(seen))
     rows = np.concatenate([each.coefficients for each in seen], axis=1)
     leave = MatrixFunction(seen[0].basis, rows, seen[0].box)
-    T, _ = balanced(loop.response(enter, leave), U.shape[1])
-    back = MatrixFunction(leave.basis, np.linalg.solve(T, leave.coefficients), leave.box)
-    return loop.closed(enter @ T, back, error)
+    open_loop = loop.closed(enter, leave)
+    ends = len(plant.disturbances), len(plant.performance)
+    points = leave.basis.points(3) if isinstance(leave.basis, Patches) else np.zeros(0)
+    model = _in_balanced_units(open_loop, ends, points, U.shape[1], len(seen))
+    said, probability, s = "", 1.0, plant.parameters[0]
+    if isinstance(plant.model, UncertainStateSpace):
+        said, probability = f"{plant.model.source}; ", plant.model.probability
+    said += f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"
+    d, v = model.inputs[ends[0] :], model.outputs[ends[1] :]
+    return UncertainStateSpace(model, d, v, 1.0, probability, said)
 
 
 class _Opened:
@@ -173,59 +182,68 @@ class _Opened:
         }
         return cls(plant, K, parts)
 
-    def response(self, enter: Array, leave: MatrixFunction) -> Array:
-        """From d = enter d_1 to leave(p) y~ at frozen p and some frequencies, (K, n, n)."""
-        model, f = self.plant.nominal, self.parts
-        assert isinstance(leave.basis, Patches)  # noqa: S101
-        dt, p = model.dt, leave.basis.points(3)
-        A, B, C = f["A"](p), f["Bd"](p) @ enter, leave(p) @ f["Cy"](p)
-        fastest = np.abs(np.linalg.eigvals(A)).max() if dt is None else np.pi / dt
-        omega = np.geomspace(1e-3 * fastest, fastest, 24)
-        s = 1j * omega if dt is None else np.exp(1j * omega * dt)
-        one = np.eye(A.shape[-1])
-        return np.concatenate([C @ np.linalg.solve(at * one - A, B) for at in s])
-
-    def closed(self, enter: Array, leave: MatrixFunction, error: float) -> UncertainStateSpace:
-        """With d = enter d_1, v_1 = leave(p) y~ and d_1 = Delta v_1, |Delta| <= 1; with the plant's
-        own block the two are one.
+    def closed(self, enter: Array, leave: MatrixFunction) -> LPVStateSpace:
+        """With d = enter d_1 and v_1 = leave(p) y~, the inputs (w, d_1, own d), the outputs (z,
+        v_1, own v); the bound of the plant's own block is in its d.
         """
         f, plant, own = self.parts, self.plant, self.plant.model
-        w = len(plant.disturbances)
-        size = np.ones(f["B"].shape[1])
-        said, probability, inside, outside = "", 1.0, (), ()
+        w, z = len(plant.disturbances), len(plant.performance)
+        size, inside, outside = np.ones(f["B"].shape[1]), (), ()
         if isinstance(own, UncertainStateSpace):
             size[w:] = own.bound
-            said, probability = f"{own.source}; ", own.probability
             inside, outside = own.perturbation_inputs, own.perturbation_outputs
-        scale = np.diag(size)
+        every, first, last = slice(None), np.diag(size)[:, :w], np.diag(size)[:, w:]
         blind = _constant(np.zeros((leave.shape[0], enter.shape[1])), f["A"])
+        seen = {"C": leave @ f["Cy"], "D": leave @ f["Dy"]}
+        columns = [f["D"] @ first, f["Dd"] @ enter, f["D"] @ last]
         basis, (A, B, C, D) = in_one_basis(
             [
                 f["A"],
-                block([[f["B"] @ scale, f["Bd"] @ enter]]),
-                block([[f["C"]], [leave @ f["Cy"]]]),
-                block([[f["D"] @ scale, f["Dd"] @ enter], [leave @ f["Dy"] @ scale, blind]]),
+                block([[f["B"] @ first, f["Bd"] @ enter, f["B"] @ last]]),
+                block([[f["C"][:z, every]], [seen["C"]], [f["C"][z:, every]]]),
+                block(
+                    [
+                        [M[:z, every] for M in columns],
+                        [seen["D"] @ first, blind, seen["D"] @ last],
+                        [M[z:, every] for M in columns],
+                    ]
+                ),
             ],
             plant.basis.ranges,
         )
-        inside = signals((*inside, *(f"wrong_{i + 1}" for i in range(enter.shape[1]))))
-        outside = signals((*outside, *(f"slope_{i + 1}" for i in range(leave.shape[0]))))
-        states = (*plant.states, *(f"controller_{s}" for s in self.K.states))
-        model = LPVStateSpace(
+        wrong = (f"wrong_{i + 1}" for i in range(enter.shape[1]))
+        slope = (f"slope_{i + 1}" for i in range(leave.shape[0]))
+        return LPVStateSpace(
             basis,
-            A,
-            B,
-            C,
-            D,
+            *(A, B, C, D),
             plant.parameters,
-            signals(states),
-            (*plant.disturbances, *inside),
-            (*plant.performance, *outside),
+            signals((*plant.states, *(f"controller_{s}" for s in self.K.states))),
+            signals((*plant.disturbances, *wrong, *inside)),
+            signals((*plant.performance, *slope, *outside)),
             plant.dt,
         )
-        s = plant.parameters[0]
-        said += f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"
-        return UncertainStateSpace(model, inside, outside, 1.0, probability, said)
+
+
+def _in_balanced_units(
+    model: LPVStateSpace, ends: tuple[int, int], p: Array, size: int, count: int
+) -> LPVStateSpace:
+    """The channels of the block, those after `ends`, in coordinates in which it costs little: by
+    the responses at p and some frequencies.
+    """
+    w, z = ends
+    A, B, C, D = model.matrices(p)
+    dt = model.dt
+    fastest = np.abs(np.linalg.eigvals(A)).max() if dt is None else np.pi / dt
+    omega = np.geomspace(1e-3 * fastest, fastest, 24)
+    one = np.eye(A.shape[-1])
+    responses = [
+        C[:, z:] @ np.linalg.solve(at * one - A, B[:, :, w:]) + D[:, z:, w:]
+        for at in (1j * omega if dt is None else np.exp(1j * omega * dt))
+    ]
+    left, right, _ = balanced(np.concatenate(responses), size, count)
+    right = linalg.block_diag(np.eye(w), right)
+    left = linalg.block_diag(np.eye(z), np.linalg.inv(left))
+    return replace(model, B=model.B @ right, C=left @ model.C, D=left @ model.D @ right)
 
 
 def _constant(M: Array, like: MatrixFunction) -> MatrixFunction:

@@ -122,10 +122,13 @@ def test_every_divided_difference_is_within_the_slopes(basis, error):
     assert np.abs(rest).max() < 1e-9 * np.abs(slope).max()
 
 
-@pytest.mark.parametrize("basis", [Polynomial(2, 0.0, 1.0), PiecewiseLinear((0.0, 0.4, 1.0))])
-def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis):
-    K = replace(scheduled(basis, seed=3), D=-1.0 - scheduled(basis, seed=4).D ** 2 / 8)
-    error, plant = 0.1, pendulum()
+@pytest.mark.parametrize(
+    ("basis", "error"), [(Polynomial(2, 0.0, 1.0), 0.02), (PiecewiseLinear((0.0, 0.4, 1.0)), 0.1)]
+)
+def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis, error):
+    K = scheduled(basis, seed=5)
+    K = replace(K, B=0.3 * K.B, D=0.2 * K.D - basis.constant()[:, None, None])
+    plant = pendulum()
     certificate = l2_gain(with_wrong_parameter(plant, K, error), search=None)
     assert certificate.verified
     worst = 0.0
@@ -137,7 +140,7 @@ def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis):
         worst = max(worst, frozen_gain(near).gamma)
     assert worst <= certificate.gamma
     right = frozen_gain(plant.close(K)).gamma
-    assert right < worst
+    assert right <= worst * (1 + 1e-9)
 
 
 def test_the_bound_is_that_of_the_exact_analysis_over_parameter_and_error():
@@ -145,12 +148,11 @@ def test_the_bound_is_that_of_the_exact_analysis_over_parameter_and_error():
     error, c0, c1, plant = 0.1, -1.0, 1.0, pendulum()
     wrong = l2_gain(with_wrong_parameter(plant, gain(c0, c1), error), search=None)
     b = Scheduling("b", "1", -error, error)
-    zero = np.zeros((2, 2))
     exact = LPVStateSpace.polynomial(
         {
             (0, 0): [[1.0, 0.1], [-0.1 + 0.1 * c0, 0.9]],
-            (1, 0): zero + [[0.0, 0.0], [-0.3 + 0.1 * c1, 0.0]],
-            (0, 1): zero + [[0.0, 0.0], [0.1 * c1, 0.0]],
+            (1, 0): [[0.0, 0.0], [-0.3 + 0.1 * c1, 0.0]],
+            (0, 1): [[0.0, 0.0], [0.1 * c1, 0.0]],
         },
         {(0, 0): [[0.0], [0.1]]},
         {(0, 0): [[1.0, 0.0]]},
@@ -162,17 +164,21 @@ def test_the_bound_is_that_of_the_exact_analysis_over_parameter_and_error():
     both = l2_gain(exact, form=form, search=None)
     assert wrong.verified
     assert both.verified
-    # one channel: a block of 1 x 1 is b itself
-    assert wrong.gamma == pytest.approx(both.gamma, rel=2e-2)
+    # a block of 1 x 1 is b itself, so that only the multiplier, one for all p, costs anything
+    assert both.gamma * (1 - CLOSE) <= wrong.gamma < 1.05 * both.gamma
     assert wrong.frozen <= both.gamma
 
 
 def test_an_error_of_zero_leaves_the_loop():
     K = scheduled(PiecewiseLinear((0.0, 0.4, 1.0)), seed=3)
     K = replace(K, D=np.full_like(K.D, -1.0))
-    plain = l2_gain(pendulum().close(K), search=None)
-    wrong = l2_gain(with_wrong_parameter(pendulum(), K, 0.0), search=None)
-    assert wrong.gamma == pytest.approx(plain.gamma, rel=1e-3)
+    plain, wrong = pendulum().close(K), with_wrong_parameter(pendulum(), K, 0.0)
+    p = np.linspace(0.0, 1.0, 7)
+    for mine, theirs in zip(wrong.nominal.matrices(p), plain.matrices(p), strict=True):
+        np.testing.assert_allclose(mine, theirs, atol=1e-14)
+    least, most = (l2_gain(m, form=Spline(degree=0), search=None).gamma for m in (plain, wrong))
+    assert most == pytest.approx(least, rel=1e-3)  # more segments, and a millionth for the block
+    assert not np.any(wrong.model.B[:, :, 1:])
 
 
 def test_the_block_of_an_uncertain_plant_is_kept():
@@ -188,7 +194,7 @@ def test_the_block_of_an_uncertain_plant_is_kept():
 
 def test_a_controller_that_jumps_is_refused():
     jumps = scheduled(Patches(1, (0.0, 0.5, 1.0)))
-    with pytest.raises(InputError, match="jumps at p = 0.5"):
+    with pytest.raises(InputError, match=r"jumps at p = 0\.5"):
         with_wrong_parameter(pendulum(), jumps, 0.1)
 
 
@@ -199,21 +205,22 @@ def test_a_wrong_error_or_controller_is_refused():
     with pytest.raises(InputError, match="the same one parameter"):
         with_wrong_parameter(lag(), other, 0.1)
     through = replace(lag().model, D=lag().model.D + np.array([[[0.0, 1.0]]] * 2))
-    with pytest.raises(InputError, match="enters twice|enters\\s+twice"):
+    with pytest.raises(InputError, match=r"enters\s+twice"):
         with_wrong_parameter(_plant(through), gain(-1.0), 0.1)
 
 
 def test_balancing_never_costs_and_finds_the_spectral_radius_of_one_matrix():
     rng = np.random.default_rng(0)
     H = rng.standard_normal((40, 4, 4)) * np.array([1.0, 1e3, 1.0, 1e-3])
-    T, least = balanced(H, 2)
+    T, same, least = balanced(H, 2, 2)
+    np.testing.assert_array_equal(T, same)
     assert least <= np.linalg.norm(H, 2, axis=(1, 2)).max()
     assert least == pytest.approx(np.linalg.norm(np.linalg.solve(T, H @ T), 2, axis=(1, 2)).max())
     assert not np.any(T[:2, 2:])
     assert not np.any(T[2:, :2])
     one = np.diag([1.0, 2.0, 3.0]) + np.triu(rng.standard_normal((3, 3)), 1)
     # no similarity goes below the spectral radius; balancing comes near it
-    assert 3.0 <= balanced(one[None], 3)[1] < 3.3
+    assert 3.0 <= balanced(one[None], 3)[2] < 3.3
 
 
 def test_a_frozen_reading_is_proven_up_to_where_the_loop_turns_unstable():
