@@ -48,6 +48,7 @@ bench: $(STAMP)
 	$(BIN)/python benchmarks/analysis.py --write
 	$(BIN)/python benchmarks/closed_loop_certificates.py --write
 	$(BIN)/python benchmarks/synthesis.py --write
+	$(BIN)/python benchmarks/controller_step.py --write
 
 clean:
 	rm -rf $(VENV) study build *.egg-info
