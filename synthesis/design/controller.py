@@ -15,6 +15,7 @@ from synthesis.design.conditions import conditions
 from synthesis.design.diagnosis import decided
 from synthesis.forms import Spline
 from synthesis.program.cone_program import LYAPUNOV
+from synthesis.worst.rates import asked as limits
 
 if TYPE_CHECKING:
     from symheli.flight import ScheduledController
@@ -95,15 +96,17 @@ class Controller:
         knows nothing of how the controller was made.
 
         Where Y(p) moved in the synthesis the inverse of P(p) is a polynomial as simple as Y, and
-        not P: then the adjoint is analysed, which has the same gain.
+        not P: then the adjoint is analysed, which has the same gain. Not where the rate of a
+        parameter is another one: backwards it is not.
         """
         from synthesis.analysis.l2_gain import l2_gain
 
         loop = self.closed()
-        tied = any(isinstance(s.rate, str) for s in loop.parameters)
+        moving = limits(loop.parameters, rate)
+        tied = any(isinstance(s.rate, str) for s in moving)
         if not self.by_adjoint or tied or isinstance(loop, UncertainStateSpace):
             return l2_gain(loop, rate, **options)
-        if len(loop.parameters) == 1:
+        if len(moving) == 1 and not {"form", "impose", "solver"} & set(options):
             options = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV} | options
         return l2_gain(loop.adjoint(), rate, **options).resting_on([ADJOINT])
 

@@ -1,0 +1,84 @@
+"""The proof of a controller: by the adjoint of its loop where that is as good, and only there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scheduled_plants import RATE, spring
+
+from symheli import Scheduling
+from symheli.errors import InputError
+from synthesis import Memory, MemoryLyapunov, Spline, l2_gain, lower_bound, output_feedback
+from synthesis.design.controller import ADJOINT
+
+
+@pytest.fixture(scope="module")
+def made():
+    return output_feedback(spring(), RATE, X=0, Y=2)
+
+
+@pytest.fixture(scope="module")
+def loop(made):
+    return made.closed()
+
+
+def test_the_adjoint_has_the_transposed_responses_and_its_adjoint_is_the_model(loop):
+    omega = np.array([0.1, 1.0, 7.0])
+    there = loop.adjoint().at(0.3).frequency_response(omega)
+    np.testing.assert_allclose(
+        np.swapaxes(there, 1, 2), loop.at(0.3).frequency_response(omega), rtol=1e-12, atol=1e-14
+    )
+    back = loop.adjoint().adjoint()
+    assert (back.inputs, back.outputs) == (loop.inputs, loop.outputs)
+    for one, other in zip(back.matrices(0.7), loop.matrices(0.7), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("dt", [None, 0.05])
+def test_the_gain_of_the_adjoint_is_that_of_the_loop(loop, dt):
+    """Both bounds enclose the same number: rich forms of P come within a percent of one another,
+    and nothing flown on the one exceeds what is proven of the other.
+    """
+    model = loop if dt is None else loop.discretize(dt, degree=6)
+    form = Spline(degree=2, segments=8)
+    own, turned = (l2_gain(m, 2.0, form=form, search=None) for m in (model, model.adjoint()))
+    assert own.verified
+    assert turned.verified
+    assert turned.gamma == pytest.approx(own.gamma, rel=1e-2)
+    assert lower_bound(model, 2.0).gamma <= turned.gamma
+
+
+def test_a_controller_is_proven_by_the_adjoint_where_y_moves(made):
+    proof = made.certify(RATE, search=None)
+    assert ADJOINT in proof.hypotheses
+    assert proof.gamma <= made.gamma * (1 + 1e-6)
+    fixed = output_feedback(spring(), RATE, X=2, Y=0)
+    assert ADJOINT not in fixed.certify(RATE, search=None).hypotheses
+
+
+def test_a_rate_that_is_another_parameter_is_not_turned_around(loop):
+    wide = loop.with_parameter(Scheduling("acceleration", "1/s", -0.5, 0.5, rate=1.0))
+    with pytest.raises(InputError, match="backwards the rate of p is not acceleration"):
+        wide.with_rate({"p": "acceleration"}).adjoint()
+
+
+def test_nor_where_the_rate_is_said_with_the_question():
+    wide = spring().model.with_parameter(Scheduling("acceleration", "1/s", -0.5, 0.5, rate=1.0))
+    own = spring()
+    plant = type(own)(
+        wide,
+        disturbances=own.disturbances,
+        performance=own.performance,
+        controls=own.controls,
+        measurements=own.measurements,
+    )
+    made = output_feedback(plant, {"p": RATE, "acceleration": 1.0}, X=0, Y=(2, 0))
+    assert made.by_adjoint
+    proof = made.certify({"p": "acceleration"}, search=None, form=Spline(degree=(2, 0), segments=1))
+    assert ADJOINT not in proof.hypotheses
+
+
+def test_another_form_or_solver_is_taken_as_it_is_asked_for(made):
+    proof = made.certify(RATE, search=None, form=Memory(0.5, segments=2))
+    assert isinstance(proof.lyapunov, MemoryLyapunov)
+    assert "CLARABEL" in made.certify(RATE, search=None, solver="CLARABEL").solver
