@@ -20,7 +20,7 @@ from synthesis.design.motions import motions, moves, used
 from synthesis.design.unknown import Blocks, Unknown, selector, unknowns
 from synthesis.polynomial.symmetric import length, smat
 from synthesis.program import interior_point
-from synthesis.program.cone_program import Answer, Solver
+from synthesis.program.cone_program import Solver
 from synthesis.program.lyapunov_program import LyapunovBlocks, Sizes
 
 Array = np.ndarray
@@ -50,17 +50,17 @@ class Conditions:
 
 
 class Found(NamedTuple):
-    """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit."""
+    """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, and
+    what the solver said.
+    """
 
     gamma: float
     coefficients: Array
-    answer: Answer
     message: str
-    seconds: float
 
 
 class Existence:
-    """The program of a plant with X and Y of these bases, |dp/dt| <= rates (per scaled time)."""
+    """The program of a plant with X and Y of these bases, its ranges cut in so many parts."""
 
     def __init__(
         self,
@@ -69,7 +69,7 @@ class Existence:
         Y: FunctionSpace | None,
         divisions: int = 1,
     ):
-        self.plant, self.divisions, self.margin = plant, divisions, MARGIN
+        self.plant = plant
         both = [b for b in (X, Y) if b is not None]
         if plant.dt is not None and Y is not None and Y.size > 1 and moves(plant.parameters):
             both.append(Y)  # the bound of Y at the next sample
@@ -79,9 +79,9 @@ class Existence:
         self.S: Unknown | None = each.pop(0) if each else self.Y
         self.count = sum(b.size for b in both)
         self.states = plant.at(np.array([[s.middle for s in plant.parameters]])).A.shape[-1]
-        self._cells = self._over_cells()
+        self._cells = self._over_cells(divisions)
 
-    def _over_cells(self) -> list[Cell]:
+    def _over_cells(self, divisions: int) -> list[Cell]:
         breaks = [sorted(set(b)) for b in self.plant.breaks]
         most = np.zeros(len(breaks), int)
         for basis in (u.basis for u in (self.X, self.Y) if u is not None):
@@ -90,8 +90,8 @@ class Existence:
                     most[i] = max(most[i], piece.bernstein.shape[1] - 1)
                     if breaks[i][0] < piece.high < breaks[i][-1]:
                         breaks[i] = sorted({*breaks[i], piece.high})
-        if self.divisions > 1:
-            breaks = [_divided(b, self.divisions) for b in breaks]
+        if divisions > 1:
+            breaks = [_divided(b, divisions) for b in breaks]
         degrees = np.array(degrees_of(self._data, breaks)) + most
         return cells(breaks, [int(d) for d in degrees])
 
@@ -102,72 +102,59 @@ class Existence:
 
     def least_gamma(self, solver: Solver) -> Found:
         """Minimise g."""
-        blocks = [
-            b
-            for cell in self._cells
-            for b in (*self._halves(cell, None), *self._coupling(cell, False, LARGEST))
-        ]
+        blocks = [*self._halves(None, MARGIN), *self._coupling(False, LARGEST)]
         return self._solved(blocks, 1.0, solver)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
         """For this g the X and Y whose product is farthest from one: first within the least bound
         beyond which that hardly grows, then within larger ones.
         """
-        for self.margin in SETTLED:
-            yield from self._within(gamma, solver)
-        self.margin = MARGIN
-
-    def _within(self, gamma: float, solver: Solver) -> Iterator[Found]:
-        found: list[Found] = []
-        for largest in WIDE:
-            blocks = [
-                b
-                for cell in self._cells
-                for b in (*self._halves(cell, gamma), *self._coupling(cell, True, largest))
-            ]
-            answer = self._solved(blocks, -1.0, solver)
-            if not np.any(answer.coefficients):
-                continue
-            found.append(answer)
-            if len(found) > 1 and answer.gamma < GROWS * found[-2].gamma:
-                yield found[-2]._replace(gamma=gamma)
-        if found:
-            yield found[-1]._replace(gamma=gamma)
+        for margin in SETTLED:
+            halves = self._halves(gamma, margin)
+            before: Found | None = None
+            for largest in WIDE:
+                blocks = [*halves, *self._coupling(True, largest)]
+                found = self._solved(blocks, -1.0, solver)
+                if not np.any(found.coefficients):
+                    continue
+                if before is not None and found.gamma < GROWS * before.gamma:
+                    yield before._replace(gamma=gamma)
+                before = found
+            if before is not None:
+                yield before._replace(gamma=gamma)
 
     def _solved(self, blocks: list[LyapunovBlocks], cost: float, solver: Solver) -> Found:
-        n = self.states
-        program = Conditions(tuple(blocks), Sizes(n, 1, self.count), cost)
-        candidate = interior_point.minimise(program, solver)
-        if candidate.x is None:
-            return Found(
-                np.inf,
-                np.zeros((self.count, n, n)),
-                candidate.answer,
-                candidate.message,
-                candidate.seconds,
-            )
-        coefficients = smat(candidate.x[: self.count * length(n)].reshape(self.count, -1), n)
-        return Found(
-            float(candidate.x[-1]),
-            coefficients,
-            candidate.answer,
-            candidate.message,
-            candidate.seconds,
+        n, count = self.states, self.count
+        candidate = interior_point.minimise(
+            Conditions(tuple(blocks), Sizes(n, 1, count), cost), solver
         )
+        if candidate.x is None:
+            return Found(np.inf, np.zeros((count, n, n)), candidate.message)
+        coefficients = smat(candidate.x[: count * length(n)].reshape(count, -1), n)
+        return Found(float(candidate.x[-1]), coefficients, candidate.message)
 
-    def _halves(self, cell: Cell, gamma: float | None) -> list[LyapunovBlocks]:
-        plant = self.plant.at(cell.nodes)
+    def _halves(self, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
+        """Those of every cell, for this g or for one that is sought."""
         out = []
-        if self.X is not None:
-            out += self._half(cell, observed(plant), self.X, self.X, 1.0, gamma)
-        if self.Y is not None and self.S is not None:
-            out += self._half(cell, controlled(plant), self.Y, self.S, -1.0, gamma)
-        if self.S is not self.Y:
-            out += self._next(cell)
+        for cell in self._cells:
+            plant = self.plant.at(cell.nodes)
+            if self.X is not None:
+                out += self._half(cell, observed(plant), self.X, self.X, 1.0, gamma, margin)
+            if self.Y is not None and self.S is not None:
+                out += self._half(cell, controlled(plant), self.Y, self.S, -1.0, gamma, margin)
+            if self.S is not self.Y:
+                out += self._next(cell, margin)
         return out
 
     def _half(
-        self, cell: Cell, half: Half, ahead: Unknown, now: Unknown, sign: float, gamma: float | None
+        self,
+        cell: Cell,
+        half: Half,
+        ahead: Unknown,
+        now: Unknown,
+        sign: float,
+        gamma: float | None,
+        margin: float,
     ) -> list[LyapunovBlocks]:
         n, N = half.flow.shape[1:]
         constant, level = half.constant, half.level
@@ -181,16 +168,14 @@ class Existence:
             blocks.add(ahead, f, L, flow - 0.5 * L).add(
                 now, now.values(cell.nodes), own, -0.5 * own
             )
-            return [
-                blocks.finished(_below(constant, n) + self.margin * np.eye(n + N), _below(level, n))
-            ]
+            return [blocks.finished(_below(constant, n) + margin * np.eye(n + N), _below(level, n))]
         L = selector(n, 0, N)
         out = []
         for motion in self._motions(ahead, cell):
             blocks = Blocks(N, len(f), cell.to_bernstein).add(ahead, f, L, half.flow)
             if np.any(motion):
                 blocks.add(ahead, sign * ahead.slopes(cell.nodes, motion), L, 0.5 * L)
-            out.append(blocks.finished(constant + self.margin * np.eye(N), level))
+            out.append(blocks.finished(constant + margin * np.eye(N), level))
         return out
 
     def _motions(self, unknown: Unknown, cell: Cell) -> list[Array]:
@@ -199,7 +184,7 @@ class Existence:
             return [np.zeros(cell.nodes.shape)]
         return motions(self.plant.parameters, cell.nodes, self.plant.time, used(unknown.basis))
 
-    def _next(self, cell: Cell) -> list[LyapunovBlocks]:
+    def _next(self, cell: Cell, margin: float) -> list[LyapunovBlocks]:
         """S(p) <= Y(p(k+1)) to first order in the step, at its ends."""
         assert self.S is not None  # noqa: S101 - see `_halves`
         assert self.Y is not None  # noqa: S101
@@ -210,14 +195,17 @@ class Existence:
             blocks = Blocks(self.states, len(there), cell.to_bernstein)
             blocks.add(self.S, self.S.values(cell.nodes), one, 0.5 * one)
             blocks.add(self.Y, there, one, -0.5 * one)
-            out.append(blocks.finished(self.margin * one, 0.0 * one))
+            out.append(blocks.finished(margin * one, 0.0 * one))
         return out
 
-    def _coupling(self, cell: Cell, apart: bool, largest: float) -> list[LyapunovBlocks]:
+    def _coupling(self, apart: bool, largest: float) -> list[LyapunovBlocks]:
         """[X I; I Y] > 0, with g in place of I where they are to be `apart`; both below a bound.
 
         Without one of the two the other is positive, or apart from zero by g.
         """
+        return [b for cell in self._cells for b in self._coupled(cell, apart, largest)]
+
+    def _coupled(self, cell: Cell, apart: bool, largest: float) -> list[LyapunovBlocks]:
         n, K, one = self.states, len(cell.nodes), np.eye(self.states)
         every = list({id(u): u for u in (self.X, self.Y, self.S) if u is not None}.values())
         out = []
