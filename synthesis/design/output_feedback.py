@@ -119,12 +119,13 @@ def _robust(
     attempts: list[Attempt],
 ) -> Controller:
     """For all models of the set, by the one of the shapes that serves the nominal one best."""
-    gammas = [(_start(plant, shape, divisions, attempts), shape) for shape in every]
-    best = min(gammas, key=lambda each: _gamma(each[0]))[1]
-    found = scaled_plant(plant, lambda p: _gamma(_start(p, best, divisions, attempts)))
+    gammas = [_gamma(_start(plant, shape, divisions, attempts)) for shape in every]
+    start = min(gammas)
+    best = every[gammas.index(start)]
+    found = scaled_plant(plant, start, lambda p: _gamma(_start(p, best, divisions, attempts)))
     if found is None:
         raise failed(plant, attempts)
-    made = _nominal(found[0], [best], factors, fastest, divisions, attempts)
+    made = _nominal(found, [best], factors, fastest, divisions, attempts)
     return replace(made, plant=plant, method=f"robust {made.method}")
 
 

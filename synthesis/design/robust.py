@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,26 +25,19 @@ SETTLED = 2e-3
 """Changes of gamma, relative, that end them."""
 
 
-def scaled_plant(plant: Plant, least: Callable[[Plant], float]) -> tuple[Plant, float] | None:
-    """The open plant whose gain gamma, once reached, is that of every model of the set; and gamma.
+def scaled_plant(plant: Plant, start: float, least: Callable[[Plant], float]) -> Plant | None:
+    """The open plant whose gain gamma, once reached, is that of every model of the set.
 
     With d = Delta v, |Delta| <= beta, channels d = gamma beta/s d', v' = s v among disturbances and
     performance: a gain of gamma from (w, d') to (z, v') is one of gamma from w to z for all Delta,
     by the small gain theorem. For each s gamma is corrected until it is what it was (`least` gives
-    the least gain of a plant); the best s is taken. None where none settles.
+    the least gain of a plant, `start` is that of the nominal one); the best s is taken. None where
+    none settles.
     """
     model = plant.model
     assert isinstance(model, UncertainStateSpace)  # noqa: S101
     if model.bound == 0:
-        nominal = type(plant)(
-            plant.nominal,
-            disturbances=plant.disturbances,
-            performance=plant.performance,
-            controls=plant.controls,
-            measurements=plant.measurements,
-        )
-        return nominal, least(nominal)
-    start = least(plant)
+        return replace(plant, model=plant.nominal)
     if not math.isfinite(start):
         return None
     unit = _even(plant)
@@ -58,7 +52,7 @@ def scaled_plant(plant: Plant, least: Callable[[Plant], float]) -> tuple[Plant, 
         if best is None:
             return None
     gamma, s = best
-    return opened(plant, s, gamma * model.bound / s), gamma
+    return opened(plant, s, gamma * model.bound / s)
 
 
 def _consistent(plant: Plant, s: float, start: float, least: Callable[[Plant], float]) -> float:
@@ -72,9 +66,7 @@ def _consistent(plant: Plant, s: float, start: float, least: Callable[[Plant], f
             return math.inf
         if found <= gamma * (1 + SETTLED):
             return max(found, gamma)
-        gamma = (
-            found * (found / gamma) ** 0.5
-        )  # a little farther than the step: it converges slowly
+        gamma = found * (found / gamma) ** 0.5  # farther than the step: it converges slowly
     return math.inf
 
 
@@ -87,12 +79,11 @@ def opened(plant: Plant, out: float, into: float) -> Plant:
     sized = model.model.scaled(
         dict.fromkeys(d, max(into, tiny)), dict.fromkeys(v, 1.0 / max(out, tiny))
     )
-    return type(plant)(
-        sized,
+    return replace(
+        plant,
+        model=sized,
         disturbances=(*plant.disturbances, *d),
         performance=(*plant.performance, *v),
-        controls=plant.controls,
-        measurements=plant.measurements,
     )
 
 
