@@ -5,14 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, LinearModel, Matrices, Scheduling
 from symheli.lpv.bases.polynomials import factors_of
+from synthesis.design.cells import degrees_of
 from synthesis.design.generalized import Generalized
 from synthesis.program.scaling import model_scaling
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
@@ -116,3 +121,21 @@ def _sizes(D: Array, axis: int) -> Array:
     """Of each channel over all p; 1 where there is nothing."""
     size = np.sqrt(np.square(D).sum(axis=axis).mean(axis=0))
     return np.where(size > 0, size, 1.0)
+
+
+def coordinates_of(plant: Plant, channel: float) -> Coordinates:
+    """Coordinates of the plant with performance in units of `channel`."""
+    one = len(plant.parameters) == 1
+    return Coordinates.of(
+        lambda p: plant.matrices(p[:, 0] if one else p),
+        plant.parameters,
+        plant.basis,
+        plant.dt,
+        channel,
+    )
+
+
+def depends(plant: Plant) -> list[bool]:
+    """On which parameters."""
+    c = coordinates_of(plant, 1.0)
+    return [d > 0 for d in degrees_of(lambda p: list(c.at(p)), c.breaks)]

@@ -13,18 +13,13 @@ from symheli.lpv import LPVStateSpace
 from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
 from symheli.values.signal import Signal
 from synthesis.certificate import Attempt, Certificate
-from synthesis.design.coordinates import Coordinates
+from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
 from synthesis.design.fitted import fitted
-from synthesis.design.output_feedback import (
-    ACCURACY,
-    USUAL,
-    coordinates_of,
-    depends,
-    failed,
-    least_ranks,
-)
+from synthesis.design.in_plant_units import ACCURACY
+from synthesis.design.output_feedback import USUAL
 from synthesis.design.recovery import control_gain
+from synthesis.design.refusals import failed, least_ranks
 from synthesis.design.sampled_recovery import state_gain
 from synthesis.design.search import BACK_OFF, Dependence, Gains, Shape, dependence, least, settled
 from synthesis.worst.rates import Rate

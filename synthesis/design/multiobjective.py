@@ -20,12 +20,13 @@ from symheli.values.signal import indices
 from synthesis.certificate import Attempt
 from synthesis.design.cells import Cell, cells, degrees_of
 from synthesis.design.controller import Controller
-from synthesis.design.coordinates import Coordinates
+from synthesis.design.coordinates import Coordinates, coordinates_of
 from synthesis.design.generalized import Generalized
+from synthesis.design.in_plant_units import in_plant_units, packed
 from synthesis.design.motions import motions, used
 from synthesis.design.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
-from synthesis.design.output_feedback import coordinates_of, failed, in_plant_units, packed
 from synthesis.design.recovery import Transformed, controller
+from synthesis.design.refusals import failed
 from synthesis.design.search import Dependence, functions, limited
 from synthesis.program.cone_program import Solver
 from synthesis.worst.rates import Rate

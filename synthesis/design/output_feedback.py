@@ -9,18 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symheli.errors import InputError, SynthesisError
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from synthesis.certificate import Attempt
-from synthesis.design.cells import degrees_of
-from synthesis.design.conditions import conditions
 from synthesis.design.controller import Controller
-from synthesis.design.coordinates import Coordinates
-from synthesis.design.diagnosis import reasons, unpriced
+from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
-from synthesis.design.fitted import fitted
+from synthesis.design.in_plant_units import ACCURACY, in_plant_units, packed
 from synthesis.design.motions import motions, used
-from synthesis.design.recovery import Gains, controller, split
+from synthesis.design.recovery import controller, split
+from synthesis.design.refusals import failed, least_ranks
 from synthesis.design.robust import scaled_plant
 from synthesis.design.sampled_recovery import joined
 from synthesis.design.search import BACK_OFF, Dependence, Shape, least, settled, shapes
@@ -33,8 +30,6 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-ACCURACY = 3e-3
-"""Of the functions of p fitted to the gains, relative, entry by entry."""
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
 
 
@@ -169,67 +164,6 @@ def _nominal(
     return replace(best, optimum=_gamma(start), attempts=tuple(attempts))
 
 
-def coordinates_of(plant: Plant, channel: float) -> Coordinates:
-    """Coordinates of the plant with performance in units of `channel`."""
-    one = len(plant.parameters) == 1
-    return Coordinates.of(
-        lambda p: plant.matrices(p[:, 0] if one else p),
-        plant.parameters,
-        plant.basis,
-        plant.dt,
-        channel,
-    )
-
-
-def depends(plant: Plant) -> list[bool]:
-    """On which parameters."""
-    c = coordinates_of(plant, 1.0)
-    return [d > 0 for d in degrees_of(lambda p: list(c.at(p)), c.breaks)]
-
-
-def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
-    """Raises `InputError` where a control costs nothing or a measurement is free of disturbances at
-    some p, and where the plant has none.
-    """
-    named = plant.channels
-    for wanted, group in (
-        (True, "disturbances"),
-        (True, "performance"),
-        (controls, "controls"),
-        (measurements, "measurements"),
-    ):
-        if wanted and not getattr(named, group):
-            raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
-    at = plant.matrices(conditions(plant)[0])
-    found: list[str] = []
-    if controls:
-        found += unpriced(at.D12, named.controls)
-    if measurements:
-        found += unpriced(np.swapaxes(at.D21, 1, 2), named.measurements, dual=True)
-    if found:
-        raise InputError("; ".join(found))
-
-
-def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
-    """The error that says why: modes, directions and weights, and every program that was tried."""
-    p, said = conditions(plant)
-    least = min((a.bound for a in attempts), default=math.inf)
-    why = reasons(
-        plant.matrices(p),
-        plant.channels,
-        dt=plant.dt,
-        at=said,
-        gamma=least if math.isfinite(least) else None,
-    )
-    lines = why or (
-        "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"
-        " more divisions may help",
-    )
-    return SynthesisError(
-        "no controller was found:\n  " + "\n  ".join([*lines, *map(str, attempts)]), tuple(lines)
-    )
-
-
 def _recover(
     coordinates: Coordinates, existence: Existence, found: Found
 ) -> Callable[[Array], Array]:
@@ -257,46 +191,6 @@ def _recover(
         return packed(controller(at, x, y, transformed, constant_x=not X.moves, moving_x=moving))
 
     return gains
-
-
-def packed(gains: Gains) -> Array:
-    """[A B; C D] (K, ..)."""
-    top, bottom = (np.concatenate(pair, axis=-1) for pair in (gains[:2], gains[2:]))
-    return np.concatenate([top, bottom], axis=-2)
-
-
-def in_plant_units(
-    plant: Plant,
-    c: Coordinates,
-    gains: Callable[[Array], Array],
-    gamma: float,
-    method: str,
-) -> Controller:
-    """The controller in the units of the plant, of `gains` (K, ..) at p (K, m) in the scaled ones,
-    as functions of p.
-    """
-    ny = len(plant.measurements)
-    n = gains(np.array([[s.middle for s in plant.parameters]])).shape[-1] - ny
-    pace = np.full(n, 1 / math.sqrt(c.time))
-    rows = np.concatenate([pace, c.controls])
-    columns = np.concatenate([pace, c.measurements])
-
-    basis, M, misfit = fitted(gains, plant.parameters, ACCURACY)
-    M = rows[:, None] * M * columns
-    names = tuple(f"k{i + 1}" for i in range(n))
-    model = LPVStateSpace(
-        basis,
-        M[:, :n, :n],
-        M[:, :n, n:],
-        M[:, n:, :n],
-        M[:, n:, n:],
-        plant.parameters,
-        names,  # type: ignore[arg-type]
-        plant.measurements,
-        plant.controls,
-        plant.dt,
-    )
-    return Controller(model=model, plant=plant, gamma=gamma, method=method, misfit=misfit)
 
 
 def _fastest(model: LPVStateSpace) -> float:

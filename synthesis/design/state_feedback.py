@@ -11,17 +11,12 @@ import numpy as np
 from symheli.errors import InputError
 from synthesis.certificate import Attempt
 from synthesis.design.controller import Controller
-from synthesis.design.coordinates import Coordinates
+from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
-from synthesis.design.output_feedback import (
-    USUAL,
-    coordinates_of,
-    depends,
-    failed,
-    in_plant_units,
-    least_ranks,
-)
+from synthesis.design.in_plant_units import in_plant_units
+from synthesis.design.output_feedback import USUAL
 from synthesis.design.recovery import control_gain
+from synthesis.design.refusals import failed, least_ranks
 from synthesis.design.sampled_recovery import state_gain
 from synthesis.design.search import BACK_OFF, Dependence, Shape, dependence, least, settled
 from synthesis.worst.rates import Rate

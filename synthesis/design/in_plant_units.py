@@ -1,0 +1,63 @@
+"""Gains that were computed in scaled coordinates as a controller in the units of its plant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symheli.lpv import LPVStateSpace
+from synthesis.design.controller import Controller
+from synthesis.design.coordinates import Coordinates
+from synthesis.design.fitted import fitted
+from synthesis.design.recovery import Gains
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
+
+Array = np.ndarray
+
+ACCURACY = 3e-3
+"""Of the functions of p fitted to the gains, relative, entry by entry."""
+
+
+def packed(gains: Gains) -> Array:
+    """[A B; C D] (K, ..)."""
+    top, bottom = (np.concatenate(pair, axis=-1) for pair in (gains[:2], gains[2:]))
+    return np.concatenate([top, bottom], axis=-2)
+
+
+def in_plant_units(
+    plant: Plant,
+    c: Coordinates,
+    gains: Callable[[Array], Array],
+    gamma: float,
+    method: str,
+) -> Controller:
+    """The controller in the units of the plant, of `gains` (K, ..) at p (K, m) in the scaled ones,
+    as functions of p.
+    """
+    ny = len(plant.measurements)
+    n = gains(np.array([[s.middle for s in plant.parameters]])).shape[-1] - ny
+    pace = np.full(n, 1 / math.sqrt(c.time))
+    rows = np.concatenate([pace, c.controls])
+    columns = np.concatenate([pace, c.measurements])
+
+    basis, M, misfit = fitted(gains, plant.parameters, ACCURACY)
+    M = rows[:, None] * M * columns
+    names = tuple(f"k{i + 1}" for i in range(n))
+    model = LPVStateSpace(
+        basis,
+        M[:, :n, :n],
+        M[:, :n, n:],
+        M[:, n:, :n],
+        M[:, n:, n:],
+        plant.parameters,
+        names,  # type: ignore[arg-type]
+        plant.measurements,
+        plant.controls,
+        plant.dt,
+    )
+    return Controller(model=model, plant=plant, gamma=gamma, method=method, misfit=misfit)
