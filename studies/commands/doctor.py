@@ -23,10 +23,17 @@ REQUIRED = (
     "clarabel",
     "matplotlib",
     "jinja2",
+    "rich",
 )
 OPTIONAL = {
     "pandas": "records from and to data frames",
+    "xarray": "labelled arrays of families and campaigns",
     "pyulog": "reading PX4 logs",
+    "pymavlink": "reading ArduPilot logs",
+    "h5py": "reading MATLAB 7.3 files",
+    "distributed": "campaigns on all cores and on clusters",
+    "zarr": "datasets of campaigns",
+    "shtab": "completion of the command line in a shell",
     "python-flint": "fast exact verification of certificates",
     "scs": "a second solver to cross-check",
     "jsbsim": "flying the AH-1S, a helicopter from elsewhere",
