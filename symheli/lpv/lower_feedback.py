@@ -24,7 +24,7 @@ PREFIX = "controller_"
 """Before the name of a controller's state that the plant has too."""
 
 
-class Channels(NamedTuple):
+class Positions(NamedTuple):
     """Positions of the inputs w, u and the outputs z, y of a plant; one may be in both."""
 
     w: list[int]
@@ -144,7 +144,7 @@ def around(
     z = _rest(plant.outputs, y) if outputs is None else indices(outputs, plant.outputs, "output")
     K = ControllerMatrices(*(replace(M, box=plant.box) for M in functions_of(controller)))
     states = apart(controller.states, plant.states, PREFIX)
-    return closed(plant, Channels(w, u, z, y), K, states)
+    return closed(plant, Positions(w, u, z, y), K, states)
 
 
 def _rest(names: Sequence[str], connected: Sequence[int]) -> list[int]:
@@ -152,12 +152,12 @@ def _rest(names: Sequence[str], connected: Sequence[int]) -> list[int]:
 
 
 def closed(
-    lpv: LPVStateSpace, at: Channels, K: ControllerMatrices, states: Sequence[Signal] = ()
+    lpv: LPVStateSpace, at: Positions, K: ControllerMatrices, states: Sequence[Signal] = ()
 ) -> LPVStateSpace:
     """w -> z with u = K y, `states` those of K: a fit of what the loop makes of what `lpv` was
     fitted to.
     """
-    P = Generalized.of(functions_of(lpv), at)
+    P = Partition.of(functions_of(lpv), at)
     found = [block(rows) for rows in _interconnected(P, K, _loop(K.D, P.D22))]
     basis, (A, B, C, D) = in_one_basis(found, lpv.basis.ranges)
     model = LPVStateSpace(
@@ -174,14 +174,14 @@ def closed(
     )
     if (origin := lpv.fitted_to) is None:
         return model
-    P = Generalized.of(origin.matrices, at)
+    P = Partition.of(origin.matrices, at)
     there = Matrices(*(M(origin.nodes) for M in K))
     N = np.stack([loop_inverse(each) for each in there.D @ P.D22])
     exact = (np.block([list(row) for row in rows]) for rows in _interconnected(P, there, N))
     return model.with_residuals(origin.nodes, Matrices(*exact))
 
 
-class Generalized(NamedTuple):
+class Partition(NamedTuple):
     """dx/dt = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u.
 
     A (..., nx, nx), B1 (..., nx, nw), B2 (..., nx, nu), C1 (..., nz, nx), C2 (..., ny, nx), and so
@@ -199,7 +199,7 @@ class Generalized(NamedTuple):
     D22: Any
 
     @classmethod
-    def of(cls, matrices: Sequence[Any], at: Channels) -> Generalized:
+    def of(cls, matrices: Sequence[Any], at: Positions) -> Partition:
         """The blocks of (A, B, C, D), arrays or `MatrixFunction`s."""
         A, B, C, D = matrices
         w, u, z, y = at
@@ -223,7 +223,7 @@ class Generalized(NamedTuple):
         )
 
 
-def _interconnected(P: Generalized, K: Any, N: Any) -> tuple[tuple[tuple[Any, ...], ...], ...]:
+def _interconnected(P: Partition, K: Any, N: Any) -> tuple[tuple[tuple[Any, ...], ...], ...]:
     """Blocks of A, B, C, D of the loop, N = (I - D_K D22)^-1: stacks of matrices or functions.
 
     With y = y0 + D22 u and y0 = C2 x + D21 w, u = N D_K y0 + N C_K x_K.

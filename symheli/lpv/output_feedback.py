@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from symheli.lpv.lower_feedback import Channels, ControllerMatrices, closed
+from symheli.lpv.lower_feedback import ControllerMatrices, Positions, closed
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.values.arrays import Array
 
@@ -17,5 +17,5 @@ def close(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
     is a loop.
     """
     driven, fed = (np.flatnonzero(np.any(K, axis=axis)).tolist() for axis in (1, 0))
-    at = Channels(list(range(len(lpv.inputs))), driven, list(range(len(lpv.outputs))), fed)
+    at = Positions(list(range(len(lpv.inputs))), driven, list(range(len(lpv.outputs))), fed)
     return closed(lpv, at, ControllerMatrices.static(K[np.ix_(driven, fed)], lpv.box))

@@ -19,8 +19,7 @@ from symheli.lpv import (
     lower_feedback,
 )
 from symheli.lpv.linear_model import is_control_system
-from symheli.lpv.lower_feedback import Channels as Positions
-from symheli.lpv.lower_feedback import Generalized as Blocks
+from symheli.lpv.lower_feedback import Partition, Positions
 from symheli.lpv.matrix_function import functions_of
 from symheli.lpv.mixing import itself, mixed
 from symheli.lpv.scheduling import Rates
@@ -140,16 +139,16 @@ class Plant:
         """The nine matrices at p; see `LPVStateSpace.matrices`. Of an uncertain plant those of
         Delta = 0.
         """
-        return Generalized(*Blocks.of(self.nominal.matrices(p), self._positions))
+        return Generalized(*Partition.of(self.nominal.matrices(p), self._positions))
 
     def at(self, *p: float) -> Generalized:
         """The nine matrices frozen at p, one value a parameter."""
         model = self.nominal.at(*p)
-        return Generalized(*Blocks.of((model.A, model.B, model.C, model.D), self._positions))
+        return Generalized(*Partition.of((model.A, model.B, model.C, model.D), self._positions))
 
     def functions(self) -> Generalized:
         """The nine matrices as functions of p, `symheli.lpv.MatrixFunction`."""
-        return Generalized(*Blocks.of(functions_of(self.nominal), self._positions))  # type: ignore[arg-type]
+        return Generalized(*Partition.of(functions_of(self.nominal), self._positions))  # type: ignore[arg-type]
 
     @property
     def channels(self) -> Channels:
