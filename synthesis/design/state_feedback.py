@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from synthesis.certificate import Attempt
+from synthesis.design.conditions import conditions
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 WORST = 1e12
-"""Condition of C2 beyond which the measurements do not show the state."""
+"""So many times weaker than what C2 shows best, anywhere, is a state that it does not show."""
 
 
 def state_feedback(
@@ -98,13 +99,13 @@ def state_feedback(
 
 def _check_measured(plant: Plant) -> None:
     n, ny = len(plant.states), len(plant.measurements)
-    middle = plant.matrices(np.array([s.middle for s in plant.parameters]).squeeze())
-    disturbed = np.any(middle.D21) or np.any(middle.D22)
-    if n != ny or disturbed or np.linalg.cond(middle.C2) > WORST:
+    at = plant.matrices(conditions(plant)[0])
+    shown = np.linalg.svd(at.C2, compute_uv=False)
+    if n != ny or np.any(at.D21) or np.any(at.D22) or shown.min() * WORST < shown.max():
         raise InputError(
-            f"state feedback needs all {n} states among the measurements, undisturbed, and nothing"
-            f" else ({', '.join(plant.states)}); measured are {', '.join(plant.measurements)}: take"
-            " output_feedback"
+            f"state feedback needs all {n} states among the measurements at every p, undisturbed,"
+            f" and nothing else ({', '.join(plant.states)}); measured are"
+            f" {', '.join(plant.measurements)}: take output_feedback"
         )
 
 

@@ -24,7 +24,7 @@ from scipy import linalg
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Patches, Scheduling, UncertainStateSpace
 from symheli.lpv.linear_model import LinearModel
-from symheli.lpv.lower_feedback import Channels, Generalized
+from symheli.lpv.lower_feedback import Partition, Positions
 from symheli.lpv.matrix_function import MatrixFunction, block, functions_of, in_one_basis
 from symheli.values.sample_period import same_period
 from symheli.values.signal import signals
@@ -140,11 +140,11 @@ class _Opened:
         if isinstance(own, UncertainStateSpace):
             w += own.perturbation_inputs
             z += own.perturbation_outputs
-        at = Channels(
+        at = Positions(
             *([model.inputs.index(s) for s in group] for group in (w, K.outputs)),
             *([model.outputs.index(s) for s in group] for group in (z, K.inputs)),
         )
-        P = Generalized.of(functions_of(model), at)
+        P = Partition.of(functions_of(model), at)
         if not (P.D22.is_constant and not np.any(P.D22.value)):
             raise InputError(
                 "the controls act on the measurements at once, so that a wrong reading enters"

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from scheduled_plants import frozen, spring, turning
+from scheduled_plants import frozen, of, spring, turning
 
+from symheli import LPVStateSpace, Scheduling
 from symheli.errors import InputError
 from synthesis import hinf, state_feedback
 
@@ -86,8 +87,25 @@ def test_state_feedback_is_no_worse_than_output_feedback():
 
 
 def test_the_states_must_be_measured():
-    with pytest.raises(InputError, match="needs all 2 states among the measurements, undisturbed"):
+    with pytest.raises(InputError, match="needs all 2 states among the measurements at every p"):
         state_feedback(spring())
+
+
+def test_the_states_must_be_measured_at_the_ends_of_the_range_too():
+    """y = p x shows the state in the middle of the range and nothing of it at p = 0."""
+    p = Scheduling("p", "1", 0.0, 1.0, rate=1.0)
+    blind = LPVStateSpace.polynomial(
+        A=[[[-1.0]]],
+        B=[[[1.0, 1.0]]],
+        C=[[[1.0], [0.0], [0.0]], [[0.0], [0.0], [1.0]]],
+        D=[[[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]]],
+        scheduling=p,
+        states=("x",),
+        inputs=("w", "u"),
+        outputs=("z_x", "z_u", "y"),
+    )
+    with pytest.raises(InputError, match="at every p"):
+        state_feedback(of(blind, ["u"], ["y"]))
 
 
 def test_a_sampled_gain_keeps_its_level():
