@@ -23,13 +23,13 @@ quick: $(STAMP)
 	$(BIN)/symheli study --quick
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 4
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 
 test-all: lint slow lowest no-compiler no-extras
 
 slow: $(STAMP)
 	@echo "== slow: all tests, the slow ones too"
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 -m 'slow or not slow'
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m 'slow or not slow'
 
 lowest no-compiler no-extras:
 	@$(PYTHON) .ci/gates $@

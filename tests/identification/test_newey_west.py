@@ -19,11 +19,12 @@ def test_it_is_the_sum_of_tapered_products_however_the_rows_come(cuts):
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-11)
 
 
-def test_instruments_know_the_scatter_of_their_coefficients():
-    """Forty flights with noisy sensors: the errors, in standard errors, have the size of one."""
+@pytest.mark.parametrize("flights", [8, pytest.param(40, marks=pytest.mark.slow)])
+def test_instruments_know_the_scatter_of_their_coefficients(flights):
+    """Flights with noisy sensors: the errors, in standard errors, have the size of one."""
     vehicle, sensors = Vehicle(na=1, nb=1), np.array([0.02] * 3 + [0.005] * 3 + [0.002] * 2)
     off = []
-    for seed in range(40):
+    for seed in range(flights):
         record = vehicle.record(800, seed=seed, sensors=sensors)
         clean = vehicle.without_noise(seed=seed)
         found = idn.fit(vehicle.kin, record, idn.InstrumentalVariables(clean))
