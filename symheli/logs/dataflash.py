@@ -9,10 +9,9 @@ log says that they are headings.
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, on_one_axis
-from symheli.logs.files import Table, existing, positive
+from symheli.logs.files import Table, existing, positive, quiet, warn_of_damage
 from symheli.values.units import to_si
 
 LABELS = {
@@ -119,19 +118,18 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messag
     with file.open("rb") as opened:
         reader = DFReader_binary if opened.read(2) == b"\xa3\x95" else DFReader_text
     rows: dict[tuple[str, str], list[Any]] = {}
-    said = io.StringIO()  # the library prints what it skips
     try:
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
-            with reader(str(file)) as log:
-                present = [n for n in log.name_to_id if n not in ABOUT_THE_LOG]
-                names = present if wanted is None else list(wanted)
-                while (message := log.recv_match(type=names, strict=True)) is not None:
-                    instance = message.fmt.instance_field
-                    key = "" if instance is None else str(getattr(message, instance))
-                    rows.setdefault((message.get_type(), key), []).append(message)
-                out: _Messages = {}
-                for (name, instance), messages in rows.items():
-                    out.setdefault(name, {})[instance] = _columns(messages)
+        with quiet() as said, _closing(reader) as log:
+            log.__init__(str(file))
+            present = [n for n in log.name_to_id if n not in ABOUT_THE_LOG]
+            names = present if wanted is None else list(wanted)
+            while (message := log.recv_match(type=names, strict=True)) is not None:
+                instance = message.fmt.instance_field
+                key = "" if instance is None else str(getattr(message, instance))
+                rows.setdefault((message.get_type(), key), []).append(message)
+            out: _Messages = {}
+            for (name, key), messages in rows.items():
+                out.setdefault(name, {})[key] = _columns(messages)
     except Exception as error:
         raise InputError(
             f"{file}: not an ArduPilot log, or one that was damaged"
@@ -142,10 +140,24 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messag
             f"{file}: no message that could be read; an ArduPilot log begins with the formats of"
             " its messages, was this one cut at its beginning?"
         )
+    if said.getvalue():
+        warn_of_damage(file)
     for name in wanted or ():
         if name not in out:
             raise UnknownNameError(f"message in {file.name}", name, sorted(out) or present)
     return out
+
+
+@contextlib.contextmanager
+def _closing(reader: Any) -> Iterator[Any]:
+    """A reader that is closed also where it fails to open: its constructor leaves the file open."""
+    log = object.__new__(reader)
+    try:
+        yield log
+    finally:
+        for part in ("data_map", "filehandle"):
+            if hasattr(log, part):
+                getattr(log, part).close()
 
 
 def _columns(messages: list[Any]) -> dict[str, Column]:

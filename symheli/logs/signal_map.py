@@ -119,8 +119,9 @@ class SignalMap:
             case "xplane":
                 return read_xplane(log, self.dt)
             case "ulog":
+                step = self._needed_step(log)
                 topics = {column: (*split_column(column), unit) for column, unit in declared.items()}
-                return read_ulog(log, topics, self._needed_step(log))
+                return read_ulog(log, topics, step)
             case "dataflash":
                 given = {s.column: s.unit for s in self.signals.values()}
                 return read_dataflash(

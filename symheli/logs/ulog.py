@@ -17,7 +17,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, on_one_axis
-from symheli.logs.files import Table, existing, positive
+from symheli.logs.files import Table, existing, positive, quiet, warn_of_damage
 
 QUATERNION = tuple(f"q[{i}]" for i in range(4))
 ANGLES = ("phi", "theta", "psi")
@@ -86,12 +86,15 @@ def _topics(path: str | os.PathLike[str]) -> dict[str, list[_Instance]]:
         from pyulog import ULog  # type: ignore[import-not-found]
     file = existing(path)
     try:
-        log = ULog(str(file))
+        with file.open("rb") as opened, quiet():
+            log = ULog(opened)
     except Exception as error:
         raise InputError(
             f"{file}: not a ULog file, or one that was cut or damaged"
             f" ({str(error) or type(error).__name__}); copy it from the aircraft once more"
         ) from error
+    if log.file_corruption:
+        warn_of_damage(file)
     out: dict[str, list[_Instance]] = {}
     for dataset in log.data_list:
         out.setdefault(dataset.name, []).append(_Instance(dataset.multi_id, dataset.data))
