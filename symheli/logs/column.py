@@ -12,6 +12,9 @@ from symheli.errors import InputError
 SILENCE = 5.0
 """A column that pauses for more than this many of its median steps is missing (NaN) in between."""
 
+FINER = 1e4
+"""A step that makes this many times as many samples as the column with most is refused."""
+
 
 @dataclass(frozen=True, eq=False)
 class Column:
@@ -39,7 +42,7 @@ def on_one_axis(
 
     Nothing is filtered: what is faster than half of 1 / dt folds back. Within a silence (more than
     5 median steps of that column) samples are missing. Raises `InputError` where no instant is
-    common.
+    common, and for a step far finer than the log.
     """
     series = {}
     for name, column in columns.items():
@@ -56,6 +59,12 @@ def on_one_axis(
         raise InputError(
             f"{path}: the columns have no time in common: {last!r} starts at {start:.3f} s,"
             f" {first!r} ends at {stop:.3f} s; leave one of them out"
+        )
+    samples, logged = (stop - start) / dt, max(len(time) for time, _ in series.values())
+    if samples > FINER * logged:
+        raise InputError(
+            f"{path}: {samples:.1e} steps of {dt:g} s for {logged} samples; dt is in seconds, or a"
+            f" clock of the log is damaged (it runs from {start:.6g} to {stop:.6g} s)"
         )
     grid = start + dt * np.arange(int((stop - start) / dt + 1e-9) + 1)
     return grid - start, {name: _interpolate(grid, *pair) for name, pair in series.items()}

@@ -150,8 +150,11 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messag
 
 @contextlib.contextmanager
 def _closing(reader: Any) -> Iterator[Any]:
-    """A reader that is closed also where it fails to open: its constructor leaves the file open."""
+    """A reader that is closed also where it fails to open (its constructor leaves the file open),
+    and tells damage in Python: its compiled index prints past `quiet`.
+    """
     log = object.__new__(reader)
+    log.init_arrays_fast = log.init_arrays
     try:
         yield log
     finally:
@@ -205,9 +208,7 @@ def _split(column: str) -> tuple[str, str | None, str]:
     return message, instance, field
 
 
-def _pick(
-    found: _Messages, message: str, instance: str | None, field: str, path: object
-) -> Column:
+def _pick(found: _Messages, message: str, instance: str | None, field: str, path: object) -> Column:
     instances = found[message]
     if instance is not None and instance not in instances:
         raise UnknownNameError(f"instance of {message}", instance, sorted(filter(None, instances)))

@@ -158,13 +158,15 @@ class SeparatedTable:
 
 
 def _with_unit(name: str) -> tuple[str, str] | None:
-    """Name and unit of "q [rad/s]" or "q (rad/s)"; None where what stands in brackets is no
-    unit.
+    """Name and unit of "q [rad/s]" or "q (rad/s)"; None where what stands in brackets is no unit,
+    or an index (xyz[1]; "n [1]" is a unit).
     """
-    match = re.fullmatch(r"(.*\S)\s*(?:\[([^][]+)\]|\(([^()]+)\))", name)
+    match = re.fullmatch(r"(.*\S)(\s*)(?:\[([^][]+)\]|\(([^()]+)\))", name)
     if match is None:
         return None
-    unit = (match[2] or match[3]).strip()
+    unit = (match[3] or match[4]).strip()
+    if unit.isdigit() and not match[2]:
+        return None
     try:
         to_si(unit)
     except InputError:

@@ -120,7 +120,9 @@ class SignalMap:
                 return read_xplane(log, self.dt)
             case "ulog":
                 step = self._needed_step(log)
-                topics = {column: (*split_column(column), unit) for column, unit in declared.items()}
+                topics = {
+                    column: (*split_column(column), unit) for column, unit in declared.items()
+                }
                 return read_ulog(log, topics, step)
             case "dataflash":
                 given = {s.column: s.unit for s in self.signals.values()}

@@ -249,9 +249,7 @@ class FlightRecord:
         `symheli.logs.signal_map`.
         """
         found = SignalMap.load(signal_map)
-        record = replace(
-            cls._from_table(*found.read(path), path), resampled=found.resampled(path)
-        )
+        record = replace(cls._from_table(*found.read(path), path), resampled=found.resampled(path))
         step = found.step(path)
         return record if step is None else record.resample(step)
 

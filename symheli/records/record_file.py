@@ -59,7 +59,7 @@ def write_record(path: str | os.PathLike[str], content: Content) -> os.PathLike[
 def read_record(path: str | os.PathLike[str]) -> Content:
     """What `write_record` wrote; raises `InputError` for anything else, pickles among it."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         header = json.loads(str(arrays["header"][()]))
         if header["schema"] != SCHEMA:

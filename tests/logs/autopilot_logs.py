@@ -56,7 +56,15 @@ FORMATS = {
 }
 """Type, letters of the fields and their names, by message."""
 
-UNITS = {"s": "s", "E": "rad/s", "O": "degC", "d": "deg", "h": "degheading", "n": "m/s", "#": "inst"}
+UNITS = {
+    "s": "s",
+    "E": "rad/s",
+    "O": "degC",
+    "d": "deg",
+    "h": "degheading",
+    "n": "m/s",
+    "#": "inst",
+}
 MULTIPLIERS = {"F": 1e-6, "0": 1.0, "B": 1e-2, "-": 0.0}
 DECLARED = {"IMU": ("s#EO", "F---"), "ATT": ("sdh", "FBB"), "RATE": ("sn", "FB")}
 """Letters of unit and multiplier for each field."""
