@@ -15,6 +15,7 @@ from symheli.errors import InputError
 from symheli.logs.column import Column
 from symheli.logs.files import Table, positive, seconds_in
 from symheli.logs.separated import SeparatedTable
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 
 
@@ -75,7 +76,7 @@ def csv_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
     return out
 
 
-def with_units(time: Sequence[float], columns: Sequence[tuple[Signal, Sequence[float]]]) -> str:
+def with_units(time: Array, columns: Sequence[tuple[Signal, Array]]) -> str:
     """A table that `read_csv` reads without being told anything: "t [s],q [rad/s]", numbers to the
     last bit, empty cells for NaN.
     """

@@ -19,7 +19,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, on_one_axis
-from symheli.logs.files import Table, existing, positive, quiet, warn_of_damage
+from symheli.logs.files import Table, existing, positive, quiet, said_by, warn_of_damage
 from symheli.values.units import to_si
 
 LABELS = {
@@ -133,7 +133,7 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messag
     except Exception as error:
         raise InputError(
             f"{file}: not an ArduPilot log, or one that was damaged"
-            f" ({str(error) or type(error).__name__}); download it once more"
+            f" ({said_by(error)}); download it once more"
         ) from error
     if not present:
         raise InputError(

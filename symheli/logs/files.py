@@ -50,6 +50,11 @@ def quiet() -> Iterator[io.StringIO]:
         yield said
 
 
+def said_by(error: Exception) -> str:
+    """What an error says, or its name where it says nothing."""
+    return str(error) or type(error).__name__
+
+
 def warn_of_damage(path: object) -> None:
     """Warn (`DataWarning`) that what could be read is not the whole log."""
     warnings.warn(

@@ -12,7 +12,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column
-from symheli.logs.files import Table, existing, seconds_in
+from symheli.logs.files import Table, existing, said_by, seconds_in
 from symheli.logs.format import is_hdf5
 
 NUMBERS = {
@@ -62,8 +62,7 @@ def _content(file: Path) -> Mapping[str, Any]:
         content = loadmat(file, simplify_cells=True)
     except Exception as error:
         raise InputError(
-            f"{file}: not a MATLAB file, or one that was cut ({str(error) or type(error).__name__});"
-            " save it once more"
+            f"{file}: not a MATLAB file, or one that was cut ({said_by(error)}); save it once more"
         ) from error
     return {name: value for name, value in content.items() if not name.startswith("__")}
 
@@ -94,7 +93,7 @@ def _hdf5(file: Path) -> Mapping[str, Any]:
             return read(opened)
     except Exception as error:
         raise InputError(
-            f"{file}: a MATLAB 7.3 file that was cut or damaged ({str(error) or type(error).__name__});"
+            f"{file}: a MATLAB 7.3 file that was cut or damaged ({said_by(error)});"
             " save it once more"
         ) from error
 

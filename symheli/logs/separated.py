@@ -124,7 +124,7 @@ class SeparatedTable:
         cell that is no number.
         """
         names = list(dict.fromkeys(names))
-        index = {}
+        index: dict[str, int] = {}
         for name in names:
             whole = name if name in self.header else self._declared.get(name, ("",))[0]
             if self.header.count(whole) > 1:
@@ -135,7 +135,7 @@ class SeparatedTable:
             if whole not in self.header:
                 raise UnknownNameError("column", name, self.names)
             index[name] = self.header.index(whole)
-        cells = {name: [row[index[name]] for row in self.rows] for name in names}
+        cells = {name: [row[i] for row in self.rows] for name, i in index.items()}
         comma = self.separator != "," and any("," in c for column in cells.values() for c in column)
         return {name: self._numbers(name, column, comma) for name, column in cells.items()}
 

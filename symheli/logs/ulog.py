@@ -17,7 +17,7 @@ import numpy as np
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
 from symheli.logs.column import Column, on_one_axis
-from symheli.logs.files import Table, existing, positive, quiet, warn_of_damage
+from symheli.logs.files import Table, existing, positive, quiet, said_by, warn_of_damage
 
 QUATERNION = tuple(f"q[{i}]" for i in range(4))
 ANGLES = ("phi", "theta", "psi")
@@ -91,7 +91,7 @@ def _topics(path: str | os.PathLike[str]) -> dict[str, list[_Instance]]:
     except Exception as error:
         raise InputError(
             f"{file}: not a ULog file, or one that was cut or damaged"
-            f" ({str(error) or type(error).__name__}); copy it from the aircraft once more"
+            f" ({said_by(error)}); copy it from the aircraft once more"
         ) from error
     if log.file_corruption:
         warn_of_damage(file)
@@ -109,7 +109,8 @@ def _column(logged: Mapping[str, list[_Instance]], topic: str, field: str) -> Co
         raise UnknownNameError("topic", name, sorted(logged))
     found = [one for one in logged[name] if not dot or str(one.number) == number]
     if not found:
-        raise UnknownNameError(f"instance of {name}", number, [one.number for one in logged[name]])
+        numbers = [str(one.number) for one in logged[name]]
+        raise UnknownNameError(f"instance of {name}", number, numbers)
     data: Mapping[str, Any] = found[0].data
     time = 1e-6 * np.asarray(data["timestamp"], dtype=float)
     if field in ANGLES and set(QUATERNION) <= data.keys():

@@ -1,4 +1,4 @@
-"""A flight record as one file: a NumPy archive of plain arrays and a JSON header, never a pickle."""
+"""A flight record as one file: a NumPy archive of plain arrays and a JSON header, no pickle."""
 
 from __future__ import annotations
 
