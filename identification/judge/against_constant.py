@@ -29,6 +29,11 @@ LEAST = -100.0
 HORIZONS = horizons()
 """One step, 1 s and free run; the verdict rests on the last two."""
 
+Verdict = Literal["pays", "pays for prediction only", "does NOT pay"]
+"""What scheduling is worth for an output: better in free run, which simulation and feedback rest
+on, and no worse 1 s ahead; better 1 s ahead alone; or neither.
+"""
+
 Trim = Literal["auto", "moving", "still"]
 """Whether the models have d(p) times the change of p (`offset_rate`): "auto" tries both."""
 
@@ -120,7 +125,9 @@ class AgainstConstant:
         if rivals:
             other = replace(self, models=rivals)
             turned = [
-                str(y) for y in self.scheduled.outputs if self.pays(str(y)) != other.pays(str(y))
+                str(y)
+                for y in self.scheduled.outputs
+                if self.verdict_on(str(y)) != other.verdict_on(str(y))
             ]
             sentences += [
                 f"{rivals[0].label} beside {rivals[1].label} would say otherwise:"
@@ -129,9 +136,16 @@ class AgainstConstant:
             ]
         return sentences
 
+    def verdict_on(self, output: str) -> Verdict:
+        """What scheduling is worth for this output on held-out data; see `Verdict` and `PAYS`."""
+        ahead, free = (self._differences(output)[h] for h in HORIZONS[1:])
+        if free == "better" and ahead != "worse":
+            return "pays"
+        return "pays for prediction only" if ahead == "better" else "does NOT pay"
+
     def pays(self, output: str) -> bool:
         """Whether scheduling is better 1 s ahead or in free run on held-out data, and worse in
-        neither; see `PAYS`.
+        neither; see `PAYS`. `verdict_on` says which.
         """
         found = self._differences(output).values()
         return "better" in found and "worse" not in found
@@ -147,13 +161,11 @@ class AgainstConstant:
     def _sentence(self, output: str) -> str:
         lpv, lti = self._fits(output)
         found = self._differences(output)
-        verdict = "pays" if self.pays(output) else "does NOT pay"
-        if {"better", "worse"} <= set(found.values()):
-            verdict = "does NOT pay throughout"
         numbers = (
             f"{percent(lpv[h])} against {percent(lti[h])} % {where} ({found[h]})"
             for h, where in zip(HORIZONS[1:], ("1 s ahead", "in free run"), strict=True)
         )
+        verdict = self.verdict_on(output)
         return f"{output}: scheduling {verdict} on held-out data: {', '.join(numbers)}"
 
     def _fits(self, output: str) -> Iterator[dict[str, float]]:
@@ -193,8 +205,9 @@ def against_constant(
 ) -> AgainstConstant:
     """Fit a scheduled model and the constant one of the same order, and say where scheduling pays.
 
-    Scheduling pays for an output where the scheduled model is more than one point better 1 s ahead
-    or in free run on held-out data, and worse in neither.
+    Scheduling pays for an output where the scheduled model is more than one point better in free run
+    on held-out data and no worse 1 s ahead; it pays for prediction only where it is better 1 s
+    ahead alone.
 
     Parameters
     ----------
@@ -216,7 +229,7 @@ def against_constant(
     Returns
     -------
     AgainstConstant
-        The models with their scores, `pays(output)` and the `verdict()` in sentences.
+        The models with their scores, `verdict_on(output)` and the `verdict()` in sentences.
 
     Raises
     ------
@@ -235,8 +248,8 @@ def against_constant(
     >>> record = symheli.FlightRecord.from_arrays(0.1 * np.arange(600), units, y=y, u=u, p=p)
     >>> arx = idn.LPVARX(
     ...     "y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
-    >>> idn.against_constant(arx, *record.split(0.7)).pays("y")
-    True
+    >>> idn.against_constant(arx, *record.split(0.7)).verdict_on("y")
+    'pays'
     """
 
     def pair(moving: bool) -> list[Scored]:

@@ -9,13 +9,23 @@ from typing import Any
 import numpy as np
 
 from identification import AgainstConstant, LPVARXModel, residual_analysis, slow_modes, uncertainty
-from identification.judge.against_constant import HORIZONS
+from identification.judge.against_constant import HORIZONS, PAYS
 from identification.judge.scores import Scores, percent
 from studies.output import columns
 from symheli.records import FlightRecord, KinematicCheck, SensorCheck
 
 CERTAIN = ("ls", "rls")
 """Methods whose coefficients have a covariance here."""
+
+FIT = (
+    "fit in percent: 100 perfect, 0 no better than the output's mean, below 0 worse than that; the",
+    "rms error is (100 - fit) % of what the output varies (its standard deviation)",
+)
+VERDICTS = (
+    f"  pays: more than {PAYS:g} point better in free run, which simulation and feedback rest on, no"
+    " worse 1 s",
+    "  ahead; pays for prediction only: better 1 s ahead, from measurements, not in free run",
+)
 
 
 def facts(
@@ -64,7 +74,6 @@ def text(
     found: dict[str, Any], result: AgainstConstant, check: KinematicCheck | None = None
 ) -> str:
     """The whole answer for a reader."""
-    fit = "fit in percent of the output's own variation (100: perfect, 0: no better than its mean)"
     parts = [
         *_read(found),
         *_structure(found, result),
@@ -72,11 +81,12 @@ def text(
         "",
         str(result.scheduled.excitation),
         "",
-        fit,
+        *FIT,
         _table(result),
         *_horizons(result),
         "",
         *result.verdict(),
+        *(VERDICTS if result.verdict() and result.test is not None else ()),
         "",
         *_certainty(result),
     ]
@@ -99,6 +109,7 @@ def data(
     }
     judged = len(result.judged) > 1 and result.test is not None
     pays = {str(y): result.pays(str(y)) for y in result.scheduled.outputs} if judged else None
+    worth = {str(y): result.verdict_on(str(y)) for y in pays} if pays is not None else None
     certain = result.scheduled.method in CERTAIN
     return {
         "read": found,
@@ -107,6 +118,7 @@ def data(
         "models": models,
         "judged": [scored.label for scored in result.judged],
         "scheduling_pays": pays,
+        "scheduling_verdict": worth,
         "verdict": result.verdict(),
         "scheduling_held": result.hold_p,
         "scheduling_leak": result.leak,
@@ -292,23 +304,26 @@ def _table(result: AgainstConstant) -> str:
     rows = [
         [
             "output",
+            "varies by",
             "model",
             *(f"{part}: {h}" if i == 0 else h for part in parts for i, h in enumerate(HORIZONS)),
         ]
     ]
-    for output in map(str, result.scheduled.outputs):
-        for scored in result.models:
+    judged = result.training if result.test is None else result.test
+    for output in result.scheduled.outputs:
+        name, varies = str(output), f"{np.nanstd(judged[output]):.3g} {output.unit}"
+        for i, scored in enumerate(result.models):
             halves = [
                 half.by_horizon for half in (scored.in_sample, scored.held_out) if half is not None
             ]
             rows.append(
                 [
-                    output,
+                    *((name, varies) if i == 0 else ("", "")),
                     scored.label,
-                    *(percent(half[h][output]) for half in halves for h in HORIZONS),
+                    *(percent(half[h][name]) for half in halves for h in HORIZONS),
                 ]
             )
-    return columns(rows, left=2)
+    return columns(rows, left=3)
 
 
 def _excitation(result: AgainstConstant) -> dict[str, Any]:

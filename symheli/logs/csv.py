@@ -1,39 +1,54 @@
 """Tables with one header line: separated by commas, semicolons, tabs or blanks, with decimal points
-or commas.
+or commas. Names may carry their unit: "q [rad/s]" or "q (deg/s)".
 """
 
 from __future__ import annotations
 
+import csv
+import io
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.logs.column import Column
 from symheli.logs.files import Table, positive, seconds_in
 from symheli.logs.separated import SeparatedTable
+from symheli.values.arrays import Array
+from symheli.values.signal import Signal
 
 
 def read_csv(
     path: str | os.PathLike[str],
     time: str | None,
-    units: Mapping[str, str],
+    units: Mapping[str, str] | None,
     dt: float | None = None,
-    time_unit: str = "s",
+    time_unit: str | None = None,
 ) -> Table:
-    """The columns named in `units`, as they stand, and the time in s.
+    """The columns named in `units`, as they stand, and the time in s; without `units` all columns
+    whose unit the header gives. What `units` says of a column counts before its header.
 
-    `time` names the time column (in `time_unit`); None where the file has none: its rows are then
-    `dt` (s) apart. Empty cells are missing samples (NaN). Raises `InputError` for a file that is no
-    table, a cell that is no number, or a time missing.
+    `time` names the time column (in `time_unit`; default that of its header, or s); None where the
+    file has none: its rows are then `dt` (s) apart. Empty cells are missing samples (NaN). Raises
+    `InputError` for a file that is no table, a cell that is no number, or a time missing.
     """
     if (time is None) == (dt is None):
         raise InputError(
             "give the name of the time column, or time=None and the sample period dt in s: one of"
             " the two"
         )
-    factor = seconds_in(time_unit)
     table = SeparatedTable.read(path)
+    if units is None:
+        units = {name: unit for name, unit in table.units.items() if name != time}
+        if not units:
+            raise InputError(
+                f"{path}: no column has its unit in the header, such as 'q [rad/s]'; name columns"
+                " and units: units={'q': 'rad/s'}"
+            )
+    if time is not None and time_unit is None:
+        time_unit = table.units.get(time)
+    factor = seconds_in(time_unit or "s")
     columns = table.columns((*units, *([time] if time else [])))
     values = {name: columns[name] for name in units}
     if time is None:
@@ -45,3 +60,29 @@ def read_csv(
             f" column {time!r}"
         )
     return seconds, values, dict(units)
+
+
+def csv_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
+    """Every column of numbers by its name, with the unit of its header; none has a clock of its
+    own.
+    """
+    table, out = SeparatedTable.read(path), {}
+    for name in table.names:
+        try:
+            values = table.columns([name])[name]
+        except InputError:  # words
+            continue
+        out[name] = Column(None, values, table.units.get(name))
+    return out
+
+
+def with_units(time: Array, columns: Sequence[tuple[Signal, Array]]) -> str:
+    """A table that `read_csv` reads without being told anything: "t [s],q [rad/s]", numbers to the
+    last bit, empty cells for NaN.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["t [s]", *(f"{signal} [{signal.unit}]" for signal, _ in columns)])
+    for row in zip(time, *(values for _, values in columns), strict=True):
+        writer.writerow(["" if np.isnan(value) else repr(float(value)) for value in row])
+    return out.getvalue()

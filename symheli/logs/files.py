@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from symheli.errors import InputError
+from symheli.errors import DataWarning, InputError
 from symheli.values.units import to_si
 
 Table = tuple[np.ndarray, dict[str, np.ndarray], dict[str, str]]
@@ -36,6 +40,29 @@ def text(path: str | os.PathLike[str]) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         return data.decode("latin-1")
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[io.StringIO]:
+    """Around a reader of others that prints what it thinks of the file: what it said."""
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        yield said
+
+
+def said_by(error: Exception) -> str:
+    """What an error says, or its name where it says nothing."""
+    return str(error) or type(error).__name__
+
+
+def warn_of_damage(path: object) -> None:
+    """Warn (`DataWarning`) that what could be read is not the whole log."""
+    warnings.warn(
+        f"{path}: parts of the log are damaged and were left out; look for gaps before believing a"
+        " fit, or copy it from the aircraft once more",
+        DataWarning,
+        stacklevel=2,
+    )
 
 
 def positive(dt: float, name: str = "dt") -> float:

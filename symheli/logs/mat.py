@@ -1,37 +1,37 @@
-"""MATLAB files with one vector a signal."""
+"""MATLAB files with one vector a signal, of any version since 5: those of -v7.3 are HDF5 files."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.logs.files import Table, existing, seconds_in
+from symheli.extras import extra
+from symheli.logs.column import Column
+from symheli.logs.files import Table, existing, said_by, seconds_in
+from symheli.logs.format import is_hdf5
+
+NUMBERS = {
+    *("double", "single", "logical"),
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+}
+"""Classes of MATLAB that hold numbers."""
 
 
 def read_mat(
     path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s"
 ) -> Table:
-    """The variables named in `units`, and `time` (there in `time_unit`) in s, from a file saved
-    with -v7 or older.
+    """The variables named in `units`, and `time` (there in `time_unit`), in s.
 
-    "log.theta" reaches into a struct. Raises `InputError` for version 7.3, a file that is none of
-    MATLAB's, and variables that are no vectors of one length.
+    "log.theta" reaches into a struct. Raises `InputError` for a file that is none of MATLAB's or
+    was cut, one of -v7.3 without h5py, and variables that are no vectors of one length.
     """
-    from scipy.io import loadmat
-
     file, factor = existing(path), seconds_in(time_unit)
-    try:
-        content = loadmat(file, simplify_cells=True)
-    except NotImplementedError as error:
-        raise InputError(
-            f"{file}: MATLAB 7.3 files are not read; save it with save(..., '-v7')"
-        ) from error
-    except Exception as error:
-        raise InputError(f"{file}: not a MATLAB file ({error})") from error
+    content = _content(file)
     vectors = {name: _vector(content, name, file) for name in (time, *units)}
     n = len(vectors[time])
     for name, vector in vectors.items():
@@ -42,10 +42,83 @@ def read_mat(
     return factor * vectors[time], {name: vectors[name] for name in units}, dict(units)
 
 
+def mat_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
+    """Every vector of two numbers or more by its name; none has a clock of its own."""
+    file = existing(path)
+    return {
+        name: Column(None, vector)
+        for name, value in _leaves(_content(file))
+        if (vector := _as_vector(value)) is not None and len(vector) > 1
+    }
+
+
+def _content(file: Path) -> Mapping[str, Any]:
+    """Variables and nested structs by name; arrays, or whatever else MATLAB may save."""
+    from scipy.io import loadmat
+
+    if is_hdf5(file):
+        return _hdf5(file)
+    try:
+        content = loadmat(file, simplify_cells=True)
+    except Exception as error:
+        raise InputError(
+            f"{file}: not a MATLAB file, or one that was cut ({said_by(error)}); save it once more"
+        ) from error
+    return {name: value for name, value in content.items() if not name.startswith("__")}
+
+
+def _hdf5(file: Path) -> Mapping[str, Any]:
+    with extra("logs", "reading a MATLAB 7.3 file"):
+        import h5py  # type: ignore[import-not-found]
+
+    def read(group: Any) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        for name, item in group.items():
+            if name.startswith("#"):  # what cells and objects refer to
+                continue
+            kind = item.attrs.get("MATLAB_class", b"double")
+            kind = kind.decode() if isinstance(kind, bytes) else str(kind)
+            if isinstance(item, h5py.Group):
+                out[name] = read(item)
+            elif kind not in NUMBERS or item.dtype.kind not in "biuf":
+                out[name] = f"a {kind}"
+            elif item.attrs.get("MATLAB_empty"):
+                out[name] = np.zeros(0)
+            else:
+                out[name] = item[()].T  # MATLAB writes columns first
+        return out
+
+    try:
+        with h5py.File(file, "r") as opened:
+            return read(opened)
+    except Exception as error:
+        raise InputError(
+            f"{file}: a MATLAB 7.3 file that was cut or damaged ({said_by(error)});"
+            " save it once more"
+        ) from error
+
+
+def _leaves(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in content.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
+
+
+def _as_vector(value: Any) -> np.ndarray | None:
+    """None where it is none of numbers."""
+    try:
+        array = np.atleast_1d(np.squeeze(np.asarray(value, dtype=float)))
+    except (TypeError, ValueError):
+        return None
+    return array if array.ndim == 1 else None
+
+
 def _vector(content: Mapping[str, Any], name: str, file: object) -> np.ndarray:
     value: Any = content
     for part in name.split("."):
-        known = [k for k in value if not k.startswith("__")] if isinstance(value, Mapping) else []
+        known = list(value) if isinstance(value, Mapping) else []
         if part not in known:
             raise UnknownNameError("variable", name, known)
         value = value[part]

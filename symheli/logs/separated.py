@@ -6,13 +6,16 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.files import text
+from symheli.values.units import to_si
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 """Tried in this order: what stands in names and numbers too comes last."""
@@ -90,23 +93,49 @@ class SeparatedTable:
             separator,
         )
 
+    @cached_property
+    def _declared(self) -> dict[str, tuple[str, str]]:
+        """Whole name and unit of the columns that have theirs in the header, by bare name."""
+        found = [(whole, declared) for whole in self.header if (declared := _with_unit(whole))]
+        bare = [name for _, (name, _) in found]
+        return {
+            name: (whole, unit)
+            for whole, (name, unit) in found
+            if bare.count(name) == 1 and name not in self.header
+        }
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each column that has it in the header, by name without it."""
+        return {name: unit for name, (_, unit) in self._declared.items()}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns in order, by their names without units."""
+        bare = {whole: name for name, (whole, _) in self._declared.items()}
+        return tuple(bare.get(whole, whole) for whole in self.header)
+
     def columns(self, names: Iterable[str]) -> dict[str, np.ndarray]:
-        """The named columns as numbers (n,), NaN where a cell is empty.
+        """The named columns as numbers (n,), NaN where a cell is empty; "q" is found as "q [rad/s]"
+        too.
 
         A comma in numbers is the decimal sign where it does not separate. Raises `UnknownNameError`
         for a name the header lacks, `InputError` for one that stands there twice and for the first
         cell that is no number.
         """
         names = list(dict.fromkeys(names))
+        index: dict[str, int] = {}
         for name in names:
-            if self.header.count(name) > 1:
+            whole = name if name in self.header else self._declared.get(name, ("",))[0]
+            if self.header.count(whole) > 1:
                 raise InputError(
-                    f"{self.path}: {self.header.count(name)} columns are called {name!r}; rename"
+                    f"{self.path}: {self.header.count(whole)} columns are called {name!r}; rename"
                     " them, so that it is clear which is meant"
                 )
-            if name not in self.header:
-                raise UnknownNameError("column", name, self.header)
-        cells = {name: [row[self.header.index(name)] for row in self.rows] for name in names}
+            if whole not in self.header:
+                raise UnknownNameError("column", name, self.names)
+            index[name] = self.header.index(whole)
+        cells = {name: [row[i] for row in self.rows] for name, i in index.items()}
         comma = self.separator != "," and any("," in c for column in cells.values() for c in column)
         return {name: self._numbers(name, column, comma) for name, column in cells.items()}
 
@@ -126,6 +155,23 @@ class SeparatedTable:
                 )
             out[i] = value
         return out
+
+
+def _with_unit(name: str) -> tuple[str, str] | None:
+    """Name and unit of "q [rad/s]" or "q (rad/s)"; None where what stands in brackets is no unit,
+    or an index (xyz[1]; "n [1]" is a unit).
+    """
+    match = re.fullmatch(r"(.*\S)(\s*)(?:\[([^][]+)\]|\(([^()]+)\))", name)
+    if match is None:
+        return None
+    unit = (match[3] or match[4]).strip()
+    if unit.isdigit() and not match[2]:
+        return None
+    try:
+        to_si(unit)
+    except InputError:
+        return None
+    return match[1], unit
 
 
 def _number(cell: str, comma: bool) -> float | None:

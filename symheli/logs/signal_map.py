@@ -1,18 +1,19 @@
 """A TOML file that says where a log keeps which signal, in which unit: written once for an
 aircraft, used for every flight of it.
 
-    format = "csv"          # csv, mat, xplane or ulog; by the log's extension where it is left out
+    format = "csv"          # csv, mat, xplane, ulog or dataflash; by its content where left out
     time = "time_us"        # time column of csv and mat
     time_unit = "us"
-    dt = 0.02               # s: resample to (needed for ulog; xplane and csv without a time)
+    dt = 0.02               # s: resample to (needed for ulog and dataflash, and without a clock)
 
     [signals]
     q = { column = "gyro_y", unit = "deg/s", scale = -1 }
     airspeed = { column = "pitot", unit = "km/h", offset = 0.4 }
 
-A signal is (scale * column + offset) in `unit`. Columns of a ulog are "topic.field", those of a
-MATLAB file may reach into a struct ("log.theta"), those of X-Plane are the names of
-`symheli.logs.xplane` and need no unit.
+A signal is (scale * column + offset) in `unit`. Columns of a ulog are "topic.field" or
+"topic.1.field", those of a dataflash log "message.field" or "message[1].field" (which need no unit
+where the log declares it), those of a MATLAB file may reach into a struct ("log.theta"), those of
+X-Plane are the names of `symheli.logs.xplane` and need no unit.
 """
 
 from __future__ import annotations
@@ -21,18 +22,18 @@ import math
 import os
 import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.logs.csv import read_csv
+from symheli.logs.dataflash import read_dataflash
 from symheli.logs.files import Table, text
+from symheli.logs.format import FORMATS, Format, format_of
 from symheli.logs.mat import read_mat
-from symheli.logs.ulog import read_ulog
+from symheli.logs.ulog import read_ulog, split_column
 from symheli.logs.xplane import read_xplane
 from symheli.values.units import to_si
 
-FORMATS = {".csv": "csv", ".mat": "mat", ".ulg": "ulog"}
 KEYS = ("format", "time", "time_unit", "dt", "signals")
 ENTRY = ("column", "unit", "scale", "offset")
 
@@ -54,7 +55,7 @@ class SignalMap:
     """The content of a signal map; `load` reads one, `read` applies it to a log."""
 
     signals: dict[str, Source]
-    format: str | None = None
+    format: Format | None = None
     time: str | None = None
     time_unit: str = "s"
     dt: float | None = None
@@ -77,8 +78,8 @@ class SignalMap:
             )
         signals = {name: _source(entry, f"{path}, signals.{name}") for name, entry in given.items()}
         kind, dt = table.get("format"), table.get("dt")
-        if kind is not None and kind not in (*FORMATS.values(), "xplane"):
-            raise UnknownNameError(f"format in {path}", str(kind), (*FORMATS.values(), "xplane"))
+        if kind is not None and kind not in FORMATS:
+            raise UnknownNameError(f"format in {path}", str(kind), FORMATS)
         if dt is not None and not (isinstance(dt, int | float) and math.isfinite(dt) and dt > 0):
             raise InputError(f"{path}: dt must be a positive number of seconds, got {dt!r}")
         return cls(signals, kind, table.get("time"), str(table.get("time_unit", "s")), dt)
@@ -104,8 +105,13 @@ class SignalMap:
         """The sample period (s) to which the log is still to be brought, None where it has it."""
         return self.dt if self._kind(log) in ("csv", "mat") and self.time is not None else None
 
-    def _kind(self, log: str | os.PathLike[str]) -> str:
-        return self.format or FORMATS.get(Path(log).suffix.lower(), "xplane")
+    def resampled(self, log: str | os.PathLike[str]) -> str:
+        """How the samples that `read` gives were made of others; empty where they were not."""
+        own_clocks = self._kind(log) in ("ulog", "dataflash")
+        return f"columns interpolated to {self.dt:g} s" if own_clocks else ""
+
+    def _kind(self, log: str | os.PathLike[str]) -> Format:
+        return self.format or format_of(log)
 
     def _columns(self, log: str | os.PathLike[str], kind: str) -> Table:
         declared = {s.column: s.unit or "1" for s in self.signals.values()}
@@ -113,19 +119,33 @@ class SignalMap:
             case "xplane":
                 return read_xplane(log, self.dt)
             case "ulog":
-                if self.dt is None:
-                    raise InputError(
-                        f"{log}: the topics of a ULog have their own clocks; give dt (s) in the"
-                        " signal map to resample them"
-                    )
-                topics = {column: (*_topic(column), unit) for column, unit in declared.items()}
-                return read_ulog(log, topics, self.dt)
+                step = self._needed_step(log)
+                topics = {
+                    column: (*split_column(column), unit) for column, unit in declared.items()
+                }
+                return read_ulog(log, topics, step)
+            case "dataflash":
+                given = {s.column: s.unit for s in self.signals.values()}
+                return read_dataflash(
+                    log,
+                    {column: column for column in given},
+                    self._needed_step(log),
+                    {column: unit for column, unit in given.items() if unit},
+                )
             case "mat":
                 if self.time is None:
                     raise InputError(f"{log}: name the time vector in the signal map: time = ...")
                 return read_mat(log, self.time, declared, self.time_unit)
         step = self.dt if self.time is None else None
         return read_csv(log, self.time, declared, step, self.time_unit)
+
+    def _needed_step(self, log: str | os.PathLike[str]) -> float:
+        if self.dt is None:
+            raise InputError(
+                f"{log}: its columns have clocks of their own; give dt (s) in the signal map to"
+                " resample them"
+            )
+        return self.dt
 
     def _unit(self, name: str, source: Source, found: str) -> str:
         if source.unit is None:
@@ -153,13 +173,3 @@ def _source(entry: Any, where: str) -> Source:
             f"{where}: scale must be a number other than 0 and offset a number, got {numbers}"
         )
     return Source(entry["column"], unit, float(numbers[0]), float(numbers[1]))
-
-
-def _topic(column: str) -> tuple[str, str]:
-    topic, dot, field = column.partition(".")
-    if not dot:
-        raise InputError(
-            f'{column!r}: a column of a ULog is "topic.field", such as'
-            ' "vehicle_angular_velocity.xyz[1]"'
-        )
-    return topic, field

@@ -1,30 +1,43 @@
-"""PX4 ULog files."""
+"""PX4 ULog files.
+
+A column is "topic.field", such as "vehicle_angular_velocity.xyz[1]", of the first instance of the
+topic, or "topic.1.field" of another. Beside what is logged, a topic with a quaternion q[0..3] has
+the Euler angles `phi`, `theta` and `psi` (rad, psi continuous) of the rotation from body to earth
+axes.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
-from symheli.logs.files import Table, existing, positive
+from symheli.logs.column import Column, on_one_axis
+from symheli.logs.files import Table, existing, positive, quiet, said_by, warn_of_damage
 
-SILENCE = 5.0
-"""A topic that pauses for more than this many of its median steps is missing (NaN) in between."""
+QUATERNION = tuple(f"q[{i}]" for i in range(4))
+ANGLES = ("phi", "theta", "psi")
+
+
+class _Instance(NamedTuple):
+    """Of a topic: the number it was logged by, and its fields."""
+
+    number: int
+    data: Mapping[str, np.ndarray]
 
 
 def read_ulog(
     path: str | os.PathLike[str], topics: Mapping[str, tuple[str, str, str]], dt: float
 ) -> Table:
-    """{signal: (topic, field, unit)} from the first instance of each topic, interpolated to steps
-    of `dt` (s) over their common time.
+    """{signal: (topic, field, unit)}, interpolated to steps of `dt` (s) over their common time as
+    `symheli.logs.column.on_one_axis` does. "topic.1" is another instance of a topic than its first.
 
-    Time counts from the first common instant. Raises `InputError` without pyulog, for a file that
-    is no ULog, and where the topics do not overlap; `UnknownNameError` for topics and fields the
-    log lacks.
+    Raises `InputError` without pyulog, for a file that is no ULog or was cut, and where the topics
+    do not overlap; `UnknownNameError` for topics, instances and fields the log lacks.
     """
     dt = positive(dt)
     if not topics:
@@ -32,50 +45,93 @@ def read_ulog(
             'name at least one signal: topics={"q": ("vehicle_angular_velocity", "xyz[1]",'
             ' "rad/s")}'
         )
-    series = _series(path, topics)
-    start, stop = max(t[0] for t, _ in series.values()), min(t[-1] for t, _ in series.values())
-    if stop - start < dt:
+    logged = _topics(path)
+    columns = {name: _column(logged, *where[:2]) for name, where in topics.items()}
+    time, values = on_one_axis(columns, dt, path)
+    return time, values, {name: unit for name, (_, _, unit) in topics.items()}
+
+
+def ulog_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
+    """Every column of numbers by its name, the instance in it where a topic has more than one."""
+    out = {}
+    for topic, instances in _topics(path).items():
+        for i, (number, data) in enumerate(instances):
+            names = [*data, *(ANGLES if set(QUATERNION) <= data.keys() else ())]
+            for field in names:
+                if not field.startswith(("timestamp", "_padding")):
+                    prefix = topic if i == 0 else f"{topic}.{number}"
+                    out[f"{prefix}.{field}"] = _column({topic: [instances[i]]}, topic, field)
+    return out
+
+
+def split_column(column: str) -> tuple[str, str]:
+    """("topic", "field") or ("topic.1", "field") of a column; raises `InputError` where it is
+    none.
+    """
+    topic, _, field = column.partition(".")
+    number, dot, rest = field.partition(".")
+    if dot and number.isdigit():
+        topic, field = f"{topic}.{number}", rest
+    if not field:
         raise InputError(
-            f"{path}: the topics have no time in common (latest start {start:.3f} s, earliest end"
-            f" {stop:.3f} s)"
+            f'{column!r}: a column of a ULog is "topic.field", such as'
+            ' "vehicle_angular_velocity.xyz[1]", or "topic.1.field" of another instance'
         )
-    grid = start + dt * np.arange(int((stop - start) / dt + 1e-9) + 1)
-    columns = {name: _interpolate(grid, *pair) for name, pair in series.items()}
-    return grid - start, columns, {name: unit for name, (_, _, unit) in topics.items()}
+    return topic, field
 
 
-def _series(
-    path: str | os.PathLike[str], topics: Mapping[str, tuple[str, str, str]]
-) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _topics(path: str | os.PathLike[str]) -> dict[str, list[_Instance]]:
+    """The instances of each topic, by number."""
     with extra("logs", "reading a ULog file"):
         from pyulog import ULog  # type: ignore[import-not-found]
     file = existing(path)
     try:
-        log = ULog(str(file))
+        with file.open("rb") as opened, quiet():
+            log = ULog(opened)
     except Exception as error:
-        raise InputError(f"{file}: not a ULog file ({error or type(error).__name__})") from error
-    data: dict[str, Any] = {}
+        raise InputError(
+            f"{file}: not a ULog file, or one that was cut or damaged"
+            f" ({said_by(error)}); copy it from the aircraft once more"
+        ) from error
+    if log.file_corruption:
+        warn_of_damage(file)
+    out: dict[str, list[_Instance]] = {}
     for dataset in log.data_list:
-        data.setdefault(dataset.name, dataset.data)
-    out = {}
-    for name, (topic, field, _) in topics.items():
-        if topic not in data:
-            raise UnknownNameError("topic", topic, sorted(data))
-        if field not in data[topic]:
-            raise UnknownNameError(f"field of {topic}", field, sorted(data[topic]))
-        time = 1e-6 * np.asarray(data[topic]["timestamp"], dtype=float)
-        keep = np.concatenate([[True], np.diff(np.maximum.accumulate(time)) > 0])
-        out[name] = time[keep], np.asarray(data[topic][field], dtype=float)[keep]
-    return out
+        out.setdefault(dataset.name, []).append(_Instance(dataset.multi_id, dataset.data))
+    if not out:
+        raise InputError(f"{file}: a ULog without a sample; was the aircraft armed?")
+    return {topic: sorted(found, key=lambda one: one.number) for topic, found in out.items()}
 
 
-def _interpolate(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    out = np.interp(grid, time, values)
-    if len(time) > 2:
-        after = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
-        step = time[after] - time[after - 1]
-        exact = np.isclose(grid, time[after], rtol=0, atol=1e-9) | np.isclose(
-            grid, time[after - 1], rtol=0, atol=1e-9
-        )
-        out[(step > SILENCE * np.median(np.diff(time))) & ~exact] = np.nan
-    return out
+def _column(logged: Mapping[str, list[_Instance]], topic: str, field: str) -> Column:
+    name, dot, number = topic.partition(".")
+    if name not in logged:
+        raise UnknownNameError("topic", name, sorted(logged))
+    found = [one for one in logged[name] if not dot or str(one.number) == number]
+    if not found:
+        numbers = [str(one.number) for one in logged[name]]
+        raise UnknownNameError(f"instance of {name}", number, numbers)
+    data: Mapping[str, Any] = found[0].data
+    time = 1e-6 * np.asarray(data["timestamp"], dtype=float)
+    if field in ANGLES and set(QUATERNION) <= data.keys():
+        quaternion = [np.asarray(data[q], dtype=float) for q in QUATERNION]
+        return Column(time, euler_angles(*quaternion)[ANGLES.index(field)], "rad")
+    if field not in data:
+        raise UnknownNameError(f"field of {topic}", field, sorted(data))
+    return Column(time, np.asarray(data[field], dtype=float))
+
+
+def euler_angles(
+    q0: np.ndarray, q1: np.ndarray, q2: np.ndarray, q3: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """phi, theta, psi (rad) of the unit quaternion that turns body into earth axes (forward, right,
+    down; north, east, down), psi made continuous; NaN where it has no length.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        size = np.sqrt(q0**2 + q1**2 + q2**2 + q3**2)
+        a, b, c, d = (q / size for q in (q0, q1, q2, q3))
+    phi = np.arctan2(2 * (a * b + c * d), 1 - 2 * (b**2 + c**2))
+    theta = np.arcsin(np.clip(2 * (a * c - b * d), -1.0, 1.0))
+    psi, known = np.arctan2(2 * (a * d + b * c), 1 - 2 * (c**2 + d**2)), np.isfinite(size)
+    psi[known] = np.unwrap(psi[known])
+    return phi, theta, psi

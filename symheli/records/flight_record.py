@@ -6,13 +6,15 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
-from symheli.logs.csv import read_csv
+from symheli.logs.csv import read_csv, with_units
+from symheli.logs.dataflash import read_dataflash
 from symheli.logs.files import seconds_in
 from symheli.logs.mat import read_mat
 from symheli.logs.signal_map import SignalMap
@@ -22,6 +24,7 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.sample_period import JITTER, period_of, warn_of_odd_steps
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.units import to_si
+from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
     import pandas
@@ -176,16 +179,17 @@ class FlightRecord:
     def from_csv(
         cls,
         path: str | os.PathLike[str],
-        time: str | None,
-        units: Mapping[str, str],
+        time: str | None = "t",
+        units: Mapping[str, str] | None = None,
         dt: float | None = None,
-        time_unit: str = "s",
+        time_unit: str | None = None,
     ) -> FlightRecord:
         """From a table with a header line: commas, semicolons, tabs or blanks between cells,
         decimal points or commas, # comments.
 
-        `time` names the time column, in `time_unit`. A file without one (`time=None`) needs the
-        sample period `dt` (s).
+        `time` names the time column, in `time_unit` (default that of its header "t [ms]", or s). A
+        file without one (`time=None`) needs the sample period `dt` (s). Without `units` all columns
+        are taken whose unit stands in the header ("q [deg/s]"), as `to_csv` writes them.
         """
         return cls._from_table(*read_csv(path, time, units, dt, time_unit), path)
 
@@ -200,8 +204,9 @@ class FlightRecord:
     def from_ulog(
         cls, path: str | os.PathLike[str], topics: Mapping[str, tuple[str, str, str]], dt: float
     ) -> FlightRecord:
-        """From a PX4 ULog: {signal: (topic, field, unit)}, resampled to `dt` (s); needs pyulog
-        (extra "logs").
+        """From a PX4 ULog: {signal: (topic, field, unit)}, resampled to `dt` (s) as
+        `symheli.logs.column` says; "topic.1" is another instance of a topic, and topics with a
+        quaternion have phi, theta and psi. Needs pyulog (extra "logs").
         """
         return replace(
             cls._from_table(*read_ulog(path, topics, dt), path),
@@ -209,10 +214,31 @@ class FlightRecord:
         )
 
     @classmethod
+    def from_dataflash(
+        cls,
+        path: str | os.PathLike[str],
+        fields: Mapping[str, str],
+        dt: float,
+        units: Mapping[str, str] | None = None,
+    ) -> FlightRecord:
+        """From an ArduPilot log (.bin or .log): {signal: "message.field"}, such as "IMU.GyrY" or
+        "IMU[1].GyrY", resampled to `dt` (s) as `symheli.logs.column` says.
+
+        Units are those that the log declares; `units` gives those it does not. Needs pymavlink
+        (extra "logs").
+        """
+        return replace(
+            cls._from_table(*read_dataflash(path, fields, dt, units), path),
+            resampled=f"messages interpolated to {dt:g} s",
+        )
+
+    @classmethod
     def from_mat(
         cls, path: str | os.PathLike[str], time: str, units: Mapping[str, str], time_unit: str = "s"
     ) -> FlightRecord:
-        """From a MATLAB file (v7.2 or older) with one vector a signal, `time` in `time_unit`."""
+        """From a MATLAB file with one vector a signal, `time` in `time_unit`; one saved with -v7.3
+        needs h5py (extra "logs").
+        """
         return cls._from_table(*read_mat(path, time, units, time_unit), path)
 
     @classmethod
@@ -223,8 +249,18 @@ class FlightRecord:
         `symheli.logs.signal_map`.
         """
         found = SignalMap.load(signal_map)
-        record, step = cls._from_table(*found.read(path), path), found.step(path)
+        record = replace(cls._from_table(*found.read(path), path), resampled=found.resampled(path))
+        step = found.step(path)
         return record if step is None else record.resample(step)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> FlightRecord:
+        """What `save` wrote, to the last bit; raises `InputError` for anything else. No pickle is
+        ever read.
+        """
+        from symheli.records.record_file import read_record
+
+        return cls(**read_record(path)._asdict())
 
     @classmethod
     def _from_table(
@@ -408,3 +444,25 @@ class FlightRecord:
         return pd.DataFrame(
             {"t": self.time, **{str(s): self.values[:, i] for i, s in enumerate(self.signals)}}
         )
+
+    # --- writing ---------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """All of it as one compressed NumPy archive (.npz), written whole or not at all, for
+        `load`: samples, names, units, note, what was resampled, and of `meta` the numbers, texts,
+        arrays, lists, tuples and mappings of them.
+
+        Anything else in `meta` (the plan of a flight) cannot be kept: its text comes back as
+        `meta["described"]`.
+        """
+        from symheli.records.record_file import Content, write_record
+
+        parts = {name: getattr(self, name) for name in Content._fields}
+        return Path(write_record(path, Content(**parts)))
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """The samples as a table, units in its header ("t [s],q [rad/s]"), that `from_csv(path)`
+        reads back to the last bit; written whole or not at all. Note and meta stay behind (`save`).
+        """
+        columns = [(signal, self.values[:, i]) for i, signal in enumerate(self.signals)]
+        return write_text(path, with_units(self.time, columns))

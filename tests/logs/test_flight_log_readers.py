@@ -1,7 +1,6 @@
 """Logs in, SI out; what cannot be read says why."""
 
 import sys
-import types
 from pathlib import Path
 
 import numpy as np
@@ -296,7 +295,7 @@ def test_a_missing_file_is_an_input_error(tmp_path):
         FlightRecord.from_csv(tmp_path / "nowhere.csv", time="t", units={"q": "rad/s"})
 
 
-# --- MATLAB and ULog -----------------------------------------------------------------------------
+# --- MATLAB -----------------------------------------------------------------------------
 
 
 def test_mat_vectors_of_either_orientation_and_inside_structs(tmp_path):
@@ -318,36 +317,6 @@ def test_a_spoilt_mat_file_says_what_is_wrong(tmp_path):
         FlightRecord.from_mat(path, time="t", units={"q": "rad/s"})
     with pytest.raises(InputError, match="to be a vector"):
         FlightRecord.from_mat(path, time="t", units={"M": "1"})
-
-
-def test_ulog_topics_of_different_rates_meet_on_one_grid(tmp_path, monkeypatch):
-    slow = (
-        np.delete(np.arange(0, 3_000_000, 100_000), slice(12, 20)) + 40_000
-    )  # us; silent from 1.14 to 2.04 s
-
-    class FakeULog:
-        def __init__(self, path):
-            fast = np.arange(0, 3_000_000, 4_000)
-            self.data_list = [
-                types.SimpleNamespace(
-                    name="rates", data={"timestamp": fast, "xyz[1]": 1e-6 * fast}
-                ),
-                types.SimpleNamespace(name="air", data={"timestamp": slow, "speed": 2e-6 * slow}),
-            ]
-
-    monkeypatch.setitem(sys.modules, "pyulog", types.SimpleNamespace(ULog=FakeULog))
-    path = write(tmp_path, "anything", name="log.ulg")
-    topics = {"q": ("rates", "xyz[1]", "deg/s"), "airspeed": ("air", "speed", "m/s")}
-    record = FlightRecord.from_ulog(path, topics, dt=0.02)
-    assert record.dt == pytest.approx(0.02)
-    instants = record.time + 0.04  # time counts from the first common instant
-    np.testing.assert_allclose(record["q"], np.deg2rad(instants), atol=1e-9)
-    silent = (instants > 1.141) & (instants < 2.039)
-    np.testing.assert_allclose(record["airspeed"][~silent], 2 * instants[~silent], atol=1e-9)
-    assert np.isnan(record["airspeed"][silent]).all()
-    assert record.resampled == "topics interpolated to 0.02 s"
-    with pytest.raises(UnknownNameError, match="unknown topic 'rate'"):
-        FlightRecord.from_ulog(path, {"q": ("rate", "xyz[1]", "deg/s")}, dt=0.02)
 
 
 def test_without_pyulog_the_message_names_the_extra(tmp_path, monkeypatch):

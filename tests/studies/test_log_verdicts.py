@@ -46,50 +46,88 @@ def judged(lpv, lti, *rivals, **over):
 
 
 @pytest.mark.parametrize(
-    ("lpv", "lti", "pays", "words"),
+    ("lpv", "lti", "verdict", "costs", "words"),
     [
         (
             (97.3, 97.0),
             (97.3, 85.6),
-            True,
+            "pays",
+            False,
             "scheduling pays .*97.3 against 97.3 % .*no different., 97.0 against 85.6 % .*better.",
         ),
-        ((96.0, 80.0), (90.0, 79.5), True, r"scheduling pays .*\(better\), .*\(no different\)"),
+        (
+            (96.0, 80.0),
+            (90.0, 79.5),
+            "pays for prediction only",
+            False,
+            r"scheduling pays for prediction only on .*\(better\), .*\(no different\)",
+        ),
         (
             (90.5, 80.0),
             (90.0, 79.5),
+            "does NOT pay",
             False,
             r"scheduling does NOT pay on held-out data: .*\(no different\), .*\(no different\)",
         ),
         (
             (91.04, 1.0),
             (90.05, 1.0),
+            "does NOT pay",
             False,
             r"91.0 against 90.0 % 1 s ahead \(no different\)",
         ),  # as printed: exactly one point
-        ((97.4, 1.0), (96.4, 1.0), False, "no different"),  # whose difference in binary exceeds one
+        (
+            (97.4, 1.0),
+            (96.4, 1.0),
+            "does NOT pay",
+            False,
+            "no different",
+        ),  # whose difference in binary exceeds one
         (
             (96.0, 60.0),
             (90.0, 79.5),
-            False,
-            r"scheduling does NOT pay throughout .*\(better\), .*\(worse\)",
+            "pays for prediction only",
+            True,
+            r"scheduling pays for prediction only .*\(better\), .*\(worse\)",
+        ),
+        (
+            (85.0, 79.5),
+            (90.0, 60.0),
+            "does NOT pay",
+            True,
+            r"scheduling does NOT pay .*\(worse\), .*\(better\)",
         ),
         (
             (80.0, -5.0),
             (70.0, -500.0),
-            True,
+            "pays for prediction only",
+            False,
             r"-5.0 against -500.0 % in free run \(neither better than the mean of the record\)",
         ),
-        ((80.0, -np.inf), (70.0, 30.0), False, r"diverges against 30.0 % in free run \(worse\)"),
-        ((-20.0, -5.0), (-90.0, -np.inf), False, "scheduling does NOT pay on held-out data"),
+        (
+            (80.0, -np.inf),
+            (70.0, 30.0),
+            "pays for prediction only",
+            True,
+            r"diverges against 30.0 % in free run \(worse\)",
+        ),
+        (
+            (-20.0, -5.0),
+            (-90.0, -np.inf),
+            "does NOT pay",
+            False,
+            "scheduling does NOT pay on held-out data",
+        ),
     ],
 )
-def test_a_verdict_follows_from_the_numbers_beside_it(lpv, lti, pays, words):
+def test_a_verdict_follows_from_the_numbers_beside_it(lpv, lti, verdict, costs, words):
+    """`costs`: better at one horizon, worse at the other."""
     found = judged(lpv, lti)
     (sentence,) = found.verdict()
     assert re.search(words, sentence), sentence
-    assert found.pays("y") is pays
-    assert sentence.startswith("y: scheduling pays on") is pays
+    assert found.verdict_on("y") == verdict
+    assert sentence.startswith(f"y: scheduling {verdict} on held-out data")
+    assert found.pays("y") is (verdict != "does NOT pay" and not costs)
 
 
 def test_the_other_treatment_of_the_trim_is_heard_where_it_says_otherwise():
@@ -104,9 +142,11 @@ def test_the_other_treatment_of_the_trim_is_heard_where_it_says_otherwise():
 
 
 def test_a_free_run_that_is_told_its_answer_is_not_counted():
-    assert judged((90.0, 99.9), (90.0, 50.0)).pays("y")
+    assert judged((90.0, 99.9), (90.0, 50.0)).verdict_on("y") == "pays"
     told = judged((90.0, 99.9), (90.0, 50.0), hold_p=True, leak=0.9)
-    assert not told.pays("y")
+    assert told.verdict_on("y") == "does NOT pay"
+    told = judged((93.0, 99.9), (90.0, 50.0), hold_p=True, leak=0.9)
+    assert told.verdict_on("y") == "pays for prediction only"
     assert "99.9 against 50.0 % in free run (not counted)" in told.verdict()[0]
 
 

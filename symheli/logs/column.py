@@ -1,0 +1,82 @@
+"""One column of a log, with the clock it was written by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from symheli.errors import InputError
+
+SILENCE = 5.0
+"""A column that pauses for more than this many of its median steps is missing (NaN) in between."""
+
+FINER = 1e4
+"""A step that makes this many times as many samples as the column with most is refused."""
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """Samples (n,) of one column of a log and their instants in s (n,), as they stand there.
+
+    `time` None where the log has no clock; `unit` None where the log declares none, else one that
+    `symheli.values.units.to_si` knows.
+    """
+
+    time: np.ndarray | None
+    values: np.ndarray
+    unit: str | None = None
+
+
+def forward(time: np.ndarray) -> np.ndarray:
+    """Mask of the samples whose instant is later than all before: repeats and steps back go."""
+    return np.concatenate([[True], np.diff(np.maximum.accumulate(time)) > 0])
+
+
+def on_one_axis(
+    columns: Mapping[str, Column], dt: float, path: object
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Columns of different rates at steps of `dt` (s), interpolated linearly between neighbours,
+    from the first instant that all have seen to the last; time counts from there.
+
+    Nothing is filtered: what is faster than half of 1 / dt folds back. Within a silence (more than
+    5 median steps of that column) samples are missing. Raises `InputError` where no instant is
+    common, and for a step far finer than the log.
+    """
+    series = {}
+    for name, column in columns.items():
+        if column.time is None or len(column.time) < 2:
+            raise InputError(f"{path}: {name!r} has fewer than two samples")
+        keep = forward(column.time)
+        series[name] = column.time[keep], column.values[keep]
+    start, stop = max(t[0] for t, _ in series.values()), min(t[-1] for t, _ in series.values())
+    if stop - start < dt:
+        last, first = (
+            pick(series, key=lambda name: series[name][0][end])
+            for pick, end in ((max, 0), (min, -1))
+        )
+        raise InputError(
+            f"{path}: the columns have no time in common: {last!r} starts at {start:.3f} s,"
+            f" {first!r} ends at {stop:.3f} s; leave one of them out"
+        )
+    samples, logged = (stop - start) / dt, max(len(time) for time, _ in series.values())
+    if samples > FINER * logged:
+        raise InputError(
+            f"{path}: {samples:.1e} steps of {dt:g} s for {logged} samples; dt is in seconds, or a"
+            f" clock of the log is damaged (it runs from {start:.6g} to {stop:.6g} s)"
+        )
+    grid = start + dt * np.arange(int((stop - start) / dt + 1e-9) + 1)
+    return grid - start, {name: _interpolate(grid, *pair) for name, pair in series.items()}
+
+
+def _interpolate(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    out = np.interp(grid, time, values)
+    if len(time) > 2:
+        after = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
+        step = time[after] - time[after - 1]
+        exact = np.isclose(grid, time[after], rtol=0, atol=1e-9) | np.isclose(
+            grid, time[after - 1], rtol=0, atol=1e-9
+        )
+        out[(step > SILENCE * np.median(np.diff(time))) & ~exact] = np.nan
+    return out

@@ -1,0 +1,239 @@
+"""ArduPilot DataFlash logs, binary (.bin) and text (.log).
+
+A column is "message.field", such as "IMU.GyrY", of the first instance of the message, or
+"IMU[1].GyrY" of another. Logs written since 2018 declare the unit of most fields (their FMTU, UNIT
+and MULT messages); those are used. Headings count to 360 degrees and are made continuous where the
+log says that they are headings.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from symheli.errors import InputError, UnknownNameError
+from symheli.extras import extra
+from symheli.logs.column import Column, on_one_axis
+from symheli.logs.files import Table, existing, positive, quiet, said_by, warn_of_damage
+from symheli.values.units import to_si
+
+LABELS = {
+    "deg": "deg",
+    "degheading": "deg",
+    "deglatitude": "deg",
+    "deglongitude": "deg",
+    "deg/s": "deg/s",
+    "deg/s/s": "deg/s/s",
+    "rad": "rad",
+    "rad/s": "rad/s",
+    "rad/s/s": "rad/s/s",
+    "m": "m",
+    "m/s": "m/s",
+    "m/s/s": "m/s^2",
+    "s": "s",
+    "us": "us",
+    "rpm": "rpm",
+    "Hz": "1/s",
+    "Pa": "Pa",
+    "V": "V",
+    "%": "%",
+    "satellites": "1",
+}
+"""Units that ArduPilot writes (libraries/AP_Logger/LogStructure.h), as they are called here. Others
+are of no use to a flight record and count as not declared.
+"""
+
+PREFIXES = {"": 1.0, "d": 1e-1, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
+"""What is put before a label for its multiplier; other multipliers stand there as a number."""
+
+CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
+"""Fields that hold the time, in s of one count."""
+
+MODE = "M"
+"""Type of a flight mode, which text logs write as a word."""
+
+ABOUT_THE_LOG = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "FILE")
+"""Messages that hold no measurement."""
+
+
+def read_dataflash(
+    path: str | os.PathLike[str],
+    fields: Mapping[str, str],
+    dt: float,
+    units: Mapping[str, str] | None = None,
+) -> Table:
+    """{signal: "message.field"}, interpolated to steps of `dt` (s) over their common time as
+    `symheli.logs.column.on_one_axis` does.
+
+    The log's own units are used; `units` declares those of the signals where it has none. Raises
+    `InputError` without pymavlink, for a file that is no such log, messages without time or in no
+    common time, and a unit that is missing or contradicts the log; `UnknownNameError` for messages
+    and fields the log lacks.
+    """
+    dt, units = positive(dt), units or {}
+    if not fields:
+        raise InputError('name at least one signal: fields={"q": "IMU.GyrY", "theta": "ATT.Pitch"}')
+    for name in units:
+        if name not in fields:
+            raise UnknownNameError("signal in units", name, fields)
+    split = {name: _split(column) for name, column in fields.items()}
+    found = _read(path, {message for message, _, _ in split.values()})
+    columns = {name: _pick(found, *where, path) for name, where in split.items()}
+    known = {
+        name: _unit(name, fields[name], column.unit, units.get(name))
+        for name, column in columns.items()
+    }
+    time, values = on_one_axis(columns, dt, path)
+    return time, values, known
+
+
+def dataflash_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
+    """Every column of numbers by its name, the instance in it where a message has more than one."""
+    return {
+        f"{message}{'' if i == 0 else f'[{instance}]'}.{field}": column
+        for message, instances in _read(path, None).items()
+        for i, (instance, columns) in enumerate(instances.items())
+        for field, column in columns.items()
+        if column.time is not None
+    }
+
+
+_Messages = dict[str, dict[str, dict[str, Column]]]
+"""Column by message, instance ("" where there is only one) and field."""
+
+
+def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messages:
+    """These messages, or all; the message's name alone where the log has none of it."""
+    with extra("logs", "reading an ArduPilot log"):
+        from pymavlink.DFReader import (  # type: ignore[import-not-found]
+            DFReader_binary,
+            DFReader_text,
+        )
+    file = existing(path)
+    with file.open("rb") as opened:
+        reader = DFReader_binary if opened.read(2) == b"\xa3\x95" else DFReader_text
+    rows: dict[tuple[str, str], list[Any]] = {}
+    try:
+        with quiet() as said, _closing(reader) as log:
+            log.__init__(str(file))
+            present = [n for n in log.name_to_id if n not in ABOUT_THE_LOG]
+            names = present if wanted is None else list(wanted)
+            while (message := log.recv_match(type=names, strict=True)) is not None:
+                instance = message.fmt.instance_field
+                key = "" if instance is None else str(getattr(message, instance))
+                rows.setdefault((message.get_type(), key), []).append(message)
+            out: _Messages = {}
+            for (name, key), messages in rows.items():
+                out.setdefault(name, {})[key] = _columns(messages)
+    except Exception as error:
+        raise InputError(
+            f"{file}: not an ArduPilot log, or one that was damaged"
+            f" ({said_by(error)}); download it once more"
+        ) from error
+    if not present:
+        raise InputError(
+            f"{file}: no message that could be read; an ArduPilot log begins with the formats of"
+            " its messages, was this one cut at its beginning?"
+        )
+    if said.getvalue():
+        warn_of_damage(file)
+    for name in wanted or ():
+        if name not in out:
+            raise UnknownNameError(f"message in {file.name}", name, sorted(out) or present)
+    return out
+
+
+@contextlib.contextmanager
+def _closing(reader: Any) -> Iterator[Any]:
+    """A reader that is closed also where it fails to open (its constructor leaves the file open),
+    and tells damage in Python: its compiled index prints past `quiet`.
+    """
+    log = object.__new__(reader)
+    log.init_arrays_fast = log.init_arrays
+    try:
+        yield log
+    finally:
+        for part in ("data_map", "filehandle"):
+            if hasattr(log, part):
+                getattr(log, part).close()
+
+
+def _columns(messages: list[Any]) -> dict[str, Column]:
+    """The fields of numbers of messages of one kind."""
+    form = messages[0].fmt
+    clock = next((name for name in CLOCKS if name in form.columns), None)
+    time = None
+    if clock is not None:
+        time = CLOCKS[clock] * np.array([float(getattr(m, clock)) for m in messages])
+    out = {}
+    for name, kind, letter in zip(form.columns, form.msg_types, form.msg_fmts, strict=False):
+        if name in CLOCKS or kind not in (int, float) or letter == MODE:
+            continue
+        values = np.array([float(getattr(m, name)) for m in messages])
+        label = form.get_unit(name)
+        if label == "degheading":
+            values = np.unwrap(values, period=360.0)
+        factor, unit = _declared(label)
+        out[name] = Column(time, values if factor == 1 else factor * values, unit)
+    return out
+
+
+def _declared(label: str) -> tuple[float, str | None]:
+    """Factor and unit of what the log says, such as "cm/s" or "1e-07 deglatitude"; (1, None) where
+    it says nothing that is known.
+    """
+    if label in LABELS:
+        return 1.0, LABELS[label]
+    number, _, rest = label.partition(" ")
+    if rest in LABELS and re.fullmatch(r"[\d.e+-]+", number):
+        return float(number), LABELS[rest]
+    if label[:1] in PREFIXES and label[1:] in LABELS:
+        return PREFIXES[label[:1]], LABELS[label[1:]]
+    return 1.0, None
+
+
+def _split(column: str) -> tuple[str, str | None, str]:
+    match = re.fullmatch(r"(\w+)(?:\[(\w+)\])?\.(\w+)", column)
+    if match is None:
+        raise InputError(
+            f'{column!r}: a column of an ArduPilot log is "message.field", such as "IMU.GyrY", or'
+            ' "IMU[1].GyrY" of another instance'
+        )
+    message, instance, field = match.groups()
+    return message, instance, field
+
+
+def _pick(found: _Messages, message: str, instance: str | None, field: str, path: object) -> Column:
+    instances = found[message]
+    if instance is not None and instance not in instances:
+        raise UnknownNameError(f"instance of {message}", instance, sorted(filter(None, instances)))
+    columns = instances[next(iter(instances)) if instance is None else instance]
+    if field not in columns:
+        raise UnknownNameError(f"field of {message} that holds numbers", field, columns)
+    if columns[field].time is None:
+        raise InputError(
+            f"{path}: {message} carries no time (logs from before 2014); it cannot be placed beside"
+            " other messages"
+        )
+    return columns[field]
+
+
+def _unit(name: str, column: str, logged: str | None, given: str | None) -> str:
+    """The log's unit, else the one given."""
+    if given is not None:
+        to_si(given)
+    if logged is None and given is None:
+        raise InputError(
+            f"the log does not declare the unit of {column}; give it: units={{{name!r}: ...}}"
+            " ('1' where it has none)"
+        )
+    if logged is not None and given is not None and to_si(logged) != to_si(given):
+        raise InputError(
+            f"{name}: the log says that {column} is in {logged}, not {given}; leave out the unit"
+        )
+    return logged or given or "1"

@@ -1,0 +1,46 @@
+"""Which kind of log a file is: by its first bytes, not by its name."""
+
+from __future__ import annotations
+
+import os
+import re
+from typing import Literal, get_args
+
+from symheli.logs.files import existing
+
+Format = Literal["xplane", "csv", "mat", "ulog", "dataflash"]
+FORMATS: tuple[Format, ...] = get_args(Format)
+
+LOOKED_AT = 4096
+"""Bytes that decide."""
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""At the beginning, or behind the 512 bytes that MATLAB writes about itself."""
+
+
+def format_of(path: str | os.PathLike[str]) -> Format:
+    """A MATLAB file, a PX4 ULog, an ArduPilot DataFlash log (binary or text), an X-Plane log
+    ("name,unit |" in its first line), else a table.
+
+    Raises `InputError` for a file that is not there or empty.
+    """
+    with existing(path).open("rb") as file:
+        head = file.read(LOOKED_AT)
+    if head.startswith(b"MATLAB") or _has_hdf5(head):
+        return "mat"
+    if head.startswith(b"ULog"):
+        return "ulog"
+    if head.startswith(b"\xa3\x95") or re.search(rb"^FMT, ?\d+, ?\d+, ?\w+,", head, re.MULTILINE):
+        return "dataflash"
+    first = next((line for line in head.splitlines() if line.strip()), b"")
+    return "xplane" if b"|" in first and b"," in first.split(b"|")[0] else "csv"
+
+
+def is_hdf5(path: str | os.PathLike[str]) -> bool:
+    """Whether a MATLAB file is one of -v7.3."""
+    with existing(path).open("rb") as file:
+        return _has_hdf5(file.read(LOOKED_AT))
+
+
+def _has_hdf5(head: bytes) -> bool:
+    return head.startswith(HDF5) or head[512:].startswith(HDF5)
