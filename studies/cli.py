@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from studies.output import Output, as_json
+from studies.progress import displayed
 from studies.threads import one_thread
 from symheli.errors import SymheliError
 
@@ -46,7 +47,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     with warnings.catch_warnings():
         warnings.showwarning = _note
         try:
-            output: Output = arguments.run(arguments)
+            with displayed():
+                output: Output = arguments.run(arguments)
             print(as_json(output.data) if arguments.json else output.text, flush=True)
             return output.status
         except SymheliError as error:
