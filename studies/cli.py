@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from studies.output import Output, as_json
+from studies.progress import displayed
 from studies.threads import one_thread
 from symheli.errors import SymheliError
 
@@ -39,21 +40,28 @@ def main(argv: Sequence[str] | None = None) -> int:
     130 interrupted.
     """
     one_thread()
+    arguments = None
     try:
         arguments = parser().parse_args(argv)
+        return _run(arguments)
     except SystemExit as stop:  # argparse has said what is wrong
         return int(stop.code or 0)
+    except KeyboardInterrupt:
+        kept = arguments.kept(arguments) if arguments else "nothing was begun"
+        print(f"\nsymheli: interrupted; {kept}", file=sys.stderr)
+        return 130
+
+
+def _run(arguments: argparse.Namespace) -> int:
     with warnings.catch_warnings():
         warnings.showwarning = _note
         try:
-            output: Output = arguments.run(arguments)
+            with displayed():
+                output: Output = arguments.run(arguments)
             print(as_json(output.data) if arguments.json else output.text, flush=True)
             return output.status
         except SymheliError as error:
             return _fail(" ".join(str(error).split()))
-        except KeyboardInterrupt:
-            print(f"\nsymheli: interrupted; {arguments.kept(arguments)}", file=sys.stderr)
-            return 130
         except BrokenPipeError:  # the reader, such as head, has seen enough
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0

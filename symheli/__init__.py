@@ -79,6 +79,7 @@ if TYPE_CHECKING:
         Scheduling,
         UncertainStateSpace,
     )
+    from symheli.progress import Progress, watched
     from symheli.records import FlightRecord
     from symheli.steady.airspeed_sweep import sweep
     from symheli.steady.derivative_table import DerivativeTable, derivatives
@@ -117,6 +118,7 @@ _ROOMS = {
     "symheli.lpv": (
         "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling UncertainStateSpace"
     ),
+    "symheli.progress": "Progress watched",
     "symheli.errors": (
         "AccuracyError CertificateError CompilerWarning ConvergenceWarning DataWarning"
         " ExcitationError FlightLostError InputError PrecisionWarning SolverError SymheliError"
@@ -159,6 +161,7 @@ __all__ = [
     "LinearModel",
     "NamedVector",
     "PrecisionWarning",
+    "Progress",
     "Radau",
     "RungeKutta4",
     "ScheduledController",
@@ -196,6 +199,7 @@ __all__ = [
     "trim_batch",
     "trim_map",
     "vehicles",
+    "watched",
 ]
 __version__ = "0.1.0"
 

@@ -31,6 +31,7 @@ SHARED = (
     "symheli.errors",
     "symheli.extras",
     "symheli.lazy",
+    "symheli.progress",
 )
 """What identification and synthesis may see of the model's room."""
 

@@ -22,6 +22,7 @@ from identification.structure.kinematic_arx import STATES, Aerodynamics, increme
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression, Samples, regressor_rows
 from symheli.errors import InputError, UnknownNameError
+from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.kinematics import VELOCITIES, kinematic_jacobian
@@ -149,7 +150,7 @@ class FilterError(Method):
         Q = np.append(self.misfit * self._unexplained(arx, records), EXACT * R[6:])
         noise = Noise(R, Q, self.gust**2, float(np.exp(-records[0].dt / self.gust_time)))
         count, settled = 0, False
-        while count < self.steps and not settled:
+        for _ in tracked("filter error", range(self.steps)):
             count += 1
             normal, right = map(sum, zip(*(s.normal(theta, noise) for s in flights), strict=True))
             step, inverse = _solved(normal, right)  # type: ignore[arg-type]
@@ -159,6 +160,8 @@ class FilterError(Method):
             theta = theta + change
             spread = np.sqrt(np.diag(inverse))
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
+            if settled:
+                break
         scores = sum(s.scores(theta, noise) for s in flights)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)

@@ -16,6 +16,7 @@ from identification.estimators.method import Estimate, Method
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression
 from symheli.errors import InputError
+from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
@@ -80,7 +81,7 @@ def lasso(arx: LPVARX, data: Regression, options: Lasso) -> tuple[Array, Array]:
         regressors = arx.regressors(group)
         X = data.phi[:, regressors]
         scale = column_scale(X) / np.sqrt(len(X))
-        for y in group.outputs:
+        for y in tracked("lasso", group.outputs):
             prices, path = lasso_path(X / scale, data.y[:, y])
             b, price = (
                 _by_criterion(X / scale, data.y[:, y], prices, path)
@@ -116,7 +117,7 @@ def lasso_path(X: Array, y: Array) -> tuple[Array, Array]:
     b, active, barred = np.zeros(n), [], np.zeros(n, dtype=bool)
     price = float(np.abs(R.T @ z).max(initial=0.0))
     prices, path, left = [price], [b], -1
-    for _ in range(20 * n):
+    for _ in tracked("corners of the path", range(20 * n)):
         if price <= 1e-14 * prices[0]:
             break
         correlation = R.T @ (z - R @ b)
@@ -201,7 +202,8 @@ def _at(weight: float, prices: Array, path: Array) -> tuple[Array, float]:
 def _by_criterion(X: Array, y: Array, prices: Array, path: Array) -> tuple[Array, float]:
     """The corner of the path whose kept coefficients, refitted, have the smallest criterion."""
     found = {tuple(np.flatnonzero(b).tolist()): k for k, b in reversed(list(enumerate(path)))}
-    best = found[min(found, key=lambda kept: _criterion(X, y, np.array(kept, dtype=int)))]
+    corners = tracked("comparing corners", found)
+    best = found[min(corners, key=lambda kept: _criterion(X, y, np.array(kept, dtype=int)))]
     return path[best], float(prices[best])
 
 
@@ -212,7 +214,7 @@ def _pruned(X: Array, y: Array, kept: Array) -> Array:
     score = _criterion(X, y, kept)
     while len(kept):
         less = [np.delete(kept, i) for i in range(len(kept))]
-        scores = [_criterion(X, y, k) for k in less]
+        scores = [_criterion(X, y, k) for k in tracked("leaving out", less)]
         best = int(np.argmin(scores))
         if scores[best] > score:
             break

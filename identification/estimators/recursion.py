@@ -12,6 +12,7 @@ from identification.recursive.forgetting import Constant, Forgetting, forgetting
 from identification.recursive.recursive_least_squares import RecursiveLeastSquares
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression
+from symheli.progress import tracked
 from symheli.records import FlightRecord
 
 
@@ -48,7 +49,8 @@ class Recursion(Method):
         """The coefficients after the last sample."""
         forgetting = forgetting_of(self.forgetting)
         online = RecursiveLeastSquares(arx, forgetting).online()
-        for phi, y in zip(data.phi, data.y, strict=True):
+        samples = zip(data.phi, data.y, strict=True)
+        for phi, y in tracked("recursive least squares", samples, len(data.y)):
             online.absorb(phi, y)
         state = online.state
         check_recursion(state, data.phi, data.y)

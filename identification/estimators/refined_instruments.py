@@ -31,6 +31,7 @@ from identification.model.stretches import (
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
+from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
@@ -158,7 +159,7 @@ def refined_instruments(
         _size([run.target - run.regressors() @ start for run in runs]),
     )
     row, output = free_of(arx)
-    for iteration in range(1, options.iterations + 1):
+    for iteration in tracked("refined instruments", range(1, options.iterations + 1)):
         model = contracted(arx, theta, clean) if exogenous is None else theta
         filters = [
             _filter(run.lag_coefficients(model), size, simulate=exogenous is None) for run in runs

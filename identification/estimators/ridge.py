@@ -18,6 +18,7 @@ from identification.structure.lpvarx import LPVARX, Group
 from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
 from symheli.lpv import FunctionSpace
+from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
@@ -89,7 +90,7 @@ def ridge(arx: LPVARX, data: Regression, options: Ridge) -> tuple[Array, Array]:
     for group in arx.groups:
         regressors, outputs = arx.regressors(group), np.array(group.outputs)
         problem = _Problem.of(arx, data, group, options)
-        for y in outputs:
+        for y in tracked("ridge", outputs):
             weights[y] = problem.cross_validated(y) if options.weight is None else options.weight
             theta[regressors, y] = problem.solve(float(weights[y]), y)
     return theta, weights

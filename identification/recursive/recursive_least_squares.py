@@ -23,10 +23,13 @@ from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import Samples, as_records, units_of
 from symheli.errors import InputError
+from symheli.progress import task
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
+AT_ONCE = 10_000
+"""So many samples are taken in before an interrupt is heard: some hundredths of a second."""
 
 
 @dataclass(frozen=True)
@@ -173,9 +176,13 @@ class RecursiveLeastSquares:
         rows = np.column_stack([measured, s.p])
         online.forget_past()
         parts = []
-        for segment in s.segments:
-            online.forget_past()
-            parts.append(online.run(rows[segment]))
+        with task("recursive least squares", len(rows)) as learning:
+            for segment in s.segments:
+                online.forget_past()
+                for begin in range(segment.start, segment.stop, AT_ONCE):
+                    end = min(begin + AT_ONCE, segment.stop)
+                    parts.append(online.run(rows[begin:end]))
+                    learning.to(end)
         learnt, innovations, coefficients = (
             np.concatenate(part) for part in zip(*parts, strict=True)
         )

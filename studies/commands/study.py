@@ -4,40 +4,42 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from studies.commands import options
 from studies.commands.options import count
-from studies.output import Output
+from studies.output import Output, columns
+
+if TYPE_CHECKING:
+    from studies.transition.configuration import Configuration
 
 HELP = "the main job: model, identification, guarantees, report"
+OVERRIDE = ("vehicle", "seed", "out", "quick")
+"""Options that win over the file."""
+STANDARD_OUTPUT = "-"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Vehicle, folder, length."""
+    """Configuration file, what wins over it, stages."""
     parser.add_argument(
-        "--vehicle",
-        default="xcell60",
-        metavar="NAME",
-        help="packaged airframe or TOML file (default: %(default)s)",
+        "file",
+        nargs="?",
+        type=Path,
+        metavar="FILE",
+        help="TOML file with what is asked for; see --write-config",
     )
     parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("study"),
-        metavar="DIR",
-        help="folder of report and numbers (default: %(default)s)",
+        "--vehicle", metavar="NAME", help="packaged airframe or TOML file (default: xcell60)"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder of report and numbers (default: study)"
     )
     parser.add_argument(
         "--quick",
-        action="store_true",
+        action=argparse.BooleanOptionalAction,
         help="shorter flights and fewer of them: a look, not the result",
     )
-    parser.add_argument(
-        "--seed",
-        type=count,
-        default=0,
-        metavar="N",
-        help="excitation and noise (default: %(default)s)",
-    )
+    parser.add_argument("--seed", type=count, metavar="N", help="excitation and noise (default: 0)")
     parser.add_argument(
         "--resume",
         action="store_true",
@@ -47,22 +49,91 @@ def configure(parser: argparse.ArgumentParser) -> None:
             " They are Python pickles: resume only folders of your own"
         ),
     )
-    parser.set_defaults(
-        kept=lambda arguments: (
-            f"what was finished is in {arguments.out}; --resume goes on from there"
-        )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--only",
+        type=options.names,
+        default=(),
+        metavar="STAGE,...",
+        help="compute these stages; what they need is taken from DIR/stages, computed if absent",
     )
+    which.add_argument(
+        "--from",
+        dest="since",
+        default="",
+        metavar="STAGE",
+        help="compute this stage and all that need it; the others are taken from DIR/stages",
+    )
+    which.add_argument(
+        "--list-stages", action="store_true", help="name, need and state of every stage; run none"
+    )
+    which.add_argument(
+        "--write-config",
+        nargs="?",
+        const=STANDARD_OUTPUT,
+        metavar="FILE",
+        help="write a configuration with the defaults (default: to standard output); run nothing",
+    )
+    parser.set_defaults(kept=_kept)
 
 
 def run(arguments: argparse.Namespace) -> Output:
     """Run the study; it shows its own progress and writes into the folder."""
+    configuration = _asked(arguments)
+    if arguments.write_config is not None:
+        return _written(configuration, arguments.write_config)
+    if arguments.list_stages:
+        return _listed(configuration)
     from studies.transition.study import run_study
 
     result = run_study(
-        vehicle=arguments.vehicle,
-        out=arguments.out,
-        quick=arguments.quick,
-        seed=arguments.seed,
-        resume=arguments.resume,
+        configuration, resume=arguments.resume, only=arguments.only, since=arguments.since
     )
-    return Output(result.summary(), result.to_dict())
+    report = configuration.out / "report.html"
+    return Output(f"{result.summary()}\nreport: {report}", result.to_dict())
+
+
+def _asked(arguments: argparse.Namespace) -> Configuration:
+    from studies.transition.configuration import Configuration
+
+    given = {name: getattr(arguments, name) for name in OVERRIDE}
+    return Configuration.read(arguments.file, {k: v for k, v in given.items() if v is not None})
+
+
+def _kept(arguments: argparse.Namespace) -> str:
+    if arguments.write_config is not None or arguments.list_stages:
+        return "nothing was written, files that were there are unchanged"
+    return f"what was finished is in {_asked(arguments).out}; --resume goes on from there"
+
+
+def _written(configuration: Configuration, target: str) -> Output:
+    from symheli.errors import InputError
+    from symheli.values.whole_files import write_text
+
+    if target == STANDARD_OUTPUT:
+        text = configuration.text(Path())
+        return Output(text.rstrip("\n"), {"configuration": text})
+    path = Path(target)
+    if path.exists():
+        raise InputError(f"{path} is there; give another name, or remove it")
+    write_text(path, configuration.text(path.parent))
+    return Output(f"wrote {path}", {"written": path})
+
+
+def _listed(configuration: Configuration) -> Output:
+    from studies.transition.stages import stages
+    from studies.transition.stored_stages import stored_stages
+
+    stored = stored_stages(configuration)
+    entries = [
+        {
+            "name": stage.name,
+            "title": stage.title,
+            "needs": stage.needs,
+            "state": stored.state(stage.name, stage.kind),
+        }
+        for stage in stages(configuration.effort)
+    ]
+    rows = [["stage", "state", "needs", "what it does"]]
+    rows += [[e["name"], e["state"], ", ".join(e["needs"]) or "-", e["title"]] for e in entries]
+    return Output(columns(rows, left=4), {"folder": stored.folder, "stages": entries})

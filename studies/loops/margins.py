@@ -12,6 +12,7 @@ from studies.loops.lateral import HOLD
 from symheli import LinearModel
 from symheli.flight import XCELL_SERVOS
 from symheli.lpv import pade_delay
+from symheli.progress import tracked
 from synthesis import Bandwidth, Margins
 
 DELAY = 0.02
@@ -43,7 +44,8 @@ def over_airspeed(
     airspeeds: Sequence[float], lateral: Sequence[LinearModel], longitudinal: Sequence[LinearModel]
 ) -> Iterator[AtAirspeed]:
     """One entry an airspeed from the continuous lateral and longitudinal models there."""
-    for airspeed, roll, pitch in zip(airspeeds, lateral, longitudinal, strict=True):
+    models = zip(airspeeds, lateral, longitudinal, strict=True)
+    for airspeed, roll, pitch in tracked("margins", models, len(airspeeds)):
         roll = behind_servo(roll, "d_lat")
         held = roll.feedback({("d_lat", "phi"): HOLD}).select(inputs=["d_lat"], outputs=["phi"])
         stick = behind_servo(pitch, "d_lon").select(inputs=["d_lon"], outputs=["theta"])

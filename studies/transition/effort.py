@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from studies.choices import about, check, choice
 from studies.marks.flights import LONGEST as AGGRESSIVE
 from studies.marks.guarantee import FORM
 from synthesis import Search, Spline
@@ -15,41 +16,63 @@ GLANCE = Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=2
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is done: the whole study, or a look (`quick`)."""
+    """How much is done: the whole study, or a look (`quick`). Raises `InputError` for what is of
+    another type or out of range.
+    """
 
-    ramps: int = 12
-    gentle_ramps: int = 10
-    gust_rates: tuple[float, ...] = (0.0, 0.1, 1.0, 3.0, 4.5, 7.6, math.inf)
-    gust_segments: tuple[int, ...] = (16,)
-    exact_rates: tuple[float, ...] = (0.0, 1.0, 3.0)
-    longitudinal_rates: tuple[float, ...] = (0.0, 3.0, math.inf)
-    thorough: bool = True
-    """Whether a P with a memory, the exact models and the LFT tests of the servo loops are part of
-    it.
+    ramps: int = choice(12, "changes of airspeed in the flights that are identified", least=2)
+    gentle_ramps: int = choice(10, "the same in the gentle flight", least=2)
+    gust_rates: tuple[float, ...] = choice(
+        (0.0, 0.1, 1.0, 3.0, 4.5, 7.6, math.inf),
+        "permitted |dV/dt| of the lateral gust loop, m/s^2; inf: airspeed may jump",
+        least=0,
+    )
+    gust_segments: tuple[int, ...] = choice(
+        (16,), "segments of P(V) of both gust loops, tried in turn", least=1
+    )
+    exact_rates: tuple[float, ...] = choice(
+        (0.0, 1.0, 3.0), "|dV/dt| for the exact lateral gust loop, m/s^2", least=0, empty=True
+    )
+    longitudinal_rates: tuple[float, ...] = choice(
+        (0.0, 3.0, math.inf),
+        "|dV/dt| of the longitudinal gust loop, m/s^2; []: leave the stage out",
+        least=0,
+        empty=True,
+    )
+    thorough: bool = choice(
+        True, "a P with a memory, the exact models and the LFT tests of the servo loops, too"
+    )
+    aggressive: float = choice(
+        AGGRESSIVE, "longest aggressive flight of the models with known kinematics, s", least=20
+    )
+    gentle_flight: bool = choice(True, "identify those from a gentle flight, too")
+    robust_rates: tuple[float, ...] = choice(
+        (0.0, 3.0), "|dV/dt| of the loop with a margin, m/s^2", least=0
+    )
+    robust_form: Spline = field(
+        default_factory=lambda: Spline(segments=(8,)), metadata=about("P(V) of that loop")
+    )
+    every_model: bool = choice(True, "prove its gain for every model that the flights allow, too")
+    servo_rates: tuple[float, ...] = choice(
+        (0.0, 3.0, 8.0, math.inf), "|dV/dt| of the servo loop, m/s^2", least=0
+    )
+    servo_segments: tuple[int, ...] = choice((8,), "segments of its P(V)", least=1)
+    design_points: int = choice(14, "airspeeds of a schedule of point designs", least=4)
+    certified_controllers: bool = choice(
+        True, "prove gains of the loops that fly, and ask for the verdict on the identified model"
+    )
+    controller_seeds: int = choice(
+        20, "flights of each controller in turbulence of each size", least=1
+    )
+    search: Search = field(
+        default_factory=Search, metadata=about("for bad trajectories of the lateral gust loop")
+    )
+    """Its gain grows with the rate; elsewhere a glance finds the growth there is, and nothing above
+    frozen.
     """
-    aggressive: float = AGGRESSIVE
-    """Longest aggressive flight of the models that know their kinematics, s."""
-    gentle_flight: bool = True
-    """Whether they are identified from a gentle flight too."""
-    robust_rates: tuple[float, ...] = (0.0, 3.0)
-    robust_form: Spline = field(default_factory=lambda: Spline(segments=(8,)))
-    """Of the loop with a margin."""
-    every_model: bool = True
-    """Whether its gain is proven for every model that the flights allow."""
-    servo_rates: tuple[float, ...] = (0.0, 3.0, 8.0, math.inf)
-    servo_segments: tuple[int, ...] = (8,)
-    design_points: int = 14
-    """Airspeeds of a schedule of point designs."""
-    certified_controllers: bool = True
-    """Whether gains of the loops that fly are proven, and the verdict on the identified model is
-    asked for.
-    """
-    controller_seeds: int = 20
-    """Flights of each controller in turbulence of each size."""
-    search: Search = field(default_factory=Search)
-    """For the lateral gust, whose gain grows with the rate; elsewhere a glance finds the growth
-    there is, and nothing above frozen.
-    """
+
+    def __post_init__(self) -> None:
+        check(self)
 
     @classmethod
     def look(cls) -> Effort:

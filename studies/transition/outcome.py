@@ -10,6 +10,7 @@ from studies.controllers.designs import Designs
 from studies.controllers.flown import FlownControllers
 from studies.transition.baseline import Baseline
 from studies.transition.comparison import Comparison
+from studies.transition.effort import Effort
 from studies.transition.flights import Flights
 from studies.transition.guarantees import Bound
 from studies.transition.identified import Identification
@@ -30,6 +31,7 @@ class Outcome:
     vehicle: str
     quick: bool
     seed: int
+    effort: Effort = field(default_factory=Effort)
     heli: Helicopter | None = None
     baseline: Baseline | None = None
     paper_experiment: PaperExperiments | None = None

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from studies.controllers.written import controllers_to_dict
 from studies.marks.truth import SPEEDS
+from studies.output import plain
 from studies.transition.axes import HORIZON
 from studies.transition.certificates import bound_to_dict
 from studies.transition.guarantees import unit_of
@@ -40,6 +42,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         "vehicle": study.vehicle,
         "quick": study.quick,
         "seed": study.seed,
+        "effort": plain(asdict(study.effort)),
         "complete": study.complete,
         "horizon": value(HORIZON, "s"),
         "versions": (

@@ -17,11 +17,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from studies.transition.configuration import Configuration
 from symheli import Helicopter
 from symheli.errors import SymheliError
 from symheli.values.whole_files import write_bytes
 
 FORMAT = "symheli stage 1"
+STAGES = "stages"
+"""Folder of the stored stages, in that of the run."""
 PACKAGES = ("symheli", "identification", "synthesis", "studies")
 LIBRARIES = ("casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
@@ -76,6 +79,16 @@ class StoredStages:
             raise NotUsable(f"{path} is damaged: it holds another stage")
         return stored
 
+    def state(self, name: str, kind: type) -> str:
+        """In a few words: whether the stage is there and can be taken, or how far it is."""
+        try:
+            if self.load(name, kind) is not None:
+                return "stored"
+        except NotUsable as reason:
+            return "damaged" if "damaged" in str(reason) else "of another run"
+        answers = len(list(self.folder.glob(f"{name}-*.stage")))
+        return f"{answers} answers stored" if answers else "absent"
+
     def answers(self, stage: str) -> StoredAnswers:
         """Where the answers to the questions of a stage are stored until it is finished."""
         return StoredAnswers(self, stage)
@@ -112,6 +125,18 @@ class StoredAnswers:
 
     def _name(self, i: int) -> str:
         return f"{self.stage}-{i}"
+
+
+def stored_stages(configuration: Configuration, heli: Helicopter | None = None) -> StoredStages:
+    """Those in the folder of a run that were computed from what it asks for."""
+    heli = heli or loaded(configuration)
+    key = content_key(heli, configuration.effort, configuration.seed)
+    return StoredStages(configuration.out / STAGES, key)
+
+
+def loaded(configuration: Configuration) -> Helicopter:
+    """The helicopter of a run."""
+    return Helicopter.load(configuration.vehicle, governor="ideal")
 
 
 def content_key(heli: Helicopter, effort: object, seed: int) -> str:

@@ -18,6 +18,7 @@ from symheli.flight.plan import FlightPlan, Options, plan_of
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.helicopter import Helicopter
 from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers_of
+from symheli.progress import task
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
 
@@ -146,10 +147,12 @@ def fly_batch(
     """
     plans = plans_of(schedules, seeds, options)
     found: dict[int, FlightData] = {}
-    for done, flown in fly_in_chunks(heli, plans, workers):
-        found.update(zip(done, flown, strict=True))
-        if progress is not None:
-            progress(len(found), len(plans))
+    with task("flying", len(plans)) as flying:
+        for done, flown in fly_in_chunks(heli, plans, workers):
+            found.update(zip(done, flown, strict=True))
+            flying.to(len(found))
+            if progress is not None:
+                progress(len(found), len(plans))
     return FlightBatch(tuple(found[i] for i in range(len(plans))))
 
 

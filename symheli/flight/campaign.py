@@ -19,6 +19,7 @@ from symheli.flight.flight_dataset import FlightDataset
 from symheli.flight.plan import FlightPlan, Options
 from symheli.flight.plan_text import described
 from symheli.helicopter import Helicopter
+from symheli.progress import task
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 
@@ -93,16 +94,18 @@ def fly_campaign(
         wanted.append(list(range(position, position + size)))
         position += size
     number = {rows[0]: chunk for rows, chunk in zip(wanted, chunks, strict=True)}
-    for rows, flown in fly_in_chunks(heli, [plans[i] for i in at], workers, wanted):
-        dataset.write(
-            number[rows[0]],
-            np.stack([_values(data, kept, len(dataset.time)) for data in flown]),
-            np.array([(data.kept - 1) * data.plan.dt for data in flown]),
-            np.array([data.lost >= 0 for data in flown]),
-        )
-        done += len(rows)
-        if progress is not None:
-            progress(done, len(plans))
+    with task("flying", len(at)) as flying:
+        for rows, flown in fly_in_chunks(heli, [plans[i] for i in at], workers, wanted):
+            dataset.write(
+                number[rows[0]],
+                np.stack([_values(data, kept, len(dataset.time)) for data in flown]),
+                np.array([(data.kept - 1) * data.plan.dt for data in flown]),
+                np.array([data.lost >= 0 for data in flown]),
+            )
+            done += len(rows)
+            flying.to(done - len(plans) + len(at))
+            if progress is not None:
+                progress(done, len(plans))
     return dataset
 
 

@@ -88,17 +88,17 @@ static void newton(lane *z, const lane *kept, lane miss, long steps, double enou
   }
 }
 
-/* Trims 0 <= k < count, in order. after[k]: an earlier one whose solution is the start of k (where
+/* Trims begin <= k < end, in order, those before being there. after[k]: an earlier one whose solution is the start of k (where
    it misses by `found` or more, the one which that was after, and so on); -1: its own row of z.
    z: count x NZ, starts and then solutions; demand: count x NC; p: rows of p_stride; miss: count,
    largest residuals. */
-void trims(long count, const long *after, const double *demand, const double *p, long p_stride,
-           double *z, double *miss, long steps, double enough, double found)
+void trims(long begin, long end, const long *after, const double *demand, const double *p,
+           long p_stride, double *z, double *miss, long steps, double enough, double found)
 {
-  for (long first = 0, last; first < count; first = last) {
+  for (long first = begin, last; first < end; first = last) {
     lane unknown[NZ], asked[NC], par[NP], kept[NK], left;
     /* as many as depend on none of each other */
-    for (last = first; last < count && last < first + LANES && after[last] < first; ++last) {
+    for (last = first; last < end && last < first + LANES && after[last] < first; ++last) {
       long start = after[last];
       while (start >= 0 && !(miss[start] < found)) start = after[start];
       if (start >= 0) memcpy(z + last * NZ, z + start * NZ, NZ * sizeof *z);

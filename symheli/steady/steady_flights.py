@@ -12,12 +12,15 @@ from functools import cached_property
 import numpy as np
 
 from symheli.helicopter import Helicopter
+from symheli.progress import task, tracked
 from symheli.steady.equations import SteadyEquations, numeric, steady_equations
 from symheli.steady.equilibrium import Equilibrium
 from symheli.steady.flight_conditions import FlightConditions
 from symheli.steady.newton import ROUNDING, STEPS, TOLERANCE
 from symheli.values.arrays import Array
 
+AT_ONCE = 4096
+"""So many trims are solved before an interrupt is heard: some hundredths of a second."""
 ALONE = -1
 """In place of the flight before: from its own start."""
 
@@ -82,24 +85,29 @@ class SteadyFlights:
         after = np.array(np.broadcast_to(after, len(self)), ctypes.c_long)
         code = self.equations.machine_code
         if code is None:
-            for k in range(len(self)):
+            for k in tracked("trimming", range(len(self))):
                 alone = Equilibrium(self.heli(k), self.conditions[k])
                 start = after[k]
                 while start != ALONE and not miss[start] < TOLERANCE:
                     start = after[start]
                 z[k], miss[k] = alone.newton(z[k if start == ALONE else start])
             return z, miss
-        code.trims(
-            ctypes.c_long(len(self)),
-            _at(after),
-            _at(self._demand),
-            *self._shared(),
-            _at(z),
-            _at(miss),
-            ctypes.c_long(STEPS),
-            ctypes.c_double(ROUNDING),
-            ctypes.c_double(TOLERANCE),
-        )
+        with task("trimming", len(self)) as trimming:
+            for begin in range(0, len(self), AT_ONCE):
+                end = min(begin + AT_ONCE, len(self))
+                code.trims(
+                    ctypes.c_long(begin),
+                    ctypes.c_long(end),
+                    _at(after),
+                    _at(self._demand),
+                    *self._shared(),
+                    _at(z),
+                    _at(miss),
+                    ctypes.c_long(STEPS),
+                    ctypes.c_double(ROUNDING),
+                    ctypes.c_double(TOLERANCE),
+                )
+                trimming.to(end)
         return z, miss
 
     def points(self, z: Array) -> Points:

@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
+from symheli.progress import tracked
 from symheli.steady.equations import SIDE_BY_SIDE, steady_equations
 from symheli.steady.equilibrium import (
     Equilibrium,
@@ -250,7 +251,7 @@ def trimmed(
     """
     z, miss = flights.solved(np.broadcast_to(z, (len(flights), z.shape[-1])), after)
     demand = flights.conditions.demand
-    for k in np.flatnonzero(~(miss < TOLERANCE)).tolist():
+    for k in tracked("searching harder", np.flatnonzero(~(miss < TOLERANCE)).tolist()):
         alone = Equilibrium(flights.heli(k), flights.conditions[k])
         others = np.flatnonzero(miss < TOLERANCE)
         if len(others):

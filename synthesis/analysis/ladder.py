@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symheli.progress import task
 from synthesis.analysis.question import Question
 from synthesis.certificate import Attempt, Proof
 from synthesis.program.cone_program import Answer
@@ -97,6 +98,10 @@ class Ladder(ABC):
         What trajectories show plays no part: a longer search for them must not change what is
         proven.
         """
+        with task("searching a proof") as self._searching:
+            return self._searched(limit)
+
+    def _searched(self, limit: float) -> Found:
         if self.asked.demand.kind == "decay rate":
             return self._decay(limit)
         if not self.asked.gains:
@@ -140,11 +145,16 @@ class Ladder(ABC):
     def _margins(self, shape: Any, best: Found) -> Found:
         # without a gain the margin itself is what is maximised
         for margin in self.asked.impose.tried if self.asked.gains else (0.0,):
-            found = self.attempt(shape, margin)
+            found = self._tried(shape, margin)
             best = best.or_better(found, 1.0)
             if found.proof is not None or found.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
                 break
         return best
+
+    def _tried(self, shape: Any, margin: float, alpha: float = 0.0) -> Found:
+        found = self.attempt(shape, margin, alpha)
+        self._searching.step(str(self.attempts[-1]) if self.attempts else "")
+        return found
 
     def _decay(self, limit: float) -> Found:
         """The largest decay rate, between 0 and `limit` (1/s); each P counts for all that it
@@ -167,7 +177,7 @@ class Ladder(ABC):
         tolerance = DECAY_TOLERANCE * limit
         low, high = max(best.bound, 0.0), limit
         while True:
-            found = self.attempt(shape, 0.0, trial)
+            found = self._tried(shape, 0.0, trial)
             if found.proof is None or found.bound > 0:
                 best = best.or_better(found, -1.0)
             if found.answer is Answer.UNTRIED:

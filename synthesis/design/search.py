@@ -14,6 +14,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, Scheduling
 from symheli.lpv.bases.polynomials import polynomials
+from symheli.progress import tracked
 from synthesis.certificate import Attempt
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import Existence, Found
@@ -172,7 +173,7 @@ def least(
 ) -> tuple[Coordinates, Existence, Found]:
     """The least gamma, in a unit of performance that suits it."""
     channel = 1.0
-    for _ in range(3):
+    for _ in tracked(f"least gamma, {shape}", range(3)):
         own = coordinates(channel)
         existence = Existence(own, shape.X, shape.Y, divisions)
         found = existence.least_gamma(solver)
@@ -196,9 +197,9 @@ def settled(
     coordinates, existence, lowest = start
     if not math.isfinite(lowest.gamma):
         return
-    for factor in back_off:
+    for factor in tracked("backing off", back_off):
         gamma = factor * lowest.gamma
-        for found in existence.widest(gamma, solver):
+        for found in tracked(f"at {factor:g} of the least gamma", existence.widest(gamma, solver)):
             gains = recover(coordinates, existence, found) if np.any(found.coefficients) else None
             reached = math.inf
             if gains is not None:

@@ -22,11 +22,13 @@ Polynomials in Control (2005).
 
 from __future__ import annotations
 
+import math
 import time
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from symheli.progress import Task, task
 from synthesis.polynomial.symmetric import indices, smat, svec, symmetrized
 from synthesis.program.block_cholesky import BlockCholesky
 from synthesis.program.cone_program import Answer, Candidate, Solver
@@ -66,14 +68,22 @@ def minimise(program: Program, solver: Solver) -> Candidate:
     The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
     feasible to rounding or there is none. Never raises for a failed solve.
     """
+    digits = -math.log10(solver.options["tolerance"])
+    with task("digits of the least level", round(digits, 1)) as solving:
+        return _minimised(program, solver, solving)
+
+
+def _minimised(program: Program, solver: Solver, solving: Task) -> Candidate:
     tolerance, iterations, seconds = (
         solver.options[name] for name in ("tolerance", "iterations", "seconds")
     )
     begin = time.perf_counter()
     cones = _Cones(program)
-    point, count, feasible, before = cones.start(), 0, False, np.inf
+    point, count, feasible, before, digits = cones.start(), 0, False, np.inf, 0.0
     while True:
         at = cones.residuals(point)
+        digits = max(digits, _digits(at.gap, tolerance))
+        solving.to(digits, f"{count} iterations")
         close = at.primal_size <= FEASIBLE
         if close and not feasible and cones.inside(point):
             feasible, point = True, point._replace(S=cones.slacks(point.P, point.y))
@@ -102,6 +112,11 @@ def minimise(program: Program, solver: Solver) -> Candidate:
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
         return Candidate(answer, x, time.perf_counter() - begin, message)
+
+
+def _digits(gap: float, tolerance: float) -> float:
+    """Of the level that are found, as far as they are asked for."""
+    return round(-math.log10(max(gap, tolerance)), 1) if gap < 1.0 else 0.0
 
 
 class _Point(NamedTuple):

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv import Matrices, Scheduling
+from symheli.progress import tracked
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.polynomial import structure
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
@@ -219,13 +220,10 @@ class Evidence(NamedTuple):
         """
         if not self.demand.meaningful(self.model.dt, P.degrees) or math.isinf(bound):
             return False
-        exactly = all(
-            map(
-                negative_definite_exactly,
-                polynomials(self.model, P, self.demand, bound, rational()),
-            )
-        )
-        return exactly and self.witnessed(P, bound, rational())
+        asked = self.model, P, self.demand, bound
+        count = sum(1 for _ in polynomials(*asked, float))
+        every = tracked("verifying in rational arithmetic", polynomials(*asked, rational()), count)
+        return all(map(negative_definite_exactly, every)) and self.witnessed(P, bound, rational())
 
     def witnessed(self, P: BoxLyapunov, bound: float, number: Number) -> bool:
         """The pieces are the model, and the inequalities hold at some p without them; see

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv import LPVStateSpace, Matrices, Scheduling
+from symheli.progress import tracked
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial import structure
@@ -224,7 +225,9 @@ def proven(claim: Claim, gamma: float) -> bool:
         ):
             return False
     g = None if math.isnan(gamma) else number(gamma) * number(gamma)
-    for block, weight in lmi_polynomials(claim, number):
+    count = sum(1 for _ in lmi_polynomials(claim, float))
+    blocks = lmi_polynomials(claim, number)
+    for block, weight in tracked("verifying in rational arithmetic", blocks, count):
         for F, factor in zip(
             block.coefficients.reshape(-1, *block.shape), weight.coefficients.ravel(), strict=True
         ):

@@ -12,6 +12,7 @@ import numpy as np
 from scipy import linalg
 
 from symheli.lpv import LPVStateSpace
+from symheli.progress import tracked
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces
 from synthesis.program.scaling import balance
@@ -186,7 +187,7 @@ def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Tra
     best: tuple[float, Trajectory | None] = (0.0, None)
     # where A does not depend on p, growth ranks nothing
     budget = Budget(search.seconds)
-    for wave in (*family.coarse()[:WAVES], *family.spread()):
+    for wave in tracked("looking for peaks", (*family.coarse()[:WAVES], *family.spread())):
         if budget.over:
             break
         cycle = Trajectory(*wave.vertices())
@@ -216,7 +217,7 @@ def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, T
     family = WaveFamily(line, rate, search)
     best: tuple[float, Trajectory | None] = (-math.inf, None)
     budget = Budget(search.seconds)
-    for wave in family.coarse()[:WAVES]:
+    for wave in tracked("looking for slow decay", family.coarse()[:WAVES]):
         if budget.over:
             break
         cycle = Trajectory(*wave.vertices())

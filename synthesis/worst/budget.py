@@ -1,14 +1,10 @@
-"""How long a search may go on, and how it tells where it is."""
+"""How long a search may go on."""
 
 from __future__ import annotations
 
-import logging
 import math
 import time
 from dataclasses import dataclass, field
-
-logger = logging.getLogger("synthesis")
-"""Progress of long searches, at the level INFO."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +23,6 @@ class Budget:
     def over(self) -> bool:
         """Whether it is used up."""
         return self.left <= 0.0
-
-    def tell(self, stage: str, *values: object) -> None:
-        """Log a stage, with the time that is left."""
-        logger.info(
-            "search from below: " + stage + ", %.1f of %.3g s left",
-            *values,
-            self.left,
-            self.seconds,
-        )
 
 
 UNLIMITED = Budget()

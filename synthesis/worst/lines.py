@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symheli.progress import tracked
 from synthesis.worst.budget import Budget
 from synthesis.worst.lower_bound import Search, growing_trajectory
 from synthesis.worst.trajectory import Trajectory
@@ -52,10 +53,9 @@ def shared(lines: Iterable[Line], search: Search | None) -> Iterator[tuple[Line,
     if search is None:
         return
     budget, lines = Budget(search.seconds), list(lines)
-    for k, line in enumerate(lines):
+    for k, line in enumerate(tracked("searching along lines", lines)):
         if budget.over:
             return
-        budget.tell("line %d of %d", k + 1, len(lines))
         yield line, replace(search, seconds=budget.left / (len(lines) - k))
 
 

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.progress import tracked
 from synthesis.worst.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
 from synthesis.worst.budget import Budget
 from synthesis.worst.corners import Corners, climb
@@ -35,7 +36,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Search:
-    """How hard to look for bad trajectories. The logger "synthesis" tells how far it is (INFO).
+    """How hard to look for bad trajectories.
 
     Parameters
     ----------
@@ -178,11 +179,11 @@ def lower_bound(
     tops = [*sorted([*hunt.ranked(cycles), *near], key=_first)[-search.starts :], *spread[-1:]]
     # the starts stay beside what they lead to: corners may fall between the nodes
     found = list(tops)
-    for cycle in hunt.improved(tops, [*near[-1:], *spread[-1:]]):
+    ascents = hunt.improved(tops, [*near[-1:], *spread[-1:]])
+    for cycle in tracked("looking for gain", ascents):
         if hunt.grows(cycle):
             return hunt.growing(cycle)
         found += hunt.ranked([cycle])
-        hunt.budget.tell("gain %.6g", max(gain for gain, _ in found) if found else best.gamma)
     if not found:
         return best
     explicit = hunt.explicit(max(found, key=_first)[1])
@@ -220,7 +221,7 @@ class _Hunt:
         them grows.
         """
         reached: list[tuple[float, Trajectory]] = []
-        for cycle in self._steepening():
+        for cycle in tracked("looking for growth", self._steepening()):
             if self.budget.over and reached:
                 break
             if self.grows(cycle):
@@ -271,7 +272,7 @@ class _Hunt:
         # one at least, so that there is something to improve
         gains = (
             (self.gain(cycle), cycle)
-            for k, cycle in enumerate(cycles)
+            for k, cycle in enumerate(tracked("ranking trajectories", list(cycles)))
             if k == 0 or not self.budget.over
         )
         return sorted(((gain, cycle) for gain, cycle in gains if math.isfinite(gain)), key=_first)

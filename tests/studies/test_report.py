@@ -26,7 +26,7 @@ GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=1
 STAGES = [
     f.name
     for f in fields(Outcome)
-    if f.name not in ("vehicle", "quick", "seed", "heli", "seconds", "complete")
+    if f.name not in ("vehicle", "quick", "seed", "effort", "heli", "seconds", "complete")
 ]
 DRAWN = (
     "baseline",

@@ -1,6 +1,5 @@
 """The search from below ends after the time it was given, says so, and tells where it is."""
 
-import logging
 import math
 import time
 
@@ -62,12 +61,6 @@ def test_more_time_is_never_worse_and_no_time_still_a_bound():
     ]
     assert l2_gain(lateral(), 0.0, search=None).frozen <= bounds[0] * (1 + 1e-9)
     assert bounds[0] <= bounds[1]
-
-
-def test_progress_is_logged(caplog):
-    with caplog.at_level(logging.INFO, logger="synthesis"):
-        l2_gain(mass_spring(), form=Spline(degree=1), search=Search(seconds=0.3))
-    assert any("line 1 of" in message and "s left" in message for message in caplog.messages)
 
 
 def test_a_budget_of_nothing_is_refused():

@@ -1,0 +1,160 @@
+"""Choices that a TOML file makes: fields of a dataclass, each with its type, its range and a
+sentence about it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, field, fields, is_dataclass
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+
+from symheli.errors import InputError
+
+Table = Mapping[str, Any]
+
+
+def about(said: str, least: float | None = None, empty: bool = False) -> dict[str, Any]:
+    """Metadata of a field: numbers are at least `least`, lists may be `empty`."""
+    return {"said": said, "least": least, "empty": empty}
+
+
+def choice(default: Any, said: str, least: float | None = None, empty: bool = False) -> Any:
+    """A field with this default and `about` it."""
+    return field(default=default, metadata=about(said, least, empty))
+
+
+class _Wrong(Exception):
+    """What was expected."""
+
+
+def checked(kind: type, given: Table, complaints: list[str], where: str = "") -> dict[str, Any]:
+    """The values of a table in the types of the fields of `kind`; what is wrong joins the
+    complaints, by the name of its key.
+    """
+    known, hints, found = {f.name: f for f in fields(kind)}, get_type_hints(kind), {}
+    for key, value in given.items():
+        if key not in known:
+            complaints.append(_unknown(f"{where}{key}", key, list(known)))
+        elif is_dataclass(hints[key]) and isinstance(value, Mapping):
+            found[key] = checked(hints[key], value, complaints, f"{where}{key}.")  # type: ignore[arg-type]
+        else:
+            try:
+                found[key] = _converted(hints[key], value, known[key].metadata)
+            except _Wrong as expected:
+                complaints.append(f"{where}{key}: expected {expected}, got {_short(value)}")
+    return found
+
+
+def check(thing: Any) -> None:
+    """Raises `InputError` with all that is wrong with the fields of this dataclass."""
+    complaints: list[str] = []
+    checked(type(thing), {f.name: getattr(thing, f.name) for f in fields(thing)}, complaints)
+    if complaints:
+        raise InputError("; ".join(complaints))
+
+
+def toml(value: Any) -> str:
+    """A value as TOML has it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str | Path):
+        return json.dumps(str(value), ensure_ascii=False)
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(toml, value))}]"
+    if isinstance(value, float) and math.isfinite(value) and value.is_integer():
+        return f"{value:.1f}" if abs(value) < 1e15 else repr(value)
+    return str(value)
+
+
+def sentence(kind: type, name: str) -> str:
+    """What is said about a field."""
+    return next((f.metadata.get("said", "") for f in fields(kind) if f.name == name), "")
+
+
+def default(kind: type, name: str) -> Any:
+    """The default of a field."""
+    own = next(f for f in fields(kind) if f.name == name)
+    return own.default if own.default_factory is MISSING else own.default_factory()
+
+
+def _unknown(path: str, key: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+    return f"{path} is unknown; {hint}"
+
+
+def _short(value: Any) -> str:
+    return f"{value!r:.60}"
+
+
+def _number(value: Any, limits: Mapping[str, Any], whole: bool) -> Any:
+    least = limits.get("least")
+    what = "a whole number" if whole else "a number"
+    expected = what if least is None else f"{what} >= {least:g}"
+    right = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
+    if not right or math.isnan(value) or (least is not None and value < least):
+        raise _Wrong(expected)
+    return value if whole else float(value)
+
+
+def _list(item: Any, value: Any, limits: Mapping[str, Any]) -> tuple[Any, ...]:
+    least, what = limits.get("least"), "whole numbers" if item is int else "numbers"
+    bound = "" if least is None else f" >= {least:g}"
+    expected = f"a list of {what}{bound}{'' if limits.get('empty') else ', one at least'}"
+    if not isinstance(value, list | tuple) or not (value or limits.get("empty")):
+        raise _Wrong(expected)
+    try:
+        return tuple(_converted(item, v, limits) for v in value)
+    except _Wrong:
+        raise _Wrong(expected) from None
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or not value:
+        raise _Wrong("a text in quotes")
+    return value
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise _Wrong("true or false")
+    return value
+
+
+_PLAIN: dict[Any, Callable[[Any, Mapping[str, Any]], Any]] = {
+    bool: lambda value, _: _truth(value),
+    int: lambda value, about: _number(value, about, whole=True),
+    float: lambda value, about: _number(value, about, whole=False),
+    str: lambda value, _: _text(value),
+    Path: lambda value, _: value if isinstance(value, Path) else Path(_text(value)),
+}
+
+
+def _converted(hint: Any, value: Any, limits: Mapping[str, Any]) -> Any:
+    if hint in _PLAIN:
+        return _PLAIN[hint](value, limits)
+    if get_origin(hint) is tuple:
+        return _list(get_args(hint)[0], value, limits)
+    if is_dataclass(hint):
+        if not isinstance(value, hint):  # type: ignore[arg-type]
+            raise _Wrong(f"a table with any of {', '.join(f.name for f in fields(hint))}")
+        return value
+    return _either(get_args(hint), value, limits)
+
+
+def _either(hints: tuple[Any, ...], value: Any, limits: Mapping[str, Any]) -> Any:
+    """Of int | tuple[int, ...] | None."""
+    if value is None and type(None) in hints:
+        return None
+    expected = []
+    for hint in hints:
+        if hint is not type(None):
+            try:
+                return _converted(hint, value, limits)
+            except _Wrong as wrong:
+                expected.append(str(wrong))
+    raise _Wrong(" or ".join(expected))

@@ -1,0 +1,134 @@
+"""How far long work is: it tells whoever asked, and shows nothing itself.
+
+Work tells its tasks and their steps; `watched` names the listener, for everything that is called
+within, in the same thread. Without one, telling costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a task is.
+
+    Parameters
+    ----------
+    task : str
+        What is done, such as "trimming and linearizing".
+    done, total : float
+        Steps finished, and how many there will be; None: nobody knows.
+    note : str
+        What the last step found.
+    depth : int
+        How many tasks it is a part of.
+    over : bool
+        It has ended, finished or not: nothing more will be told of it.
+
+    Examples
+    --------
+    >>> str(symheli.Progress("flying", 3, 12))
+    'flying: 3 of 12'
+    """
+
+    task: str
+    done: float = 0
+    total: float | None = None
+    note: str = ""
+    depth: int = 0
+    over: bool = False
+
+    def __str__(self) -> str:
+        of = "" if self.total is None else f" of {self.total:g}"
+        count = f": {self.done:g}{of}" if of or self.done else ""
+        return f"{self.task}{count}{self.note and f' ({self.note})'}"
+
+
+Listener = Callable[[Progress], object]
+
+_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
+_depth: ContextVar[int] = ContextVar("depth", default=0)
+
+
+@contextmanager
+def watched(listener: Listener | None) -> Iterator[None]:
+    """Tell this listener where the work within is; None: nobody.
+
+    It is called in the thread that works, when a task begins, with each step and when it ends; an
+    exception it raises ends the work.
+
+    Parameters
+    ----------
+    listener : callable
+        Called with a `Progress`.
+
+    Examples
+    --------
+    >>> with symheli.watched(lambda progress: print(progress) if progress.over else None):
+    ...     trims = symheli.trim_batch(heli, airspeed=[2.0, 5.0, 8.0])
+    trimming: 3 of 3
+    """
+    before = _listener.get()
+    _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.set(before)
+
+
+class Task:
+    """A task under way."""
+
+    def __init__(self, title: str, total: float | None, listener: Listener | None, depth: int):
+        self._at = Progress(title, 0, total, depth=depth)
+        self._listener = listener
+        if listener is not None:
+            listener(self._at)
+
+    def to(self, done: float, note: str = "") -> None:
+        """So many steps are finished."""
+        if self._listener is not None:
+            self._at = replace(self._at, done=done, note=note)
+            self._listener(self._at)
+
+    def step(self, note: str = "") -> None:
+        """One step more is finished."""
+        self.to(self._at.done + 1, note)
+
+    def end(self) -> None:
+        """Nothing more will be told."""
+        if self._listener is not None:
+            self._listener(replace(self._at, over=True))
+
+
+@contextmanager
+def task(title: str, total: float | None = None) -> Iterator[Task]:
+    """A task of `total` steps, ended however its block is left."""
+    depth = _depth.get()
+    begun = Task(title, total, _listener.get(), depth)
+    _depth.set(depth + 1)
+    try:
+        yield begun
+    finally:
+        _depth.set(depth)
+        begun.end()
+
+
+def tracked(title: str, items: Iterable[T], total: float | None = None) -> Iterator[T]:
+    """The items, a step finished whenever the next one is asked for."""
+    if total is None and hasattr(items, "__len__"):
+        total = len(items)  # type: ignore[arg-type]
+    if total == 0:
+        yield from items
+        return
+    with task(title, total) as own:
+        for item in items:
+            yield item
+            own.step()
