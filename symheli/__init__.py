@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         LinearModel,
         LPVStateSpace,
         Scheduling,
+        StepResponse,
         UncertainStateSpace,
     )
     from symheli.records import FlightRecord
@@ -115,7 +116,8 @@ _ROOMS = {
     "symheli.values": "NamedVector Signal",
     "symheli.records": "FlightRecord",
     "symheli.lpv": (
-        "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling UncertainStateSpace"
+        "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling StepResponse"
+        " UncertainStateSpace"
     ),
     "symheli.errors": (
         "AccuracyError CertificateError CompilerWarning ConvergenceWarning DataWarning"
@@ -168,6 +170,7 @@ __all__ = [
     "Signal",
     "SimulatedFlight",
     "SolverError",
+    "StepResponse",
     "StitchedModel",
     "SymheliError",
     "TableController",

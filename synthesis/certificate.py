@@ -16,6 +16,7 @@ import numpy as np
 
 from symheli.errors import CertificateError, InputError
 from symheli.lpv import Scheduling
+from symheli.values.summary import as_table, summarized
 from synthesis.program.cone_program import Answer
 from synthesis.worst.trajectory import Trajectory
 
@@ -112,6 +113,8 @@ class Proof(NamedTuple):
 
     evidence: Evidence
     lyapunov: Any
+
+    __repr__ = summarized
 
     def fault(self, kind: Kind, rates: tuple[float, ...]) -> str | None:
         """What keeps this from being a proof of such a claim, None where nothing does."""
@@ -213,6 +216,9 @@ class Certificate:
     perturbation: Array | None = None
     indicative: float = math.nan
     proof: Proof | None = field(default=None, repr=False)
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         """The form of the claim, then the order of the bounds.

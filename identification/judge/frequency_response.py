@@ -15,6 +15,7 @@ from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
+from symheli.values.summary import as_table, summarized
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,6 +53,9 @@ class FrequencyResponse:
     random_error: Array
     outputs: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def mismatch(self, model: LinearModel, coherence: float = 0.6) -> Array:
         """Mean squared mismatch cost J (ny, nu) of a model's response; below 100 is a good, below

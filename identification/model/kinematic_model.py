@@ -21,6 +21,7 @@ from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen
 from symheli.values.kinematics import RIGID_BODY
+from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
     from identification.recursive.kinematic_observer import KinematicObserver
@@ -65,6 +66,9 @@ class KinematicModel:
     aerodynamics: LPVARXModel
     trim: Array
     coefficient_covariance: Array | None = None
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         n, size = self.structure.n_regressors, self.structure.basis.size

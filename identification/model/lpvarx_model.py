@@ -21,6 +21,7 @@ from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal, signals
 from symheli.values.arrays import Array, frozen
 from symheli.values.sample_period import JITTER, same_period
+from symheli.values.summary import as_table, summarized
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,6 +80,9 @@ class LPVARXModel:
     excitation: ExcitationReport | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     covariance: Array | None = field(default=None, repr=False)
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         arx = self.structure

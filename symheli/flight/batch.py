@@ -20,6 +20,7 @@ from symheli.helicopter import Helicopter
 from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers_of
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import as_table, summarized
 
 CHUNK = 2 * SIDE_BY_SIDE.lanes
 """Flights a worker takes at a time."""
@@ -48,6 +49,9 @@ class FlightBatch(Sequence[FlightRecord]):
     """
 
     data: tuple[FlightData, ...]
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __len__(self) -> int:
         return len(self.data)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,12 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
 AIRSPEED = Signal("airspeed", "m/s")
 
@@ -55,6 +62,11 @@ class LinearFamily:
     >>> roll = family.select(["v", "p", "r", "phi", "b1"], ["d_lat", "d_ped"])
     >>> roll.interpolate("polynomial", degree=2).at(4.0).A.shape
     (5, 5)
+    >>> frame = roll.to_frame()
+    >>> frame.shape, frame.attrs["units"]["A[p, v]"]
+    ((4, 70), 'rad/m/s')
+    >>> roll.to_xarray()["A"].sel(airspeed=5.0, equation="p").shape
+    (5,)
     """
 
     airspeeds: Array
@@ -69,6 +81,9 @@ class LinearFamily:
     dt: float | None = None
     kinks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     models: LinearModels = field(init=False, repr=False)
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
@@ -164,6 +179,32 @@ class LinearFamily:
         drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2 (None: as fast as it likes).
         """
         return interpolated(self.models, (AIRSPEED,), (self.airspeeds,), kind, degree, rate)
+
+    def plot(self, ax: Axes | None = None, entries: Sequence[str] | None = None) -> Axes:
+        """Entries such as "A[q, u]" or "B[q, d_lon]" over airspeed, each by its largest magnitude,
+        which the legend gives; default the diagonal of A. Returns the axes; raises
+        `UnknownNameError` for an entry that is not there.
+        """
+        from symheli.lpv.entry_plot import plot_entries
+
+        return plot_entries(ax, AIRSPEED, self.airspeeds, self, self, entries, ".")
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row an airspeed (m/s), a column an entry A[q, u] ..., their units in attrs["units"].
+        Raises `InputError` without pandas.
+        """
+        from symheli.lpv.labelled_models import models_frame
+
+        return models_frame([(AIRSPEED, self.airspeeds)], self, self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A, B, C, D over "airspeed", "equation", "state", "input" and "output", and x0, u0 where
+        the trims are known; units in the attributes of the coordinates. Raises `InputError` without
+        xarray.
+        """
+        from symheli.lpv.labelled_models import models_dataset
+
+        return models_dataset([(AIRSPEED, self.airspeeds)], self, self, self.models.points)
 
     def _of(self, models: LinearModels) -> LinearFamily:
         return LinearFamily.from_models(self.airspeeds, models, self.kinks)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,11 @@ from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +60,9 @@ class LinearGrid:
     axes: tuple[Signal, ...]
     values: tuple[Array, ...]
     models: LinearModels
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         axes = tuple(a if isinstance(a, Signal) else Signal(a) for a in self.axes)
@@ -99,6 +108,11 @@ class LinearGrid:
     def outputs(self) -> tuple[Signal, ...]:
         """Outputs with units."""
         return self.models.outputs
+
+    @property
+    def dt(self) -> float | None:
+        """Sample period, s; None in continuous time."""
+        return self.models.dt
 
     @property
     def A(self) -> Array:
@@ -173,6 +187,23 @@ class LinearGrid:
         airspeed beside an acceleration changes as that says.
         """
         return interpolated(self.models, self.axes, self.values, kind, degree, rate)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a model by the values of the axes, a column an entry A[q, u] ..., their units in
+        attrs["units"]. Raises `InputError` without pandas.
+        """
+        from symheli.lpv.labelled_models import models_frame
+
+        return models_frame(list(zip(self.axes, self.values, strict=True)), self, self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A, B, C, D over the axes, "equation", "state", "input" and "output", and x0, u0 where the
+        trims are known. Raises `InputError` without xarray.
+        """
+        from symheli.lpv.labelled_models import models_dataset
+
+        axes = list(zip(self.axes, self.values, strict=True))
+        return models_dataset(axes, self, self, self.models.points)
 
     def _stacked(self, name: str) -> Array:
         every = getattr(self.models, name)

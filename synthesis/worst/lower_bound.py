@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.summary import summarized
 from synthesis.worst.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
 from synthesis.worst.budget import Budget
 from synthesis.worst.corners import Corners, climb
@@ -113,6 +114,8 @@ class LowerBound(NamedTuple):
     trajectory: Trajectory | None
     input: Array | None = None
     growth: float = math.nan
+
+    __repr__ = summarized
 
 
 def lower_bound(
