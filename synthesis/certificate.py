@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Protocol, Self, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, Self, get_args
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from symheli.lpv import Scheduling
 from symheli.values.summary import as_table, summarized
 from synthesis.program.cone_program import Answer
 from synthesis.worst.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = np.ndarray
 Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
@@ -336,6 +339,14 @@ class Certificate:
         from synthesis.certificate_file import read
 
         return read(path)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Frozen, flown and proven bound, the bracket between the last two shaded; returns the
+        axes. Raises `InputError` for stability, which has no numbers.
+        """
+        from synthesis.certificate_plot import plot_certificate
+
+        return plot_certificate(self, ax)
 
     def resting_on(self, sentences: Iterable[str]) -> Self:
         """The same with further hypotheses."""

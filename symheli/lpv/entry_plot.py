@@ -42,7 +42,9 @@ def draw_scaled(
     for name, along in drawn:
         largest = float(np.abs(along).max())
         unit = "" if name.unit == "1" else f" {name.unit}"
-        ax.plot(values, along / (largest or 1.0), marker=marker, label=f"{name}, {largest:.3g}{unit}")
+        ax.plot(
+            values, along / (largest or 1.0), marker=marker, label=f"{name}, {largest:.3g}{unit}"
+        )
     ax.axhline(0.0, color=GREY, linewidth=0.8)
     ax.set_xlabel(label(over))
     ax.set_ylabel("entry by its largest magnitude")

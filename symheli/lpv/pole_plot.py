@@ -21,7 +21,7 @@ def plot_poles(model: LinearModel, ax: Axes | None = None) -> Axes:
     stable = np.real(poles) < 0 if model.dt is None else np.abs(poles) < 1
     for mask, colour, name in ((stable, BLUE, "stable"), (~stable, RED, "not stable")):
         if mask.any():
-            ax.plot(poles[mask].real, poles[mask].imag, "x", color=colour, label=name)
+            ax.plot(np.real(poles[mask]), np.imag(poles[mask]), "x", color=colour, label=name)
     if model.dt is None:
         ax.axvline(0.0, color=GREY, linewidth=0.8)
         ax.set_xlabel("real part (1/s)")
