@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -205,6 +207,31 @@ class LinearFamily:
         from symheli.lpv.labelled_models import models_dataset
 
         return models_dataset([(AIRSPEED, self.airspeeds)], self, self, self.models.points)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the models with names, units and trims, as JSON or NPZ by the ending of the name,
+        in the form `symheli.lpv.family_file` describes; every number exact. Raises `SymheliError`
+        where the file cannot be written.
+        """
+        from symheli.lpv.family_file import Content, write
+
+        return write(Content((AIRSPEED,), (self.airspeeds,), self.models, self.kinks), path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> LinearFamily:
+        """The models in a file that `save`, another program or somebody wrote. Raises `InputError`
+        for a file that is none, or whose models are not over airspeed alone.
+        """
+        from symheli.lpv.family_file import read
+
+        found = read(path)
+        if found.axes != (AIRSPEED,) or found.axes[0].unit != AIRSPEED.unit:
+            axes = ", ".join(f"{s} ({s.unit})" for s in found.axes)
+            raise InputError(
+                f"{path}: expected models over airspeed (m/s), got {axes}: read them with"
+                " LinearGrid.load"
+            )
+        return cls.from_models(found.values[0], found.models, found.kinks)
 
     def _of(self, models: LinearModels) -> LinearFamily:
         return LinearFamily.from_models(self.airspeeds, models, self.kinks)

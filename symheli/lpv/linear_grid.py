@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -204,6 +206,25 @@ class LinearGrid:
 
         axes = list(zip(self.axes, self.values, strict=True))
         return models_dataset(axes, self, self, self.models.points)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the models with names, units and trims, as JSON or NPZ by the ending of the name,
+        in the form `symheli.lpv.family_file` describes; every number exact. Raises `SymheliError`
+        where the file cannot be written.
+        """
+        from symheli.lpv.family_file import Content, write
+
+        return write(Content(self.axes, self.values, self.models, {}), path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> LinearGrid:
+        """The models in a file that `save`, another program or somebody wrote. Raises `InputError`
+        for a file that is none.
+        """
+        from symheli.lpv.family_file import read
+
+        found = read(path)
+        return cls(found.axes, found.values, found.models)
 
     def _stacked(self, name: str) -> Array:
         every = getattr(self.models, name)
