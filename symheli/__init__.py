@@ -77,6 +77,7 @@ if TYPE_CHECKING:
         LinearModel,
         LPVStateSpace,
         Scheduling,
+        StepResponse,
         UncertainStateSpace,
     )
     from symheli.progress import Progress, watched
@@ -116,7 +117,8 @@ _ROOMS = {
     "symheli.values": "NamedVector Signal",
     "symheli.records": "FlightRecord",
     "symheli.lpv": (
-        "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling UncertainStateSpace"
+        "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling StepResponse"
+        " UncertainStateSpace"
     ),
     "symheli.progress": "Progress watched",
     "symheli.errors": (
@@ -171,6 +173,7 @@ __all__ = [
     "Signal",
     "SimulatedFlight",
     "SolverError",
+    "StepResponse",
     "StitchedModel",
     "SymheliError",
     "TableController",

@@ -22,6 +22,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.physics import inflow
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, signals
+from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
     from symheli.equations import RightHandSide
@@ -75,6 +76,9 @@ class Helicopter:
     density: float = 1.225
     printed: frozenset[str] = frozenset()
     smoothing: float = 0.0
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         if self.governor not in ("pi", "ideal"):

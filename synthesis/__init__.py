@@ -35,6 +35,7 @@ from symheli.lazy import lazily
 
 if TYPE_CHECKING:
     from synthesis.analysis.decay_rate import decay_rate
+    from synthesis.analysis.gain_against_rate import gain_against_rate
     from synthesis.analysis.generalized_h2 import generalized_h2
     from synthesis.analysis.l2_gain import l2_gain
     from synthesis.analysis.stability import stability
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from synthesis.design.state_feedback import state_feedback
     from synthesis.design.wrong_parameter import with_wrong_parameter
     from synthesis.forms import HigherOrder, Memory, Spline
+    from synthesis.gain_curve import GainCurve
     from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
     from synthesis.lft.gain import lft_gain, lft_stability
     from synthesis.lft.multipliers import SCALINGS, Multiplier
@@ -73,6 +75,7 @@ if TYPE_CHECKING:
 
 _ROOMS = {
     "synthesis.analysis.decay_rate": "decay_rate",
+    "synthesis.analysis.gain_against_rate": "gain_against_rate",
     "synthesis.analysis.generalized_h2": "generalized_h2",
     "synthesis.analysis.l2_gain": "l2_gain",
     "synthesis.analysis.stability": "stability",
@@ -95,6 +98,7 @@ _ROOMS = {
     "synthesis.design.point_design": "DesignStatus PointDesign",
     "synthesis.design.wrong_parameter": "with_wrong_parameter",
     "synthesis.forms": "HigherOrder Memory Spline",
+    "synthesis.gain_curve": "GainCurve",
     "synthesis.impose": "Bernstein Grid SumOfSquares Vertices",
     "synthesis.lft.gain": "lft_gain lft_stability",
     "synthesis.lft.multipliers": "SCALINGS Multiplier",
@@ -126,6 +130,7 @@ __all__ = [
     "Estimator",
     "Flown",
     "FrozenGain",
+    "GainCurve",
     "Generalized",
     "Grid",
     "HigherOrder",
@@ -155,6 +160,7 @@ __all__ = [
     "estimator",
     "frozen_box_gain",
     "frozen_gain",
+    "gain_against_rate",
     "generalized_h2",
     "h2",
     "hinf",

@@ -10,14 +10,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Protocol, Self, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, Self, get_args
 
 import numpy as np
 
 from symheli.errors import CertificateError, InputError
 from symheli.lpv import Scheduling
+from symheli.values.summary import as_table, summarized
 from synthesis.program.cone_program import Answer
 from synthesis.worst.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = np.ndarray
 Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
@@ -112,6 +116,8 @@ class Proof(NamedTuple):
 
     evidence: Evidence
     lyapunov: Any
+
+    __repr__ = summarized
 
     def fault(self, kind: Kind, rates: tuple[float, ...]) -> str | None:
         """What keeps this from being a proof of such a claim, None where nothing does."""
@@ -213,6 +219,9 @@ class Certificate:
     perturbation: Array | None = None
     indicative: float = math.nan
     proof: Proof | None = field(default=None, repr=False)
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         """The form of the claim, then the order of the bounds.
@@ -330,6 +339,14 @@ class Certificate:
         from synthesis.certificate_file import read
 
         return read(path)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Frozen, flown and proven bound, the bracket between the last two shaded; returns the
+        axes. Raises `InputError` for stability, which has no numbers.
+        """
+        from synthesis.certificate_plot import plot_certificate
+
+        return plot_certificate(self, ax)
 
     def resting_on(self, sentences: Iterable[str]) -> Self:
         """The same with further hypotheses."""

@@ -51,7 +51,14 @@ TYPES: dict[str, Any] = {
         *(PolynomialMatrix, Motion, Scaling, box.Units, Demand, Coordinates, NormBounded),
         *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
         *(Multiplier, lft_proof.Quadratic),
-        *(bases.Polynomial, bases.BSpline, bases.PiecewiseLinear, bases.Spline, bases.Product),
+        *(
+            bases.Polynomial,
+            bases.BSpline,
+            bases.PiecewiseLinear,
+            bases.Spline,
+            bases.Product,
+            bases.Patches,
+        ),
     )
 }
 """What a file may contain, by name."""

@@ -15,6 +15,16 @@ PACKAGES = ("symheli", "identification")
 FUNCTIONS_OF = ("symheli.lpv", "symheli.records")
 """Rooms whose classes are values of other rooms, or results: here the functions are shown."""
 
+PUBLIC = tuple(
+    {
+        thing
+        for package in (*PACKAGES, *FUNCTIONS_OF, "symheli.flight", "synthesis")
+        for name in importlib.import_module(package).__all__
+        if isinstance(thing := getattr(importlib.import_module(package), name), type)
+    }
+)
+"""The classes that users meet."""
+
 FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 
 
@@ -39,6 +49,21 @@ def run(text, where, names):
     return examples.globs
 
 
+FLOOD = 1000
+"""Characters that no public value may print at a prompt."""
+
+
+def check_short(names):
+    """Every value of a public class among the names shows itself in a few lines."""
+    for name, value in names.items():
+        if isinstance(value, PUBLIC) and not isinstance(value, type):
+            assert len(repr(value)) <= FLOOD, f"{name}: {type(value).__name__} prints {value!r}"
+            if hasattr(value, "_repr_html_"):
+                table = value._repr_html_()
+                assert table.startswith("<table>"), name
+                assert "://" not in table, f"{name}: a table that loads something"
+
+
 @pytest.fixture(scope="module")
 def start():
     """What the docstring of each package makes."""
@@ -57,7 +82,7 @@ def test_the_examples_of_an_exported_name_print_what_they_say(package, name, sta
     text = inspect.getdoc(getattr(importlib.import_module(package), name)) or ""
     where = f"{package}.{name}"
     assert "\nExamples\n--------\n" in text, f"{where} has no section Examples"
-    run(text, where, start(package))
+    check_short(run(text, where, start(package)))
 
 
 WITHOUT = {
@@ -92,8 +117,10 @@ def test_an_example_needs_nothing_but_its_imports(package, name, start, tmp_path
     told: list[str] = []
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        failed = doctest.DocTestRunner(verbose=False).run(test, out=told.append).failed
+        runner = doctest.DocTestRunner(verbose=False)
+        failed = runner.run(test, out=told.append, clear_globs=False).failed
     assert not failed, "".join(told)
+    check_short(test.globs)
 
 
 @pytest.mark.parametrize(("package", "name"), [pair for pair in EXPLAINED if pair[1].islower()])

@@ -7,9 +7,13 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from symheli.values.summary import as_table, summarized
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("symheli", "identification", "synthesis", "studies")
@@ -70,6 +74,52 @@ def test_every_public_name_exists_and_is_documented(package):
                     f"{package}.{name}.{member} has no docstring"
                 )
     assert list(module.__all__) == list(dict.fromkeys(module.__all__))
+
+
+ARRAY = re.compile(r"(tuple\[|ForwardRef\(')?(Array|np\.ndarray)\b")
+
+
+def test_no_public_value_prints_its_arrays():
+    """A dataclass or named tuple with arrays says what it is in a few lines; a string at a prompt
+    that scrolls the work away is of no use.
+    """
+    flooding = []
+    for package in PACKAGES:
+        module = importlib.import_module(package)
+        for name in module.__all__:
+            thing = getattr(module, name)
+            if is_dataclass(thing):
+                types = [f.type for f in fields(thing) if f.repr]
+            elif hasattr(thing, "_fields"):
+                types = [str(hint) for hint in thing.__annotations__.values()]
+            else:
+                continue
+            if any(ARRAY.match(str(t)) for t in types):
+                own = thing.__repr__ is summarized or name == "NamedVector"
+                flooding += [] if own else [f"{package}.{name}"]
+    assert not flooding, ", ".join(flooding)
+
+
+def test_a_summary_is_short_and_a_table_is_escaped():
+    @dataclass(frozen=True)
+    class Made:
+        title: str
+        values: np.ndarray
+        names: tuple
+        nothing: None = None
+
+        __repr__ = summarized
+        _repr_html_ = as_table
+
+    made = Made("<b>a & b</b>", np.arange(1e6), tuple(f"signal{i}" for i in range(1000)))
+    assert repr(made).startswith(
+        "Made(title='<b>a & b</b>', values=1000000 numbers from 0 to 999999"
+    )
+    assert len(repr(made)) < 300
+    assert "nothing" not in repr(made)
+    assert '<td style="text-align:left">&#x27;&lt;b&gt;a &amp; b&lt;/b&gt;&#x27;</td>' in (
+        made._repr_html_()
+    )
 
 
 def test_importing_the_packages_loads_no_heavy_library():

@@ -14,6 +14,7 @@ from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import ExcitationError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 RANK_TOLERANCE = 1e-11
 """A direction with a singular value below this fraction of the largest is lost to rounding (columns
@@ -78,6 +79,8 @@ class ExcitationReport:
     scheduling: str
     reason: str
     outputs: tuple[str, ...] = ()
+
+    __repr__ = summarized
 
     @property
     def sufficient(self) -> bool:

@@ -15,6 +15,7 @@ from identification.structure.regressors import as_records, regression
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,8 @@ class Experiment:
     duration: float
     factor: Array
     exceeded: Mapping[str, float]
+
+    __repr__ = summarized
 
     @property
     def allowed(self) -> bool:
@@ -80,6 +83,8 @@ class Plan:
 
     experiments: tuple[Experiment, ...]
     gains: tuple[float, ...]
+
+    __repr__ = summarized
 
     @property
     def bounds(self) -> Array:

@@ -14,6 +14,7 @@ from identification.structure.regressors import Regression
 from symheli.errors import ConvergenceWarning, InputError, UnknownNameError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -44,6 +45,8 @@ class Estimate:
     remarks: tuple[Warning, ...] = ()
     residual_covariance: Array | None = None
     covariance: Array | None = None
+
+    __repr__ = summarized
 
 
 class Method(ABC):

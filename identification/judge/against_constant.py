@@ -17,6 +17,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
+from symheli.values.summary import summarized
 
 PAYS = 1.0
 """Points of held-out fit by which one model must beat another to be called better; what is printed
@@ -93,6 +94,8 @@ class AgainstConstant:
     hold_p: bool = False
     leak: float = 0.0
     trim_note: str = ""
+
+    __repr__ = summarized
 
     @property
     def scheduled(self) -> LPVARXModel:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.records.record_plot import GRID, LINE, empty_figure, label
+from symheli.records.record_plot import empty_figure
 from symheli.values.arrays import Array
+from symheli.values.drawing import GRID, LINE, label
 
 if TYPE_CHECKING:
     from identification.judge.uncertainty import Uncertainty

@@ -16,6 +16,7 @@ from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +50,8 @@ class BaselineModel:
     scheduling: str | Sequence[str] | None = None
     inputs: tuple[str, ...] | None = None
     drift: bool = True
+
+    __repr__ = summarized
 
     def on(self, record: FlightRecord) -> BaselinePredictor:
         """The model along a record."""
@@ -214,6 +217,8 @@ class BesideBaseline:
     outputs: tuple[str, ...]
     record: FlightRecord
     predictions: tuple[Prediction, ...]
+
+    __repr__ = summarized
 
     def best(self, output: str, names: Collection[str] | None = None) -> Prediction:
         """The one that predicts `output` best `Scores.horizon` seconds ahead, of those called

@@ -13,6 +13,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.regressors import as_records, stacked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 SIGNIFICANT = 1e-3
 """A probability below this is not chance."""
@@ -57,6 +58,8 @@ class DependenceReport:
     residual: Array
     explained: Array
     probability: Array
+
+    __repr__ = summarized
 
     @property
     def dynamic(self) -> tuple[bool, ...]:

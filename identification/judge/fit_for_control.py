@@ -22,6 +22,7 @@ from symheli.lpv import LinearModel
 from symheli.lpv.stability_margin import Feedback
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 POINTS = 9
 """Values of one scheduling parameter at which a model is judged unless told otherwise."""
@@ -60,6 +61,8 @@ class FitForControl:
     gap: Array
     second_gap: Array
     true_gap: Array | None = None
+
+    __repr__ = summarized
 
     @property
     def verdict(self) -> Verdict:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.signal import csd, get_window
@@ -15,6 +15,12 @@ from symheli.lpv import LinearModel
 from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
+from symheli.values.labelled import frame, per
+from symheli.values.summary import as_table, summarized
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,6 +49,8 @@ class FrequencyResponse:
     >>> found = idn.frequency_response(still, ["y"], ["u"], window=10.0, band=(1.0, 5.0))
     >>> print(np.abs(found.G[0]).round(1), bool(found.coherence.min() > 0.9))
     [[2.]] True
+    >>> list(found.to_frame().columns)
+    ['y from u', 'coherence of y from u']
     """
 
     omega: Array
@@ -52,6 +60,32 @@ class FrequencyResponse:
     random_error: Array
     outputs: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
+
+    __repr__ = summarized
+    _repr_html_ = as_table
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Magnitude of every response over frequency (rad/s), shaded by its random error; returns
+        the axes.
+        """
+        from identification.judge.frequency_response_plot import plot_response
+
+        return plot_response(self, ax)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Over frequency (rad/s), columns "y from u" (complex) and "coherence of y from u"; units
+        in attrs["units"]. Raises `InputError` without pandas.
+        """
+        pairs = [
+            (i, y, j, u) for j, u in enumerate(self.inputs) for i, y in enumerate(self.outputs)
+        ]
+        columns = [
+            (Signal(f"{y} from {u}", per(y.unit, u.unit)), self.G[:, i, j]) for i, y, j, u in pairs
+        ]
+        columns += [
+            (Signal(f"coherence of {y} from {u}"), self.coherence[:, i, j]) for i, y, j, u in pairs
+        ]
+        return frame([(Signal("omega", "rad/s"), self.omega)], columns)
 
     def mismatch(self, model: LinearModel, coherence: float = 0.6) -> Array:
         """Mean squared mismatch cost J (ny, nu) of a model's response; below 100 is a good, below

@@ -12,6 +12,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv import LinearModel, LPVStateSpace, chordal_distance, nu_gap
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 FAST = 3.0
 """Frequency (rad/s) above which models are compared on their own: what is slower hardly shows in
@@ -68,6 +69,8 @@ class FrozenModels:
     channel: tuple[str, str]
     responses_at: float
     responses: Mapping[str, Array]
+
+    __repr__ = summarized
 
 
 def pole_miss(model: LinearModel, pole: complex) -> float:

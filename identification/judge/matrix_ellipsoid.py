@@ -14,6 +14,7 @@ from scipy.stats import binom, chi2
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
+from symheli.values.summary import summarized
 
 SETTLED = 1e-10
 """Relative change of the factors at which the fit ends."""
@@ -58,6 +59,8 @@ class MatrixEllipsoid(NamedTuple):
     bound: float
     probability: float
     inflation: float
+
+    __repr__ = summarized
 
     def contains(self, error: object) -> Array:
         """Whether Theta - Theta_hat (..., n, m) lies in it, (...) of bool."""

@@ -15,6 +15,7 @@ from symheli.errors import ExcitationError, InputError
 from symheli.lpv import Polynomial
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,6 +49,8 @@ class Trial:
     free_run: Array
     refused: str = ""
 
+    __repr__ = summarized
+
     @property
     def na(self) -> int:
         """Order."""
@@ -79,6 +82,8 @@ class OrderScan:
 
     trials: tuple[Trial, ...]
     horizon: int
+
+    __repr__ = summarized
 
     def best(self, by: str = "ahead") -> Trial:
         """The trial of the largest median fit over the outputs "one_step", "ahead" or in

@@ -14,6 +14,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 ROUNDING = 1e-14
 """An error below this fraction of the signals' size is rounding: it has no causes to share out."""
@@ -81,6 +82,8 @@ class ResidualAnalysis:
     bound: float
     portmanteau: Array
     theil: tuple[Theil, ...]
+
+    __repr__ = summarized
 
     @property
     def outside(self) -> Array:

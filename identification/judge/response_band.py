@@ -9,6 +9,7 @@ import numpy as np
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.realization import one_value
 from symheli.values.arrays import Array, frozen
+from symheli.values.summary import summarized
 
 
 class ResponseBand(NamedTuple):
@@ -34,6 +35,8 @@ class ResponseBand(NamedTuple):
     omega: Array
     G: Array
     standard_error: Array
+
+    __repr__ = summarized
 
 
 def response_band(model: LPVARXModel, joint: Array, p: object, omega: object) -> ResponseBand:

@@ -20,6 +20,7 @@ from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
     pass
@@ -54,6 +55,8 @@ class Band(NamedTuple):
     standard_error: Array
     freedom: float = float("inf")
     stretch: float = 1.0
+
+    __repr__ = summarized
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Lower and upper end (n,) of the confidence interval at each p: Student's, `stretch` times
@@ -101,6 +104,9 @@ class Uncertainty:
     freedom: Array
     lags: int
     samples: int
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     @property
     def stretch(self) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from identification.structure.lpvarx import LPVARX, Term
 from symheli.lpv import FunctionSpace
 from symheli.values.arrays import Array, frozen
+from symheli.values.summary import summarized
 
 
 class CoefficientValues(NamedTuple):
@@ -37,6 +38,8 @@ class CoefficientValues(NamedTuple):
     B: Array
     c: Array
     d: Array
+
+    __repr__ = summarized
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -75,6 +78,8 @@ class Coefficients:
     B: Array
     c: Array
     d: Array
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         n, ny = self.basis.size, self.c.shape[-1]

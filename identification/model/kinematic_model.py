@@ -21,8 +21,12 @@ from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array, frozen
 from symheli.values.kinematics import RIGID_BODY
+from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
+
     from identification.recursive.kinematic_observer import KinematicObserver
 
 
@@ -65,6 +69,9 @@ class KinematicModel:
     aerodynamics: LPVARXModel
     trim: Array
     coefficient_covariance: Array | None = None
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         n, size = self.structure.n_regressors, self.structure.basis.size
@@ -330,6 +337,23 @@ class KinematicModel:
         )
 
     # --- files -----------------------------------------------------------------------------------
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The coefficients: a row a regressor, a column an output; the units of the outputs in
+        attrs["units"], those of the regressors in attrs["regressor_units"]. Raises `InputError`
+        without pandas.
+        """
+        from identification.model.labelled_coefficients import coefficients_frame
+
+        return coefficients_frame(self.aerodynamics)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The coefficients `theta` over "regressor" and "output", each with its units; the basis is
+        an attribute. Raises `InputError` without xarray.
+        """
+        from identification.model.labelled_coefficients import coefficients_dataset
+
+        return coefficients_dataset(self.aerodynamics)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model as JSON, every number exact, at once or not at all; see `load`."""

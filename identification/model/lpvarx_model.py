@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -21,6 +21,11 @@ from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal, signals
 from symheli.values.arrays import Array, frozen
 from symheli.values.sample_period import JITTER, same_period
+from symheli.values.summary import as_table, summarized
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,6 +69,8 @@ class LPVARXModel:
     (799, 'ls', (800, 1))
     >>> print(model.at(0.0).poles().round(1), model.to_state_space().dt)
     [0.5] 0.1
+    >>> list(model.to_frame().index)[0], dict(model.to_xarray().sizes)
+    ('y(k-1) f0(p(k-1))', {'regressor': 4, 'output': 1})
     """
 
     structure: LPVARX
@@ -79,6 +86,9 @@ class LPVARXModel:
     excitation: ExcitationReport | None = field(default=None, repr=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
     covariance: Array | None = field(default=None, repr=False)
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         arx = self.structure
@@ -207,6 +217,23 @@ class LPVARXModel:
         return self.to_state_space().truncate(
             order, input_scale=input_scale, output_scale=output_scale
         )
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The coefficients: a row a regressor, a column an output; the units of the outputs in
+        attrs["units"], those of the regressors in attrs["regressor_units"]. Raises `InputError`
+        without pandas.
+        """
+        from identification.model.labelled_coefficients import coefficients_frame
+
+        return coefficients_frame(self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The coefficients `theta` over "regressor" and "output", each with its units; the basis is
+        an attribute. Raises `InputError` without xarray.
+        """
+        from identification.model.labelled_coefficients import coefficients_dataset
+
+        return coefficients_dataset(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model as JSON, every number exact, at once or not at all; see `load`."""

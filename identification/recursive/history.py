@@ -11,6 +11,7 @@ from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX
 from symheli.values import Signal
 from symheli.values.arrays import Array
+from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
     from identification.recursive.rls_state import RLSState
@@ -61,6 +62,9 @@ class History:
     scheduling: Signal | tuple[Signal, ...]
     dropped: int
     trim: Array | None = None
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     @property
     def model(self) -> Any:

@@ -13,6 +13,7 @@ from identification.recursive.kernel import twin
 from identification.recursive.kernel.configuration import Configuration, GroupLayout
 from symheli.errors import InputError
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,8 @@ class RLSState:
     configuration: Configuration
     memory: Array
     _learnt: dict[str, Array] = field(default_factory=dict, repr=False)
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         self.memory.flags.writeable = False
@@ -199,3 +202,5 @@ class RLSInfo(NamedTuple):
     gain: Array
     coefficients: Array
     determined: bool
+
+    __repr__ = summarized

@@ -17,14 +17,14 @@ from typing import Any, NamedTuple
 import synthesis
 from studies.bracket.servo import curves_of, found_of, measure_servo, text_of
 from studies.bracket.table import bracket_table
-from studies.figures.gain_curve import GainCurve, save
+from studies.figures.gain_curve import save
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
 from studies.output import as_json, columns, progress
 from studies.stamped_tables import DOCS, keep, parsed, processor
 from symheli import Helicopter, LPVStateSpace
 from symheli.lpv.bases import Polynomial
-from synthesis import HigherOrder, Memory, Search, Solver, Spline
+from synthesis import GainCurve, HigherOrder, Memory, Search, Solver, Spline
 from synthesis.cover import Remainder, covering
 from synthesis.forms import LyapunovForm
 

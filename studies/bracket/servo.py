@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 import symheli
-from studies.figures.gain_curve import GainCurve
 from studies.output import progress
 from studies.transition import axes, gain_tables, guarantees
 from studies.transition.axes import LATERAL
@@ -19,7 +18,7 @@ from studies.transition.effort import Effort
 from studies.transition.flights import TOP, FlightPlan, autopilot_for
 from studies.transition.guarantees import Bound
 from symheli import Helicopter
-from synthesis import Spline
+from synthesis import GainCurve, Spline
 
 RATES = (0.0, 0.1, 1.0, 3.0, 4.5, 8.0, 20.0, math.inf)
 """Permitted accelerations, m/s^2."""

@@ -6,17 +6,19 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from studies.commands import options
+from studies.commands import given_model, options
 from studies.output import Output, progress
 from symheli.errors import InputError
 
 if TYPE_CHECKING:
+    from symheli import LPVStateSpace
     from synthesis import Certificate
     from synthesis.forms import LyapunovForm
 
-HELP = "proven gain and stability of the lateral loop for a rate of airspeed"
+HELP = "proven gain and stability of the lateral loop, or of any model, for a rate of airspeed"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -27,22 +29,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=options.rate,
         default=3.0,
         metavar="M/S^2",
-        help="largest |dV/dt|, m/s^2, or inf (default: %(default)s)",
+        help="largest |dV/dt|, m/s^2 (of --model: of its parameter), or inf (default: %(default)s)",
     )
     parser.add_argument(
         "--airspeeds",
         type=options.number,
         nargs=2,
-        default=(0.0, 13.0),
         metavar=("LOW", "HIGH"),
-        help="range, m/s (default: 0 13)",
+        help="range, m/s (default: 0 13; of --model its own)",
     )
     parser.add_argument(
         "--channel",
         choices=("gust", "inputs"),
-        default="gust",
-        help="lateral gust, or disturbances at the inputs, -> r, phi",
+        help="lateral gust (default), or disturbances at the inputs, -> r, phi",
     )
+    given_model.configure(parser)
     parser.add_argument(
         "--lft",
         metavar="TEST",
@@ -93,19 +94,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Output:
     """Build the loop, prove, verify; exit status 1 where nothing could be proven."""
     import synthesis
-    from studies.loops.lateral import HOLD, lateral_loop
 
-    low, high = arguments.airspeeds
-    progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
-    loop = lateral_loop(options.helicopter(arguments), low, high, arguments.channel)
+    loop, head = _given(arguments) if arguments.model else _lateral(arguments)
     cert: Certificate
     if arguments.lft:
         _refuse_form(arguments)
-        progress(f"LFT test with {arguments.lft} for an airspeed that may jump")
+        progress(f"LFT test with {arguments.lft} for a parameter that may jump")
         test = synthesis.lft_stability if arguments.stability else synthesis.lft_gain
         cert, rate = test(loop.to_lft().reduce(), arguments.lft), math.inf
     else:
-        progress(f"searching a Lyapunov function for |dV/dt| <= {arguments.rate:g} m/s^2")
+        progress(f"searching a Lyapunov function for |dp/dt| <= {arguments.rate:g} per second")
         certify = synthesis.stability if arguments.stability else synthesis.l2_gain
         cert, rate = (
             certify(loop, rate=arguments.rate, form=_form(arguments)),
@@ -117,10 +115,6 @@ def run(arguments: argparse.Namespace) -> Output:
         exact = cert.verify(rigorous=True)
     if arguments.save:
         cert.save(arguments.save)
-    head = (
-        f"lateral loop of {arguments.vehicle}, d_lat = {HOLD:g} phi, {low:g} to {high:g} m/s,"
-        f" {arguments.channel} -> r, phi (SI)"
-    )
     text = f"{head}\n{cert}" + (
         "" if exact is None else f"\n  exact verification: {'passed' if exact else 'not passed'}"
     )
@@ -138,8 +132,44 @@ def run(arguments: argparse.Namespace) -> Output:
         "hypotheses": cert.hypotheses,
         "solver": cert.solver,
         "seconds": cert.seconds._asdict(),
+        "proof": arguments.save,
     }
     return Output(text, data, status=0 if cert.verified and exact is not False else 1)
+
+
+def _lateral(arguments: argparse.Namespace) -> tuple[LPVStateSpace, str]:
+    """The lateral loop of --vehicle, and what it is."""
+    from studies.loops.lateral import ATTITUDE_HOLD, lateral_loop
+
+    given_model.only_with_a_model(arguments)
+    (low, high), channel = arguments.airspeeds or (0.0, 13.0), arguments.channel or "gust"
+    gains = dict(arguments.feedback) or ATTITUDE_HOLD
+    progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
+    loop = lateral_loop(
+        options.helicopter(arguments), low, high, channel, arguments.degree, gains=gains
+    )
+    return loop, (
+        f"lateral loop of {arguments.vehicle}, {given_model.words(gains)}, {low:g} to {high:g} m/s,"
+        f" {channel} -> r, phi (SI)"
+    )
+
+
+def _given(arguments: argparse.Namespace) -> tuple[LPVStateSpace, str]:
+    """The loop of --model, and what it is."""
+    if arguments.channel:
+        raise InputError(
+            "--channel is one of the lateral loop of a vehicle: name --inputs and --outputs of the"
+            " model"
+        )
+    loop = given_model.closed_loop(arguments, given_model.lpv_model(arguments))
+    if arguments.airspeeds:
+        low, high = arguments.airspeeds
+        loop = loop.with_scheduling(replace(loop.scheduling, low=low, high=high))
+    ranges = ", ".join(f"{s.name} {s.low:g} to {s.high:g} {s.unit}" for s in loop.parameters)
+    return loop, (
+        f"{arguments.model}, {given_model.words(dict(arguments.feedback))}, {ranges},"
+        f" {', '.join(loop.inputs)} -> {', '.join(loop.outputs)} (SI)"
+    )
 
 
 def _refuse_form(arguments: argparse.Namespace) -> None:

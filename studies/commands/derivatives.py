@@ -28,7 +28,6 @@ def run(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
-    from studies.figures.derivatives import plot
     from studies.figures.written import write
 
     low, high, n = arguments.airspeeds
@@ -36,11 +35,7 @@ def run(arguments: argparse.Namespace) -> Output:
     table = symheli.derivatives(
         symheli.sweep(options.helicopter(arguments), np.linspace(low, high, int(n)).tolist())
     )
-    written = (
-        write(arguments.out, "derivatives", table.csv(), lambda: plot(table))
-        if arguments.out
-        else []
-    )
+    written = write(arguments.out, "derivatives", table.csv(), table.plot) if arguments.out else []
     text = "\n".join([str(table), *(f"wrote {path}" for path in written)])
     data = {
         "airspeeds": table.airspeeds,

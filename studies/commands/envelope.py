@@ -37,7 +37,6 @@ def run(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
-    from studies.figures.trim_map import plot
     from studies.figures.written import write
 
     speeds, rates = (
@@ -48,9 +47,7 @@ def run(arguments: argparse.Namespace) -> Output:
         f"trimming {arguments.vehicle} at {len(speeds)} airspeeds and {len(rates)} climb rates"
     )
     found = symheli.trim_map(options.helicopter(arguments), speeds, rates)
-    written = (
-        write(arguments.out, "trim_map", found.csv(), lambda: plot(found)) if arguments.out else []
-    )
+    written = write(arguments.out, "trim_map", found.csv(), found.plot) if arguments.out else []
     text = "\n".join([_picture(found), *_numbers(found), *(f"wrote {path}" for path in written)])
     return Output(text, {**_data(found), "written": written})
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from studies.commands import estimator, options
+from studies.commands import estimator, given_model, options
 from studies.output import Output
 from symheli.errors import InputError
 
@@ -25,7 +25,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help=(
             "c: equations of motion and header; estimator: recursive identification as C for an"
             " autopilot; model: an identified model (--model) as C; controller: one in a table"
-            " over airspeed (--model) as C; mat: linear models along airspeed; latex, markdown:"
+            " over airspeed (--model) as C; mat: linear models along airspeed, or what --model holds; latex, markdown:"
             " every component's equations to read"
         ),
     )
@@ -56,12 +56,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     estimator.configure(parser)
     group = parser.add_argument_group(
-        "model, controller",
+        "model, controller, mat",
         "C code that predicts and simulates what symheli identify --save kept (--single applies),"
-        " or that flies what TableController.save kept",
+        " or that flies what TableController.save kept; a MATLAB file of an identified model or a"
+        " family of linear models",
     )
     group.add_argument(
-        "--model", type=Path, metavar="FILE.json", help="the identified model, or the controller"
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="the identified model, the controller, or the family of linear models",
     )
 
 
@@ -71,6 +75,12 @@ def run(arguments: argparse.Namespace) -> Output:
         return _said(_model(arguments))
     if arguments.format == "controller":
         return _said(_controller(arguments))
+    if arguments.model and arguments.format == "mat":
+        return _said(_mat(arguments))
+    if arguments.model:
+        raise InputError(
+            f"--model is for model, controller and mat; {arguments.format} is of a vehicle"
+        )
     heli = options.helicopter(arguments)
     name = Path(arguments.vehicle).stem
     if arguments.format == "c":
@@ -102,14 +112,37 @@ def run(arguments: argparse.Namespace) -> Output:
 
 
 def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
-    from identification import LPVARXModel
-    from identification.export import write_model
+    from identification import KinematicModel, LPVARXModel
+    from identification.export import write_kinematic_model, write_model
 
-    return write_model(
-        LPVARXModel.load(_named(arguments, "as symheli identify LOG --save FILE.json writes it")),
-        arguments.out or Path("model"),
-        precision="single" if arguments.single else "double",
+    given = given_model.read(
+        _named(arguments, "as symheli identify LOG --save FILE.json writes it")
     )
+    folder = arguments.out or Path("model")
+    precision = "single" if arguments.single else "double"
+    if isinstance(given, KinematicModel):
+        return write_kinematic_model(given, folder, precision=precision)
+    if isinstance(given, LPVARXModel):
+        return write_model(given, folder, precision=precision)
+    raise InputError(
+        f"{arguments.model}: a family of linear models predicts nothing by itself; export mat"
+        " writes it for MATLAB"
+    )
+
+
+def _mat(arguments: argparse.Namespace) -> tuple[Path, ...]:
+    """The model of --model for MATLAB."""
+    from symheli.export import write_family_mat
+    from symheli.lpv import LinearFamily, LinearGrid
+
+    given, path = given_model.read(arguments.model), arguments.out
+    path = path or Path(f"{arguments.model.stem}.mat")
+    if isinstance(given, LinearGrid):
+        axes = ", ".join(given.axes)
+        raise InputError(f"{arguments.model}: models over {axes}; MATLAB gets those over airspeed")
+    if isinstance(given, LinearFamily):
+        return write_family_mat(given, path, arguments.model.name)
+    return (given.save_mat(path),)
 
 
 def _controller(arguments: argparse.Namespace) -> tuple[Path, ...]:

@@ -6,11 +6,18 @@ from __future__ import annotations
 
 import argparse
 import math
+from typing import TYPE_CHECKING
 
-from studies.commands import options
+from studies.commands import given_model, options
 from studies.output import Output, progress
+from symheli.errors import InputError
+
+if TYPE_CHECKING:
+    from synthesis import Margins
 
 HELP = "gain, phase, delay and disk margins and attitude bandwidths over airspeed"
+HOLD_COLUMNS = f"{'gain':>7s}{'phase':>7s}{'delay':>8s}{'disk':>6s}"
+HOLD_UNITS = f"{'x':>7s}{'deg':>7s}{'ms':>8s}{'':>6s}"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -20,9 +27,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--airspeeds",
         type=options.number,
         nargs=2,
-        default=(0.0, 13.0),
         metavar=("LOW", "HIGH"),
-        help="range, m/s (default: 0 13)",
+        help="range, m/s (default: 0 13; of --model its own)",
     )
     parser.add_argument(
         "--points",
@@ -31,25 +37,65 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="airspeeds (default: %(default)s)",
     )
-    parser.add_argument(
-        "--degree",
-        type=options.at_least_one,
-        default=3,
-        metavar="D",
-        help="of the interpolation (default: %(default)s)",
-    )
+    given_model.configure(parser, channels=False)
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """The exact models beside their element-wise interpolation."""
+    """The exact models of a vehicle beside their element-wise interpolation, or the loops around a
+    model from a file.
+    """
+    return _of_model(arguments) if arguments.model else _of_vehicle(arguments)
+
+
+def _of_model(arguments: argparse.Namespace) -> Output:
+    import numpy as np
+
+    from studies.loops.given import over_parameter
+
+    gains = dict(arguments.feedback)
+    if not gains:
+        raise InputError("name the loop whose margins are asked for: --feedback d_lat=phi:-0.02")
+    lpv = given_model.lpv_model(arguments)
+    s = lpv.scheduling
+    low, high = arguments.airspeeds or (s.low, s.high)
+    values = np.linspace(low, high, arguments.points).tolist()
+    rows = list(over_parameter(lpv, gains, values))
+    head = f"{arguments.model}, {given_model.words(gains)}: the loop broken at each input"
+    names = list(rows[0].margins)
+    lines = [
+        head,
+        "",
+        f"{'':9s}" + "".join(f"  {u:<28s}" for u in names),
+        f"{f'{s.name}, {s.unit}':>9.9s}" + "".join(f"  {HOLD_COLUMNS}" for _ in names),
+        f"{'':9s}" + "".join(f"  {HOLD_UNITS}" for _ in names),
+    ]
+    lines += [
+        f"{row.p:9.4g}" + "".join(f"  {_margins(row.margins[u])}" for u in names) for row in rows
+    ]
+    data = {
+        "loop": head,
+        "parameter": s.name,
+        "values": values,
+        "margins": {u: [_margin_entry(row.margins[u]) for row in rows] for u in names},
+        "units": {"parameter": s.unit, "phase": "rad", "delay": "s"},
+    }
+    return Output("\n".join(lines), data)
+
+
+def _of_vehicle(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
     from studies.loops.lateral import HOLD
     from studies.loops.margins import DELAY, LATERAL, LONGITUDINAL, over_airspeed
-    from symheli.errors import InputError
 
-    low, high = arguments.airspeeds
+    given_model.only_with_a_model(arguments)
+    if arguments.feedback:
+        raise InputError(
+            f"the loop of a vehicle is its roll hold d_lat = {HOLD:g} phi; --feedback goes with"
+            " --model FILE"
+        )
+    low, high = arguments.airspeeds or (0.0, 13.0)
     if not (0 <= low < high) or arguments.points <= arguments.degree:
         raise InputError(
             "expected 0 <= LOW < HIGH and more points than the degree of the interpolation"
@@ -74,11 +120,8 @@ def run(arguments: argparse.Namespace) -> Output:
         " and interpolated lateral model (input / 0.01 rad, output / 0.1 SI)"
     )
     lines = [head, "", f"{'':34s}exact{'':47s}interpolated"]
-    columns = (
-        f"{'gain':>7s}{'phase':>7s}{'delay':>8s}{'disk':>6s}{'roll BW':>9s}{'lag':>7s}"
-        f"{'pitch BW':>10s}"
-    )
-    units = f"{'x':>7s}{'deg':>7s}{'ms':>8s}{'':>6s}{'rad/s':>9s}{'ms':>7s}{'rad/s':>10s}"
+    columns = f"{HOLD_COLUMNS}{'roll BW':>9s}{'lag':>7s}{'pitch BW':>10s}"
+    units = f"{HOLD_UNITS}{'rad/s':>9s}{'ms':>7s}{'rad/s':>10s}"
     lines += [f"{'V, m/s':>7s}{columns}  {columns}{'gap':>7s}", f"{'':7s}{units}  {units}"]
     for exact, near, gap in zip(tables["exact"], tables["interpolated"], gaps, strict=True):
         lines.append(f"{exact.airspeed:7.2f}{_row(exact)}  {_row(near)}{gap:7.3f}")
@@ -99,18 +142,22 @@ def _gap(exact, near) -> float:
 
 
 def _row(row) -> str:
-    hold, roll, pitch = row.hold, row.roll, row.pitch
+    roll, pitch = row.roll, row.pitch
     return (
-        f"{hold.gain[1]:7.2f}{math.degrees(hold.phase):7.1f}{1000 * hold.delay:8.0f}"
-        f"{hold.disk:6.2f}{roll.rate_response:9.2f}{1000 * roll.phase_delay:7.0f}"
+        f"{_margins(row.hold)}{roll.rate_response:9.2f}{1000 * roll.phase_delay:7.0f}"
         f"{pitch.rate_response:10.2f}"
     )
 
 
-def _entry(row) -> dict[str, object]:
-    hold, unit = row.hold, {"phase": "rad", "delay": "s", "bandwidth": "rad/s", "phase_delay": "s"}
+def _margins(hold: Margins) -> str:
+    return (
+        f"{hold.gain[1]:7.2f}{math.degrees(hold.phase):7.1f}{1000 * hold.delay:8.0f}"
+        f"{hold.disk:6.2f}"
+    )
+
+
+def _margin_entry(hold: Margins) -> dict[str, object]:
     return {
-        "airspeed": row.airspeed,
         "stable": hold.stable,
         "gain": hold.gain,
         "phase": hold.phase,
@@ -118,6 +165,14 @@ def _entry(row) -> dict[str, object]:
         "disk": hold.disk,
         "disk_gain": hold.disk_gain,
         "disk_phase": hold.disk_phase,
+    }
+
+
+def _entry(row) -> dict[str, object]:
+    unit = {"phase": "rad", "delay": "s", "bandwidth": "rad/s", "phase_delay": "s"}
+    return {
+        "airspeed": row.airspeed,
+        **_margin_entry(row.hold),
         "roll_bandwidth": row.roll.rate_response,
         "roll_phase_delay": row.roll.phase_delay,
         "pitch_bandwidth": row.pitch.rate_response,

@@ -1,51 +1,73 @@
-"""symheli verify: prove a saved certificate again, in exact arithmetic and from its file alone."""
+"""symheli verify: prove saved certificates again, in exact arithmetic and from their files alone."""
 
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.output import Output, progress
 
 if TYPE_CHECKING:
     from synthesis import Certificate
 
-HELP = "prove a saved certificate again, exactly, from its file alone"
+HELP = "prove saved certificates again, exactly, from their files alone"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """The file."""
-    parser.add_argument("file", help="written by Certificate.save or symheli certify --save")
+    """The files."""
+    parser.add_argument(
+        "files",
+        nargs="+",
+        metavar="file",
+        help="written by Certificate.save, symheli certify --save or a study (DIR/proofs)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Load, verify in rational arithmetic; exit status 1 where the proof fails."""
+    """Load, verify in rational arithmetic; exit status 1 where a proof fails."""
+    if len(arguments.files) == 1:
+        cert, verdict, data = _verified(arguments.files[0])
+        return Output(f"{cert}\n{verdict}", data, status=0 if data["exact"] else 1)
+    lines, proofs = [], []
+    for file in arguments.files:
+        _, verdict, data = _verified(file)
+        lines.append(f"{file}: {verdict}")
+        proofs.append(data)
+    exact = all(proof["exact"] for proof in proofs)
+    data = {"exact": exact, "proofs": proofs}
+    return Output("\n".join(lines), data, status=0 if exact else 1)
+
+
+def _verified(file: str) -> tuple[Certificate, str, dict[str, Any]]:
+    """The certificate in a file, what exact arithmetic says of it, and the same for a program."""
     from synthesis import Certificate
 
-    cert = Certificate.load(arguments.file)
+    cert = Certificate.load(file)
     if cert.proof is None:
-        verdict = f"not proven: {arguments.file} holds no proof ({cert.status.value})"
+        verdict = f"not proven: {file} holds no proof ({cert.status.value})"
         exact = False
     else:
-        progress("verifying in rational arithmetic")
+        progress(f"verifying {file} in rational arithmetic")
         exact = cert.verify(rigorous=True)
         verdict = (
             f"proven in exact arithmetic: {_bound(cert)}"
             if exact
             else f"not proven: {cert.fault or 'the inequalities do not hold in exact arithmetic'}"
         )
-    data = {
-        "file": arguments.file,
-        "kind": cert.kind,
-        "rates": cert.rates,
-        "gamma": cert.gamma,
-        "alpha": cert.alpha,
-        "status": cert.status.name,
-        "exact": exact,
-        "hypotheses": cert.hypotheses,
-    }
-    text = f"{cert}\n{verdict}"
-    return Output(text, data, status=0 if exact else 1)
+    return (
+        cert,
+        verdict,
+        {
+            "file": file,
+            "kind": cert.kind,
+            "rates": cert.rates,
+            "gamma": cert.gamma,
+            "alpha": cert.alpha,
+            "status": cert.status.name,
+            "exact": exact,
+            "hypotheses": cert.hypotheses,
+        },
+    )
 
 
 def _bound(cert: Certificate) -> str:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from studies.controllers.designs import BASELINE, HINF, IDENTIFIED, LFT, LQR
-from studies.figures.gain_curve import BLUE, GREEN, GREY, ORANGE, RED
+from symheli.values.drawing import BLUE, GREEN, GREY, ORANGE, RED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from studies.controllers.tables import conclusions
 from studies.transition.certificates import bound_to_dict
 from studies.transition.quantities import named, value, values
+from studies.transition.saved_proofs import proof_file
 
 if TYPE_CHECKING:
     from studies.controllers.designs import Design
@@ -19,7 +20,7 @@ def controllers_to_dict(study: Outcome) -> dict[str, Any]:
     proofs, flown = study.certified_controllers, study.flown_controllers
     return {
         "designs": study.controllers and [_design(d) for d in study.controllers.designs],
-        "bounds": proofs and [bound_to_dict(b) for b in proofs.bounds],
+        "bounds": proofs and [bound_to_dict(b, proof_file(b)) for b in proofs.bounds],
         "flights": flown and [_flown(one) for one in flown.flown],
         "conclusions": conclusions(study),
     }

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED
 from studies.jerk.flown import Fastest
 from studies.jerk.gains import Loop
+from symheli.values.drawing import BLUE, GREEN, GREY, INK, ORANGE, RED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

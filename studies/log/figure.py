@@ -11,7 +11,8 @@ import numpy as np
 from identification import AgainstConstant
 from identification.judge.against_constant import Scored
 from identification.judge.scores import percent, predicted, steps
-from symheli.records.record_plot import draw, empty_figure, label, shade_missing
+from symheli.records.record_plot import draw, empty_figure, shade_missing
+from symheli.values.drawing import label
 from symheli.values.whole_files import write_bytes
 
 if TYPE_CHECKING:

@@ -26,16 +26,19 @@ def lateral_loop(
     channel: Literal["gust", "inputs"] = "gust",
     degree: int = 3,
     points: int = 27,
+    gains: Mapping[tuple[str, str], float] = ATTITUDE_HOLD,
 ) -> LPVStateSpace:
-    """v p r phi b1 from `low` to `high` m/s under attitude hold, element-wise polynomials of
-    `degree` through `points` airspeeds.
+    """v p r phi b1 from `low` to `high` m/s under `gains` (the attitude hold), element-wise
+    polynomials of `degree` through `points` airspeeds.
 
     channel "gust": lateral gust v_w (m/s) -> r (rad/s), phi (rad); "inputs": disturbances added to
     d_lat, d_ped (rad) -> the same.
     """
     family = symheli.sweep(heli, np.linspace(low, high, points), inputs=("d_lat", "d_ped", "v_w"))  # type: ignore[arg-type]
     return close(
-        family.select(STATES, ("d_lat", "d_ped", "v_w")).interpolate("polynomial", degree), channel
+        family.select(STATES, ("d_lat", "d_ped", "v_w")).interpolate("polynomial", degree),
+        channel,
+        gains,
     )
 
 

@@ -8,8 +8,8 @@ from studies.transition.guarantees import Bound, unit_of
 from studies.transition.quantities import value
 
 
-def bound_to_dict(b: Bound) -> dict[str, Any]:
-    """One certificate."""
+def bound_to_dict(b: Bound, proof: str | None = None) -> dict[str, Any]:
+    """One certificate, and the file beside results.json that proves it."""
     c, unit = b.certificate, unit_of(b.channel)
     return {
         "model": b.model,
@@ -25,4 +25,5 @@ def bound_to_dict(b: Bound) -> dict[str, Any]:
         "solver": c.solver,
         "time": value(sum(c.seconds), "s"),
         "hypotheses": list(c.hypotheses),
+        "proof": proof,
     }

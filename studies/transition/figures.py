@@ -10,24 +10,23 @@ import numpy as np
 
 from studies.controllers.figure import CAPTION as RATIOS
 from studies.controllers.figure import energy_ratios
-from studies.figures import gain_curve
-from studies.figures.gain_curve import BLUE, GREEN, GREY, INK, ORANGE, RED
 from studies.marks import models
 from studies.marks.truth import SPEEDS
 from studies.transition.flights import NOISES
 from studies.transition.guarantees import curves
 from studies.transition.known_kinematics import CUBIC, KNOWN, TWO_INPUTS
+from symheli.values.drawing import BLUE, GREEN, GREY, INK, ORANGE, RED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification import FrozenModels
-    from studies.figures.gain_curve import GainCurve
     from studies.transition.comparison import ComparedAxis
     from studies.transition.flights import Flights
     from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
     from studies.transition.paper_experiment import Experiment
+    from synthesis import GainCurve
 
 DEGREES = 180 / math.pi
 
@@ -378,5 +377,5 @@ def gain_curves(curves: list[GainCurve]) -> Figure:
         1, len(curves), 7.5 if len(curves) == 1 else 11.5, 4.2, width_ratios=(1.5, 1)[: len(curves)]
     )
     for ax, curve in zip(axes[0], curves, strict=True):
-        gain_curve.plot(curve, ax)
+        curve.plot(ax)
     return figure

@@ -11,7 +11,6 @@ from functools import partial
 
 import synthesis
 from identification import LPVARXModel
-from studies.figures.gain_curve import GainCurve
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import ATTITUDE_HOLD, STATES, close
 from studies.transition.flights import TOP
@@ -24,7 +23,7 @@ from symheli import (
     UncertainStateSpace,
 )
 from symheli.lpv.bases import Polynomial
-from synthesis import Certificate, Memory, Search, Spline
+from synthesis import Certificate, GainCurve, Memory, Search, Spline
 from synthesis.worst.frozen import norm
 
 SIZES = {"d_lat": 0.01, "d_ped": 0.02, "r": 0.1, "phi": 0.1}
@@ -262,20 +261,8 @@ def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> 
     own = [
         b for b in found if (b.model, b.channel, b.certificate.kind) == (model, channel, "l2 gain")
     ]
-    flown: dict[float, float] = {}
-    for b in own:
-        flown[b.rate] = max(b.certificate.lower, flown.get(b.rate, 0.0))
-    varying = {form: {b.rate: proven(b) for b in own if b.form == form} for form in (MEMORY, PLAIN)}
-    jumping = {b.form: proven(b) for b in own if math.isinf(b.rate)}
-    unit = unit_of(channel)
-    return GainCurve(
-        title,
-        unit,
-        own[0].certificate.frozen,
-        flown,
-        {form: g for form, g in varying.items() if g},
-        jumping,
-    )
+    own.sort(key=lambda b: FORMS.index(b.form))
+    return GainCurve.of(((b.form, b.rate, b.certificate) for b in own), title, unit_of(channel))
 
 
 def rate_text(rate: float) -> str:

@@ -15,6 +15,7 @@ from studies.transition.axes import AXES
 from studies.transition.conclusions import certificates, conclusions
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
+from studies.transition.saved_proofs import save_proofs
 from symheli.values.whole_files import write_bytes, write_text
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ TEMPLATE = "report.html.j2"
 
 
 def write_results(study: Outcome, out: Path) -> Path:
-    """results.json with everything reached so far."""
+    """results.json with everything reached so far, after the proofs that it names."""
+    save_proofs(study, out)
     return write_text(
         out / "results.json", json.dumps(to_dict(study), indent=1, allow_nan=False) + "\n"
     )

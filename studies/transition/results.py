@@ -18,6 +18,7 @@ from studies.transition.certificates import bound_to_dict
 from studies.transition.guarantees import unit_of
 from studies.transition.paper_experiment import PERIOD
 from studies.transition.quantities import named, value, values
+from studies.transition.saved_proofs import proof_file
 
 if TYPE_CHECKING:
     from identification import FrozenModels, Scores
@@ -280,5 +281,5 @@ def _guarantees(study: Outcome) -> dict[str, Any]:
             }
             for name, peak in (study.servo.frozen_peaks.items() if study.servo else ())
         ],
-        "bounds": [bound_to_dict(b) for b in study.bounds],
+        "bounds": [bound_to_dict(b, proof_file(b)) for b in study.bounds],
     }

@@ -21,6 +21,7 @@ from symheli.airframe.vehicle_file import LINEAR
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
 from symheli.values.units import to_si
 
 _TABLES = ("states", "inputs", "equations", "parameters")
@@ -57,6 +58,9 @@ class IdentifiedModel(LinearModel):
     title: str = ""
     source: str = ""
     parameters: Mapping[str, Quantity] = field(default_factory=dict)
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     @property
     def assumed(self) -> list[str]:

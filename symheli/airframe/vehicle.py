@@ -14,6 +14,7 @@ from symheli.airframe.plausibility import impossibilities
 from symheli.airframe.quantity import Quantity
 from symheli.airframe.vehicle_file import LINEAR, VehicleFile
 from symheli.errors import InputError, UnknownNameError
+from symheli.values.summary import summarized
 from symheli.values.units import dimension
 
 
@@ -26,6 +27,8 @@ class Vehicle:
     source: str
     sections: Mapping[str, Mapping[str, Quantity]]
     components: Mapping[str, Part]
+
+    __repr__ = summarized
 
     def values(self, section: str) -> dict[str, float]:
         """{entry: value in SI} of a section."""

@@ -2,6 +2,6 @@
 
 from symheli.export.c import write_c
 from symheli.export.controller import write_controller
-from symheli.export.mat import write_mat
+from symheli.export.mat import write_family_mat, write_mat
 
-__all__ = ["write_c", "write_controller", "write_mat"]
+__all__ = ["write_c", "write_controller", "write_family_mat", "write_mat"]

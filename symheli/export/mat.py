@@ -81,8 +81,47 @@ def write_mat(
             f" {points}"
         )
     family = sweep(heli, np.linspace(low, high, points))  # type: ignore[arg-type]
-    path = Path(path)
     title = f"{heli.vehicle.title}, {heli.governor} governor; {heli.vehicle.source}"
+    return write_family_mat(family, path, title)
+
+
+def write_family_mat(
+    family: LinearFamily, path: str | os.PathLike[str], title: str
+) -> tuple[Path, ...]:
+    """Write a family as `write_mat` does, under a `title` of one line.
+
+    Parameters
+    ----------
+    family : LinearFamily
+        Models over airspeed with their trims.
+    path : path
+        Of the MATLAB file; load_symheli.m and symheli_at.m are written beside it.
+    title : str
+        What the models are.
+
+    Returns
+    -------
+    tuple of Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        For a family without trims.
+
+    Examples
+    --------
+    >>> import symheli, tempfile
+    >>> from symheli.export import write_family_mat
+    >>> heli = symheli.Helicopter.load("xcell60", governor="ideal")
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> family = symheli.sweep(heli, [4.0, 8.0])
+    >>> files = write_family_mat(family, f"{folder.name}/two.mat", "two models")
+    >>> [file.name for file in files]
+    ['two.mat', 'load_symheli.m', 'symheli_at.m']
+    >>> folder.cleanup()
+    """
+    path = Path(path)
     functions = (
         write_text(path.with_name(name), (HERE / name).read_text(encoding="utf-8"))
         for name in FUNCTIONS

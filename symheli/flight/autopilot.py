@@ -21,6 +21,7 @@ from symheli.lpv.scheduling import Scheduling
 from symheli.steady.airspeed_sweep import sweep
 from symheli.values.arrays import frozen
 from symheli.values.signal import Signal, signals
+from symheli.values.summary import summarized
 
 UNMEASURED = ("a1", "b1")
 SCALE = {
@@ -74,6 +75,8 @@ class Autopilot:
     states: tuple[Signal, ...]
     dt: float
     radius: float | None = None
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "states", signals(self.states))

@@ -21,6 +21,7 @@ from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers
 from symheli.progress import task
 from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.summary import as_table, summarized
 
 CHUNK = 2 * SIDE_BY_SIDE.lanes
 """Flights a worker takes at a time."""
@@ -49,6 +50,9 @@ class FlightBatch(Sequence[FlightRecord]):
     """
 
     data: tuple[FlightData, ...]
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __len__(self) -> int:
         return len(self.data)

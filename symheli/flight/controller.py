@@ -20,6 +20,7 @@ from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import summarized
 
 MEASURED = signals(("u", "v", "w", "p", "q", "r", "phi", "theta"))
 """States with a sensor, which a controller sees as that reads them."""
@@ -117,6 +118,8 @@ class ScheduledController:
 
     model: LPVStateSpace
     follow: Follow = "command"
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, LPVStateSpace):

@@ -17,6 +17,7 @@ from symheli.lpv.linear_family import LinearFamily
 from symheli.physics.rigid_body import euler_rates, gravity_euler, rotation, translation
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, signals
+from symheli.values.summary import summarized
 
 BODY_STATES = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 STEP = 0.005
@@ -78,6 +79,8 @@ class StitchedModel:
     inputs: tuple[Signal, ...]
     filter: float = 0.5
     inertia: tuple[float, float, float, float] | None = None
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs"):

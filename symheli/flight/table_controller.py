@@ -40,6 +40,7 @@ from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +111,8 @@ class TableController:
     airspeed: AirspeedMonitor = field(default_factory=AirspeedMonitor)
     follow: Follow = "command"
     misfit: float = 0.0
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):

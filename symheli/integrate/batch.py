@@ -18,6 +18,7 @@ from symheli.integrate.rk4 import Flights, RungeKutta4
 from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers_of
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
+from symheli.values.summary import summarized
 
 CHUNK, CHUNK_IN_NUMPY = 64, 512
 """Flights a worker takes at a time; in NumPy so many that the arrays of one stage still fit the
@@ -54,6 +55,8 @@ class Batch:
     states: Array
     signals: tuple[Signal, ...]
     inputs: Array | None = None
+
+    __repr__ = summarized
 
     def __len__(self) -> int:
         return len(self.states)

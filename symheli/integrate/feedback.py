@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array, frozen
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +45,8 @@ class Feedback:
     gains: Array
     reference: Array
     travel: Array
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gains", frozen(self.gains, "gains", (None, 4, None)))

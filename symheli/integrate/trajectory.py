@@ -13,6 +13,7 @@ from symheli.records.flight_record import FlightRecord
 from symheli.values.arrays import Array, frozen
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import as_table, summarized
 
 EULER = ("u", "v", "w", "p", "q", "r", "phi", "theta")
 INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
@@ -61,6 +62,9 @@ class Trajectory:
     evaluations: int | None
     method: Any
     parameters: NamedVector
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         n = len(self.times) - 1

@@ -51,6 +51,7 @@ from symheli.lpv.nu_gaps import nu_gaps
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
 from symheli.lpv.stability_margin import stability_margin
+from symheli.lpv.step_response import StepResponse
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.lpv.uncertain_state_space import UncertainStateSpace
 
@@ -75,6 +76,7 @@ __all__ = [
     "Product",
     "Scheduling",
     "Spline",
+    "StepResponse",
     "TrimSchedule",
     "Truncation",
     "UncertainStateSpace",

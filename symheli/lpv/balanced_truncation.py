@@ -17,6 +17,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.nu_gap import angles, nu_gap
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal
+from symheli.values.summary import summarized
 
 Model = TypeVar("Model", LPVStateSpace, LinearModel)
 
@@ -43,6 +44,8 @@ class BalancedTruncation(Generic[Model]):
     p: Array
     nu_gap: Array
     error: Array
+
+    __repr__ = summarized
 
 
 def balanced_truncation(

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +20,12 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
 AIRSPEED = Signal("airspeed", "m/s")
 
@@ -55,6 +64,11 @@ class LinearFamily:
     >>> roll = family.select(["v", "p", "r", "phi", "b1"], ["d_lat", "d_ped"])
     >>> roll.interpolate("polynomial", degree=2).at(4.0).A.shape
     (5, 5)
+    >>> frame = roll.to_frame()
+    >>> frame.shape, frame.attrs["units"]["A[p, v]"]
+    ((4, 70), 'rad/m/s')
+    >>> roll.to_xarray()["A"].sel(airspeed=5.0, equation="p").shape
+    (5,)
     """
 
     airspeeds: Array
@@ -69,6 +83,9 @@ class LinearFamily:
     dt: float | None = None
     kinks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     models: LinearModels = field(init=False, repr=False)
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
@@ -164,6 +181,57 @@ class LinearFamily:
         drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2 (None: as fast as it likes).
         """
         return interpolated(self.models, (AIRSPEED,), (self.airspeeds,), kind, degree, rate)
+
+    def plot(self, ax: Axes | None = None, entries: Sequence[str] | None = None) -> Axes:
+        """Entries such as "A[q, u]" or "B[q, d_lon]" over airspeed, each by its largest magnitude,
+        which the legend gives; default the diagonal of A. Returns the axes; raises
+        `UnknownNameError` for an entry that is not there.
+        """
+        from symheli.lpv.entry_plot import plot_entries
+
+        return plot_entries(ax, AIRSPEED, self.airspeeds, self, self, entries, ".")
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row an airspeed (m/s), a column an entry A[q, u] ..., their units in attrs["units"].
+        Raises `InputError` without pandas.
+        """
+        from symheli.lpv.labelled_models import models_frame
+
+        return models_frame([(AIRSPEED, self.airspeeds)], self, self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A, B, C, D over "airspeed", "equation", "state", "input" and "output", and x0, u0 where
+        the trims are known; units in the attributes of the coordinates. Raises `InputError` without
+        xarray.
+        """
+        from symheli.lpv.labelled_models import models_dataset
+
+        return models_dataset([(AIRSPEED, self.airspeeds)], self, self, self.models.points)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the models with names, units and trims, as JSON or NPZ by the ending of the name,
+        in the form `symheli.lpv.family_file` describes; every number exact. Raises `SymheliError`
+        where the file cannot be written.
+        """
+        from symheli.lpv.family_file import Content, write
+
+        return write(Content((AIRSPEED,), (self.airspeeds,), self.models, self.kinks), path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> LinearFamily:
+        """The models in a file that `save`, another program or somebody wrote. Raises `InputError`
+        for a file that is none, or whose models are not over airspeed alone.
+        """
+        from symheli.lpv.family_file import read
+
+        found = read(path)
+        if found.axes != (AIRSPEED,) or found.axes[0].unit != AIRSPEED.unit:
+            axes = ", ".join(f"{s} ({s.unit})" for s in found.axes)
+            raise InputError(
+                f"{path}: expected models over airspeed (m/s), got {axes}: read them with"
+                " LinearGrid.load"
+            )
+        return cls.from_models(found.values[0], found.models, found.kinks)
 
     def _of(self, models: LinearModels) -> LinearFamily:
         return LinearFamily.from_models(self.airspeeds, models, self.kinks)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +21,11 @@ from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +62,9 @@ class LinearGrid:
     axes: tuple[Signal, ...]
     values: tuple[Array, ...]
     models: LinearModels
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         axes = tuple(a if isinstance(a, Signal) else Signal(a) for a in self.axes)
@@ -99,6 +110,11 @@ class LinearGrid:
     def outputs(self) -> tuple[Signal, ...]:
         """Outputs with units."""
         return self.models.outputs
+
+    @property
+    def dt(self) -> float | None:
+        """Sample period, s; None in continuous time."""
+        return self.models.dt
 
     @property
     def A(self) -> Array:
@@ -173,6 +189,42 @@ class LinearGrid:
         airspeed beside an acceleration changes as that says.
         """
         return interpolated(self.models, self.axes, self.values, kind, degree, rate)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a model by the values of the axes, a column an entry A[q, u] ..., their units in
+        attrs["units"]. Raises `InputError` without pandas.
+        """
+        from symheli.lpv.labelled_models import models_frame
+
+        return models_frame(list(zip(self.axes, self.values, strict=True)), self, self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A, B, C, D over the axes, "equation", "state", "input" and "output", and x0, u0 where the
+        trims are known. Raises `InputError` without xarray.
+        """
+        from symheli.lpv.labelled_models import models_dataset
+
+        axes = list(zip(self.axes, self.values, strict=True))
+        return models_dataset(axes, self, self, self.models.points)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the models with names, units and trims, as JSON or NPZ by the ending of the name,
+        in the form `symheli.lpv.family_file` describes; every number exact. Raises `SymheliError`
+        where the file cannot be written.
+        """
+        from symheli.lpv.family_file import Content, write
+
+        return write(Content(self.axes, self.values, self.models, {}), path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> LinearGrid:
+        """The models in a file that `save`, another program or somebody wrote. Raises `InputError`
+        for a file that is none.
+        """
+        from symheli.lpv.family_file import read
+
+        found = read(path)
+        return cls(found.axes, found.values, found.models)
 
     def _stacked(self, name: str) -> Array:
         every = getattr(self.models, name)

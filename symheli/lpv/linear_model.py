@@ -15,9 +15,13 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from symheli.lpv.linear_models import LinearModels
+    from symheli.lpv.step_response import StepResponse
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +60,9 @@ class LinearModel:
     outputs: tuple[Signal, ...]
     dt: float | None = None
     point: OperatingPoint | None = None
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):
@@ -177,6 +184,21 @@ class LinearModel:
             self.C @ np.linalg.solve(pencil, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
             + self.D
         )
+
+    def step_response(self, duration: float, samples: int = 501) -> StepResponse:
+        """Outputs after a unit step of each input from rest, over `duration` (s): exact at the
+        `samples`, which of a discrete model are its own. Raises `InputError` for a duration that is
+        not positive.
+        """
+        from symheli.lpv.step_response import step_response
+
+        return step_response(self, duration, samples)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """The poles in the complex plane, those that are not stable in red; returns the axes."""
+        from symheli.lpv.pole_plot import plot_poles
+
+        return plot_poles(self, ax)
 
     def to_control(self) -> Any:
         """A python-control `StateSpace` with the same names (dt = 0 where continuous)."""

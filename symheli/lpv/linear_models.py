@@ -13,6 +13,7 @@ from symheli.lpv.linear_model import LinearModel, selected
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_points import ListedPoints, OperatingPoints
 from symheli.values.signal import Signal, signals
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,8 @@ class LinearModels(Sequence[LinearModel]):
     outputs: tuple[Signal, ...]
     dt: float | None = None
     points: OperatingPoints = field(default_factory=ListedPoints)
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):

@@ -20,8 +20,12 @@ from symheli.lpv.scheduling import UNSCHEDULED, Rates, Scheduling, check_all, pa
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
     from symheli.lpv.balanced_truncation import BalancedTruncation
     from symheli.lpv.lft import LFT
     from symheli.lpv.prediction import Prediction
@@ -34,6 +38,8 @@ class Matrices(NamedTuple):
     B: Array
     C: Array
     D: Array
+
+    __repr__ = summarized
 
 
 class Residuals(NamedTuple):
@@ -115,6 +121,9 @@ class LPVStateSpace:
     dt: float | None = None
     trim: TrimSchedule | None = None
     residuals: Residuals | None = None
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", parameters(self.parameters))
@@ -519,6 +528,26 @@ class LPVStateSpace:
         from symheli.lpv.trim_drift import with_trim_drift
 
         return with_trim_drift(self)
+
+    def plot(self, ax: Axes | None = None, entries: Sequence[str] | None = None) -> Axes:
+        """Entries such as "A[q, u]" over the scheduling parameter, each by its largest magnitude,
+        which the legend gives; default the diagonal of A. Returns the axes; raises `InputError`
+        for several parameters, `UnknownNameError` for an entry that is not there.
+        """
+        from symheli.lpv.entry_plot import plot_entries
+
+        s = self.scheduling
+        p = np.linspace(s.low, s.high, 201)
+        return plot_entries(ax, Signal(s.name, s.unit), p, self, self.matrices(p), entries, "")
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The coefficients of A, B, C, D over "function" (j of f_j), "equation", "state", "input"
+        and "output"; the attribute `basis` says what the functions are. Raises `InputError` without
+        xarray.
+        """
+        from symheli.lpv.labelled_models import coefficient_dataset
+
+        return coefficient_dataset(self, self, repr(self.basis))
 
     def to_control(self, *p: float) -> Any:
         """A python-control `StateSpace` with the same names, p held: one value a parameter."""

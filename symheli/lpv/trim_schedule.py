@@ -8,6 +8,7 @@ import numpy as np
 
 from symheli.lpv.bases.function_space import FunctionSpace, Order
 from symheli.values.arrays import Array, frozen
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +23,8 @@ class TrimSchedule:
     x: Array
     u: Array
     xdot: Array | None = None
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "x", frozen(self.x, "trim states", (self.basis.size, None)))

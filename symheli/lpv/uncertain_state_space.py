@@ -15,6 +15,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Rates, Scheduling
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import as_table, summarized
 
 ROUNDING = 1e-12
 """A perturbation may exceed the bound by this fraction of it."""
@@ -67,6 +68,9 @@ class UncertainStateSpace:
     bound: float
     probability: float
     source: str
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, LPVStateSpace):

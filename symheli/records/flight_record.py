@@ -23,11 +23,13 @@ from symheli.logs.xplane import read_xplane
 from symheli.values.arrays import Array, frozen
 from symheli.values.sample_period import JITTER, period_of, warn_of_odd_steps
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import as_table, summarized
 from symheli.values.units import to_si
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
 
     from symheli.records.kinematic_check import KinematicCheck
 
@@ -83,6 +85,9 @@ class FlightRecord:
     note: str = ""
     meta: Mapping[str, Any] = field(default_factory=dict)
     resampled: str = ""
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "signals", signals(self.signals))
@@ -435,15 +440,30 @@ class FlightRecord:
         return split(self, fraction)
 
     def to_frame(self) -> pandas.DataFrame:
-        """A pandas DataFrame with a "t" column (s) and one column a signal. Raises `InputError`
-        without pandas.
+        """A pandas DataFrame with a "t" column (s) and one column a signal, units in
+        attrs["units"]. Raises `InputError` without pandas.
         """
         with extra("logs", "a data frame"):
             import pandas as pd
 
-        return pd.DataFrame(
+        made = pd.DataFrame(
             {"t": self.time, **{str(s): self.values[:, i] for i, s in enumerate(self.signals)}}
         )
+        made.attrs["units"] = {"t": "s", **{str(s): s.unit for s in self.signals}}
+        return made
+
+    def to_xarray(self) -> xarray.Dataset:
+        """An xarray Dataset over "time" (s), a variable a signal with its unit; the note is its
+        title. Raises `InputError` without xarray.
+        """
+        from symheli.values.labelled import dataset
+
+        variables = {
+            str(s): (("time",), column, s.unit)
+            for s, column in zip(self.signals, self.values.T, strict=True)
+        }
+        time = {"time": (Signal("time", "s"), self.time)}
+        return dataset(time, variables, title=self.note or None)
 
     # --- writing ---------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array
-from symheli.values.signal import Signal
+from symheli.values.drawing import GRID, LINE, SHADE, label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from symheli.records.flight_record import FlightRecord
 
-LINE, SHADE, GRID = "#0b61a4", "#eceff1", "#e6e9ec"
 PANELS = 6
 """More signals than this stand in two columns."""
 
@@ -60,11 +59,6 @@ def empty_figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
-
-
-def label(signal: Signal) -> str:
-    """Name and unit; the name alone where it has none."""
-    return str(signal) if signal.unit == "1" else f"{signal} ({signal.unit})"
 
 
 def draw(ax: Axes, record: FlightRecord, column: Array, **style: object) -> None:

@@ -4,16 +4,21 @@ N_ped, L_b1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.lpv.linear_family import LinearFamily
+from symheli.lpv.entries import Entry
+from symheli.lpv.linear_family import AIRSPEED, LinearFamily
 from symheli.values.arrays import Array, frozen
 from symheli.values.comma_separated import comma_separated
+from symheli.values.drawing import axes_of
+from symheli.values.labelled import dataset, frame
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
 from symheli.values.units import quotient
 
 ROW = {"u": "X", "v": "Y", "w": "Z", "p": "L", "q": "M", "r": "N"}
@@ -32,6 +37,14 @@ KINEMATIC = {
 """Entry of A: (trim velocity, sign) of what is added to leave the force: u' = v r - w q + X/m, so
 A[u, q] = X_q - w0.
 """
+
+SHOWN = ("X_u", "Z_w", "M_u", "M_w", "Y_v", "L_v", "N_v", "N_r")
+"""Those that shape the transition."""
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +69,16 @@ class DerivativeTable:
     >>> table = symheli.derivatives(symheli.sweep(heli, [2.0, 8.0]))
     >>> table.values.shape == (2, len(table.names)), table.names[0].unit
     (True, '1/s')
+    >>> table.to_frame()["M_q"].shape, table.to_frame().attrs["units"]["M_q"]
+    ((2,), '1/s')
     """
 
     airspeeds: Array
     names: tuple[Signal, ...]
     values: Array
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
@@ -83,6 +101,35 @@ class DerivativeTable:
         """One line an airspeed, one column a derivative, units in the second line."""
         columns = zip(self.names, self.values.T, strict=True)
         return comma_separated([(Signal("airspeed"), self.airspeeds), *columns])
+
+    def plot(self, ax: Axes | None = None, names: Sequence[str] = SHOWN) -> Axes:
+        """Each of `names` over airspeed, by its largest magnitude, which the legend gives with its
+        unit. Returns the axes; raises `UnknownNameError`.
+        """
+        from symheli.lpv.entry_plot import draw_scaled
+
+        drawn = [Entry(next(s for s in self.names if s == n), self[n]) for n in names]
+        ax = draw_scaled(axes_of(ax), AIRSPEED, self.airspeeds, drawn)
+        ax.set_ylabel("derivative by its largest magnitude")
+        return ax
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row an airspeed (m/s), a column a derivative, their units in attrs["units"]. Raises
+        `InputError` without pandas.
+        """
+        columns = list(zip(self.names, self.values.T, strict=True))
+        return frame([(AIRSPEED, self.airspeeds)], columns)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A variable a derivative over "airspeed", with its unit. Raises `InputError` without
+        xarray.
+        """
+        columns = zip(self.names, self.values.T, strict=True)
+        over = str(AIRSPEED)
+        return dataset(
+            {over: (AIRSPEED, self.airspeeds)},
+            {str(name): ((over,), values, name.unit) for name, values in columns},
+        )
 
     def __str__(self) -> str:
         """One line a derivative, one column an airspeed; derivatives that are zero throughout are

@@ -18,6 +18,7 @@ from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
 from symheli.values.units import quotient
 
 
@@ -57,6 +58,9 @@ class TrimPoint(OperatingPoint):
     on_stops: tuple[str, ...]
     vortex_ring: bool
     density: float
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     @property
     def success(self) -> bool:

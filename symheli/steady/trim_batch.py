@@ -27,6 +27,7 @@ from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal, indices
+from symheli.values.summary import as_table, summarized
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,9 @@ class TrimBatch(OperatingPoints):
     switches: Mapping[str, Array]
     torque: Array
     _made: dict[int, TrimPoint] = field(default_factory=dict, init=False, repr=False)
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         for array in (*vars(self).values(), *self.switches.values()):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +16,19 @@ from symheli.steady.steady_flights import SteadyFlights
 from symheli.steady.trim_batch import hover, one_after_another, trimmed
 from symheli.values.arrays import Array, frozen
 from symheli.values.comma_separated import comma_separated
+from symheli.values.labelled import dataset, frame
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
 
 POWER = Signal("power", "W")
 OMEGA = Signal("Om")
+AIRSPEED, CLIMB = Signal("airspeed"), Signal("climb_rate", "m/s")
+FLAGS = ("success", "attainable", "vortex_ring")
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +52,17 @@ class TrimMap:
     >>> found = symheli.trim_map(heli, [4.0, 8.0], [0.0, 2.0])
     >>> found["theta"].shape, bool((found.power[:, 1] > found.power[:, 0]).all())
     ((2, 2), True)
+    >>> dict(found.to_xarray().sizes)
+    {'airspeed': 2, 'climb_rate': 2}
     """
 
     airspeeds: Array
     climb_rates: Array
     points: tuple[tuple[TrimPoint | None, ...], ...]
     power: Array
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         for name in ("airspeeds", "climb_rates"):
@@ -113,15 +128,49 @@ class TrimMap:
 
     def csv(self) -> str:
         """Every signal and flag, one line a grid point that is possible."""
-        keep = self.possible
+        return comma_separated([*self._pairs(), *self._columns()])
+
+    def plot(self, ax: Axes | None = None, quantity: str = "power") -> Axes:
+        """`quantity` (a state, input or "power") at every trim over horizontal airspeed and climb
+        rate; hatched: vortex ring; crosses: a control beyond its stop; gray: no trim. Returns the
+        axes; raises `UnknownNameError`.
+        """
+        from symheli.steady.trim_map_plot import plot_trim_map
+
+        return plot_trim_map(self, ax, quantity)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a pair of airspeed and climb rate (m/s) that is possible: every signal, and the
+        flags success, attainable and vortex_ring; units in attrs["units"]. Raises `InputError`
+        without pandas.
+        """
+        return frame(self._pairs(), self._columns())
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Every signal and flag over "airspeed" and "climb_rate", NaN where there is no trim.
+        Raises `InputError` without xarray.
+        """
+        over = str(AIRSPEED), str(CLIMB)
+        variables = {
+            **{str(s): (over, self[s], s.unit) for s in self.signals},
+            **{flag: (over, getattr(self, flag), "1") for flag in FLAGS},
+        }
+        coordinates = {
+            over[0]: (AIRSPEED, self.airspeeds),
+            over[1]: (CLIMB, self.climb_rates),
+        }
+        return dataset(coordinates, variables)
+
+    def _pairs(self) -> list[tuple[Signal, Array]]:
+        """Airspeed and climb rate of every pair that is possible."""
         speeds, rates = np.meshgrid(self.airspeeds, self.climb_rates, indexing="ij")
-        columns = [(Signal("airspeed"), speeds[keep]), (Signal("climb_rate", "m/s"), rates[keep])]
-        columns += [(name, self[name][keep]) for name in self.signals]
-        columns += [
-            (Signal(flag), getattr(self, flag)[keep])
-            for flag in ("success", "attainable", "vortex_ring")
-        ]
-        return comma_separated(columns)
+        return [(AIRSPEED, speeds[self.possible]), (CLIMB, rates[self.possible])]
+
+    def _columns(self) -> list[tuple[Signal, Array]]:
+        """Every signal and flag there."""
+        keep = self.possible
+        signals = [(name, self[name][keep]) for name in self.signals]
+        return signals + [(Signal(flag), getattr(self, flag)[keep]) for flag in FLAGS]
 
     def _flags(self, name: str) -> Array:
         return np.array(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from symheli.values.named_vector import NamedVector
+from symheli.values.summary import summarized
 
 
 @dataclass(frozen=True)
@@ -19,3 +20,5 @@ class OperatingPoint:
     u: NamedVector
     xdot: NamedVector
     airspeed: float
+
+    __repr__ = summarized

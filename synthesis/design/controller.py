@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.named_vector import NamedVector
+from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
 from synthesis.design.conditions import conditions
 from synthesis.design.diagnosis import decided
@@ -72,6 +73,9 @@ class Controller:
     misfit: float = 0.0
     attempts: tuple[Attempt, ...] = ()
     by_adjoint: bool = False
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def at(self, *p: float) -> LinearModel:
         """The controller frozen at p, one value a parameter."""

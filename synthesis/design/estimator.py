@@ -12,6 +12,7 @@ import numpy as np
 from symheli.lpv import LPVStateSpace
 from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
 from symheli.values.signal import Signal
+from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
 from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
@@ -60,6 +61,9 @@ class Estimator:
     gamma: float
     misfit: float
     attempts: tuple[Attempt, ...] = ()
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def certify(self, rate: Any = None, **options: Any) -> Certificate:
         """The proven gain of the error: `synthesis.l2_gain`."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
+from symheli.values.summary import summarized
 from synthesis.analysis.l2_gain import l2_gain
 from synthesis.certificate import Certificate
 from synthesis.cover import Remainder, covering
@@ -62,6 +63,8 @@ class Flown:
     certificate: Certificate
     synthesized: float = math.nan
     misfit: float = 0.0
+
+    __repr__ = summarized
 
     @property
     def gamma(self) -> float:

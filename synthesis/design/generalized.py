@@ -11,6 +11,7 @@ from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.lpv.equilibration import is_singular
 from symheli.values.signal import Signal, indices
+from symheli.values.summary import summarized
 
 Array = np.ndarray
 
@@ -31,6 +32,8 @@ class Generalized(NamedTuple):
     D12: Array
     D21: Array
     D22: Array
+
+    __repr__ = summarized
 
     @classmethod
     def of(

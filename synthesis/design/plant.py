@@ -24,6 +24,7 @@ from symheli.lpv.matrix_function import functions_of
 from symheli.lpv.mixing import itself, mixed
 from symheli.lpv.scheduling import Rates
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import as_table, summarized
 from symheli.values.units import quotient
 from synthesis.design import parts
 from synthesis.design.as_controller import as_controller
@@ -89,6 +90,9 @@ class Plant:
     performance: tuple[Signal, ...] = ()
     controls: tuple[Signal, ...] = ()
     measurements: tuple[Signal, ...] = ()
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         model = _scheduled(self.model)

@@ -14,6 +14,7 @@ from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.lpv.linear_model import is_control_system
 from symheli.values.signal import Signal
+from symheli.values.summary import summarized
 from synthesis.design.generalized import Channels, Generalized
 from synthesis.worst.frozen import norm
 
@@ -59,6 +60,8 @@ class PointDesign:
     optimum: float
     reasons: tuple[str, ...] = ()
     limit: str = ""
+
+    __repr__ = summarized
 
     @classmethod
     def without(

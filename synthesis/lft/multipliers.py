@@ -28,6 +28,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.lft.model import parts
+from symheli.values.summary import summarized
 from synthesis.polynomial import structure
 from synthesis.polynomial.symmetric import basis
 
@@ -51,6 +52,8 @@ class Multiplier:
     Q: Array
     S: Array
     R: Array
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         if not isinstance(self.sizes, tuple) or any(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.summary import summarized
 from synthesis.polynomial import structure
 from synthesis.polynomial.matrix import PolynomialMatrix
 
@@ -28,6 +29,8 @@ class BoxLyapunov:
     knots: tuple[Array, ...]
     degrees: tuple[int, ...]
     coefficients: Array
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         if not isinstance(self.knots, tuple) or not isinstance(self.degrees, tuple):

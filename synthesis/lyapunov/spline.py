@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.summary import summarized
 from synthesis.lyapunov.lag import LagRegion
 from synthesis.polynomial import structure
 from synthesis.polynomial.bernstein import blossom
@@ -47,6 +48,8 @@ class SplineLyapunov:
     order: int = 1
     slack: Array | None = None
     multiplier: Array | None = None
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         given = (name for name in ("slack", "multiplier") if getattr(self, name) is not None)
@@ -217,6 +220,8 @@ class MemoryLyapunov:
     lead_knots: Array
     lead_degree: int
     coefficients: Array
+
+    __repr__ = summarized
 
     order = 1
     slack = None

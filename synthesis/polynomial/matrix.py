@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.summary import summarized
 from synthesis.polynomial.bernstein import blossom, elevation_matrix, restriction
 
 Array = np.ndarray
@@ -56,6 +57,8 @@ class PolynomialMatrix:
 
     box: Box
     coefficients: Array
+
+    __repr__ = summarized
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "box", tuple((low, high) for low, high in self.box))

@@ -20,6 +20,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.progress import tracked
+from symheli.values.summary import summarized
 from synthesis.worst.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
 from synthesis.worst.budget import Budget
 from synthesis.worst.corners import Corners, climb
@@ -114,6 +115,8 @@ class LowerBound(NamedTuple):
     trajectory: Trajectory | None
     input: Array | None = None
     growth: float = math.nan
+
+    __repr__ = summarized
 
 
 def lower_bound(

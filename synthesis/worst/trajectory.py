@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.values.summary import as_table, summarized
+
 Array = np.ndarray
 
 
@@ -19,3 +21,6 @@ class Trajectory(NamedTuple):
 
     time: Array
     p: Array
+
+    __repr__ = summarized
+    _repr_html_ = as_table

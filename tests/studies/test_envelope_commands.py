@@ -90,19 +90,12 @@ def test_figures_draw_on_the_axes_they_are_given(ideal):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    from studies.figures import derivatives as derivative_figure
-    from studies.figures import trim_map as trim_map_figure
-
     found = symheli.trim_map(ideal, [0.0, 5.0, 28.0], [-5.0, 0.0, 5.0])
     assert not found.attainable[2].all()
     figure, (left, right) = plt.subplots(1, 2)
-    assert trim_map_figure.plot(found, left, "theta") is left
-    assert (
-        derivative_figure.plot(
-            symheli.derivatives(symheli.sweep(ideal, [2.0, 5.0])), right, ["M_q"]
-        )
-        is right
-    )
+    assert found.plot(left, "theta") is left
+    table = symheli.derivatives(symheli.sweep(ideal, [2.0, 5.0]))
+    assert table.plot(right, ["M_q"]) is right
     assert "control at or beyond its stop" in [
         text.get_text() for text in left.get_legend().get_texts()
     ]

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from studies.figures.gain_curve import GainCurve, plot, save
+from studies.figures.gain_curve import save
 from studies.transition import gain_tables, guarantees
 from symheli import LPVStateSpace, Scheduling
-from synthesis import Search, Spline
+from synthesis import GainCurve, Search, Spline
 
 NOTHING = {"constant P": math.inf, "LFT D/G": math.inf}
 STEEP = GainCurve(
@@ -43,7 +43,7 @@ def test_the_words_say_what_is_proven_and_what_grows():
 def test_the_open_region_is_shaded_only_where_no_test_proves_a_gain(tmp_path):
     plt = pytest.importorskip("matplotlib.pyplot")
     for curve, words in ((STEEP, {"open", "grows"}), (FLAT, set())):
-        ax = plot(curve, plt.figure().add_subplot())
+        ax = curve.plot(plt.figure().add_subplot())
         assert {text.get_text() for text in ax.texts} & {"open", "grows"} == words
         plt.close(ax.figure)
     save([STEEP, FLAT], tmp_path / "curves.png")

@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
+from symheli.values.summary import summarized
 
 Range = tuple[float, float]
 Order = int | tuple[int, ...]
@@ -24,6 +25,8 @@ class Piece(NamedTuple):
     low: float
     high: float
     bernstein: Array
+
+    __repr__ = summarized
 
 
 class FunctionSpace(ABC):

@@ -17,6 +17,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
+from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
     from symheli.lpv.lft.sampling import HoldError
@@ -86,6 +87,9 @@ class LFT:
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     dt: float | None = None
+
+    __repr__ = summarized
+    _repr_html_ = as_table
 
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):

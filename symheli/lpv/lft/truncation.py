@@ -13,6 +13,7 @@ from symheli.lpv.equilibration import equilibrate, significant
 from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.lpv.lft.reduction import reduce
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 
 class Truncation(NamedTuple):
@@ -26,6 +27,8 @@ class Truncation(NamedTuple):
     lft: LFT
     error: float
     bound: float
+
+    __repr__ = summarized
 
 
 def truncate(lft: LFT, error: float | None, order: int | None) -> Truncation:

@@ -8,20 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symheli.values.drawing import GREY, INK, RED, axes_of
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from symheli import TrimMap
+    from symheli.steady.trim_map import TrimMap
 
 
-def plot(trim_map: TrimMap, ax: Axes | None = None, quantity: str = "power") -> Axes:
-    """`quantity` (a state, input or "power") at every trim; hatched: vortex ring; crosses: a
-    control beyond its stop; gray: no trim.
-    """
-    if ax is None:
-        import matplotlib.pyplot as plt
-
-        ax = plt.subplots(figsize=(7.0, 4.5), layout="constrained")[1]
+def plot_trim_map(trim_map: TrimMap, ax: Axes | None = None, quantity: str = "power") -> Axes:
+    """See `TrimMap.plot`."""
+    ax = axes_of(ax)
     level, climb = (
         trim_map.level_speeds,
         np.broadcast_to(trim_map.climb_rates, trim_map.success.shape),
@@ -35,15 +32,15 @@ def plot(trim_map: TrimMap, ax: Axes | None = None, quantity: str = "power") -> 
     marks: tuple[tuple[np.ndarray, dict[str, Any], str], ...] = (
         (
             keep & trim_map.vortex_ring,
-            {"marker": "o", "facecolors": "none", "edgecolors": "#b3261e", "hatch": "////"},
+            {"marker": "o", "facecolors": "none", "edgecolors": RED, "hatch": "////"},
             "vortex ring",
         ),
         (
             keep & ~trim_map.attainable,
-            {"marker": "x", "color": "#1b1f24"},
+            {"marker": "x", "color": INK},
             "control at or beyond its stop",
         ),
-        (trim_map.possible & ~keep, {"marker": ".", "color": "#8a949e"}, "no trim"),
+        (trim_map.possible & ~keep, {"marker": ".", "color": GREY}, "no trim"),
     )
     for mask, style, label in marks:
         if mask.any():

@@ -1,0 +1,98 @@
+"""The entries of matrices that change with the scheduling, by name and with units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
+
+from symheli.errors import UnknownNameError
+from symheli.values.arrays import Array
+from symheli.values.labelled import per
+from symheli.values.signal import Signal
+
+
+class Stacked(Protocol):
+    """Matrices over any axes, which come first."""
+
+    @property
+    def A(self) -> Array:
+        """(..., nx, nx)."""
+        ...
+
+    @property
+    def B(self) -> Array:
+        """(..., nx, nu)."""
+        ...
+
+    @property
+    def C(self) -> Array:
+        """(..., ny, nx)."""
+        ...
+
+    @property
+    def D(self) -> Array:
+        """(..., ny, nu)."""
+        ...
+
+
+class Names(Protocol):
+    """What the rows and columns are called."""
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """nx of them."""
+        ...
+
+    @property
+    def inputs(self) -> tuple[Signal, ...]:
+        """nu of them."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[Signal, ...]:
+        """ny of them."""
+        ...
+
+    @property
+    def dt(self) -> float | None:
+        """Sample period, s; None in continuous time."""
+        ...
+
+
+class Entry(NamedTuple):
+    """One entry of A, B, C or D along the scheduling: its name, A[q, u], with unit, and values."""
+
+    name: Signal
+    values: Array
+
+
+def entries(names: Names, matrices: Stacked) -> Iterator[Entry]:
+    """Every entry, matrix by matrix and row by row."""
+    outputs = [y.unit for y in names.outputs]
+    for matrix, rows, units, columns in (
+        ("A", names.states, rates(names), names.states),
+        ("B", names.states, rates(names), names.inputs),
+        ("C", names.outputs, outputs, names.states),
+        ("D", names.outputs, outputs, names.inputs),
+    ):
+        values = getattr(matrices, matrix)
+        for i, (row, unit) in enumerate(zip(rows, units, strict=True)):
+            for j, column in enumerate(columns):
+                name = Signal(f"{matrix}[{row}, {column}]", per(unit, column.unit))
+                yield Entry(name, values[..., i, j])
+
+
+def rates(names: Names) -> list[str]:
+    """Units of the left sides of x' = A x + B u: those of the states per second, their own where
+    x' is the next sample.
+    """
+    return [s.unit if names.dt is not None else per(s.unit, "s") for s in names.states]
+
+
+def chosen(every: Sequence[Entry], wanted: Sequence[str]) -> list[Entry]:
+    """Those of these names; raises `UnknownNameError`."""
+    by_name = {str(e.name): e for e in every}
+    for name in wanted:
+        if name not in by_name:
+            raise UnknownNameError("entry", name, by_name)
+    return [by_name[name] for name in wanted]

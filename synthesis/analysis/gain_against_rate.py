@@ -1,0 +1,119 @@
+"""How much the rate of the parameter is worth: the gain of a loop at one permitted rate after the
+other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from symheli.errors import InputError
+from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli.values.labelled import per
+from symheli.values.signal import Signal
+from synthesis.analysis.l2_gain import l2_gain
+from synthesis.forms import LyapunovForm
+from synthesis.gain_curve import GainCurve
+from synthesis.impose import Imposed
+from synthesis.lft.gain import lft_gain
+from synthesis.program.cone_program import Solver
+from synthesis.worst.lower_bound import THOROUGH, Search
+
+MOVING, CONSTANT = "P(p)", "constant P"
+"""How the Lyapunov function of a bounded rate, and that of a parameter that jumps, are called."""
+
+
+def gain_against_rate(
+    model: LPVStateSpace | UncertainStateSpace,
+    rates: Sequence[float],
+    *,
+    lft: Sequence[str] = (),
+    title: str = "",
+    form: LyapunovForm | None = None,
+    impose: Imposed | None = None,
+    solver: Solver | str | None = None,
+    search: Search | None = THOROUGH,
+) -> GainCurve:
+    """Certified L2 gains of a model over the permitted rates of its parameter, with what no proof
+    can undercut.
+
+    Parameters
+    ----------
+    model : LPVStateSpace or UncertainStateSpace
+        With one scheduling parameter.
+    rates : sequence of float
+        Largest |dp/dt| in units of p per second, in any order: 0 is frozen, math.inf a parameter
+        that may jump.
+    lft : sequence of str
+        LFT tests for a parameter that may jump, "small gain", "D", "DG" or "full block"; of
+        polynomial models only.
+    title : str
+        Of the curve.
+    form, impose, solver, search
+        As of `l2_gain`, for every rate.
+
+    Returns
+    -------
+    GainCurve
+        Its `certificates` are the proofs, by form and rate; a rate at which nothing could be proven
+        has inf.
+
+    Raises
+    ------
+    InputError
+        No rates, one that is negative or twice there, a model of several parameters, LFT tests of
+        what is no polynomial model.
+
+    Examples
+    --------
+    >>> from symheli.lpv import LPVStateSpace, Scheduling
+    >>> p = Scheduling("p", "1", 0.0, 1.0)
+    >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    >>> curve = gain_against_rate(lag, [0.0, 0.5], lft=["DG"], search=None)
+    >>> print(f"{curve.best[0.5]:.3f}, when p may jump {curve.jumping['LFT DG']:.3f}")
+    1.000, when p may jump 1.000
+    >>> curve.certificates["P(p)", 0.5].verified
+    True
+    """
+    asked = _checked(rates)
+    s = _parameter(model)
+    if lft and not isinstance(model, LPVStateSpace):
+        raise InputError("LFT tests are of one model: leave out lft= for an uncertain one")
+    options = {"form": form, "impose": impose, "solver": solver, "search": search}
+    found = [
+        (CONSTANT if math.isinf(rate) else MOVING, rate, l2_gain(model, rate, **options))
+        for rate in asked
+    ]
+    if lft:
+        assert isinstance(model, LPVStateSpace)  # noqa: S101
+        reduced = model.to_lft().reduce()
+        found += [
+            (f"LFT {scaling}", math.inf, lft_gain(reduced, scaling, search=None)) for scaling in lft
+        ]
+    unit = per(_units(model.outputs), _units(model.inputs))
+    return GainCurve.of(found, title, unit, s.name, per(s.unit, "s"))
+
+
+def _checked(rates: Sequence[float]) -> list[float]:
+    asked = sorted(float(rate) for rate in rates)
+    if not asked or not asked[0] >= 0 or len(set(asked)) < len(asked):
+        raise InputError(
+            "rates: expected different numbers >= 0 (math.inf: the parameter may jump), got"
+            f" {list(rates)!r:.80}"
+        )
+    return asked
+
+
+def _parameter(model: LPVStateSpace | UncertainStateSpace) -> Scheduling:
+    if len(model.parameters) > 1:
+        raise InputError(
+            "a curve over the rate is that of one parameter, the model has"
+            f" {', '.join(s.name for s in model.parameters)}: hold the others, .along(...)"
+        )
+    return model.scheduling
+
+
+def _units(names: Sequence[Signal]) -> str:
+    """The unit of a group of signals, or all of them where they differ."""
+    units = list(dict.fromkeys(s.unit for s in names))
+    return units[0] if len(units) == 1 else f"({', '.join(units)})"
