@@ -43,7 +43,7 @@ def energy_ratios(found: FlownControllers, proofs: CertifiedControllers | None) 
         limit = math.inf if proofs is None else proofs.gain(name)
         if math.isfinite(limit):
             ax.axhline(limit, color=COLOURS[name], linestyle="--", linewidth=1)
-        ax.set_title(name)
+        ax.set_title(name.replace(" from ", "\nfrom "))
         ax.set_xlabel("gusts (m/s)")
     axes[0][0].set_ylim(bottom=0.0)
     axes[0][0].set_ylabel("energy ratio")
@@ -67,7 +67,7 @@ def seeds(found: FlownControllers) -> Figure:
                 own = [f.ratio for f in one.flights if f.lost is lost]
                 ax.plot([k] * len(own), own, marker, color=COLOURS[one.name], ms=3.5)
             ax.plot([k - 0.3, k + 0.3], [one.ratio] * 2, color=COLOURS[one.name], linewidth=2.2)
-        labels = [one.name.replace(" ", "\n", 1).replace("the ", "the\n") for one in flown]
+        labels = [one.name.replace(" ", "\n").replace("from\n", "from ") for one in flown]
         ax.set_xticks(range(len(flown)), labels, fontsize=8)
         ax.set_title(f"gusts of {flown[0].gust:.1f} m/s")
     axes[0][0].set_ylim(bottom=0.0)

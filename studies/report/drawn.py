@@ -52,6 +52,8 @@ def drawn(pictures: Iterable[tuple[str, str, str, Figure]], folder: Path) -> lis
     for name, caption, source, figure in pictures:
         for line, place in _curves(figure):
             line.set_gid(place)
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # laid out once, for every kind of file
         with matplotlib.rc_context(STABLE):
             files = {ending: _saved(figure, ending) for ending in ("png", "svg", "pdf")}
         described = json.dumps(_axes(figure), separators=(",", ":"))

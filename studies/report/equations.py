@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from studies.report.mathml import (
-    both,
+    bar,
     display,
     dot,
     extremum,
@@ -30,7 +30,7 @@ def _at(signal: str, lag: str = "") -> str:
 
 EQUATIONS: dict[str, str] = {
     "lpv": display(
-        dot("x"), "=", _Ap, "x", "+", _Bp, "u", "−", both("x", 0, "′"), "(", "p", ")", _dp,
+        dot("x"), "=", _Ap, "x", "+", _Bp, "u", "−", sub("x", 0), "′", "(", "p", ")", _dp,
         ",", "   ", "y", "=", "C", "x",
     ),
     "entries": display(
@@ -62,7 +62,7 @@ EQUATIONS: dict[str, str] = {
     ),
     "fit": display(
         words("fit"), "=", 100, "(", 1, "−",
-        fraction(norm("y", "−", hat("y")), norm("y", "−", row('<mover accent="true"><mi>y</mi><mo>¯</mo></mover>'))),
+        fraction(norm("y", "−", hat("y")), norm("y", "−", bar("y"))),
         ")", " ", "%",
     ),
     "gap": display(

@@ -139,7 +139,12 @@
     host.dataset.drawn = `${axis.axis} ${speeds[k]}`;
   }
 
-  for (const one of held.derivatives) find("select").append(new Option(one.name, one.name));
+  for (const one of held.derivatives)
+    find("select").append(new Option(one.name, one.name, one.name === "N_v", one.name === "N_v"));
+  for (const box of host.querySelectorAll("[name=model]")) {
+    box.style.accentColor = box.parentElement.style.color = looks[box.value].colour;
+    box.parentElement.append(" " + { circle: "○", plus: "+", cross: "×", diamond: "◇" }[looks[box.value].mark]);
+  }
   host.querySelectorAll("svg").forEach(watch);
   host.addEventListener("input", draw);
   host.hidden = false;

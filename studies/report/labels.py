@@ -34,9 +34,11 @@ class Labels:
         self.contents.append((f"section-{key}", number, title))
         return number
 
-    def to(self, kind: str, key: str) -> Markup:
-        """A link, "figure 3"; of what the study has not reached a word."""
-        number = self.known.get(f"{kind}-{key}")
+    def to(self, kind: str, key: str, first: bool = False) -> Markup:
+        """A link, "figure 3", or where it is the `first` word "Figure 3"; of what the study has not
+        reached words.
+        """
+        word, number = kind.capitalize() if first else kind, self.known.get(f"{kind}-{key}")
         if number is None:
-            return Markup(f"{escape(kind)} not reached")
-        return Markup(f'<a href="#{kind}-{escape(key)}">{escape(kind)} {number}</a>')
+            return Markup(f"{escape(word)} not reached")
+        return Markup(f'<a href="#{kind}-{escape(key)}">{escape(word)} {number}</a>')

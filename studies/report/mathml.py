@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from html import escape
+from unicodedata import normalize
 
 Part = str | float
 """MathML, an identifier, an operator or a number."""
@@ -38,19 +39,23 @@ def sup(base: Part, power: Part) -> str:
     return f"<msup>{_atom(base)}{_atom(power)}</msup>"
 
 
-def both(base: Part, index: Part, power: Part) -> str:
-    """With an index and a power."""
-    return f"<msubsup>{_atom(base)}{_atom(index)}{_atom(power)}</msubsup>"
-
-
-def dot(base: Part) -> str:
+def dot(letter: str) -> str:
     """A derivative with respect to time."""
-    return f'<mover accent="true">{_atom(base)}<mo>˙</mo></mover>'
+    return _accented(letter, "\N{COMBINING DOT ABOVE}")
 
 
-def hat(base: Part) -> str:
+def hat(letter: str) -> str:
     """An estimate."""
-    return f'<mover accent="true">{_atom(base)}<mo>^</mo></mover>'
+    return _accented(letter, "\N{COMBINING CIRCUMFLEX ACCENT}")
+
+
+def bar(letter: str) -> str:
+    """A mean."""
+    return _accented(letter, "\N{COMBINING MACRON}")
+
+
+def _accented(letter: str, accent: str) -> str:
+    return f'<mi class="accented">{normalize("NFC", letter + accent)}</mi>'
 
 
 def total(index: Part, last: Part, *summand: Part) -> str:
@@ -74,10 +79,10 @@ def root(*parts: Part) -> str:
 
 
 def matrix(*rows: tuple[Part, ...]) -> str:
-    """In brackets, row by row."""
+    """In brackets, which the style sheet draws, row by row."""
     cells = ("".join(f"<mtd>{_atom(cell)}</mtd>" for cell in each) for each in rows)
     table = "".join(f"<mtr>{each}</mtr>" for each in cells)
-    return f"<mrow><mo>[</mo><mtable>{table}</mtable><mo>]</mo></mrow>"
+    return f'<mtable class="brackets">{table}</mtable>'
 
 
 def display(*parts: Part) -> str:

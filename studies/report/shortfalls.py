@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from studies.controllers.flown import WINDS
@@ -50,10 +50,13 @@ def _models(study: Outcome) -> Iterator[Row]:
             " the spline and the exact models are kept beside the polynomial.",
             "baseline.entries_no_polynomial_fits",
         )
+    refused: dict[str, list[str]] = {}
     for run in study.paper_experiment.runs if study.paper_experiment else ():
+        refused.setdefault(run.cubic_refused, []).append(run.loop)
+    for why, which in refused.items():
         yield (
-            f"A cubic basis is refused in the published experiment, {run.loop} loop.",
-            f"{run.cubic_refused}.",
+            f"A cubic basis is refused in the published experiment, {' and '.join(which)} loop.",
+            f"{why[:1].upper()}{why[1:]}.",
             "paper_experiment",
         )
 
@@ -107,7 +110,7 @@ def _proofs(study: Outcome) -> Iterator[Row]:
         failed: dict[tuple[str, str, str], list[Bound]] = {}
         for b in bounds:
             if b.certificate.kind == "l2 gain" and not b.certificate.verified:
-                failed.setdefault((b.channel, b.model, _why(b)), []).append(b)
+                failed.setdefault((b.channel, b.model, _why(b, bounds)), []).append(b)
         for (channel, model, why), some in failed.items():
             tests = ", ".join(f"{b.form} ({rate_text(b.rate)})" for b in some)
             yield f"No gain proven, {channel} channel, {model}: {tests}.", why, path
@@ -116,11 +119,13 @@ def _proofs(study: Outcome) -> Iterator[Row]:
         yield sentence, why, "guarantees.bounds"
 
 
-def _why(b: Bound) -> str:
-    c = b.certificate
+def _why(b: Bound, bounds: Sequence[Bound]) -> str:
+    """By what any search among the same airspeeds has found."""
+    c, same = b.certificate, (b.channel, b.model, b.rate)
+    flown = max(o.certificate.lower for o in bounds if (o.channel, o.model, o.rate) == same)
     if c.status is Status.UNSTABLE or math.isinf(c.frozen):
         return "The loop is unstable at an airspeed held."
-    if math.isinf(c.lower):
+    if math.isinf(flown):
         return "A computed airspeed history makes the state grow: there is nothing to prove."
     if math.isinf(b.rate):
         return "Conservative: an airspeed that jumps is allowed."

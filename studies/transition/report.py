@@ -76,7 +76,8 @@ def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) ->
     }
     first = Labels()
     template.render(labels=first, contents=[], **said)
-    return template.render(labels=Labels(first.given), contents=first.contents, **said)
+    text = template.render(labels=Labels(first.given), contents=first.contents, **said)
+    return text.replace("m/s^2", "m/s²")
 
 
 def compact(data: object) -> str:

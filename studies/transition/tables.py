@@ -341,7 +341,7 @@ def scheduling(found: KnownKinematics) -> Table:
     outputs = list(found.rivals[0].ahead)
     table = Table(
         "What moving coefficients are worth: change of the fit 1 s ahead, in points",
-        ["instead of", "", *outputs],
+        ["instead of", "model", *outputs],
         name="scheduling",
         source="known_kinematics.models",
     )
@@ -349,15 +349,17 @@ def scheduling(found: KnownKinematics) -> Table:
         ("constant coefficients (LTI)", models.ALONE, models.CONSTANT),
         ("airspeed alone", models.BOTH, models.ALONE),
     ):
-        a, b = found.of(KNOWN[one]).ahead, found.of(KNOWN[other]).ahead
-        row = [title, KNOWN[one], *(f"{a[y] - b[y]:+.0f}" for y in outputs)]
-        table.rows.append(row)
-    a, b = (found.of(SPLINE[kind]).ahead for kind in (models.BOTH, models.ALONE))
-    name = SPLINE[models.BOTH]
-    table.rows.append(["airspeed alone", name, *(f"{a[y] - b[y]:+.0f}" for y in outputs)])
+        table.rows.append([title, KNOWN[one], *_changes(found, KNOWN[one], KNOWN[other])])
+    one, other = SPLINE[models.BOTH], SPLINE[models.ALONE]
+    table.rows.append(["airspeed alone", one, *_changes(found, one, other)])
     table.remarks.append(
         f"A difference of less than {LEVEL:g} points is what another seed changes. Where the rotor"
         " has no stabilizer bar scheduling is worth tens of points in nearly every output (AH-1S,"
         " docs/ah1s.md, not run here)."
     )
     return table
+
+
+def _changes(found: KnownKinematics, one: str, other: str) -> list[str]:
+    a, b = found.of(one).ahead, found.of(other).ahead
+    return [f"{round(a[y] - b[y]):+d}" for y in a]
