@@ -46,7 +46,7 @@ EQUATIONS: dict[str, str] = {
         "+", "c", "(", "p", ")", "+", "d", "(", "p", ")", _dp,
     ),
     "rls": display(
-        hat("θ"), "=", words("arg"), " ",
+        hat("θ"), "=", words("arg"),
         extremum(
             "min", "θ",
             total(row("k", "=", 1), "N", sup("λ", row("N", "−", "k")),
@@ -67,7 +67,7 @@ EQUATIONS: dict[str, str] = {
     ),
     "gap": display(
         sub("δ", "ν"), "(", "P", ",", sub("P", 1), ")", "<", "b", "(", "P", ",", "K", ")",
-        "   ", "⟹", "   ", words("K stabilizes "), sub("P", 1),
+        "   ", "⟹", "   ", words("K stabilizes\N{NO-BREAK SPACE}"), sub("P", 1),
     ),
     "gain": display(
         "γ", "=", extremum("sup", row("w", "≠", 0, ",", " ", row("|", _dp, "|"), "≤", "ρ"),
@@ -84,7 +84,7 @@ EQUATIONS: dict[str, str] = {
     ),
     "scalings": display(
         sup(matrix((row("p", "I"),), ("I",)), "⊤"), "Π", matrix((row("p", "I"),), ("I",)), "⪰", 0,
-        " ", words("for "), row("|", "p", "|"), "≤", 1, ",", "   ", sub("Π", words("D/G")), "=",
+        " ", words("for\N{NO-BREAK SPACE}"), row("|", "p", "|"), "≤", 1, ",", "   ", sub("Π", words("D/G")), "=",
         matrix((row("−", "D"), "G"), (sup("G", "⊤"), "D")), ",", " ", "D", "≻", 0, ",", " ",
         "G", "+", sup("G", "⊤"), "=", 0,
     ),

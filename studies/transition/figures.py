@@ -344,7 +344,7 @@ def frozen(f: FrozenModels) -> Figure:
     axes[0][0].axvline(0, color=GREY, linewidth=0.8)
     axes[0][0].set_xlabel("real (rad/s)")
     axes[0][0].set_title("poles, imaginary part (rad/s)")
-    axes[0][0].legend(loc="upper left")
+    axes[0][0].legend(loc="center left")
     for name, colour in (("reference", INK), ("baseline", ORANGE), ("identified", BLUE)):
         axes[0][1].loglog(
             f.omega,
