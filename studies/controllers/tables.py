@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from studies.controllers.designs import LQR
@@ -37,7 +37,10 @@ def every(study: Outcome) -> list[Table]:
     if study.controllers is not None:
         out.append(designed(study.controllers, study.certified_controllers))
     if study.flown_controllers is not None:
+        out.append(ranking(study.flown_controllers))
         out.append(flown(study.flown_controllers, study.certified_controllers))
+        if study.certified_controllers is not None and study.certified_controllers.bounds:
+            out.append(exceeded(study.flown_controllers, study.certified_controllers))
     return out
 
 
@@ -53,6 +56,8 @@ def designed(found: Designs, proofs: CertifiedControllers | None) -> Table:
             f"proven, to {RATE:g} m/s^2",
             "proven, airspeed jumps",
         ],
+        name="designed",
+        source="controllers",
     )
     for design in found.designs:
         own = {b.form: b for b in proofs.bounds if b.model == design.name} if proofs else {}
@@ -82,13 +87,15 @@ def flown(found: FlownControllers, proofs: CertifiedControllers | None) -> Table
         f"Flown: a transition of {found.duration:.0f} s at up to {RATE:g} m/s^2, {found.seeds}"
         " seeds; median and worst",
         ["controller", "gusts (m/s)", "lost", "proven", *MEASURES],
+        name="flown",
+        source="controllers",
     )
     for wind in WINDS:
         best = next(iter(found.ranked(wind)), None)
         for one in found.at(wind):
             bound = "" if proofs is None or not proofs.bounds else gain(proofs.gain(one.name))
             cells = ["{:.2f}, {:.2f}".format(*one.of(measure)) for measure in MEASURES.values()]
-            if one is best:
+            if one is best and math.isfinite(one.ratio):
                 table.bold.add((len(table.rows), 4))
             table.rows.append([one.name, f"{one.gust:.1f}", str(one.lost), bound, *cells])
     table.remarks.append(
@@ -101,14 +108,60 @@ def flown(found: FlownControllers, proofs: CertifiedControllers | None) -> Table
     return table
 
 
+def ranking(found: FlownControllers) -> Table:
+    """A row a size of turbulence: who flew best, and how far the others are behind."""
+    names = list(dict.fromkeys(one.name for one in found.flown))
+    table = Table(
+        "Who flew best: least median energy ratio among those that lost no flight; how much larger"
+        " that of each other is, percent",
+        ["gusts (m/s)", "best", "its ratio", "seeds better than the next", *names],
+        name="ranking",
+        source="controllers",
+    )
+    for wind in WINDS:
+        everyone, ranked = {one.name: one for one in found.at(wind)}, found.ranked(wind)
+        if not everyone:
+            continue
+        gust = f"{next(iter(everyone.values())).gust:.1f}"
+        lost = {name: f"{one.lost} lost" for name, one in everyone.items() if one.lost}
+        if not ranked:
+            table.rows.append([gust, "none", "", "", *(lost.get(name, "") for name in names)])
+            continue
+        first, rest = ranked[0], ranked[1:]
+        behind = {one.name: f"+{100 * (one.ratio / first.ratio - 1):.0f}" for one in rest}
+        pair = f"{_better(first, rest[0])} of {found.seeds}" if rest else ""
+        cells = [(lost | behind).get(name, "") for name in names]
+        table.rows.append([gust, first.name, f"{first.ratio:.2f}", pair, *cells])
+    return table
+
+
+def exceeded(found: FlownControllers, proofs: CertifiedControllers) -> Table:
+    """A row a controller: its proven gain beside the largest energy ratio of any flight."""
+    table = Table(
+        "Proven gains beside the largest energy ratio of any flight, from still air to more than"
+        " any weather",
+        ["controller", "proven", "largest flown", "in gusts of (m/s)", "exceeded from (m/s)"],
+        name="exceeded",
+        source="controllers",
+    )
+    for name in dict.fromkeys(one.name for one in found.flown):
+        limit = proofs.gain(name)
+        largest = max(found.of(name), key=_worst)
+        above = found.exceeded(name, limit)
+        first = "" if math.isinf(limit) else "never" if above is None else f"{above.gust:.1f}"
+        table.rows.append(
+            [name, gain(limit), f"{_worst(largest):.2f}", f"{largest.gust:.1f}", first]
+        )
+    table.remarks.append("None: nothing is proven, there is nothing to exceed.")
+    return table
+
+
 def conclusions(study: Outcome) -> list[str]:
-    """Who won and by how much, and where hypotheses of the certificates broke."""
-    found, proofs = study.flown_controllers, study.certified_controllers
+    """Who won and by how much, and whether hypotheses of the certificates broke."""
+    found = study.flown_controllers
     if found is None or not found.flown:
         return []
-    out = [_won(found, wind) for wind in WINDS]
-    out += list(_bounds(found, proofs)) if proofs is not None and proofs.bounds else []
-    return [*out, _hypotheses(found)]
+    return [*(_won(found, wind) for wind in WINDS), hypotheses(found)]
 
 
 def _won(found: FlownControllers, wind: float) -> str:
@@ -119,58 +172,41 @@ def _won(found: FlownControllers, wind: float) -> str:
     if not ranked:
         return f"{where} every controller lost flights: none won.{fell}"
     first, *rest = ranked
-    behind = ", ".join(f"{100 * (f.ratio / first.ratio - 1):.0f} % ({f.name})" for f in rest)
-    others = f"; larger by {behind}" if rest else ""
-    simple = " No synthesis was worth it there." if first.name == LQR else ""
-    won = f"{first.name} won: a median energy ratio of {first.ratio:.2f}{others}."
+    won = f"{where} {first.name} won, with a median energy ratio of {first.ratio:.2f}"
     if rest:
-        pairs = zip(first.flights, rest[0].flights, strict=True)
-        better = sum(one.ratio < other.ratio for one, other in pairs)
-        won += f" It was better than the next with {better} of {found.seeds} seeds."
-    return f"{where} {won}{simple}{fell}"
+        behind = 100 * (rest[0].ratio / first.ratio - 1)
+        won += (
+            f"; {rest[0].name} is next with {behind:.0f} % more. It was better than the next with"
+            f" {_better(first, rest[0])} of {found.seeds} seeds"
+        )
+    simple = " No synthesis was worth it there." if first.name == LQR else ""
+    return f"{won}.{simple}{fell}"
 
 
-def _bounds(found: FlownControllers, proofs: CertifiedControllers) -> Iterator[str]:
-    for name in dict.fromkeys(one.name for one in found.flown):
-        limit, own = proofs.gain(name), found.of(name)
-        if math.isinf(limit):
-            yield f"{name}: no gain is proven, there is nothing to exceed."
-            continue
-        largest = max(own, key=_worst)
-        above = found.exceeded(name, limit)
-        said = (
-            f"not exceeded in any flight from still air to gusts of {own[-1].gust:.1f} m/s"
-            if above is None
-            else f"first exceeded in gusts of {above.gust:.1f} m/s ({_worst(above):.2f})"
-        )
-        yield (
-            f"{name}: the proven {gain(limit)} is {said}; the largest energy ratio is"
-            f" {_worst(largest):.2f}, in gusts of {largest.gust:.1f} m/s."
-        )
+def _better(one: Flown, other: Flown) -> int:
+    pairs = zip(one.flights, other.flights, strict=True)
+    return sum(a.ratio < b.ratio for a, b in pairs)
 
 
 def _worst(one: Flown) -> float:
     return one.of(lambda flight: flight.ratio)[1]
 
 
-def _hypotheses(found: FlownControllers) -> str:
-    outside, faster = "outside the range (%)", "faster than the rate (%)"
-    parts = []
-    for wind in WINDS:
-        some = found.at(wind)
-        shares = [
-            ", ".join(f"{one.of(MEASURES[column])[0]:.0f} % ({one.name})" for one in some)
-            for column in (outside, faster)
-        ]
-        parts.append(
-            f"in gusts of {some[0].gust:.1f} m/s airspeed was outside 0 to {TOP:g} m/s for"
-            f" {shares[0]} of the time and changed faster than {RATE:g} m/s^2 for {shares[1]}"
-        )
-    every = all(_broke(one) for wind in WINDS for one in found.at(wind))
-    which = "every certificate" if every else "certificates"
+def hypotheses(found: FlownControllers) -> str:
+    """Whether the flights kept to range and rate of the certificates."""
+    some = [one for wind in WINDS for one in found.at(wind)]
+    if not any(_broke(one) for one in some):
+        return "Every flight kept to the range and the rate of the certificates."
+    shares = [
+        [one.of(MEASURES[column])[0] for one in some]
+        for column in ("outside the range (%)", "faster than the rate (%)")
+    ]
+    outside, faster = (f"{min(each):.0f} to {max(each):.0f} %" for each in shares)
+    which = "every controller" if all(_broke(one) for one in some) else "some controllers"
     return (
-        f"The command keeps to range and rate, the helicopter does not: hypotheses of {which} broke"
-        f" (medians); {'; '.join(parts)}."
+        f"The flights left the hypotheses of the certificates with {which}: by median, airspeed was"
+        f" outside 0 to {TOP:g} m/s for {outside} of the time and changed faster than {RATE:g}"
+        f" m/s^2 for {faster}."
     )
 
 

@@ -1,5 +1,5 @@
-"""What the study says, in sentences: where scheduling pays, what recursion costs, what the LFT
-loses, what a certificate from flights is worth, which controller flies best.
+"""What the study says, in short sentences from its numbers: the question's answer first, what it
+rests on after it; long lists are tables.
 """
 
 from __future__ import annotations
@@ -7,30 +7,261 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from studies.controllers.tables import conclusions as flown
+from studies.controllers.designs import BASELINE, LFT
+from studies.controllers.flown import WINDS
+from studies.controllers.tables import hypotheses
 from studies.marks import models
 from studies.marks.guarantee import PROBABILITY, verdict
-from studies.transition.guarantees import ALLOWED, CONSTANT, ESTIMATE, LFT_TESTS, proven, rate_text
+from studies.transition.guarantees import (
+    ALLOWED,
+    CONSTANT,
+    ESTIMATE,
+    LFT_TESTS,
+    gain_curve,
+    proven,
+    rate_text,
+)
 from studies.transition.known_kinematics import CUBIC, KNOWN, LOOPS, SPLINE, TWO_INPUTS
-from studies.transition.tables import gain
+from studies.transition.tables import LEVEL, gain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from synthesis import GainCurve
     from studies.transition.guarantees import Bound
-    from studies.transition.known_kinematics import KnownKinematics, Rival
+    from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
 
-LEVEL = 3.0
-"""Points between fits that are called level: what another seed changes."""
+CHEAP = 0.1
+"""Share by which a gain that is proven for any rate may exceed the frozen one for the rate to
+matter little.
+"""
+
+LOOP_NAMES = {
+    "gust": "the lateral loop under attitude hold",
+    "longitudinal": "the longitudinal loop under attitude hold",
+    "robust": "the lateral loop with a margin",
+}
+"""By channel."""
+
+
+def abstract(study: Outcome) -> list[str]:
+    """What was done and found, for a reader of nothing else."""
+    return [*_answer(study), *_models(study), *_flights(study), *_limits(study)]
 
 
 def conclusions(study: Outcome) -> list[str]:
-    """One sentence or two each, of what the study has reached."""
-    out: list[str] = []
-    if (found := study.known_kinematics) is not None:
-        out += [_scheduling(found), _acceleration(found), _feedback(found), _recursion(found)]
-    return [*out, *_lft(study), *certificates(study), *flown(study)]
+    """What to do, and what it rests on."""
+    return [
+        *_where_lft_is_enough(study),
+        *_models(study),
+        *_acceleration(study),
+        *_recursion(study),
+        *certificates(study),
+        *_controllers(study),
+    ]
+
+
+def loops(study: Outcome) -> dict[str, GainCurve]:
+    """What was proven of the baseline of each loop, by channel."""
+    return {
+        channel: gain_curve(study.bounds, "baseline", channel, name)
+        for channel, name in LOOP_NAMES.items()
+        if any(
+            (b.model, b.channel, b.certificate.kind) == ("baseline", channel, "l2 gain")
+            for b in study.bounds
+        )
+    }
+
+
+def _answer(study: Outcome) -> Iterator[str]:
+    """LFT or LPV, loop by loop."""
+    for curve in loops(study).values():
+        if math.isinf(curve.frozen):
+            yield f"In {curve.title} no gain can be proven: it is unstable at an airspeed held."
+            continue
+        rate, most = curve.fastest
+        bounded = (
+            f"an LPV certificate proves a gain of {gain(most)} for every acceleration up to"
+            f" {rate:g} m/s^2"
+            if rate > 0 and math.isfinite(most)
+            else ""
+        )
+        tried = bool(set(curve.jumping) & set(LFT_TESTS))
+        least = min(curve.jumping.values(), default=math.inf)
+        if tried and math.isfinite(least):
+            yield (
+                f"In {curve.title} the LFT is enough: its tests prove a gain of {gain(least)} for"
+                f" an airspeed that jumps, {_more(least, curve.frozen)} than the frozen"
+                f" {gain(curve.frozen)}."
+            )
+        elif tried:
+            never = (
+                ", and none can: an airspeed that jumps makes the state grow"
+                if math.isinf(curve.flown.get(math.inf, 0.0))
+                else ""
+            )
+            sentence = f"In {curve.title} no LFT test proves anything{never}"
+            yield f"{sentence}; {bounded} (frozen {gain(curve.frozen)})." if bounded else (
+                f"{sentence}."
+            )
+        elif bounded:
+            yield f"In {curve.title} {bounded} (frozen {gain(curve.frozen)})."
+
+
+def _more(one: float, other: float) -> str:
+    return f"{100 * (one / other - 1):.2g} % more"
+
+
+def _where_lft_is_enough(study: Outcome) -> Iterator[str]:
+    """When to take which."""
+    tried = {c: v for c, v in loops(study).items() if set(v.jumping) & set(LFT_TESTS)}
+    if not tried:
+        return
+    enough, costly, needs = [], [], []
+    for curve in tried.values():
+        least = min(curve.jumping.values())
+        within = least <= (1 + CHEAP) * curve.frozen
+        kind = needs if math.isinf(least) else enough if within else costly
+        kind.append(curve.title)
+    if enough:
+        yield (
+            f"Take the LFT for {' and '.join(enough)}: what it proves for any rate is within"
+            f" {100 * CHEAP:g} % of the frozen gain, so the rate of the airspeed does not matter."
+        )
+    if costly:
+        yield f"For {' and '.join(costly)} the LFT proves a gain, at a price of more than that."
+    if needs:
+        yield (
+            f"Take an LPV model with a bounded rate for {' and '.join(needs)}: under the LFT's"
+            " assumption, an airspeed that may jump, nothing is proven there."
+        )
+
+
+def _models(study: Outcome) -> Iterator[str]:
+    """How much the LFT loses as a model, how close identification comes."""
+    found = study.known_kinematics
+    if found is None:
+        return
+    cubic, spline = (found.of(name) for name in (CUBIC, SPLINE[models.ALONE]))
+    lost = max(abs(cubic.ahead[y] - spline.ahead[y]) for y in cubic.ahead)
+    yield (
+        "As a model the LFT loses little by being polynomial: its worst nu-gap with the airspeed"
+        f" held is {max(g.max() for g in cubic.gaps.values()):.3f}, and its fits 1 s ahead are"
+        f" within {lost:.0f} points of the spline's."
+    )
+    names = TWO_INPUTS, KNOWN[models.CONSTANT], KNOWN[models.BOTH]
+    arx, constant, both = (found.of(name).gaps["lateral"].max() for name in names)
+    least = {loop: margin.min() for loop, margin in found.margins.items()}
+    hold, margin = (least[name] for name in LOOPS)
+    yield (
+        f"Identified from {sum(found.flown.values()):.0f} s of noisy flight, the worst lateral"
+        f" nu-gap is {arx:.2f} with LPV-ARX, {constant:.2f} with known kinematics and constant"
+        f" coefficients (LTI), {both:.3f} with scheduled ones. The attitude hold has a margin of"
+        f" {hold:.3f}, the other loop one of {margin:.2f}: {_within(both, hold, margin)}"
+    )
+
+
+def _within(gap: float, hold: float, margin: float) -> str:
+    if gap < hold:
+        return "the last model is close enough for either."
+    if gap < margin:
+        return "the last model is close enough for the second, not for the first."
+    return "the last model is close enough for neither."
+
+
+def _flights(study: Outcome) -> Iterator[str]:
+    """Who flew best."""
+    found = study.flown_controllers
+    if found is None or not found.flown:
+        return
+    best = [found.ranked(wind)[0] for wind in WINDS if found.ranked(wind)]
+    if not best:
+        yield "Every controller lost flights in turbulence of every size."
+        return
+    names = list(dict.fromkeys(one.name for one in best))
+    wins = ", ".join(
+        f"{name} ({', '.join(f'{one.gust:.1f}' for one in best if one.name == name)} m/s)"
+        for name in names
+    )
+    yield (
+        f"Flown {found.seeds} times in gusts of each size, the least median energy ratio was that"
+        f" of {wins}."
+    )
+
+
+def _limits(study: Outcome) -> Iterator[str]:
+    """What the certificates do not say."""
+    if study.flown_controllers is not None and study.flown_controllers.flown:
+        yield hypotheses(study.flown_controllers)
+
+
+def _acceleration(study: Outcome) -> Iterator[str]:
+    """What scheduling is worth in prediction."""
+    found = study.known_kinematics
+    if found is None:
+        return
+    pairs = (
+        ("Moving coefficients instead of constant ones", KNOWN, models.ALONE, models.CONSTANT),
+        ("Acceleration as second parameter of the baseline", SPLINE, models.BOTH, models.ALONE),
+        ("Acceleration with known kinematics", KNOWN, models.BOTH, models.ALONE),
+    )
+    for title, family, one, other in pairs:
+        a, b = found.of(family[one]).ahead, found.of(family[other]).ahead
+        moved = [y for y in a if abs(a[y] - b[y]) > LEVEL]
+        most = max(a, key=lambda y: abs(a[y] - b[y]))
+        yield f"{title} changes the fit 1 s ahead by " + (
+            f"more than {LEVEL:g} points in {len(moved)} of {len(a)} outputs, the most by"
+            f" {a[most] - b[most]:+.0f} ({most})."
+            if moved
+            else f"at most {LEVEL:g} points in any output."
+        )
+
+
+def _recursion(study: Outcome) -> Iterator[str]:
+    found = study.known_kinematics
+    if found is not None:
+        share = 100 * found.update_time / found.model.dt
+        yield (
+            f"One recursive update of all coefficients took {1e6 * found.update_time:.2g} us,"
+            f" {share:.2g} % of the sample period: recursion is affordable in flight."
+        )
+
+
+def _controllers(study: Outcome) -> Iterator[str]:
+    """What bounded rates are worth in flight, and what was proven of the loops that fly."""
+    found, proofs = study.flown_controllers, study.certified_controllers
+    if found is None:
+        return
+    yield from _flights(study)
+    pairs = [
+        (lft.ratio, lpv.ratio)
+        for wind in WINDS
+        for lft in found.at(wind)
+        for lpv in found.at(wind)
+        if (lft.name, lpv.name) == (LFT, BASELINE)
+        if not (lft.lost or lpv.lost)
+    ]
+    if pairs:
+        change = [100 * (lpv / lft - 1) for lft, lpv in pairs]
+        yield (
+            "Designed from the same baseline, LPV flew with an energy ratio"
+            f" {min(change):+.0f} to {max(change):+.0f} % from the LFT's, over the sizes of the"
+            " gusts: in flight the bounded rate decides little."
+            if max(map(abs, change)) < 100 * CHEAP
+            else "Designed from the same baseline, LPV flew with an energy ratio"
+            f" {min(change):+.0f} to {max(change):+.0f} % from the LFT's, over the sizes of the"
+            " gusts."
+        )
+    if proofs is not None and proofs.bounds:
+        names = list(dict.fromkeys(b.model for b in proofs.bounds))
+        held = [name for name in names if math.isfinite(proofs.gain(name))]
+        over = [name for name in held if found.exceeded(name, proofs.gain(name)) is not None]
+        said = f"Gains are proven of {len(held)} of {len(names)} loops that fly"
+        yield f"{said}; a flight exceeded that of {', '.join(over)}." if over else (
+            f"{said}; no flight exceeded one of them."
+        )
+    yield from _limits(study)
 
 
 def certificates(study: Outcome) -> list[str]:
@@ -69,90 +300,3 @@ def _told(own: list[Bound]) -> Iterator[str]:
         if estimate is not None:
             said = words[verdict(proven(estimate), *truth)]
             yield f"that of the estimate alone {said}, and nothing in it could tell"
-
-
-def _scheduling(found: KnownKinematics) -> str:
-    constant, alone = (found.of(KNOWN[kind]) for kind in (models.CONSTANT, models.ALONE))
-    return (
-        "Where scheduling pays: moving coefficients instead of constant ones change the 1 s fit of"
-        f" this helicopter by {_differences(alone, constant)}. Where the rotor has no stabilizer"
-        " bar it is tens of points in nearly every output (AH-1S: docs/ah1s.md, python -m"
-        " studies.ah1s --knots 60; not run here)."
-    )
-
-
-def _acceleration(found: KnownKinematics) -> str:
-    base = _differences(found.of(SPLINE[models.BOTH]), found.of(SPLINE[models.ALONE]))
-    own = _differences(found.of(KNOWN[models.BOTH]), found.of(KNOWN[models.ALONE]))
-    return (
-        f"Acceleration as second parameter changes the baseline's 1 s fit by {base}. With known"
-        f" kinematics and the rate of the airspeed in the trim it changes the fit by {own}."
-    )
-
-
-def _feedback(found: KnownKinematics) -> str:
-    names = TWO_INPUTS, KNOWN[models.CONSTANT], KNOWN[models.BOTH]
-    arx, constant, both = (found.of(name).gaps["lateral"].max() for name in names)
-    least = {loop: margin.min() for loop, margin in found.margins.items()}
-    hold, margin = (least[name] for name in LOOPS)
-    return (
-        "For feedback prediction is no measure: the worst lateral nu-gap is"
-        f" {arx:.2f} with LPV-ARX, {constant:.2f} with known kinematics and constant coefficients,"
-        f" {both:.3f} with two parameters. The attitude hold has a stability margin of"
-        f" {hold:.3f} and the other loop one of {margin:.2f}: {_within(both, hold, margin)}"
-    )
-
-
-def _within(gap: float, hold: float, margin: float) -> str:
-    if gap < hold:
-        return "the model is close enough for either."
-    if gap < margin:
-        return "the model is close enough for the second, not for the first."
-    return "the model is close enough for neither."
-
-
-def _recursion(found: KnownKinematics) -> str:
-    share = 100 * found.update_time / found.model.dt
-    return (
-        "What the recursion costs: one update of all coefficients with known kinematics took"
-        f" {1e6 * found.update_time:.2g} us of processor time, {share:.2g} % of the sample period."
-        " It is least squares; what noise in the loop does to these only the batch methods undo."
-    )
-
-
-def _lft(study: Outcome) -> Iterator[str]:
-    found = study.known_kinematics
-    if found is not None:
-        cubic, spline = (found.of(name) for name in (CUBIC, SPLINE[models.ALONE]))
-        yield (
-            "What the LFT loses by being polynomial is little: its worst nu-gap with the airspeed"
-            f" held is {max(g.max() for g in cubic.gaps.values()):.3f}, and its 1 s fits are within"
-            f" {max(abs(cubic.ahead[y] - spline.ahead[y]) for y in cubic.ahead):.0f} points of the"
-            " spline's."
-        )
-    for channel, loop in (
-        ("gust", "gusts under the attitude hold"),
-        ("robust", "the loop with a margin"),
-    ):
-        own = [b for b in study.bounds if (b.channel, b.model) == (channel, "baseline")]
-        tests = [proven(b) for b in own if b.form in LFT_TESTS]
-        slow = [b for b in own if 0 < b.rate < math.inf and b.certificate.verified]
-        if tests and slow:
-            last = max(slow, key=lambda b: (b.rate, -b.certificate.gamma))
-            least = min(tests)
-            yield (
-                f"What it loses by letting the airspeed jump, {loop}: its tests prove"
-                f" {'nothing' if math.isinf(least) else 'a gain of ' + gain(least)}, where"
-                f" {gain(last.certificate.gamma)} is proven up to {rate_text(last.rate)}."
-            )
-
-
-def _differences(one: Rival, other: Rival) -> str:
-    """ "+21 (v), -4 (r) points, by at most 3 for u, p"."""
-    change = {y: one.ahead[y] - other.ahead[y] for y in one.ahead}
-    ranked = sorted(change, key=lambda y: -abs(change[y]))
-    moved = [f"{change[y]:+.0f} ({y})" for y in ranked if abs(change[y]) > LEVEL]
-    level = [y for y in change if abs(change[y]) <= LEVEL]
-    parts = [f"{', '.join(moved)} points"] if moved else []
-    parts += [f"at most {LEVEL:g} points for {', '.join(level)}"] if level else []
-    return ", by ".join(parts)

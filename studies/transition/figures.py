@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.controllers.figure import CAPTION as RATIOS
-from studies.controllers.figure import energy_ratios
+from studies.controllers.figure import RATIOS, SEEDS, energy_ratios, seeds
 from studies.marks import models
 from studies.marks.truth import SPEEDS
 from studies.transition.flights import NOISES
@@ -66,52 +65,81 @@ CAPTION = {
 }
 
 
-def figures(study: Outcome) -> Iterator[tuple[str, str, Figure]]:
-    """(name, caption, figure) of everything the study has reached."""
+SOURCE = {
+    "trim": "baseline.trim",
+    "interpolation": "baseline.entries",
+    "convergence": "paper_experiment",
+    "outputs": "paper_experiment",
+    "flights": "flights",
+    "prediction": "comparison.predictions",
+    "frozen": "comparison.frozen",
+    "gaps": "known_kinematics.models",
+    "gain": "guarantees.bounds",
+    "flown": "controllers.flights",
+}
+"""Where results.json has the numbers that each kind of figure shows, or those of the stage that a
+record was flown in.
+"""
+
+STYLE: dict[Any, Any] = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "lines.linewidth": 1.3,
+    "axes.grid": True,
+    "grid.color": "#e6e9ec",
+    "grid.linewidth": 0.6,
+    "figure.constrained_layout.use": True,
+}
+
+Picture = tuple[str, str, str, "Figure"]
+"""Name, caption, where results.json has its numbers, and the figure."""
+
+
+def figures(study: Outcome) -> Iterator[Picture]:
+    """Everything the study has reached."""
     import matplotlib
 
     matplotlib.use("Agg")
-    style: dict[Any, Any] = {
-        "font.size": 9,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.edgecolor": GREY,
-        "axes.labelcolor": INK,
-        "axes.titlesize": 9.5,
-        "axes.titlelocation": "left",
-        "legend.frameon": False,
-        "legend.fontsize": 8,
-        "lines.linewidth": 1.3,
-        "axes.grid": True,
-        "grid.color": "#e6e9ec",
-        "grid.linewidth": 0.6,
-        "svg.hashsalt": "symheli",
-        "figure.constrained_layout.use": True,
-    }
-    with matplotlib.rc_context(style):
-        if study.baseline:
-            yield "trim", CAPTION["trim"], trim(study)
-            yield "interpolation", CAPTION["interpolation"], entries(study)
-        for e in study.paper_experiment.runs if study.paper_experiment else ():
-            yield f"convergence-{e.loop}", CAPTION["convergence"].format(e.loop), convergence(e)
-            yield f"outputs-{e.loop}", CAPTION["outputs"].format(e.loop), outputs(e)
-        if study.flights:
-            yield "flights", CAPTION["flights"], flights(study.flights)
+    with matplotlib.rc_context(STYLE):
+        yield from _of_models(study)
         if study.comparison:
             for c in study.comparison.predictions:
                 if c.noise == NOISES[0]:
-                    caption = CAPTION["prediction"].format(c.axis.name)
-                    yield f"prediction-{c.axis.name}", caption, prediction(c)
+                    name = c.axis.name
+                    yield _picture("prediction", prediction(c), f"prediction-{name}", name)
             for f in study.comparison.frozen:
-                caption = CAPTION["frozen"].format(f.axis.name, f.found.fast)
-                yield f"frozen-{f.axis.name}", caption, frozen(f.found)
+                words = f.axis.name, f.found.fast
+                yield _picture("frozen", frozen(f.found), f"frozen-{f.axis.name}", *words)
         if study.known_kinematics:
-            yield "gaps", CAPTION["gaps"], gaps(study.known_kinematics)
+            yield _picture("gaps", gaps(study.known_kinematics))
         if found := curves(study.bounds):
-            yield "gain-against-rate", CAPTION["gain"], gain_curves(found)
-        if study.flown_controllers:
-            picture = energy_ratios(study.flown_controllers, study.certified_controllers)
-            yield "energy-ratios", RATIOS, picture
+            yield _picture("gain", gain_curves(found), "gain-against-rate")
+        if study.flown_controllers and study.flown_controllers.flown:
+            ratios = energy_ratios(study.flown_controllers, study.certified_controllers)
+            yield "energy-ratios", RATIOS, SOURCE["flown"], ratios
+            yield "seeds", SEEDS, SOURCE["flown"], seeds(study.flown_controllers)
+
+
+def _of_models(study: Outcome) -> Iterator[Picture]:
+    if study.baseline:
+        yield _picture("trim", trim(study))
+        yield _picture("interpolation", entries(study))
+    for e in study.paper_experiment.runs if study.paper_experiment else ():
+        yield _picture("convergence", convergence(e), f"convergence-{e.loop}", e.loop)
+        yield _picture("outputs", outputs(e), f"outputs-{e.loop}", e.loop)
+    if study.flights:
+        yield _picture("flights", flights(study.flights))
+
+
+def _picture(kind: str, figure: Figure, name: str = "", *words: object) -> Picture:
+    return name or kind, CAPTION[kind].format(*words), SOURCE[kind], figure
 
 
 def _subplots(
@@ -315,7 +343,7 @@ def frozen(f: FrozenModels) -> Figure:
     axes[0][0].axvline(0, color=GREY, linewidth=0.8)
     axes[0][0].set_xlabel("real (rad/s)")
     axes[0][0].set_title("poles, imaginary part (rad/s)")
-    axes[0][0].legend(loc="upper left")
+    axes[0][0].legend(loc="center left")
     for name, colour in (("reference", INK), ("baseline", ORANGE), ("identified", BLUE)):
         axes[0][1].loglog(
             f.omega,

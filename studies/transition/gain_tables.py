@@ -35,7 +35,12 @@ def guarantee(found: Sequence[Bound], channel: str) -> Table:
     own = [b for b in found if b.channel == channel]
     gains = [b for b in own if b.certificate.kind == "l2 gain"]
     forms = [form for form in FORMS if any(b.form == form for b in gains)]
-    table = Table(CHANNELS[channel], ["model", "acceleration", "stable", "frozen", "flown", *forms])
+    table = Table(
+        CHANNELS[channel],
+        ["model", "acceleration", "stable", "frozen", "flown", *forms],
+        name=f"gain-{channel}",
+        source="guarantees.bounds",
+    )
     for model in dict.fromkeys(b.model for b in gains):
         jumping = {b.form: b for b in gains if b.model == model and math.isinf(b.rate)}
         for rate in sorted({b.rate for b in gains if b.model == model}):

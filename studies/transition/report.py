@@ -2,73 +2,106 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.controllers import tables as controllers
+from studies.report.drawn import Drawn, drawn
+from studies.report.equations import EQUATIONS
+from studies.report.labels import Labels
+from studies.report.references import REFERENCES
+from studies.report.shortfalls import shortfalls
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
-from studies.transition.conclusions import certificates, conclusions
+from studies.transition.conclusions import abstract, certificates, conclusions
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
 from studies.transition.saved_proofs import save_proofs
-from symheli.values.whole_files import write_bytes, write_text
+from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
     from identification import LPVARXModel
     from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
 
-TEMPLATE = "report.html.j2"
+FOLDER = Path(__file__).parents[1] / "report"
+TEMPLATE, STYLE, SCRIPTS = "page.html.j2", "page.css", ("hover.js", "explorer.js")
+DIGITS = 4
+"""Significant ones of the numbers that the slider moves over."""
 
 
 def write_results(study: Outcome, out: Path) -> Path:
     """results.json with everything reached so far, after the proofs that it names."""
     save_proofs(study, out)
-    return write_text(
-        out / "results.json", json.dumps(to_dict(study), indent=1, allow_nan=False) + "\n"
-    )
+    return _written(to_dict(study), out)
 
 
 def write_report(study: Outcome, out: Path) -> Path:
-    """results.json, figures/*.png and report.html (self-contained: figures inside), in this order:
-    no number waits for a picture.
+    """results.json, figures (PNG, SVG, PDF) and report.html (self-contained), in this order: no
+    number waits for a picture.
     """
-    import jinja2
-    import matplotlib.pyplot as plt
-
     from studies.transition.figures import figures
 
-    write_results(study, out)
-    pictures = {}
-    for name, caption, figure in figures(study):
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=130)
-        plt.close(figure)
-        write_bytes(out / "figures" / f"{name}.png", stream.getvalue())
-        pictures[name] = {
-            "caption": caption,
-            "data": base64.b64encode(stream.getvalue()).decode("ascii"),
-        }
+    results = to_dict(study)
+    _written(results, out)
+    pictures = {one.name: one for one in drawn(figures(study), out / "figures")}
+    return write_text(out / "report.html", page(study, pictures, results))
+
+
+def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) -> str:
+    """The report as HTML; rendered twice, so that what stands below can be referred to above."""
+    import jinja2
+    from markupsafe import Markup
+
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        loader=jinja2.FileSystemLoader(FOLDER),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    page = environment.get_template(TEMPLATE).render(
-        study=study, pictures=pictures, axes=AXES, t=tables, **_headline(study)
-    )
-    return write_text(out / "report.html", page)
+    template = environment.get_template(TEMPLATE)
+    said = {
+        "study": study,
+        "pictures": pictures,
+        "axes": AXES,
+        "t": tables,
+        "results": results,
+        "equations": EQUATIONS,
+        "references": REFERENCES,
+        "style": Markup((FOLDER / STYLE).read_text(encoding="utf-8")),
+        "scripts": [Markup((FOLDER / name).read_text(encoding="utf-8")) for name in SCRIPTS],
+        "held": Markup(compact(results["held"])),
+        **_headline(study),
+    }
+    first = Labels()
+    template.render(labels=first, contents=[], **said)
+    text = template.render(labels=Labels(first.given), contents=first.contents, **said)
+    return text.replace("m/s^2", "m/s²")
+
+
+def compact(data: object) -> str:
+    """JSON for a script element, with few digits."""
+
+    def short(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {key: short(value) for key, value in part.items()}
+        if isinstance(part, list):
+            return [short(value) for value in part]
+        return float(f"{part:.{DIGITS}g}") if isinstance(part, float) else part
+
+    return json.dumps(short(data), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _written(results: dict[str, Any], out: Path) -> Path:
+    text = json.dumps(results, indent=1, allow_nan=False) + "\n"
+    return write_text(out / "results.json", text)
 
 
 def _headline(study: Outcome) -> dict[str, object]:
-    """The numbers the first paragraph speaks of."""
+    """What the page says in sentences, and the numbers at its head."""
     gust = [
         b
         for b in study.bounds
@@ -77,13 +110,13 @@ def _headline(study: Outcome) -> dict[str, object]:
     proven = [b for b in gust if b.certificate.verified]
     hypotheses = list(dict.fromkeys(h for b in proven for h in b.certificate.hypotheses))
     return {
+        "abstract": abstract(study),
         "conclusions": conclusions(study),
+        "shortfalls": shortfalls(study),
         "curves": curves(study.bounds),
         "gain_tables": gain_tables.every(study.bounds),
         "certificates": certificates(study),
         "controller_tables": controllers.every(study),
-        "flown_conclusions": controllers.conclusions(study),
-        "not_about_the_helicopter": gain_tables.not_about_the_helicopter(study.bounds),
         "frozen_gain": next((b.certificate.frozen for b in gust), None),
         "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),
         "jump": min(

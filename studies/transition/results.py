@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 from studies.controllers.written import controllers_to_dict
 from studies.marks.truth import SPEEDS
 from studies.output import plain
+from studies.report.held import held_to_dict
+from studies.report.provenance import provenance
 from studies.transition.axes import HORIZON
 from studies.transition.certificates import bound_to_dict
 from studies.transition.guarantees import unit_of
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from studies.transition.recovery import Recovery
     from symheli import Signal
 
-SCHEMA = "symheli study 4"
+SCHEMA = "symheli study 5"
 LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
 
@@ -49,6 +51,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         "versions": (
             {name: version(name) for name in LIBRARIES} | {"python": platform.python_version()}
         ),
+        "provenance": provenance(),
         "stage_time": named(study.seconds, "s"),
         "baseline": study.baseline and _baseline(study.baseline),
         "paper_experiment": (
@@ -63,6 +66,7 @@ def to_dict(study: Outcome) -> dict[str, Any]:
         "known_kinematics": study.known_kinematics and _known(study.known_kinematics),
         "guarantees": _guarantees(study),
         "controllers": controllers_to_dict(study),
+        "held": held_to_dict(study),
     }
 
 

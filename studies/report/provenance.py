@@ -1,0 +1,57 @@
+"""Where the numbers of a report come from: date, source, command, machine."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+import shutil
+import subprocess
+import sys
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+from studies.stamped_tables import processor
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def provenance() -> dict[str, str]:
+    """Date of writing (UTC), source (commit where this is a git checkout, else version), command,
+    processor, system.
+    """
+    now = datetime.datetime.now(datetime.UTC)
+    return {
+        "date": now.strftime("%Y-%m-%d %H:%M UTC"),
+        "source": source(ROOT),
+        "command": command(),
+        "processor": processor(),
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+@cache
+def source(root: Path) -> str:
+    """The commit checked out in root, and whether files differ from it; the version without one."""
+    git = shutil.which("git")
+    if git is None or not (root / ".git").exists():
+        return f"version {version('symheli')}"
+    try:
+        commit, changed = (
+            subprocess.run(
+                [git, "-C", str(root), *words],
+                check=True,
+                capture_output=True,
+                text=True,
+                timeout=10,
+            ).stdout.strip()
+            for words in (("rev-parse", "HEAD"), ("status", "--porcelain", "-uno"))
+        )
+    except (OSError, subprocess.SubprocessError):
+        return f"version {version('symheli')}"
+    return f"commit {commit[:12]}{', with changes' if changed else ''}"
+
+
+def command() -> str:
+    """What started this process, as one would type it."""
+    return " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])

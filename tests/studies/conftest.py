@@ -1,0 +1,44 @@
+"""One outcome of the study with every stage, as short as it gets, for all that looks at reports."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from studies.marks.guarantee import FORM
+from studies.transition import study as stages
+from studies.transition.effort import Effort
+from symheli import Helicopter
+from synthesis import Search
+
+GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+
+
+@pytest.fixture(scope="session")
+def full():
+    """Every stage, as short as it gets."""
+    effort = Effort(
+        ramps=6,
+        gentle_ramps=4,
+        gust_rates=(0.0, math.inf),
+        gust_segments=(2,),
+        exact_rates=(0.0,),
+        longitudinal_rates=(0.0,),
+        thorough=False,
+        aggressive=60.0,
+        gentle_flight=False,
+        robust_rates=(0.0,),
+        robust_form=FORM,
+        servo_rates=(0.0, math.inf),
+        servo_segments=(2,),
+        design_points=4,
+        certified_controllers=False,
+        controller_seeds=2,
+        search=GLIMPSE,
+    )
+    heli = Helicopter.load("xcell60", governor="ideal")
+    study = stages.Study(vehicle="xcell60", quick=True, seed=0, heli=heli)
+    for stage in stages.stages(effort):
+        study = stages.with_stage(study, stage, stages.computed(stage, study, effort))
+    return study
