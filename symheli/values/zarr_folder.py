@@ -22,7 +22,7 @@ FORMAT = 2
 @dataclass(frozen=True, kw_only=True)
 class ZarrArray:
     """`shape` along named `dimensions` in chunks of `chunks`; `fill` is what is read where a chunk
-    is not there (None: every chunk is).
+    is not there (None: zero, or empty text); `coordinates` name the arrays that label it besides.
     """
 
     dimensions: tuple[str, ...]
@@ -30,12 +30,17 @@ class ZarrArray:
     chunks: tuple[int, ...]
     dtype: str
     fill: Any = None
+    coordinates: tuple[str, ...] = ()
 
     @classmethod
     def whole(cls, dimension: str, values: Array) -> ZarrArray:
         """Of one chunk that holds all values."""
         shape = values.shape
         return cls(dimensions=(dimension,), shape=shape, chunks=shape, dtype=values.dtype.str)
+
+    def filled(self, shape: tuple[int, ...]) -> Array:
+        """What is read where nothing was written."""
+        return np.zeros(shape, self.dtype) if self.fill is None else np.full(shape, self.fill)
 
     def along(self) -> range:
         """Chunks along the first dimension."""
@@ -63,7 +68,8 @@ class ZarrFolder:
                 "order": "C",
                 "filters": None,
             }
-            metadata[f"{name}/.zattrs"] = {"_ARRAY_DIMENSIONS": array.dimensions}
+            labels = {"coordinates": " ".join(array.coordinates)} if array.coordinates else {}
+            metadata[f"{name}/.zattrs"] = {"_ARRAY_DIMENSIONS": array.dimensions, **labels}
         for name, content in metadata.items():
             write_text(self.path / name, json.dumps(content))
         consolidated = {"zarr_consolidated_format": 1, "metadata": metadata}
@@ -80,7 +86,7 @@ class ZarrFolder:
     def write(self, name: str, chunk: int, values: Array) -> None:
         """The chunk along the first dimension, filled up where `values` has fewer rows."""
         array = self.array(name)
-        whole = np.full(array.chunks, array.fill, array.dtype)
+        whole = array.filled(array.chunks)
         whole[: len(values)] = values
         write_bytes(self._file(name, chunk, array), whole.tobytes())
 
@@ -102,6 +108,7 @@ class ZarrFolder:
             chunks=tuple(about["chunks"]),
             dtype=about["dtype"],
             fill=float("nan") if about["fill_value"] == "NaN" else about["fill_value"],
+            coordinates=tuple(along.get("coordinates", "").split()),
         )
 
     def missing(self, name: str) -> list[int]:
@@ -118,8 +125,7 @@ class ZarrFolder:
     def whole(self, name: str) -> Array:
         """All of an array, with what it is filled with where chunks are not there."""
         array = self.array(name)
-        fill = np.zeros(1, array.dtype)[0] if array.fill is None else array.fill
-        out, step = np.full(array.shape, fill, array.dtype), array.chunks[0]
+        out, step = array.filled(array.shape), array.chunks[0]
         for k in array.along():
             block = self._read(name, k, array)
             if block is not None:
