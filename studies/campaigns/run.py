@@ -12,6 +12,8 @@ from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from studies.campaigns.campaign import Campaign
 from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.runners import Runner, answers
@@ -19,6 +21,7 @@ from studies.campaigns.trial import Outcome, Trial, Value, reason_of
 from studies.output import progress
 from studies.transition.stored_stages import code_digest
 from symheli.errors import DataWarning, SymheliError
+from symheli.values.arrays import Array
 
 EVERY = 2.0
 """Between two lines of progress, s, at least."""
@@ -92,6 +95,35 @@ def run(
         dataset.write(missing[i], outcome)
         told.of(outcome)
     return dataset
+
+
+def columns_of(campaign: Campaign, on: Runner, path: Path | None = None) -> dict[str, Array]:
+    """Every quantity over the cases of the campaign, in their order (N,); with a `path` kept there
+    as `run` does.
+
+    Raises `SymheliError` where a case has failed, when the others are done.
+    """
+    if path is not None:
+        dataset = run(campaign, path, on)
+        rows, reasons = dataset.rows_of(campaign.cases), dataset.reasons
+        values = dataset.values[rows]
+        failed = {i: reasons[row] for i, row in enumerate(rows) if row in reasons}
+    else:
+        told = _Told(len(campaign.cases), 0, 0)
+        values = np.full((len(campaign.cases), len(campaign.trial.units)), np.nan)
+        failed = {}
+        for i, one in outcomes(campaign.trial, [c.parameters for c in campaign.cases], on):
+            values[i] = one.values
+            if one.reason:
+                failed[i] = one.reason
+            told.of(one)
+    if failed:
+        first = min(failed)
+        raise SymheliError(
+            f"{len(failed)} of {len(campaign.cases)} cases failed; the first,"
+            f" {dict(campaign.cases[first].parameters)}: {failed[first]}"
+        )
+    return dict(zip(campaign.trial.units, values.T, strict=True))
 
 
 def outcomes(

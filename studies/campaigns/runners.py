@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 PATIENCE = 10.0
 """For a scheduler to answer, s."""
 
+AHEAD = 3
+"""Calls handed to the cluster for each of its threads: none waits for this process."""
+
 
 class Runner(Executor):
     """Takes calls as any executor does; `window` of them are handed to it at a time."""
@@ -89,30 +92,32 @@ class Cluster(Runner):
     (`at`). A call whose worker is gone is given to another.
     """
 
-    def __init__(self, client: distributed.Client, own: distributed.LocalCluster | None = None):
-        self._client, self._own = client, own
-        self._executor = client.get_executor(pure=False)
-        threads: Any = client.ncores()
-        self.window = 3 * max(sum(threads.values()), 1)
+    def __init__(self, connect: Callable[[], distributed.Client], window: int):
+        self._connect, self.window = connect, window
+        self._client: distributed.Client | None = None
 
     @classmethod
     def local(cls, count: int) -> Cluster:
-        """`count` workers of one thread on the loopback interface, without dashboard; they end with
-        this process, however it ends.
+        """`count` workers of one thread on the loopback interface, without dashboard: they start
+        with the first call, and end with this process, however it ends.
         """
         with extra("campaigns", "a campaign on a cluster"):
             import distributed
-        own = distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address=None,  # type: ignore[arg-type]
-            worker_dashboard_address=None,
-            memory_limit=0,  # type: ignore[arg-type]
-            silence_logs=logging.CRITICAL,
-        )
-        return cls(distributed.Client(own, set_as_default=False), own)
+
+        def connect() -> distributed.Client:
+            own = distributed.LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address=None,  # type: ignore[arg-type]
+                worker_dashboard_address=None,
+                memory_limit=0,  # type: ignore[arg-type]
+                silence_logs=logging.CRITICAL,
+            )
+            return distributed.Client(own, set_as_default=False)
+
+        return cls(connect, AHEAD * count)
 
     @classmethod
     def at(cls, address: str) -> Cluster:
@@ -123,16 +128,21 @@ class Cluster(Runner):
         with extra("campaigns", "a campaign on a cluster"):
             import distributed
         try:
-            return cls(distributed.Client(address, timeout=PATIENCE, set_as_default=False))
+            client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             raise InputError(
                 f"no scheduler of dask.distributed answers at {address!r} ({error}); start one with"
                 " `dask scheduler`, or leave --scheduler out for the cores of this machine"
             ) from error
+        threads: Any = client.ncores()
+        there = cls(lambda: client, AHEAD * max(sum(threads.values()), 1))
+        there._client = client
+        return there
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """A result to come."""
-        return self._executor.submit(fn, *args, **kwargs)
+        self._client = self._client or self._connect()
+        return self._client.get_executor(pure=False).submit(fn, *args, **kwargs)
 
     def lost(self, error: BaseException) -> bool:
         """The scheduler gives a call to another worker, and says when it has seen enough end."""
@@ -140,9 +150,11 @@ class Cluster(Runner):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the scheduler; a cluster of its own ends."""
-        self._client.close()
-        if self._own is not None:
-            self._own.close()
+        if self._client is not None:
+            own = self._client.cluster
+            self._client.close()
+            if own is not None:
+                own.close()
 
 
 def runner(workers: int | None = None, scheduler: str | None = None) -> Runner:
