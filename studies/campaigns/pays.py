@@ -4,24 +4,24 @@ wind and noise.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, partial
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from identification import AgainstConstant, against_constant
 from identification.judge.against_constant import HORIZONS, PAYS
 from identification.judge.scores import percent
+from studies.campaigns.campaign import Campaign
+from studies.campaigns.run import columns_of
+from studies.campaigns.runners import Runner
+from studies.campaigns.trials.pays import AXES, MODELS, TRIAL, fit_of, paying
 from studies.output import progress
-from studies.processes import Processes
-from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, Axis
-from studies.transition.flights import NOISE_DB, FlightPlan, autopilot_for
-from symheli import Helicopter
-from symheli.flight import Autopilot
+from studies.transition.axes import Axis
+from studies.transition.flights import NOISE_DB, FlightPlan
 
-AXES = (LONGITUDINAL, LATERAL, ALL)
 CONDITIONS = {
     "still air, no noise": FlightPlan(),
     "still air, 30 dB of sensor noise": FlightPlan(noise_db=NOISE_DB),
@@ -49,76 +49,34 @@ class Line:
 
 
 def where_scheduling_pays(
-    seeds: int, vehicle: str, conditions: Mapping[str, FlightPlan] = CONDITIONS
+    seeds: int,
+    vehicle: str,
+    conditions: Mapping[str, FlightPlan] = CONDITIONS,
+    *,
+    on: Runner,
+    path: Path | None = None,
 ) -> Iterator[Line]:
     """In each condition fly with the default seed and `seeds` others, fit, and judge on another
-    transition; the flights of a seed in a process.
+    transition; a case is the flights of a seed, kept in the dataset at `path` where one is given.
     """
-    with Processes() as processes:
-        asked = {
-            condition: processes.submit(
-                [partial(_of_seed, vehicle, replace(plan, seed=k)) for k in range(seeds + 1)]
-            )
-            for condition, plan in conditions.items()
+    for condition, plan in conditions.items():
+        progress(f"  {condition}")
+        fixed = {
+            "vehicle": vehicle,
+            "noise_db": math.inf if plan.noise_db is None else plan.noise_db,
+            "windy": plan.windy,
+            "ramps": plan.ramps,
         }
-        for condition, answers in asked.items():
-            found: list[_Run] = []
-            for seed, answer in enumerate(answers):
-                found.append(answer.result())
-                progress(f"  {condition}: seed {seed} of {seeds}")
-            yield from (
-                _line(condition, axis, output, found) for axis in AXES for output in axis.outputs
-            )
+        asked = Campaign(TRIAL, grid={"seed": range(seeds + 1)}, fixed=fixed)
+        found = columns_of(asked, on, path)
+        yield from (
+            _line(condition, axis, output, found) for axis in AXES for output in axis.outputs
+        )
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """Fits of one axis in percent by horizon and output, LPV and LTI; the outputs for which
-    scheduling pays.
-    """
-
-    lpv: Mapping[str, Mapping[str, float]]
-    lti: Mapping[str, Mapping[str, float]]
-    pays: frozenset[str]
-
-    @classmethod
-    def of(cls, found: AgainstConstant) -> _Pair:
-        lpv, lti = (one.held_out.by_horizon for one in found.models if one.held_out is not None)
-        return cls(lpv, lti, frozenset(str(y) for y in lpv[HORIZONS[0]] if found.pays(str(y))))
-
-
-_Run = Mapping[str, _Pair]
-"""Of one seed, by axis."""
-
-
-def _of_seed(vehicle: str, plan: FlightPlan) -> _Run:
-    """Fly, fit, judge."""
-    heli, autopilot = _flown(vehicle)
-    training, test = plan.training(heli, autopilot), plan.test(heli, autopilot)
-    found = {
-        axis.name: against_constant(axis.structure(), training, test, trim="moving")
-        for axis in AXES
-    }
-    return {name: _Pair.of(one) for name, one in found.items()}
-
-
-@cache
-def _flown(vehicle: str) -> tuple[Helicopter, Autopilot]:
-    """The helicopter and its autopilot, once a process."""
-    heli = Helicopter.load(vehicle, governor="ideal")
-    return heli, autopilot_for(heli)
-
-
-def _line(condition: str, axis: Axis, output: str, runs: Sequence[_Run]) -> Line:
-    pairs = [run[axis.name] for run in runs]
-    return Line(
-        condition,
-        axis.name,
-        output,
-        {h: np.array([pair.lpv[h][output] for pair in pairs]) for h in HORIZONS},
-        {h: np.array([pair.lti[h][output] for pair in pairs]) for h in HORIZONS},
-        sum(output in pair.pays for pair in pairs),
-    )
+def _line(condition: str, axis: Axis, output: str, found: Mapping[str, np.ndarray]) -> Line:
+    lpv, lti = ({h: found[fit_of(axis, output, h, model)] for h in HORIZONS} for model in MODELS)
+    return Line(condition, axis.name, output, lpv, lti, int(found[paying(axis, output)].sum()))
 
 
 def table(lines: Sequence[Line]) -> str:

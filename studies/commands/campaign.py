@@ -1,35 +1,83 @@
-"""symheli campaign: the study's identification over many seeds."""
+"""symheli campaign: any trial over a grid and draws; the study's identification over many seeds."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
-from studies.commands.options import at_least_one
+from studies.commands.options import at_least_one, on_a_runner
 from studies.output import Output
+from symheli.errors import InputError
 
-HELP = "repeat the identification over many seeds: how much do the numbers scatter"
+HELP = "a grid and draws of cases from a TOML file; without one the identification over many seeds"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """How many, of which airframe."""
+    """What, where it is kept, where it runs."""
+    parser.add_argument(
+        "file",
+        nargs="?",
+        type=Path,
+        metavar="FILE",
+        help="TOML file that declares the campaign (docs/campaigns.md)",
+    )
     parser.add_argument(
         "--vehicle",
-        default="xcell60",
         metavar="NAME",
-        help="packaged airframe or TOML file (default: %(default)s)",
+        help="without FILE: packaged airframe or TOML file (default: xcell60)",
     )
     parser.add_argument(
         "--seeds",
         type=at_least_one,
-        default=20,
         metavar="N",
-        help="number of seeds (default: %(default)s)",
+        help="without FILE: number of seeds (default: 20)",
     )
+    parser.add_argument(
+        "--show",
+        action="append",
+        metavar="QUANTITY",
+        help="with FILE: what the table shows, as often as needed (default: the first ones)",
+    )
+    parser.add_argument(
+        "--again", action="store_true", help="with FILE: compute failed cases once more"
+    )
+    on_a_runner(parser)
 
 
 def run(arguments: argparse.Namespace) -> Output:
     """Run the campaign; it shows its own progress."""
+    from studies.campaigns.runners import runner
+
+    if arguments.file is not None:
+        return _declared(arguments)
+    if arguments.show or arguments.again:
+        raise InputError("--show and --again belong to a campaign from a file: name the file")
     from studies.transition.campaign import run_campaign
 
-    result = run_campaign(seeds=arguments.seeds, vehicle=arguments.vehicle)
+    with runner(arguments.workers, arguments.scheduler) as on:
+        result = run_campaign(
+            seeds=arguments.seeds or 20,
+            vehicle=arguments.vehicle or "xcell60",
+            on=on,
+            path=arguments.out,
+        )
     return Output(result.summary(), result.to_dict())
+
+
+def _declared(arguments: argparse.Namespace) -> Output:
+    from studies.campaigns import summary
+    from studies.campaigns.campaign_file import read_campaign
+    from studies.campaigns.run import run as run_declared
+    from studies.campaigns.runners import runner
+
+    if arguments.vehicle or arguments.seeds:
+        raise InputError(
+            "--vehicle and --seeds are for the campaign of the study; a file says both itself"
+        )
+    campaign = read_campaign(arguments.file)
+    arguments.out = arguments.out or Path(f"{arguments.file.stem}.zarr")
+    with runner(arguments.workers, arguments.scheduler) as on:
+        dataset = run_declared(campaign, arguments.out, on, again=arguments.again)
+    found = summary.data(campaign, dataset)
+    nothing = found["failed"] == len(campaign.cases)
+    return Output(summary.table(campaign, dataset, arguments.show), found, status=int(nothing))

@@ -199,6 +199,34 @@ def model_file(text: str) -> Path:
     return path
 
 
+def on_a_runner(parser: argparse.ArgumentParser) -> None:
+    """--workers, --scheduler and --out of a campaign."""
+    parser.add_argument(
+        "--workers",
+        type=at_least_one,
+        metavar="N",
+        help="of this machine, one thread each (default: one a core; 1: in this process)",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="run on the scheduler of dask.distributed there, such as tcp://10.0.0.5:8786",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR.zarr",
+        help="dataset of the cases: run again, what is there is not computed again",
+    )
+    parser.set_defaults(
+        kept=lambda arguments: (
+            f"what was finished is in {arguments.out}: the same command goes on from there"
+            if arguments.out
+            else "what was finished is kept where --out or a file of a campaign says so"
+        )
+    )
+
+
 def unit(text: str) -> tuple[str, str]:
     """name=unit"""
     name, sign, value = text.partition("=")

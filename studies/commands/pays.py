@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from studies.commands.options import count
+from studies.commands.options import count, on_a_runner
 from studies.output import Output
 
 HELP = (
@@ -28,11 +28,18 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="seeds beside the default one (default: %(default)s)",
     )
+    on_a_runner(parser)
 
 
 def run(arguments: argparse.Namespace) -> Output:
     """Fly, fit, judge; it shows its own progress."""
     from studies.campaigns import pays
+    from studies.campaigns.runners import runner
 
-    lines = list(pays.where_scheduling_pays(arguments.seeds, arguments.vehicle))
+    with runner(arguments.workers, arguments.scheduler) as on:
+        lines = list(
+            pays.where_scheduling_pays(
+                arguments.seeds, arguments.vehicle, on=on, path=arguments.out
+            )
+        )
     return Output(pays.table(lines), {"lines": pays.data(lines)})

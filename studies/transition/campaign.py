@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from studies.transition import accelerating_baseline, axes
-from studies.transition.accelerating_baseline import BOTH, MARKS, SCATTER
-from studies.transition.axes import AXES
-from studies.transition.flights import NOISE_DB, FlightPlan, autopilot_for
+from studies.campaigns.campaign import Campaign
+from studies.campaigns.run import columns_of
+from studies.campaigns.runners import Runner
+from studies.campaigns.trials import marks
+from studies.transition.accelerating_baseline import ALONE, BOTH, MARKS, SCATTER
+from studies.transition.axes import AXES, FROZEN_SPEEDS
+from studies.transition.flights import NOISES
 from studies.transition.quantities import value
-from symheli import Helicopter
 
 MODE_MARK = 3.0
 """Percent by which a noise-free frozen rotor mode may miss the exact one."""
@@ -66,8 +69,8 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Campaign:
-    """The rows of a campaign; the first value of each is the default seed's."""
+class MarksOverSeeds:
+    """The rows over all seeds; the first value of each is the default seed's."""
 
     rows: tuple[Row, ...]
     seeds: int
@@ -103,43 +106,29 @@ class Campaign:
         }
 
 
-def run_campaign(seeds: int = 20, vehicle: str = "xcell60") -> Campaign:
+def run_campaign(
+    seeds: int = 20,
+    vehicle: str = "xcell60",
+    *,
+    on: Runner,
+    path: Path | None = None,
+) -> MarksOverSeeds:
     """Fly, identify and judge with the default seed and `seeds` others (new schedules, excitation
-    and noise each).
+    and noise each); a case is a seed, kept in the dataset at `path` where one is given.
     """
-    heli = Helicopter.load(vehicle, governor="ideal")
-    autopilot = autopilot_for(heli)
-    collected: dict[tuple[str, float, bool], list[float]] = {}
-    rivals = accelerating_baseline.baselines(heli)
-    predicted: dict[tuple[str, str], list[float]] = {}
-    for seed in range(seeds + 1):
-        for noise_db in (None, NOISE_DB):
-            plan = FlightPlan(seed, noise_db=noise_db)
-            training, test = plan.training(heli, autopilot), plan.test(heli, autopilot)
-            if noise_db is None:
-                for key, fit in accelerating_baseline.fits(rivals, test).items():
-                    predicted.setdefault(key, []).append(fit)
-            for axis in AXES:
-                result = axes.judged(heli, axis, axes.identify(axis, training, "ls"), test)
-                label = "noise-free" if noise_db is None else f"{noise_db:g} dB"
-                for output, marks in axis.marks.items():
-                    key = (
-                        f"{output}, 1 s ahead, {label} ({axis.name})",
-                        marks[noise_db is not None],
-                        False,
-                    )
-                    collected.setdefault(key, []).append(result.scores.ahead[output])
-                if noise_db is None:
-                    for speed, miss in result.mode_miss.items():
-                        collected.setdefault(
-                            (f"{axis.mode} mode at {speed:g} m/s", MODE_MARK, True), []
-                        ).append(miss)
-        print(f"  seed {seed} of {seeds}", file=sys.stderr, flush=True)
-    rows = [Row(name, np.array(v), mark, largest) for (name, mark, largest), v in collected.items()]
-    for (model, output), fits in predicted.items():
-        name, values = f"{output}, {model}, 1 s ahead", np.array(fits)
-        if model == BOTH:
-            rows.append(Row(name, values, MARKS[output], scatter=SCATTER))
-        else:
-            rows.append(Row(name, values, None))
-    return Campaign(tuple(rows), seeds)
+    asked = Campaign(marks.TRIAL, grid={"seed": range(seeds + 1)}, fixed={"vehicle": vehicle})
+    return MarksOverSeeds(tuple(_rows(columns_of(asked, on, path))), seeds)
+
+
+def _rows(found: Mapping[str, np.ndarray]) -> Iterator[Row]:
+    for noisy, noise in enumerate(NOISES):
+        for axis in AXES:
+            for output, limits in axis.marks.items():
+                name = marks.ahead(axis, output, noise)
+                yield Row(name, found[name], limits[noisy])
+            for name in () if noisy else (marks.of_mode(axis, v) for v in FROZEN_SPEEDS):
+                yield Row(name, found[name], MODE_MARK, largest=True)
+    for model, limits, scatter in ((BOTH, MARKS, SCATTER), (ALONE, {}, None)):
+        for output in MARKS:
+            name = marks.of_baseline(model, output)
+            yield Row(name, found[name], limits.get(output), scatter=scatter)

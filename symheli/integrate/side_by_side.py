@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import closing
 from typing import TypeVar
 
 from symheli.codegen import Layout
@@ -29,6 +31,27 @@ def workers_of(asked: int | None) -> int:
     return asked
 
 
+def as_done(
+    executor: Executor, run: Callable[[Chunk], Result], chunks: Iterable[Chunk], ahead: int
+) -> Generator[tuple[Chunk, Future[Result]], None, None]:
+    """Each chunk with the finished future of `run(chunk)`, as they are done, at most `ahead` handed
+    to the executor at a time. Where the reader gives up, those not begun are cancelled.
+    """
+    waiting = iter(chunks)
+    running: dict[Future[Result], Chunk] = {}
+    try:
+        while True:
+            for chunk in itertools.islice(waiting, ahead - len(running)):
+                running[executor.submit(run, chunk)] = chunk
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                yield running.pop(future), future
+    finally:
+        for future in running:
+            future.cancel()
+
+
 def over_the_cores(
     run: Callable[[Chunk], Result],
     chunks: Sequence[Chunk],
@@ -38,18 +61,11 @@ def over_the_cores(
     """Each chunk with what `run` makes of it, as they are done. Where one fails, or the reader or
     Ctrl-C gives up, `stop` is called, the chunks under way are awaited and the rest is left.
     """
-    waiting = list(reversed(chunks))
     with ThreadPoolExecutor(workers) as pool:
-        running: dict[Future[Result], Chunk] = {}
         try:
-            while waiting or running:
-                while waiting and len(running) < 2 * workers:
-                    chunk = waiting.pop()
-                    running[pool.submit(run, chunk)] = chunk
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    yield running.pop(future), future.result()
+            with closing(as_done(pool, run, chunks, 2 * workers)) as answers:
+                for chunk, future in answers:
+                    yield chunk, future.result()
         except BaseException:
-            for future in running:
-                future.cancel()
             stop()
             raise
