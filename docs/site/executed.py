@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
+import types
 import warnings
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -67,7 +68,8 @@ def printed(page, name):
 
     What a compiler would print is None where there is none.
     """
-    found, names = blocks(page), {"__name__": "page"}
+    found, module = blocks(page), types.ModuleType("page")
+    sys.modules["page"] = module  # where classes of the page are looked for
     for block, after in zip(found, [*found[1:], None], strict=True):
         if block.kind == "text":
             continue
@@ -79,7 +81,7 @@ def printed(page, name):
                 if block.kind == "python":
                     # blank lines in front: an error then names the line of the page
                     code = "\n" * (block.line - 1) + block.code
-                    exec(compile(code, name, "exec"), names)
+                    exec(compile(code, name, "exec", dont_inherit=True), vars(module))
                 else:
                     _shell(block.code)
         except _NoCompiler:
