@@ -110,7 +110,7 @@ def _shell(code):
             if (status := cli.main(words[1:])) != 0:
                 raise PageError(f"{line}: ended with {status}")
             continue
-        if words[0] == "cc" and shutil.which("cc") is None:
+        if "cc" in words and shutil.which("cc") is None:
             raise _NoCompiler
         done = subprocess.run(line, shell=True, capture_output=True, text=True)
         if done.returncode:
