@@ -50,7 +50,7 @@ class Block:
 
 
 def blocks(page):
-    """The fences of the text of a page that run, and those of their output."""
+    """The fences of the text of a page, in order."""
     return [
         Block(
             found["info"].strip(),
@@ -59,7 +59,6 @@ def blocks(page):
             page.count("\n", 0, found.start("code")) + 1,
         )
         for found in FENCE.finditer(page)
-        if found["info"].strip() in (*RUNS, "text")
     ]
 
 
@@ -71,7 +70,7 @@ def printed(page, name):
     found, module = blocks(page), types.ModuleType("page")
     sys.modules["page"] = module  # where classes of the page are looked for
     for block, after in zip(found, [*found[1:], None], strict=True):
-        if block.kind == "text":
+        if block.kind not in RUNS:
             continue
         out = io.StringIO()
         try:
