@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
 import os
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from studies.output import Output, as_json
 from studies.progress import displayed
@@ -37,14 +38,17 @@ VERBS = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; the exit status: 0 done, 1 failed with one sentence on stderr, 2 wrong usage,
-    130 interrupted.
+    130 interrupted. With --json what failed is on stdout too, as {"error": {"type", "message"}}.
     """
     one_thread()
     arguments = None
+    asks_json = "--json" in (sys.argv[1:] if argv is None else argv)
     try:
         arguments = parser().parse_args(argv)
         return _run(arguments)
-    except SystemExit as stop:  # argparse has said what is wrong
+    except UsageError as error:
+        return _fail(error, asks_json, status=2)
+    except SystemExit as stop:  # --help, --version
         return int(stop.code or 0)
     except KeyboardInterrupt:
         kept = arguments.kept(arguments) if arguments else "nothing was begun"
@@ -61,19 +65,33 @@ def _run(arguments: argparse.Namespace) -> int:
             print(as_json(output.data) if arguments.json else output.text, flush=True)
             return output.status
         except SymheliError as error:
-            return _fail(" ".join(str(error).split()))
+            return _fail(error, arguments.json)
         except BrokenPipeError:  # the reader, such as head, has seen enough
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except OSError as error:
-            return _fail(f"{error.filename or 'a file'}: {error.strerror or error}")
+            sentence = f"{error.filename or 'a file'}: {error.strerror or error}"
+            return _fail(error, arguments.json, sentence)
 
 
-def parser() -> argparse.ArgumentParser:
+class UsageError(SymheliError):
+    """The command line cannot be understood."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Wrong usage is an exception, so that it is told as every failure is."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and raise `UsageError`."""
+        self.print_usage(sys.stderr)
+        raise UsageError(message)
+
+
+def parser() -> Parser:
     """The parser with every verb."""
     from symheli import __version__
 
-    whole = argparse.ArgumentParser(
+    whole = Parser(
         prog="symheli", description="Helicopter models, LPV identification, certified gains."
     )
     whole.add_argument("--version", action="version", version=f"symheli {__version__}")
@@ -90,9 +108,15 @@ def parser() -> argparse.ArgumentParser:
     return whole
 
 
-def _fail(sentence: str) -> int:
+def _fail(error: Exception, asks_json: bool, sentence: str = "", status: int = 1) -> int:
+    """Say what failed, as `sentence` or in the words of the error, and return the exit status."""
+    sentence = sentence or " ".join(str(error).split())
     print(f"symheli: {sentence}", file=sys.stderr)
-    return 1
+    if asks_json:
+        told = {"error": {"type": type(error).__name__, "message": sentence}}
+        with contextlib.suppress(OSError):  # it may be stdout that failed
+            print(as_json(told), flush=True)
+    return status
 
 
 def _note(message: Any, *_: Any, **__: Any) -> None:

@@ -15,6 +15,7 @@ from identification.structure.regressors import as_records, regression
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 
 
@@ -181,8 +182,7 @@ def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
     >>> [e.name for e in idn.choose_experiments(found, 1).experiments]
     ['loud']
     """
-    if count < 1:
-        raise InputError(f"count: expected at least one experiment, got {count}")
+    count = whole(count, "count", 1)
     left = [e for e in experiments if e.allowed]
     if not left:
         worst = "; ".join(f"{e.name}: {', '.join(e.exceeded)}" for e in experiments)

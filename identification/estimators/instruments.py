@@ -22,6 +22,7 @@ from identification.structure.regressors import (
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import whole
 
 
 @runtime_checkable
@@ -93,6 +94,9 @@ class FlightSource(Protocol):
         ...
 
 
+MOST = 10**9
+"""Samples in a window of instruments."""
+
 Instruments = str | Sequence[str] | InstrumentSource | FlightSource
 """A source of instruments, or the names of signals of the record with the defaults of
 `LaggedSignals`.
@@ -138,11 +142,9 @@ class LaggedSignals:
                 "instruments: expected names of signals, the external excitation added to the"
                 f" stabilised inputs, got {given!r:.80}"
             )
-        if not (np.isfinite(self.window) and self.window > 0) or self.lags < 1:
-            raise InputError(
-                f"instruments need a window > 0 s and at least one lag, got {self.window} s and"
-                f" {self.lags}"
-            )
+        whole(self.lags, "lags", 1)
+        if not (np.isfinite(self.window) and self.window > 0):
+            raise InputError(f"instruments need a window > 0 s, got {self.window} s")
 
     def __str__(self) -> str:
         return ", ".join(self.signals)
@@ -153,6 +155,12 @@ class LaggedSignals:
 
     def instrument_lags(self, dt: float, first: int, memory: int) -> tuple[int, ...]:
         """Evenly over the window, whatever the memory of the structure."""
+        if not self.window / MOST < dt < np.inf:
+            raise InputError(
+                f"dt: expected seconds, at least a {MOST}th of the window of {self.window:g} s, got"
+                f" {dt}"
+            )
+        first = whole(first, "first")
         last = max(first + 1, round(self.window / dt))
         count = min(self.lags, last - first + 1)
         return tuple(int(i) for i in np.unique(np.round(np.linspace(first, last, count))))

@@ -19,6 +19,7 @@ from identification.structure.regressors import Regression
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 
 ADVICE = "allow more evaluations, or fit a smaller structure"
 """What to try where the search stops early."""
@@ -70,11 +71,9 @@ class OutputError(Method):
             source_of(self.instruments)
         if self.initial not in ("estimated", "measured"):
             raise InputError(f'initial: expected "estimated" or "measured", got {self.initial!r}')
-        if self.evaluations < 1 or not 0 < self.tolerance < 1:
-            raise InputError(
-                f"expected evaluations >= 1 and a tolerance in (0, 1), got {self.evaluations} and"
-                f" {self.tolerance}"
-            )
+        whole(self.evaluations, "evaluations", 1)
+        if not 0 < self.tolerance < 1:
+            raise InputError(f"tolerance: expected a number in (0, 1), got {self.tolerance}")
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
         """With `evaluations`, whether the search `converged` and its `message`, and the

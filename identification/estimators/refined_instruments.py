@@ -34,6 +34,7 @@ from symheli.errors import ExcitationError, InputError
 from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 
 Filter = Callable[[Array], Array]
 
@@ -87,11 +88,10 @@ class RefinedInstruments(Method):
     def __post_init__(self) -> None:
         if self.instruments is not None:
             source_of(self.instruments)
-        if self.iterations < 1 or self.noise_order < 0 or not self.tolerance > 0:
-            given = f"{self.iterations}, {self.noise_order}, {self.tolerance}"
-            raise InputError(
-                f"expected iterations >= 1, noise_order >= 0 and a tolerance > 0, got {given}"
-            )
+        whole(self.iterations, "iterations", 1)
+        whole(self.noise_order, "noise_order")
+        if not self.tolerance > 0:
+            raise InputError(f"tolerance: expected a number > 0, got {self.tolerance}")
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
         """With `iterations`, whether they `converged` and the `noise` model in the details."""

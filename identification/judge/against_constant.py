@@ -15,7 +15,7 @@ from identification.estimators.method import Method
 from identification.judge.scores import Scores, horizons, percent, scores
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
-from symheli.errors import ExcitationError, InputError
+from symheli.errors import ExcitationError, InputError, UnknownNameError
 from symheli.records import FlightRecord
 from symheli.values.summary import summarized
 
@@ -150,6 +150,8 @@ class AgainstConstant:
         """Whether scheduling is better 1 s ahead or in free run on held-out data, and worse in
         neither; see `PAYS`. `verdict_on` says which.
         """
+        if output not in self.scheduled.outputs:
+            raise UnknownNameError("output", output, map(str, self.scheduled.outputs))
         found = self._differences(output).values()
         return "better" in found and "worse" not in found
 

@@ -143,6 +143,8 @@ class BaselinePredictor:
         """Columns of the states (n, nx), and y = C(p) x + D(p) u of outputs that are no states."""
         states, names = list(map(str, self.lpv.states)), list(map(str, self.lpv.outputs))
         columns = []
+        if not outputs:
+            raise InputError("outputs: name at least one")
         for y in map(str, outputs):
             if y in states:
                 columns.append(x[:, states.index(y)])

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 
 
 def drawn(
@@ -17,6 +18,7 @@ def drawn(
     `boundary`: each is moved along its ray to the boundary of the ellipsoid that holds this share
     of the distribution.
     """
+    count, seed = whole(count, "draws", 1), whole(seed, "seed")
     mask = free.T.reshape(-1)
     square = joint.reshape(len(mask), len(mask))[mask][:, mask]
     scale = np.sqrt(np.diagonal(square))

@@ -190,6 +190,8 @@ def frozen_models(
     for signal in (*inputs, *outputs):
         if signal not in scales:
             raise UnknownNameError("size in scales", signal, scales)
+    if len(channel) != 2:
+        raise InputError(f"channel: expected (input, output), got {channel!r:.80}")
     for signal, there in zip(channel, (inputs, outputs), strict=True):
         if signal not in there:
             raise UnknownNameError("signal of channel", signal, there)

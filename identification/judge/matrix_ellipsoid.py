@@ -64,7 +64,10 @@ class MatrixEllipsoid(NamedTuple):
 
     def contains(self, error: object) -> Array:
         """Whether Theta - Theta_hat (..., n, m) lies in it, (...) of bool."""
-        error = np.asarray(error, dtype=float)
+        error = frozen(error, "error")
+        if error.shape[-2:] != (len(self.left), self.right.shape[1]):
+            shape = f"(..., {len(self.left)}, {self.right.shape[1]})"
+            raise InputError(f"error: expected {shape}, got shape {error.shape}")
         seen, heard = np.any(self.left, axis=1), np.any(self.right, axis=0)
         left, right = self.left[np.ix_(seen, seen)], self.right[np.ix_(heard, heard)]
         D = np.linalg.solve(left, error[..., seen, :][..., heard]) @ np.linalg.inv(right)

@@ -14,6 +14,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 
 ROUNDING = 1e-14
@@ -158,7 +159,8 @@ def residual_analysis(model: LPVARXModel, record: FlightRecord, lags: int = 25) 
     y, u = record.columns(model.outputs), record.columns(model.inputs)
     keep = np.isfinite(guess).all(axis=1) & np.isfinite(y).all(axis=1) & np.isfinite(u).all(axis=1)
     n = int(keep.sum())
-    if lags < 1 or n < 10 * lags:
+    lags = whole(lags, "lags", 1)
+    if n < 10 * lags:
         raise InputError(
             f"{n} residuals are too few for correlations over {lags} lags; record longer or ask for"
             " fewer"

@@ -47,7 +47,7 @@ def response_band(model: LPVARXModel, joint: Array, p: object, omega: object) ->
     (sum_j dB_j z^-j - sum_i dA_i z^-i G). Raises `InputError` for p outside the basis.
     """
     arx = model.structure
-    omega = np.atleast_1d(frozen(omega, "omega"))
+    omega = frozen(np.atleast_1d(omega), "omega", (None,))
     f = arx.basis(one_value(p, arx.basis))
     size, ny, count = arx.basis.size, arx.ny, len(arx.entries)
     entries = np.einsum(

@@ -16,6 +16,7 @@ from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.regressors import Regression, as_records, stacked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 
 SLOW = 0.1
 """A mode turns or decays by less than this (rad, or natural logarithm) from sample to sample."""
@@ -163,7 +164,7 @@ def slow_modes(
     records = as_records(records)
     joint, data = uncertainty(model, records).joint, stacked(model.structure, records)
     others = [replace(model, theta=theta, covariance=None) for theta in _compensated(model, data)]
-    p = data.p.reshape(len(data.p), -1)
+    p, points = data.p.reshape(len(data.p), -1), whole(points, "points", 1)
     found = []
     for row in np.unique(np.quantile(p, (np.arange(points) + 0.5) / points, axis=0), axis=0):
         moved = [_poles(other, row) for other in others]

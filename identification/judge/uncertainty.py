@@ -20,6 +20,7 @@ from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.numbers import whole
 from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
@@ -143,6 +144,8 @@ class Uncertainty:
         """Every coefficient function at p (n,) (or (n, parameters)), with its standard error."""
         arx, theta = self.model.structure, self.model.theta
         f = np.atleast_2d(arx.basis(p))
+        if f.ndim > 2:
+            raise InputError(f"p: expected (n,) or (n, parameters), got shape {np.shape(p)}")
         size = arx.basis.size
         out = []
         for y, output in enumerate(arx.outputs):
@@ -173,10 +176,8 @@ class Uncertainty:
         Whatever is made of the model (state space, reduction, a controller's margin) is made of
         each of them to see how far it is certain.
         """
-        if not isinstance(count, int | np.integer) or count < 1:
-            raise InputError(f"count: expected a whole number of models >= 1, got {count!r}")
         free = self.model.structure.free
-        thetas = drawn(self.model.theta, self.joint, free, int(count), seed)
+        thetas = drawn(self.model.theta, self.joint, free, whole(count, "count", 1), seed)
         return tuple(replace(self.model, theta=theta) for theta in thetas)
 
     def frequency_response(self, p: object, omega: object) -> ResponseBand:

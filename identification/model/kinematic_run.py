@@ -104,6 +104,9 @@ def predict(run: Run, horizon: int) -> Array:
     starts = np.concatenate(
         [np.arange(s.start + run.memory - 1, s.stop - horizon) for s in run.segments]
     ).astype(int)
+    out = np.full_like(run.y, np.nan)
+    if not len(starts):
+        return out
     past = [run.y[starts - i] for i in range(run.memory)]
     bad = np.zeros(len(starts), bool)
     with np.errstate(all="ignore"):
@@ -112,7 +115,6 @@ def predict(run: Run, horizon: int) -> Array:
             new = run.step(starts + j, past, inputs)
             bad |= np.isinf(new).any(axis=1)
             past = [new, *past[:-1]]
-    out = np.full_like(run.y, np.nan)
     out[starts + horizon] = np.where(bad[:, None], np.inf, past[0])
     return out
 

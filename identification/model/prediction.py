@@ -76,6 +76,8 @@ def predict(run: Recursion, horizon: int) -> Array:
     y and P_j(t) is the prediction of y(t) made j steps before.
     """
     require_horizon(horizon)
+    if horizon >= max(part.stop - part.start for part in run.segments):
+        return np.full_like(run.y, np.nan)
     ahead = [run.y]
     with np.errstate(all="ignore"):
         for j in range(1, int(horizon) + 1):
@@ -96,6 +98,8 @@ def predict_holding(arx: LPVARX, theta: Array, record: FlightRecord, horizon: in
     """
     require_horizon(horizon)
     s, starts = Samples.of(arx, record), _starts(arx, record.segments(), horizon)
+    if not len(starts):
+        return np.full_like(s.y, np.nan)
     size, ahead = arx.basis.size, np.full((horizon + 1, len(starts), arx.ny), np.nan)
     with np.errstate(all="ignore"):
         for j in range(1, horizon + 1):

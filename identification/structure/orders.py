@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 
 from symheli.errors import InputError, UnknownNameError
 
+LONGEST = 10_000
+"""Lags of a signal, samples."""
+
 Table = tuple[tuple[int, ...], ...]
 Orders = int | Mapping[str, "int | Mapping[str, int]"] | Sequence[Sequence[int]]
 """One number; {output: number}; for inputs {input: number}; {output: {signal: number}}; or rows,
@@ -72,9 +75,10 @@ def _complete(
 
 
 def _order(value: object, name: str) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= LONGEST:
         raise InputError(
-            f"{name}: expected an integer >= 0, a mapping by signal name or one row an output, got"
+            f"{name}: expected an integer from 0 to {LONGEST}, a mapping by signal name or one row"
+            " an output, got"
             f" {value!r:.80}"
         )
     return value

@@ -12,6 +12,7 @@ import numpy as np
 
 from symheli.codegen.compile import library
 from symheli.errors import InputError
+from symheli.values.numbers import whole
 
 FOOT = 0.3048
 LOWEST, HIGHEST = 10 * FOOT, 1000 * FOOT  # m above ground, range of the low-altitude model
@@ -116,7 +117,7 @@ class Dryden:
         if not np.all(np.isfinite(speed)) or np.any(speed < 0):
             raise InputError("airspeed: expected finite numbers >= 0 m/s")
         flown = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
-        white = np.random.default_rng(seed).standard_normal((len(time), 5))
+        white = np.random.default_rng(whole(seed, "seed")).standard_normal((len(time), 5))
         sigma, length = self.intensities, self.lengths
         return np.column_stack(
             [

@@ -10,6 +10,8 @@ import numpy as np
 from symheli.environment.gust import Gust
 from symheli.environment.turbulence import Dryden
 from symheli.errors import InputError
+from symheli.values.arrays import frozen
+from symheli.values.numbers import whole
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,7 @@ class Wind:
             raise InputError(
                 f"steady: expected a finite wind (north, east, down), m/s, got {self.steady}"
             )
+        whole(self.seed, "seed")
 
     @property
     def is_steady(self) -> bool:
@@ -62,7 +65,7 @@ class Wind:
         """Wind (n, 3), north east down, m/s, at `time` (n,) s, met at `airspeed` ((n,) or one,
         m/s).
         """
-        time = np.asarray(time, float)
+        time = frozen(time, "time", (None,))
         total = np.tile(np.array(self.steady, float), (len(time), 1))
         for gust in self.gusts:
             total += gust(time)

@@ -10,6 +10,8 @@ import numpy as np
 from scipy.signal import chirp
 
 from symheli.errors import InputError, UnknownNameError
+from symheli.values.arrays import frozen
+from symheli.values.numbers import whole
 
 Kind = Literal["multisine", "prbs", "chirp"]
 
@@ -60,13 +62,19 @@ class Excitation:
     def __post_init__(self) -> None:
         if self.kind not in ("multisine", "prbs", "chirp"):
             raise UnknownNameError("excitation", self.kind, ("multisine", "prbs", "chirp"))
-        if not 0 < self.band[0] < self.band[1]:
+        whole(self.seed, "seed")
+        if not 0 < self.period < np.inf:
+            raise InputError(f"period: expected seconds > 0, got {self.period}")
+        if len(self.band) != 2 or not 0 < self.band[0] < self.band[1]:
             raise InputError(f"band must be 0 < low < high in Hz, got {self.band}")
         if not all(np.isfinite(a) and a >= 0 for a in self.amplitude.values()):
             raise InputError(f"amplitudes must be >= 0 rad, got {dict(self.amplitude)}")
 
     def __call__(self, time: np.ndarray) -> dict[str, np.ndarray]:
         """{input: signal (n,) in rad} at uniformly sampled `time` (n,) s."""
+        time = frozen(time, "time", (None,))
+        if len(time) < 2 or np.any(np.diff(time) <= 0):
+            raise InputError(f"time: expected increasing seconds (n,), n >= 2, got {len(time)}")
         dt = float(time[1] - time[0])
         if self.band[1] > 0.5 / dt:
             raise InputError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from typing import Any, Literal, TypedDict, get_args
@@ -18,6 +17,7 @@ from symheli.flight.excitation import Excitation
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
+from symheli.values.numbers import whole
 
 READ = (*map(str, MEASURED), "airspeed")
 """Signals that have a sensor."""
@@ -119,7 +119,7 @@ class FlightPlan:
             raise InputError("give either noise_db or sensors: each says what the measurements are")
         if self.noise_db is not None:
             _number("noise_db", self.noise_db, "a number of decibels, as 30")
-        object.__setattr__(self, "seed", _seed(self.seed))
+        object.__setattr__(self, "seed", whole(self.seed, "seed"))
         object.__setattr__(self, "wind", _wind(self.wind))
         _each("servos", self.servos, Servo, INPUTS)
         _each("sensors", self.sensors, Sensor, READ)
@@ -134,7 +134,7 @@ class FlightPlan:
         """The same flight with other random numbers: sensors' noise from `seed`, turbulence and
         excitation from their own seed plus `seed`.
         """
-        seed = _seed(seed)
+        seed = whole(seed, "seed")
         stirred = self.excitation and replace(self.excitation, seed=self.excitation.seed + seed)
         wind = replace(self.wind, seed=self.wind.seed + seed)
         return replace(self, seed=seed, wind=wind, excitation=stirred)
@@ -167,16 +167,6 @@ def _number(name: str, value: Any, wanted: str) -> float:
     if not math.isfinite(number) or isinstance(value, bool):
         raise InputError(f"{name}: expected {wanted}, got {value!r:.80}")
     return number
-
-
-def _seed(value: Any) -> int:
-    try:
-        seed = operator.index(value)
-    except TypeError:
-        seed = -1
-    if seed < 0 or isinstance(value, bool):
-        raise InputError(f"seed: expected a whole number >= 0, got {value!r:.80}")
-    return seed
 
 
 def _wind(wind: Any) -> Wind:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.numbers import whole
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ class AirspeedSchedule:
         """low -> high -> low (m/s), `laps` times, with this peak acceleration (m/s^2), held `hold`
         s at each end.
         """
+        laps = whole(laps, "laps", 1)
         return cls((high, low) * laps, (acceleration,) * (2 * laps), (hold,) * (2 * laps), low)
 
     @classmethod

@@ -161,6 +161,13 @@ class StitchedModel:
         (...), m/s, or at the airspeed.
         """
         x, u, wind = np.asarray(x, float), np.asarray(u, float), np.asarray(wind, float)
+        for name, given, size in (
+            ("x", x, self.x0.shape[1]),
+            ("u", u, self.u0.shape[1]),
+            ("wind", wind, 3),
+        ):
+            if given.shape[-1:] != (size,):
+                raise InputError(f"{name}: expected (..., {size}), got shape {given.shape}")
         p = self.airspeed(x, wind) if lookup is None else np.asarray(lookup, float)
         weights = self.basis(np.clip(p, self.basis.low, self.basis.high))
         x0, u0, f0 = weights @ self.x0, weights @ self.u0, weights @ self.f0

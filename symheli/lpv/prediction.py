@@ -11,6 +11,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import check_all
 from symheli.lpv.simulate import steps
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import whole
 from symheli.values.sample_period import same_period
 
 
@@ -30,7 +31,7 @@ class Prediction(NamedTuple):
         `horizon`.
         """
         n = len(self.x)
-        if not 0 < horizon < n:
+        if not whole(horizon, "horizon", 1) < n:
             raise InputError(f"horizon: expected 1 .. {n - 1} samples, got {horizon}")
         z = (self.x - self.x0)[: n - horizon]
         for h in range(horizon):

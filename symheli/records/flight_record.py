@@ -359,7 +359,11 @@ class FlightRecord:
 
     def rows(self, keep: object) -> FlightRecord:
         """The samples at these indices (slice, index array or mask)."""
-        return replace(self, time=self.time[keep], values=self.values[keep])  # type: ignore[index]
+        try:
+            time, values = self.time[keep], self.values[keep]  # type: ignore[index]
+        except IndexError as error:
+            raise InputError(f"rows of a record of {len(self)} samples: {error}") from error
+        return replace(self, time=time, values=values)
 
     def select(self, names: Sequence[str]) -> FlightRecord:
         """Only these signals."""

@@ -155,7 +155,7 @@ def test_fit_recovers_coefficients_and_counts_its_nodes(basis):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: BSpline(0, NODES), "degree must be an integer >= 1"),
+        (lambda: BSpline(0, NODES), "degree: expected a whole number >= 1"),
         (lambda: BSpline(2, (1.0, 1.0)), "strictly increasing breakpoints"),
         (
             lambda: UserFunctions((np.log,), 0.0, 1.0),
@@ -180,7 +180,7 @@ def test_fit_recovers_coefficients_and_counts_its_nodes(basis):
             lambda: Product((Polynomial(1, 0, 1),) * 2, total_degree=1).form("bernstein"),
             "mixes degrees",
         ),
-        (lambda: Polynomial(-1, 0, 1), "degree must be an integer"),
+        (lambda: Polynomial(-1, 0, 1), "degree: expected a whole number"),
         (lambda: Polynomial(2, 5.0, 5.0), "low < high"),
         (lambda: Spline((0.0, 1.0, 2.0)), "at least 4 strictly increasing"),
         (lambda: PiecewiseLinear((0.0, 0.0)), "strictly increasing"),

@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 
 Range = tuple[float, float]
@@ -108,7 +109,12 @@ class FunctionSpace(ABC):
 
         Raises `InputError` outside the ranges and for a wrong number of parameters.
         """
-        return self._values(self._inside(p), derivative)
+        orders = (
+            tuple(whole(order, "derivative") for order in derivative)
+            if isinstance(derivative, tuple)
+            else whole(derivative, "derivative")
+        )
+        return self._values(self._inside(p), orders)
 
     def fit(self, p: object, values: object) -> Array:
         """Least-squares coefficients (n, ...) of `values` (K, ...) sampled at `p` (K,), or (K, d)

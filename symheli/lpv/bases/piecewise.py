@@ -32,7 +32,8 @@ class PiecewisePolynomial(Basis):
         return self._piecewise()
 
     def _values(self, p: Array, derivative: Any) -> Array:
-        return np.asarray(self._functions(np.clip(p, self.low, self.high), nu=derivative))
+        f = self._functions
+        return np.asarray(f(np.clip(p, self.low, self.high), nu=min(derivative, len(f.c))))
 
     def pieces(self) -> tuple[Piece, ...]:
         """One piece between every two breakpoints."""

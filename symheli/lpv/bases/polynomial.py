@@ -16,6 +16,7 @@ from symheli.lpv.bases.basis import Basis, check_range
 from symheli.lpv.bases.function_space import Piece
 from symheli.lpv.recentred import centre, recentred
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import whole
 
 DIGITS = 8.0
 """More decimal digits lost than this, half of a double's, are worth a warning."""
@@ -60,8 +61,7 @@ class Polynomial(Basis):
 
     def __post_init__(self) -> None:
         check_range(self.low, self.high)
-        if int(self.degree) != self.degree or self.degree < 0:
-            raise InputError(f"degree must be an integer >= 0, got {self.degree}")
+        object.__setattr__(self, "degree", whole(self.degree, "degree"))
 
     @property
     def size(self) -> int:

@@ -1,0 +1,85 @@
+"""Every entry with one argument changed at a time, and what came of it."""
+
+from __future__ import annotations
+
+import faulthandler
+from collections import Counter
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from altered_values import ANOTHER, altered, made
+from entries import NAN_IS_SAID
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from valid_calls import ValidCall
+from verdict import SECONDS, judged
+
+
+class Fault(NamedTuple):
+    """An answer that is neither a result nor a refusal, and how to see it again."""
+
+    entry: str
+    argument: str
+    kind: str
+    changed: str
+    fault: str
+
+    def __str__(self) -> str:
+        return f"{self.entry}({self.argument}: {self.kind}, {self.changed}): {self.fault}"
+
+
+class Tally(NamedTuple):
+    """How often each outcome, and the faults."""
+
+    outcomes: Counter[str]
+    faults: list[Fault]
+
+
+def tally(calls: Iterable[ValidCall], inputs: int) -> Tally:
+    """`inputs` changed calls of one entry, the same ones every time.
+
+    A good call that has no arguments, or fails by itself (an example of a refusal), is left out.
+    """
+    good, types = list[ValidCall](), list[type]()
+    for call in calls:
+        if call.arguments and judged(call.repeated, "").outcome == "result":
+            types.append(type(call.repeated()))
+            good.append(call)
+    found = Tally(Counter(), [])
+    if not good:
+        return found
+
+    @settings(
+        max_examples=inputs,
+        database=None,
+        derandomize=True,
+        deadline=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(st.data())
+    def ask(data: st.DataObject) -> None:
+        call = data.draw(st.sampled_from(good))
+        name = data.draw(st.sampled_from(list(call.arguments)))
+        parameter = call.kinds[name]
+        kind, new = data.draw(altered(call.arguments[name], 0, parameter.annotation))
+        if parameter.kind is parameter.VAR_KEYWORD and kind == "unknown name":
+            kind = ANOTHER  # an unexpected keyword, which is Python's to refuse
+        # what hangs in compiled code hears no alarm
+        faulthandler.dump_traceback_later(3 * SECONDS, exit=True)
+        verdict = judged(
+            lambda: call.repeated({name: made(new)}), kind, call.arguments, tuple(types)
+        )
+        faulthandler.cancel_dump_traceback_later()
+        found.outcomes[verdict.outcome] += 1
+        if verdict.fault and not said(call.entry, verdict.fault):
+            found.faults.append(Fault(call.entry, name, kind, " ".join(repr(new).split())[:300], verdict.fault))
+
+    ask()
+    return found
+
+
+
+def said(entry: str, fault: str) -> bool:
+    """Whether the NaN of a fault is documented."""
+    return any(f"NaN in the result{place}" in fault for place in NAN_IS_SAID.get(entry, ()))
