@@ -159,11 +159,11 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 def _poles(model: LinearModel) -> dict[str, Any]:
     """Those in the upper half plane."""
-    poles = continuous_poles(model)
-    upper = poles[poles.imag >= -1e-9]
+    poles = np.asarray(continuous_poles(model))
+    upper = poles[np.imag(poles) >= -1e-9]
     return {
-        "real": values(upper.real, "rad/s"),
-        "imag": values(upper.imag, "rad/s"),
+        "real": values(np.real(upper), "rad/s"),
+        "imag": values(np.imag(upper), "rad/s"),
     }
 
 

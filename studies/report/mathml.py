@@ -1,7 +1,7 @@
 """Formulas as MathML, which browsers draw without any library.
 
-An argument that begins with `<` is MathML already; a word is an identifier, a number a number,
-anything else an operator.
+An argument that begins with `<` is MathML already. Any other is a row of atoms between spaces: a
+word is an identifier, a number a number, anything else an operator.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from html import escape
 from unicodedata import normalize
 
 Part = str | float
-"""MathML, an identifier, an operator or a number."""
+"""MathML, atoms between spaces, or a number."""
 
 
 def row(*parts: Part) -> str:
@@ -85,6 +85,10 @@ def matrix(*rows: tuple[Part, ...]) -> str:
     return f'<mtable class="brackets">{table}</mtable>'
 
 
+SPACE = '<mspace width="1em"/>'
+"""Between two formulas."""
+
+
 def display(*parts: Part) -> str:
     """A formula on a line of its own."""
     return f'<math display="block">{row(*parts)}</math>'
@@ -100,6 +104,8 @@ def _atom(part: Part) -> str:
         return f"<mn>{part:g}</mn>"
     if part.startswith("<") and part != "<":
         return part
+    if len(atoms := part.split()) > 1:
+        return row(*atoms)
     if re.fullmatch(r"[^\W\d_]+", part):
         return f"<mi>{escape(part)}</mi>"
     if re.fullmatch(r"[\d.]+", part):

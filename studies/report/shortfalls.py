@@ -62,8 +62,9 @@ def _models(study: Outcome) -> Iterator[Row]:
 
 
 def _marks(study: Outcome) -> Iterator[Row]:
-    found = study.identification
-    for axis in AXES if found is not None else ():
+    if (found := study.identification) is None:
+        return
+    for axis in AXES:
         for k, noise in enumerate(NOISES):
             one = found.of(axis, noise)
             missed = [
@@ -136,8 +137,9 @@ def _controllers(study: Outcome) -> Iterator[Row]:
     for design in study.controllers.designs if study.controllers else ():
         if design.controller is None:
             yield f"No controller: {design.name}.", f"{design.reason}.", "controllers.designs"
-    found = study.flown_controllers
-    for wind in WINDS if found is not None else ():
+    if (found := study.flown_controllers) is None:
+        return
+    for wind in WINDS:
         for one in found.at(wind):
             if one.lost:
                 yield (

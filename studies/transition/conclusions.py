@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from synthesis import GainCurve
     from studies.transition.guarantees import Bound
-    from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
 
 CHEAP = 0.1
@@ -102,8 +101,10 @@ def _answer(study: Outcome) -> Iterator[str]:
                 else ""
             )
             sentence = f"In {curve.title} no LFT test proves anything{never}"
-            yield f"{sentence}; {bounded} (frozen {gain(curve.frozen)})." if bounded else (
-                f"{sentence}."
+            yield (
+                f"{sentence}; {bounded} (frozen {gain(curve.frozen)})."
+                if bounded
+                else (f"{sentence}.")
             )
         elif bounded:
             yield f"In {curve.title} {bounded} (frozen {gain(curve.frozen)})."
@@ -258,8 +259,10 @@ def _controllers(study: Outcome) -> Iterator[str]:
         held = [name for name in names if math.isfinite(proofs.gain(name))]
         over = [name for name in held if found.exceeded(name, proofs.gain(name)) is not None]
         said = f"Gains are proven of {len(held)} of {len(names)} loops that fly"
-        yield f"{said}; a flight exceeded that of {', '.join(over)}." if over else (
-            f"{said}; no flight exceeded one of them."
+        yield (
+            f"{said}; a flight exceeded that of {', '.join(over)}."
+            if over
+            else (f"{said}; no flight exceeded one of them.")
         )
     yield from _limits(study)
 

@@ -43,6 +43,7 @@ DRAWN = (
 def unpainted(monkeypatch):
     """Figures are drawn but not turned into pixels, which takes most of the time."""
     monkeypatch.setattr(Figure, "savefig", lambda figure, stream, **_: stream.write(b"picture"))
+    monkeypatch.setattr(Figure, "draw_without_rendering", lambda figure: None)
 
 
 def page(outcome, folder):

@@ -106,9 +106,10 @@ def test_the_conclusions_tell_the_numbers_of_the_tables(found):
     study = Outcome(vehicle="xcell60", quick=True, seed=0, known_kinematics=found)
     text = " ".join(conclusions.conclusions(study))
     own = found.of(KNOWN[BOTH]).gaps["lateral"].max()
-    assert f"{own:.3f} with two parameters" in text
-    change = found.of(SPLINE[BOTH]).ahead["phi"] - found.of(SPLINE[ALONE]).ahead["phi"]
-    assert f"{change:+.0f} (phi)" in text
+    assert f"{own:.3f} with scheduled ones" in text
+    both, alone = (found.of(SPLINE[kind]).ahead for kind in (BOTH, ALONE))
+    most = max(both, key=lambda y: abs(both[y] - alone[y]))
+    assert f"the most by {both[most] - alone[most]:+.0f} ({most})" in text
 
 
 @pytest.mark.parametrize(
