@@ -129,17 +129,20 @@ class Bars:
             same += 1
         for _, bar in self._bars[same:]:
             self._live.remove_task(bar)
-        self._bars[same:] = [(one, self._live.add_task("", total=None)) for one in wanted[same:]]
+        del self._bars[same:]
+        for one in wanted[same:]:
+            bar = self._live.add_task("", total=None, count="", time="", note="")
+            self._bars.append((one, bar))
         for one, bar in self._bars:
-            left = one.remaining(now)
+            left, spent = one.remaining(now), duration(now - one.since)
             self._live.update(
                 bar,
                 description="  " * one.at.depth + one.at.task,
                 completed=one.at.done,
                 total=one.at.total,
+                count=one.at.count,
+                time=spent if left is None else f"{spent}, about {duration(left)} left",
                 note=one.at.note,
-                left="" if left is None else f"about {duration(left)} left",
-                spent=duration(now - one.since),
             )
 
     def close(self) -> None:
@@ -175,16 +178,20 @@ def displayed() -> Iterator[None]:
 
 def _live() -> Any:
     from rich.console import Console
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn
+    from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as RichProgress
+    from rich.table import Column
+
+    def text(form: str, style: str = "none") -> TextColumn:
+        column = Column(no_wrap=True, overflow="ellipsis")
+        return TextColumn(form, style, markup=False, table_column=column)
 
     return RichProgress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=24),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[spent]}"),
-        TextColumn("{task.fields[left]}"),
-        TextColumn("{task.fields[note]}", style="dim"),
+        text("{task.description}"),
+        BarColumn(bar_width=20),
+        text("{task.fields[count]}"),
+        text("{task.fields[time]}"),
+        text("{task.fields[note]}", "dim"),
         console=Console(stderr=True),
         transient=True,
         redirect_stdout=False,

@@ -45,10 +45,15 @@ class Progress:
     depth: int = 0
     over: bool = False
 
+    @property
+    def count(self) -> str:
+        """How many of how many, as far as it is known."""
+        if self.total is None:
+            return f"{self.done:g}" if self.done else ""
+        return f"{self.done:g} of {self.total:g}"
+
     def __str__(self) -> str:
-        of = "" if self.total is None else f" of {self.total:g}"
-        count = f": {self.done:g}{of}" if of or self.done else ""
-        return f"{self.task}{count}{self.note and f' ({self.note})'}"
+        return f"{self.task}{self.count and f': {self.count}'}{self.note and f' ({self.note})'}"
 
 
 Listener = Callable[[Progress], object]

@@ -114,7 +114,7 @@ def run_study(
             found = _taken(stored, stage)
             study = study if found is None else with_stage(study, stage, found)
     run = _Run(stored, resume, selection.open(every, study.seconds))
-    with task("study", sum(stage.cost for stage in run.todo)) as whole:
+    with task("study, percent", 100) as whole:
         study = run.finish(study, whole)
     study = replace(study, complete={stage.name for stage in every} <= study.seconds.keys())
     with _shown("Writing figures and report"):
@@ -155,16 +155,16 @@ class _Run:
                 study = with_stage(study, stage, found)
                 write_results(study, self.stored.folder.parent)
                 todo.remove(stage)
-                whole.to(self._done(todo, asked))
+                whole.to(self._percent(todo, asked))
         return study
 
-    def _done(self, todo: Sequence[Stage], asked: dict[str, Asked]) -> float:
+    def _percent(self, todo: Sequence[Stage], asked: dict[str, Asked]) -> int:
         """Of the cost of all, what is not in front of us."""
         left = (
             stage.cost * (1 - (asked[stage.name].share if stage.name in asked else 0.0))
             for stage in todo
         )
-        return sum(stage.cost for stage in self.todo) - sum(left)
+        return round(100 * (1 - sum(left) / sum(stage.cost for stage in self.todo)))
 
 
 def computed(stage: Stage, study: Study, effort: Effort) -> Stored:

@@ -16,6 +16,7 @@ from identification import LPVARXModel
 from studies import cli
 from studies.commands import study as study_command
 from studies.output import as_json
+from studies.transition.configuration import Configuration
 from symheli.errors import SymheliError
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
@@ -529,7 +530,12 @@ def test_help_and_version_succeed(run):
             ["study", "--quick", "--seed", "3", "--out", "o"],
             "study",
             "run_study",
-            {"vehicle": "xcell60", "out": Path("o"), "quick": True, "seed": 3, "resume": False},
+            {
+                "configuration": Configuration.of({"out": Path("o"), "quick": True, "seed": 3}),
+                "resume": False,
+                "only": (),
+                "since": "",
+            },
         ),
         (
             ["campaign", "--seeds", "4"],
@@ -551,14 +557,15 @@ def test_long_jobs_get_their_options_and_show_their_result(
         def to_dict(self):
             return {"gain": np.float64(2.5)}
 
-    def job(**options):
-        given.update(options)
+    def job(*arguments, **options):
+        given.update(zip(("configuration",), arguments, strict=False), **options)
         return Result()
 
     monkeypatch.setitem(
         sys.modules, f"studies.transition.{module}", SimpleNamespace(**{function: job})
     )
-    assert run(*arguments)[:2] == (0, "a table\n")
+    status, out, _ = run(*arguments)
+    assert (status, out.splitlines()[0]) == (0, "a table")
     assert given == passed
     assert json.loads(run(*arguments, "--json")[1]) == {"gain": 2.5}
 

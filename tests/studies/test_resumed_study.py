@@ -11,14 +11,22 @@ from functools import partial
 import pytest
 
 from studies.processes import Processes
-from studies.transition import study
+from studies.transition import stages, study
+from studies.transition.configuration import Configuration
 from studies.transition.effort import Effort
 from studies.transition.proofs import Questions
 from studies.transition.recovery import Recoveries
 from studies.transition.stored_stages import NotUsable, Stored, StoredStages, content_key
+from symheli.errors import InputError
 
 FIRST = ("baseline", "paper_experiment", "exact_recovery")
 """The stages that are quick."""
+
+
+def run(out, *, resume=False, only=(), since="", **entries):
+    """A quick study into this folder."""
+    asked = Configuration.of({"quick": True, "out": out, **entries})
+    return study.run_study(asked, resume=resume, only=only, since=since)
 
 
 @pytest.fixture
@@ -49,9 +57,9 @@ def stopped(short, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as once:
-        once.setattr(study, "recover_at", interrupted)
+        once.setattr(stages, "recover_at", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            study.run_study(out=tmp_path, quick=True)
+            run(tmp_path)
     short.clear()
     return tmp_path
 
@@ -66,7 +74,7 @@ def test_an_interrupted_study_leaves_whole_results_of_its_finished_stages(stoppe
     assert found["baseline"]["lft_order"]["value"] == 45
     assert [run["loop"] for run in found["paper_experiment"]] == ["open", "closed"]
     assert found["exact_recovery"] is None
-    assert sorted(p.name for p in stopped.iterdir()) == ["results.json", "stages"]
+    assert sorted(p.name for p in stopped.iterdir()) == ["results.json", "stages", "study.toml"]
     assert sorted(p.name for p in (stopped / "stages").iterdir()) == [
         "baseline.stage",
         "paper_experiment.stage",
@@ -75,7 +83,7 @@ def test_an_interrupted_study_leaves_whole_results_of_its_finished_stages(stoppe
 
 def test_it_goes_on_with_the_stage_that_was_interrupted(stopped, short, capsys):
     before = results(stopped)
-    done = study.run_study(out=stopped, quick=True, resume=True)
+    done = run(stopped, resume=True)
     assert short == ["exact_recovery"]
     after = results(stopped)
     assert after["complete"]
@@ -87,7 +95,7 @@ def test_it_goes_on_with_the_stage_that_was_interrupted(stopped, short, capsys):
 
 
 def test_without_being_asked_it_begins_anew(stopped, short):
-    study.run_study(out=stopped, quick=True)
+    run(stopped)
     assert tuple(short) == FIRST
 
 
@@ -98,17 +106,17 @@ def test_without_being_asked_it_begins_anew(stopped, short):
 def test_stages_of_another_seed_effort_or_vehicle_are_computed_again(
     stopped, short, capsys, other, again
 ):
-    study.run_study(**{"out": stopped, "quick": True, "resume": True, **other})
+    run(stopped, resume=True, **other)
     assert tuple(short) == again
     said = capsys.readouterr().err
-    assert said.count("is of another version, vehicle, effort or seed: computed again") == 2
+    assert said.count("is of another version, vehicle, effort or seed: not taken") == 2
 
 
 def test_stages_of_other_code_are_computed_again(stopped, short, monkeypatch):
     from studies.transition import stored_stages
 
     monkeypatch.setattr(stored_stages, "code_digest", lambda: "another day")
-    study.run_study(out=stopped, quick=True, resume=True)
+    run(stopped, resume=True)
     assert tuple(short) == FIRST
 
 
@@ -124,11 +132,11 @@ def test_a_damaged_stage_is_computed_again_and_said(stopped, short, capsys, dama
             "foreign": b"a note to myself\n",
         }[damage]
     )
-    study.run_study(out=stopped, quick=True, resume=True)
+    run(stopped, resume=True)
     assert tuple(short) == ("baseline", "exact_recovery")
     assert "baseline.stage is damaged" in capsys.readouterr().err
     short.clear()
-    study.run_study(out=stopped, quick=True, resume=True)
+    run(stopped, resume=True)
     assert not short  # what was computed again was stored again
 
 
@@ -155,7 +163,7 @@ def test_the_command_says_how_to_go_on(short, tmp_path, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as once:
-        once.setattr(study, "run_experiments", interrupted)
+        once.setattr(stages, "run_experiments", interrupted)
         assert cli.main(["study", "--quick", "--out", str(tmp_path)]) == 130
     assert "--resume goes on from there" in capsys.readouterr().err
     short.clear()
@@ -174,7 +182,7 @@ def test_proofs_that_were_found_are_not_proven_again(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return [k]
 
-    stage = study.Stage(
+    stage = stages.Stage(
         "gust",
         "Three questions",
         tuple,
@@ -187,13 +195,97 @@ def test_proofs_that_were_found_are_not_proven_again(tmp_path, monkeypatch):
     for name in ("write_report", "write_results"):
         monkeypatch.setattr(study, name, lambda *_: None)
     with pytest.raises(KeyboardInterrupt):
-        study.run_study(out=tmp_path, quick=True)
+        run(tmp_path)
     assert asked == [0, 1, 2]
     assert sorted(p.name for p in (tmp_path / "stages").iterdir()) == [
         "gust-0.stage",
         "gust-1.stage",
     ]
-    done = study.run_study(out=tmp_path, quick=True, resume=True)
+    done = run(tmp_path, resume=True)
     assert asked == [0, 1, 2, 2]
     assert done.gust == (0, 1, 2)
     assert [p.name for p in (tmp_path / "stages").iterdir()] == ["gust.stage"]
+
+
+def test_a_stage_runs_alone_from_the_stored_ones_it_needs(stopped, short):
+    done = run(stopped, only=["exact_recovery"])
+    assert short == ["exact_recovery"]
+    assert done.complete
+    short.clear()
+    run(stopped, only=["exact_recovery"])
+    assert short == ["exact_recovery"]  # asked for again, computed again
+    short.clear()
+    run(stopped, only=["exact_recovery"], resume=True)
+    assert not short
+
+
+def test_what_a_stage_needs_is_computed_where_it_is_absent_and_nothing_else(short, tmp_path):
+    done = run(tmp_path, only=["exact_recovery"])
+    assert short == ["baseline", "exact_recovery"]
+    assert not done.complete
+    assert done.paper_experiment is None
+    assert results(tmp_path)["exact_recovery"]
+
+
+def test_from_a_stage_on_all_that_need_it_are_computed_again(short, tmp_path):
+    run(tmp_path)
+    short.clear()
+    assert run(tmp_path, since="paper_experiment").complete
+    assert short == ["paper_experiment"]
+    short.clear()
+    assert run(tmp_path, since="baseline").complete
+    assert tuple(short) == FIRST
+
+
+def test_a_stage_there_is_not_is_named(short, tmp_path):
+    with pytest.raises(InputError, match="unknown stage 'exact'; did you mean"):
+        run(tmp_path, only=["exact"])
+    with pytest.raises(InputError, match="either"):
+        run(tmp_path, only=["baseline"], since="baseline")
+    assert not short
+
+
+def test_each_stage_needs_only_those_before_it():
+    before = set()
+    for stage in stages.stages(Effort()):
+        assert set(stage.needs) <= before
+        before.add(stage.name)
+
+
+def test_the_list_of_stages_says_what_is_there(stopped, capsys):
+    from studies import cli
+
+    def states(*more):
+        assert cli.main(["study", "--quick", "--out", str(stopped), *more, "--list-stages"]) == 0
+        rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
+        return {row[0]: row[1] for row in rows}
+
+    known = states()
+    assert list(known) == [stage.name for stage in stages.stages(Effort.look())]
+    assert [name for name, state in known.items() if state == "stored"] == [
+        "baseline",
+        "paper_experiment",
+    ]
+    assert states("--seed", "1")["baseline"] == "of"  # another run
+    assert results(stopped)["exact_recovery"] is None  # nothing was run
+
+
+def test_what_was_asked_for_is_kept_and_asks_for_the_same(short, tmp_path):
+    asked = Configuration.of(
+        {"quick": True, "seed": 2, "out": tmp_path, "effort": {"ramps": 7, "search": {"nodes": 50}}}
+    )
+    study.run_study(asked)
+    again = Configuration.read(tmp_path / "study.toml", {})
+    assert again == asked
+    assert results(tmp_path)["effort"]["ramps"] == 7
+    assert results(tmp_path)["effort"]["gust_rates"][-1] == "inf"
+    short.clear()
+    study.run_study(again, resume=True)
+    assert not short
+
+
+def test_the_last_line_says_where_the_report_is(short, tmp_path, capsys):
+    from studies import cli
+
+    assert cli.main(["study", "--quick", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f"report: {tmp_path / 'report.html'}"

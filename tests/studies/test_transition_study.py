@@ -173,9 +173,10 @@ def test_every_row_of_the_experiments_table_fills_its_columns(baseline):
 
 @pytest.mark.slow
 def test_the_quick_study_writes_a_self_contained_report(tmp_path):
+    from studies.transition.configuration import Configuration
     from studies.transition.study import run_study
 
-    study = run_study(out=tmp_path, quick=True)
+    study = run_study(Configuration.of({"out": tmp_path, "quick": True}))
     page = (tmp_path / "report.html").read_text()
     assert "http" not in page.replace("http-equiv", "")
     drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
