@@ -391,9 +391,8 @@ def _clock_text(found: Survey) -> list[str]:
     clock = found.clock
     source = f"column {clock.column} [{clock.unit}]" if clock.column else "its own clock"
     even = "" if clock.even else ", unevenly (--dt resamples)"
-    gaps = (
-        f"{clock.gaps} gaps, the longest {clock.longest:.3g} s" if clock.gaps else "without a gap"
-    )
+    number = f"{clock.gaps} gap{'' if clock.gaps == 1 else 's'}"
+    gaps = f"{number}, the longest {clock.longest:.3g} s" if clock.gaps else "without a gap"
     return [
         f"  time: {source}, {clock.duration:.5g} s in steps of {clock.step:.4g} s"
         f" ({1 / clock.step:.4g} Hz){even}, {gaps}"
