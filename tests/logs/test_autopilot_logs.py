@@ -149,7 +149,7 @@ def test_a_ulog_that_ends_anywhere_is_read_so_far_or_refused(px4, tmp_path):
 def ardupilot(request, tmp_path):
     """Two gyros at 50 Hz, attitude at 10 Hz, a heading that passes north."""
     pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
-    rows = []
+    rows = [("GPS", (1_000_000, 3, 1000, 2000))]  # by which readers set their clock
     for k in range(200):
         stamp = 1_000_000 + 20_000 * k
         rows += [("IMU", (stamp, 0, 0.001 * k, 20.0)), ("IMU", (stamp, 1, 1.0, 20.0))]
@@ -236,6 +236,17 @@ def test_damage_in_the_middle_is_said_and_what_is_around_it_is_read(ardupilot, c
         record = FlightRecord.from_dataflash(path, {"q": "IMU.GyrY"}, dt=0.02)
     np.testing.assert_allclose(record["q"][-1], 0.001 * 199, atol=1e-6)
     assert capfd.readouterr() == ("", "")
+
+
+def test_messages_without_time_cannot_be_placed(tmp_path):
+    """As logs were before 2014."""
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    path = tmp_path / "old.log"
+    head = "ArduCopter V3.0.1\nFMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\n"
+    formats = "FMT, 130, 35, GPS, BIc, Status,Time,Alt\nFMT, 1, 17, ATT, cc, Roll,Pitch\n"
+    path.write_text(head + formats + "GPS, 3, 308900200, 9.48\nATT, 0.23, 0.75\n" * 50)
+    with pytest.raises(InputError, match=r"ATT carries no time \(logs from before 2014\)"):
+        FlightRecord.from_dataflash(path, {"theta": "ATT.Pitch"}, 0.1, {"theta": "deg"})
 
 
 def test_what_is_no_ardupilot_log_is_refused(tmp_path):
