@@ -29,6 +29,14 @@ HELP = (
 XPLANE = {"outputs": ("q", "theta"), "inputs": ("stick_lon",), "scheduling": "airspeed"}
 """What is identified from an X-Plane log unless asked otherwise."""
 
+ASKED = (
+    *("outputs", "inputs", "scheduling", "scheduling_from", "instruments", "orders", "test"),
+    *("plot", "bands", "save", "loop"),
+)
+"""Options that ask for a fit; without any of them a log is only looked at, unless it can be
+identified at once.
+"""
+
 ONE_MODEL = {
     "plot": "draws the fits of",
     "bands": "draws the coefficients of",
@@ -216,7 +224,7 @@ def run(arguments: argparse.Namespace) -> Output:
     from studies.log.reading import scheduling_range
 
     kind = "mapped" if arguments.map else _format(arguments)
-    if not (arguments.outputs or arguments.inputs):
+    if not any(getattr(arguments, name) for name in ASKED):
         seen = _contents(arguments, kind)
         if not _at_once(arguments, kind, seen):
             return _survey(arguments, seen)

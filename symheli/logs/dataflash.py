@@ -153,8 +153,8 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messag
 @contextlib.contextmanager
 def _closing(reader: Any) -> Iterator[Any]:
     """A reader that is closed also where it fails to open (its constructor leaves the file open),
-    tells damage in Python (its compiled index prints past `quiet`), and looks for no calendar (which
-    fails for old logs).
+    tells damage in Python (its compiled index prints past `quiet`), and looks for no calendar
+    (which fails for old logs).
     """
     log = object.__new__(reader)
     log.init_arrays_fast, log.init_clock = log.init_arrays, lambda: None

@@ -3,6 +3,7 @@ they lie beside the project.
 """
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,9 @@ from symheli.logs.format import format_of
 from symheli.logs.mat import mat_columns
 from symheli.logs.ulog import ulog_columns
 from symheli.records import FlightRecord
+
+DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
+
 
 # --- one axis ------------------------------------------------------------------------------------
 
@@ -312,6 +316,44 @@ def test_without_h5py_the_message_names_the_extra(mat73, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     with pytest.raises(InputError, match=r"needs h5py: pip install 'symheli\[logs\]'"):
         FlightRecord.from_mat(mat73, time="t", units={"log.theta": "deg"})
+
+
+# --- real logs -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        (
+            "px4/sample.ulg",  # of github.com/PX4/pyulog, BSD licence
+            lambda log: FlightRecord.from_ulog(
+                log,
+                {
+                    "p": ("vehicle_attitude", "rollspeed", "rad/s"),
+                    "phi": ("vehicle_attitude", "phi", "rad"),
+                },
+                dt=0.02,
+            ),
+        ),
+        (
+            "ardupilot/sample.bin",  # of github.com/BeastAyyG/ardupilot-log-diagnosis
+            lambda log: FlightRecord.from_dataflash(
+                log, {"p": "IMU.GyrX", "phi": "ATT.Roll"}, dt=0.1
+            ),
+        ),
+    ],
+)
+def test_in_a_real_log_the_roll_angle_follows_the_roll_rate(name, read):
+    """Units, clocks and quaternions at once: with level wings d(phi)/dt is p."""
+    path = DATA / name
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    record = read(path)
+    slope = record.derivative("phi")
+    known = np.isfinite(slope) & np.isfinite(record["p"])
+    assert np.corrcoef(slope[known], record["p"][known])[0, 1] > 0.9
+    # the attitude of ArduPilot is logged at 10 Hz: differences over 0.2 s are somewhat low
+    assert np.polyfit(slope[known], record["p"][known], 1)[0] == pytest.approx(1.0, abs=0.1)
 
 
 # --- what a file is ------------------------------------------------------------------------------
