@@ -210,8 +210,8 @@ def against_constant(
 ) -> AgainstConstant:
     """Fit a scheduled model and the constant one of the same order, and say where scheduling pays.
 
-    Scheduling pays for an output where the scheduled model is more than one point better in free run
-    on held-out data and no worse 1 s ahead; it pays for prediction only where it is better 1 s
+    Scheduling pays for an output where the scheduled model is more than one point better in free
+    run on held-out data and no worse 1 s ahead; it pays for prediction only where it is better 1 s
     ahead alone.
 
     Parameters

@@ -13,16 +13,29 @@ import numpy as np
 from studies.commands import options
 from studies.output import Output
 from symheli.errors import InputError
+from symheli.logs.format import FORMATS, Format, format_of
 
 if TYPE_CHECKING:
+    from symheli.logs.contents import Contents
     from symheli.records import FlightRecord, KinematicCheck
 
 METHODS = ("ls", "rls", "ridge", "lasso", "iv", "riv", "oe")
 """Those of `identification.fit`."""
 
-HELP = "fit an LPV-ARX model to a flight log and judge it on data it has not seen"
+HELP = (
+    "fit an LPV-ARX model to a flight log and judge it on data it has not seen; with the log alone,"
+    " say what it holds and suggest a command"
+)
 XPLANE = {"outputs": ("q", "theta"), "inputs": ("stick_lon",), "scheduling": "airspeed"}
 """What is identified from an X-Plane log unless asked otherwise."""
+
+ASKED = (
+    *("outputs", "inputs", "scheduling", "scheduling_from", "instruments", "orders", "test"),
+    *("plot", "bands", "save", "loop"),
+)
+"""Options that ask for a fit; without any of them a log is only looked at, unless it can be
+identified at once.
+"""
 
 ONE_MODEL = {
     "plot": "draws the fits of",
@@ -38,9 +51,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add("log", type=Path, metavar="LOG", help="flight log")
     add(
         "--format",
-        choices=("auto", "xplane", "csv", "mat"),
+        choices=("auto", *FORMATS),
         default="auto",
-        help="default: by extension and content",
+        help="default: by content",
     )
     add(
         "--map",
@@ -52,8 +65,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add(
         "--time-unit",
         choices=("s", "ms", "us", "ns"),
-        default="s",
-        help="unit of the time column (default: %(default)s)",
+        help="unit of the time column (default: that of its header, or s)",
     )
     add(
         "--dt",
@@ -206,18 +218,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Read, prepare, fit, judge."""
+    """Read, prepare, fit, judge; or look, where nothing says what to fit."""
     from identification import LPVARX, Polynomial, against_constant
     from studies.log import in_feedback, report
-    from studies.log.reading import format_of, scheduling_range
+    from studies.log.reading import scheduling_range
 
-    kind: Any = (
-        "mapped"
-        if arguments.map
-        else format_of(arguments.log)
-        if arguments.format == "auto"
-        else arguments.format
-    )
+    kind = "mapped" if arguments.map else _format(arguments)
+    if not any(getattr(arguments, name) for name in ASKED):
+        seen = _contents(arguments, kind)
+        if not _at_once(arguments, kind, seen):
+            return _survey(arguments, seen)
     signals = _signals(arguments, kind)
     prepared = _prepared(arguments, arguments.log, signals, cut=True)
     record = prepared.record
@@ -291,6 +301,46 @@ def run(arguments: argparse.Namespace) -> Output:
     return Output(text, data)
 
 
+def _format(arguments: argparse.Namespace) -> Format:
+    """What the log is said to be, or is by its content."""
+    return format_of(arguments.log) if arguments.format == "auto" else arguments.format
+
+
+def _contents(arguments: argparse.Namespace, kind: str) -> Contents:
+    """All columns of the log, or the signals of the map."""
+    from symheli.logs.column import Column
+    from symheli.logs.contents import Contents, contents_of
+    from symheli.records import FlightRecord
+
+    if kind != "mapped":
+        return contents_of(arguments.log, _format(arguments))
+    record = FlightRecord.from_map(arguments.log, arguments.map)
+    columns = {str(s): Column(record.time, record[s], s.unit) for s in record.signals}
+    return Contents("mapped", columns)
+
+
+def _at_once(arguments: argparse.Namespace, kind: str, seen: Contents) -> bool:
+    """Whether there are defaults for what this log holds: X-Plane's, with a clock or --dt."""
+    timed = arguments.dt or all(column.time is not None for column in seen.columns.values())
+    wanted = {*XPLANE["outputs"], *XPLANE["inputs"], XPLANE["scheduling"]}
+    return kind == "xplane" and bool(timed) and wanted <= seen.columns.keys()
+
+
+def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
+    """What the log holds, and a command that would identify."""
+    from studies.log.survey import answer, survey
+
+    found = survey(
+        arguments.log,
+        seen,
+        time=arguments.time,
+        time_unit=arguments.time_unit or "s",
+        dt=arguments.dt,
+        signal_map=arguments.map,
+    )
+    return answer(found)
+
+
 class _Signals(NamedTuple):
     """What is predicted from what; `scheduling` None where it is made of others, or there is
     none.
@@ -331,7 +381,7 @@ def _prepared(
     """Read `log` and do to it what the options say, in the order of docs/identify.md; start and
     stop only where it is to be `cut`.
     """
-    from studies.log.reading import COMBINED, format_of, read
+    from studies.log.reading import COMBINED, read
     from symheli.records import FlightRecord, conditioning
     from symheli.records.kinematics import lacking
 
@@ -345,7 +395,7 @@ def _prepared(
     if arguments.map:
         record = FlightRecord.from_map(log, arguments.map)
     else:
-        kind: Any = format_of(log) if arguments.format == "auto" else arguments.format
+        kind = format_of(log) if arguments.format == "auto" else arguments.format
         record = read(
             log,
             list(dict.fromkeys(wanted)),

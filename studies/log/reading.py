@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
-from symheli.logs.files import existing
+from symheli.logs.format import Format
 from symheli.logs.separated import SEPARATORS, SeparatedTable
 from symheli.records import FlightRecord
 from symheli.records.kinematics import COMPARED
@@ -18,31 +17,10 @@ from symheli.values.signal import UNITS
 STILL = 1e-6
 """A scheduling signal that moves by less than this part of its size stays where it is."""
 
-Format = Literal["xplane", "csv", "mat"]
 COMBINED = "speed"
 """The scheduling signal made of --scheduling-from."""
 TIMES = ("t", "time")
 """Columns taken as the time where none is named."""
-
-
-def format_of(path: Path) -> Format:
-    """By extension, then by content: a MATLAB file, an X-Plane log ("name,unit |" in its first
-    line), else a table.
-    """
-    existing(path)
-    if path.suffix.lower() == ".mat":
-        return "mat"
-    if path.suffix.lower() == ".ulg":
-        raise InputError(
-            f"{path}: PX4 logs need topics: name them in a signal map, --map FILE.toml, or read it"
-            " by FlightRecord.from_ulog"
-        )
-    with path.open("rb") as file:
-        head = file.read(4096)
-    if head.startswith(b"MATLAB"):
-        return "mat"
-    first = next((line for line in head.splitlines() if line.strip()), b"")
-    return "xplane" if b"|" in first and b"," in first.split(b"|")[0] else "csv"
 
 
 def read(
@@ -53,26 +31,36 @@ def read(
     dt: float | None,
     time: str | None,
     units: Mapping[str, str],
-    time_unit: str = "s",
+    time_unit: str | None = None,
 ) -> FlightRecord:
     """The record, on a uniform step where `dt` (s) says so; a time column is in `time_unit`.
 
     X-Plane logs declare their units. Of a table, what `check_kinematics` compares is read too where
-    it is there. Elsewhere `units` declares those of `signals`; the names every
-    room knows (u, q, theta, ...) are SI unless declared otherwise. A time column and `dt` together
-    resample. Raises `InputError`.
+    it is there. Elsewhere `units` declares those of `signals`, before the header of a table; the
+    names every room knows (u, q, theta, ...) are SI unless declared otherwise. A time column and
+    `dt` together resample. Raises `InputError`.
     """
     if format == "xplane":
         return FlightRecord.from_xplane(path, dt)
+    if format in ("ulog", "dataflash"):
+        raise InputError(
+            f"{path}: the columns of an autopilot's log are named in a signal map, --map FILE.toml;"
+            " symheli identify with the log alone suggests one"
+        )
+    known: dict[str, str] = {}
     if format == "csv":
-        header = SeparatedTable.read(path).header
-        signals = list(dict.fromkeys([*signals, *(n for n in COMPARED if n in header)]))
-    declared = {name: units.get(name) or UNITS.get(name) or _undeclared(name) for name in signals}
+        table = SeparatedTable.read(path)
+        known = table.units
+        signals = list(dict.fromkeys([*signals, *(n for n in COMPARED if n in table.names)]))
+    declared = {
+        name: units.get(name) or known.get(name) or UNITS.get(name) or _undeclared(name)
+        for name in signals
+    }
     for name in units:
         if name not in declared:
             raise UnknownNameError("signal in --units", name, declared)
     if format == "mat":
-        record = FlightRecord.from_mat(path, time or "t", declared, time_unit)
+        record = FlightRecord.from_mat(path, time or "t", declared, time_unit or "s")
     else:
         column = time or _time_column(path, dt)
         record = FlightRecord.from_csv(
@@ -92,11 +80,11 @@ def _undeclared(name: str) -> str:
 def _time_column(path: Path, dt: float | None) -> str | None:
     table = SeparatedTable.read(path)
     for name in TIMES:
-        if name in table.header:
+        if name in table.names:
             return name
     if dt is not None:
         return None
-    found = f"{', '.join(map(repr, table.header))} (separated by {SEPARATORS[table.separator]})"
+    found = f"{', '.join(map(repr, table.names))} (separated by {SEPARATORS[table.separator]})"
     raise InputError(
         f"{path}: no column is called {' or '.join(TIMES)}; name it with --time, or give the sample"
         f" period with --dt; found {found}"

@@ -22,9 +22,9 @@ FIT = (
     "rms error is (100 - fit) % of what the output varies (its standard deviation)",
 )
 VERDICTS = (
-    f"  pays: more than {PAYS:g} point better in free run, which simulation and feedback rest on, no"
-    " worse 1 s",
-    "  ahead; pays for prediction only: better 1 s ahead, from measurements, not in free run",
+    f"  pays: more than {PAYS:g} point better in free run, as simulation and feedback need it, and"
+    " no worse",
+    "  1 s ahead; pays for prediction only: better 1 s ahead, from measurements, not in free run",
 )
 
 

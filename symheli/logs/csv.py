@@ -22,12 +22,13 @@ from symheli.values.signal import Signal
 def read_csv(
     path: str | os.PathLike[str],
     time: str | None,
-    units: Mapping[str, str] | None,
+    units: Mapping[str, str | None] | None,
     dt: float | None = None,
     time_unit: str | None = None,
 ) -> Table:
     """The columns named in `units`, as they stand, and the time in s; without `units` all columns
-    whose unit the header gives. What `units` says of a column counts before its header.
+    whose unit the header gives. What `units` says of a column counts before its header; where it
+    says None, the header counts, and "1" where that says nothing either.
 
     `time` names the time column (in `time_unit`; default that of its header, or s); None where the
     file has none: its rows are then `dt` (s) apart. Empty cells are missing samples (NaN). Raises
@@ -46,20 +47,21 @@ def read_csv(
                 f"{path}: no column has its unit in the header, such as 'q [rad/s]'; name columns"
                 " and units: units={'q': 'rad/s'}"
             )
+    known = {name: unit or table.units.get(name, "1") for name, unit in units.items()}
     if time is not None and time_unit is None:
         time_unit = table.units.get(time)
     factor = seconds_in(time_unit or "s")
-    columns = table.columns((*units, *([time] if time else [])))
-    values = {name: columns[name] for name in units}
+    columns = table.columns((*known, *([time] if time else [])))
+    values = {name: columns[name] for name in known}
     if time is None:
-        return positive(dt or 0.0) * np.arange(len(table.rows)), values, dict(units)
+        return positive(dt or 0.0) * np.arange(len(table.rows)), values, known
     seconds = factor * columns[time]
     if np.isnan(seconds).any():
         raise InputError(
             f"{path}: the time is missing in row {int(np.flatnonzero(np.isnan(seconds))[0]) + 1} of"
             f" column {time!r}"
         )
-    return seconds, values, dict(units)
+    return seconds, values, known
 
 
 def csv_columns(path: str | os.PathLike[str]) -> dict[str, Column]:

@@ -121,6 +121,8 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messag
     try:
         with quiet() as said, _closing(reader) as log:
             log.__init__(str(file))
+            if reader is DFReader_text:
+                _learn_units(log)
             present = [n for n in log.name_to_id if n not in ABOUT_THE_LOG]
             names = present if wanted is None else list(wanted)
             while (message := log.recv_match(type=names, strict=True)) is not None:
@@ -151,16 +153,24 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messag
 @contextlib.contextmanager
 def _closing(reader: Any) -> Iterator[Any]:
     """A reader that is closed also where it fails to open (its constructor leaves the file open),
-    and tells damage in Python: its compiled index prints past `quiet`.
+    tells damage in Python (its compiled index prints past `quiet`), and looks for no calendar
+    (which fails for old logs).
     """
     log = object.__new__(reader)
-    log.init_arrays_fast = log.init_arrays
+    log.init_arrays_fast, log.init_clock = log.init_arrays, lambda: None
     try:
         yield log
     finally:
         for part in ("data_map", "filehandle"):
             if hasattr(log, part):
                 getattr(log, part).close()
+
+
+def _learn_units(log: Any) -> None:
+    """Read what a text log says of its units: its reader does so message by message."""
+    while log.recv_match(type=["UNIT", "MULT", "FMTU"], strict=True) is not None:
+        pass
+    log.rewind()
 
 
 def _columns(messages: list[Any]) -> dict[str, Column]:

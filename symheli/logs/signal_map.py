@@ -30,7 +30,7 @@ from symheli.logs.dataflash import read_dataflash
 from symheli.logs.files import Table, text
 from symheli.logs.format import FORMATS, Format, format_of
 from symheli.logs.mat import read_mat
-from symheli.logs.ulog import read_ulog, split_column
+from symheli.logs.ulog import read_ulog, split_column, unit_of
 from symheli.logs.xplane import read_xplane
 from symheli.values.units import to_si
 
@@ -57,7 +57,7 @@ class SignalMap:
     signals: dict[str, Source]
     format: Format | None = None
     time: str | None = None
-    time_unit: str = "s"
+    time_unit: str | None = None
     dt: float | None = None
 
     @classmethod
@@ -82,7 +82,7 @@ class SignalMap:
             raise UnknownNameError(f"format in {path}", str(kind), FORMATS)
         if dt is not None and not (isinstance(dt, int | float) and math.isfinite(dt) and dt > 0):
             raise InputError(f"{path}: dt must be a positive number of seconds, got {dt!r}")
-        return cls(signals, kind, table.get("time"), str(table.get("time_unit", "s")), dt)
+        return cls(signals, kind, table.get("time"), table.get("time_unit"), dt)
 
     def read(self, log: str | os.PathLike[str]) -> Table:
         """Time (s), the mapped signals and their units."""
@@ -114,18 +114,20 @@ class SignalMap:
         return self.format or format_of(log)
 
     def _columns(self, log: str | os.PathLike[str], kind: str) -> Table:
-        declared = {s.column: s.unit or "1" for s in self.signals.values()}
+        given = {s.column: s.unit for s in self.signals.values()}
+        declared = {column: unit or "1" for column, unit in given.items()}
         match kind:
             case "xplane":
                 return read_xplane(log, self.dt)
             case "ulog":
                 step = self._needed_step(log)
+                split = {column: split_column(column) for column in given}
                 topics = {
-                    column: (*split_column(column), unit) for column, unit in declared.items()
+                    column: (topic, field, given[column] or unit_of(field))
+                    for column, (topic, field) in split.items()
                 }
                 return read_ulog(log, topics, step)
             case "dataflash":
-                given = {s.column: s.unit for s in self.signals.values()}
                 return read_dataflash(
                     log,
                     {column: column for column in given},
@@ -135,9 +137,9 @@ class SignalMap:
             case "mat":
                 if self.time is None:
                     raise InputError(f"{log}: name the time vector in the signal map: time = ...")
-                return read_mat(log, self.time, declared, self.time_unit)
+                return read_mat(log, self.time, declared, self.time_unit or "s")
         step = self.dt if self.time is None else None
-        return read_csv(log, self.time, declared, step, self.time_unit)
+        return read_csv(log, self.time, given, step, self.time_unit)
 
     def _needed_step(self, log: str | os.PathLike[str]) -> float:
         if self.dt is None:

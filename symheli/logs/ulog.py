@@ -80,6 +80,13 @@ def split_column(column: str) -> tuple[str, str]:
     return topic, field
 
 
+def unit_of(field: str) -> str:
+    """The unit of a field where nobody says one: a ULog declares none; phi, theta and psi are
+    computed in rad.
+    """
+    return "rad" if field in ANGLES else "1"
+
+
 def _topics(path: str | os.PathLike[str]) -> dict[str, list[_Instance]]:
     """The instances of each topic, by number."""
     with extra("logs", "reading a ULog file"):

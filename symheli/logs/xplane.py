@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.logs.column import Column
 from symheli.logs.files import Table, positive, text
 from symheli.values.units import to_si
 
@@ -104,6 +105,17 @@ def read_xplane(path: str | os.PathLike[str], dt: float | None = None) -> Table:
         {n: np.concatenate(c) for n, c in columns.items()},
         {n: _unit(n) for n in names},
     )
+
+
+def xplane_columns(path: str | os.PathLike[str]) -> tuple[dict[str, Column], float | None]:
+    """Signals of a Data.txt, without an instant where the log has no clock; then an estimate of its
+    sample period (s), where its positions and velocities give one.
+    """
+    segments = [s for s in _segments(path) if len(s)]
+    clock = all(any(name in s.columns for name in CLOCKS) for s in segments)
+    time, values, units = read_xplane(path, None if clock else 1.0)
+    step = None if clock else estimated_period(segments)
+    return {n: Column(time if clock else None, v, units[n]) for n, v in values.items()}, step
 
 
 def _segments(path: str | os.PathLike[str]) -> list[Segment]:

@@ -53,6 +53,7 @@ FORMATS = {
     "IMU": (140, "QBff", "TimeUS,I,GyrY,T"),
     "ATT": (141, "QcC", "TimeUS,Pitch,Yaw"),
     "RATE": (142, "Qh", "TimeUS,POut"),
+    "GPS": (143, "QBIH", "TimeUS,Status,GMS,GWk"),
 }
 """Type, letters of the fields and their names, by message."""
 
@@ -69,7 +70,18 @@ MULTIPLIERS = {"F": 1e-6, "0": 1.0, "B": 1e-2, "-": 0.0}
 DECLARED = {"IMU": ("s#EO", "F---"), "ATT": ("sdh", "FBB"), "RATE": ("sn", "FB")}
 """Letters of unit and multiplier for each field."""
 
-TYPES = {"Q": "Q", "B": "B", "b": "b", "f": "f", "c": "h", "C": "H", "h": "h", "d": "d"} | {
+TYPES = {
+    "Q": "Q",
+    "I": "I",
+    "B": "B",
+    "b": "b",
+    "f": "f",
+    "c": "h",
+    "C": "H",
+    "H": "H",
+    "h": "h",
+    "d": "d",
+} | {
     "n": "4s",
     "N": "16s",
     "Z": "64s",

@@ -3,6 +3,7 @@ they lie beside the project.
 """
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,9 @@ from symheli.logs.format import format_of
 from symheli.logs.mat import mat_columns
 from symheli.logs.ulog import ulog_columns
 from symheli.records import FlightRecord
+
+DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
+
 
 # --- one axis ------------------------------------------------------------------------------------
 
@@ -149,7 +153,7 @@ def test_a_ulog_that_ends_anywhere_is_read_so_far_or_refused(px4, tmp_path):
 def ardupilot(request, tmp_path):
     """Two gyros at 50 Hz, attitude at 10 Hz, a heading that passes north."""
     pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
-    rows = []
+    rows = [("GPS", (1_000_000, 3, 1000, 2000))]  # by which readers set their clock
     for k in range(200):
         stamp = 1_000_000 + 20_000 * k
         rows += [("IMU", (stamp, 0, 0.001 * k, 20.0)), ("IMU", (stamp, 1, 1.0, 20.0))]
@@ -238,6 +242,17 @@ def test_damage_in_the_middle_is_said_and_what_is_around_it_is_read(ardupilot, c
     assert capfd.readouterr() == ("", "")
 
 
+def test_messages_without_time_cannot_be_placed(tmp_path):
+    """As logs were before 2014."""
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    path = tmp_path / "old.log"
+    head = "ArduCopter V3.0.1\nFMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\n"
+    formats = "FMT, 130, 35, GPS, BIc, Status,Time,Alt\nFMT, 1, 17, ATT, cc, Roll,Pitch\n"
+    path.write_text(head + formats + "GPS, 3, 308900200, 9.48\nATT, 0.23, 0.75\n" * 50)
+    with pytest.raises(InputError, match=r"ATT carries no time \(logs from before 2014\)"):
+        FlightRecord.from_dataflash(path, {"theta": "ATT.Pitch"}, 0.1, {"theta": "deg"})
+
+
 def test_what_is_no_ardupilot_log_is_refused(tmp_path):
     pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
     path = tmp_path / "bad.bin"
@@ -301,6 +316,44 @@ def test_without_h5py_the_message_names_the_extra(mat73, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     with pytest.raises(InputError, match=r"needs h5py: pip install 'symheli\[logs\]'"):
         FlightRecord.from_mat(mat73, time="t", units={"log.theta": "deg"})
+
+
+# --- real logs -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        (
+            "px4/sample.ulg",  # of github.com/PX4/pyulog, BSD licence
+            lambda log: FlightRecord.from_ulog(
+                log,
+                {
+                    "p": ("vehicle_attitude", "rollspeed", "rad/s"),
+                    "phi": ("vehicle_attitude", "phi", "rad"),
+                },
+                dt=0.02,
+            ),
+        ),
+        (
+            "ardupilot/sample.bin",  # of github.com/BeastAyyG/ardupilot-log-diagnosis
+            lambda log: FlightRecord.from_dataflash(
+                log, {"p": "IMU.GyrX", "phi": "ATT.Roll"}, dt=0.1
+            ),
+        ),
+    ],
+)
+def test_in_a_real_log_the_roll_angle_follows_the_roll_rate(name, read):
+    """Units, clocks and quaternions at once: with level wings d(phi)/dt is p."""
+    path = DATA / name
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    record = read(path)
+    slope = record.derivative("phi")
+    known = np.isfinite(slope) & np.isfinite(record["p"])
+    assert np.corrcoef(slope[known], record["p"][known])[0, 1] > 0.9
+    # the attitude of ArduPilot is logged at 10 Hz: differences over 0.2 s are somewhat low
+    assert np.polyfit(slope[known], record["p"][known], 1)[0] == pytest.approx(1.0, abs=0.1)
 
 
 # --- what a file is ------------------------------------------------------------------------------

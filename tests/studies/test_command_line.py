@@ -480,7 +480,7 @@ def test_a_failure_is_one_sentence_and_status_1(run, arguments, sentence):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ([], "--outputs"),
+        (["--outputs", "y"], "name what is to be predicted and what drives it"),
         (["--outputs", "y", "--inputs", "u"], "name the scheduling signal"),
         (
             ["--outputs", "y", "--inputs", "u", "--scheduling", "p"],

@@ -1,0 +1,280 @@
+"""A log alone: what it holds is said, nothing is used, and what is suggested works."""
+
+import json
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from autopilot_logs import dataflash, ulog
+from scipy.io import savemat
+
+from studies import cli
+from symheli.logs.column import Column
+from symheli.logs.meaning import guesses
+
+DATA = Path(__file__).parents[1] / "data"
+STEP = 0.02
+
+
+def flight(n=900, seed=0):
+    """Pitch, driven by a stick, slower the faster it flies; rad, rad/s, m/s."""
+    rng = np.random.default_rng(seed)
+    airspeed = 8 + 5 * np.sin(2 * np.pi * np.arange(n) / 600)
+    lon = 0.3 * np.repeat(rng.choice([-1.0, 1.0], n // 10), 10)
+    q, theta = np.zeros(n), np.zeros(n)
+    for k in range(1, n):
+        q[k] = (0.96 - 0.01 * airspeed[k - 1]) * q[k - 1] - 0.02 * theta[k - 1] + 0.1 * lon[k - 1]
+        theta[k] = theta[k - 1] + STEP * 0.5 * (q[k] + q[k - 1])
+    return {
+        "t": STEP * np.arange(n),
+        "q": q + 1e-3 * rng.standard_normal(n),
+        "theta": theta,
+        "lon": lon,
+        "airspeed": airspeed,
+    }
+
+
+def table(path, columns):
+    np.savetxt(
+        path,
+        np.stack(list(columns.values()), 1),
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+    )
+    return path
+
+
+@pytest.fixture
+def answer(capsys):
+    """What `symheli identify` answers to a program."""
+
+    def call(*options):
+        assert cli.main(["identify", *map(str, options), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return call
+
+
+@pytest.fixture
+def look(answer, capsys):
+    """What it answers where it only looks: as data, and as text."""
+
+    def call(*options):
+        seen = answer(*options)
+        assert not seen["identified"]
+        assert cli.main(["identify", *map(str, options)]) == 0
+        return seen, capsys.readouterr().out
+
+    return call
+
+
+def csv_log(tmp_path):
+    f = flight()
+    columns = {
+        "stamp_us": 1e6 * f["t"],
+        "gyro_y (deg/s)": np.degrees(f["q"]),
+        "pitch_deg": np.degrees(f["theta"]),
+        "elevator": f["lon"],
+        "TAS_kt": f["airspeed"] * 3600 / 1852,
+        "battery": 12.0 + 0 * f["t"],
+    }
+    return table(tmp_path / "log.csv", columns)
+
+
+def timeless_csv(tmp_path):
+    f = flight()
+    return table(tmp_path / "log.csv", {n: v for n, v in f.items() if n != "t"})
+
+
+def mat_log(tmp_path):
+    f = flight()
+    log = {"log": {**f, "time": f["t"], "short": np.arange(5.0)}}
+    savemat(tmp_path / "log.mat", log)
+    return tmp_path / "log.mat"
+
+
+def ulog_log(tmp_path):
+    pytest.importorskip("pyulog", reason="needs pyulog: pip install 'symheli[logs]'")
+    f = flight()
+    stamps = np.round(1e6 * f["t"]).astype(int)
+    half = f["theta"] / 2
+    zero = 0 * half
+    path = tmp_path / "log.ulg"
+    path.write_bytes(
+        ulog(
+            {
+                ("vehicle_angular_velocity", 0): {"timestamp": stamps, "xyz[1]": f["q"]},
+                ("vehicle_attitude", 0): {
+                    "timestamp": stamps,
+                    **{"q[0]": np.cos(half), "q[1]": zero, "q[2]": np.sin(half), "q[3]": zero},
+                },
+                ("vehicle_torque_setpoint", 0): {"timestamp": stamps, "xyz[1]": f["lon"]},
+                ("airspeed", 0): {
+                    "timestamp": stamps[::10],
+                    "true_airspeed_m_s": f["airspeed"][::10],
+                },
+            }
+        )
+    )
+    return path
+
+
+LOGS = {"csv": csv_log, "csv without time": timeless_csv, "mat": mat_log, "ulog": ulog_log}
+
+
+@pytest.mark.parametrize("kind", LOGS)
+def test_the_suggested_command_identifies_what_was_flown(look, answer, tmp_path, monkeypatch, kind):
+    monkeypatch.chdir(tmp_path)
+    seen, _ = look(LOGS[kind](tmp_path))
+    if seen["suggested_map"]:
+        Path("aircraft.toml").write_text(seen["suggested_map"])
+    program, verb, *rest = seen["suggested_command"]
+    assert (program, verb) == ("symheli", "identify")
+    found = answer(*rest)
+    assert found["read"]["dt"] == pytest.approx(STEP, rel=0.02)
+    assert found["scheduling_verdict"] is not None
+    assert list(found["read"]["signals"].values()) == ["rad/s", "rad", "1", "m/s"]
+    low, high = found["read"]["scheduling_range"]
+    assert (low, high) == (pytest.approx(3.0, abs=0.1), pytest.approx(13.0, abs=0.1))
+    best = next(iter(found["models"].values()))
+    assert best["fit_percent"]["held_out"]["1 s"][next(iter(found["read"]["signals"]))] > 80
+
+
+def test_the_text_ends_in_the_command_for_a_shell(look, tmp_path):
+    log = ulog_log(tmp_path)
+    seen, text = look(log)
+    *_, last = text.splitlines()
+    assert shlex.split(last) == seen["suggested_command"]
+    block = text[text.index("cat > aircraft.toml <<'END'\n") :].splitlines()
+    assert "\n".join(block[1 : block.index("END")]) == seen["suggested_map"]
+
+
+def test_motion_is_counted_column_by_column(look, tmp_path):
+    f = flight()
+    q = np.degrees(f["q"])
+    q[100:130] = np.nan
+    time = np.delete(f["t"], slice(200, 400))
+    columns = {n: np.delete(v, slice(200, 400)) for n, v in {**f, "gyro_y (deg/s)": q}.items()}
+    columns.pop("q")
+    columns |= {"t": time, "rotor": np.full(len(time), 150.0)}
+    seen, text = look(table(tmp_path / "log.csv", columns))
+    rows = {row["name"]: row for row in seen["columns"]}
+    kept = columns["gyro_y (deg/s)"]
+    gyro = rows["gyro_y"]
+    assert (gyro["samples"], gyro["missing"], gyro["unit"]) == (len(kept), 30, "deg/s")
+    assert gyro["deviation"] == pytest.approx(np.nanstd(kept), rel=1e-9)
+    assert (gyro["low"], gyro["high"]) == (
+        pytest.approx(np.nanmin(kept)),
+        pytest.approx(np.nanmax(kept)),
+    )
+    assert gyro["guess"] == {"signal": "q", "column": "gyro_y", "unit": "deg/s", "why": "the log"}
+    assert not rows["rotor"]["moves"]
+    assert "columns that stay where they are: rotor" in text
+    assert seen["time"]["gaps"] == 1
+    assert seen["time"]["longest"] == pytest.approx(201 * STEP)
+    assert "1 gap, the longest 4.02 s" in text
+    assert "airspeed covers 3 to 13 m/s" in text
+
+
+@pytest.mark.parametrize(
+    ("without", "sentence", "command"),
+    [
+        ("airspeed", "without it the model is LTI", True),
+        ("lon", "an input that moves", False),
+        ("t", "a clock: say how far apart the rows are", True),
+        ("q", "angular rates p, q, r", True),
+    ],
+)
+def test_what_is_missing_is_said(look, tmp_path, without, sentence, command):
+    columns = {n: v for n, v in flight().items() if n != without}
+    seen, text = look(table(tmp_path / "log.csv", columns))
+    assert sentence in text
+    assert (seen["suggested_command"] is not None) is command
+    if without == "airspeed":
+        assert seen["suggested_command"][-2:] == ["--degree", "0"]
+
+
+def test_without_angles_and_rates_nothing_says_how_far_apart_rows_are(look, tmp_path):
+    columns = {n: v for n, v in flight().items() if n not in ("t", "theta")}
+    seen, _ = look(table(tmp_path / "log.csv", columns))
+    assert (seen["time"], seen["suggested_step"], seen["suggested_command"]) == (None, None, None)
+    seen, _ = look(tmp_path / "log.csv", "--dt", STEP)
+    assert seen["suggested_command"][3:5] == ["--dt", f"{STEP:g}"]
+
+
+def test_a_step_is_found_in_noise_from_an_angle_and_its_rate(look, tmp_path):
+    f = flight()
+    noise = np.random.default_rng(1).standard_normal(len(f["t"]))
+    columns = {"q": f["q"] + 0.3 * f["q"].std() * noise, "theta": f["theta"], "lon": f["lon"]}
+    seen, _ = look(table(tmp_path / "log.csv", columns))
+    assert seen["suggested_step"] == pytest.approx(STEP, rel=0.03)
+
+
+def test_an_xplane_log_without_a_clock_is_looked_at_and_with_dt_identified(look, answer):
+    log = DATA / "xplane" / "Forward.txt"
+    seen, text = look(log)
+    assert seen["suggested_command"] is not None
+    assert "a clock: say how far apart the rows are" in text
+    assert 0.09 < seen["suggested_step"] < 0.11  # nominal 10 Hz
+    found = answer(log, "--dt", 0.1)
+    assert "models" in found
+
+
+@pytest.mark.parametrize("option", [("--plot", "fits.png"), ("--orders",), ("--save", "m.json")])
+def test_who_asks_for_a_fit_is_told_that_outputs_are_missing(tmp_path, capsys, option):
+    assert cli.main(["identify", str(csv_log(tmp_path)), *option]) == 1
+    assert "name what is to be predicted" in capsys.readouterr().err
+
+
+def test_a_map_alone_shows_its_signals(look, tmp_path):
+    log, signal_map = csv_log(tmp_path), tmp_path / "m.toml"
+    signal_map.write_text(
+        'time = "stamp_us"\ntime_unit = "us"\n[signals]\nq = { column = "gyro_y" }\n'
+        'd_lon = { column = "elevator", unit = "1" }\n'
+    )
+    seen, _ = look(log, "--map", signal_map)
+    assert {row["name"]: row["unit"] for row in seen["columns"]} == {"q": "rad/s", "d_lon": "1"}
+    assert seen["suggested_command"][3:] == [
+        *("--map", str(signal_map), "--outputs", "q", "--inputs", "d_lon", "--degree", "0"),
+    ]
+
+
+def test_ardupilot_columns_are_guessed_with_the_units_of_the_log(look, tmp_path):
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    f, rows = flight(), []
+    for k, t in enumerate(f["t"]):
+        stamp = round(1e6 * t)
+        rows.append(("IMU", (stamp, 0, f["q"][k], 20.0)))
+        if k % 5 == 0:
+            pitch = round(100 * np.degrees(f["theta"][k]))
+            rows += [("ATT", (stamp, pitch, 0)), ("RATE", (stamp, round(100 * f["lon"][k])))]
+    (tmp_path / "log.bin").write_bytes(dataflash(rows))
+    seen, _ = look(tmp_path / "log.bin")
+    assert seen["suggested_map"].splitlines() == [
+        "dt = 0.1",
+        "[signals]",
+        'q = { column = "IMU.GyrY" }',
+        'theta = { column = "ATT.Pitch" }',
+        'lon = { column = "RATE.POut" }',
+    ]
+
+
+def test_a_latitude_is_no_stick_and_large_numbers_are_degrees():
+    wave = np.sin(np.arange(50.0))
+    columns = {
+        "lat": Column(None, 52 + wave),
+        "lon": Column(None, 13 + wave),
+        "Roll Rate": Column(None, 80 * wave),
+        "pitch": Column(None, 20 * wave),
+        "rudder": Column(None, 1500 + 300 * wave),
+        "q_dps": Column(None, 2 * wave),
+    }
+    found = guesses(columns, "csv")
+    assert {g.signal: (g.column, g.unit) for g in found.values()} == {
+        "p": ("Roll Rate", "deg/s"),
+        "q": ("q_dps", "deg/s"),
+        "theta": ("pitch", "deg"),
+        "ped": ("rudder", "us"),
+    }
