@@ -54,8 +54,6 @@ class GainCurve:
     >>> curve = gain_against_rate(lag, [0.0, 0.5], search=None)
     >>> print(f"{curve.frozen:.3f} <= gain <= {curve.best[0.5]:.3f}")
     1.000 <= gain <= 1.000
-    >>> list(curve.to_frame().columns)
-    ['lower', 'proven', 'P(p)']
     """
 
     title: str

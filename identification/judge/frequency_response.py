@@ -49,8 +49,6 @@ class FrequencyResponse:
     >>> found = idn.frequency_response(still, ["y"], ["u"], window=10.0, band=(1.0, 5.0))
     >>> print(np.abs(found.G[0]).round(1), bool(found.coherence.min() > 0.9))
     [[2.]] True
-    >>> list(found.to_frame().columns)
-    ['y from u', 'coherence of y from u']
     """
 
     omega: Array

@@ -69,8 +69,6 @@ class LPVARXModel:
     (799, 'ls', (800, 1))
     >>> print(model.at(0.0).poles().round(1), model.to_state_space().dt)
     [0.5] 0.1
-    >>> list(model.to_frame().index)[0], dict(model.to_xarray().sizes)
-    ('y(k-1) f0(p(k-1))', {'regressor': 4, 'output': 1})
     """
 
     structure: LPVARX

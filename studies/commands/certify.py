@@ -145,9 +145,8 @@ def _lateral(arguments: argparse.Namespace) -> tuple[LPVStateSpace, str]:
     (low, high), channel = arguments.airspeeds or (0.0, 13.0), arguments.channel or "gust"
     gains = dict(arguments.feedback) or ATTITUDE_HOLD
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")
-    loop = lateral_loop(
-        options.helicopter(arguments), low, high, channel, arguments.degree, gains=gains
-    )
+    heli, degree = options.helicopter(arguments), arguments.degree
+    loop = lateral_loop(heli, low, high, channel, degree, gains=gains)
     return loop, (
         f"lateral loop of {arguments.vehicle}, {given_model.words(gains)}, {low:g} to {high:g} m/s,"
         f" {channel} -> r, phi (SI)"

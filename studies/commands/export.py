@@ -25,8 +25,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help=(
             "c: equations of motion and header; estimator: recursive identification as C for an"
             " autopilot; model: an identified model (--model) as C; controller: one in a table"
-            " over airspeed (--model) as C; mat: linear models along airspeed, or what --model holds; latex, markdown:"
-            " every component's equations to read"
+            " over airspeed (--model) as C; mat: linear models along airspeed, or what --model"
+            " holds; latex, markdown: every component's equations to read"
         ),
     )
     options.vehicle(parser)

@@ -65,12 +65,12 @@ def _of_model(arguments: argparse.Namespace) -> Output:
     lines = [
         head,
         "",
-        f"{'':9s}" + "".join(f"  {u:<28s}" for u in names),
-        f"{f'{s.name}, {s.unit}':>9.9s}" + "".join(f"  {HOLD_COLUMNS}" for _ in names),
-        f"{'':9s}" + "".join(f"  {HOLD_UNITS}" for _ in names),
+        f"{'':14s}" + "".join(f"  {u:>28s}" for u in names),
+        f"{f'{s.name}, {s.unit}':>14.14s}" + "".join(f"  {HOLD_COLUMNS}" for _ in names),
+        f"{'':14s}" + "".join(f"  {HOLD_UNITS}" for _ in names),
     ]
     lines += [
-        f"{row.p:9.4g}" + "".join(f"  {_margins(row.margins[u])}" for u in names) for row in rows
+        f"{row.p:14.4g}" + "".join(f"  {_margins(row.margins[u])}" for u in names) for row in rows
     ]
     data = {
         "loop": head,
@@ -150,6 +150,8 @@ def _row(row) -> str:
 
 
 def _margins(hold: Margins) -> str:
+    if not hold.stable:
+        return f"{'unstable':>28s}"
     return (
         f"{hold.gain[1]:7.2f}{math.degrees(hold.phase):7.1f}{1000 * hold.delay:8.0f}"
         f"{hold.disk:6.2f}"

@@ -1,4 +1,4 @@
-"""symheli verify: prove saved certificates again, in exact arithmetic and from their files alone."""
+"""symheli verify: prove saved certificates again, in exact arithmetic, from their files alone."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ A JSON file is one object:
 
 An NPZ file holds the same as arrays: A, B, C, D, dt, x0, u0, xdot0; `axes`, `states`, `inputs` and
 `outputs` are arrays of names with `axes_units`, `states_units` ... beside them, and the values of
-the axes are `values_0`, `values_1`, ...; kinks are not in it.
+the axes are `values_0`, `values_1`, ...; `kinks` are names, with the airspeeds `kinks_at`.
 """
 
 from __future__ import annotations
@@ -97,6 +97,9 @@ def _labels(content: Content, names: Mapping[str, Sequence[Signal]]) -> dict[str
     labels |= {f"{g}_units": np.array([s.unit for s in names[g]]) for g in GROUPS}
     values = {f"values_{i}": v for i, v in enumerate(content.values)}
     dt = content.models.dt
+    kinks = [(name, at) for name, places in content.kinks.items() for at in places]
+    if kinks:
+        labels |= {"kinks": np.array([n for n, _ in kinks]), "kinks_at": [at for _, at in kinks]}
     return labels | values | {"schema": SCHEMA, "version": VERSION} | ({"dt": dt} if dt else {})
 
 
@@ -147,7 +150,10 @@ def _from_npz(path: Path) -> dict[str, Any]:
             whole[group] = {n: None if u is None else str(u) for n, u in pairs}
     count = len(whole.get("axes", ()))
     whole["values"] = [whole[f"values_{i}"] for i in range(count) if f"values_{i}" in whole]
-    return whole | {"version": int(whole.get("version", 0))}
+    kinks: dict[str, list[float]] = {}
+    for name, at in zip(whole.pop("kinks", ()), whole.pop("kinks_at", ()), strict=True):
+        kinks.setdefault(str(name), []).append(float(at))
+    return whole | {"kinks": kinks, "version": int(whole.get("version", 0))}
 
 
 def _content(given: dict[str, Any]) -> Content:

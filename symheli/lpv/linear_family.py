@@ -64,11 +64,6 @@ class LinearFamily:
     >>> roll = family.select(["v", "p", "r", "phi", "b1"], ["d_lat", "d_ped"])
     >>> roll.interpolate("polynomial", degree=2).at(4.0).A.shape
     (5, 5)
-    >>> frame = roll.to_frame()
-    >>> frame.shape, frame.attrs["units"]["A[p, v]"]
-    ((4, 70), 'rad/m/s')
-    >>> roll.to_xarray()["A"].sel(airspeed=5.0, equation="p").shape
-    (5,)
     """
 
     airspeeds: Array

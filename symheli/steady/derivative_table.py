@@ -69,8 +69,6 @@ class DerivativeTable:
     >>> table = symheli.derivatives(symheli.sweep(heli, [2.0, 8.0]))
     >>> table.values.shape == (2, len(table.names)), table.names[0].unit
     (True, '1/s')
-    >>> table.to_frame()["M_q"].shape, table.to_frame().attrs["units"]["M_q"]
-    ((2,), '1/s')
     """
 
     airspeeds: Array

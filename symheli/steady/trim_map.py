@@ -52,8 +52,6 @@ class TrimMap:
     >>> found = symheli.trim_map(heli, [4.0, 8.0], [0.0, 2.0])
     >>> found["theta"].shape, bool((found.power[:, 1] > found.power[:, 0]).all())
     ((2, 2), True)
-    >>> dict(found.to_xarray().sizes)
-    {'airspeed': 2, 'climb_rate': 2}
     """
 
     airspeeds: Array
