@@ -532,10 +532,10 @@ def test_help_and_version_succeed(run):
             {"vehicle": "xcell60", "out": Path("o"), "quick": True, "seed": 3, "resume": False},
         ),
         (
-            ["campaign", "--seeds", "4"],
+            ["campaign", "--seeds", "4", "--out", "c.zarr", "--workers", "1"],
             "campaign",
             "run_campaign",
-            {"seeds": 4, "vehicle": "xcell60"},
+            {"seeds": 4, "vehicle": "xcell60", "path": Path("c.zarr")},
         ),
     ],
 )
@@ -551,7 +551,7 @@ def test_long_jobs_get_their_options_and_show_their_result(
         def to_dict(self):
             return {"gain": np.float64(2.5)}
 
-    def job(**options):
+    def job(on=None, **options):
         given.update(options)
         return Result()
 
