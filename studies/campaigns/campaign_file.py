@@ -65,7 +65,8 @@ def campaign_of(entries: Mapping[str, Any]) -> Campaign:
         if not isinstance(values, list):
             raise InputError(f"the axis {name} of the grid is a list of values, got {values!r}")
     random = {name: _drawn(name, what) for name, what in given.get("random", {}).items()}
-    return Campaign(trial(entries["trial"]), **given | {"random": random})
+    given["random"] = random
+    return Campaign(trial(entries["trial"]), **given)
 
 
 def _drawn(name: str, what: Any) -> Normal | Uniform:

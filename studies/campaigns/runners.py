@@ -110,8 +110,7 @@ class Cluster(Runner):
                 threads_per_worker=1,
                 processes=True,
                 host="127.0.0.1",
-                dashboard_address=None,  # type: ignore[arg-type]
-                worker_dashboard_address=None,
+                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
                 memory_limit=0,  # type: ignore[arg-type]
                 silence_logs=logging.CRITICAL,
             )

@@ -25,11 +25,11 @@ from identification import (
 )
 from identification import fit_for_control as judge
 from identification.judge.criteria_in_feedback import SHARE_OF_MARGIN
+from studies.campaigns.runners import results, runner
 from studies.loops.lateral import STATES
 from studies.loops.robust_lateral import FEEDBACK, INPUTS, SIZES
 from studies.marks.measured import PAIRS, seeds_of
 from studies.output import progress
-from studies.processes import Processes
 from studies.transition.flights import ACCELERATIONS, AMPLITUDE, TOP, autopilot_for
 from symheli import (
     AirspeedSchedule,
@@ -185,9 +185,8 @@ def campaign(
         for kind in KINDS
         for vehicle in PAIRS
     ]
-    with Processes(processes) as pool:
-        for result in pool.submit(calls):
-            yield result.result()
+    with runner(processes) as on:
+        yield from results(on, calls)
 
 
 def table(outcomes: Sequence[Outcome]) -> str:

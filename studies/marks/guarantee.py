@@ -17,6 +17,7 @@ import numpy as np
 import symheli
 import synthesis
 from identification import KinematicModel, unseen_flight
+from studies.campaigns.runners import results, runner
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.robust_lateral import FEEDBACK
 from studies.marks.coverage import coverage
@@ -25,7 +26,6 @@ from studies.marks.measured import PAIRS, seeds_of
 from studies.marks.models import identified
 from studies.marks.truth import Truth
 from studies.output import progress
-from studies.processes import Processes
 from studies.stamped_tables import DOCS, keep, parsed, processor
 from studies.transition.flights import TOP, autopilot_for
 from studies.transition.guarantees import PERIOD, SIZES
@@ -156,7 +156,7 @@ def main() -> None:
     exact = proof.gamma, proof.lower
     progress(f"exact loop: proven {exact[0]:.3f}, flown {exact[1]:.3f}")
     found = []
-    with Processes(options.processes) as processes:
+    with runner(options.processes) as on:
         calls = [
             partial(
                 of_seed,
@@ -168,8 +168,8 @@ def main() -> None:
             )
             for seed in seeds
         ]
-        for answer in processes.submit(calls):
-            found.append(answer.result())
+        for answer in results(on, calls):
+            found.append(answer)
             progress(str(found[-1]))
     text = table(options.truth, exact, found)
     print(text)

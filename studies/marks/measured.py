@@ -14,11 +14,11 @@ import numpy as np
 
 import symheli
 from identification import BaselineModel, fit_percent
+from studies.campaigns.runners import results, runner
 from studies.marks.flights import aggressive, transition
 from studies.marks.models import identified
 from studies.marks.truth import SPEEDS, Truth, frozen_axes
 from studies.output import as_json, progress
-from studies.processes import Processes
 from studies.stamped_tables import DOCS, keep, parsed, processor
 from studies.transition.flights import (
     ABOVE_GROUND,
@@ -209,13 +209,11 @@ def seeds_of(text: str) -> list[int]:
 
 
 def measure(setting: Setting, seeds: Sequence[int]) -> tuple[list[Marks], dict[str, float]]:
-    """Every seed, a process a core; and the simulator's own gaps."""
+    """Every seed, on the runner that is there; and the simulator's own gaps."""
     heli, simulator = setting.helicopters()
     own = Truth.of(heli, setting.servos).gaps(Truth.of(simulator, setting.servos).models)
-    with Processes() as processes:
-        found = [
-            f.result() for f in processes.submit([partial(of_seed, setting, s) for s in seeds])
-        ]
+    with runner() as on:
+        found = list(results(on, [partial(of_seed, setting, s) for s in seeds]))
     return found, {name: float(gap.max()) for name, gap in own.items()}
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import closing
 from dataclasses import replace
+from functools import partial
+from itertools import accumulate, pairwise
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
@@ -19,6 +23,7 @@ from symheli.flight.flight_dataset import FlightDataset
 from symheli.flight.plan import FlightPlan, Options
 from symheli.flight.plan_text import described
 from symheli.helicopter import Helicopter
+from symheli.integrate.side_by_side import as_done, workers_of
 from symheli.progress import task
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
@@ -31,7 +36,7 @@ def fly_campaign(
     *,
     seeds: Iterable[int] | None = None,
     signals: Sequence[str] | None = None,
-    workers: int | None = None,
+    workers: int | Executor | None = None,
     progress: Progress | None = None,
     **options: Unpack[Options],
 ) -> FlightDataset:
@@ -48,8 +53,11 @@ def fly_campaign(
         As in `fly_batch`; one sample period for all.
     path : str or path
         Folder of the dataset, by habit named *.zarr; made where it is not there.
-    seeds, workers, progress, **options
+    seeds, progress, **options
         As in `fly_batch`; `progress` counts the flights that were there too.
+    workers : int or Executor, optional
+        Threads of this process, default one a core; or where chunks of flights are flown, such as
+        `distributed.Client(...).get_executor(pure=False)`: the flights have the same bits.
     signals : sequence of str, optional
         What to keep of each flight; default all.
 
@@ -80,33 +88,68 @@ def fly_campaign(
         raise InputError(f"one dataset has one sample period, got dt = {sorted(periods)} s")
     kept = _kept(heli, plans, signals)
     dataset = _dataset(heli, plans, Path(path), kept)
-    chunks = dataset.missing_chunks
-    at = [i for chunk in chunks for i in dataset.flights_of(chunk)]
-    done = len(plans) - len(at)
+    missing = sum(len(dataset.flights_of(chunk)) for chunk in dataset.missing_chunks)
+    done = len(plans) - missing
     if progress is not None:
         progress(done, len(plans))
-    if not at:
+    if not missing:
         return dataset
-    position = 0
-    wanted: list[list[int]] = []
-    for chunk in chunks:
-        size = len(dataset.flights_of(chunk))
-        wanted.append(list(range(position, position + size)))
-        position += size
-    number = {rows[0]: chunk for rows, chunk in zip(wanted, chunks, strict=True)}
-    with task("flying", len(at)) as flying:
-        for rows, flown in fly_in_chunks(heli, [plans[i] for i in at], workers, wanted):
-            dataset.write(
-                number[rows[0]],
-                np.stack([_values(data, kept, len(dataset.time)) for data in flown]),
-                np.array([(data.kept - 1) * data.plan.dt for data in flown]),
-                np.array([data.lost >= 0 for data in flown]),
-            )
-            done += len(rows)
-            flying.to(done - len(plans) + len(at))
+    with task("flying", missing) as flying:
+        for chunk, flown in _flown(heli, plans, dataset, workers):
+            dataset.write(chunk, *flown)
+            done += len(dataset.flights_of(chunk))
+            flying.to(done - len(plans) + missing)
             if progress is not None:
                 progress(done, len(plans))
     return dataset
+
+
+Rows = tuple[Array, Array, Array]
+"""Of a chunk of flights: values (flight, time, signal), duration and lost (flight)."""
+
+
+def _flown(
+    heli: Helicopter,
+    plans: Sequence[FlightPlan],
+    dataset: FlightDataset,
+    workers: int | Executor | None,
+) -> Iterator[tuple[int, Rows]]:
+    """Every missing chunk of the dataset, as it is flown."""
+    chunks = {k: [plans[i] for i in dataset.flights_of(k)] for k in dataset.missing_chunks}
+    rows = partial(_rows, kept=dataset.signals, longest=len(dataset.time))
+    if isinstance(workers, Executor):
+        work = [_Chunk(k, heli, tuple(some)) for k, some in chunks.items()]
+        ahead = 2 * workers_of(None)
+        with closing(as_done(workers, partial(_elsewhere, rows), work, ahead)) as answers:
+            for chunk, future in answers:
+                yield chunk.number, future.result()
+        return
+    missing = [plan for some in chunks.values() for plan in some]
+    ends = list(accumulate(map(len, chunks.values()), initial=0))
+    number = dict(zip(ends, chunks, strict=False))
+    places = [range(first, end) for first, end in pairwise(ends)]
+    for done, flown in fly_in_chunks(heli, missing, workers, places):
+        yield number[done[0]], rows(flown)
+
+
+class _Chunk(NamedTuple):
+    number: int
+    heli: Helicopter
+    plans: tuple[FlightPlan, ...]
+
+
+def _elsewhere(rows: Callable[[list[FlightData]], Rows], chunk: _Chunk) -> Rows:
+    every = range(len(chunk.plans))
+    ((_, flown),) = fly_in_chunks(chunk.heli, chunk.plans, 1, [every])
+    return rows(flown)
+
+
+def _rows(flown: Sequence[FlightData], kept: Sequence[Signal], longest: int) -> Rows:
+    return (
+        np.stack([_values(data, kept, longest) for data in flown]),
+        np.array([(data.kept - 1) * data.plan.dt for data in flown]),
+        np.array([data.lost >= 0 for data in flown]),
+    )
 
 
 def _kept(

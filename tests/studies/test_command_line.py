@@ -538,10 +538,10 @@ def test_help_and_version_succeed(run):
             },
         ),
         (
-            ["campaign", "--seeds", "4"],
+            ["campaign", "--seeds", "4", "--out", "c.zarr", "--workers", "1"],
             "campaign",
             "run_campaign",
-            {"seeds": 4, "vehicle": "xcell60"},
+            {"seeds": 4, "vehicle": "xcell60", "path": Path("c.zarr")},
         ),
     ],
 )

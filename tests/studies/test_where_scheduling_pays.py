@@ -7,12 +7,14 @@ import numpy as np
 from identification import fit, scores
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns import pays
+from studies.campaigns.runners import Here
 from studies.transition.flights import FlightPlan, autopilot_for
 
 
 def test_every_output_of_every_axis_is_judged_and_counted():
     short = {"short": FlightPlan(ramps=3)}
-    lines = list(pays.where_scheduling_pays(0, "xcell60", short))
+    with Here() as here:
+        lines = list(pays.where_scheduling_pays(0, "xcell60", short, on=here))
     assert [line.output for line in lines] == [
         output for axis in pays.AXES for output in axis.outputs
     ]
@@ -34,7 +36,7 @@ def test_the_models_are_those_of_the_study_with_a_moving_trim(ideal):
     training, test = plan.training(ideal, autopilot), plan.test(ideal, autopilot)
     own = scores(fit(pays.LATERAL.structure(), training), test).by_horizon
     assert pays.LATERAL.structure().offset_rate
-    for line in pays.where_scheduling_pays(0, "xcell60", {"short": plan}):
+    for line in pays.where_scheduling_pays(0, "xcell60", {"short": plan}, on=Here()):
         if line.axis == pays.LATERAL.name:
             assert {h: line.lpv[h][0] for h in HORIZONS} == {h: own[h][line.output] for h in own}
 
