@@ -29,8 +29,8 @@ FIRST_PAGES = ("symheli", "identification", "synthesis")
 
 
 def public():
-    """(package, name, room) of every public class and function, once: where it is imported from first, and the
-    package whose file it is written in.
+    """(package, name, room) of every public class and function, once: where it is imported from
+    first, and the room of the file it is written in.
     """
     seen = set()
     for package in PACKAGES:
@@ -111,10 +111,7 @@ def _index(rooms):
         text.append("")
     text.append(".. toctree::\n   :hidden:\n")
     text += [
-        f"   {room}"
-        for package in FIRST_PAGES
-        for room in rooms
-        if room.split(".")[0] == package
+        f"   {room}" for package in FIRST_PAGES for room in rooms if room.split(".")[0] == package
     ]
     return "\n".join(text) + "\n"
 
