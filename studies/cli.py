@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(as_json(output.data) if arguments.json else output.text, flush=True)
             return output.status
         except SymheliError as error:
-            return _fail(" ".join(str(error).split()))
+            return _fail("\n  ".join(" ".join(s.split()) for s in str(error).splitlines()))
         except KeyboardInterrupt:
             print(f"\nsymheli: interrupted; {arguments.kept(arguments)}", file=sys.stderr)
             return 130
