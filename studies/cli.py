@@ -110,7 +110,7 @@ def parser() -> Parser:
 
 def _fail(error: Exception, asks_json: bool, sentence: str = "", status: int = 1) -> int:
     """Say what failed, as `sentence` or in the words of the error, and return the exit status."""
-    sentence = sentence or " ".join(str(error).split())
+    sentence = sentence or "\n  ".join(" ".join(s.split()) for s in str(error).splitlines())
     print(f"symheli: {sentence}", file=sys.stderr)
     if asks_json:
         told = {"error": {"type": type(error).__name__, "message": sentence}}

@@ -1,4 +1,4 @@
-"""symheli vehicles: which airframes come along."""
+"""symheli vehicles: which airframes come along, and a file to start from."""
 
 from __future__ import annotations
 
@@ -8,16 +8,48 @@ from studies.output import Output
 
 HELP = (
     "list the packaged airframes and identified models, their sources, and how much of each is"
-    " assumed"
+    " assumed; print a vehicle file to start from, or the reference of its entries"
 )
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """No options of its own."""
+    """Which airframe, and in which form."""
+    parser.add_argument(
+        "vehicle", nargs="?", help="one of them, or a vehicle file: checked, and summarised"
+    )
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument(
+        "--toml",
+        action="store_true",
+        help="print a whole vehicle file to start from (default: that of xcell60)",
+    )
+    form.add_argument(
+        "--reference",
+        action="store_true",
+        help="print every part and entry of a vehicle file: meaning, units, plausible range",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Output:
-    """Name, title, source and assumptions of each."""
+    """Name, title, source and assumptions of each; a vehicle file; the reference."""
+    from symheli.airframe.vehicle import load_vehicle
+    from symheli.airframe.written import as_toml, reference
+
+    if arguments.reference:
+        text = reference()
+        return Output(text.rstrip("\n"), {"reference": text})
+    if arguments.toml:
+        text = as_toml(load_vehicle(arguments.vehicle or "xcell60"))
+        return Output(text.rstrip("\n"), {"toml": text})
+    if arguments.vehicle:
+        v = load_vehicle(arguments.vehicle)
+        listed = (v.name, v.title, v.source, len(v.quantities), v.assumed)
+        return Output(_lines(listed), _data(listed))
+    return _list()
+
+
+def _list() -> Output:
+    """Everything that comes along."""
     from symheli.airframe.identified_models import identified_model, identified_models
     from symheli.airframe.vehicle import load_vehicle, vehicles
 

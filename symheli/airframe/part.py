@@ -9,13 +9,9 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
-from symheli.components import Component, Effect, Flow, Motion
+from symheli.airframe.sections import PLACE
+from symheli.components import Component, Effect, Entry, Flow, Motion
 from symheli.values.signal import Signal
-
-PLACE = {"x": "m", "y": "m", "z": "m"}
-"""Optional entries of a component's section: its reference point from the c.g., body axes (x
-forward, y right, z down).
-"""
 
 
 @dataclass(frozen=True)
@@ -25,7 +21,8 @@ class Part:
     suffix: added to the names of its states, flow and switches; empty for the first of a kind, "_"
     + section for the others. controls: {control of the component: {control of the vehicle: gain}}
     where they differ. flow: {needed: name it is taken from} where they differ. placed: whether it
-    has an x, y or z. given: the component's optional entries it has.
+    has an x, y or z. given: the component's optional entries it has. kind: the component as the
+    file names it.
     """
 
     section: str
@@ -35,32 +32,19 @@ class Part:
     flow: Mapping[str, str] = field(default_factory=dict)
     placed: bool = False
     given: tuple[str, ...] = ()
+    kind: str = ""
 
     @property
-    def parameters(self) -> Mapping[str, str]:
-        """{entry: unit} of its numbers."""
-        optional = {entry: self.component.optional[entry] for entry in self.given}
-        return {**self.component.parameters, **optional, **(PLACE if self.placed else {})}
-
-    @property
-    def positive(self) -> tuple[str, ...]:
-        """Entries that must be > 0."""
-        return self.component.positive
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """{entry: least} of those that must be whole numbers."""
-        return self.component.counts
+    def entries(self) -> dict[str, Entry]:
+        """What it asks of its section, without the optional entries that are not there."""
+        own = self.component.entries
+        asked = {name: e for name, e in own.items() if not e.optional or name in self.given}
+        return {**asked, **(PLACE if self.placed else {})}
 
     @property
     def subscript(self) -> str:
         """What marks its forces in print."""
         return self.component.subscript + self.suffix
-
-    @property
-    def symbols(self) -> Mapping[str, str]:
-        """{entry: LaTeX} of its numbers."""
-        return self.component.symbols
 
     @property
     def states(self) -> tuple[Signal, ...]:

@@ -10,13 +10,15 @@ from typing import Any, NamedTuple
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.units import dimension, to_si, units_of
 
-KEYS = ("value", "unit", "source", "assumed", "ref")
+KEYS = ("value", "unit", "source", "assumed", "unusual", "ref")
 """What an entry of a data file may say."""
 
 
 class Quantity(NamedTuple):
     """A value in SI, its SI unit, where it was published, whether it is an assumption (`source`
     then says why), and the name of the entry it is taken from where it has no value of its own.
+
+    `unusual`: meant although no other airframe has it. `given`: the unit it was written in.
     """
 
     value: float
@@ -24,47 +26,59 @@ class Quantity(NamedTuple):
     source: str
     assumed: bool = False
     ref: str = ""
+    unusual: bool = False
+    given: str = ""
 
 
 def read_quantity(where: str, table: Any, unit: str) -> Quantity:
     """A quantity from `{ value = ..., unit = ..., source = ... }`, converted to `unit`.
 
-    `where` begins the message of every `InputError`: file, line and entry.
+    `where` begins the message of the `InputError`, which says everything that is wrong with it.
     """
     if not isinstance(table, Mapping):
         raise InputError(
             f"{where}: a bare number has no unit: write {{ value = {table}, unit = {unit!r}, source"
             " = ... }"
         )
-    for key in table:
-        if key not in KEYS:
-            raise InputError(f"{where}: {UnknownNameError('key', key, KEYS)}")
     value, given = table.get("value"), table.get("unit")
-    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-        raise InputError(f"{where}: expected a finite number as value, got {value!r}")
+    wrong = [str(UnknownNameError("key", key, KEYS)) for key in table if key not in KEYS]
+    number = math.nan
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value)
+    if not math.isfinite(number):
+        wrong.append(f"expected a finite number as value, got {value!r}")
+    factor = 1.0
     if given is None:
-        raise InputError(f"{where}: the unit is missing: expected unit = {unit!r}{_others(unit)}")
-    try:
-        factor = to_si(str(given))[0]
-        powers = dimension(str(given))
-    except UnknownNameError as error:
-        raise InputError(f"{where}: {_misspelt(str(given), float(value), unit)}") from error
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from error
-    if powers != dimension(unit):
-        raise InputError(
-            f"{where}: expected {unit}{_others(unit)}, got {value} {given}, which is another kind"
-            " of quantity"
-        )
-    if not isinstance(table.get("assumed", False), bool):
-        raise InputError(f"{where}: assumed must be true or false, got {table['assumed']!r}")
+        wrong.append(f"the unit is missing: expected unit = {unit!r}{_others(unit)}")
+    else:
+        try:
+            factor = to_si(str(given), unit)[0]
+            if dimension(str(given), unit) != dimension(unit):
+                wrong.append(
+                    f"expected {unit}{_others(unit)}, got {value} {given}, which is another kind"
+                    " of quantity"
+                )
+        except UnknownNameError:
+            wrong.append(_misspelt(str(given), number, unit))
+        except InputError as error:
+            wrong.append(str(error))
+    for key in ("assumed", "unusual"):
+        if not isinstance(table.get(key, False), bool):
+            wrong.append(f"{key} must be true or false, got {table[key]!r}")
     if not table.get("source"):
-        raise InputError(
-            f"{where}: every number needs a source; of an assumed one (assumed = true) the source"
-            " says why this value"
+        wrong.append(
+            "every number needs a source; of an assumed one (assumed = true) the source says why"
+            " this value"
         )
+    if wrong:
+        raise InputError(f"{where}: {'; '.join(wrong)}")
     return Quantity(
-        factor * float(value), unit, str(table["source"]), bool(table.get("assumed", False))
+        factor * number,
+        unit,
+        str(table["source"]),
+        bool(table.get("assumed", False)),
+        unusual=bool(table.get("unusual", False)),
+        given=str(given),
     )
 
 
@@ -79,7 +93,9 @@ def _misspelt(given: str, value: float, unit: str) -> str:
     start = f"unknown unit {given!r}; expected {unit}{_others(unit)}"
     if not near:
         return start
-    factor = to_si(near[0])[0]
+    factor = to_si(near[0], unit)[0]
     return f"{start}; did you mean {near[0]!r}" + (
-        f", {value:g} {near[0]} = {factor * value:.6g} {unit}?" if near[0] != unit else "?"
+        f", {value:g} {near[0]} = {factor * value:.6g} {unit}?"
+        if near[0] != unit and math.isfinite(value)
+        else "?"
     )

@@ -12,7 +12,9 @@ from pathlib import Path
 from symheli.airframe.part import Part
 from symheli.airframe.plausibility import impossibilities
 from symheli.airframe.quantity import Quantity
-from symheli.airframe.vehicle_file import LINEAR, VehicleFile
+from symheli.airframe.readable import text_of
+from symheli.airframe.vehicle_file import LINEAR, VehicleFile, entries_of
+from symheli.components import Entry
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.summary import summarized
 from symheli.values.units import dimension
@@ -29,6 +31,11 @@ class Vehicle:
     components: Mapping[str, Part]
 
     __repr__ = summarized
+
+    @property
+    def entries(self) -> dict[str, Mapping[str, Entry]]:
+        """What each section asks, {section: {entry: `Entry`}}."""
+        return entries_of(self.sections, self.components)
 
     def values(self, section: str) -> dict[str, float]:
         """{entry: value in SI} of a section."""
@@ -68,7 +75,7 @@ class Vehicle:
                 else q
             )
         )
-        for section, entry, wrong in impossibilities(changed.sections, changed.components):
+        for section, entry, wrong in impossibilities(changed.sections, changed.entries):
             raise InputError(f"{self.title}, {section}.{entry}: {wrong}")
         return changed
 
@@ -127,8 +134,8 @@ def vehicles() -> list[str]:
 
 
 def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
-    """Read a packaged airframe by name, or any TOML file by path. Raises `InputError` naming file,
-    line, entry and unit.
+    """Read a packaged airframe by name, or any TOML file by path. Raises `InputError` with every
+    wrong or missing entry of the file: its line, what was expected and what came.
     """
     given = os.fspath(name_or_path)
     if given.endswith(".toml"):
@@ -137,24 +144,21 @@ def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
             raise InputError(
                 f"no vehicle file at {given}; packaged airframes: {', '.join(vehicles())}"
             )
-        file, name = VehicleFile(given, path.read_text(encoding="utf-8"), path.parent), path.stem
+        file, name = VehicleFile(given, text_of(path), path.parent), path.stem
     else:
         if given not in vehicles():
             raise UnknownNameError("vehicle", given, vehicles())
-        file, name = (
-            VehicleFile(
-                given,
-                (resources.files("symheli.airframe.vehicles") / f"{given}.toml").read_text(
-                    encoding="utf-8"
-                ),
-            ),
-            given,
-        )
-    parts = file.parts()
+        file, name = VehicleFile(given, packaged_text(given)), given
+    parts, quantities = file.read()
     return Vehicle(
         name,
         str(file.tables.get("title", name)),
         str(file.tables.get("source", "")),
-        file.quantities(parts),
+        quantities,
         parts,
     )
+
+
+def packaged_text(name: str) -> str:
+    """The file of a packaged airframe."""
+    return (resources.files("symheli.airframe.vehicles") / f"{name}.toml").read_text("utf-8")

@@ -1,31 +1,22 @@
-"""Reading a vehicle file: every message names file, line, entry and the unit expected."""
+"""Reading a vehicle file: one message names every wrong or missing entry with its line."""
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
-import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from symheli.airframe.part import PLACE, Part
-from symheli.airframe.plausibility import impossibilities
+from symheli.airframe.part import Part
+from symheli.airframe.plausibility import implausibilities, impossibilities
 from symheli.airframe.quantity import Quantity, read_quantity
-from symheli.components import Component, find
+from symheli.airframe.readable import UNREADABLE, readable
+from symheli.airframe.sections import CONTROLS, FIXED, PLACE
+from symheli.components import Component, Entry, find, packaged
 from symheli.errors import InputError, UnknownNameError
-
-BODY = {"mass": "kg", "Ixx": "kg m^2", "Iyy": "kg m^2", "Izz": "kg m^2"}
-DRIVETRAIN = {
-    "nominal_speed": "rad/s",
-    "inertia": "kg m^2",
-    "max_power": "W",
-    "governor_kp": "s/rad",
-    "governor_ki": "1/rad",
-}
-CONTROLS = dict.fromkeys(("d_lon", "d_lat", "d_col", "d_ped"), "rad")
-FIXED = {"body": BODY, "drivetrain": DRIVETRAIN, "controls": CONTROLS}
-"""Sections every airframe has, {entry: unit}; every other section is a component."""
+from symheli.values.units import dimension
 
 WIRING = ("component", "controls", "flow")
 """Keys of a component's section that are no quantities."""
@@ -35,82 +26,143 @@ LINEAR = ".linear.toml"
 
 
 class VehicleFile:
-    """The text of a vehicle file, its tables, and where in the text each entry stands."""
+    """The text of a vehicle file, its tables, where in the text each entry stands, and everything
+    that was found wrong.
+    """
 
     def __init__(self, path: str, text: str, folder: Path | None = None):
         self.path, self.lines, self.folder = path, text.splitlines(), folder
-        try:
-            self.tables: Mapping[str, Any] = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{path} is not valid TOML: {error}") from error
+        self.tables, unread = readable(text)
+        self._written: dict[str, str] = {}
+        """{section: name it has in the text}, where that is misspelt."""
+        self._entries: dict[tuple[str, str], str] = {}
+        """{(section, entry): name it has in the text}, where that is misspelt."""
+        self._asked: Mapping[str, Mapping[str, Entry]] = {}
+        self.problems: list[tuple[int, str]] = [
+            (line, f"line {line}, not valid TOML: {wrong}") for line, wrong in unread
+        ]
 
-    def parts(self) -> dict[str, Part]:
-        """Every section that is not fixed, as a part, in the order of the file."""
+    def read(self) -> tuple[dict[str, Part], dict[str, dict[str, Quantity]]]:
+        """The parts in the order of the file, and every number of every section.
+
+        Raises one `InputError` with everything that is wrong, in the order of the file.
+        """
+        tables = self._sections()
+        parts = self._parts(tables)
+        entries = entries_of(tables, parts)
+        self._asked = entries
+        quantities = self._quantities(tables, parts, entries)
+        for section, entry, wrong in impossibilities(quantities, entries):
+            self._problem(section, entry, wrong)
+        for section, entry, wrong in implausibilities(self._sound(quantities), entries):
+            self._problem(section, entry, wrong)
+        if self.problems:
+            said = [text for _, text in sorted(self.problems, key=lambda problem: problem[0])]
+            if len(said) == 1:
+                raise InputError(f"{self.path}, {said[0]}")
+            raise InputError("\n  ".join([f"{self.path}: {len(said)} things to put right", *said]))
+        return parts, quantities
+
+    def _parts(self, tables: Mapping[str, dict[str, Any]]) -> dict[str, Part]:
+        """Every section that is not fixed, as a part; one that cannot be is noted and left out."""
         parts: dict[str, Part] = {}
         taken: set[str] = set()
-        for section, table in self._sections().items():
-            if section not in FIXED:
-                if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", section):
-                    raise InputError(
-                        f"{self.where(section)}: a section is named with letters, digits and single"
-                        " underscores"
-                    )
-                component = self._component(section, table)
-                names = {
-                    f"[{table.get('component', section)}]",
-                    *component.states,
-                    *component.makes,
-                }
-                suffix = f"_{section}" if names & taken else ""
-                taken |= {f"{name}{suffix}" for name in names}
-                mix, flow = self._controls(section, table), self._flow(section, table, component)
-                given = tuple(entry for entry in component.optional if entry in table)
-                parts[section] = Part(
-                    section,
-                    component,
-                    suffix,
-                    mix,
-                    flow,
-                    any(axis in table for axis in PLACE),
-                    given,
+        whole = True
+        for section, table in tables.items():
+            if section in FIXED:
+                continue
+            if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", section):
+                self._problem(
+                    section, "", "a section is named with letters, digits and single underscores"
                 )
+                whole = False
+                continue
+            kind = str(table.get("component", section))
+            try:
+                component = self._component(section, kind)
+            except InputError as error:
+                self._problem(section, "component", str(error))
+                whole = False
+                continue
+            names = {f"[{kind}]", *component.states, *component.makes}
+            suffix = f"_{section}" if names & taken else ""
+            taken |= {f"{name}{suffix}" for name in names}
+            optional = (name for name, entry in component.entries.items() if entry.optional)
+            parts[section] = Part(
+                section,
+                component,
+                suffix,
+                self._controls(section, table),
+                self._flow(section, table, component),
+                any(axis in table for axis in PLACE),
+                tuple(entry for entry in optional if entry in table),
+                kind,
+            )
+        if whole:
+            self._flow_is_made(parts)
         return parts
 
-    def quantities(self, parts: Mapping[str, Part]) -> dict[str, dict[str, Quantity]]:
-        """Every number of every section."""
-        tables = self._sections()
+    def _flow_is_made(self, parts: Mapping[str, Part]) -> None:
+        """Note every flow that a part needs and no part makes, with the part that would."""
+        made = {name for part in parts.values() for name in part.makes}
+        for section, part in parts.items():
+            for name in part.needs:
+                if name not in made:
+                    makers = [kind for kind in packaged() if name in find(kind).makes]
+                    add = f"; add a section [{makers[0]}]" if makers else ""
+                    self._problem(
+                        section,
+                        "flow" if part.flow else "",
+                        f"needs the flow {name}, which no part makes{add} (made are"
+                        f" {', '.join(sorted(made)) or 'none'})",
+                    )
+
+    def _quantities(
+        self,
+        tables: Mapping[str, dict[str, Any]],
+        parts: Mapping[str, Part],
+        entries: Mapping[str, Mapping[str, Entry]],
+    ) -> dict[str, dict[str, Quantity]]:
+        """Every number that can be read; what cannot, and what is missing or unknown, is noted."""
         for required in FIXED:
             if required not in tables:
-                raise InputError(f"{self.path}: section [{required}] is missing")
-        wanted = {}
-        for section, table in tables.items():
-            units = FIXED.get(section) or parts[section].parameters
-            for entry in table:
-                if entry not in (*units, *(() if section in FIXED else (*WIRING, *PLACE))):
-                    raise InputError(
-                        f"{self.where(section, entry)}: {UnknownNameError('entry', entry, units)}"
-                    )
-            wanted[section] = units
-        out: dict[str, dict[str, Quantity]] = {section: {} for section in wanted}
-        for by_reference in (False, True):  # values first: a wrong one is reported where it stands
-            for section, units in wanted.items():
-                for entry, unit in units.items():
-                    if _refers(tables[section].get(entry)) == by_reference:
-                        out[section][entry] = self._quantity(section, entry, unit)
-        for section, entry, wrong in impossibilities(out, parts):
-            raise InputError(f"{self.where(section, entry)}: {wrong}")
-        return out
-
-    def where(self, section: str, entry: str = "") -> str:
-        """File, line and name of an entry (or of a section), as far as the text tells."""
-        line = self._line(section, entry) or self._line(section, "")
-        name = f"{section}.{entry}" if entry else f"[{section}]"
-        return f"{self.path}, line {line}, {name}" if line else f"{self.path}, {name}"
+                asked = ", ".join(f"{name} ({e.unit})" for name, e in FIXED[required].items())
+                self.problems.append(
+                    (len(self.lines) + 1, f"section [{required}] is missing: it has {asked}")
+                )
+        out: dict[str, dict[str, Quantity]] = {section: {} for section in entries}
+        for section, asked in entries.items():
+            table = tables[section]
+            known = (*asked, *(() if section in FIXED else (*WIRING, *PLACE)))
+            if section in parts:
+                known += tuple(parts[section].component.entries)
+            for name in table:
+                if name not in known:
+                    self._problem(section, name, str(UnknownNameError("entry", name, asked)))
+                    free = [
+                        e for e in asked if e not in table and (section, e) not in self._entries
+                    ]
+                    for near in difflib.get_close_matches(name, free, n=1, cutoff=0.6):
+                        self._entries[section, near] = name
+        for by_reference in (False, True):
+            for section, asked in entries.items():
+                for name, entry in asked.items():
+                    written = self._entries.get((section, name), name)
+                    if _refers(tables[section].get(written)) != by_reference:
+                        continue
+                    try:
+                        out[section][name] = self._quantity(section, name, entry, out)
+                    except InputError as error:
+                        self._problem(section, written, str(error))
+                    except _AlreadySaidError:
+                        pass
+        return {s: {e: of[e] for e in entries[s] if e in of} for s, of in out.items()}
 
     def _line(self, section: str, entry: str) -> int | None:
         """Line of `entry =` below [section], of `section.entry =`, or of [section.entry]; of
         [section] without an entry.
         """
+        section = self._written.get(section, section)
         wanted = [section, entry] if entry else [section]
         header: list[str] = []
         for number, line in enumerate(self.lines, 1):
@@ -126,74 +178,175 @@ class VehicleFile:
         return None
 
     def _sections(self) -> dict[str, dict[str, Any]]:
-        return {key: value for key, value in self.tables.items() if isinstance(value, dict)}
+        """The sections; one whose name is nearly that of a missing fixed or a packaged one is taken
+        for that, and noted.
+        """
+        found = {key: value for key, value in self.tables.items() if isinstance(value, dict)}
+        for key in self.tables:
+            if key not in found and key not in ("title", "source"):
+                self._problem(
+                    key, "", f"stands in no section: put it below one of {', '.join(FIXED)}, ..."
+                )
+        known = [*FIXED, *packaged()]
+        out = {}
+        for name, table in found.items():
+            near = difflib.get_close_matches(
+                name, [k for k in known if k not in found and k not in out], n=1, cutoff=0.6
+            )
+            if name in known or "component" in table or not near:
+                out[name] = table
+            else:
+                self._problem(name, "", f"unknown component {name!r}; did you mean {near[0]!r}?")
+                self._written[near[0]] = name
+                out[near[0]] = table
+        return out
 
-    def _quantity(self, section: str, entry: str, unit: str) -> Quantity:
-        where, table = self.where(section, entry), self.tables[section].get(entry)
-        if table is None and entry in PLACE:
+    def _problem(self, section: str, entry: str, wrong: str) -> None:
+        """Note what is wrong with an entry (or a section)."""
+        line = self._line(section, entry) or self._line(section, "")
+        name = f"{section}.{entry}" if entry else f"[{section}]"
+        place = f"line {line}, {name}" if line else name
+        self.problems.append((line or 0, f"{place}: {wrong}"))
+
+    def _sound(
+        self, quantities: Mapping[str, dict[str, Quantity]]
+    ) -> dict[str, dict[str, Quantity]]:
+        """The numbers nothing was found wrong with."""
+        said = " ".join(text for _, text in self.problems)
+        return {
+            section: {name: q for name, q in of.items() if f" {section}.{name}:" not in f" {said}"}
+            for section, of in quantities.items()
+        }
+
+    def _quantity(
+        self,
+        section: str,
+        name: str,
+        entry: Entry,
+        known: Mapping[str, Mapping[str, Quantity]],
+    ) -> Quantity:
+        """An entry, from those with a value `known` where it refers to one; the message does not
+        say where.
+        """
+        written = self._entries.get((section, name), name)
+        table = self.tables[self._written.get(section, section)].get(written)
+        unit = entry.unit
+        if table is None and name in PLACE:
             return Quantity(0.0, unit, "not given: at the c.g.")
         if table is None:
             raise InputError(
-                f"{where}: missing; add {entry} = {{ value = ..., unit = {unit!r}, source = ... }}"
+                f"missing ({entry.meaning}); add {name} = {{ value = ..., unit = {unit!r}, source ="
+                " ... }"
             )
-        if _refers(table):
-            other_section, _, other_entry = str(table["ref"]).partition(".")
-            target = self.tables.get(other_section, {})
-            target = target.get(other_entry) if isinstance(target, Mapping) else None
-            if len(table) > 1 or not isinstance(target, Mapping) or "ref" in target:
-                raise InputError(
-                    f"{where}: {{ ref = 'section.entry' }} must name an entry with a value and say"
-                    f" nothing else, got {table}"
-                )
-            return read_quantity(where, target, unit)._replace(ref=str(table["ref"]))
-        return read_quantity(where, table, unit)
-
-    def _component(self, section: str, table: Mapping[str, Any]) -> Component:
-        try:
-            return find(str(table.get("component", section)), self.folder)
-        except UnknownNameError as error:
+        if table == UNREADABLE:
+            raise _AlreadySaidError
+        if not _refers(table):
+            return _read(table, unit)
+        target = self._target(table)
+        if len(table) > 1 or target is None or _refers(target):
+            if target is not None and _refers(target) and self._target(target) is None:
+                raise _AlreadySaidError
             raise InputError(
-                f"{self.where(section, 'component')}: {error}; or name a file: component ="
-                f" './{section}.py'"
-            ) from error
-        except InputError as error:
-            raise InputError(f"{self.where(section, 'component')}: {error}") from error
+                "{ ref = 'section.entry' } must name an entry with a value and say nothing else,"
+                f" got {table}"
+            )
+        ref = str(table["ref"])
+        where, _, other = ref.partition(".")
+        if other not in known.get(where, {}):
+            raise _AlreadySaidError
+        if dimension(known[where][other].unit) != dimension(unit):
+            raise InputError(
+                f"expected {unit}, got the {known[where][other].unit} of {ref}, which is another"
+                " kind of quantity"
+            )
+        return known[where][other]._replace(unit=unit, ref=ref)
+
+    def _target(self, table: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        """The entry that another refers to, as the file has it, a missing one as one that refers to
+        nothing; None where no section has such an entry.
+        """
+        section, _, entry = str(table["ref"]).partition(".")
+        asked = self.tables.get(self._written.get(section, section))
+        target = asked.get(self._entries.get((section, entry), entry)) if asked else None
+        if target is None and entry in self._asked.get(section, {}):
+            return {"ref": ""}
+        return target if isinstance(target, Mapping) else None
+
+    def _component(self, section: str, kind: str) -> Component:
+        try:
+            return find(kind, self.folder)
+        except UnknownNameError as error:
+            raise InputError(f"{error}; or name a file: component = './{section}.py'") from error
 
     def _controls(self, section: str, table: Mapping[str, Any]) -> dict[str, dict[str, float]]:
-        where, mixes = self.where(section, "controls"), table.get("controls", {})
+        """{control of the part: {control of the vehicle: gain}}; what cannot be is noted."""
+        mixes = table.get("controls", {})
         if not isinstance(mixes, Mapping) or not all(
             isinstance(mix, Mapping) for mix in mixes.values()
         ):
-            raise InputError(
-                f"{where}: expected {{ d_col = {{ d_col = 1.0, d_lon = 0.2 }} }}, for a control of"
-                f" the part its mix; got {mixes}"
+            self._problem(
+                section,
+                "controls",
+                "expected { d_col = { d_col = 1.0, d_lon = 0.2 } }, for a control of the part its"
+                f" mix; got {mixes}",
             )
+            return {}
         for name in (*mixes, *(control for mix in mixes.values() for control in mix)):
             if name not in CONTROLS:
-                raise InputError(f"{where}: {UnknownNameError('control', name, CONTROLS)}")
+                self._problem(section, "controls", str(UnknownNameError("control", name, CONTROLS)))
         for gain in (gain for mix in mixes.values() for gain in mix.values()):
             if (
                 isinstance(gain, bool)
                 or not isinstance(gain, int | float)
                 or not math.isfinite(gain)
             ):
-                raise InputError(f"{where}: a gain must be a finite number (rad/rad), got {gain!r}")
+                self._problem(
+                    section, "controls", f"a gain must be a finite number (rad/rad), got {gain!r}"
+                )
+                return {}
         return {
             name: {control: float(gain) for control, gain in mix.items()}
             for name, mix in mixes.items()
         }
 
     def _flow(self, section: str, table: Mapping[str, Any], component: Component) -> dict[str, str]:
-        where, flow = self.where(section, "flow"), table.get("flow", {})
+        """{flow the part needs: whose it takes}; what cannot be is noted."""
+        flow = table.get("flow", {})
         if not isinstance(flow, Mapping):
-            raise InputError(
-                f"{where}: expected {{ V_imr = 'V_imr_aft_rotor' }}: for a flow the part needs,"
-                f" whose it takes, got {flow!r}"
+            self._problem(
+                section,
+                "flow",
+                "expected { V_imr = 'V_imr_aft_rotor' }: for a flow the part needs, whose it takes,"
+                f" got {flow!r}",
             )
+            return {}
         for name in flow:
             if name not in component.needs:
-                raise InputError(f"{where}: {UnknownNameError('flow', name, component.needs)}")
+                self._problem(section, "flow", str(UnknownNameError("flow", name, component.needs)))
         return {name: str(source) for name, source in flow.items()}
+
+
+class _AlreadySaidError(Exception):
+    """What is wrong was noted where it stands."""
+
+
+def entries_of(
+    sections: Iterable[str], parts: Mapping[str, Part]
+) -> dict[str, Mapping[str, Entry]]:
+    """What each section asks; sections that are neither fixed nor a part are left out."""
+    return {
+        section: FIXED[section] if section in FIXED else parts[section].entries
+        for section in sections
+        if section in FIXED or section in parts
+    }
+
+
+def _read(table: Any, unit: str) -> Quantity:
+    """`read_quantity` for a place that is said elsewhere."""
+    try:
+        return read_quantity("", table, unit)
+    except InputError as error:
+        raise InputError(str(error).removeprefix(": ")) from error
 
 
 def _refers(table: Any) -> bool:

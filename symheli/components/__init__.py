@@ -14,9 +14,10 @@ import pkgutil
 from pathlib import Path
 
 from symheli.components.component import Component, Effect, Flow, Motion, unnamed
+from symheli.components.entry import Entry
 from symheli.errors import InputError, UnknownNameError
 
-__all__ = ["Component", "Effect", "Flow", "Motion", "find", "unnamed"]
+__all__ = ["Component", "Effect", "Entry", "Flow", "Motion", "find", "packaged", "unnamed"]
 
 
 def find(name: str, folder: Path | None = None) -> Component:
@@ -27,10 +28,15 @@ def find(name: str, folder: Path | None = None) -> Component:
     """
     if name.endswith(".py"):
         return _from_file((folder or Path()) / name)
-    known = [m.name for m in pkgutil.iter_modules(__path__) if m.name not in ("component", "rotor")]
-    if name not in known:
-        raise UnknownNameError("component", name, known)
+    if name not in packaged():
+        raise UnknownNameError("component", name, packaged())
     return importlib.import_module(f"{__name__}.{name}").COMPONENT
+
+
+def packaged() -> list[str]:
+    """Names of the packaged components."""
+    shared = ("component", "entry", "rotor")
+    return [m.name for m in pkgutil.iter_modules(__path__) if m.name not in shared]
 
 
 def _from_file(path: Path) -> Component:

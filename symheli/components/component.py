@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+from symheli.components.entry import Entry
 from symheli.errors import InputError
 from symheli.values.signal import Signal
 
@@ -72,26 +73,21 @@ class Effect:
 class Component:
     """A part of the airframe: a pure function and what it must be given.
 
-    `parameters` {name: unit} come from the vehicle file, `optional` ones if they are there, those
-    in `positive` must be > 0, those in `counts` {name: least} whole numbers; `states` are its own;
-    it may use the flow in `needs` and makes the flow in `makes`. `evaluate(parameters, motion,
-    controls, own, flow)` returns an `Effect` under these names: where a vehicle has two of a kind
-    or puts one off the c.g., `symheli.airframe.part.Part` translates. In print, `subscript` marks
-    its forces and `symbols` {parameter: LaTeX} its parameters; without, their names do.
+    `parameters` {name: `Entry`} come from the vehicle file (a unit alone stands for an `Entry` of
+    that unit); `states` are its own; it may use the flow in `needs` and makes the flow in `makes`.
+    `evaluate(parameters, motion, controls, own, flow)` returns an `Effect` under these names: where
+    a vehicle has two of a kind or puts one off the c.g., `symheli.airframe.part.Part` translates.
+    In print, `subscript` marks its forces.
     """
 
     evaluate: Callable[
         [SimpleNamespace, Motion, Mapping[str, Any], Mapping[str, Any], Flow], Effect
     ]
-    parameters: Mapping[str, str]
+    parameters: Mapping[str, Entry | str]
     states: tuple[Signal, ...] = ()
     needs: tuple[str, ...] = ()
     makes: tuple[str, ...] = ()
-    positive: tuple[str, ...] = ()
-    counts: Mapping[str, int] = field(default_factory=dict)
-    optional: Mapping[str, str] = field(default_factory=dict)
     subscript: str = ""
-    symbols: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if reserved := {"x", "y", "z"} & set(self.parameters):
@@ -99,3 +95,11 @@ class Component:
                 f"parameters {', '.join(sorted(reserved))}: every part has a place x y z already;"
                 " choose other names"
             )
+
+    @property
+    def entries(self) -> dict[str, Entry]:
+        """Its `parameters`, each as an `Entry`."""
+        return {
+            name: Entry(entry) if isinstance(entry, str) else entry
+            for name, entry in self.parameters.items()
+        }

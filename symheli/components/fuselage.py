@@ -8,6 +8,7 @@ from typing import Any
 
 from symheli.codegen.symbolic import sqrt
 from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.entry import Entry
 
 
 def evaluate(
@@ -38,8 +39,15 @@ def evaluate(
 
 COMPONENT = Component(
     evaluate,
-    parameters={"area_x": "m^2", "area_y": "m^2", "area_z": "m^2"},
+    parameters={
+        "area_x": Entry(
+            "m^2", "drag area (drag by dynamic pressure) in flow from ahead", "S_x", "area"
+        ),
+        "area_y": Entry("m^2", "drag area in flow from the side", "S_y", "area"),
+        "area_z": Entry(
+            "m^2", "drag area in flow from above, the main rotor's downwash", "S_z", "area"
+        ),
+    },
     needs=("V_imr",),
     subscript="fus",
-    symbols={"area_x": "S_x", "area_y": "S_y", "area_z": "S_z"},
 )

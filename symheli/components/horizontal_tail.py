@@ -8,6 +8,7 @@ from typing import Any
 
 from symheli.codegen.symbolic import absolute, clip
 from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.entry import Entry
 
 
 def evaluate(
@@ -40,8 +41,11 @@ def evaluate(
 
 COMPONENT = Component(
     evaluate,
-    parameters={"area": "m^2", "lift_slope": "1/rad", "arm": "m"},
+    parameters={
+        "area": Entry("m^2", "area of the tail", "S_{ht}", "area"),
+        "lift_slope": Entry("1/rad", "lift-curve slope", r"C_{L\alpha,ht}", "lift slope"),
+        "arm": Entry("m", "distance behind the centre of gravity", "l_{ht}", "distance"),
+    },
     needs=("w_wake",),
     subscript="ht",
-    symbols={"area": "S_{ht}", "lift_slope": r"C_{L\alpha,ht}", "arm": "l_{ht}"},
 )

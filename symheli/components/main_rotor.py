@@ -8,6 +8,7 @@ from typing import Any
 
 from symheli.codegen.symbolic import absolute, sqrt
 from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.entry import Entry
 from symheli.components.rotor import disc, load
 from symheli.values.signal import Signal
 
@@ -113,48 +114,85 @@ def evaluate(
 COMPONENT = Component(
     evaluate,
     parameters={
-        "radius": "m",
-        "chord": "m",
-        "blades": "1",
-        "lift_slope": "1/rad",
-        "profile_drag": "1",
-        "ct_max": "1",
-        "hub_height": "m",
-        "hub_stiffness": "N m/rad",
-        "bar_lock_number": "1",
-        "lateral_gain": "rad/rad",
-        "longitudinal_gain": "rad/rad",
-        "flapping_fraction": "1",
-        "nominal_speed": "rad/s",
-        "inflow_efficiency": "1",
+        "radius": Entry("m", "radius of the disc", "R_{mr}", "rotor radius", positive=True),
+        "chord": Entry("m", "chord of a blade, mean", "c_{mr}", "chord", positive=True),
+        "blades": Entry("1", "number of blades", "b_{mr}", "blades", least=2),
+        "lift_slope": Entry(
+            "1/rad",
+            "lift-curve slope of the blade section, dC_L/dalpha",
+            "a_{mr}",
+            "lift slope",
+            positive=True,
+        ),
+        "profile_drag": Entry(
+            "1",
+            "profile drag coefficient C_D0 of the blade section",
+            "C_{D0,mr}",
+            "drag coefficient",
+        ),
+        "ct_max": Entry(
+            "1",
+            "largest thrust coefficient T/(rho (Om R)^2 pi R^2), at blade stall",
+            "C_{T max,mr}",
+            "thrust coefficient",
+            positive=True,
+        ),
+        "hub_height": Entry(
+            "m", "height of the hub above the centre of gravity", "h_{mr}", "distance"
+        ),
+        "hub_stiffness": Entry(
+            "N m/rad",
+            "torsional stiffness of the hub, moment by flapping angle; 0: teetering",
+            r"K_\beta",
+            "hub stiffness",
+        ),
+        "bar_lock_number": Entry(
+            "1",
+            "Lock number of the stabiliser bar: flapping takes 16/(gamma Om) seconds",
+            r"\gamma_{fb}",
+            "Lock number",
+            positive=True,
+        ),
+        "lateral_gain": Entry(
+            "rad/rad",
+            "steady lateral flapping by lateral cyclic at nominal speed",
+            "B_{nom}",
+            "flapping gain",
+        ),
+        "longitudinal_gain": Entry(
+            "rad/rad",
+            "steady longitudinal flapping by longitudinal cyclic at nominal speed",
+            "A_{nom}",
+            "flapping gain",
+        ),
+        "flapping_fraction": Entry(
+            "1",
+            "share of the rotor's own flapping with flight speed that the hub leaves, K_mu",
+            r"K_\mu",
+            "fraction",
+        ),
+        "nominal_speed": Entry(
+            "rad/s",
+            "rotor speed at which the flapping gains hold",
+            r"\Omega_{nom}",
+            "rotor speed",
+            positive=True,
+        ),
+        "inflow_efficiency": Entry(
+            "1",
+            "eta_w of momentum theory: 1 ideal, less with losses",
+            r"\eta_w",
+            "efficiency",
+            positive=True,
+        ),
     },
     states=(Signal("a1"), Signal("b1")),
-    makes=("V_imr", "lam0", "C_T", "T_mr", "Q_mr"),
-    positive=(
-        "radius",
-        "chord",
-        "lift_slope",
-        "ct_max",
-        "bar_lock_number",
-        "nominal_speed",
-        "inflow_efficiency",
+    makes=(
+        "V_imr",
+        "lam0",
+        "C_T",
+        "T_mr",
+        "Q_mr",
     ),
-    counts={"blades": 2},
     subscript="mr",
-    symbols={
-        "radius": "R_{mr}",
-        "chord": "c_{mr}",
-        "blades": "b_{mr}",
-        "lift_slope": "a_{mr}",
-        "profile_drag": "C_{D0,mr}",
-        "ct_max": "C_{T max,mr}",
-        "hub_height": "h_{mr}",
-        "hub_stiffness": r"K_\beta",
-        "bar_lock_number": r"\gamma_{fb}",
-        "lateral_gain": "B_{nom}",
-        "longitudinal_gain": "A_{nom}",
-        "flapping_fraction": r"K_\mu",
-        "nominal_speed": r"\Omega_{nom}",
-        "inflow_efficiency": r"\eta_w",
-    },
 )

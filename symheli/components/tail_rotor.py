@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.entry import Entry
 from symheli.components.rotor import Load, disc, linear_load, load
 from symheli.errors import InputError
 
@@ -67,36 +68,55 @@ def _thrust_law(par: SimpleNamespace) -> Callable[..., Load]:
 COMPONENT = Component(
     evaluate,
     parameters={
-        "radius": "m",
-        "chord": "m",
-        "blades": "1",
-        "lift_slope": "1/rad",
-        "profile_drag": "1",
-        "ct_max": "1",
-        "gear_ratio": "1",
-        "arm": "m",
-        "height": "m",
-        "fin_area": "m^2",
-        "inflow_efficiency": "1",
+        "radius": Entry("m", "radius of the disc", "R_{tr}", "length", positive=True),
+        "chord": Entry("m", "chord of a blade, mean", "c_{tr}", "chord", positive=True),
+        "blades": Entry("1", "number of blades", "b_{tr}", "blades", least=2),
+        "lift_slope": Entry(
+            "1/rad",
+            "lift-curve slope of the blade section, dC_L/dalpha",
+            "a_{tr}",
+            "lift slope",
+            positive=True,
+        ),
+        "profile_drag": Entry(
+            "1",
+            "profile drag coefficient C_D0 of the blade section",
+            "C_{D0,tr}",
+            "drag coefficient",
+        ),
+        "ct_max": Entry(
+            "1",
+            "largest thrust coefficient, at blade stall",
+            "C_{T max,tr}",
+            "thrust coefficient",
+            positive=True,
+        ),
+        "gear_ratio": Entry(
+            "1", "tail-rotor speed by main-rotor speed", "n_{tr}", "gear ratio", positive=True
+        ),
+        "arm": Entry("m", "distance of the hub behind the centre of gravity", "l_{tr}", "distance"),
+        "height": Entry("m", "height of the hub above the centre of gravity", "h_{tr}", "distance"),
+        "fin_area": Entry("m^2", "area of the fin that blocks the disc", "S_{vf}", "area"),
+        "inflow_efficiency": Entry(
+            "1",
+            "eta_w of momentum theory: 1 ideal, less with losses",
+            r"\eta_w",
+            "efficiency",
+            positive=True,
+        ),
+        "trim_pitch": Entry(
+            "rad",
+            "blade pitch in hover; used by the printed option tail_rotor_linear only",
+            r"\delta_{ped,trim}",
+            "angle",
+            optional=True,
+        ),
     },
-    optional={"trim_pitch": "rad"},
     needs=("w_wake",),
-    makes=("V_itr", "Y_tr", "Q_tr"),
-    positive=("radius", "chord", "lift_slope", "ct_max", "gear_ratio", "inflow_efficiency"),
-    counts={"blades": 2},
+    makes=(
+        "V_itr",
+        "Y_tr",
+        "Q_tr",
+    ),
     subscript="tr",
-    symbols={
-        "radius": "R_{tr}",
-        "chord": "c_{tr}",
-        "blades": "b_{tr}",
-        "lift_slope": "a_{tr}",
-        "profile_drag": "C_{D0,tr}",
-        "ct_max": "C_{T max,tr}",
-        "gear_ratio": "n_{tr}",
-        "arm": "l_{tr}",
-        "height": "h_{tr}",
-        "fin_area": "S_{vf}",
-        "inflow_efficiency": r"\eta_w",
-        "trim_pitch": r"\delta_{ped,trim}",
-    },
 )

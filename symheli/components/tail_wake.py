@@ -8,6 +8,7 @@ from typing import Any
 
 from symheli.codegen.symbolic import clip, maximum, where
 from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.entry import Entry
 
 
 def evaluate(
@@ -44,14 +45,31 @@ def evaluate(
 
 COMPONENT = Component(
     evaluate,
-    parameters={"rotor_radius": "m", "tail_radius": "m", "tail_arm": "m", "tail_height": "m"},
-    needs=("V_imr",),
-    makes=("w_wake", "K_lam"),
-    positive=("rotor_radius", "tail_radius", "tail_height"),
-    symbols={
-        "rotor_radius": "R_{mr}",
-        "tail_radius": "R_{tr}",
-        "tail_arm": "l_{tr}",
-        "tail_height": "h_{tr}",
+    parameters={
+        "rotor_radius": Entry(
+            "m",
+            "radius of the main rotor, whose wake it is",
+            "R_{mr}",
+            "rotor radius",
+            positive=True,
+        ),
+        "tail_radius": Entry(
+            "m",
+            "radius of the tail rotor, over which the wake's edge passes",
+            "R_{tr}",
+            "length",
+            positive=True,
+        ),
+        "tail_arm": Entry(
+            "m", "distance of the tail behind the centre of gravity", "l_{tr}", "distance"
+        ),
+        "tail_height": Entry(
+            "m", "height of the tail above the centre of gravity", "h_{tr}", "length", positive=True
+        ),
     },
+    needs=("V_imr",),
+    makes=(
+        "w_wake",
+        "K_lam",
+    ),
 )

@@ -8,6 +8,7 @@ from typing import Any
 
 from symheli.codegen.symbolic import absolute, clip, sqrt
 from symheli.components.component import Component, Effect, Flow, Motion
+from symheli.components.entry import Entry
 
 
 def evaluate(
@@ -44,19 +45,20 @@ def evaluate(
 COMPONENT = Component(
     evaluate,
     parameters={
-        "area": "m^2",
-        "lift_slope": "1/rad",
-        "tail_rotor_wash": "1",
-        "arm": "m",
-        "height": "m",
+        "area": Entry("m^2", "area of the fin", "S_{vf}", "area"),
+        "lift_slope": Entry("1/rad", "lift-curve slope", r"C_{L\alpha,vf}", "lift slope"),
+        "tail_rotor_wash": Entry(
+            "1",
+            "share of the tail rotor's induced velocity that the fin feels",
+            r"\epsilon_{vf}",
+            "fraction",
+        ),
+        "arm": Entry("m", "distance behind the centre of gravity", "l_{tr}", "distance"),
+        "height": Entry("m", "height above the centre of gravity", "h_{tr}", "distance"),
     },
-    needs=("w_wake", "V_itr"),
+    needs=(
+        "w_wake",
+        "V_itr",
+    ),
     subscript="vf",
-    symbols={
-        "area": "S_{vf}",
-        "lift_slope": r"C_{L\alpha,vf}",
-        "tail_rotor_wash": r"\epsilon_{vf}",
-        "arm": "l_{tr}",
-        "height": "h_{tr}",
-    },
 )

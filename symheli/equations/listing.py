@@ -12,24 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
+from symheli.airframe.sections import FIXED
 from symheli.components import Component, Effect, Flow, Motion
 from symheli.equations.notation import dot, printed, real, symbol_of, upright
 from symheli.physics import inflow, rigid_body
 
 if TYPE_CHECKING:
     from symheli.helicopter import Helicopter
-
-_SYMBOLS = {
-    "body": {"mass": "m", "Ixx": "I_{xx}", "Iyy": "I_{yy}", "Izz": "I_{zz}"},
-    "drivetrain": {
-        "nominal_speed": r"\Omega_{nom}",
-        "inertia": "I_{rot}",
-        "max_power": "P_{max}",
-        "governor_kp": "K_p",
-        "governor_ki": "K_i",
-    },
-    "controls": {name: rf"{symbol_of(name)}" for name in ("d_lon", "d_lat", "d_col", "d_ped")},
-}
 
 
 @dataclass(frozen=True)
@@ -140,16 +129,14 @@ def _symbols(heli: Helicopter) -> SimpleNamespace:
 def _parameters(heli: Helicopter, section: str) -> SimpleNamespace:
     latex = _latex_of(heli, section)
     values = {entry: real(latex[entry]) for entry in heli.vehicle.sections[section]}
-    weight = real(_SYMBOLS["body"]["mass"]) * rigid_body.GRAVITY
+    weight = real(FIXED["body"]["mass"].symbol) * rigid_body.GRAVITY
     return SimpleNamespace(**values, printed=heli.printed, smoothing=heli.smoothing, weight=weight)
 
 
 def _latex_of(heli: Helicopter, section: str) -> Mapping[str, str]:
-    component = heli.vehicle.components.get(section)
-    known = component.symbols if component else _SYMBOLS[section]
     return {
-        entry: known.get(entry, rf"\mathrm{{{entry}}}".replace("_", r"\_"))
-        for entry in heli.vehicle.sections[section]
+        name: entry.symbol or rf"\mathrm{{{name}}}".replace("_", r"\_")
+        for name, entry in heli.vehicle.entries[section].items()
     }
 
 
@@ -236,7 +223,7 @@ def _drivetrain(heli: Helicopter, own: Mapping[str, Any], effects: Mapping[str, 
             value + (drive.speed_follows_yaw * real(dot("r")) if name == "Om" else 0),
         )
     if heli.governor == "ideal":
-        notes.equal(symbol_of("Om"), real(_SYMBOLS["drivetrain"]["nominal_speed"]))
+        notes.equal(symbol_of("Om"), real(FIXED["drivetrain"]["nominal_speed"].symbol))
     held = (
         "The rotor speed is held exactly"
         if heli.governor == "ideal"

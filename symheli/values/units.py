@@ -9,6 +9,9 @@ from collections.abc import Mapping
 
 from symheli.errors import InputError, UnknownNameError
 
+_STANDARD_GRAVITY = 9.80665
+_POUND = 0.45359237
+
 _TO_SI: dict[str, tuple[float, str]] = {
     "1": (1.0, "1"),
     "%": (0.01, "1"),
@@ -17,6 +20,7 @@ _TO_SI: dict[str, tuple[float, str]] = {
     "us": (1e-6, "s"),
     "ns": (1e-9, "s"),
     "min": (60.0, "s"),
+    "h": (3600.0, "s"),
     "m": (1.0, "m"),
     "cm": (0.01, "m"),
     "mm": (1e-3, "m"),
@@ -35,29 +39,88 @@ _TO_SI: dict[str, tuple[float, str]] = {
     "rad": (1.0, "rad"),
     "deg": (math.pi / 180, "rad"),
     "mrad": (1e-3, "rad"),
+    "rev": (2 * math.pi, "rad"),
     "rad/s": (1.0, "rad/s"),
     "deg/s": (math.pi / 180, "rad/s"),
     "rpm": (2 * math.pi / 60, "rad/s"),
     "kg": (1.0, "kg"),
-    "lb": (0.45359237, "kg"),
+    "gram": (1e-3, "kg"),
+    "lb": (_POUND, "kg"),
+    "oz": (_POUND / 16, "kg"),
     "slug": (14.593902937, "kg"),
     "kg m^2": (1.0, "kg m^2"),
+    "kg cm^2": (1e-4, "kg m^2"),
+    "gram cm^2": (1e-7, "kg m^2"),
+    "lb ft^2": (_POUND * 0.3048**2, "kg m^2"),
+    "lb in^2": (_POUND * 0.0254**2, "kg m^2"),
     "slug ft^2": (14.593902937 * 0.3048**2, "kg m^2"),
     "m^2": (1.0, "m^2"),
+    "cm^2": (1e-4, "m^2"),
     "ft^2": (0.3048**2, "m^2"),
+    "in^2": (0.0254**2, "m^2"),
     "N": (1.0, "N"),
+    "kN": (1e3, "N"),
+    "kgf": (_STANDARD_GRAVITY, "N"),
+    "lbf": (_POUND * _STANDARD_GRAVITY, "N"),
+    "ozf": (_POUND / 16 * _STANDARD_GRAVITY, "N"),
     "N m": (1.0, "N m"),
+    "N cm": (0.01, "N m"),
+    "kgf cm": (_STANDARD_GRAVITY * 0.01, "N m"),
+    "ft lbf": (0.3048 * _POUND * _STANDARD_GRAVITY, "N m"),
+    "in lbf": (0.0254 * _POUND * _STANDARD_GRAVITY, "N m"),
     "N m/rad": (1.0, "N m/rad"),
+    "N m/deg": (180 / math.pi, "N m/rad"),
+    "ft lbf/rad": (0.3048 * _POUND * _STANDARD_GRAVITY, "N m/rad"),
     "W": (1.0, "W"),
+    "kW": (1e3, "W"),
     "hp": (745.6998715822702, "W"),
+    "PS": (735.49875, "W"),
     "Pa": (1.0, "Pa"),
+    "hPa": (100.0, "Pa"),
+    "kPa": (1e3, "Pa"),
+    "bar": (1e5, "Pa"),
+    "psi": (_POUND * _STANDARD_GRAVITY / 0.0254**2, "Pa"),
     "kg/m^3": (1.0, "kg/m^3"),
     "1/rad": (1.0, "1/rad"),
+    "1/deg": (180 / math.pi, "1/rad"),
     "rad/rad": (1.0, "rad/rad"),
     "s/rad": (1.0, "s/rad"),
     "1/s": (1.0, "1/s"),
+    "Hz": (1.0, "1/s"),
     "V": (1.0, "V"),
 }
+"""{unit: (factor to SI, SI unit)}; messages offer these, and every product of them is read."""
+
+_ALSO = {
+    **dict.fromkeys(("kn", "kts", "knot", "knots"), "kt"),
+    **dict.fromkeys(("lbs", "lbm", "pound", "pounds"), "lb"),
+    **dict.fromkeys(("grams", "gm"), "gram"),
+    **dict.fromkeys(("ounce", "ounces"), "oz"),
+    **dict.fromkeys(("slugs",), "slug"),
+    **dict.fromkeys(("kilogram", "kilograms", "kgs"), "kg"),
+    **dict.fromkeys(("foot", "feet"), "ft"),
+    **dict.fromkeys(("inch", "inches"), "in"),
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("sec", "second", "seconds"), "s"),
+    **dict.fromkeys(("hr", "hour", "hours"), "h"),
+    **dict.fromkeys(("degree", "degrees", "°"), "deg"),
+    **dict.fromkeys(("radian", "radians"), "rad"),
+    **dict.fromkeys(("mbar",), "hPa"),
+    **dict.fromkeys(("newton", "newtons"), "N"),
+    **dict.fromkeys(("watt", "watts"), "W"),
+    **dict.fromkeys(("µs", "μs"), "us"),
+    "kph": "km/h",
+    "Nm": "N m",
+    "RPM": "rpm",
+}
+"""Other names of known units."""
+
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+
+_MEANT = {"g": "gram", "lb": "lbf", "oz": "ozf"}
+"""What a name of two meanings is read as where its first does not fit what is expected: 18 lb of
+thrust, ft lb of torque, 850 g of mass.
+"""
 
 _BASE = ("kg", "m", "rad", "s", "V")
 _ATOMS: dict[str, dict[str, int]] = {
@@ -74,25 +137,60 @@ tells N m from N m/rad.
 """
 
 
-def to_si(unit: str) -> tuple[float, str]:
+def to_si(unit: str, expected: str = "") -> tuple[float, str]:
     """(factor, SI unit) such that value_SI = factor * value. Raises `UnknownNameError`.
 
-    Products, powers and quotients of known units are units too: "slug ft^2", "ft/s^2/rad", "1/(ft
-    s)".
+    Products, powers and quotients of known units are units too, in the usual spellings: "slug
+    ft^2", "N*m", "kg·m²", "ft-lbf", "ft/s^2/rad", "1/(ft s)". Where a name has two meanings ("g",
+    "lb", "oz") the one is taken that makes the dimension of `expected`.
     """
     if not isinstance(unit, str):
         raise InputError(
             f"unit: expected a text such as 'deg/s' ('1' where there is none), got {unit!r}"
         )
-    if unit in _TO_SI:
-        return _TO_SI[unit]
-    factor, powers = _parse(unit)
+    read = _read(unit, expected)
+    if read in _TO_SI:
+        return _TO_SI[read]
+    factor, powers = _parse(read)
     return factor, text(powers)
 
 
-def dimension(unit: str) -> Dimension:
-    """The dimension of a unit, {"kg": 1, "m": 2, "s": -2} for N m. Raises `UnknownNameError`."""
-    return dict(_parse(unit)[1])
+def dimension(unit: str, expected: str = "") -> Dimension:
+    """The dimension of a unit, {"kg": 1, "m": 2, "s": -2} for N m; `expected` as in `to_si`.
+    Raises `UnknownNameError`.
+    """
+    return dict(_parse(_read(unit, expected))[1])
+
+
+@functools.cache
+def _read(unit: str, expected: str) -> str:
+    """The unit in this module's spelling, each name in the meaning that fits `expected`."""
+    if unit in _TO_SI:
+        plain = unit
+    else:
+        power = unit.translate(_SUPERSCRIPTS).replace("**", "^").replace("^(", "^").strip()
+        joined = re.sub(r"[*·⋅×]|(?<=[A-Za-z])-(?=[A-Za-z])", " ", power)
+        joined = re.sub(r"(?<![\d^-])\b([A-Za-z°µμ]+)(-?[1-9])(?!\d)", r"\1^\2", joined)
+        plain = re.sub(r"[A-Za-z°µμ]+", lambda m: _named(m[0]), joined)
+        plain = " ".join(re.sub(r"\s*/\s*", "/", plain).split())
+    if expected:
+        wanted = _parse(expected)[1]
+        other = re.sub(r"[A-Za-z]+", lambda m: _MEANT.get(m[0], m[0]), plain)
+        if other != plain and _parse(plain)[1] != wanted and _parse(other)[1] == wanted:
+            return other
+    return plain
+
+
+def _named(name: str) -> str:
+    """A known name for one of a unit: another name of it, or the same in other case."""
+    if name in _TO_SI:
+        return name
+    if name in _ALSO:
+        return _ALSO[name]
+    small = name.lower()
+    return (
+        _ALSO.get(small, small) if len(name) > 1 and (small in _TO_SI or small in _ALSO) else name
+    )
 
 
 def quotient(unit: str, by: str) -> str:

@@ -557,7 +557,7 @@ def test_long_jobs_get_their_options_and_show_their_result(
         def to_dict(self):
             return {"gain": np.float64(2.5)}
 
-    def job(*arguments, **options):
+    def job(*arguments, on=None, **options):
         given.update(zip(("configuration",), arguments, strict=False), **options)
         return Result()
 

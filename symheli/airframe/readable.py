@@ -1,0 +1,86 @@
+"""The text of a TOML file that was typed by hand: every line that is no TOML is found in one go."""
+
+from __future__ import annotations
+
+import codecs
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from symheli.errors import InputError
+
+UNREADABLE: Mapping[str, Any] = {"unreadable": True}
+"""Stands for the value of an entry whose line is no TOML."""
+
+_MOST = 50
+"""So many broken lines are looked for."""
+
+
+def text_of(path: Path) -> str:
+    """The text of a file in UTF-8, or in UTF-16 with its mark, as a shell on Windows writes it; a
+    mark at its beginning is dropped. Raises `InputError` with the line that is neither.
+    """
+    raw = path.read_bytes()
+    utf16 = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    try:
+        text = raw.decode("utf-16" if utf16 else "utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise InputError(
+            f"{path}, line {line}: no text in UTF-8; save the file as UTF-8"
+        ) from error
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def readable(text: str) -> tuple[dict[str, Any], list[tuple[int, str]]]:
+    """The tables of a TOML text without the lines that are no TOML, and (line, what is wrong) of
+    each of those; the entry of such a line is `UNREADABLE`.
+    """
+    lines, wrong = text.splitlines(), []
+    for _ in range(_MOST):
+        try:
+            return tomllib.loads("\n".join(lines) + "\n"), wrong
+        except tomllib.TOMLDecodeError as error:
+            said = re.search(r"^(.*) \(at line (\d+), column (\d+)\)$", str(error), re.DOTALL)
+            number = int(said[2]) if said else len(lines)
+            while number > 1 and (number > len(lines) or not lines[number - 1].strip()):
+                number -= 1
+            line = lines[number - 1]
+            what = f"{said[1]} (column {said[3]})" if said else str(error)
+            if number not in [earlier for earlier, _ in wrong]:
+                wrong.append((number, f"{what}{_hint(line, what)}"))
+            lines[number - 1] = _stand_in(line)
+    return {}, wrong
+
+
+def _stand_in(line: str) -> str:
+    """What is read in place of a broken line: the section, or the entry without its value."""
+    if line.rstrip().endswith("{ unreadable = true }"):
+        return ""
+    if header := re.match(r"\s*\[+\s*([\w.]+)\s*[^\]]*$", line):
+        return f"[{header[1]}]"
+    key = re.match(r"\s*([\w.]+)\s*[=:]", line)
+    return f"{key[1]} = {{ unreadable = true }}" if key else ""
+
+
+def _hint(line: str, what: str) -> str:
+    """What usually makes a line no TOML."""
+    if "overwrite" in what or "twice" in what:
+        return ": it stands there already, keep one of the two"
+    if re.search(r"\d,\d", line):
+        return ": write numbers with a point, as 8.2"
+    if re.search(r"=\s*-?\.\d|\d\.\s*[,}]", line):
+        return ": write a digit before and behind the point, as 0.5"
+    if re.search(r"\b(unit|source)\s*=\s*[^\s\"'{]", line):
+        return ': texts stand in quotes, as unit = "kg"'
+    if re.match(r"\s*\w+\s*:", line):
+        return ": write = in place of :"
+    if line.count("{") != line.count("}"):
+        return ": an entry stands on one line and ends in }"
+    if line.count('"') % 2:
+        return ": a text ends with its quote"
+    if line.lstrip().startswith("[") and "]" not in line:
+        return ": a section is named as in [body]"
+    return ': write NAME = { value = ..., unit = "...", source = "..." }'
