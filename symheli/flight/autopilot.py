@@ -20,6 +20,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Scheduling
 from symheli.steady.airspeed_sweep import sweep
 from symheli.values.arrays import frozen
+from symheli.values.numbers import whole
 from symheli.values.signal import Signal, signals
 from symheli.values.summary import summarized
 
@@ -165,7 +166,7 @@ def gain_scheduled_lqr(
     >>> bool(np.abs(record["phi"]).max() < 0.2)
     True
     """
-    family = sweep(heli, np.linspace(low, high, points))  # type: ignore[arg-type]
+    family = sweep(heli, np.linspace(low, high, whole(points, "points", 2)))  # type: ignore[arg-type]
     design = family.residualize([s for s in UNMEASURED if s in family.states])
     designs, plants = (
         [design[k].discretize(dt) for k in range(len(design))],

@@ -19,6 +19,9 @@ from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
 from symheli.values.numbers import whole
 
+LOUDEST = 1000
+"""Decibels, above or below the signal."""
+
 READ = (*map(str, MEASURED), "airspeed")
 """Signals that have a sensor."""
 Trims = Literal["quasi-steady", "level"]
@@ -118,7 +121,9 @@ class FlightPlan:
         if self.noise_db is not None and self.sensors is not None:
             raise InputError("give either noise_db or sensors: each says what the measurements are")
         if self.noise_db is not None:
-            _number("noise_db", self.noise_db, "a number of decibels, as 30")
+            level = _number("noise_db", self.noise_db, "a number of decibels, as 30")
+            if abs(level) > LOUDEST:
+                raise InputError(f"noise_db: expected -{LOUDEST} to {LOUDEST} dB, got {level:g}")
         object.__setattr__(self, "seed", whole(self.seed, "seed"))
         object.__setattr__(self, "wind", _wind(self.wind))
         _each("servos", self.servos, Servo, INPUTS)

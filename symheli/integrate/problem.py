@@ -14,6 +14,9 @@ from symheli.physics.attitude import flight_state
 from symheli.steady.equilibrium import TrimPoint
 from symheli.values.arrays import Array, frozen
 
+MOST = 1_000_000
+"""Steps a sample."""
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -42,7 +45,12 @@ class Problem:
         """Number and size (s) of the equal steps, none longer than `longest`, that make one
         sample.
         """
-        count = max(math.ceil(self.dt / longest - 1e-9), 1)
+        count = max(math.ceil(min(self.dt / longest, 2.0 * MOST) - 1e-9), 1)
+        if count > MOST:
+            raise InputError(
+                f"dt of {self.dt:g} s takes more than {MOST} steps of {longest:g} s a sample; is it"
+                " in seconds?"
+            )
         return count, self.dt / count
 
 

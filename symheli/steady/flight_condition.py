@@ -73,6 +73,8 @@ class FlightCondition:
             *self.wind,
             self.altitude or 0.0,
         ]
+        if len(self.wind) != 3:
+            raise InputError(f"wind: expected (north, east, down) in m/s, got {self.wind!r:.80}")
         if not all(math.isfinite(v) for v in values):
             raise InputError(f"a flight condition needs finite numbers, got {self!r}")
         if self.airspeed < 0:

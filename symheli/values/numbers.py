@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from typing import Any
 
@@ -16,4 +17,15 @@ def whole(value: Any, name: str, least: int = 0) -> int:
         number = least - 1
     if number < least or isinstance(value, bool):
         raise InputError(f"{name}: expected a whole number >= {least}, got {value!r:.80}")
+    return number
+
+
+def positive(value: Any, name: str) -> float:
+    """The value as a float; raises `InputError` unless it is finite and > 0."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not (math.isfinite(number) and number > 0):
+        raise InputError(f"{name}: expected a number > 0, got {value!r:.80}")
     return number

@@ -8,7 +8,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from symheli.errors import SymheliError
+from symheli.errors import InputError, SymheliError
 
 
 def write_text(path: str | os.PathLike[str], content: str) -> Path:
@@ -47,6 +47,8 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
     except OSError as error:
         _remove(temporary)
         raise SymheliError(_reason(target, error, len(content))) from error
+    except ValueError as error:  # a null byte, or half a character
+        raise InputError(f"{str(path)!r} is no path: {error}") from error
     except BaseException:
         _remove(temporary)
         raise

@@ -14,6 +14,7 @@ from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
 from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
+from synthesis.design.back_off import levels_above
 from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
 from synthesis.design.fitted import fitted
@@ -127,7 +128,7 @@ def estimator(
     attempts: list[Attempt] = []
     shape = Shape(dependence(X, parameters, "X", depends(plant), still=plant.dt is not None), None)
     start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
-    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
+    factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts, _error):
         model, error, misfit = _observer(plant, design.coordinates, design.gains)
         return Estimator(

@@ -11,8 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.errors import InputError
 from symheli.lpv import FunctionSpace
 from symheli.lpv.bases.polynomials import factors_of
+from symheli.values.numbers import whole
 from synthesis.design.cells import Cell, cells, degrees_of
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.elimination import Half, controlled, observed
@@ -35,6 +37,9 @@ MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
 SETTLED = (1e-3, 1e-5, 1e-8)
 """The same once g is settled, tried in turn: at a block that is singular gains have no bound."""
+
+FINEST = 1000
+"""Parts that an interval of p may be divided into: each is an LMI of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +95,8 @@ class Existence:
                     most[i] = max(most[i], piece.bernstein.shape[1] - 1)
                     if breaks[i][0] < piece.high < breaks[i][-1]:
                         breaks[i] = sorted({*breaks[i], piece.high})
+        if not 1 <= whole(divisions, "divisions", 1) <= FINEST:
+            raise InputError(f"divisions: expected 1 to {FINEST}, got {divisions}")
         if divisions > 1:
             breaks = [_divided(b, divisions) for b in breaks]
         degrees = np.array(degrees_of(self._data, breaks)) + most

@@ -51,6 +51,9 @@ NO_LEAST = (
     " what limits it (noise, a price on the controls)"
 )
 
+LARGEST = 1e100
+"""Of a level, and of its inverse: its square is a number, too."""
+
 
 def hinf(
     model: LinearModel,
@@ -115,8 +118,10 @@ def hinf(
     0.6009252 0.607 True
     """
     model = as_model(model)
-    if gamma is not None and not (math.isfinite(gamma) and gamma > 0):
-        raise InputError(f"gamma: expected a positive number, got {gamma}")
+    if gamma is not None and not 1 / LARGEST < gamma < LARGEST:
+        raise InputError(
+            f"gamma: expected a number from {1 / LARGEST:g} to {LARGEST:g}, got {gamma}"
+        )
     if not (math.isfinite(back_off) and back_off >= 1):
         raise InputError(f"back_off: expected a number from 1 on, got {back_off}")
     names = Channels.of(model, controls, measurements, disturbances, performance)

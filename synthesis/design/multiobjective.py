@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError
+from symheli.errors import InputError, SolverError
 from symheli.lpv import FunctionSpace
 from symheli.values.signal import indices
 from synthesis.certificate import Attempt
+from synthesis.design.back_off import levels_above
 from synthesis.design.cells import Cell, cells, degrees_of
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates, coordinates_of
@@ -29,6 +30,7 @@ from synthesis.design.recovery import Transformed, controller
 from synthesis.design.refusals import failed
 from synthesis.design.search import Dependence, functions, limited
 from synthesis.program.cone_program import Solver
+from synthesis.program.panic import no_panic
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
@@ -124,6 +126,7 @@ def multiobjective(
                 " them be of degree 0 (in discrete time both)"
             )
     solver = solver if isinstance(solver, Solver) else Solver(solver)
+    (factor,) = levels_above(float(back_off))
     problem = _Problem(
         plant, coordinates_of(plant, 1.0), bases[0], bases[1], gains, every, region, direct
     )
@@ -131,7 +134,7 @@ def multiobjective(
     values = problem.best(solver, attempts)
     if values is None:
         raise failed(plant, attempts)
-    found = problem.settled([back_off * v for v in values], solver, attempts)
+    found = problem.settled([factor * v for v in values], solver, attempts)
     if found is None:
         raise failed(plant, attempts)
     total = math.sqrt(sum(o.soft * v * v for o, v in zip(every, values, strict=True)))
@@ -450,10 +453,10 @@ def _solve(problem: Any, solver: Solver) -> tuple[str, float]:
     from cvxpy.error import SolverError as CvxpyError
 
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), no_panic():
             warnings.simplefilter("ignore", UserWarning)  # the status says that it is inaccurate
             problem.solve(solver=solver.name, **solver.options)
-    except CvxpyError as error:
+    except (CvxpyError, SolverError) as error:
         return str(error), math.inf
     solved = problem.status in ("optimal", "optimal_inaccurate")
     return str(problem.status), float(problem.value) if solved else math.inf

@@ -11,6 +11,7 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from synthesis.certificate import Attempt
+from synthesis.design.back_off import levels_above
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
@@ -97,7 +98,7 @@ def output_feedback(
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)
     least_ranks(plant)
-    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
+    factors = levels_above(back_off)
     attempts: list[Attempt] = []
     every = shapes(parameters, X, Y, plant.dt is not None, depends(plant))
     if isinstance(plant.model, UncertainStateSpace):

@@ -9,6 +9,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Matrices
 from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.values.numbers import positive
 
 Array = np.ndarray
 
@@ -24,6 +25,7 @@ def tustin(model: LPVStateSpace, dt: float) -> LPVStateSpace:
     """
     if model.dt is not None:
         raise InputError(f"the controller is already sampled (dt = {model.dt} s)")
+    positive(dt, "dt")
 
     def rule(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, ...]:
         each = [

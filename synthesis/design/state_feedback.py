@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from synthesis.certificate import Attempt
+from synthesis.design.back_off import levels_above
 from synthesis.design.conditions import conditions
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates, coordinates_of, depends
@@ -87,7 +88,7 @@ def state_feedback(
     attempts: list[Attempt] = []
     shape = Shape(None, dependence(Y, parameters, "Y", depends(plant)))
     start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
-    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
+    factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts):
         made = in_plant_units(
             plant, design.coordinates, design.gains, design.gamma, f"state feedback, {shape}"

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
+from symheli.values.numbers import whole
 
 
 class Bandwidth(NamedTuple):
@@ -81,7 +82,7 @@ def bandwidth(
     if not 0 < low < high:
         raise InputError(f"band: expected 0 < low < high rad/s, got {band}")
     top = 2 * high if model.dt is None else min(2 * high, 0.999 * math.pi / model.dt)
-    grid = np.geomspace(low, top, points)
+    grid = np.geomspace(low, top, whole(points, "points", 2))
     values = model.frequency_response(grid)[:, 0, 0]
     if np.any(values == 0):
         raise InputError(f"{model.outputs[0]} does not respond to {model.inputs[0]}")

@@ -28,6 +28,7 @@ from scipy import sparse
 from symheli.errors import InputError, SolverError
 from synthesis.polynomial.symmetric import basis, length
 from synthesis.program.interruptible import in_process, in_thread
+from synthesis.program.panic import no_panic
 
 Array = np.ndarray
 
@@ -313,7 +314,11 @@ def _clarabel(program: ConeProgram, solver: Solver) -> tuple[Answer, Any, str]:
         engine.set_termination_callback(lambda _: stop.is_set())
         return engine.solve()
 
-    solution = in_thread(work)
+    try:
+        with no_panic():
+            solution = in_thread(work)
+    except SolverError as error:
+        return Answer.FAILED, None, str(error)
     word = str(solution.status)
     if "PrimalInfeasible" in word:
         return Answer.INFEASIBLE, None, word

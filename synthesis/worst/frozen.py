@@ -11,6 +11,7 @@ import numpy as np
 from scipy import linalg
 
 from symheli.lpv import LPVStateSpace
+from symheli.values.numbers import positive, whole
 from synthesis.worst.over_box import worst_over
 from synthesis.worst.scheduled import Scheduled
 
@@ -59,7 +60,8 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     FrozenGain(gamma=1.0, p=0.0, omega=0.0)
     """
     low, high = lpv.scheduling.low, lpv.scheduling.high
-    grid = np.linspace(low, high, points)
+    positive(tolerance, "tolerance")
+    grid = np.linspace(low, high, whole(points, "points", 2))
     if isinstance(lpv, LPVStateSpace):
         ends = [p for piece in lpv.basis.pieces() for p in (piece.low, piece.high)]
         grid = np.unique([*grid, *(p for p in ends if low < p < high)])

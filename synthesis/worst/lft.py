@@ -12,6 +12,7 @@ import numpy as np
 
 from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
+from symheli.values.numbers import positive
 from synthesis.worst.frozen import FrozenGain, norm
 from synthesis.worst.lines import Line, alone, directions, growing_on, shared
 from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
@@ -54,6 +55,8 @@ def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
     >>> frozen_box_gain(lag.to_lft()).p
     (0.0,)
     """
+
+    positive(tolerance, "tolerance")
 
     def at(delta: Array) -> tuple[float, float]:
         M, x = lft.matrix(delta), len(lft.states)

@@ -7,6 +7,7 @@ from valid_calls import exported
 ERRORS = "raised or warned with, not called"
 PROTOCOL = "a protocol: nothing to call"
 CHOICE = "a choice of the package: its values are listed"
+ARITHMETIC = "computes with what it is given, NaN too; what comes in is checked by its users"
 RESULT = "made by the package alone, from what it has checked: see the entry that returns it"
 
 EXEMPT: dict[str, str] = {
@@ -23,10 +24,7 @@ EXEMPT: dict[str, str] = {
         PROTOCOL,
     ),
     **dict.fromkeys(
-        (
-            *("identification.Forgetting", "synthesis.Status", "synthesis.DesignStatus"),
-            "identification.Variable",
-        ),
+        (*("synthesis.Status", "synthesis.DesignStatus", "identification.Variable"),),
         CHOICE,
     ),
     **{
@@ -57,8 +55,69 @@ EXEMPT: dict[str, str] = {
             *("SplineLyapunov", "Trajectory"),
         )
     },
+    "synthesis.PolynomialMatrix": ARITHMETIC,
 }
 """Public callables whose making is not fuzzed; their methods are, where an example calls them."""
 
-NAN_IS_SAID: dict[str, tuple[str, ...]] = {}
+CERTIFICATE = (".alpha", ".gamma", ".lower")
+NAN_IS_SAID: dict[str, tuple[str, ...]] = {
+    "symheli.FlightRecord": (".values",),
+    "symheli.FlightRecord.with_signals": (".values",),
+    "symheli.FlightRecord.from_arrays": (".values",),
+    "symheli.NamedVector": ("",),
+    "symheli.StitchedModel.rhs": ("",),
+    "symheli.simulate_batch": (".states",),
+    "symheli.fly_batch": (".states",),
+    "symheli.trim_map": (".power",),
+    "identification.RecursiveLeastSquares.update": ("[1].innovation",),
+    "identification.RecursiveLeastSquares.run": (".innovations",),
+    "identification.Online.update": (".innovation", "[1].innovation"),
+    "identification.RigidBodyOnline.update": (".innovation",),
+    "identification.beside_baseline": (".predictions",),
+    "identification.fit_for_control": (".second_gap",),
+    "identification.KinematicModel.score": ("[",),
+    "identification.LPVARXModel.score": ("[",),
+    "identification.LPVARXModel.predict": ("",),
+    "identification.KinematicModel.predict": ("",),
+    "identification.order_scan": (".trials",),
+    "synthesis.frozen_box_gain": (".omega",),
+    **{
+        f"synthesis.{name}": CERTIFICATE
+        for name in (
+            *("stability", "l2_gain", "decay_rate", "generalized_h2", "lft_gain", "lft_stability"),
+            *("Certificate.load", "Certificate.verify", "Controller.certify", "Estimator.certify"),
+            *("certify_flown", "proven_around"),
+        )
+    },
+}
 """Where a result may hold NaN, by entry and the start of the place, as its documentation says."""
+
+USUAL = 60
+FEW = 12
+SLOW = {
+    *("symheli.sweep", "symheli.sweep_grid", "symheli.fly", "symheli.fly_batch"),
+    *("symheli.fly_campaign", "symheli.trim_map", "symheli.gain_scheduled_lqr"),
+    *("identification.fit_for_control", "identification.order_scan", "identification.design_model"),
+    *("identification.unseen_flight", "identification.KinematicModel.observer"),
+    *("synthesis.l2_gain", "synthesis.output_feedback", "synthesis.Controller.certify"),
+    *("synthesis.Controller.discretize", "synthesis.estimator", "synthesis.Estimator.certify"),
+    *("synthesis.certify_flown", "synthesis.lft_feedback", "synthesis.multiobjective"),
+    *("synthesis.proven_around", "synthesis.state_feedback", "synthesis.with_wrong_parameter"),
+    *("synthesis.frozen_box_gain", "synthesis.generalized_h2", "synthesis.decay_rate"),
+    *("synthesis.stability", "synthesis.lower_bound", "synthesis.lft_gain"),
+    *("synthesis.Certificate.verify", "synthesis.lft_stability"),
+}
+"""Entries that fly, sweep or solve: `FEW` inputs each."""
+LARGER = {"synthesis.multiobjective", "synthesis.output_feedback", "synthesis.lft_feedback"}
+"""Where a larger count is a larger problem, that takes its time: not asked."""
+
+
+def asked(entry: str) -> bool:
+    """Whether it is fuzzed: methods of results are, those of mere arithmetic are not."""
+    owner = ".".join(entry.split(".")[:2])
+    return entry not in EXEMPT and EXEMPT.get(owner) != ARITHMETIC
+
+
+def inputs(entry: str) -> int:
+    """How many changed calls of the entry make up the whole."""
+    return FEW if entry in SLOW else USUAL

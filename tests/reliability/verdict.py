@@ -61,7 +61,9 @@ def judged(
         verdict = Verdict("too long", f"no answer within {SECONDS:g} s")
     except MemoryError:
         verdict = Verdict("refused by Python")
-    except Exception as error:
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # a panic in a library of Rust is no Exception
         python = kind == ANOTHER and isinstance(error, BY_PYTHON)
         verdict = (
             Verdict("refused by Python")

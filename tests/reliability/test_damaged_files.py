@@ -1,0 +1,24 @@
+"""A damaged file is refused, or read as what it still is; nothing else, and it stays as it was."""
+
+import damaged_files
+import pytest
+
+
+@pytest.fixture(scope="module")
+def readers(tmp_path_factory):
+    return damaged_files.readers(tmp_path_factory.mktemp("files"))
+
+
+def test_no_damage_of_a_file_fails_silently(readers):
+    told = [fault for reader in readers for fault in damaged_files.tally(reader, 16).faults]
+    assert not told, "\n".join(map(str, told))
+
+
+@pytest.mark.slow
+def test_no_damage_of_many_fails_silently(readers):
+    told = [
+        fault
+        for reader in readers
+        for fault in damaged_files.tally(reader, damaged_files.USUAL).faults
+    ]
+    assert not told, "\n".join(map(str, told))
