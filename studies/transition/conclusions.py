@@ -97,7 +97,7 @@ def _answer(study: Outcome) -> Iterator[str]:
         elif tried:
             never = (
                 ", and none can: an airspeed that jumps makes the state grow"
-                if math.isinf(curve.flown.get(math.inf, 0.0))
+                if math.isinf(curve.lower.get(math.inf, 0.0))
                 else ""
             )
             sentence = f"In {curve.title} no LFT test proves anything{never}"
