@@ -17,7 +17,7 @@ from symheli.values.whole_files import write_bytes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LARGEST = 130_000
+LARGEST = 110_000
 """Bytes of an SVG that still stands in the page."""
 
 COLOURS = 64
@@ -78,7 +78,17 @@ def inside_a_page(svg: str, name: str) -> str:
     svg = re.sub(r'href="#', f'href="#{name}-', svg)
     svg = re.sub(r"url\(#", f"url(#{name}-", svg)
     svg = re.sub(r"(-?\d+\.\d\d)\d+", r"\1", svg)
-    return re.sub(r"\s*\n\s*", "\n", svg).strip()
+    svg = re.sub(r"\s*\n\s*", "\n", svg).strip()
+    return re.sub(r'<g( clip-path="[^"]*")>\n((?:<use [^>]*/>\n)+)</g>', _styled_once, svg)
+
+
+def _styled_once(markers: re.Match[str]) -> str:
+    """Markers of one style, which their group then has."""
+    styles = set(re.findall(r' style="([^"]*)"', markers[2]))
+    if len(styles) != 1:
+        return markers[0]
+    plain = re.sub(r' style="[^"]*"', "", markers[2])
+    return f'<g{markers[1]} style="{styles.pop()}">\n{plain}</g>'
 
 
 def _curves(figure: Figure) -> Iterator[tuple[Any, str]]:

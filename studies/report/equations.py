@@ -22,7 +22,7 @@ from studies.report.mathml import (
 
 _rate = dot("p")
 _AtP, _PA, _PB = row(sup("A ( p )", "⊤"), "P ( p )"), "P ( p ) A ( p )", "P ( p ) B ( p )"
-_slope = row("± ρ", fraction("d P", "d p"))
+_slope = row("ρ", fraction("d P", "d p"))
 _p_one = matrix(("p I",), ("I",))
 _past = matrix(("v ( k − i )",), ("ω ( k − i )",), ("u ( k − i )",))
 _energy = {s: total("k = 1", "N", sup(norm(f"{s} ( k )"), 2)) for s in "zw"}
@@ -43,7 +43,8 @@ EQUATIONS: dict[str, str] = {
         total("i = 1", "n", sub("a", "i"), "( p ) y ( k − i )"),
         "+",
         total("j = 1", "n", sub("b", "j"), "( p ) u ( k − j )"),
-        row("+ c ( p ) + d ( p )", _rate),
+        "+",
+        row("c ( p ) + d ( p )", _rate),
     ),
     "rls": display(
         row(hat("θ"), "=", words("arg")),
@@ -54,12 +55,14 @@ EQUATIONS: dict[str, str] = {
         matrix((dot("v"),), (dot("ω"),)),
         "=",
         matrix(("v × ω + g ( φ , θ )",), (0,)),
-        row("+", total("i = 1", 2, sub("Θ", "i"), "( p )", _past)),
+        "+",
+        total("i = 1", 2, sub("Θ", "i"), "( p )", _past),
     ),
     "fit": display(
         row(words("fit"), "= 100 ( 1 −"),
         fraction(norm("y −", hat("y")), norm("y −", bar("y"))),
-        ") %",
+        ")",
+        words("\N{NO-BREAK SPACE}%"),
     ),
     "gap": display(
         row(sub("δ", "ν"), "( P ,", sub("P", 1), ") < b ( P , K )"),
@@ -72,11 +75,13 @@ EQUATIONS: dict[str, str] = {
     ),
     "lmi": display(
         matrix(
-            (row(_AtP, "+", _PA, _slope), _PB, sup("C ( p )", "⊤")),
+            (row(_AtP, "+", _PA, "±", _slope), _PB, sup("C ( p )", "⊤")),
             ("⋅", "− γ I", sup("D ( p )", "⊤")),
             ("⋅", "⋅", "− γ I"),
         ),
-        row("≺ 0 ,", SPACE, "P ( p ) ≻ 0 ,", SPACE, "p ∈ [ 0 , 13 ]", words(" m/s")),
+        row(
+            "≺ 0 ,", SPACE, "P ( p ) ≻ 0 ,", SPACE, "p ∈ [ 0 , 13 ]", words("\N{NO-BREAK SPACE}m/s")
+        ),
     ),
     "scalings": display(
         row(sup(_p_one, "⊤"), "Π", _p_one, "⪰ 0 , | p | ≤ 1 ,", SPACE),

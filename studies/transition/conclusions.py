@@ -89,11 +89,13 @@ def _answer(study: Outcome) -> Iterator[str]:
         tried = bool(set(curve.jumping) & set(LFT_TESTS))
         least = min(curve.jumping.values(), default=math.inf)
         if tried and math.isfinite(least):
-            yield (
-                f"In {curve.title} the LFT is enough: its tests prove a gain of {gain(least)} for"
-                f" an airspeed that jumps, {_more(least, curve.frozen)} than the frozen"
-                f" {gain(curve.frozen)}."
-            )
+            more = f"{gain(least)} for an airspeed that jumps, {_more(least, curve.frozen)}"
+            said = f"{more} than the frozen {gain(curve.frozen)}"
+            if _cheap(curve):
+                yield f"In {curve.title} the LFT is enough: its tests prove a gain of {said}."
+            else:
+                also = f"; {bounded}" if bounded else ""
+                yield f"In {curve.title} the LFT tests prove a gain of {said}{also}."
         elif tried:
             never = (
                 ", and none can: an airspeed that jumps makes the state grow"
@@ -110,6 +112,11 @@ def _answer(study: Outcome) -> Iterator[str]:
             yield f"In {curve.title} {bounded} (frozen {gain(curve.frozen)})."
 
 
+def _cheap(curve: GainCurve) -> bool:
+    """Whether what is proven for an airspeed that jumps is near the frozen gain."""
+    return min(curve.jumping.values()) <= (1 + CHEAP) * curve.frozen
+
+
 def _more(one: float, other: float) -> str:
     return f"{100 * (one / other - 1):.2g} % more"
 
@@ -122,8 +129,7 @@ def _where_lft_is_enough(study: Outcome) -> Iterator[str]:
     enough, costly, needs = [], [], []
     for curve in tried.values():
         least = min(curve.jumping.values())
-        within = least <= (1 + CHEAP) * curve.frozen
-        kind = needs if math.isinf(least) else enough if within else costly
+        kind = needs if math.isinf(least) else enough if _cheap(curve) else costly
         kind.append(curve.title)
     if enough:
         yield (
@@ -131,7 +137,10 @@ def _where_lft_is_enough(study: Outcome) -> Iterator[str]:
             f" {100 * CHEAP:g} % of the frozen gain, so the rate of the airspeed does not matter."
         )
     if costly:
-        yield f"For {' and '.join(costly)} the LFT proves a gain, at a price of more than that."
+        yield (
+            f"For {' and '.join(costly)} either will do: the LFT proves a gain for any rate, more"
+            f" than {100 * CHEAP:g} % above the frozen one."
+        )
     if needs:
         yield (
             f"Take an LPV model with a bounded rate for {' and '.join(needs)}: under the LFT's"
