@@ -71,7 +71,10 @@ class Processes:
 
     def _start(self) -> None:
         process = subprocess.Popen(
-            [sys.executable, "-m", "studies.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [sys.executable, "-m", "studies.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C is for this process, which ends them
         )
         self._running.append(process)
         self._serving.append(threading.Thread(target=self._serve, args=(process,), daemon=True))

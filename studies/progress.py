@@ -28,8 +28,8 @@ class _Open:
     since: float
 
     def remaining(self, now: float) -> float | None:
-        """Seconds, at the speed so far; None where nothing is known."""
-        if not self.at.total or not 0 < self.at.done <= self.at.total:
+        """Seconds, at the speed so far; None where too little is known."""
+        if not self.at.total or not self.at.total / 20 <= self.at.done <= self.at.total:
             return None
         return (now - self.since) * (self.at.total - self.at.done) / self.at.done
 

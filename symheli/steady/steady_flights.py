@@ -5,7 +5,7 @@ CasADi's virtual machine where there is no compiler.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from symheli.steady.newton import ROUNDING, STEPS, TOLERANCE
 from symheli.values.arrays import Array
 
 AT_ONCE = 4096
-"""So many trims are solved before an interrupt is heard: some hundredths of a second."""
+"""So many flights are computed before an interrupt is heard: some hundredths of a second."""
 ALONE = -1
 """In place of the flight before: from its own start."""
 
@@ -93,11 +93,10 @@ class SteadyFlights:
                 z[k], miss[k] = alone.newton(z[k if start == ALONE else start])
             return z, miss
         with task("trimming", len(self)) as trimming:
-            for begin in range(0, len(self), AT_ONCE):
-                end = min(begin + AT_ONCE, len(self))
+            for part in self._parts():
                 code.trims(
-                    ctypes.c_long(begin),
-                    ctypes.c_long(end),
+                    ctypes.c_long(part.start),
+                    ctypes.c_long(part.stop),
                     _at(after),
                     _at(self._demand),
                     *self._shared(),
@@ -107,7 +106,7 @@ class SteadyFlights:
                     ctypes.c_double(ROUNDING),
                     ctypes.c_double(TOLERANCE),
                 )
-                trimming.to(end)
+                trimming.to(part.stop)
         return z, miss
 
     def points(self, z: Array) -> Points:
@@ -122,9 +121,9 @@ class SteadyFlights:
                     row[k] = value
             return made
         z = np.ascontiguousarray(z, float)
-        code.points(
-            ctypes.c_long(len(self)), _at(z), _at(self._demand), *self._shared(), *map(_at, rows)
-        )
+        for part in self._parts():
+            own = [_at(array[part]) for array in (z, self._demand)]
+            code.points(_length(part), *own, *self._shared(part), *(_at(row[part]) for row in rows))
         return made
 
     def slopes(self, x: Array, u: Array, wind: Array) -> tuple[Array, Array, Array]:
@@ -139,12 +138,24 @@ class SteadyFlights:
                     row[k] = value.reshape(row.shape[1:])
             return made
         given = [np.ascontiguousarray(a, float) for a in (x, u, wind)]
-        code.slopes(ctypes.c_long(n), *map(_at, given), *self._shared(), *map(_at, made))
+        for part in self._parts():
+            own, out = ([_at(array[part]) for array in arrays] for arrays in (given, made))
+            code.slopes(_length(part), *own, *self._shared(part), *out)
         return made
 
-    def _shared(self) -> tuple[ctypes.c_void_p, ctypes.c_long]:
-        stride = self._parameters.shape[1] if len(self._parameters) > 1 else 0
-        return _at(self._parameters), ctypes.c_long(stride)
+    def _parts(self) -> Iterator[slice]:
+        for begin in range(0, len(self), AT_ONCE):
+            yield slice(begin, min(begin + AT_ONCE, len(self)))
+
+    def _shared(self, part: slice = slice(0, 0)) -> tuple[ctypes.c_void_p, ctypes.c_long]:
+        """Parameters from the first flight of a part on, and how far apart they are."""
+        if len(self._parameters) == 1:
+            return _at(self._parameters), ctypes.c_long(0)
+        return _at(self._parameters[part.start :]), ctypes.c_long(self._parameters.shape[1])
+
+
+def _length(part: slice) -> ctypes.c_long:
+    return ctypes.c_long(part.stop - part.start)
 
 
 def _at(array: Array) -> ctypes.c_void_p:

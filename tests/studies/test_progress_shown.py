@@ -85,7 +85,7 @@ def test_what_is_over_soon_shows_nothing_and_loads_nothing(capfd):
 def test_the_remaining_time_is_that_of_the_speed_so_far():
     assert _Open(Progress("x", 3, 12), since=100.0).remaining(130.0) == pytest.approx(90.0)
     assert _Open(Progress("x", 12, 12), since=100.0).remaining(130.0) == 0
-    for unknown in (Progress("x", 0, 12), Progress("x", 3, None)):
+    for unknown in (Progress("x", 0, 12), Progress("x", 3, None), Progress("x", 4, 100)):
         assert _Open(unknown, since=100.0).remaining(130.0) is None
 
 
