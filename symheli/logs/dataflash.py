@@ -113,7 +113,7 @@ _Found = dict[str, dict[str, dict[str, Column]]]
 
 
 def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
-    """These messages, or all; the message's name alone where the log has none of it."""
+    """These messages, or all; raises `UnknownNameError` where the log has none of one."""
     with extra("logs", "reading an ArduPilot log"):
         from pymavlink.DFReader import (  # type: ignore[import-not-found]
             DFReader_binary,
@@ -127,7 +127,8 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
         with quiet() as said, _closing(reader) as log:
             log.__init__(str(file))
             declared = _declared(log)
-            present = [n for n in log.name_to_id if n not in ABOUT_THE_LOG]
+            names = dict.fromkeys(form.name for form in log.formats.values())
+            present = [name for name in names if name not in ABOUT_THE_LOG]
             for message in _messages(log, present if wanted is None else wanted):
                 name, known = message.get_type(), declared.get(message.fmt.type, {})
                 field = next((f for f, ids in known.items() if ids.unit == INSTANCE), None)
