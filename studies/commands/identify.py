@@ -328,7 +328,9 @@ def _at_once(arguments: argparse.Namespace, kind: str, seen: Contents) -> bool:
 
 def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
     """What the log holds, and a command that would identify."""
-    from studies.log.survey import answer, survey
+    from studies.log import survey_report
+    from studies.log.suggestion import suggestion
+    from studies.log.survey import survey
 
     found = survey(
         arguments.log,
@@ -336,9 +338,9 @@ def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
         time=arguments.time,
         time_unit=arguments.time_unit or "s",
         dt=arguments.dt,
-        signal_map=arguments.map,
     )
-    return answer(found)
+    hint = suggestion(found, dt=arguments.dt, signal_map=arguments.map)
+    return Output(survey_report.text(found, hint), survey_report.data(found, hint))
 
 
 class _Signals(NamedTuple):

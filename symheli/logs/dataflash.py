@@ -12,7 +12,7 @@ import contextlib
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,11 +48,16 @@ LABELS = {
 are of no use to a flight record and count as not declared.
 """
 
-PREFIXES = {"": 1.0, "d": 1e-1, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
-"""What is put before a label for its multiplier; other multipliers stand there as a number."""
+NOT_WORKED_OUT = "?"
+"""Multiplier of a field whose scale ArduPilot does not know: its unit is then not known either."""
+
+INSTANCE = "#"
+"""Unit of the field that tells instances of a message apart."""
 
 CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields that hold the time, in s of one count."""
+
+HEADING = "degheading"
 
 MODE = "M"
 """Type of a flight mode, which text logs write as a word."""
@@ -103,12 +108,12 @@ def dataflash_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
     }
 
 
-_Messages = dict[str, dict[str, dict[str, Column]]]
+_Found = dict[str, dict[str, dict[str, Column]]]
 """Column by message, instance ("" where there is only one) and field."""
 
 
-def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messages:
-    """These messages, or all; the message's name alone where the log has none of it."""
+def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
+    """These messages, or all; raises `UnknownNameError` where the log has none of one."""
     with extra("logs", "reading an ArduPilot log"):
         from pymavlink.DFReader import (  # type: ignore[import-not-found]
             DFReader_binary,
@@ -121,17 +126,18 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Messag
     try:
         with quiet() as said, _closing(reader) as log:
             log.__init__(str(file))
-            if reader is DFReader_text:
-                _learn_units(log)
-            present = [n for n in log.name_to_id if n not in ABOUT_THE_LOG]
-            names = present if wanted is None else list(wanted)
-            while (message := log.recv_match(type=names, strict=True)) is not None:
-                instance = message.fmt.instance_field
-                key = "" if instance is None else str(getattr(message, instance))
-                rows.setdefault((message.get_type(), key), []).append(message)
-            out: _Messages = {}
+            declared = _declared(log)
+            names = dict.fromkeys(form.name for form in log.formats.values())
+            present = [name for name in names if name not in ABOUT_THE_LOG]
+            for message in _messages(log, present if wanted is None else wanted):
+                name, known = message.get_type(), declared.get(message.fmt.type, {})
+                field = next((f for f, ids in known.items() if ids.unit == INSTANCE), None)
+                key = "" if field is None else str(getattr(message, field))
+                rows.setdefault((name, key), []).append(message)
+            out: _Found = {}
             for (name, key), messages in rows.items():
-                out.setdefault(name, {})[key] = _columns(messages)
+                known = declared.get(messages[0].fmt.type, {})
+                out.setdefault(name, {})[key] = _columns(messages, known)
     except Exception as error:
         raise InputError(
             f"{file}: not an ArduPilot log, or one that was damaged"
@@ -166,14 +172,56 @@ def _closing(reader: Any) -> Iterator[Any]:
                 getattr(log, part).close()
 
 
-def _learn_units(log: Any) -> None:
-    """Read what a text log says of its units: its reader does so message by message."""
-    while log.recv_match(type=["UNIT", "MULT", "FMTU"], strict=True) is not None:
-        pass
+def _messages(log: Any, names: Iterable[str]) -> Iterator[Any]:
+    """The messages of these names, in order, from the beginning."""
+    names = set(names)
     log.rewind()
+    while (message := log.recv_match(type=list(names))) is not None:
+        if message.get_type() in names:
+            yield message
 
 
-def _columns(messages: list[Any]) -> dict[str, Column]:
+class _Said(NamedTuple):
+    """Of a field: the letter of its unit, its label there, and what one count is (None: not
+    known).
+    """
+
+    unit: str
+    label: str
+    factor: float | None
+
+
+def _declared(log: Any) -> dict[int, dict[str, _Said]]:
+    """What the log says of its fields, by type of message and name."""
+    labels: dict[str, str] = {}
+    factors: dict[str, float] = {}
+    fields: dict[int, tuple[str, str]] = {}
+    for message in _messages(log, ("UNIT", "MULT", "FMTU")):
+        match message.get_type():
+            case "UNIT":
+                labels[chr(message.Id)] = message.Label
+            case "MULT":  # a double that was a float
+                factors[chr(message.Id)] = float(f"{message.Mult:.7g}") or 1.0
+            case _:
+                fields[message.FmtType] = message.UnitIds, message.MultIds
+    forms = {form.type: form for form in log.formats.values()}
+    return {
+        number: {
+            name: _Said(
+                unit,
+                labels.get(unit, ""),
+                None if mult == NOT_WORKED_OUT else 1.0 if own else factors.get(mult, 1.0),
+            )
+            for name, own, unit, mult in zip(
+                forms[number].columns, forms[number].msg_mults, *ids, strict=False
+            )
+        }
+        for number, ids in fields.items()
+        if number in forms
+    }
+
+
+def _columns(messages: list[Any], known: Mapping[str, _Said]) -> dict[str, Column]:
     """The fields of numbers of messages of one kind."""
     form = messages[0].fmt
     clock = next((name for name in CLOCKS if name in form.columns), None)
@@ -185,26 +233,15 @@ def _columns(messages: list[Any]) -> dict[str, Column]:
         if name in CLOCKS or kind not in (int, float) or letter == MODE:
             continue
         values = np.array([float(getattr(m, name)) for m in messages])
-        label = form.get_unit(name)
-        if label == "degheading":
+        said = known.get(name)
+        if said is None or said.factor is None or said.label not in LABELS:
+            out[name] = Column(time, values)
+            continue
+        if said.label == HEADING:
             values = np.unwrap(values, period=360.0)
-        factor, unit = _declared(label)
-        out[name] = Column(time, values if factor == 1 else factor * values, unit)
+        scaled = values if said.factor == 1 else said.factor * values
+        out[name] = Column(time, scaled, LABELS[said.label])
     return out
-
-
-def _declared(label: str) -> tuple[float, str | None]:
-    """Factor and unit of what the log says, such as "cm/s" or "1e-07 deglatitude"; (1, None) where
-    it says nothing that is known.
-    """
-    if label in LABELS:
-        return 1.0, LABELS[label]
-    number, _, rest = label.partition(" ")
-    if rest in LABELS and re.fullmatch(r"[\d.e+-]+", number):
-        return float(number), LABELS[rest]
-    if label[:1] in PREFIXES and label[1:] in LABELS:
-        return PREFIXES[label[:1]], LABELS[label[1:]]
-    return 1.0, None
 
 
 def _split(column: str) -> tuple[str, str | None, str]:
@@ -218,7 +255,7 @@ def _split(column: str) -> tuple[str, str | None, str]:
     return message, instance, field
 
 
-def _pick(found: _Messages, message: str, instance: str | None, field: str, path: object) -> Column:
+def _pick(found: _Found, message: str, instance: str | None, field: str, path: object) -> Column:
     instances = found[message]
     if instance is not None and instance not in instances:
         raise UnknownNameError(f"instance of {message}", instance, sorted(filter(None, instances)))
