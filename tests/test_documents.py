@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,12 @@ def printed_and_written(page):
 @pytest.mark.parametrize(
     "page",
     [
+        pytest.param(
+            "campaigns.md",
+            marks=pytest.mark.skipif(
+                find_spec("zarr") is None, reason="needs zarr: pip install 'symheli[campaigns]'"
+            ),
+        ),
         "controllers.md",
         "flying.md",
         "identification.md",

@@ -1,6 +1,8 @@
 """Campaigns: the same numbers wherever they run, nothing finished is lost, a failure is a row."""
 
+import doctest
 import errno
+import importlib
 import os
 import signal
 import subprocess
@@ -47,6 +49,16 @@ def seeds_of(campaign):
 def importable(monkeypatch):
     """Workers find the trials of the tests."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(PATHS))
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["campaign", "campaign_file", "run", "trial", "trials"],
+)
+def test_what_the_examples_show_is_so(module):
+    found = importlib.import_module(f"studies.campaigns.{module}")
+    names = {"np": np, "Here": Here, "Trial": Trial, "Campaign": Campaign}
+    assert doctest.testmod(found, extraglobs=names).failed == 0
 
 
 # --- what is declared ----------------------------------------------------------------------------
