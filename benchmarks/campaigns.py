@@ -31,7 +31,7 @@ from symheli.integrate.side_by_side import workers_of  # noqa: E402
 LONG = 0.5
 """Of a case, s."""
 LIMIT = 1.05
-SHORT_CASES, CASES = 2, 12
+SHORT_CASES, CASES = 4, 12
 """In a run of --quick, and in another, for each worker."""
 QUANTITIES = {f"quantity {i}": "1" for i in range(25)}
 """As many as the trial `identification` has."""
@@ -49,6 +49,9 @@ def waited(*, number: int = 0, run: int = 0) -> dict[str, float]:
     """Nothing but the time: what is added to it is not hidden by other work."""
     time.sleep(LONG)
     return dict.fromkeys(QUANTITIES, float(number))
+
+
+KINDS = ((waited, "waiting"), (half_a_second, "computing"))
 
 
 def numbered(call: Callable[..., object], number: int) -> object:
@@ -69,7 +72,7 @@ def through(trial: Trial, on: Runner, folder: Path, cases: int) -> Callable[[], 
 
 
 def main() -> None:
-    options = arguments(__doc__)
+    options = arguments(__doc__, write=True)
     workers = workers_of(None)
     cases = SHORT_CASES if options.quick else CASES
     ways: dict[str, Runner] = {"dask.distributed": Cluster.local(workers)}
@@ -84,7 +87,7 @@ def main() -> None:
     ):
         for on in (pool, *ways.values()):  # workers that have started, and imported what they need
             list(map(Future.result, [on.submit(half_a_second) for _ in range(2 * workers)]))
-        for call, what in ((waited, "waiting"), (half_a_second, "computing")):
+        for call, what in KINDS[: 1 if options.quick else None]:
             trial, every = Trial(call, QUANTITIES), range(cases * workers)
             loop, futures = f"{what}: a loop", f"{what}: concurrent.futures"
             here = f"{what}: a campaign in this process"
