@@ -1,6 +1,9 @@
 """Campaigns: the same numbers wherever they run, nothing finished is lost, a failure is a row."""
 
+import doctest
 import errno
+import importlib
+import json
 import os
 import signal
 import subprocess
@@ -15,6 +18,7 @@ import numpy as np
 import pytest
 from campaign_trials import DEADLY, PENDULUM, pendulum
 
+from studies import cli
 from studies.campaigns.campaign import Campaign, Normal, Uniform
 from studies.campaigns.campaign_file import campaign_of, read_campaign
 from studies.campaigns.dataset import CampaignDataset
@@ -47,6 +51,16 @@ def seeds_of(campaign):
 def importable(monkeypatch):
     """Workers find the trials of the tests."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(PATHS))
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["campaign", "campaign_file", "run", "trial", "trials"],
+)
+def test_what_the_examples_show_is_so(module):
+    found = importlib.import_module(f"studies.campaigns.{module}")
+    names = {"np": np, "Here": Here, "Trial": Trial, "Campaign": Campaign}
+    assert doctest.testmod(found, extraglobs=names).failed == 0
 
 
 # --- what is declared ----------------------------------------------------------------------------
@@ -289,6 +303,52 @@ def test_the_dataset_is_read_by_xarray_and_pandas(tmp_path, pd):
     frame = dataset.to_frame()
     assert list(frame) == ["length", "kind", "seed", "period", "bob", "seconds", "reason"]
     assert frame.groupby("kind")["bob"].count().to_dict() == {"bob": 9, "rod": 0}
+
+
+@pytest.fixture
+def declared(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pendulums.toml").write_text(
+        'trial = "campaign_trials:PENDULUM"\n[grid]\nlength = [1.0, -1.0]\nkind = ["rod", "bob"]\n'
+    )
+    return ["campaign", "pendulums.toml", "--workers", "1"]
+
+
+def test_the_command_runs_a_file_and_shows_medians_and_failures(declared, capsys):
+    assert cli.main([*declared, "--show", "period"]) == 0
+    out = capsys.readouterr().out
+    rows = [line.split() for line in out.splitlines()[1:7]]
+    assert rows[0] == ["length", "kind", "cases", "period"]
+    assert rows[2][:3] == ["1.0", "rod", "1/1"]
+    assert 1.9 < float(rows[2][3]) < 2.1
+    assert rows[4][:3] == ["-1.0", "rod", "0/1"]
+    assert "failed: 2 x ValueError: no pendulum is -1 m long" in out
+    assert "every case: pendulums.zarr" in out
+    assert cli.main([*declared, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["failed"] == 2
+    assert found["cases"][0]["parameters"]["length"] == 1.0
+    assert found["units"] == {"period": "s", "bob": "kg", "seconds": "s"}
+
+
+def test_a_campaign_of_which_nothing_came_fails(declared):
+    Path("pendulums.toml").write_text(
+        'trial = "campaign_trials:PENDULUM"\n[fixed]\nlength = -1.0\n'
+    )
+    assert cli.main(declared) == 1
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--seeds", "3"], "are for the campaign of the study"),
+        (["--show", "perod"], "did you mean 'period'"),
+    ],
+)
+def test_options_that_do_not_belong_to_a_file_are_refused(declared, more, message, capsys):
+    assert cli.main([*declared, *more]) == 1
+    assert message in capsys.readouterr().err
+    assert cli.main(["campaign", "--again"]) == 1
 
 
 # --- where it runs -------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from identification import fit, scores
 from identification.judge.against_constant import HORIZONS
 from studies.campaigns import pays
 from studies.campaigns.runners import Here
+from studies.transition.axes import LATERAL
 from studies.transition.flights import FlightPlan, autopilot_for
 
 
@@ -34,10 +35,10 @@ def test_the_models_are_those_of_the_study_with_a_moving_trim(ideal):
     plan = FlightPlan(ramps=3)
     autopilot = autopilot_for(ideal)
     training, test = plan.training(ideal, autopilot), plan.test(ideal, autopilot)
-    own = scores(fit(pays.LATERAL.structure(), training), test).by_horizon
-    assert pays.LATERAL.structure().offset_rate
+    own = scores(fit(LATERAL.structure(), training), test).by_horizon
+    assert LATERAL.structure().offset_rate
     for line in pays.where_scheduling_pays(0, "xcell60", {"short": plan}, on=Here()):
-        if line.axis == pays.LATERAL.name:
+        if line.axis == LATERAL.name:
             assert {h: line.lpv[h][0] for h in HORIZONS} == {h: own[h][line.output] for h in own}
 
 
