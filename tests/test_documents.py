@@ -188,6 +188,21 @@ def test_a_docstring_becomes_text_that_docutils_does_not_take_for_markup():
     ]
 
 
+def test_a_formula_needs_no_font_for_mathematics():
+    """Accents and the parentheses of a matrix are not left to it."""
+    pytest.importorskip("sphinx", reason="needs Sphinx: pip install 'symheli[docs]'")
+    import mathml
+
+    written = mathml.converted(
+        r"\dot x = \begin{pmatrix} \dot q & \hat\Theta \end{pmatrix}", None, True
+    )
+    assert 'class="accented">\u1e8b<' in written
+    assert "q\u0307" in written
+    assert "\u0398\u0302" in written
+    assert '<mtable class="round">' in written
+    assert not re.search("<mover|[(][^)]*mtable", written)
+
+
 SITE = """# A site
 
 ```{toctree}

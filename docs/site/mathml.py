@@ -1,8 +1,14 @@
 """Formulas as MathML, written when the site is built: no script and no font is loaded to read
 them.
+
+Where no font for mathematics is installed browsers neither place accents nor stretch parentheses.
+So an accented letter is one character, and the parentheses of a matrix are its rounded borders.
 """
 
 from __future__ import annotations
+
+import re
+import unicodedata
 
 from docutils.nodes import SkipNode
 from docutils.utils.math import MathError
@@ -10,15 +16,30 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.util import logging
 
 SAYS = logging.getLogger(__name__)
+COMBINING = {"˙": "\u0307", "¨": "\u0308", "ˉ": "\u0304", "^": "\u0302", "ˆ": "\u0302"}
+ACCENT = re.compile(
+    rf"<mover[^>]*>\s*<mi[^>]*>(\w)</mi>\s*<mo[^>]*>([{''.join(COMBINING)}])</mo>\s*</mover>"
+)
+MATRIX = re.compile(
+    r"<mrow>\s*<mo[^>]*>\(</mo>\s*<mtable>((?:(?!<mtable).)*?)</mtable>\s*<mo[^>]*>\)</mo>\s*</mrow>",
+    re.DOTALL,
+)
 
 
 def converted(tex, node, block):
     """The element <math> of a formula; a warning names one that cannot be written so."""
     try:
-        return tex2mathml(tex, as_block=block)
+        written = tex2mathml(tex, as_block=block)
     except MathError as error:
         SAYS.warning("formula: %s in %s", error, tex, location=node)
         return f"<code>{tex}</code>"
+    written = ACCENT.sub(_accented, written)
+    return MATRIX.sub(r'<mtable class="round">\1</mtable>', written)
+
+
+def _accented(found):
+    letter = unicodedata.normalize("NFC", found[1] + COMBINING[found[2]])
+    return f'<mi class="accented">{letter}</mi>'
 
 
 def inline(writer, node):

@@ -171,6 +171,24 @@ def _field_of_a_tuple(app, kind, name, thing, skip, options):
     return True if str(getattr(thing, "__doc__", "")).startswith("Alias for field number") else None
 
 
+NAME = re.compile(rf"(?:{'|'.join(FIRST_PAGES)})(?:\.\w+)+")
+
+
+def _linked(app, page):
+    """Makes a public name that stands in a page as code lead to its place in the reference."""
+    from docutils import nodes
+    from sphinx import addnodes
+
+    for code in list(page.findall(nodes.literal)):
+        name = code.astext().split("(")[0]
+        if NAME.fullmatch(name) and not isinstance(code.parent, addnodes.pending_xref):
+            code.replace_self(
+                addnodes.pending_xref(
+                    "", code.deepcopy(), refdomain="py", reftype="obj", reftarget=name
+                )
+            )
+
+
 def _before(app):
     write_pages(Path(app.srcdir) / "api")
 
@@ -178,6 +196,7 @@ def _before(app):
 def setup(app):
     """To Sphinx: the pages are written before any is read."""
     app.connect("builder-inited", _before)
+    app.connect("doctree-read", _linked)
     app.connect("autodoc-skip-member", _field_of_a_tuple)
     app.connect("autodoc-process-docstring", _docstring, priority=100)
     return {"parallel_read_safe": True}
