@@ -37,6 +37,7 @@ class VehicleFile:
         """{section: name it has in the text}, where that is misspelt."""
         self._entries: dict[tuple[str, str], str] = {}
         """{(section, entry): name it has in the text}, where that is misspelt."""
+        self._doubted: set[tuple[str, str]] = set()
         self._asked: Mapping[str, Mapping[str, Entry]] = {}
         self.problems: list[tuple[int, str]] = [
             (line, f"line {line}, not valid TOML: {wrong}") for line, wrong in unread
@@ -203,6 +204,7 @@ class VehicleFile:
 
     def _problem(self, section: str, entry: str, wrong: str) -> None:
         """Note what is wrong with an entry (or a section)."""
+        self._doubted.add((section, entry))
         line = self._line(section, entry) or self._line(section, "")
         name = f"{section}.{entry}" if entry else f"[{section}]"
         place = f"line {line}, {name}" if line else name
@@ -212,9 +214,8 @@ class VehicleFile:
         self, quantities: Mapping[str, dict[str, Quantity]]
     ) -> dict[str, dict[str, Quantity]]:
         """The numbers nothing was found wrong with."""
-        said = " ".join(text for _, text in self.problems)
         return {
-            section: {name: q for name, q in of.items() if f" {section}.{name}:" not in f" {said}"}
+            section: {name: q for name, q in of.items() if (section, name) not in self._doubted}
             for section, of in quantities.items()
         }
 
