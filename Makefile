@@ -1,5 +1,5 @@
 # make study : set up .venv and run the main job     make test : set up .venv and run the default tests
-# make test-all : lint, slow tests, the lowest versions of pyproject.toml, no compiler, no extras (.ci/gates)
+# make test-all : lint, slow tests, the lowest versions of pyproject.toml, no compiler, no extras, wheel and sdist (.ci/gates)
 # Python >= 3.11 as python3; PYTHON=... for another one.
 
 PYTHON ?= python3
@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: study quick test test-all slow lint lowest no-compiler no-extras bench clean
+.PHONY: study quick test test-all slow lint lowest no-compiler no-extras packaging bench clean
 .NOTPARALLEL: # test-all stops at the first that fails, and make names it
 
 $(STAMP): pyproject.toml constraints.txt setup.py $(wildcard identification/recursive/kernel/*.[ch])
@@ -25,13 +25,13 @@ quick: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4
 
-test-all: lint slow lowest no-compiler no-extras
+test-all: lint slow lowest no-compiler no-extras packaging
 
 slow: $(STAMP)
 	@echo "== slow: all tests, the slow ones too"
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 -m 'slow or not slow'
 
-lowest no-compiler no-extras:
+lowest no-compiler no-extras packaging:
 	@$(PYTHON) .ci/gates $@
 
 lint: $(STAMP)

@@ -145,7 +145,7 @@ class VehicleFile:
                     ]
                     for near in difflib.get_close_matches(name, free, n=1, cutoff=0.6):
                         self._entries[section, near] = name
-        for by_reference in (False, True):
+        for by_reference in (False, True):  # what is referred to comes first
             for section, asked in entries.items():
                 for name, entry in asked.items():
                     written = self._entries.get((section, name), name)
@@ -157,7 +157,7 @@ class VehicleFile:
                         self._problem(section, written, str(error))
                     except _AlreadySaidError:
                         pass
-        return {s: {e: of[e] for e in entries[s] if e in of} for s, of in out.items()}
+        return out
 
     def _line(self, section: str, entry: str) -> int | None:
         """Line of `entry =` below [section], of `section.entry =`, or of [section.entry]; of
