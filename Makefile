@@ -1,6 +1,6 @@
 # make study : set up .venv and run the main job     make test : set up .venv and run the default tests
 # make docs : the site in build/site; its blocks are run, and what they print is compared with the pages
-# make test-all : lint, slow tests, the site, the lowest versions of pyproject.toml, no compiler, no extras (.ci/gates)
+# make test-all : lint, slow tests, the site, the lowest versions of pyproject.toml, no compiler, no extras, wheel and sdist (.ci/gates)
 # Python >= 3.11 as python3; PYTHON=... for another one.
 
 PYTHON ?= python3
@@ -8,7 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: study quick test test-all slow docs lint lowest no-compiler no-extras bench clean
+.PHONY: study quick test test-all slow docs lint lowest no-compiler no-extras packaging bench clean
 .NOTPARALLEL: # test-all stops at the first that fails, and make names it
 
 $(STAMP): pyproject.toml constraints.txt setup.py $(wildcard identification/recursive/kernel/*.[ch])
@@ -26,7 +26,7 @@ quick: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 
-test-all: lint slow docs lowest no-compiler no-extras
+test-all: lint slow docs lowest no-compiler no-extras packaging
 
 slow: $(STAMP)
 	@echo "== slow: all tests, the slow ones too"
@@ -37,7 +37,7 @@ docs: $(STAMP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -c docs/site docs build/site
 
-lowest no-compiler no-extras:
+lowest no-compiler no-extras packaging:
 	@$(PYTHON) .ci/gates $@
 
 lint: $(STAMP)

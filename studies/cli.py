@@ -32,6 +32,7 @@ VERBS = (
     "pays",
     "design",
     "doctor",
+    "completion",
 )
 """Each is the module of that name in `studies.commands`."""
 

@@ -1,9 +1,15 @@
-"""What lies beside the code and is read at run time is declared as package data."""
+"""What lies beside the code is packaged, and the package is a command that a shell completes."""
 
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+
+from studies import cli
+from studies.commands import completion
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("symheli", "identification", "synthesis", "studies")
@@ -32,3 +38,42 @@ def test_no_line_of_code_is_longer_than_a_hundred_columns(room):
         if len(line) > 100
     ]
     assert not long
+
+
+def test_the_package_runs_as_a_module():
+    """`python -m symheli` is the installed command."""
+    answer = subprocess.run(
+        [sys.executable, "-m", "symheli", "--version"], capture_output=True, text=True
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout.split()[0] == "symheli"
+
+
+@pytest.mark.parametrize("shell", completion.SHELLS)
+def test_every_verb_is_completed(shell, capsys):
+    pytest.importorskip("shtab")
+    assert cli.main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(verb in script for verb in cli.VERBS)
+
+
+def test_completion_without_its_package_says_how_to_get_it(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "shtab", None)
+    assert cli.main(["completion", "bash"]) == 1
+    assert "pip install 'symheli[shell]'" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+def test_bash_completes_a_verb(tmp_path, capsys):
+    pytest.importorskip("shtab")
+    assert cli.main(["completion", "bash"]) == 0
+    (tmp_path / "symheli.bash").write_text(capsys.readouterr().out)
+    asked = "source symheli.bash; COMP_WORDS=(symheli linea); COMP_CWORD=1; _shtab_symheli"
+    answer = subprocess.run(
+        ["bash", "-c", f'{asked}; echo "${{COMPREPLY[@]}}"'],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert answer.stdout.split() == ["linearize"]

@@ -33,7 +33,7 @@ OPTIONAL = {
     "h5py": "reading MATLAB 7.3 files",
     "distributed": "campaigns on all cores and on clusters",
     "zarr": "datasets of campaigns",
-    "shtab": "completion of the command line in a shell",
+    "shtab": "completion in a shell: symheli completion bash|zsh|tcsh",
     "python-flint": "fast exact verification of certificates",
     "scs": "a second solver to cross-check",
     "jsbsim": "flying the AH-1S, a helicopter from elsewhere",

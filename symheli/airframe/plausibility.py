@@ -79,6 +79,17 @@ RANGES: Mapping[str, Range] = {
 }
 """{kind of quantity: plausible range}, wider than any helicopter by a factor of two or more."""
 
+USUAL = {
+    "rad": "deg",
+    "rad/s": "rpm",
+    "1/rad": "1/deg",
+    "kg": "gram",
+    "m": "mm",
+    "kg m^2": "kg cm^2",
+    "W": "hp",
+}
+"""What a number is most often in that was not converted to this unit."""
+
 IMPLIED = {"rad": "deg", "rad/s": "rpm", "1/rad": "1/deg"}
 """The unit in which a number is easier to doubt."""
 
@@ -172,13 +183,12 @@ def _doubt(q: Quantity, kind: Range, compared: float, scale: Scale | None) -> st
 
 
 def _meant(q: Quantity, kind: Range, scale: Scale | None) -> str:
-    """The unit that would make the number plausible: the usual slip first, then the others."""
+    """The units that would make the number plausible, the usual slip first, at most two."""
     given = q.given or q.unit
     number = q.value / to_si(given, q.unit)[0]
     units = [u for u in units_of(dimension(q.unit)) if u != given]
-    units.sort(key=lambda u: u != IMPLIED.get(q.unit))
-    for unit in units:
-        value = number * to_si(unit, q.unit)[0]
-        if kind.among(value, scale)[1]:
-            return f"; did you mean {number:g} {unit}, {value:.4g} {q.unit}?"
-    return ""
+    units.sort(key=lambda u: u != USUAL.get(q.unit))
+    values = {unit: number * to_si(unit, q.unit)[0] for unit in units}
+    fit = [unit for unit in units if kind.among(values[unit], scale)[1]][:2]
+    said = " or ".join(f"{number:g} {u}, {values[u]:.4g} {q.unit}" for u in fit)
+    return f"; did you mean {said}?" if said else ""

@@ -28,9 +28,7 @@ def text_of(path: Path) -> str:
         text = raw.decode("utf-16" if utf16 else "utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
-        raise InputError(
-            f"{path}, line {line}: no text in UTF-8; save the file as UTF-8"
-        ) from error
+        raise InputError(f"{path}, line {line}: not in UTF-8; save it as UTF-8") from error
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 

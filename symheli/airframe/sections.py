@@ -16,7 +16,7 @@ DRIVETRAIN = {
     ),
     "inertia": Entry(
         "kg m^2",
-        "of everything that turns, referred to the main shaft",
+        "inertia of all that turns, referred to the main shaft",
         "I_{rot}",
         "inertia",
         positive=True,

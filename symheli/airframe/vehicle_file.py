@@ -37,6 +37,7 @@ class VehicleFile:
         """{section: name it has in the text}, where that is misspelt."""
         self._entries: dict[tuple[str, str], str] = {}
         """{(section, entry): name it has in the text}, where that is misspelt."""
+        self._doubted: set[tuple[str, str]] = set()
         self._asked: Mapping[str, Mapping[str, Entry]] = {}
         self.problems: list[tuple[int, str]] = [
             (line, f"line {line}, not valid TOML: {wrong}") for line, wrong in unread
@@ -144,7 +145,7 @@ class VehicleFile:
                     ]
                     for near in difflib.get_close_matches(name, free, n=1, cutoff=0.6):
                         self._entries[section, near] = name
-        for by_reference in (False, True):
+        for by_reference in (False, True):  # what is referred to comes first
             for section, asked in entries.items():
                 for name, entry in asked.items():
                     written = self._entries.get((section, name), name)
@@ -156,7 +157,7 @@ class VehicleFile:
                         self._problem(section, written, str(error))
                     except _AlreadySaidError:
                         pass
-        return {s: {e: of[e] for e in entries[s] if e in of} for s, of in out.items()}
+        return out
 
     def _line(self, section: str, entry: str) -> int | None:
         """Line of `entry =` below [section], of `section.entry =`, or of [section.entry]; of
@@ -203,6 +204,7 @@ class VehicleFile:
 
     def _problem(self, section: str, entry: str, wrong: str) -> None:
         """Note what is wrong with an entry (or a section)."""
+        self._doubted.add((section, entry))
         line = self._line(section, entry) or self._line(section, "")
         name = f"{section}.{entry}" if entry else f"[{section}]"
         place = f"line {line}, {name}" if line else name
@@ -212,9 +214,8 @@ class VehicleFile:
         self, quantities: Mapping[str, dict[str, Quantity]]
     ) -> dict[str, dict[str, Quantity]]:
         """The numbers nothing was found wrong with."""
-        said = " ".join(text for _, text in self.problems)
         return {
-            section: {name: q for name, q in of.items() if f" {section}.{name}:" not in f" {said}"}
+            section: {name: q for name, q in of.items() if (section, name) not in self._doubted}
             for section, of in quantities.items()
         }
 

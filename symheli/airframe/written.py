@@ -16,10 +16,11 @@ from symheli.components import Component, Entry, find, packaged
 from symheli.values.units import dimension, units_of
 
 _HEAD = """\
-# A vehicle file: NAME = { value = ..., unit = "...", source = "..." }, a line above saying what it is.
-# Change what is yours, say where each number is from, and load the file by its path. Other units are
-# converted. assumed = true marks what is not published; unusual = true a number that is meant although
-# no helicopter is known to have it; { ref = "section.entry" } takes the value of another entry.
+# A vehicle file: NAME = { value = ..., unit = "...", source = "..." }; above each what it is, its
+# unit, what it must be and plausibly is. Change what is yours, say where each number is from, and
+# load the file by its path. Other units are converted. assumed = true marks what is not published,
+# unusual = true a number that is meant although no helicopter is known to have it, and
+# { ref = "section.entry" } takes the value of another entry.
 """
 
 

@@ -101,7 +101,6 @@ _ALSO = {
     **dict.fromkeys(("foot", "feet"), "ft"),
     **dict.fromkeys(("inch", "inches"), "in"),
     **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
-    **dict.fromkeys(("sec", "second", "seconds"), "s"),
     **dict.fromkeys(("hr", "hour", "hours"), "h"),
     **dict.fromkeys(("degree", "degrees", "°"), "deg"),
     **dict.fromkeys(("radian", "radians"), "rad"),

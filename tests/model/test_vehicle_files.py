@@ -6,10 +6,14 @@ import math
 import re
 
 import pytest
-from airframes import XCELL, write
+from airframes import AFT_ROTOR, DOCS, FORWARD, XCELL, write
 
 import symheli
-from symheli.airframe.vehicle import load_vehicle
+from studies import cli
+from symheli.airframe.plausibility import RANGES, implausibilities
+from symheli.airframe.vehicle import load_vehicle, vehicles
+from symheli.airframe.written import as_toml, reference
+from symheli.components import find, packaged
 from symheli.values.units import dimension, quotient, text, to_si
 
 MASS = 'mass = { value = 8.2, unit = "kg", source = "G15 Table 15.1" }'
@@ -100,8 +104,8 @@ def line_of(entry):
             'd_lon = { value = 0.096, unit = "rad", source = "G15 text, servo travel, symmetric" }',
             'd_lon = { value = 5.5, unit = "degs", source = "x" }',
             (
-                "unknown unit 'degs'; expected rad (or deg, mrad, rev); did you mean 'deg', 5.5 deg ="
-                " 0.0959931 rad?"
+                "unknown unit 'degs'; expected rad (or deg, mrad, rev); did you mean"
+                " 'deg', 5.5 deg = 0.0959931 rad?"
             ),
         ),
         (
@@ -218,3 +222,173 @@ def test_quotients_of_units_and_ambiguous_products():
     for wrong in ("foo/s", "m^", "m^x", "", "m//s"):
         with pytest.raises(symheli.InputError, match="unit"):
             to_si(wrong)
+
+
+TEN_MISTAKES = {
+    MASS: 'mass = { value = 8200, unit = "kg", source = "scales" }',  # grams
+    'Ixx = { value = 0.18, unit = "kg m^2", source = "G15 Table 15.1" }': "Ixx = 0.18",
+    "nominal_speed = { value = 167.0, unit": "nominal_speed = { value = 1600, unit",
+    'd_col = { value = 0.183, unit = "rad"': 'd_col = { value = 12, unit = "rad"',
+    RADIUS: RADIUS.replace("radius", "radios"),
+    "[fuselage]": "[fuselag]",
+    'area_y = { value = 0.22, unit = "m^2"': 'area_y = { value = 0,22, unit = "m^2"',
+    'hub_height = { value = 0.235, unit = "m", source = "G15 Table 15.1" }\n': "",
+    'max_power = { value = 2000.0, unit = "W"': 'max_power = { value = 2000.0, unit = "N"',
+    'gear_ratio = { value = 4.66, unit = "1", source = "G15 Table 15.1" }': (
+        'gear_ratio = { value = 4.66, unit = "1" }'
+    ),
+}
+
+
+def test_one_message_lists_ten_different_mistakes_and_the_corrected_file_loads(tmp_path):
+    """A vehicle file written from the documentation once took a new user 47 runs."""
+    path = write(tmp_path, replace=TEN_MISTAKES)
+    with pytest.raises(symheli.InputError) as caught:
+        load_vehicle(path)
+    first, *said = str(caught.value).splitlines()
+    assert first == f"{path}: 10 things to put right"
+    expected = [
+        "body.mass: 8200 kg is disc loading m g/(pi R^2) = 4.263e+04 N/m^2, plausible is 2 to"
+        " 3000 N/m^2; did you mean 8200 gram, 8.2 kg",
+        "body.Ixx: a bare number has no unit: write { value = 0.18, unit = 'kg m^2'",
+        "drivetrain.nominal_speed: 1600 rad/s is tip speed Om R = 1240 m/s, plausible is 10 to 400"
+        " m/s; did you mean 1600 rpm, 167.6 rad/s",
+        "drivetrain.max_power: expected W (or kW, hp, PS), got 2000.0 N, which is another kind",
+        "controls.d_col: 12 rad is 687.5 deg, plausible is 0.005 to 1 rad; did you mean 12 deg,"
+        " 0.2094 rad",
+        "main_rotor.hub_height: missing (height of the hub above the centre of gravity)",
+        "main_rotor.radios: unknown entry 'radios'; did you mean 'radius'?",
+        "[fuselag]: unknown component 'fuselag'; did you mean 'fuselage'?",
+        "not valid TOML: ",
+        "tail_rotor.gear_ratio: every number needs a source",
+    ]
+    for line, message in zip(said, expected, strict=True):
+        assert message in line
+    assert "write numbers with a point, as 8.2" in said[8]
+    numbers = [int(re.match(r"  line (\d+), ", line)[1]) for line in said]
+    assert numbers == sorted(numbers)
+    text = path.read_text(encoding="utf-8")
+    for right, wrong in TEN_MISTAKES.items():
+        if wrong:
+            text = text.replace(wrong, right)
+    hub = next(line for line in XCELL.splitlines() if line.startswith("hub_height"))
+    path.write_text(text.replace(RADIUS, f"{RADIUS}\n{hub}"), encoding="utf-8")
+    assert load_vehicle(path).sections["body"] == load_vehicle("xcell60").sections["body"]
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "unit", "meant"),
+    [
+        ("lift_slope", 0.1, "1/rad", "did you mean 0.1 1/deg, 5.73 1/rad?"),
+        ("radius", 775, "m", "did you mean 775 mm, 0.775 m"),
+        ("chord", 58, "m", "did you mean 58 mm, 0.058 m"),
+    ],
+)
+def test_a_number_in_the_wrong_unit_is_doubted_with_the_unit_that_would_do(
+    tmp_path, entry, value, unit, meant
+):
+    old = next(line for line in XCELL.splitlines() if line.startswith(f"{entry} ="))
+    new = f'{entry} = {{ value = {value}, unit = "{unit}", source = "x" }}'
+    with pytest.raises(symheli.InputError, match=re.escape(meant)):
+        load_vehicle(write(tmp_path, replace={old: new}))
+    told = write(tmp_path, replace={old: new.replace("source", "unusual = true, source")})
+    if entry != "radius":  # with which everything else is compared
+        assert load_vehicle(told).sections["main_rotor"][entry].unusual
+
+
+@pytest.mark.parametrize("name", vehicles())
+@pytest.mark.parametrize("factor", [0.3, 5.0])
+def test_ranges_serve_every_size(name, factor):
+    """A scaled airframe is as plausible as its original: the ranges are ratios, or angles."""
+    scaled = load_vehicle(name).scaled(factor)
+    assert not list(implausibilities(scaled.sections, scaled.entries))
+
+
+@pytest.mark.parametrize("name", vehicles())
+def test_the_template_of_an_airframe_is_the_airframe(tmp_path, name, capsys):
+    """`symheli vehicles NAME --toml > mine.toml`, loaded, has every part and number unchanged, and
+    says above each entry what it means.
+    """
+    assert cli.main(["vehicles", name, "--toml"]) == 0
+    text = capsys.readouterr().out
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    one, other = load_vehicle(name), load_vehicle(path)
+    assert (one.sections, one.components) == (other.sections, other.components)
+    assert (one.title, one.source) == (other.title, other.source)
+    lines = text.splitlines()
+    for section, entries in one.entries.items():
+        for entry, asked in entries.items():
+            at = next(
+                i
+                for i in range(lines.index(f"[{section}]"), len(lines))
+                if lines[i].startswith(f"{entry} =")
+            )
+            assert lines[at - 1].startswith(f"# {asked.meaning}")
+
+
+def test_a_template_keeps_the_wiring_of_its_parts(tmp_path):
+    one = load_vehicle(write(tmp_path, AFT_ROTOR, replace={"[main_rotor]": FORWARD}))
+    (tmp_path / "again.toml").write_text(as_toml(one), encoding="utf-8")
+    other = load_vehicle(tmp_path / "again.toml")
+    assert other.components == one.components
+    assert other.values("aft_rotor") == one.values("aft_rotor")
+
+
+def test_the_page_has_the_reference_of_the_code():
+    """To renew it: symheli vehicles --reference, below the heading of docs/vehicles.md."""
+    _, found, rest = DOCS.partition("## Every part and entry\n\n")
+    assert found
+    assert rest.partition("\n## ")[0].strip() == reference().strip()
+
+
+def test_every_packaged_entry_says_what_it_means_and_has_a_known_range():
+    for kind in packaged():
+        for name, entry in find(kind).entries.items():
+            assert entry.meaning, f"{kind}.{name}"
+            assert entry.kind in RANGES, f"{kind}.{name}"
+
+
+@pytest.mark.parametrize(
+    "encoded",
+    [
+        lambda text: b"\xef\xbb\xbf" + text.encode(),
+        lambda text: text.replace("\n", "\r\n").encode(),
+        lambda text: text.encode("utf-16"),
+    ],
+    ids=["mark", "crlf", "utf-16"],
+)
+def test_files_of_other_editors_are_read(tmp_path, encoded):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(encoded(XCELL))
+    assert load_vehicle(path).sections == load_vehicle("xcell60").sections
+
+
+def test_a_file_in_another_encoding_says_in_which_line(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(XCELL.replace("G15 text", "Müller", 1).encode("latin-1"))
+    with pytest.raises(symheli.InputError, match=r"line \d+: not in UTF-8"):
+        load_vehicle(path)
+
+
+@pytest.mark.parametrize(
+    ("written", "expected", "si"),
+    [
+        *((u, "", to_si("N m")) for u in ("N*m", "N·m", "N-m", "Nm")),
+        *((u, "", to_si("kg m^2")) for u in ("kg*m**2", "kg·m²", "kg m2", "Kg m^2")),
+        *((u, "N m", to_si("ft lbf")) for u in ("ft lb", "lb ft", "ft-lb", "lbf*ft")),
+        ("lb", "kg", (0.45359237, "kg")),
+        ("lb", "N", (4.4482216152605, "N")),
+        ("g", "kg", (1e-3, "kg")),
+        ("g", "m/s^2", (9.80665, "m/s^2")),
+        ("kn", "", to_si("kt")),
+        ("RPM", "", to_si("rpm")),
+        ("rev/min", "", to_si("rpm")),
+        ("m s^-1", "", (1.0, "m/s")),
+        ("slug-ft²", "", to_si("slug ft^2")),
+    ],
+)
+def test_units_are_read_as_people_write_them(written, expected, si):
+    factor, unit = to_si(written, expected)
+    assert factor == pytest.approx(si[0], rel=1e-12)
+    assert dimension(unit) == dimension(si[1])

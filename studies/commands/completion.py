@@ -1,0 +1,27 @@
+"""symheli completion: what a shell needs to complete the command line."""
+
+from __future__ import annotations
+
+import argparse
+
+from studies.output import Output
+from symheli.extras import extra
+
+HELP = "print the completion of this command line for bash, zsh or tcsh"
+
+SHELLS = ("bash", "zsh", "tcsh")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Which shell."""
+    parser.add_argument("shell", choices=SHELLS, help="the shell to complete in")
+
+
+def run(arguments: argparse.Namespace) -> Output:
+    """The script; a shell evaluates it, or reads it from a file of its completions."""
+    with extra("shell", "completion of the command line"):
+        import shtab
+    from studies.cli import parser
+
+    script = shtab.complete(parser(), shell=arguments.shell)
+    return Output(script, {"shell": arguments.shell, "script": script})
