@@ -14,6 +14,7 @@ from symheli.airframe.plausibility import impossibilities
 from symheli.airframe.quantity import Quantity
 from symheli.airframe.vehicle_file import LINEAR, VehicleFile
 from symheli.errors import InputError, UnknownNameError
+from symheli.values.text_file import text_of
 from symheli.values.units import dimension
 
 
@@ -134,7 +135,7 @@ def load_vehicle(name_or_path: str | os.PathLike[str]) -> Vehicle:
             raise InputError(
                 f"no vehicle file at {given}; packaged airframes: {', '.join(vehicles())}"
             )
-        file, name = VehicleFile(given, path.read_text(encoding="utf-8"), path.parent), path.stem
+        file, name = VehicleFile(given, text_of(path), path.parent), path.stem
     else:
         if given not in vehicles():
             raise UnknownNameError("vehicle", given, vehicles())
