@@ -27,9 +27,9 @@ from studies.transition.tables import LEVEL, gain
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from synthesis import GainCurve
     from studies.transition.guarantees import Bound
     from studies.transition.outcome import Outcome
+    from synthesis import GainCurve
 
 CHEAP = 0.1
 """Share by which a gain that is proven for any rate may exceed the frozen one for the rate to

@@ -22,6 +22,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
 from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
+from symheli.values.text_file import text_of
 from symheli.values.units import to_si
 
 _TABLES = ("states", "inputs", "equations", "parameters")
@@ -123,7 +124,7 @@ def identified_model(name_or_path: str | os.PathLike[str]) -> IdentifiedModel:
             raise InputError(
                 f"no model file at {given}; packaged models: {', '.join(identified_models())}"
             )
-        text = Path(given).read_text(encoding="utf-8")
+        text = text_of(Path(given))
     elif given in identified_models():
         text = (resources.files("symheli.airframe.vehicles") / f"{given}{LINEAR}").read_text(
             encoding="utf-8"

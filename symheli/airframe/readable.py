@@ -2,34 +2,16 @@
 
 from __future__ import annotations
 
-import codecs
 import re
 import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
-
-from symheli.errors import InputError
 
 UNREADABLE: Mapping[str, Any] = {"unreadable": True}
 """Stands for the value of an entry whose line is no TOML."""
 
 _MOST = 50
 """So many broken lines are looked for."""
-
-
-def text_of(path: Path) -> str:
-    """The text of a file in UTF-8, or in UTF-16 with its mark, as a shell on Windows writes it; a
-    mark at its beginning is dropped. Raises `InputError` with the line that is neither.
-    """
-    raw = path.read_bytes()
-    utf16 = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    try:
-        text = raw.decode("utf-16" if utf16 else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise InputError(f"{path}, line {line}: not in UTF-8; save it as UTF-8") from error
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def readable(text: str) -> tuple[dict[str, Any], list[tuple[int, str]]]:

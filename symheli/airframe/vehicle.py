@@ -12,11 +12,11 @@ from pathlib import Path
 from symheli.airframe.part import Part
 from symheli.airframe.plausibility import impossibilities
 from symheli.airframe.quantity import Quantity
-from symheli.airframe.readable import text_of
 from symheli.airframe.vehicle_file import LINEAR, VehicleFile, entries_of
 from symheli.components import Entry
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.summary import summarized
+from symheli.values.text_file import text_of
 from symheli.values.units import dimension
 
 

@@ -1,0 +1,104 @@
+"""Every public entry with one argument changed at a time and every reader with damaged files: how
+often what came back, and what failed.
+
+    python benchmarks/fuzz.py --write
+
+The inputs are the same ones every time. --write keeps the table in docs/reliability.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import warnings
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[0] = str(ROOT)  # not benchmarks/, whose files are named after the rooms they measure
+
+from studies.stamped_tables import DOCS, keep, processor  # noqa: E402
+from studies.threads import one_thread  # noqa: E402
+
+one_thread()
+sys.path.append(str(ROOT / "tests" / "reliability"))
+
+import damaged_files  # noqa: E402
+import entries  # noqa: E402
+import fuzzed  # noqa: E402
+from valid_calls import PACKAGES, ValidCall, caught  # noqa: E402
+
+OUTCOMES = ("refused", "refused by Python", "result", "another exception", "too long", "crash")
+
+
+def rows(package: str, quick: bool) -> dict[str, fuzzed.Tally]:
+    """{entry: tally} of a package, or of the readers."""
+    if package == "readers":
+        with tempfile.TemporaryDirectory() as folder:
+            return {
+                reader.entry: damaged_files.tally(reader, 16 if quick else damaged_files.USUAL)
+                for reader in damaged_files.readers(Path(folder))
+            }
+    calls: dict[str, list[ValidCall]] = {}
+    for call in caught(lambda name: name.startswith(package + ".")):
+        if entries.asked(call.entry) and not (quick and call.entry in entries.SLOW):
+            calls.setdefault(call.entry, []).append(call)
+    return {
+        entry: fuzzed.tally(of, 2 if quick else entries.inputs(entry))
+        for entry, of in sorted(calls.items())
+    }
+
+
+def table(found: dict[str, fuzzed.Tally]) -> str:
+    """Markdown: an entry a row, and all together."""
+    head = ("entry", "inputs", *OUTCOMES, "faults")
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    total: Counter[str] = Counter()
+    faults = 0
+    for entry, tally in found.items():
+        total += tally.outcomes
+        faults += len(tally.faults)
+        lines.append(_row(f"`{entry}`", tally.outcomes, len(tally.faults)))
+    return "\n".join([*lines, _row("**together**", total, faults)])
+
+
+def _row(name: str, outcomes: Counter[str], faults: int) -> str:
+    counts = [outcomes.total(), *(outcomes[word] for word in OUTCOMES), faults]
+    return f"| {name} | " + " | ".join(str(n) if n else "" for n in counts) + " |"
+
+
+def main() -> None:
+    """Count and print a table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="a few of each, under 40 s")
+    parser.add_argument("--json", action="store_true", help="print the counts by entry")
+    parser.add_argument("--write", action="store_true", help="keep them in docs/reliability.md")
+    parser.add_argument(
+        "--only", choices=(*PACKAGES, "readers"), action="append", help="default: all"
+    )
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    found: dict[str, fuzzed.Tally] = {}
+    home = os.getcwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)  # what is saved by a changed path stays here
+        for package in options.only or (*PACKAGES, "readers"):
+            found |= rows(package, options.quick)
+        os.chdir(home)
+    faults = [str(fault) for tally in found.values() for fault in tally.faults]
+    if options.json:
+        counts = {entry: dict(tally.outcomes) for entry, tally in found.items()}
+        print(json.dumps({"counts": counts, "faults": faults}, indent=1))
+    else:
+        print(table(found), *faults, sep="\n")
+    if options.write:
+        keep(DOCS / "reliability.md", "fuzzing", table(found), processor())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,190 @@
+"""Inputs that once ended in another exception, in NaN without a word or in no answer at all."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import identification as idn
+import symheli
+import synthesis
+from symheli.errors import InputError, SolverError, UnknownNameError
+from symheli.lpv import LinearModel
+from symheli.values.text_file import text_of
+from synthesis.design.back_off import levels_above
+from synthesis.program.panic import no_panic
+
+T = np.arange(0.0, 4.0, 0.02)
+RNG = np.random.default_rng(0)
+
+
+@pytest.fixture(scope="module")
+def record():
+    u, y = RNG.uniform(-1, 1, 120), np.zeros(120)
+    for k in range(1, 120):
+        y[k] = 0.5 * y[k - 1] + u[k - 1] + 0.01 * RNG.standard_normal()
+    return symheli.FlightRecord.from_arrays(
+        0.1 * np.arange(120), dict.fromkeys("yup", "1"), y=y, u=u, p=np.sin(np.arange(120))
+    )
+
+
+@pytest.fixture(scope="module")
+def model(record):
+    arx = idn.LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
+    return idn.fit(arx, record)
+
+
+@pytest.mark.parametrize("degree", [math.nan, math.inf, 1.5, 2.0, True, -1])
+def test_a_degree_is_a_whole_number(degree):
+    with pytest.raises(InputError, match="degree: expected a whole number"):
+        idn.Polynomial(degree, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("seed", [math.nan, -1, 0.5])
+def test_a_seed_is_a_whole_number(seed):
+    for make in (
+        lambda: symheli.Wind(seed=seed),
+        lambda: symheli.Excitation({"d_lon": 0.01}, seed=seed),
+        lambda: symheli.Dryden(wind=5.0, altitude=50.0).history(T, 5.0, seed),
+        lambda: symheli.FlightPlan(symheli.AirspeedSchedule.transition(4.0, 5.0), seed=seed),
+    ):
+        with pytest.raises(InputError, match="seed"):
+            make()
+
+
+@pytest.mark.parametrize("time", [[], [0.0], [0.0, 0.0], [1.0, 0.5], [0.0, math.nan], 3.0])
+def test_an_excitation_wants_increasing_times(time):
+    with pytest.raises(InputError, match="time"):
+        symheli.Excitation({"d_lon": 0.01})(np.asarray(time))
+
+
+@pytest.mark.parametrize("band", [(0.1,), (0.1, 1.0, 5.0), ()])
+def test_a_band_has_two_ends(band):
+    with pytest.raises(InputError, match="band"):
+        symheli.Excitation({"d_lon": 0.01}, band=band)
+
+
+def test_a_period_is_finite():
+    with pytest.raises(InputError, match="period"):
+        symheli.Excitation({"d_lon": 0.01}, period=math.nan)
+
+
+def test_laps_are_counted():
+    with pytest.raises(InputError, match="laps"):
+        symheli.AirspeedSchedule.transition(0.0, 13.0, laps=-(10**30))
+
+
+def test_a_wind_has_three_components():
+    with pytest.raises(InputError, match="north, east, down"):
+        symheli.FlightCondition(5.0, wind=(0.0, 0.0))
+
+
+def test_noise_in_decibels_is_a_number_that_can_be_raised_to():
+    schedule = symheli.AirspeedSchedule.transition(4.0, 5.0)
+    with pytest.raises(InputError, match="noise_db"):
+        symheli.FlightPlan(schedule, noise_db=-5e15)
+
+
+def test_a_sample_of_a_billion_years_is_refused_and_not_begun(ideal):
+    point = symheli.trim(ideal, airspeed=5.0)
+    x0 = np.tile(point.x.array, (2, 1))
+    for dt in (4.3e16, 1e300):
+        with pytest.raises(InputError, match="steps"):
+            symheli.simulate_batch(ideal, x0, [point.u.array] * 2, dt=dt)
+
+
+def test_rows_outside_a_record_are_refused(record):
+    for keep in (np.full(120, math.nan), np.ones(3, bool), np.ones((120, 1), bool), [500]):
+        with pytest.raises(InputError, match="rows"):
+            record.rows(keep)
+
+
+def test_a_horizon_beyond_the_record_predicts_nothing_at_once(model, record):
+    """A trillion steps were walked through."""
+    for hold in (False, True):
+        assert np.isnan(model.predict(record, 10**12, hold_p=hold)).all()
+
+
+def test_an_order_of_a_trillion_lags_is_refused_at_once():
+    with pytest.raises(InputError, match="from 0 to"):
+        idn.LPVARX("y", "u", "p", na=10**12, nb=1, delay=1, basis=idn.Polynomial(1, -1.0, 1.0))
+
+
+def test_derivatives_of_a_basis_have_an_order():
+    basis = idn.BSpline(2, (0.0, 0.5, 1.0))
+    for order in (math.nan, math.inf, 1.5, -1):
+        with pytest.raises(InputError, match="derivative"):
+            basis([0.5], order)
+    assert not basis([0.5], 10**12).any()
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, 1e-300, math.nan, math.inf])
+def test_lags_need_a_sample_period(dt):
+    with pytest.raises(InputError, match="dt"):
+        idn.LaggedSignals("u").instrument_lags(dt, 1, 1)
+
+
+def test_counts_of_the_judges_are_whole(model, record):
+    for judge in (
+        lambda n: idn.residual_analysis(model, record, lags=n),
+        lambda n: idn.slow_modes(model, record, points=n),
+        lambda n: idn.choose_experiments((), n),
+    ):
+        for count in (math.nan, 0, 1.5):
+            with pytest.raises(InputError, match="whole number"):
+                judge(count)
+
+
+def test_an_output_that_is_none_is_named():
+    found = SimpleNamespace(scheduled=SimpleNamespace(outputs=("q", "theta")))
+    with pytest.raises(UnknownNameError, match="did you mean 'theta'"):
+        idn.AgainstConstant.pays(found, "thetax")  # type: ignore[arg-type]
+
+
+def test_iterations_are_counted():
+    for make in (
+        lambda n: idn.RefinedInstruments(iterations=n),
+        lambda n: idn.OutputError(evaluations=n),
+    ):
+        with pytest.raises(InputError, match="whole number"):
+            make(math.nan)
+
+
+@pytest.mark.parametrize("back_off", [-1e300, 0.5, math.nan, 1.6e16, ()])
+def test_a_level_above_the_optimum_is_near_it(back_off):
+    """1.6e16 made Clarabel panic, which is no `Exception`."""
+    with pytest.raises(InputError, match="back_off"):
+        levels_above(back_off)
+
+
+def test_a_panic_of_a_solver_is_an_error_of_this_project():
+    panic = type("PanicException", (BaseException,), {})
+    with pytest.raises(SolverError, match="index out of bounds"), no_panic():
+        raise panic("index out of bounds")
+    with pytest.raises(KeyboardInterrupt), no_panic():
+        raise KeyboardInterrupt
+
+
+def test_grids_and_tolerances_of_the_analysis_are_checked():
+    lag = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
+    for points in (math.nan, 0, 1.5):
+        with pytest.raises(InputError, match="points"):
+            synthesis.bandwidth(lag, points=points)
+    p = symheli.Scheduling("p", "1", 0.0, 1.0)
+    lpv = symheli.LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    for points in (0, -1):
+        with pytest.raises(InputError, match="points"):
+            synthesis.frozen_gain(lpv, points=points)
+    with pytest.raises(InputError, match="tolerance"):
+        synthesis.frozen_box_gain(lpv.to_lft(), tolerance=math.nan)
+
+
+def test_a_text_file_with_flipped_bytes_is_refused(tmp_path):
+    """A vehicle file with one bit changed ended in UnicodeDecodeError."""
+    path = tmp_path / "vehicle.toml"
+    path.write_bytes(b'title = "\xe1"')
+    with pytest.raises(InputError, match="UTF-8"):
+        symheli.Helicopter.load(path)
+    with pytest.raises(InputError, match="No such file"):
+        text_of(tmp_path / "none")
