@@ -367,7 +367,7 @@ def test_files_of_other_editors_are_read(tmp_path, encoded):
 def test_a_file_in_another_encoding_says_in_which_line(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(XCELL.replace("G15 text", "Müller", 1).encode("latin-1"))
-    with pytest.raises(symheli.InputError, match=r"line \d+: not in UTF-8"):
+    with pytest.raises(symheli.InputError, match=r"line \d+: not a text file in UTF-8"):
         load_vehicle(path)
 
 
