@@ -257,7 +257,7 @@ def test_one_message_lists_ten_different_mistakes_and_the_corrected_file_loads(t
         "controls.d_col: 12 rad is 687.5 deg, plausible is 0.005 to 1 rad; did you mean 12 deg,"
         " 0.2094 rad",
         "main_rotor.hub_height: missing (height of the hub above the centre of gravity)",
-        "main_rotor.radios: unknown entry 'radios'; did you mean 'radius'?",
+        "main_rotor.radios: unknown entry 'radios'; did you mean 'radius'",
         "[fuselag]: unknown component 'fuselag'; did you mean 'fuselage'?",
         "not valid TOML: ",
         "tail_rotor.gear_ratio: every number needs a source",
