@@ -17,15 +17,18 @@ from studies.controllers.flown import WINDS
 from studies.report.labels import Labels
 from studies.report.references import REFERENCES
 from studies.report.shortfalls import shortfalls
-from studies.transition import conclusions, gain_tables, report, tables
+from studies.transition import conclusions, gain_tables, guarantees, report, tables
 from studies.transition.flights import NOISES
 from studies.transition.outcome import Outcome
 from studies.transition.results import to_dict
-from synthesis import Status
+from symheli import LPVStateSpace, Scheduling
+from synthesis import Search, Spline
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 WANTED = ("mark", "seeds better")
 """Columns that are no results, by how they begin, or counted from others."""
+
+GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
 
 
 @pytest.fixture(scope="module")
@@ -185,7 +188,7 @@ def test_no_bold_cell_of_any_table_diverges(full):
 
 def test_abstract_and_conclusion_are_short_sentences_with_the_numbers(full):
     for said in (conclusions.abstract(full), conclusions.conclusions(full)):
-        assert 4 <= len(said) <= 14
+        assert 4 <= len(said) <= 13
         assert max(map(len, said)) < 420
     cubic = full.known_kinematics.rivals[0]
     worst = max(gap.max() for gap in cubic.gaps.values())
@@ -193,22 +196,25 @@ def test_abstract_and_conclusion_are_short_sentences_with_the_numbers(full):
 
 
 def test_the_answer_follows_the_proofs(full):
-    """The gust loop of the fixture grows when airspeed jumps; with LFT tests that prove a gain near
-    the frozen one the answer is the other.
+    """The gust loop of the fixture grows when airspeed jumps; a lag that hardly changes does not
+    care.
     """
     alone = Outcome(vehicle="x", quick=True, seed=0, gust=full.gust)
-    first, *_ = conclusions.conclusions(alone)
-    assert first.startswith("Take an LPV model")
+    assert conclusions.conclusions(alone)[0].startswith("Take an LPV model")
     assert "makes the state grow" in conclusions.abstract(alone)[0]
-
-    def easy(bound):
-        c = bound.certificate
-        if math.isinf(bound.rate):
-            proven = {"status": Status.PROVEN, "verified": True}
-            c = replace(c, gamma=1.01 * c.frozen, lower=c.frozen, **proven)
-        return replace(bound, certificate=c)
-
-    gust = replace(full.gust, bounds=tuple(map(easy, full.gust.bounds)))
-    tame = replace(alone, gust=gust)
+    tame = replace(alone, gust=replace(full.gust, bounds=hardly_changing()))
     assert conclusions.conclusions(tame)[0].startswith("Take the LFT")
     assert "the LFT is enough" in conclusions.abstract(tame)[0]
+
+
+def hardly_changing():
+    """Bounds of a lag whose pole moves by a hundredth."""
+    lag = LPVStateSpace.polynomial(
+        [[[-1.0]], [[-0.01]]],
+        [[[1.0]]],
+        [[[1.0]]],
+        [[[0.0]]],
+        Scheduling("airspeed", "m/s", 0.0, 1.0),
+    )
+    asked = guarantees.bounds("baseline", "gust", lag, (0.0, math.inf), Spline(), GLIMPSE)
+    return tuple(guarantees.answered([*asked, *guarantees.lft_bounds("baseline", "gust", lag)]))
