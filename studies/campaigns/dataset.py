@@ -47,7 +47,7 @@ class CampaignDataset:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "path", Path(self.path))
-        object.__setattr__(self, "_folder", ZarrFolder(self.path))
+        object.__setattr__(self, "_folder", ZarrFolder(self.path, remade=True))
         try:
             content = json.loads((self.path / CASES).read_text(encoding="utf-8"))
             object.__setattr__(self, "attributes", content["attributes"])

@@ -26,9 +26,10 @@ def write_own(path: str | os.PathLike[str], content: str) -> Path | None:
     return write_text(target, content)
 
 
-def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
+def write_bytes(path: str | os.PathLike[str], content: bytes, *, forced: bool = True) -> Path:
     """Replace `path` by `content` at once, folders made as needed: a reader sees the old file or
-    the new one, never half of it.
+    the new one, never half of it. Where it is not `forced` onto the disk, which takes some
+    milliseconds, that holds for stops and kills but not for a power failure.
 
     Raises `SymheliError` where the disk is full or the folder cannot be written; the old file is
     then still there.
@@ -41,7 +42,8 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
             file.flush()
-            os.fsync(file.fileno())
+            if forced:
+                os.fsync(file.fileno())
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, target)
     except OSError as error:

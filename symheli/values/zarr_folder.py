@@ -14,7 +14,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array
-from symheli.values.whole_files import write_bytes, write_text
+from symheli.values.whole_files import write_bytes
 
 FORMAT = 2
 
@@ -49,9 +49,12 @@ class ZarrArray:
 
 @dataclass(frozen=True)
 class ZarrFolder:
-    """The folder `path`; each file in it is whole or not there."""
+    """The folder `path`; each file in it is whole or not there. `remade`: its owner says anew what
+    is in it whenever it writes to it, so that only chunks need to outlive a power failure.
+    """
 
     path: Path
+    remade: bool = False
 
     def describe(self, arrays: Mapping[str, ZarrArray]) -> None:
         """Say which arrays there are; chunks that are there stay."""
@@ -71,17 +74,17 @@ class ZarrFolder:
             labels = {"coordinates": " ".join(array.coordinates)} if array.coordinates else {}
             metadata[f"{name}/.zattrs"] = {"_ARRAY_DIMENSIONS": array.dimensions, **labels}
         for name, content in metadata.items():
-            write_text(self.path / name, json.dumps(content))
+            self._say(name, content)
         consolidated = {"zarr_consolidated_format": 1, "metadata": metadata}
-        write_text(self.path / ".zmetadata", json.dumps(consolidated))
+        self._say(".zmetadata", consolidated)
 
     def say(self, attributes: Mapping[str, Any]) -> None:
         """The attributes of the whole."""
-        write_text(self.path / ".zattrs", json.dumps(attributes))
+        self._say(".zattrs", attributes)
 
     def keep(self, name: str, values: Array) -> None:
         """An array of one chunk."""
-        write_bytes(self.path / name / "0", values.tobytes())
+        write_bytes(self.path / name / "0", values.tobytes(), forced=not self.remade)
 
     def write(self, name: str, chunk: int, values: Array) -> None:
         """The chunk along the first dimension, filled up where `values` has fewer rows."""
@@ -132,6 +135,9 @@ class ZarrFolder:
                 rows = slice(k * step, (k + 1) * step)
                 out[rows] = block[: len(out[rows])]
         return out
+
+    def _say(self, name: str, content: Any) -> None:
+        write_bytes(self.path / name, json.dumps(content).encode(), forced=not self.remade)
 
     def _read(self, name: str, chunk: int, array: ZarrArray) -> Array | None:
         path, dtype = self._file(name, chunk, array), np.dtype(array.dtype)
