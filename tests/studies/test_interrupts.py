@@ -105,7 +105,8 @@ def interrupted(child):
     assert child.poll() is None, "it ended by itself: there was nothing to interrupt"
     before = spent(child.pid)
     child.send_signal(signal.SIGINT)
-    err = child.stderr.read()
+    with child.stdout, child.stderr:
+        err = child.stderr.read()
     _, status, usage = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
     return err, child.returncode, usage.ru_utime + usage.ru_stime - before
