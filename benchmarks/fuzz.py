@@ -3,7 +3,7 @@ often what came back, and what failed.
 
     python benchmarks/fuzz.py --write
 
-The inputs are the same ones every time. --write keeps the table in docs/reliability.md.
+The inputs are the same ones every time. --write keeps a table a package in docs/reliability.md.
 """
 
 from __future__ import annotations
@@ -88,7 +88,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)  # what is saved by a changed path stays here
         for package in options.only or (*PACKAGES, "readers"):
-            found |= rows(package, options.quick)
+            one = rows(package, options.quick)
+            if options.write:
+                keep(DOCS / "reliability.md", f"fuzzing {package}", table(one), processor())
+            found |= one
         os.chdir(home)
     faults = [str(fault) for tally in found.values() for fault in tally.faults]
     if options.json:
@@ -96,8 +99,6 @@ def main() -> None:
         print(json.dumps({"counts": counts, "faults": faults}, indent=1))
     else:
         print(table(found), *faults, sep="\n")
-    if options.write:
-        keep(DOCS / "reliability.md", "fuzzing", table(found), processor())
 
 
 if __name__ == "__main__":

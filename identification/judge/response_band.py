@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.realization import one_value
+from symheli.errors import InputError
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
 
@@ -47,7 +48,9 @@ def response_band(model: LPVARXModel, joint: Array, p: object, omega: object) ->
     (sum_j dB_j z^-j - sum_i dA_i z^-i G). Raises `InputError` for p outside the basis.
     """
     arx = model.structure
-    omega = frozen(np.atleast_1d(omega), "omega", (None,))
+    omega = np.atleast_1d(frozen(omega, "omega"))
+    if omega.ndim != 1:
+        raise InputError(f"omega: expected (k,) rad/s, got shape {omega.shape}")
     f = arx.basis(one_value(p, arx.basis))
     size, ny, count = arx.basis.size, arx.ny, len(arx.entries)
     entries = np.einsum(

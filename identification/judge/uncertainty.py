@@ -145,7 +145,7 @@ class Uncertainty:
         arx, theta = self.model.structure, self.model.theta
         f = np.atleast_2d(arx.basis(p))
         if f.ndim > 2:
-            raise InputError(f"p: expected (n,) or (n, parameters), got shape {np.shape(p)}")
+            raise InputError(f"p: expected (n,) or (n, parameters), got {p!r:.80}")
         size = arx.basis.size
         out = []
         for y, output in enumerate(arx.outputs):

@@ -67,7 +67,7 @@ def tally(calls: Iterable[ValidCall], inputs: int) -> Tally:
             kind = ANOTHER  # an unexpected keyword, which is Python's to refuse
         assume(kind != "another count" or call.entry not in LARGER)
         # what hangs in compiled code hears no alarm
-        faulthandler.dump_traceback_later(3 * SECONDS, exit=True)
+        faulthandler.dump_traceback_later(30 * SECONDS, exit=True)
         verdict = judged(
             lambda: call.repeated({name: made(new)}), kind, call.arguments, tuple(types)
         )

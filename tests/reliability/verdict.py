@@ -22,7 +22,7 @@ from symheli import errors
 from symheli.errors import SymheliError
 
 SECONDS = 20.0
-"""Longer than this none of the calls may take; the good ones take less than two."""
+"""Processor time that none of the calls may take; the good ones take less than two."""
 
 BY_PYTHON = (TypeError, AttributeError, ValueError, LookupError, OverflowError)
 DOCUMENTED = tuple(
@@ -129,12 +129,12 @@ class _at_most:
         self.seconds = seconds
 
     def __enter__(self) -> None:
-        self.before = signal.signal(signal.SIGALRM, self._ring)
-        signal.setitimer(signal.ITIMER_REAL, self.seconds, 1.0)
+        self.before = signal.signal(signal.SIGPROF, self._ring)
+        signal.setitimer(signal.ITIMER_PROF, self.seconds, 1.0)
 
     def __exit__(self, *_: object) -> None:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, self.before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, self.before)
 
     @staticmethod
     def _ring(*_: object) -> None:
