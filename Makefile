@@ -55,6 +55,7 @@ bench: $(STAMP)
 	$(BIN)/python benchmarks/closed_loop_certificates.py --write
 	$(BIN)/python benchmarks/synthesis.py --write
 	$(BIN)/python benchmarks/controller_step.py --write
+	$(BIN)/python benchmarks/campaigns.py --write
 
 clean:
 	rm -rf $(VENV) study build docs/api *.egg-info
