@@ -38,7 +38,7 @@ a third is 0.333
 ```
 
 ```sh
-symheli vehicles
+symheli vehicles > vehicles.txt
 ```
 
 ```python not run
@@ -51,11 +51,13 @@ class Names:
     third: float
 
 
-print(Names(x).third < 1)
+from pathlib import Path
+
+print(Names(x).third < 1, "xcell60" in Path("vehicles.txt").read_text())
 ```
 
 ```text
-True
+True True
 ```
 """
 
@@ -83,11 +85,11 @@ def test_a_page_is_run_in_a_folder_of_its_own_and_from_top_to_bottom(page, tmp_p
     [
         ("0.333\n", "0.345\n", "line 4: .* line 1 of what is printed"),
         ("a third is 0", "one third is 0.333\na third is 0", "prints  a third .*says    one third"),
-        ("True", "True\nTrue", "prints 1 lines, says 2"),
+        ("True True", "True True\nTrue", "prints 1 lines, says 2"),
         ("x = 1 / 3", "x = 1 / 0", r'the block fails(.|\n)*"page.md", line 7(.|\n)*ZeroDivisionEr'),
         ("x = 1 / 3", "warnings.warn('old')\nx = 1 / 3", "UserWarning: old"),
-        ("symheli vehicles", "symheli trim --vehicle nobody", "line 20: (.|\n)*ended with 1"),
-        ("symheli vehicles", "false", "line 20: (.|\n)*ended with 1"),
+        ("symheli vehicles >", "symheli trim --vehicle nobody >", "line 20: (.|\n)*ended with 1"),
+        ("symheli vehicles >", "false >", "line 20: (.|\n)*ended with 1"),
     ],
 )
 def test_a_block_that_fails_or_prints_something_else_is_named_with_its_line(page, old, new, said):
@@ -125,7 +127,7 @@ def test_numbers_agree_to_two_percent_or_the_last_digit(found, said, same):
 
 def test_a_line_for_a_compiler_is_left_out_where_there_is_none(page, monkeypatch):
     monkeypatch.setattr(executed.shutil, "which", lambda name: None)
-    check(page("symheli vehicles", "cc --no-such-option"))
+    check(page("symheli vehicles >", "symheli vehicles > vehicles.txt\ncc --no-such-option >"))
 
 
 def test_every_page_stands_in_the_table_of_contents():

@@ -106,7 +106,13 @@ def _shell(code):
         if not words:
             continue
         if words[0] == "symheli":
-            if (status := cli.main(words[1:])) != 0:
+            words, into = (words[:-2], words[-1]) if ">" in words[-2:-1] else (words, None)
+            with contextlib.ExitStack() as stack:
+                if into is not None:
+                    file = stack.enter_context(open(into, "w", encoding="utf-8"))
+                    stack.enter_context(contextlib.redirect_stdout(file))
+                status = cli.main(words[1:])
+            if status != 0:
                 raise PageError(f"{line}: ended with {status}")
             continue
         if "cc" in words and shutil.which("cc") is None:

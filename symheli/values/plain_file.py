@@ -33,7 +33,7 @@ def write(path: str | os.PathLike[str], schema: str, content: dict[str, Any]) ->
 def read(path: str | os.PathLike[str], schema: str) -> dict[str, Any]:
     """What `write` wrote; raises `InputError` unless the file is whole and of this schema."""
     try:
-        whole = json.loads(Path(path).read_text(encoding="utf-8"))
+        whole = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refused)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
     except ValueError as error:
@@ -72,3 +72,7 @@ def _canonical(content: Any) -> str:
 
 def _digest(content: dict[str, Any]) -> str:
     return hashlib.sha256(_canonical(content).encode()).hexdigest()
+
+
+def _refused(constant: str) -> None:
+    raise ValueError(f"{constant} is no number of JSON")

@@ -11,6 +11,7 @@ import symheli
 import synthesis
 from symheli.errors import InputError, SolverError, UnknownNameError
 from symheli.lpv import LinearModel
+from symheli.values import plain_file
 from symheli.values.text_file import text_of
 from synthesis.design.back_off import levels_above
 from synthesis.program.panic import no_panic
@@ -188,3 +189,11 @@ def test_a_text_file_with_flipped_bytes_is_refused(tmp_path):
         symheli.Helicopter.load(path)
     with pytest.raises(InputError, match="No such file"):
         text_of(tmp_path / "none")
+
+
+def test_a_number_replaced_by_nan_in_a_saved_file_is_refused(tmp_path):
+    """NaN is read by Python's JSON and ended in ValueError where the digest was made."""
+    path = plain_file.write(tmp_path / "one.json", "one", {"value": 1.5})
+    path.write_text(path.read_text(encoding="utf-8").replace("1.5", "NaN"), encoding="utf-8")
+    with pytest.raises(InputError, match="NaN is no number"):
+        plain_file.read(path, "one")

@@ -42,7 +42,11 @@ class TooLong(BaseException):
 
 
 def judged(
-    call: Callable[[], Any], kind: str, given: Any = (), types: tuple[type, ...] = ()
+    call: Callable[[], Any],
+    kind: str,
+    given: Any = (),
+    types: tuple[type, ...] = (),
+    seconds: float = SECONDS,
 ) -> Verdict:
     """The verdict on one call with a value changed in the way of `kind`; `types` are those that
     its result may have (none: any).
@@ -50,7 +54,7 @@ def judged(
     before = {id(a): (a, a.tobytes()) for a in _arrays(given)}
     told: list[warnings.WarningMessage] = []
     try:
-        with warnings.catch_warnings(record=True) as told, _at_most(SECONDS):
+        with warnings.catch_warnings(record=True) as told, _at_most(seconds):
             warnings.simplefilter("always")
             result = call()
     except Refused as refused:
@@ -58,7 +62,7 @@ def judged(
     except SymheliError as error:
         verdict = _refused(error)
     except TooLong:
-        verdict = Verdict("too long", f"no answer within {SECONDS:g} s")
+        verdict = Verdict("too long", f"no answer within {seconds:g} s")
     except MemoryError:
         verdict = Verdict("refused by Python")
     except (KeyboardInterrupt, SystemExit):
