@@ -90,8 +90,8 @@ static void newton(lane *z, const lane *kept, lane miss, long steps, double enou
 
 /* Trims begin <= k < end, in order, those before being there. after[k]: an earlier one whose
    solution is the start of k (where it misses by `found` or more, the one which that was after, and
-   so on); -1: its own row of z. z: count x NZ, starts and then solutions; demand: count x NC; p: rows of p_stride; miss: count,
-   largest residuals. */
+   so on); -1: its own row of z. z: count x NZ, starts and then solutions; demand: count x NC; p:
+   rows of p_stride; miss: count, largest residuals. */
 void trims(long begin, long end, const long *after, const double *demand, const double *p,
            long p_stride, double *z, double *miss, long steps, double enough, double found)
 {
