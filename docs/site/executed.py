@@ -67,6 +67,8 @@ def printed(page, name):
 
     What a compiler would print is None where there is none.
     """
+    from symheli.errors import CompilerWarning
+
     found, module = blocks(page), types.ModuleType("page")
     sys.modules["page"] = module  # where classes of the page are looked for
     for block, after in zip(found, [*found[1:], None], strict=True):
@@ -77,6 +79,7 @@ def printed(page, name):
             with contextlib.redirect_stdout(out), warnings.catch_warnings():
                 warnings.simplefilter("error")
                 warnings.simplefilter("ignore", DeprecationWarning)
+                warnings.simplefilter("default", CompilerWarning)  # slower, and no fault of a page
                 if block.kind == "python":
                     # blank lines in front: an error then names the line of the page
                     code = "\n" * (block.line - 1) + block.code

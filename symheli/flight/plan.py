@@ -19,6 +19,9 @@ from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, one_each
 from symheli.values.numbers import whole
 
+SHORTEST = 1e-6
+"""Seconds between samples."""
+
 LOUDEST = 1000
 """Decibels, above or below the signal."""
 
@@ -106,8 +109,10 @@ class FlightPlan:
     def __post_init__(self) -> None:
         _expect("schedule", self.schedule, AirspeedSchedule)
         dt = _number("dt", self.dt, "a positive number of seconds")
-        if not dt > 0:
-            raise InputError(f"dt must be a positive number of seconds, got {self.dt}")
+        if not SHORTEST <= dt:
+            raise InputError(
+                f"dt must be a positive number of seconds, from {SHORTEST:g} on, got {self.dt}"
+            )
         if math.floor(self.schedule.duration / dt + 1e-9) < 2:
             raise InputError(
                 f"the schedule lasts {self.schedule.duration:g} s, less than two samples of"

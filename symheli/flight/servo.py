@@ -11,6 +11,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel
+from symheli.values.numbers import whole
 from symheli.values.signal import Signal
 
 
@@ -65,8 +66,8 @@ class Servo:
         pair = [value for value in (self.zero, self.pole) if value is not None]
         if len(pair) == 1 or not all(value > 0 for value in pair):
             raise InputError("a servo's zero and pole are both given, > 0 rad/s, or both left out")
-        if self.steps is not None and self.steps < 2:
-            raise InputError(f"steps: expected at least 2 positions, got {self.steps}")
+        if self.steps is not None:
+            whole(self.steps, "steps", 2)
 
     def linear(self, name: str) -> LinearModel:
         """From the input `<name>_command` to the output `name` (rad), without limits; states

@@ -17,6 +17,7 @@ from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Rates
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import positive
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal
@@ -86,6 +87,8 @@ class LinearFamily:
         object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
         if np.any(np.diff(self.airspeeds) <= 0):
             raise InputError("airspeeds must increase strictly")
+        if self.dt is not None:
+            positive(self.dt, "dt")
         models = LinearModels(
             self.A,
             self.B,

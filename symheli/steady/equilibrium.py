@@ -145,7 +145,7 @@ def trim(
         climb_rate=float(climb_rate),
         turn_rate=float(turn_rate),
         sideslip=float(sideslip),
-        wind=(float(wind[0]), float(wind[1]), float(wind[2])),
+        wind=tuple(float(v) for v in wind),  # type: ignore[arg-type]
         acceleration=float(acceleration),
         altitude=None if altitude is None else float(altitude),
     )

@@ -35,8 +35,8 @@ USUAL = 300
 KINDS = ("cut", "flipped", "dropped", "repeated", "number", "lines", "zeros", "foreign")
 
 KNOWN = {("MAT", 123), *(("ULog", seed) for seed in range(USUAL))}
-"""Damage that is known to fail, by seed: SciPy's loadmat ends the process, a ULog may end in KeyError
-or in no answer. Counted as it comes, and told in docs/reliability.md.
+"""Damage that is known to fail, by seed: SciPy's loadmat ends the process, a ULog may end in
+KeyError or in no answer. Counted as it comes, and told in docs/reliability.md.
 """
 
 

@@ -3,6 +3,11 @@
 import damaged_files
 import pytest
 
+# pyulog leaves a file open that it cannot read
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+
 
 @pytest.fixture(scope="module")
 def readers(tmp_path_factory):
