@@ -28,7 +28,7 @@ class Progress:
     note : str
         What the last step found.
     depth : int
-        How many tasks it is a part of.
+        How many tasks of the listener it is a part of.
     over : bool
         It has ended, finished or not: nothing more will be told of it.
 
@@ -80,12 +80,14 @@ def watched(listener: Listener | None) -> Iterator[None]:
     ...     trims = symheli.trim_batch(heli, airspeed=[2.0, 5.0, 8.0])
     trimming: 3 of 3
     """
-    before = _listener.get()
+    before = _listener.get(), _depth.get()
     _listener.set(listener)
+    _depth.set(0)
     try:
         yield
     finally:
-        _listener.set(before)
+        _listener.set(before[0])
+        _depth.set(before[1])
 
 
 class Task:

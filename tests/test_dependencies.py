@@ -17,7 +17,7 @@ from symheli.extras import extra
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("symheli", "identification", "synthesis", "studies")
-PACKAGE = {"flint": "python-flint"}
+PACKAGE = {"flint": "python-flint", "PIL": "pillow"}
 """Where a module is not called like what brings it."""
 ASKED_FOR_BY_NAME = {"scs"}
 """Solvers: `Solver` refuses those that are not installed before they are imported."""

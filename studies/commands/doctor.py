@@ -23,6 +23,8 @@ REQUIRED = (
     "clarabel",
     "matplotlib",
     "jinja2",
+    "markupsafe",
+    "pillow",
     "rich",
 )
 OPTIONAL = {

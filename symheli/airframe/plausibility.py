@@ -111,9 +111,9 @@ def impossibilities(
                 yield section, name, f"an area must be >= 0 m^2, got {q.value:g}"
     body = sections.get("body", {})
     inertia = {axis: body[axis].value for axis in ("Ixx", "Iyy", "Izz") if axis in body}
-    for largest, *others in permutations(inertia):
+    for largest, *others in permutations(inertia) if len(inertia) == 3 else ():
         both = sum(inertia[axis] for axis in others)
-        if len(others) == 2 and others == sorted(others) and inertia[largest] > both * (1 + 1e-12):
+        if others == sorted(others) and inertia[largest] > both * (1 + 1e-12):
             yield (
                 "body",
                 largest,

@@ -155,7 +155,7 @@ def test_fit_recovers_coefficients_and_counts_its_nodes(basis):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: BSpline(0, NODES), "degree: expected a whole number >= 1"),
+        (lambda: BSpline(0, NODES), "degree must be an integer >= 1"),
         (lambda: BSpline(2, (1.0, 1.0)), "strictly increasing breakpoints"),
         (
             lambda: UserFunctions((np.log,), 0.0, 1.0),

@@ -31,7 +31,7 @@ EXEMPT: dict[str, str] = {
         f"symheli.{name}": RESULT
         for name in (
             *("Air", "Autopilot", "Batch", "DerivativeTable", "FlightBatch", "Helicopter"),
-            *("Trajectory", "TrimBatch", "TrimMap", "TrimPoint", "FlightDataset"),
+            *("Trajectory", "TrimBatch", "TrimMap", "TrimPoint", "FlightDataset", "StepResponse"),
         )
     },
     **{
@@ -50,7 +50,15 @@ EXEMPT: dict[str, str] = {
         f"synthesis.{name}": RESULT
         for name in (
             *("Attempt", "Bandwidth", "BoxGain", "BoxLyapunov", "Certificate", "Controller"),
-            *("Estimator", "Flown", "FrozenGain", "Generalized", "LowerBound", "Margins"),
+            *(
+                "Estimator",
+                "Flown",
+                "FrozenGain",
+                "GainCurve",
+                "Generalized",
+                "LowerBound",
+                "Margins",
+            ),
             *("MemoryLyapunov", "Multiplier", "PointDesign", "Proof", "Seconds"),
             *("SplineLyapunov", "Trajectory"),
         )

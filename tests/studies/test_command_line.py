@@ -487,7 +487,7 @@ def test_a_failure_is_one_sentence_and_status_1(run, arguments, sentence):
             "the unit of 'y' is not known: --units y=UNIT",
         ),
         ([*STRUCTURE, *UNITS, "z=1"], "unknown signal in --units 'z'"),
-        ([*STRUCTURE, "--units", "y=deg", "u=1", "p=knots"], "unknown unit 'knots'"),
+        ([*STRUCTURE, "--units", "y=deg", "u=1", "p=knotz"], "unknown unit 'knotz'"),
         ([*STRUCTURE, *UNITS, "--scheduling-from", "u,y"], "not both"),
         ([*STRUCTURE, *UNITS, "--start", "99"], "the record goes from 0 to 44.95 s"),
         ([*STRUCTURE, *UNITS, "--decimate", "600"], "leaves fewer than two"),
