@@ -24,13 +24,13 @@ quick: $(STAMP)
 	$(BIN)/symheli study --quick
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadgroup
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 
 test-all: lint slow docs lowest no-compiler no-extras packaging
 
 slow: $(STAMP)
 	@echo "== slow: all tests, the slow ones too"
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadgroup -m 'slow or not slow'
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -m 'slow or not slow'
 
 docs: $(STAMP)
 	@echo "== docs: the site, every page run"

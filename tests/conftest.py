@@ -11,14 +11,6 @@ import pytest  # noqa: E402
 import symheli  # noqa: E402
 
 
-def pytest_itemcollected(item):
-    """Tests of one file share its fixtures on one worker, and so do all that look at the outcome of
-    a study (make test runs them with --dist loadgroup).
-    """
-    group = "outcome" if "full" in getattr(item, "fixturenames", ()) else str(item.path)
-    item.add_marker(pytest.mark.xdist_group(group))
-
-
 @pytest.fixture(scope="session", params=["ideal", "pi"])
 def heli(request):
     return symheli.Helicopter.load("xcell60", governor=request.param)

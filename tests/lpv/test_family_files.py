@@ -87,7 +87,7 @@ def test_a_file_written_by_hand_needs_names_a_and_b(tmp_path):
         ({"outputs": {"phi": "rad"}}, "C: missing"),
         ({"kinks": [7.0]}, "kinks: expected"),
         ({"x0": [[0, 0]], "u0": [[0], [0]]}, "x0: expected shape"),
-        ({"dt": -0.1}, "dt must be a positive"),
+        ({"dt": -0.1}, "dt: expected a number > 0"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said(tmp_path, change, said):
