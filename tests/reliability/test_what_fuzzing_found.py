@@ -5,6 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from damaged_files import damaged
+from scipy.io import savemat
 
 import identification as idn
 import symheli
@@ -197,3 +199,13 @@ def test_a_number_replaced_by_nan_in_a_saved_file_is_refused(tmp_path):
     path.write_text(path.read_text(encoding="utf-8").replace("1.5", "NaN"), encoding="utf-8")
     with pytest.raises(InputError, match="NaN is no number"):
         plain_file.read(path, "one")
+
+
+@pytest.mark.parametrize("seed", [123, 297])
+def test_a_damaged_mat_file_is_refused_before_scipy_reads_it(tmp_path, seed):
+    """SciPy ended the process with a segmentation fault."""
+    savemat(tmp_path / "log.mat", {"t": T[:40], "q": np.sin(T[:40]), "u": 0.1 * T[:40]})
+    path = tmp_path / "damaged.mat"
+    path.write_bytes(damaged((tmp_path / "log.mat").read_bytes(), seed)[1])
+    with pytest.raises(InputError, match="save it once more"):
+        symheli.FlightRecord.from_mat(path, time="t", units={"q": "rad/s", "u": "1"})
