@@ -86,7 +86,7 @@ def _logs(folder: Path) -> list[Reader]:
     ]
     if importlib.util.find_spec("pyulog"):
         ulog = folder / "log.ulg"
-        ulog.write_bytes(_ulog(t))
+        ulog.write_bytes(ulog_of(t))
         topics = {"q": ("rates", "xyz[1]", "rad/s")}
         found.append(
             Reader("ULog", ulog, lambda p: symheli.FlightRecord.from_ulog(p, topics, dt=0.02))
@@ -94,7 +94,7 @@ def _logs(folder: Path) -> list[Reader]:
     return found
 
 
-def _ulog(t: np.ndarray) -> bytes:
+def ulog_of(t: np.ndarray) -> bytes:
     """A log of one topic, from the description of the format."""
 
     def message(kind: bytes, body: bytes) -> bytes:
