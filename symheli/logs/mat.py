@@ -14,6 +14,7 @@ from symheli.extras import extra
 from symheli.logs.column import Column
 from symheli.logs.files import Table, existing, said_by, seconds_in
 from symheli.logs.format import is_hdf5
+from symheli.logs.mat5 import check_mat5
 
 NUMBERS = {
     *("double", "single", "logical"),
@@ -59,6 +60,7 @@ def _content(file: Path) -> Mapping[str, Any]:
     if is_hdf5(file):
         return _hdf5(file)
     try:
+        check_mat5(file)
         content = loadmat(file, simplify_cells=True)
     except Exception as error:
         raise InputError(

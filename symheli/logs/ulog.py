@@ -104,6 +104,9 @@ def _topics(path: str | os.PathLike[str]) -> dict[str, list[_Instance]]:
         warn_of_damage(file)
     out: dict[str, list[_Instance]] = {}
     for dataset in log.data_list:
+        if "timestamp" not in dataset.data:  # its name was damaged
+            warn_of_damage(file)
+            continue
         out.setdefault(dataset.name, []).append(_Instance(dataset.multi_id, dataset.data))
     if not out:
         raise InputError(f"{file}: a ULog without a sample; was the aircraft armed?")

@@ -5,11 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from damaged_files import damaged, ulog_of
+from scipy.io import savemat
 
 import identification as idn
 import symheli
 import synthesis
-from symheli.errors import InputError, SolverError, UnknownNameError
+from symheli.errors import DataWarning, InputError, SolverError, UnknownNameError
 from symheli.lpv import LinearModel
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
@@ -197,3 +199,22 @@ def test_a_number_replaced_by_nan_in_a_saved_file_is_refused(tmp_path):
     path.write_text(path.read_text(encoding="utf-8").replace("1.5", "NaN"), encoding="utf-8")
     with pytest.raises(InputError, match="NaN is no number"):
         plain_file.read(path, "one")
+
+
+@pytest.mark.parametrize("seed", [123, 297])
+def test_a_damaged_mat_file_is_refused_before_scipy_reads_it(tmp_path, seed):
+    """SciPy ended the process with a segmentation fault."""
+    savemat(tmp_path / "log.mat", {"t": T[:40], "q": np.sin(T[:40]), "u": 0.1 * T[:40]})
+    path = tmp_path / "damaged.mat"
+    path.write_bytes(damaged((tmp_path / "log.mat").read_bytes(), seed)[1])
+    with pytest.raises(InputError, match="save it once more"):
+        symheli.FlightRecord.from_mat(path, time="t", units={"q": "rad/s", "u": "1"})
+
+
+def test_a_topic_of_a_ulog_without_time_stamps_is_left_out_and_said(tmp_path):
+    """One flipped bit in the name of the field ended in KeyError."""
+    pytest.importorskip("pyulog")
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulog_of(T).replace(b"timestamp;", b"tilestamp;"))
+    with pytest.warns(DataWarning, match="damaged"), pytest.raises(InputError, match="armed"):
+        symheli.FlightRecord.from_ulog(path, {"q": ("rates", "xyz[1]", "rad/s")}, dt=0.02)
