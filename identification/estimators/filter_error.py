@@ -26,6 +26,7 @@ from symheli.progress import tracked
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.kinematics import VELOCITIES, kinematic_jacobian
+from symheli.values.numbers import whole
 
 MISFIT = 30.0
 """What the structure leaves unexplained of the simulated flight is slow against a sample: white
@@ -119,11 +120,12 @@ class FilterError(Method):
                 raise UnknownNameError("sensor in noise", name, STATES)
         numbers = [*(self.noise or {}).values(), self.misfit]
         numbers.append(self.gust_time)
-        if not all(np.isfinite(n) and n > 0 for n in numbers) or self.steps < 1:
+        if not all(np.isfinite(n) and n > 0 for n in numbers):
             raise InputError(
-                "noise, misfit, gust_time and steps must be positive, got"
-                f" {dict(self.noise or {})}, {self.misfit}, {self.gust_time}, {self.steps}"
+                "noise, misfit and gust_time must be positive, got"
+                f" {dict(self.noise or {})}, {self.misfit}, {self.gust_time}"
             )
+        whole(self.steps, "steps", 1)
         if not 0 <= self.gust < np.inf:
             raise InputError(f"gust: expected a standard deviation >= 0, m/s, got {self.gust}")
 

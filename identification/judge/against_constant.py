@@ -141,6 +141,7 @@ class AgainstConstant:
 
     def verdict_on(self, output: str) -> Verdict:
         """What scheduling is worth for this output on held-out data; see `Verdict` and `PAYS`."""
+        self._known(output)
         ahead, free = (self._differences(output)[h] for h in HORIZONS[1:])
         if free == "better" and ahead != "worse":
             return "pays"
@@ -150,10 +151,13 @@ class AgainstConstant:
         """Whether scheduling is better 1 s ahead or in free run on held-out data, and worse in
         neither; see `PAYS`. `verdict_on` says which.
         """
-        if output not in self.scheduled.outputs:
-            raise UnknownNameError("output", output, map(str, self.scheduled.outputs))
+        AgainstConstant._known(self, output)
         found = self._differences(output).values()
         return "better" in found and "worse" not in found
+
+    def _known(self, output: str) -> None:
+        if output not in self.scheduled.outputs:
+            raise UnknownNameError("output", output, map(str, self.scheduled.outputs))
 
     def _differences(self, output: str) -> dict[str, str]:
         """{horizon: better, worse or no different}; free runs that are told their answer, or of no

@@ -90,6 +90,11 @@ def pole_miss(model: LinearModel, pole: complex) -> float:
     float
         Percent.
 
+    Raises
+    ------
+    InputError
+        A pole that is 0 or not finite, a model without poles other than delays.
+
     Examples
     --------
     >>> import identification as idn, symheli
@@ -99,9 +104,15 @@ def pole_miss(model: LinearModel, pole: complex) -> float:
     >>> round(idn.pole_miss(lag.at(0.0).discretize(0.1), -2.1), 2)
     4.76
     """
-    if pole == 0:
-        raise InputError("pole: expected one that is not 0; a miss is told in percent of it")
-    return float(100 * np.abs(continuous_poles(model) - pole).min() / abs(pole))
+    if pole == 0 or not np.isfinite(pole):
+        raise InputError(
+            f"pole: expected a finite one that is not 0, got {pole}; a miss is told in percent"
+            " of it"
+        )
+    poles = continuous_poles(model)
+    if not len(poles):
+        raise InputError("the model has no pole but delays; there is none to compare")
+    return float(100 * np.abs(poles - pole).min() / abs(pole))
 
 
 def continuous_poles(model: LinearModel) -> Array:
@@ -200,6 +211,8 @@ def frozen_models(
         "output_scale": [scales[y] for y in outputs],
     }
     omega = np.geomspace(0.3, 0.8 * np.pi / dt, 200)
+    if not fast <= omega[-1]:
+        raise InputError(f"fast: expected at most {omega[-1]:.4g} rad/s, got {fast}")
     names = ("reference", "baseline", "identified")
     poles: dict[str, list[Array]] = {name: [] for name in names}
     misses, gaps, distances = ({name: [] for name in names[1:]} for _ in range(3))

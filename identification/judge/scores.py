@@ -54,7 +54,15 @@ class Scores:
         free_run: Array,
         horizon: float = HORIZON,
     ) -> Scores:
-        """Of predictions (n, ny) beside what was `measured`, a column an output."""
+        """Of predictions (n, ny) beside what was `measured`, a column an output.
+
+        Raises `InputError` unless every output has one column.
+        """
+        columns = 1 if measured.ndim < 2 else measured.shape[1]
+        if len(set(outputs)) != len(outputs) or len(outputs) != columns:
+            raise InputError(
+                f"outputs: expected {columns} different names, one a column, got {list(outputs)}"
+            )
 
         def fits(guess: Array) -> dict[str, float]:
             values = fit_percent(measured, guess)

@@ -193,6 +193,10 @@ def _flagged(y: Array) -> Array:
     return np.where(np.abs(y) >= DIVERGED, np.inf, y)
 
 
+LARGEST = 1e150
+"""From here on the square of a measurement may overflow."""
+
+
 def fit_percent(y: object, yhat: object) -> Array:
     """100 (1 - |y - yhat| / |y - mean y|) per output: 100 is perfect, 0 no better than the mean.
 
@@ -209,7 +213,7 @@ def fit_percent(y: object, yhat: object) -> Array:
     Raises
     ------
     InputError
-        The shapes differ.
+        The shapes differ, or a measurement is infinite or too large to be squared.
 
     References
     ----------
@@ -225,6 +229,10 @@ def fit_percent(y: object, yhat: object) -> Array:
         raise InputError(
             f"expected two arrays of one shape (n, outputs), got {y.shape} and {yhat.shape}"
         )
+    if np.any(np.abs(y) >= LARGEST):
+        raise InputError(
+            f"y: expected measurements below {LARGEST:.0e} in magnitude; mark bad samples as NaN"
+        )
     columns = zip(y.reshape(len(y), -1).T, yhat.reshape(len(y), -1).T, strict=True)
     return np.array([_fit(a, b) for a, b in columns])
 
@@ -234,7 +242,7 @@ def _fit(y: Array, yhat: Array) -> float:
     if not keep.any():
         return float("nan")
     y, yhat = y[keep], yhat[keep]
-    if np.isinf(yhat).any():
+    if np.any(np.abs(yhat) >= LARGEST):
         return float("-inf")
     error, spread = np.linalg.norm(y - yhat), np.linalg.norm(y - y.mean())
     if spread == 0:

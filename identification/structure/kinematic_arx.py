@@ -17,6 +17,7 @@ from symheli.records import FlightRecord
 from symheli.values import Signal
 from symheli.values.arrays import Array
 from symheli.values.kinematics import RIGID_BODY, VELOCITIES, kinematic_rates
+from symheli.values.numbers import whole
 
 STATES = tuple(map(str, RIGID_BODY))
 MOVING = tuple(map(str, VELOCITIES))
@@ -156,13 +157,9 @@ class KinematicARX:
         """The regression: `INCREMENTS` from lagged velocities and inputs, as any method takes
         it.
         """
-        na = (
-            self.na
-            if isinstance(self.na, Mapping | int)
-            else dict(zip(MOVING, self.na, strict=True))
-        )
+        na = self.na if isinstance(self.na, Mapping | int) else _of_each(self.na)
         orders = {z: na if isinstance(na, int) else na.get(z, FLAPPING[z]) for z in MOVING}
-        nb = self.nb
+        nb = self.nb if isinstance(self.nb, Mapping) else whole(self.nb, "nb", 1)
         more = {u: nb if isinstance(nb, int) else nb[u] for u in self.inputs}  # type: ignore[index,call-overload]
         return Aerodynamics(
             tuple(map(str, INCREMENTS)),
@@ -191,3 +188,9 @@ class KinematicARX:
     def memory(self) -> int:
         """How many samples before k the regressor of y(k) reaches back."""
         return self.aerodynamics.memory
+
+
+def _of_each(na: tuple[int, ...]) -> dict[str, int]:
+    if len(na) != len(MOVING):
+        raise InputError(f"na: expected lags of {', '.join(MOVING)}, got {len(na)} numbers")
+    return dict(zip(MOVING, na, strict=True))

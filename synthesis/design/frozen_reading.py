@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from synthesis.design.plant import Plant
 
 
+FINEST = 1e-6
+"""The smallest tolerance: twenty bisections, each of them a proof; solvers decide no closer."""
+
+
 def proven_around(
     plant: Plant,
     controller: Any,
@@ -54,7 +58,7 @@ def proven_around(
     Raises
     ------
     InputError
-        Several parameters, an `at` out of range.
+        Several parameters, an `at` out of range, a tolerance below `FINEST` or not below 1.
 
     Examples
     --------
@@ -70,6 +74,8 @@ def proven_around(
     >>> print(low, round(high, 3))
     0.0 0.719
     """
+    if not FINEST <= tolerance < 1:
+        raise InputError(f"tolerance: expected from {FINEST:g} to below 1, got {tolerance}")
     (s,) = _one(plant, rate)
     if not s.low <= at <= s.high:
         raise InputError(f"at: expected {s.name} within [{s.low:g}, {s.high:g}] {s.unit}, got {at}")

@@ -143,7 +143,7 @@ class Channels(NamedTuple):
 
         What is no control is a disturbance, what is not measured is performance, unless they are
         named. Raises `UnknownNameError` for a name the model does not have, `InputError` for a
-        group without a name.
+        group without a name or with one twice.
         """
         groups = {
             "controls": (controls, model.inputs),
@@ -153,6 +153,8 @@ class Channels(NamedTuple):
         }
         found: dict[str, tuple[Signal, ...]] = {}
         for group, (given, known) in groups.items():
+            if given is not None and len({*map(str, given)}) != len(tuple(given)):
+                raise InputError(f"{group}: expected every name once, got {tuple(given)}")
             if given is None:
                 taken = found["controls" if known is model.inputs else "measurements"]
                 found[group] = tuple(s for s in known if s not in taken)

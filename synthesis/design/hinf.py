@@ -14,6 +14,7 @@ from scipy import linalg, optimize
 
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
+from synthesis.design.back_off import levels_above
 from synthesis.design.bilinear import continuous_plant, sampled_controller
 from synthesis.design.central import Normalised, Obstacle, Trial
 from synthesis.design.diagnosis import decided_by, reasons
@@ -122,8 +123,7 @@ def hinf(
         raise InputError(
             f"gamma: expected a number from {1 / LARGEST:g} to {LARGEST:g}, got {gamma}"
         )
-    if not (math.isfinite(back_off) and back_off >= 1):
-        raise InputError(f"back_off: expected a number from 1 on, got {back_off}")
+    levels_above(back_off)
     names = Channels.of(model, controls, measurements, disturbances, performance)
     plant = Generalized.between(model, names)
     if against := reasons(plant, names, dt=model.dt):

@@ -12,6 +12,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.values.signal import Signal
+from synthesis.design.back_off import levels_above
 from synthesis.design.bilinear import sampled_controller
 from synthesis.design.diagnosis import reasons
 from synthesis.design.generalized import Channels, Generalized
@@ -53,7 +54,8 @@ def ncf(
     Raises
     ------
     InputError
-        A weight with another number of channels or another sample period.
+        A weight of 0, one with another number of channels or another sample period, a `back_off`
+        that is not from 1 to 1000.
 
     References
     ----------
@@ -71,8 +73,10 @@ def ncf(
     1.414214 1.428 0.0
     """
     G = as_model(G)
-    if not (math.isfinite(back_off) and back_off >= 1):
-        raise InputError(f"back_off: expected a number from 1 on, got {back_off}")
+    levels_above(back_off)
+    for name, weight in (("W1", W1), ("W2", W2)):
+        if isinstance(weight, int | float) and weight == 0:
+            raise InputError(f"{name}: expected a weight that is not 0, which opens the loop")
     before = as_weight(W1, "W1", G.inputs, G.dt)
     behind = as_weight(W2, "W2", G.outputs, G.dt)
     shaped = series(series(before, G), behind)

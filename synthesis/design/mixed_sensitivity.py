@@ -106,7 +106,12 @@ def _weighted(G: LinearModel, *weights: LinearModel | None) -> LinearModel:
     order = len(A) - nx
     C = np.vstack(
         [
-            np.hstack([np.vstack([W.D @ g[:, :nx] for W, g, _ in there]), own.reshape(-1, order)]),
+            np.hstack(
+                [
+                    np.vstack([W.D @ g[:, :nx] for W, g, _ in there]),
+                    own.reshape(sum(len(W.D) for W, _, _ in there), order),
+                ]
+            ),
             np.hstack([G.C, np.zeros((ny, order))]),
         ]
     )

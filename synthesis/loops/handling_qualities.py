@@ -16,7 +16,8 @@ from symheli.values.numbers import whole
 class Bandwidth(NamedTuple):
     """phase_bandwidth: where 45 deg of phase are left; gain_bandwidth: where 6 dB of gain are left
     before omega_180, at which the response lags 180 deg (rad/s, inf where the band ends before);
-    phase_delay (s): how fast the phase falls beyond omega_180.
+    phase_delay (s): how fast the phase falls beyond omega_180; NaN where the response lags 180 deg
+    nowhere in the band, or half the sampling frequency comes before 2 omega_180.
     """
 
     phase_bandwidth: float
@@ -78,6 +79,8 @@ def bandwidth(
             f"bandwidth is that of one attitude to one stick, got {len(model.inputs)} inputs and"
             f" {len(model.outputs)} outputs"
         )
+    if len(band) != 2:
+        raise InputError(f"band: expected (low, high) in rad/s, got {band!r:.80}")
     low, high = band
     if not 0 < low < high:
         raise InputError(f"band: expected 0 < low < high rad/s, got {band}")

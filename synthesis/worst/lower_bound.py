@@ -20,6 +20,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.progress import tracked
+from symheli.values.numbers import whole
 from symheli.values.summary import summarized
 from synthesis.worst.ascent import GAIN, GROWTH, Objective, ascend, on_nodes
 from synthesis.worst.budget import Budget
@@ -91,11 +92,10 @@ class Search:
             "steps": 8,
             "samples": 8,
         }
-        wrong = [f"{name} >= {low}" for name, low in least.items() if getattr(self, name) < low]
-        if wrong or not self.cycles > 0 or not self.seconds > 0:
-            raise InputError(
-                f"expected {', '.join([*wrong, 'cycles > 0', 'seconds > 0'])}, got {self}"
-            )
+        for name, low in least.items():
+            whole(getattr(self, name), name, low)
+        if not self.cycles > 0 or not self.seconds > 0:
+            raise InputError(f"expected cycles > 0 and seconds > 0, got {self}")
 
 
 THOROUGH = Search()

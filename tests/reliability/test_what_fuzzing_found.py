@@ -218,3 +218,45 @@ def test_a_topic_of_a_ulog_without_time_stamps_is_left_out_and_said(tmp_path):
     path.write_bytes(ulog_of(T).replace(b"timestamp;", b"tilestamp;"))
     with pytest.warns(DataWarning, match="damaged"), pytest.raises(InputError, match="armed"):
         symheli.FlightRecord.from_ulog(path, {"q": ("rates", "xyz[1]", "rad/s")}, dt=0.02)
+
+
+def test_a_miss_is_that_of_a_finite_pole(model):
+    for pole in (math.nan, math.inf, 0.0):
+        with pytest.raises(InputError, match="pole"):
+            idn.pole_miss(model.at(0.0), pole)
+
+
+def test_a_fit_is_that_of_measurements_that_can_be_squared():
+    for y in (math.inf, -1e300):
+        with pytest.raises(InputError, match="mark bad samples"):
+            idn.fit_percent([1.0, 2.0, y], [1.0, 2.0, 3.0])
+    assert idn.fit_percent([1.0, 2.0], [1.0, 1e300]) == -math.inf
+
+
+def test_scores_have_a_name_a_column():
+    y = np.arange(5.0)[:, None]
+    for names in ([], ["y", "y"]):
+        with pytest.raises(InputError, match="outputs"):
+            idn.Scores.of(y, names, one_step=y, ahead=y, free_run=y)
+
+
+@pytest.mark.parametrize("lags", [{"nb": 1.5}, {"nb": math.nan}, {"na": (1,) * 12}])
+def test_lags_of_a_vehicle_are_counted(lags):
+    given = {"nb": 1, **lags}
+    with pytest.raises(InputError, match=r"na:|nb:"):
+        idn.KinematicARX(("d",), "p", basis=idn.Polynomial(0, 0.0, 1.0), **given)
+
+
+def test_designs_refuse_what_they_cannot_mean():
+    lag = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
+    for design in (
+        lambda: synthesis.ncf(lag, W1=0.0),
+        lambda: synthesis.ncf(lag, W2=-0.0),
+        lambda: synthesis.ncf(lag, back_off=1e300),
+        lambda: synthesis.mixed_sensitivity(lag, 1.0, 1.0, back_off=1e300),
+        lambda: synthesis.h2(lag, ["u"], ["y", "y"]),
+        lambda: synthesis.bandwidth(lag, band=(1.0,)),  # type: ignore[arg-type]
+        lambda: synthesis.Search(levels=math.nan),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(InputError, match="expected"):
+            design()
