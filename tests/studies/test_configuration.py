@@ -120,7 +120,7 @@ def test_paths_are_relative_to_the_file(tmp_path):
         ("[effort]\ngust_rates = [-1]", "effort.gust_rates: expected a list of numbers >= 0, one"),
         ("[effort]\ngust_segments = [2.5]", "effort.gust_segments: expected a list of whole"),
         ("[effort.search]\nnode = 3", "effort.search.node is unknown; did you mean nodes?"),
-        ("[effort.search]\nnodes = 3", "effort.search: expected nodes >= 8"),
+        ("[effort.search]\nnodes = 3", "effort.search: nodes: expected a whole number >= 8"),
         ("[effort.robust_form]\ndegree = 9", "effort.robust_form: degree of P must be 0 .. 4"),
         ('[effort.robust_form]\nsegments = "a"', "effort.robust_form.segments: expected a whole"),
     ],

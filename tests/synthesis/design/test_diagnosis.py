@@ -249,7 +249,7 @@ def test_levels_and_systems_that_cannot_be_are_refused():
         with pytest.raises(InputError, match="gamma: expected a number from"):
             hinf(model, u, y, gamma=gamma)
     for back_off in (0.99, np.nan):
-        with pytest.raises(InputError, match="back_off: expected a number from 1 on"):
+        with pytest.raises(InputError, match="back_off: expected numbers from 1 to"):
             hinf(model, u, y, back_off=back_off)
     with pytest.raises(InputError, match="expected a LinearModel or a system of python-control"):
         h2(np.eye(3), u, y)
