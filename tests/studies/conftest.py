@@ -1,11 +1,13 @@
-"""One outcome of the study with every stage, as short as it gets, for all that looks at reports."""
+"""The command line as a user types it, and one outcome of the study with every stage."""
 
 from __future__ import annotations
 
+import json
 import math
 
 import pytest
 
+from studies import cli
 from studies.marks.guarantee import FORM
 from studies.transition import study as stages
 from studies.transition.effort import Effort
@@ -13,6 +15,30 @@ from symheli import Helicopter
 from synthesis import Search
 
 GLIMPSE = Search(levels=2, dwells=1, starts=1, nodes=8, evaluations=1, samples=100)
+
+
+@pytest.fixture
+def run(capsys):
+    """Status, stdout and stderr of one command line."""
+
+    def call(*arguments):
+        status = cli.main([str(a) for a in arguments])
+        captured = capsys.readouterr()
+        return status, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def answer(run):
+    """What a program reads from a command that succeeds."""
+
+    def call(*arguments):
+        status, out, err = run(*arguments, "--json")
+        assert status == 0, err
+        return json.loads(out)
+
+    return call
 
 
 @pytest.fixture(scope="session")

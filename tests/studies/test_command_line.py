@@ -23,30 +23,6 @@ DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 TREX_UNITS = ("--units", "q_radps=rad/s", "theta_rad=rad", "lon=1", "u_mps=m/s", "v_mps=m/s")
 
 
-@pytest.fixture
-def run(capsys):
-    """Status, stdout and stderr of one command line."""
-
-    def call(*arguments):
-        status = cli.main([str(a) for a in arguments])
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
-    return call
-
-
-@pytest.fixture
-def answer(run):
-    """What a program reads from a command that succeeds."""
-
-    def call(*arguments):
-        status, out, err = run(*arguments, "--json")
-        assert status == 0, err
-        return json.loads(out)
-
-    return call
-
-
 def test_vehicles_are_listed_with_title_and_source(run, answer):
     assert "MIT X-Cell .60 SE" in run("vehicles")[1]
     assert all(v["source"] for v in answer("vehicles")["vehicles"])

@@ -9,19 +9,6 @@ import numpy as np
 import pytest
 
 import symheli
-from studies import cli
-
-
-@pytest.fixture
-def run(capsys):
-    """Status, stdout and stderr of one command line."""
-
-    def call(*arguments):
-        status = cli.main([str(a) for a in arguments])
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
-    return call
 
 
 def test_envelope_shows_the_map_and_writes_table_and_figure(run, tmp_path, ideal):

@@ -1,6 +1,5 @@
 """Identified models and families of matrices from files: certified, judged and exported."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -10,32 +9,7 @@ from scipy.io import loadmat
 import identification
 import symheli
 import synthesis
-from studies import cli
 from studies.loops.lateral import lateral_loop
-
-
-@pytest.fixture
-def run(capsys):
-    """Status, stdout and stderr of one command line."""
-
-    def call(*arguments):
-        status = cli.main([str(a) for a in arguments])
-        captured = capsys.readouterr()
-        return status, captured.out, captured.err
-
-    return call
-
-
-@pytest.fixture
-def answer(run):
-    """What a program reads from a command that succeeds."""
-
-    def call(*arguments):
-        status, out, err = run(*arguments, "--json")
-        assert status == 0, err
-        return json.loads(out)
-
-    return call
 
 
 @pytest.fixture(scope="module")
