@@ -400,6 +400,26 @@ def test_a_case_that_ends_every_worker_is_a_row_with_its_reason(tmp_path, cluste
 
 
 @pytest.mark.slow
+def test_eight_workers_fly_and_identify_the_numbers_of_one_process(tmp_path):
+    pytest.importorskip("distributed", reason="needs dask: pip install 'symheli[campaigns]'")
+    declared = {
+        "trial": "identification",
+        "draws": 4,
+        "paired": ["order"],
+        "grid": {"order": [2, 3]},
+        "random": {"noise_db": {"low": 20.0, "high": 40.0}},
+        "fixed": {"ramps": 3, "axis": "lateral"},
+    }
+    with Here() as here, Cluster.local(8) as eight:
+        one, many = (
+            run(campaign_of(declared), tmp_path / f"{kind}.zarr", on).values[:, :-1]
+            for kind, on in (("here", here), ("eight", eight))
+        )
+    assert np.isfinite(one).any(axis=1).all()
+    np.testing.assert_array_equal(many, one)
+
+
+@pytest.mark.slow
 def test_processes_do_the_same_without_a_cluster(tmp_path, importable):
     with InProcesses(2) as on:
         same_numbers(tmp_path, on)
