@@ -24,7 +24,9 @@ def autopilot(vehicle: str, period: float = 0.02) -> Autopilot:
     return autopilot_for(helicopter(vehicle), period)
 
 
-def scattered(vehicle: str, mass: float, inertia: float, governor: Governor = "ideal") -> Helicopter:
+def scattered(
+    vehicle: str, mass: float, inertia: float, governor: Governor = "ideal"
+) -> Helicopter:
     """With `mass` and `inertia` times what its file says."""
     known = helicopter(vehicle, governor)
     factors = {"body.mass": mass} | {f"body.{name}": inertia for name in INERTIAS}
