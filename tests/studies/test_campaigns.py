@@ -1,8 +1,6 @@
 """Campaigns: the same numbers wherever they run, nothing finished is lost, a failure is a row."""
 
-import doctest
 import errno
-import importlib
 import json
 import os
 import signal
@@ -53,16 +51,6 @@ def importable(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(PATHS))
 
 
-@pytest.mark.parametrize(
-    "module",
-    ["campaign", "campaign_file", "run", "trial", "trials"],
-)
-def test_what_the_examples_show_is_so(module):
-    found = importlib.import_module(f"studies.campaigns.{module}")
-    names = {"np": np, "Here": Here, "Trial": Trial, "Campaign": Campaign}
-    assert doctest.testmod(found, extraglobs=names).failed == 0
-
-
 # --- what is declared ----------------------------------------------------------------------------
 
 
@@ -99,6 +87,17 @@ def test_a_normal_parameter_is_drawn_as_it_says():
     # four standard errors of a mean and of a deviation
     assert lengths.mean() == pytest.approx(5.0, abs=4 * 0.5 / 20)
     assert lengths.std() == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(800))
+
+
+def test_parameters_of_a_case_are_drawn_independently_of_each_other():
+    def plane(*, x: float = 0.0, y: float = 0.0, seed: int = 0) -> dict[str, float]:
+        return {"sum": x + y}
+
+    both = {"x": Normal(0.0, 1.0), "y": Normal(0.0, 1.0)}
+    many = Campaign(Trial(plane, {"sum": "1"}), random=both, draws=400)
+    x, y = ([case.parameters[name] for case in many.cases] for name in ("x", "y"))
+    # four standard errors of the correlation of independent draws
+    assert abs(np.corrcoef(x, y)[0, 1]) < 4 / np.sqrt(400)
 
 
 @pytest.mark.parametrize(
