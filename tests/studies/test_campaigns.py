@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -166,6 +167,16 @@ def test_every_trial_that_has_a_name_says_what_it_gives(name):
     found = trial(name)
     assert found.quantities
     assert len(campaign_of({"trial": name}).cases) == 1
+
+
+def test_the_campaigns_of_the_page_can_be_run(tmp_path):
+    page = (HERE.parents[1] / "docs" / "campaigns.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^```toml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    for k, text in enumerate(shown):
+        file = tmp_path / f"{k}.toml"
+        file.write_text(text, encoding="utf-8")
+        assert len(read_campaign(file).cases) > 1
+    assert len(shown) == 2
 
 
 # --- what is kept --------------------------------------------------------------------------------
