@@ -176,7 +176,7 @@ def test_the_campaigns_of_the_page_can_be_run(tmp_path):
         file = tmp_path / f"{k}.toml"
         file.write_text(text, encoding="utf-8")
         assert len(read_campaign(file).cases) > 1
-    assert len(shown) == 2
+    assert len(shown) == 3
 
 
 # --- what is kept --------------------------------------------------------------------------------
