@@ -13,7 +13,8 @@ import pytest  # noqa: E402
 import symheli  # noqa: E402
 
 TOGETHER = {
-    f"tests/studies/test_report{part}.py": "the report" for part in ("", "_numbers", "_in_browser")
+    f"tests/studies/test_{name}.py": "the report"
+    for name in ("report", "report_numbers", "report_in_browser", "what_stages_read")
 }
 """Files that need the same long computation: one process does it once."""
 
