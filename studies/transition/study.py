@@ -34,8 +34,8 @@ from symheli.progress import Task, task, tracked
 
 LONG = 6
 """So many others take as long as one of those questions that take longest."""
-REPORT = 4.0
-"""Seconds of figures and report."""
+REPORT = 10.0
+"""Of figures and report, which keep one core busy, s."""
 
 
 class Study(Outcome):
