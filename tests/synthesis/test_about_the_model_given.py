@@ -61,7 +61,7 @@ def stiff(slow, fast, coupling):
 
 
 @pytest.mark.parametrize("route", ROUTES)
-@settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=5, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(
     speeds=st.sampled_from([(1e-4, 1e4), (1e-2, 1e2), (1e-4, 1.0)]),
     coupling=st.sampled_from([0.0, 0.3]),
