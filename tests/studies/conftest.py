@@ -11,6 +11,7 @@ import pytest
 from studies import cli
 from studies.controllers import designs
 from studies.marks.guarantee import FORM
+from studies.transition import known_kinematics
 from studies.transition import study as stages
 from studies.transition.effort import Effort
 from symheli import Helicopter
@@ -45,7 +46,9 @@ def answer(run):
 
 @pytest.fixture(scope="session")
 def full():
-    """Every stage, as short as it gets: the LPV designs have constant X and Y."""
+    """Every stage, as short as it gets: LPV designs have constant X and Y, nu-gaps few
+    frequencies.
+    """
     effort = Effort(
         ramps=6,
         gentle_ramps=4,
@@ -69,6 +72,7 @@ def full():
     study = stages.Study(vehicle="xcell60", quick=True, seed=0, heli=heli)
     with pytest.MonkeyPatch.context() as shorter:
         shorter.setattr(designs, "output_feedback", partial(output_feedback, X=0, Y=0))
+        shorter.setattr(known_kinematics, "POINTS", 60)
         for stage in stages.stages(effort):
             study = stages.with_stage(study, stage, stages.computed(stage, study, effort))
     return study
