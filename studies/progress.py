@@ -22,16 +22,26 @@ FIRST, EVERY = 2.0, 10.0
 
 @dataclass
 class _Open:
-    """A task under way, begun at `since` (s)."""
+    """A task under way, begun at `since` and at its last step when `told` (s)."""
 
     at: Progress
     since: float
+    told: float
+
+    def step(self, at: Progress, now: float) -> None:
+        """Note where it is."""
+        if at.done > self.at.done:
+            self.told = now
+        self.at = at
 
     def remaining(self, now: float) -> float | None:
-        """Seconds, at the speed so far; None where too little is known."""
+        """Seconds, at the speed up to the last step; None where too little is known, or where the
+        next step takes longer than all that should be left.
+        """
         if not self.at.total or not self.at.total / 20 <= self.at.done <= self.at.total:
             return None
-        return (now - self.since) * (self.at.total - self.at.done) / self.at.done
+        left = (self.told - self.since) * (self.at.total - self.at.done) / self.at.done
+        return left - (now - self.told) if left >= now - self.told else None
 
 
 class _Shown(Protocol):
@@ -60,14 +70,15 @@ class Display:
 
     def __call__(self, progress: Progress) -> None:
         """Note where a task is."""
+        now = time.monotonic()
         with self._lock:
             known = self._open[progress.depth :][:1]
             if progress.over:
                 del self._open[progress.depth :]
             elif known and known[0].at.task == progress.task:
-                known[0].at = progress
+                known[0].step(progress, now)
             else:
-                self._open[progress.depth :] = [_Open(progress, time.monotonic())]
+                self._open[progress.depth :] = [_Open(progress, now, now)]
         if self._thread is None:
             self._thread = threading.Thread(target=self._tick, daemon=True, name="progress")
             self._thread.start()
@@ -93,14 +104,16 @@ class Lines:
         self._next, self._last = 0.0, ""
 
     def show(self, tasks: list[_Open], now: float) -> None:
-        """The outermost task and the innermost one, with what the outermost will still take."""
+        """The outermost task and the innermost one, with what the outermost that knows its steps
+        will still take.
+        """
         if not tasks or now < self._next or now - tasks[0].since < FIRST:
             return
         ends = tasks if len(tasks) < 3 else [tasks[0], tasks[-1]]
         said = "; ".join(str(one.at) for one in ends)
         if said == self._last:
             return
-        left = next((r for t in tasks if (r := t.remaining(now)) is not None), None)
+        left = next((task.remaining(now) for task in tasks if task.at.total), None)
         self._next, self._last = now + EVERY, said
         words = "" if left is None else f", about {duration(left)} left"
         print(f"symheli: {said}{words}", file=sys.stderr, flush=True)

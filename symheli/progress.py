@@ -25,6 +25,8 @@ class Progress:
         What is done, such as "trimming and linearizing".
     done, total : float
         Steps finished, and how many there will be; None: nobody knows.
+    percent : bool
+        The steps are of no interest, their share of the total is.
     note : str
         What the last step found.
     depth : int
@@ -34,8 +36,8 @@ class Progress:
 
     Examples
     --------
-    >>> str(symheli.Progress("flying", 3, 12))
-    'flying: 3 of 12'
+    >>> str(symheli.Progress("flying", 3, 12)), str(symheli.Progress("study", 3, 12, percent=True))
+    ('flying: 3 of 12', 'study: 25 %')
     """
 
     task: str
@@ -44,12 +46,15 @@ class Progress:
     note: str = ""
     depth: int = 0
     over: bool = False
+    percent: bool = False
 
     @property
     def count(self) -> str:
-        """How many of how many, as far as it is known."""
+        """How many of how many, as far as it is known, or the percentage."""
         if self.total is None:
             return f"{self.done:g}" if self.done else ""
+        if self.percent:
+            return f"{100 * self.done / self.total:.0f} %"
         return f"{self.done:g} of {self.total:g}"
 
     def __str__(self) -> str:
@@ -93,8 +98,8 @@ def watched(listener: Listener | None) -> Iterator[None]:
 class Task:
     """A task under way."""
 
-    def __init__(self, title: str, total: float | None, listener: Listener | None, depth: int):
-        self._at = Progress(title, 0, total, depth=depth)
+    def __init__(self, begun: Progress, listener: Listener | None):
+        self._at = begun
         self._listener = listener
         if listener is not None:
             listener(self._at)
@@ -116,10 +121,12 @@ class Task:
 
 
 @contextmanager
-def task(title: str, total: float | None = None) -> Iterator[Task]:
-    """A task of `total` steps, ended however its block is left."""
+def task(title: str, total: float | None = None, *, percent: bool = False) -> Iterator[Task]:
+    """A task of `total` steps, ended however its block is left; with `percent` only their share is
+    told.
+    """
     depth = _depth.get()
-    begun = Task(title, total, _listener.get(), depth)
+    begun = Task(Progress(title, 0, total, depth=depth, percent=percent), _listener.get())
     _depth.set(depth + 1)
     try:
         yield begun

@@ -1,6 +1,8 @@
-"""What several test modules share."""
+"""What several test modules share, and how files are handed out to processes."""
 
 from __future__ import annotations
+
+from collections import Counter
 
 from studies.threads import one_thread
 
@@ -9,6 +11,61 @@ one_thread()  # before NumPy is imported
 import pytest  # noqa: E402
 
 import symheli  # noqa: E402
+
+TOGETHER = {
+    f"tests/studies/test_{name}.py": "the report"
+    for name in ("report", "report_numbers", "report_in_browser", "what_stages_read")
+}
+"""Files that need the same long computation: one process does it once."""
+
+LONGEST = (
+    "the report",
+    "tests/synthesis/test_about_the_model_given.py",
+    "tests/synthesis/test_uncertain_models.py",
+    "tests/synthesis/test_never_call_unstable_stable.py",
+    "tests/records/test_kinematic_check.py",
+    "tests/synthesis/test_order_of_bounds.py",
+    "tests/synthesis/test_tied_rates.py",
+    "tests/synthesis/design/test_certify.py",
+    "tests/synthesis/design/test_wrong_parameter.py",
+    "tests/studies/test_resumed_study.py",
+)
+"""Handed out first, so that none of them keeps one process busy when the others have ended."""
+
+
+def lot(nodeid):
+    """What a process gets at once: a file, or those that belong `TOGETHER`."""
+    file = nodeid.split("::", 1)[0]
+    return TOGETHER.get(file, file)
+
+
+def pytest_collection_modifyitems(config, items):
+    """In processes: the longest lots first, then those of many tests."""
+    if hasattr(config, "workerinput"):
+        size = Counter(lot(item.nodeid) for item in items)
+        first = {name: place for place, name in enumerate(LONGEST)}
+        items.sort(
+            key=lambda item: (
+                first.get(own := lot(item.nodeid), len(first)),
+                -size[own],
+                own,
+            )
+        )
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """That of `--dist loadfile`, with `lot` in place of the file and in the order above."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Lots(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            return lot(nodeid)
+
+    config.option.loadscopereorder = False
+    return Lots(config, log)
 
 
 @pytest.fixture(scope="session", params=["ideal", "pi"])

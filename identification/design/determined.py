@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.design.tall_factors import triangular
 from symheli.lpv import FunctionSpace
 from symheli.values.arrays import Array
 
@@ -44,7 +45,7 @@ def determined_columns(phi: Array, basis: FunctionSpace) -> Array:
     signals = (np.abs(phi).max(axis=0, initial=0.0).reshape(-1, basis.size) / size).max(axis=1)
     peak = np.outer(signals, size).reshape(-1)
     scaled = phi / np.where(peak > 0, peak, 1.0)
-    diagonal = np.diagonal(np.linalg.qr(scaled, mode="r")) if m else np.zeros(0)
+    diagonal = np.diagonal(triangular(scaled)) if m else np.zeros(0)
     d = np.pad(diagonal**2, (0, n - len(diagonal)))
     return determined(d, np.sum(scaled**2, axis=0), PRIOR * np.finfo(float).eps * (peak > 0))
 

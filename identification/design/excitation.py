@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.design.determined import determined_columns
 from identification.design.never_determined import never_determined
+from identification.design.tall_factors import triangular
 from identification.structure.lpvarx import LPVARX, Group
 from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import ExcitationError
@@ -235,7 +236,7 @@ def spectrum(phi: Array) -> tuple[Array, Array]:
     columns of length 1.
     """
     n = phi.shape[1]
-    R = np.linalg.qr(phi / column_scale(phi), mode="r") if len(phi) else np.zeros((0, n))
+    R = triangular(phi / column_scale(phi)) if len(phi) else np.zeros((0, n))
     _, values, directions = np.linalg.svd(R, full_matrices=True)
     return np.pad(values, (0, n - len(values))), directions
 

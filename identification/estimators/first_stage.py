@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.design.excitation import RANK_TOLERANCE, column_scale, direction_in_words
+from identification.design.tall_factors import orthonormal, triangular
 from symheli.values.arrays import Array
 
 WEAK = 10.0
@@ -37,15 +38,16 @@ def first_stage(phi: Array, Q: Array, names: tuple[str, ...], own: Array) -> Fir
     """
     scale = column_scale(phi)
     X = phi / scale
-    mine = np.linalg.qr(X[:, own])[0]
+    mine = orthonormal(X[:, own])[0]
     X = X[:, ~own] - mine @ (mine.T @ X[:, ~own])
     m, k, free = len(X), Q.shape[1], Q.shape[1] - mine.shape[1]
     if not X.shape[1] or free <= 0 or m <= k:
         return FirstStage(np.inf, "")
-    U, size, Vh = np.linalg.svd(X, full_matrices=False)
+    basis, triangle = orthonormal(X)
+    U, size, Vh = np.linalg.svd(triangle, full_matrices=False)
     kept = size > RANK_TOLERANCE * size[0]
-    U = U[:, kept]
-    _, left_over, right = np.linalg.svd(U - Q @ (Q.T @ U), full_matrices=False)
+    U = basis @ U[:, kept]
+    _, left_over, right = np.linalg.svd(triangular(U - Q @ (Q.T @ U)), full_matrices=False)
     unexplained = float(left_over[0]) ** 2
     direction = np.zeros(len(scale))
     direction[~own] = (Vh[kept].T / size[kept]) @ right[0]

@@ -11,6 +11,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from identification.design.excitation import RANK_TOLERANCE, column_scale
+from identification.design.tall_factors import orthonormal
 from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import (
     Samples,
@@ -249,7 +250,7 @@ def _signals(arx: LPVARX, record: FlightRecord, source: InstrumentSource) -> Arr
 
 def column_space(W: Array) -> Array:
     """Orthonormal basis of the columns of W, dependent ones dropped."""
-    Q, R = np.linalg.qr(W / column_scale(W))
+    Q, R = orthonormal(W / column_scale(W))
     U, values, _ = np.linalg.svd(R)
     return Q @ U[:, values > RANK_TOLERANCE * values[0]]
 

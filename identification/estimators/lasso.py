@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from identification.design.excitation import RANK_TOLERANCE, column_scale
+from identification.design.tall_factors import triangular
 from identification.estimators.least_squares import least_squares
 from identification.estimators.method import Estimate, Method
 from identification.structure.lpvarx import LPVARX
@@ -112,7 +113,7 @@ def lasso_path(X: Array, y: Array) -> tuple[Array, Array]:
     Statistics 32, 407-499, with the lasso modification.
     """
     m, n = X.shape
-    R = np.asarray(np.linalg.qr(np.column_stack([X, y]), mode="r"))
+    R = triangular(np.column_stack([X, y]))
     R, z = R[:, :n] / np.sqrt(m), R[:, n] / np.sqrt(m)
     b, active, barred = np.zeros(n), [], np.zeros(n, dtype=bool)
     price = float(np.abs(R.T @ z).max(initial=0.0))

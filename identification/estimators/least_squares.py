@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from identification.design.excitation import column_scale
+from identification.design.tall_factors import orthonormal
 from identification.estimators.method import Estimate, Method
 from identification.estimators.self_check import check_least_squares
 from identification.structure.lpvarx import LPVARX
@@ -45,7 +46,7 @@ def least_squares(phi: Array, y: Array) -> Array:
     never formed.
     """
     scale = column_scale(phi)
-    Q, R = np.linalg.qr(phi / scale)
+    Q, R = orthonormal(phi / scale)
     return solve_triangular(R, Q.T @ y) / scale[:, None]
 
 

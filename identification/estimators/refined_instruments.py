@@ -16,6 +16,7 @@ from identification.design.excitation import (
     direction_in_words,
     spectrum,
 )
+from identification.design.tall_factors import orthonormal
 from identification.estimators.instrumental_variables import starting_point
 from identification.estimators.instruments import Instruments, explained, source_of
 from identification.estimators.least_squares import least_squares
@@ -231,7 +232,7 @@ def _whitened(signal: Array, noise: Array) -> Array:
 def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
     """b with Z'(y - X b) = 0, by the orthonormal factor of the scaled instruments."""
     scale = column_scale(X)
-    Q, _ = np.linalg.qr(Z / column_scale(Z))
+    Q, _ = orthonormal(Z / column_scale(Z))
     square = Q.T @ (X / scale)
     values, directions = spectrum(square)
     if values[-1] <= RANK_TOLERANCE * values[0]:

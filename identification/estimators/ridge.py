@@ -13,6 +13,7 @@ from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import minimize_scalar
 
 from identification.design.excitation import column_scale
+from identification.design.tall_factors import orthonormal
 from identification.estimators.method import Estimate, Method
 from identification.structure.lpvarx import LPVARX, Group
 from identification.structure.regressors import Regression
@@ -118,7 +119,7 @@ class _Problem:
             X[:, j : j + size] @ whitened for j in range(0, X.shape[1], size)
         ]  # one lagged signal each, in orthonormal functions
         sizes = [np.linalg.norm(block) / np.sqrt(size * max(len(X), 1)) for block in blocks]
-        Q, R = np.linalg.qr(X / scale)
+        Q, R = orthonormal(X / scale)
         Z = Q.T @ data.y
         return cls(
             R,

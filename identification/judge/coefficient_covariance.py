@@ -14,6 +14,7 @@ from scipy.fft import next_fast_len
 from scipy.linalg import solve_triangular
 
 from identification.design.excitation import column_scale
+from identification.design.tall_factors import triangular
 from identification.structure.lpvarx import LPVARX
 from symheli.values.arrays import Array
 
@@ -95,7 +96,7 @@ class _Equation(NamedTuple):
     @classmethod
     def of(cls, regressors: Array, phi: Array) -> _Equation:
         scale = column_scale(phi[:, regressors])
-        R = np.linalg.qr(phi[:, regressors] / scale, mode="r")
+        R = triangular(phi[:, regressors] / scale)
         inverse = solve_triangular(R, np.eye(len(scale))) / scale[:, None]
         return cls(regressors, inverse @ inverse.T, max(len(phi) - len(scale), 1))
 

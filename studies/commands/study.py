@@ -45,8 +45,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help=(
             "take the stages that an earlier run has finished from DIR/stages, where version,"
-            " vehicle, effort and seed are the same; others, and damaged ones, are computed again."
-            " They are Python pickles: resume only folders of your own"
+            " vehicle, seed and what they read of the effort are the same; others, and damaged"
+            " ones, are computed again. They are Python pickles: resume only folders of your own"
         ),
     )
     which = parser.add_mutually_exclusive_group()
@@ -124,7 +124,8 @@ def _listed(configuration: Configuration) -> Output:
     from studies.transition.stages import stages
     from studies.transition.stored_stages import stored_stages
 
-    stored = stored_stages(configuration)
+    every = stages(configuration.effort)
+    stored = stored_stages(configuration, every)
     entries = [
         {
             "name": stage.name,
@@ -132,7 +133,7 @@ def _listed(configuration: Configuration) -> Output:
             "needs": stage.needs,
             "state": stored.state(stage.name, stage.kind),
         }
-        for stage in stages(configuration.effort)
+        for stage in every
     ]
     rows = [["stage", "state", "needs", "what it does"]]
     rows += [[e["name"], e["state"], ", ".join(e["needs"]) or "-", e["title"]] for e in entries]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from types import SimpleNamespace
+from typing import Any, TypeVar, cast
 
 from studies.controllers.certified import CertifiedControllers, controller_questions
 from studies.controllers.designs import Designs, design_questions
@@ -38,7 +40,8 @@ T = TypeVar("T")
 @dataclass(frozen=True)
 class Stage:
     """What fills one field of an `Outcome`: its title, the type of its result, and how it is
-    computed from the stages it `needs`: at once, or as `Questions` that processes answer.
+    computed from the stages it `needs` and the entries of the effort it `reads`: at once, or as
+    `Questions` that processes answer.
 
     `cost` is about the work in seconds, for the remaining time.
     """
@@ -48,20 +51,34 @@ class Stage:
     kind: type
     needs: tuple[str, ...]
     compute: Callable[[Outcome, Effort], Any]
+    reads: tuple[str, ...] = ()
     asks: bool = False
     cost: float = 1.0
 
+    def found(self, outcome: Outcome, effort: Effort) -> Any:
+        """What it computes, or its questions. Nothing is there but vehicle, seed, what it `needs`
+        and what it `reads`: for the rest its result would not be computed again.
+        """
+        known = ("vehicle", "seed", "heli", *self.needs)
+        given = SimpleNamespace(**{name: getattr(outcome, name) for name in known})
+        asked = SimpleNamespace(**{name: getattr(effort, name) for name in self.reads})
+        return self.compute(cast(Outcome, given), cast(Effort, asked))
+
 
 def stages(effort: Effort) -> tuple[Stage, ...]:
-    """In order: each needs some of those before it."""
+    """In order: each needs some of those before it. Costs were measured in the study and its look,
+    which takes a fraction.
+    """
+    segments, thorough = sum(effort.gust_segments), effort.thorough
     longitudinal = Stage(
         "longitudinal",
         "Proving gains of the longitudinal gust loop (baseline, continuous)",
         LongitudinalProofs,
         (),
         lambda s, effort: longitudinal_questions(_there(s.heli), effort),
+        reads=("longitudinal_rates", "gust_segments"),
         asks=True,
-        cost=40,
+        cost=1 + 0.25 * segments * len(effort.longitudinal_rates),
     )
     return (
         Stage(
@@ -70,7 +87,7 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             Baseline,
             (),
             lambda s, _: build_baseline(_there(s.heli)),
-            cost=1,
+            cost=0.2,
         ),
         Stage(
             "paper_experiment",
@@ -78,7 +95,7 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             PaperExperiments,
             ("baseline",),
             lambda s, _: run_experiments(_there(s.baseline).nodes, s.seed),
-            cost=1,
+            cost=0.2,
         ),
         Stage(
             "exact_recovery",
@@ -86,7 +103,7 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             Recoveries,
             ("baseline",),
             lambda s, _: recover_at(_there(s.baseline).nodes, (0.02, PERIOD), s.seed),
-            cost=1,
+            cost=0.1,
         ),
         Stage(
             "flights",
@@ -96,7 +113,8 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             lambda s, effort: fly_transitions(
                 _there(s.heli), s.seed, effort.ramps, effort.gentle_ramps
             ),
-            cost=1,
+            reads=("ramps", "gentle_ramps"),
+            cost=0.2,
         ),
         Stage(
             "identification",
@@ -104,7 +122,7 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             Identification,
             ("flights",),
             lambda s, _: identify_axes(_there(s.heli), _there(s.flights)),
-            cost=3,
+            cost=0.08 * effort.ramps,
         ),
         Stage(
             "comparison",
@@ -114,7 +132,7 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             lambda s, _: compare(
                 _there(s.heli), _there(s.baseline), _there(s.flights), _there(s.identification)
             ),
-            cost=6,
+            cost=2,
         ),
         Stage(
             "known_kinematics",
@@ -124,7 +142,8 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             lambda s, effort: identify_with_known_kinematics(
                 _there(s.heli), s.vehicle, _there(s.baseline), s.seed, effort
             ),
-            cost=100,
+            reads=("aggressive", "gentle_flight"),
+            cost=0.1 * effort.aggressive + 22 * effort.gentle_flight,
         ),
         Stage(
             "gust",
@@ -132,8 +151,11 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             GustProofs,
             ("baseline",),
             lambda s, effort: gust_questions(_there(s.heli), _there(s.baseline), effort),
+            reads=("gust_rates", "gust_segments", "exact_rates", "thorough", "search"),
             asks=True,
-            cost=220,
+            cost=2
+            + 0.27 * segments * _limits(effort.gust_rates + effort.exact_rates * thorough)
+            + 80 * thorough,
         ),
         *((longitudinal,) if effort.longitudinal_rates else ()),
         Stage(
@@ -144,8 +166,9 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             lambda s, effort: servo_questions(
                 _there(s.heli), _there(s.baseline), _there(s.identification), effort
             ),
+            reads=("servo_rates", "servo_segments", "thorough"),
             asks=True,
-            cost=90,
+            cost=2 + 1.6 * sum(effort.servo_segments) * _limits(effort.servo_rates),
         ),
         Stage(
             "robust",
@@ -155,8 +178,9 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             lambda s, effort: robust_questions(
                 _there(s.heli), _there(s.baseline), _there(s.known_kinematics), effort
             ),
+            reads=("robust_rates", "robust_form", "every_model", "thorough"),
             asks=True,
-            cost=85,
+            cost=1 + (5 + 16 * effort.every_model + 10 * thorough) * _limits(effort.robust_rates),
         ),
         Stage(
             "controllers",
@@ -166,8 +190,9 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             lambda s, effort: design_questions(
                 _there(s.heli), _there(s.known_kinematics).model, s.seed, effort
             ),
+            reads=("certified_controllers", "design_points"),
             asks=True,
-            cost=90,
+            cost=37 + 0.4 * effort.design_points + 16 * effort.certified_controllers,
         ),
         Stage(
             "flown_controllers",
@@ -177,7 +202,8 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             lambda s, effort: fly_controllers(
                 s.vehicle, _there(s.controllers), range(effort.controller_seeds)
             ),
-            cost=8,
+            reads=("controller_seeds",),
+            cost=0.3 * effort.controller_seeds,
         ),
         Stage(
             "certified_controllers",
@@ -185,10 +211,16 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             CertifiedControllers,
             ("controllers",),
             lambda s, effort: controller_questions(_there(s.controllers), effort),
+            reads=("certified_controllers",),
             asks=True,
-            cost=390,
+            cost=1 + 106 * effort.certified_controllers,
         ),
     )
+
+
+def _limits(rates: tuple[float, ...]) -> int:
+    """How many of the rates are limits: proofs of a P that moves."""
+    return sum(0 < rate < math.inf for rate in rates)
 
 
 def _there(thing: T | None) -> T:

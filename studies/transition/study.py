@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -31,6 +31,11 @@ from studies.transition.stored_stages import (
 )
 from studies.transition.summary import summary
 from symheli.progress import Task, task, tracked
+
+LONG = 6
+"""So many others take as long as one of those questions that take longest."""
+REPORT = 10.0
+"""Of figures and report, which keep one core busy, s."""
 
 
 class Study(Outcome):
@@ -67,12 +72,20 @@ class Asked:
 
     @property
     def share(self) -> float:
-        """Of the questions that are answered."""
-        return sum(answer.done() for answer in self.answers) / max(len(self.answers), 1)
+        """Of the work, as far as the questions are answered."""
+        whole = done = 0
+        for proof, answer in zip(self.questions.proofs, self.answers, strict=True):
+            work = LONG if any(proof is long for long in self.questions.long) else 1
+            whole += work
+            done += work * answer.done()
+        return done / whole if whole else 1.0
 
-    def stored(self) -> Stored:
-        """Wait for the answers; `seconds` is the work they were."""
-        found = [answer.result() for answer in tracked("answers", self.answers)]
+    def stored(self, told: Callable[[], object] = lambda: None) -> Stored:
+        """Wait for the answers; `seconds` is the work they were. Each is `told`."""
+        found = []
+        for answer in tracked("answers", self.answers):
+            found.append(answer.result())
+            told()
         bounds = tuple(bound for _, own in found for bound in own)
         return Stored(
             result=self.questions.together(bounds), seconds=sum(seconds for seconds, _ in found)
@@ -91,10 +104,10 @@ def run_study(
 
     Proofs that do not need each other run side by side, in a process a core, while the other stages
     are computed here. `resume` takes the stages that an earlier run has stored in the folder, where
-    code, libraries, vehicle, effort and seed are the same; others, and those that are damaged, are
-    computed again. Stages may run alone (`only`), or `since` one of them: what they need is taken
-    as it is stored, and computed where it is not. An interrupted run leaves its finished stages,
-    the proofs that are found and their results; files are whole or absent.
+    code, libraries, vehicle, seed and what they read of the effort are the same; others, and those
+    that are damaged, are computed again. Stages may run alone (`only`), or `since` one of them:
+    what they need is taken as it is stored, and computed where it is not. An interrupted run leaves
+    its finished stages, the proofs that are found and their results; files are whole or absent.
     """
     out, effort = configuration.out, configuration.effort
     every = stages(effort)
@@ -107,18 +120,19 @@ def run_study(
         effort=effort,
         heli=heli,
     )
-    stored = stored_stages(configuration, heli)
+    stored = stored_stages(configuration, every, heli)
     configuration.write(out / KEPT)
     for stage in every:
         if resume or stage.name not in selection.again:
             found = _taken(stored, stage)
             study = study if found is None else with_stage(study, stage, found)
     run = _Run(stored, resume, selection.open(every, study.seconds))
-    with task("study, percent", 100) as whole:
+    with task("study", run.cost, percent=True) as whole:
         study = run.finish(study, whole)
-    study = replace(study, complete={stage.name for stage in every} <= study.seconds.keys())
-    with _shown("Writing figures and report"):
-        write_report(study, out)
+        study = replace(study, complete={stage.name for stage in every} <= study.seconds.keys())
+        with _shown("Writing figures and report"):
+            write_report(study, out)
+        whole.to(run.cost)
     return study
 
 
@@ -130,23 +144,32 @@ class _Run:
     resume: bool
     todo: Sequence[Stage]
 
+    @property
+    def cost(self) -> float:
+        """Of all, the report too, s."""
+        return REPORT + sum(stage.cost for stage in self.todo)
+
     def finish(self, study: Study, whole: Task) -> Study:
         """All of them, each as soon as what it needs is there; questions wait for other stages to
         be computed.
         """
         todo, asked = list(self.todo), dict[str, Asked]()
+
+        def tell() -> None:
+            whole.to(self._done(todo, asked))
+
         with Processes() as processes:
             while todo:
                 ready = [stage for stage in todo if set(stage.needs) <= study.seconds.keys()]
                 for stage in ready:
                     if stage.asks and stage.name not in asked:
-                        questions = stage.compute(study, study.effort)
+                        questions = stage.found(study, study.effort)
                         kept = self.stored.answers(stage.name)
                         asked[stage.name] = Asked.of(questions, processes, kept, self.resume)
                 stage = next((stage for stage in ready if not stage.asks), ready[0])
                 with _shown(stage.title):
                     found = (
-                        asked[stage.name].stored()
+                        asked[stage.name].stored(tell)
                         if stage.asks
                         else computed(stage, study, study.effort)
                     )
@@ -155,25 +178,25 @@ class _Run:
                 study = with_stage(study, stage, found)
                 write_results(study, self.stored.folder.parent)
                 todo.remove(stage)
-                whole.to(self._percent(todo, asked))
+                tell()
         return study
 
-    def _percent(self, todo: Sequence[Stage], asked: dict[str, Asked]) -> int:
+    def _done(self, todo: Sequence[Stage], asked: dict[str, Asked]) -> float:
         """Of the cost of all, what is not in front of us."""
         left = (
             stage.cost * (1 - (asked[stage.name].share if stage.name in asked else 0.0))
             for stage in todo
         )
-        return round(100 * (1 - sum(left) / sum(stage.cost for stage in self.todo)))
+        return max(0.0, self.cost - REPORT - sum(left))
 
 
 def computed(stage: Stage, study: Study, effort: Effort) -> Stored:
     """Compute a stage here."""
     if stage.asks:
         with Processes(1) as here:
-            return Asked.of(stage.compute(study, effort), here).stored()
+            return Asked.of(stage.found(study, effort), here).stored()
     begin = time.perf_counter()
-    result = stage.compute(study, effort)
+    result = stage.found(study, effort)
     return Stored(result=result, seconds=time.perf_counter() - begin)
 
 

@@ -5,6 +5,7 @@ convergence.
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,14 +22,18 @@ LOW, HIGH = 0.0, 10.0
 
 def rates(y):
     """Rates (8,) of a rigid body without aerodynamics: g in body axes less omega x V, Euler."""
-    V, omega, (phi, theta) = y[:3], y[3:6], y[6:]
-    c, s = np.cos, np.sin
+    V, omega = y[:3], y[3:6]
+    p, q, r, phi, theta = y[3:].tolist()
+    c, s = math.cos, math.sin
     roll = np.array([[1, 0, 0], [0, c(phi), s(phi)], [0, -s(phi), c(phi)]])
     pitch = np.array([[c(theta), 0, -s(theta)], [0, 1, 0], [s(theta), 0, c(theta)]])
     # columns: body rates of a unit rate of roll, of pitch and of yaw
-    turned = np.column_stack([[1, 0, 0], roll[:, 1], roll @ pitch[:, 2]])
-    euler = np.linalg.solve(turned, omega)
-    return np.concatenate([roll @ pitch @ G - np.cross(omega, V), np.zeros(3), euler[:2]])
+    turned = np.array([(1.0, 0.0, 0.0), roll[:, 1], roll @ pitch[:, 2]]).T
+    cross = np.array([[0, -r, q], [r, 0, -p], [-q, p, 0]])  # omega x
+    out = np.zeros(8)
+    out[:3] = roll @ (pitch @ G) - cross @ V
+    out[6:] = np.linalg.solve(turned, omega)[:2]
+    return out
 
 
 class Vehicle:
@@ -61,25 +66,19 @@ class Vehicle:
             values.append(DT * base * growth)
         self.theta = np.vstack([aero.basis.fit(points, v) for v in values])  # (n, 6)
 
-    def added(self, k, y, u, p):
-        """Increments (6,) from samples before k and p of k and k - 1."""
-        aero = self.kin.aerodynamics
-        f, row = aero.basis(p[k]), 0
-        out = np.zeros(6)
-        for entry in aero.entries:
-            lagged = np.concatenate([y[k - entry.lag, :6], u[k - entry.lag]])
-            signal = {
-                "input": lambda e=entry, s=lagged: s[e.channel],
-                "offset": lambda: 1.0,
-                "increment": lambda: p[k] - p[k - 1],
-            }[entry.kind]()
-            out += signal * (f @ self.theta[row : row + len(f)])
-            row += len(f)
-        return out
+    def added(self, k, y, u, p, f):
+        """Increments (6,) from samples before k and p of k and k - 1; f is the basis at p(k)."""
+        signals = [
+            (y[k - e.lag, e.channel] if e.channel < 6 else u[k - e.lag, e.channel - 6])
+            if e.kind == "input"
+            else {"offset": 1.0, "increment": p[k] - p[k - 1]}[e.kind]
+            for e in self.kin.aerodynamics.entries
+        ]
+        return np.outer(signals, f).reshape(-1) @ self.theta
 
-    def advanced(self, k, y, u, p):
+    def advanced(self, k, y, u, p, f):
         """y(k) by the trapezoidal rule, its equation solved until nothing moves."""
-        added = np.append(self.added(k, y, u, p), [0.0, 0.0])
+        added = np.append(self.added(k, y, u, p, f), [0.0, 0.0])
         new, start = y[k - 1], rates(y[k - 1])
         for _ in range(60):
             last, new = new, y[k - 1] + added + 0.5 * DT * (start + rates(new))
@@ -99,12 +98,12 @@ class Vehicle:
         p = 0.5 * (LOW + HIGH) + 4.5 * np.sin(2 * np.pi * DT / period * np.arange(n) + 0.3)
         blur = noise.normal(size=(n, 8)) * (np.zeros(8) if sensors is None else sensors)
         pushes = process * noise.normal(size=(n, 6))
-        pilot, first = Pilot(), self.kin.memory
+        pilot, first, f = Pilot(), self.kin.memory, self.kin.aerodynamics.basis(p)
         for k in range(n):
             if k < first:
                 y[k] = 0.05 * rng.normal(size=8)
             else:
-                y[k] = self.advanced(k, y, u, p)
+                y[k] = self.advanced(k, y, u, p, f[k])
                 y[k, :6] += pushes[k]
             u[k] = pilot.step(y[k] + blur[k], None, None) + e[k]
         columns = dict(zip((*STATES, *CONTROLS), np.column_stack([y + blur, u]).T, strict=True))

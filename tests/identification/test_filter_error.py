@@ -52,7 +52,8 @@ def test_a_step_is_generalized_least_squares_with_the_dense_covariance(vehicle, 
     theta = vehicle.theta + 1e-3
 
     def left(y):
-        added = np.array([vehicle_like.added(k, y, s.u[:, 6:], np.ravel(s.p)) for k in range(1, 9)])
+        u, p = s.u[:, 6:], np.ravel(s.p)
+        added = np.array([vehicle_like.added(k, y, u, p, s.f[k]) for k in range(1, 9)])
         out = increments(y, s.dt)[1:]
         out[:, :6] -= added
         return out.ravel()

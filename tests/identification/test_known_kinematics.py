@@ -110,6 +110,7 @@ def test_predictions_are_those_of_stepping_one_sample_at_a_time(vehicle, flight,
     """The vehicle's own loop, from the measured past: the same numbers by another route."""
     model = vehicle.model(flight)
     y, u, p = flight.columns(STATES), flight.columns(CONTROLS), flight["airspeed_command"]
+    f = vehicle.kin.aerodynamics.basis(p)
     for horizon in (1, 7):
         guess = model.predict(flight, horizon)
         first = vehicle.kin.memory - 1 + horizon
@@ -118,7 +119,7 @@ def test_predictions_are_those_of_stepping_one_sample_at_a_time(vehicle, flight,
         for k in (first, 100, len(y) - 1):
             past = y[: k + 1].copy()
             for j in range(k - horizon + 1, k + 1):
-                past[j] = vehicle.advanced(j, past, u, p)
+                past[j] = vehicle.advanced(j, past, u, p, f[j])
             np.testing.assert_allclose(guess[k], past[k], rtol=1e-13, atol=1e-14)
 
 

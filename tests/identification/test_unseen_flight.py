@@ -21,7 +21,7 @@ def vehicle():
 @pytest.fixture(scope="module")
 def model(vehicle):
     method = idn.FilterError(vehicle.without_noise(seed=1), noise=NOISE)
-    return idn.fit(vehicle.kin, vehicle.record(2400, seed=1, sensors=SENSORS), method)
+    return idn.fit(vehicle.kin, vehicle.record(1600, seed=1, sensors=SENSORS), method)
 
 
 def test_other_flights_of_the_vehicle_are_explained(vehicle, model):

@@ -40,20 +40,28 @@ def airframe(name):
     return heli.with_parameters(changes) if name == "changed" else heli
 
 
-@pytest.mark.parametrize(
-    "name", ["ideal", "pi", "other", "printed", "smoothed", "scaled", "changed"]
+AIRFRAMES = ("ideal", "pi", "other", "printed", "smoothed", "scaled", "changed")
+ASKED = (
+    {},
+    {"acceleration": 2.0},
+    {"acceleration": -2.0, "climb_rate": 0.5},
+    {"sideslip": 1.0},
+    {"wind": (-3.0, 2.0, 0.5)},
+    {"turn_rate": 0.2},
 )
+
+
 @pytest.mark.parametrize(
-    "asked",
-    [
-        {},
-        {"acceleration": 2.0},
-        {"acceleration": -2.0, "climb_rate": 0.5},
-        {"sideslip": 1.0},
-        {"wind": (-3.0, 2.0, 0.5)},
-        {"turn_rate": 0.2},
+    ("name", "asked"),
+    [  # by default every airframe, and every condition twice
+        pytest.param(
+            *(name, asked),
+            id=f"{'-'.join(asked) or 'level'}-{name}",
+            marks=() if (i + j) % 3 == 0 else pytest.mark.slow,
+        )
+        for i, name in enumerate(AIRFRAMES)
+        for j, asked in enumerate(ASKED)
     ],
-    ids=lambda asked: "-".join(asked) or "level",
 )
 def test_a_batch_holds_the_trims_found_one_after_another(name, asked):
     """Eight at a time from one that is eight airspeeds away, the same branch as from the next."""

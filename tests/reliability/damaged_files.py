@@ -60,10 +60,14 @@ def readers(folder: Path) -> list[Reader]:
         encoding="utf-8",
     )
     found.append(Reader("signal map", signals, SignalMap.load))
-    stages = StoredStages(folder, "key")
+    stages = StoredStages(folder, {"one": "key"})
     path = stages.save("one", Stored(result=[1.0, 2.0], seconds=0.5))
     found.append(
-        Reader("study stage", path, lambda p: StoredStages(p.parent, "key").load(p.stem, list))
+        Reader(
+            "study stage",
+            path,
+            lambda p: StoredStages(p.parent, {p.stem: "key"}).load(p.stem, list),
+        )
     )
     return found
 

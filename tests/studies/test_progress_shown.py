@@ -82,25 +82,46 @@ def test_what_is_over_soon_shows_nothing_and_loads_nothing(capfd):
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
 
 
-def test_the_remaining_time_is_that_of_the_speed_so_far():
-    assert _Open(Progress("x", 3, 12), since=100.0).remaining(130.0) == pytest.approx(90.0)
-    assert _Open(Progress("x", 12, 12), since=100.0).remaining(130.0) == 0
+def begun(at, since, told):
+    return _Open(at, since=since, told=told)
+
+
+def test_the_remaining_time_is_that_of_the_speed_so_far_less_what_has_passed():
+    part = begun(Progress("x", 3, 12), 100.0, 130.0)
+    assert part.remaining(130.0) == pytest.approx(90.0)
+    assert part.remaining(150.0) == pytest.approx(70.0)
+    assert part.remaining(221.0) is None  # that step takes longer than all that was left
+    assert begun(Progress("x", 12, 12), 100.0, 130.0).remaining(130.0) == 0
     for unknown in (Progress("x", 0, 12), Progress("x", 3, None), Progress("x", 4, 100)):
-        assert _Open(unknown, since=100.0).remaining(130.0) is None
+        assert begun(unknown, 100.0, 130.0).remaining(130.0) is None
+
+
+def test_time_is_measured_to_the_last_step_whatever_is_noted_between():
+    part = begun(Progress("x", 0, 10), 0.0, 0.0)
+    part.step(Progress("x", 1, 10), 10.0)
+    part.step(Progress("x", 1, 10, "the same step"), 30.0)
+    assert part.remaining(30.0) == pytest.approx(70.0)
 
 
 def test_a_line_tells_of_the_whole_and_of_the_innermost_part(capsys):
     lines = Lines()
-    tasks = [_Open(Progress("study", 30, 100), 0.0), _Open(Progress("stage"), 1.0)]
-    tasks.append(_Open(Progress("flying", 1, 4, "gusts"), 2.0))
+    whole = Progress("study", 60.0, 200.0, percent=True)
+    tasks = [begun(whole, 0.0, 60.0), begun(Progress("stage"), 1.0, 1.0)]
+    tasks.append(begun(Progress("flying", 1, 4, "gusts"), 2.0, 2.0))
     lines.show(tasks, 1.0)
     assert not capsys.readouterr().err
     lines.show(tasks, 60.0)
     said = capsys.readouterr().err
-    assert said == "symheli: study: 30 of 100; flying: 1 of 4 (gusts), about 2:20 min left\n"
+    assert said == "symheli: study: 30 %; flying: 1 of 4 (gusts), about 2:20 min left\n"
     lines.show(tasks, 600.0)
     assert not capsys.readouterr().err  # nothing has changed
     assert duration(7260.0) == "2:01 h"
+
+
+def test_the_time_a_part_will_take_is_not_said_of_the_whole(capsys):
+    whole, part = Progress("study", 1, 100, percent=True), Progress("answers", 3, 4)
+    Lines().show([begun(whole, 0.0, 10.0), begun(part, 0.0, 30.0)], 30.0)
+    assert capsys.readouterr().err == "symheli: study: 1 %; answers: 3 of 4\n"
 
 
 def test_the_display_keeps_the_open_tasks_only():

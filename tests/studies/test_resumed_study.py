@@ -5,8 +5,8 @@ compute.
 from __future__ import annotations
 
 import json
-from dataclasses import replace
-from functools import partial
+from dataclasses import fields, replace
+from functools import cache, partial
 
 import pytest
 
@@ -14,10 +14,19 @@ from studies.processes import Processes
 from studies.transition import stages, study
 from studies.transition.configuration import Configuration
 from studies.transition.effort import Effort
+from studies.transition.outcome import Outcome
 from studies.transition.proofs import Questions
 from studies.transition.recovery import Recoveries
-from studies.transition.stored_stages import NotUsable, Stored, StoredStages, content_key
+from studies.transition.stored_stages import (
+    NotUsable,
+    Stored,
+    StoredStages,
+    content_key,
+    stage_keys,
+)
+from symheli import Helicopter
 from symheli.errors import InputError
+from synthesis import Search, Spline
 
 FIRST = ("baseline", "paper_experiment", "exact_recovery")
 """The stages that are quick."""
@@ -27,6 +36,16 @@ def run(out, *, resume=False, only=(), since="", **entries):
     """A quick study into this folder."""
     asked = Configuration.of({"quick": True, "out": out, **entries})
     return study.run_study(asked, resume=resume, only=only, since=since)
+
+
+@cache
+def vehicle(name):
+    return Helicopter.load(name, governor="ideal")
+
+
+def helicopter(configuration):
+    """That of a run, which every run of these tests takes."""
+    return vehicle(configuration.vehicle)
 
 
 @pytest.fixture
@@ -45,6 +64,7 @@ def short(monkeypatch):
         return tuple(counting(stage) for stage in whole(effort) if stage.name in FIRST)
 
     monkeypatch.setattr(study, "stages", first)
+    monkeypatch.setattr(study, "loaded", helicopter)
     monkeypatch.setattr(study, "write_report", study.write_results)
     return counted
 
@@ -99,15 +119,15 @@ def test_without_being_asked_it_begins_anew(stopped, short):
     assert tuple(short) == FIRST
 
 
-@pytest.mark.parametrize(
-    ("other", "again"),
-    [({"seed": 1}, FIRST), ({"quick": False}, FIRST), ({"vehicle": "xcell_kahn_hudson"}, FIRST)],
-)
-def test_stages_of_another_seed_effort_or_vehicle_are_computed_again(
-    stopped, short, capsys, other, again
-):
+def test_the_whole_study_takes_from_a_look_what_reads_nothing_of_the_effort(stopped, short):
+    assert run(stopped, resume=True, quick=False).complete
+    assert short == ["exact_recovery"]
+
+
+@pytest.mark.parametrize("other", [{"seed": 1}, {"vehicle": "xcell_kahn_hudson"}], ids=str)
+def test_stages_of_another_seed_or_vehicle_are_computed_again(stopped, short, capsys, other):
     run(stopped, resume=True, **other)
-    assert tuple(short) == again
+    assert tuple(short) == FIRST
     said = capsys.readouterr().err
     assert said.count("is of another version, vehicle, effort or seed: not taken") == 2
 
@@ -141,7 +161,7 @@ def test_a_damaged_stage_is_computed_again_and_said(stopped, short, capsys, dama
 
 
 def test_a_stage_under_the_name_of_another_is_refused(tmp_path):
-    stored = StoredStages(tmp_path, "key")
+    stored = StoredStages(tmp_path, dict.fromkeys(("baseline", "servo"), "key"))
     stored.save("baseline", Stored(result=Recoveries(runs=()), seconds=1.0))
     assert stored.load("baseline", Recoveries).seconds == 1.0
     assert stored.load("servo", Recoveries) is None
@@ -150,10 +170,101 @@ def test_a_stage_under_the_name_of_another_is_refused(tmp_path):
 
 
 def test_the_key_is_that_of_the_content(ideal, pi):
-    own = content_key(ideal, Effort(), 0)
-    assert own == content_key(ideal, Effort(), 0)
-    others = (pi, Effort(), 0), (ideal, Effort.look(), 0), (ideal, Effort(), 1)
-    assert len({own, *(content_key(*other) for other in others)}) == 4
+    own = content_key(ideal, 0)
+    assert own == content_key(ideal, 0)
+    assert len({own, content_key(pi, 0), content_key(ideal, 1)}) == 3
+
+
+AFTER_KINEMATICS = {"robust", "controllers", "flown_controllers", "certified_controllers"}
+
+
+@pytest.mark.parametrize(
+    ("change", "reached"),
+    [
+        ({"servo_rates": (0.0, 3.1)}, {"servo"}),
+        ({"exact_rates": (0.0, 1.0)}, {"gust"}),
+        ({"search": replace(Search(), nodes=99)}, {"gust"}),
+        ({"longitudinal_rates": (0.0, 3.1)}, {"longitudinal"}),
+        ({"gust_segments": (16, 32)}, {"gust", "longitudinal"}),
+        ({"robust_form": Spline(segments=(9,))}, {"robust"}),
+        ({"controller_seeds": 21}, {"flown_controllers"}),
+        ({"design_points": 13}, AFTER_KINEMATICS - {"robust"}),
+        ({"gentle_flight": False}, {"known_kinematics"} | AFTER_KINEMATICS),
+        ({"ramps": 11}, {"flights", "identification", "comparison", "servo"}),
+        ({"thorough": False}, {"gust", "servo", "robust"}),
+    ],
+    ids=str,
+)
+def test_a_changed_entry_changes_the_keys_of_the_stages_it_reaches(change, reached):
+    def keys(effort):
+        return stage_keys(stages.stages(effort), "content", effort)
+
+    before, after = keys(Effort()), keys(replace(Effort(), **change))
+    assert {name for name in before if before[name] != after[name]} == reached
+    assert not before.keys() ^ after.keys()
+
+
+def test_every_entry_of_the_effort_is_read_by_a_stage_and_all_keys_differ():
+    every = stages.stages(Effort())
+    assert {name for stage in every for name in stage.reads} == {f.name for f in fields(Effort)}
+    keys = stage_keys(every, "content", Effort())
+    assert len(set(keys.values())) == len(every)
+    assert not set(keys.values()) & set(stage_keys(every, "other code", Effort()).values())
+
+
+def test_a_stage_is_given_nothing_but_what_it_needs_and_reads():
+    def stage(compute):
+        return stages.Stage("servo", "A stage", tuple, ("baseline",), compute, ("servo_rates",))
+
+    outcome = Outcome(vehicle="xcell60", quick=False, seed=3)
+    got = stage(lambda s, effort: (s.vehicle, s.seed, s.baseline, effort.servo_rates))
+    assert got.found(outcome, Effort()) == ("xcell60", 3, None, Effort().servo_rates)
+    for undeclared in (lambda s, _: s.effort, lambda s, _: s.gust, lambda _, effort: effort.ramps):
+        with pytest.raises(AttributeError):
+            stage(undeclared).found(outcome, Effort())
+
+
+def test_one_rate_changed_in_the_file_computes_only_what_it_touches(tmp_path, monkeypatch):
+    """`robust` needs `servo`, `flights` neither: results are those of the file, whatever the folder
+    holds.
+    """
+    computed = []
+
+    def stage(name, needs, entry):
+        def compute(s, effort):
+            computed.append(name)
+            own = getattr(effort, entry) if entry else ()
+            return (own, *(getattr(s, other) for other in needs))
+
+        return stages.Stage(name, name, tuple, needs, compute, (entry,) if entry else ())
+
+    every = (
+        stage("flights", (), "ramps"),
+        stage("servo", (), "servo_rates"),
+        stage("robust", ("servo",), ""),
+    )
+    monkeypatch.setattr(study, "stages", lambda effort: every)
+    monkeypatch.setattr(study, "loaded", helicopter)
+    for name in ("write_report", "write_results"):
+        monkeypatch.setattr(study, name, lambda *_: None)
+    file = tmp_path / "my.toml"
+
+    def again(entries):
+        file.write_text(f'out = "."\n[effort]\n{entries}\n')
+        computed.clear()
+        done = study.run_study(Configuration.read(file, {}), resume=True)
+        return [*computed], (done.flights, done.servo, done.robust)
+
+    first = (5,), ((0.0, 3.0),), ((), ((0.0, 3.0),))
+    assert again("ramps = 5\nservo_rates = [0, 3]") == (["flights", "servo", "robust"], first)
+    assert again("ramps = 5\nservo_rates = [0, 3]") == ([], first)
+    # an entry that none of them reads
+    assert again("ramps = 5\nservo_rates = [0, 3]\ngust_rates = [0, 2]") == ([], first)
+    other = (5,), ((0.0, 4.0),), ((), ((0.0, 4.0),))
+    assert again("ramps = 5\nservo_rates = [0, 4]") == (["servo", "robust"], other)
+    assert again("ramps = 6\nservo_rates = [0, 4]") == (["flights"], ((6,), *other[1:]))
+    # what was stored for the first file is gone, and is not taken for it
+    assert again("ramps = 5\nservo_rates = [0, 3]") == (["flights", "servo", "robust"], first)
 
 
 def test_the_command_says_how_to_go_on(short, tmp_path, monkeypatch, capsys):

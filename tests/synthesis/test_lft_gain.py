@@ -148,7 +148,7 @@ def test_without_parameters_every_test_gives_the_h_infinity_norm(dt):
     ("seed", "dt"),
     [
         (3, 0.1),
-        (4, 0.1),
+        pytest.param(4, 0.1, marks=pytest.mark.slow),
         pytest.param(3, None, marks=pytest.mark.slow),
         pytest.param(4, None, marks=pytest.mark.slow),
     ],

@@ -170,7 +170,7 @@ def test_a_matrix_of_blocks_that_is_not_definite_is_refused():
         BlockCholesky({(0, 0): np.eye(2), (1, 0): 2 * np.eye(2), (1, 1): np.eye(2)})
 
 
-@pytest.mark.parametrize("dt", [None, 0.05])
+@pytest.mark.parametrize("dt", [pytest.param(None, marks=pytest.mark.slow), 0.05])
 def test_of_a_model_that_does_not_move_it_finds_the_frozen_norm(dt):
     """The bounded real lemma is exact there; the norm comes from level sets of the response."""
     rng = np.random.default_rng(4)
@@ -189,7 +189,7 @@ def test_of_a_model_that_does_not_move_it_finds_the_frozen_norm(dt):
     assert cert.verify(rigorous=True)
 
 
-@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("dt", [None, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_it_agrees_with_a_general_solver(dt):
     for seed in (1, 2):
         lpv = random_stable(seed, states=4, dt=dt)

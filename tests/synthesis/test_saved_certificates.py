@@ -20,7 +20,7 @@ from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, UserFunction
 from synthesis import Certificate, Grid, Spline, Status, l2_gain, stability
 
 QUICK = settings(
-    max_examples=60, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
+    max_examples=30, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
 )
 
 

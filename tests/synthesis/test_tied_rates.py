@@ -93,7 +93,7 @@ def test_a_cycle_along_which_the_state_grows_is_shown_as_it_moves():
     np.testing.assert_allclose(p[:, 0] - p[0, 0], moved, atol=0.02)
 
 
-@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("flip", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_helicopter_that_brakes_less_than_it_accelerates_is_searched_as_hard_as_it_brakes(flip):
     V = Scheduling("V", "m/s", 0.0, 1.0, rate="a")
     a = Scheduling("a", "m/s^2", -0.05, 0.6, rate=2.0)

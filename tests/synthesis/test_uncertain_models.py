@@ -39,11 +39,11 @@ CLOSE = 1e-4
 @pytest.mark.parametrize(
     ("pole", "bound", "dt", "truth"),
     [
-        (0.5, 0.2, 0.1, 1 / 0.3),
+        pytest.param(0.5, 0.2, 0.1, 1 / 0.3, marks=pytest.mark.slow),
         (0.5, 0.499, 0.1, 1 / 0.001),
         (-0.5, 0.2, 0.1, 1 / 0.3),
         (-1.0, 0.5, None, 1 / 0.5),
-        (-1.0, 0.99, None, 1 / 0.01),
+        pytest.param(-1.0, 0.99, None, 1 / 0.01, marks=pytest.mark.slow),
     ],
 )
 def test_a_pole_known_within_a_margin_has_the_gain_of_the_slowest(pole, bound, dt, truth):
@@ -106,8 +106,14 @@ def scaled_norm(A, B, C, D, bound, dt):
     return high
 
 
-@pytest.mark.parametrize("dt", [None, 0.1])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("seed", "dt"),
+    [
+        (1, None),
+        (2, 0.1),
+        *(pytest.param(*p, marks=pytest.mark.slow) for p in ((1, 0.1), (2, None))),
+    ],
+)
 def test_of_a_time_invariant_model_it_is_the_norm_with_the_best_scaling(seed, dt):
     unc = random_uncertain(seed, 0.3, dt)
     frozen = unc.model.at(0.4)
@@ -126,8 +132,14 @@ def test_without_perturbation_it_is_the_certificate_of_the_model(dt):
         assert l2_gain(unc, form=COARSE, search=None).gamma == pytest.approx(own, rel=CLOSE)
 
 
-@pytest.mark.parametrize("dt", [None, 0.1])
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize(
+    ("seed", "dt"),
+    [
+        *((1, None), (0, 0.1)),
+        *(pytest.param(k, None, marks=pytest.mark.slow) for k in (0, 2)),
+        *(pytest.param(k, 0.1, marks=pytest.mark.slow) for k in (1, 2)),
+    ],
+)
 def test_no_model_of_the_set_exceeds_the_bound_and_the_worst_one_found_is_one(seed, dt):
     unc = random_uncertain(seed, 0.3, dt)
     cert = l2_gain(unc, form=COARSE, search=None)
@@ -315,7 +327,7 @@ def test_what_is_not_asked_of_a_set_is_refused_with_what_to_do(ask):
         ask()
 
 
-@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("dt", [None, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_the_method_for_many_states_finds_what_the_general_solver_finds(dt):
     unc = random_uncertain(1, 0.3, dt)
     own, general = (

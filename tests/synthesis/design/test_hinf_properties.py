@@ -14,7 +14,7 @@ from synthesis.design.bilinear import continuous_plant, sampled_controller
 from synthesis.design.generalized import Generalized
 from synthesis.worst.frozen import norm, to_continuous
 
-SEEDS = range(12)
+SEEDS = [pytest.param(k, marks=() if k % 2 else pytest.mark.slow) for k in range(12)]
 
 
 def generalized(plant):

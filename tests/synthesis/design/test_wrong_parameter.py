@@ -123,7 +123,11 @@ def test_every_divided_difference_is_within_the_slopes(basis, error):
 
 
 @pytest.mark.parametrize(
-    ("basis", "error"), [(Polynomial(2, 0.0, 1.0), 0.02), (PiecewiseLinear((0.0, 0.4, 1.0)), 0.1)]
+    ("basis", "error"),
+    [
+        (Polynomial(2, 0.0, 1.0), 0.02),
+        pytest.param(PiecewiseLinear((0.0, 0.4, 1.0)), 0.1, marks=pytest.mark.slow),
+    ],
 )
 def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis, error):
     K = scheduled(basis, seed=5)
@@ -137,7 +141,7 @@ def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis, error):
         near = frozen.with_scheduling(
             Scheduling("p", "1", max(0.0, q - error), min(1.0, q + error), 0.1)
         )
-        worst = max(worst, frozen_gain(near).gamma)
+        worst = max(worst, frozen_gain(near, points=9).gamma)
     assert worst <= certificate.gamma
     right = frozen_gain(plant.close(K)).gamma
     assert right <= worst * (1 + 1e-9)
