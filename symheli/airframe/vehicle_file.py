@@ -56,7 +56,7 @@ class VehicleFile:
         for section, entry, wrong in impossibilities(quantities, entries):
             self._problem(section, entry, wrong)
         for section, entry, wrong in implausibilities(self._sound(quantities), entries):
-            self._problem(section, entry, wrong)
+            self._problem(section, entry, f"{wrong} (unusual = true if it is meant)")
         if self.problems:
             said = [text for _, text in sorted(self.problems, key=lambda problem: problem[0])]
             if len(said) == 1:

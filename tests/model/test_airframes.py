@@ -69,6 +69,7 @@ def test_more_blades_of_less_chord_are_the_same_rotor(ideal):
         )  # rounding of the solidity through Newton's method
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 @pytest.mark.parametrize("factor", [0.3, 5.0])
 @pytest.mark.parametrize("name", vehicles())
 def test_froude_scaling_is_exact_similarity(name, factor):
