@@ -233,7 +233,7 @@ def test_the_command_line_says_it_of_a_vehicle_file(capsys, tmp_path, ideal):
     path = tmp_path / "large.toml"
     path.write_text(as_toml(ideal.scaled(4.0).vehicle), encoding="utf-8")
     assert main(["vehicles", str(path)]) == 0
-    assert "a Mach number of 0.76 at the advancing tip in hover" in capsys.readouterr().err
+    assert "a Mach number of 0.761 at the advancing tip in hover" in capsys.readouterr().err
 
 
 # --- numbers that no helicopter has --------------------------------------------------------------
