@@ -76,8 +76,7 @@ def designed(found: Designs, proofs: CertifiedControllers | None) -> Table:
     )
     for design in found.designs:
         if design.remark:
-            said = f"{design.name}: is that model fit for this loop? {design.remark}."
-            table.remarks.append(said)
+            table.remarks.append(f"{design.name}: {design.remark}")
     return table
 
 

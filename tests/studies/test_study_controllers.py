@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import symheli
+from identification import Criterion, FitForControl
 from studies.controllers import tables
 from studies.controllers.certified import CertifiedControllers, bounded
 from studies.controllers.designs import (
@@ -21,6 +22,7 @@ from studies.controllers.designs import (
     hinf_schedule,
     lqr_schedule,
     simplest,
+    verdict_in_words,
 )
 from studies.controllers.flown import (
     NOISE_SHARE,
@@ -144,6 +146,34 @@ def test_a_synthesis_that_finds_none_is_a_design_with_its_reason(base):
     table = tables.designed(Designs(designs=(found,), plant=flown_plant(base)), None)
     assert table.rows[0][2] == "none exists"
     assert "nothing moves it" in table.remarks[0]
+
+
+def judged(*criteria):
+    """A `FitForControl` of rows (name, verdict, decides)."""
+    rows = tuple(
+        Criterion(name=n, value=1.0, threshold=1.0, verdict=v, source="", decides=d)
+        for n, v, d in criteria
+    )
+    one = np.ones(1)
+    return FitForControl(
+        criteria=rows, points=(0.0,), margin=one, gap=one, second_gap=one, true_gap=None
+    )
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [
+        ("fit", "The identified model is fit for this loop, by the flight that it was identified"),
+        ("not fit", "is not fit for this loop, by the flight that it was identified from: gap."),
+        ("not known", "leaves open whether it is fit for this loop: gap."),
+    ],
+)
+def test_the_verdict_on_a_model_is_a_sentence(verdict, said):
+    rows = ("gap", verdict, True), ("slow modes", "not fit", False), ("record", "fit", True)
+    text = verdict_in_words(judged(*rows))
+    assert said in text
+    assert text.endswith(".")
+    assert "slow modes" not in text
 
 
 def test_the_schedule_of_point_designs_keeps_their_gain_at_each_point(base):
