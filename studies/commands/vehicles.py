@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> Output:
     from symheli.airframe.vehicle import load_vehicle
     from symheli.airframe.written import as_toml, reference
     from symheli.helicopter import Helicopter
-    from symheli.steady.validity import Judge, warn
+    from symheli.steady.validity import Validity, warn
 
     if arguments.reference:
         text = reference()
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> Output:
         return Output(text.rstrip("\n"), {"toml": text})
     if arguments.vehicle:
         v = load_vehicle(arguments.vehicle)
-        warn(Judge.of(Helicopter(v)).in_hover())
+        warn(Validity.of(Helicopter(v)).in_hover())
         listed = (v.name, v.title, v.source, len(v.quantities), v.assumed)
         return Output(_lines(listed), _data(listed))
     return _list()

@@ -11,7 +11,7 @@ from symheli.flight import FlightBatch, FlightPlan
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Readings
 from symheli.flight.flight_data import WIND, FlightData
-from symheli.steady.validity import Judge
+from symheli.steady.validity import Validity
 from symheli.values.arrays import Array
 
 AT_THE_STOP = 0.999
@@ -67,7 +67,7 @@ def of_flight(flown: FlightData) -> Measures:
         ratio=energy_ratio(z, w),
         outside=float(np.mean((forward < 0.0) | (forward > TOP))),
         faster=float(np.mean(np.abs(change) > RATE)),
-        beyond=float(np.mean(column["airspeed"] > Judge.of(flown.heli).harmless[0])),
+        beyond=float(np.mean(column["airspeed"] > Validity.of(flown.heli).harmless[0])),
     )
 
 

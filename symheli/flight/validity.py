@@ -11,7 +11,7 @@ import numpy as np
 from symheli.flight.flight_data import FlightData
 from symheli.flight.plan import FlightPlan
 from symheli.helicopter import Helicopter
-from symheli.steady.validity import Judge, warn
+from symheli.steady.validity import Validity, warn
 from symheli.values.arrays import Array
 
 
@@ -35,4 +35,4 @@ def _warn(heli: Helicopter, speeds: Array, what: str) -> None:
         return f"at {speeds[flight]:.4g} m/s, {what}{named}"
 
     velocity = np.column_stack([speeds, np.zeros((len(speeds), 2))])
-    warn(Judge.of(heli).beyond(where, velocity))
+    warn(Validity.of(heli).beyond(where, velocity))

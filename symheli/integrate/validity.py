@@ -7,7 +7,7 @@ import numpy as np
 from symheli.helicopter import Helicopter
 from symheli.integrate.problem import Problem
 from symheli.physics.rigid_body import body_to_earth
-from symheli.steady.validity import Judge, in_a_ring, warn
+from symheli.steady.validity import Validity, in_a_ring, warn
 from symheli.values.arrays import Array
 
 AT_ONCE = 65_536
@@ -19,9 +19,9 @@ def warn_of_flights(heli: Helicopter, problem: Problem, states: Array, every: in
     the states that are kept (N, kept, nx), every `every`-th of the problem up to its last.
     """
     own = len(problem.p) == 1 and np.array_equal(problem.p[0], heli.parameters.array)
-    judge = Judge.of(heli) if own else Judge(heli, problem.p)
-    if _harmless(judge, states, problem.wind):
-        warn(judge.in_hover())
+    validity = Validity.of(heli) if own else Validity(heli, problem.p)
+    if _harmless(validity, states, problem.wind):
+        warn(validity.in_hover())
         return
     count, kept = states.shape[:2]
     samples = every * np.arange(problem.samples // every + 1)[-kept:]
@@ -32,7 +32,7 @@ def warn_of_flights(heli: Helicopter, problem: Problem, states: Array, every: in
         air = _through_the_air(states[part], _of(problem.wind, part), samples)
         fastest[part] = k = np.hypot(air[..., 0], air[..., 1]).argmax(axis=1)
         velocity[part] = air[np.arange(len(k)), k]
-        inside = Judge(heli, _of(problem.p, part)).in_vortex_ring(air)
+        inside = Validity(heli, _of(problem.p, part)).in_vortex_ring(air)
         sinking[part], ring[part] = inside.argmax(axis=1), inside.any(axis=1)
 
     def after(flight: int, sample: int) -> str:
@@ -43,13 +43,13 @@ def warn_of_flights(heli: Helicopter, problem: Problem, states: Array, every: in
         speed = np.linalg.norm(velocity[flight])
         return f"at {speed:.4g} m/s {after(flight, fastest[flight])}"
 
-    found = judge.beyond(where, velocity)
+    found = validity.beyond(where, velocity)
     warn(found + in_a_ring(lambda flight: after(flight, sinking[flight]), ring))
 
 
-def _harmless(judge: Judge, states: Array, wind: Array) -> bool:
+def _harmless(validity: Validity, states: Array, wind: Array) -> bool:
     """Whether no velocity can be too much, by the extremes of states and wind alone."""
-    speed, sinking = judge.harmless
+    speed, sinking = validity.harmless
     blowing = float(np.linalg.norm([abs(wind[..., i]).max() for i in range(3)]))
     largest = [max(states[..., i].max(), -states[..., i].min()) for i in range(3)]
     return bool(

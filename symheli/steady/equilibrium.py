@@ -14,7 +14,7 @@ from symheli.helicopter import Helicopter
 from symheli.steady.equations import numeric, steady_equations
 from symheli.steady.flight_condition import FlightCondition
 from symheli.steady.newton import TOLERANCE, newton
-from symheli.steady.validity import Judge, in_a_ring, warn
+from symheli.steady.validity import Validity, in_a_ring, warn
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_point import OperatingPoint
@@ -181,7 +181,7 @@ def _beyond(heli: Helicopter, point: TrimPoint) -> list[str]:
         return f"at {point.condition}"
 
     ring = np.array([point.vortex_ring])
-    return Judge.of(heli).beyond(where, velocity[None]) + in_a_ring(where, ring)
+    return Validity.of(heli).beyond(where, velocity[None]) + in_a_ring(where, ring)
 
 
 def on_stops(u: Array, travel: Array) -> Array:

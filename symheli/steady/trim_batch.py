@@ -23,7 +23,7 @@ from symheli.steady.flight_condition import FlightCondition
 from symheli.steady.flight_conditions import FlightConditions
 from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import ALONE, SteadyFlights
-from symheli.steady.validity import Judge, in_a_ring, warn
+from symheli.steady.validity import Validity, in_a_ring, warn
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_points import OperatingPoints
@@ -227,12 +227,12 @@ def warn_of_trims(flights: SteadyFlights, trims: TrimBatch, ring: bool = True) -
     """One `ValidityWarning` where the equations are not known to hold at all of these; `ring`:
     also where a rotor is in a vortex ring.
     """
-    judge, velocity = Judge(flights.helis[0], flights.parameters), trims.x[:, :3] - trims.wind
+    validity, velocity = Validity(flights.helis[0], flights.parameters), trims.x[:, :3] - trims.wind
 
     def where(k: int) -> str:
         return f"at {trims.conditions[k]}"
 
-    found = judge.beyond(where, velocity)
+    found = validity.beyond(where, velocity)
     warn(found + in_a_ring(where, trims.vortex_ring) if ring else found)
 
 

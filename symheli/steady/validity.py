@@ -24,9 +24,10 @@ m/s", which is 0.1546 at the 129.4 m/s of its rotor.
 """
 REYNOLDS = 1e5
 """Least Reynolds number of the blade section at 3/4 radius in hover. Lift slope and drag are
-constants here; "below 1e5" those of usual sections fall and rise steeply: Winslow, Otsuka,
-Govindarajan and Chopra (2018), Basic understanding of airfoil characteristics at low Reynolds
-numbers, Journal of Aircraft 55(3).
+constants here, those of a rotor of some size; the lower the number the more they change with it,
+and below 1e5 conventional sections are worse than cambered plates: Winslow, Otsuka, Govindarajan
+and Chopra (2018), Basic understanding of airfoil characteristics at low Reynolds numbers, Journal
+of Aircraft, doi 10.2514/1.C034415.
 """
 MACH = 0.73
 """Largest Mach number of the advancing tip. The sections are incompressible here; this is the
@@ -47,7 +48,7 @@ RING = (
 )
 
 
-class Judge:
+class Validity:
     """What the equations of a helicopter, with parameters p (N or 1, n) as in
     `Helicopter.parameters`, are known to hold for.
     """
@@ -58,11 +59,11 @@ class Judge:
         self.rotors = [section for section, part in parts if part.kind == "main_rotor"]
 
     @classmethod
-    def of(cls, heli: Helicopter) -> Judge:
+    def of(cls, heli: Helicopter) -> Validity:
         """That of its own parameters, kept with it."""
-        if "_judge" not in heli.__dict__:
-            heli.__dict__["_judge"] = cls(heli, heli.parameters.array[None])
-        return heli.__dict__["_judge"]
+        if "_validity" not in heli.__dict__:
+            heli.__dict__["_validity"] = cls(heli, heli.parameters.array[None])
+        return heli.__dict__["_validity"]
 
     def value(self, section: str, entry: str) -> Array:
         """A parameter (N or 1,), SI."""
@@ -152,7 +153,7 @@ class Judge:
         if self.rotors and (reynolds := self.reynolds.min()) < REYNOLDS:
             found.append(
                 f"a Reynolds number of {reynolds:.2g} at 3/4 radius of the main rotor: lift slope"
-                " and drag of the blade sections are constants here, and none below"
+                " and drag of the blade sections are constants here, and change with it below"
                 f" {REYNOLDS:.0e} (Winslow et al. 2018)"
             )
         return found
@@ -182,7 +183,7 @@ class Judge:
 
 
 def in_a_ring(where: Callable[[int], str], ring: Array) -> list[str]:
-    """The first of N points in a vortex ring, `where(k)`, as `Judge.beyond` has it; `ring` (N,)
+    """The first of N points in a vortex ring, `where(k)`, as `Validity.beyond` has it; `ring` (N,)
     tells which are.
     """
     if not ring.any():

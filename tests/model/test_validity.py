@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 import symheli
 from studies.cli import main
 from symheli.errors import DataWarning, TrimError, ValidityWarning
-from symheli.steady.validity import ADVANCE_RATIO, MACH, REYNOLDS, Judge
+from symheli.steady.validity import ADVANCE_RATIO, MACH, REYNOLDS, Validity
 
 TIP_SPEED = 167.0 * 0.775  # of the X-Cell, m/s
 FASTEST = ADVANCE_RATIO * TIP_SPEED
@@ -210,7 +210,7 @@ def test_a_trim_that_fails_says_that_nobody_promised_it(ideal):
 
 
 def test_a_vehicle_without_a_main_rotor_is_not_judged_by_one(ideal):
-    judge = Judge(ideal, ideal.parameters.array[None])
+    judge = Validity(ideal, ideal.parameters.array[None])
     judge.rotors = []
     assert judge.beyond(lambda _: "here", np.array([[80.0, 0.0, 0.0]])) == []
     assert not judge.in_vortex_ring(np.array([[[0.0, 0.0, 3.0]]])).any()
