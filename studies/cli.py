@@ -59,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(arguments: argparse.Namespace) -> int:
     with warnings.catch_warnings():
-        warnings.showwarning = _note
+        warnings.showwarning = _Notes()
         try:
             with displayed():
                 output: Output = arguments.run(arguments)
@@ -120,8 +120,16 @@ def _fail(error: Exception, asks_json: bool, sentence: str = "", status: int = 1
     return status
 
 
-def _note(message: Any, *_: Any, **__: Any) -> None:
-    print(f"symheli: note: {message}", file=sys.stderr)
+class _Notes:
+    """What is warned of, each once, however many steps of the work say it."""
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def __call__(self, message: Any, *_: Any, **__: Any) -> None:
+        if (note := str(message)) not in self._said:
+            self._said.add(note)
+            print(f"symheli: note: {note}", file=sys.stderr)
 
 
 if __name__ == "__main__":

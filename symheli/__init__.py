@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         SymheliError,
         TrimError,
         UnknownNameError,
+        ValidityWarning,
     )
     from symheli.flight import (
         AirspeedMonitor,
@@ -124,7 +125,7 @@ _ROOMS = {
     "symheli.errors": (
         "AccuracyError CertificateError CompilerWarning ConvergenceWarning DataWarning"
         " ExcitationError FlightLostError InputError PrecisionWarning SolverError SymheliError"
-        " TrimError UnknownNameError"
+        " TrimError UnknownNameError ValidityWarning"
     ),
 }
 __all__ = [
@@ -184,6 +185,7 @@ __all__ = [
     "TrimPoint",
     "UncertainStateSpace",
     "UnknownNameError",
+    "ValidityWarning",
     "Wind",
     "derivatives",
     "fly",

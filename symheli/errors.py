@@ -119,3 +119,9 @@ class DataWarning(UserWarning):
     """Data, or a model made of them, may not mean what they seem to; the message says what was seen
     and what to do.
     """
+
+
+class ValidityWarning(DataWarning):
+    """The helicopter is beyond what its equations are known to hold for; the message says by how
+    much, and whose limit it is.
+    """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 
 from studies.threads import one_thread
@@ -85,4 +86,12 @@ def pi():
 
 @pytest.fixture
 def pd():
-    return pytest.importorskip("pandas", reason="needs pandas: pip install 'symheli[logs]'")
+    return pytest.importorskip("pandas", reason="needs pandas: pip install 'symheli[labelled]'")
+
+
+@pytest.fixture(autouse=True)
+def _pictures_are_closed():
+    """Those that a test leaves to be shown: matplotlib warns of more than twenty."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.records.record_plot import empty_figure
 from symheli.values.arrays import Array
-from symheli.values.drawing import GRID, LINE, label
+from symheli.values.drawing import GRID, LINE, label, new_figure
 
 if TYPE_CHECKING:
     from identification.judge.uncertainty import Uncertainty
@@ -21,7 +20,7 @@ COLUMNS = 4
 
 def plot_bands(known: Uncertainty, level: float = 0.95) -> Array:
     """One panel a coefficient function, its value over p and the normal confidence interval at each
-    p: an array (coefficients,) of matplotlib's Axes, in a figure that belongs to no window.
+    p: an array (coefficients,) of matplotlib's Axes.
 
     Raises `InputError` for several scheduling parameters and a level outside (0, 1).
     """
@@ -35,7 +34,7 @@ def plot_bands(known: Uncertainty, level: float = 0.95) -> Array:
     p = np.linspace(low, high, 101)
     shown = known.bands(p)
     tall = -(-len(shown) // COLUMNS)
-    figure = empty_figure(2.6 * COLUMNS, 0.6 + 1.5 * tall)
+    figure = new_figure(2.6 * COLUMNS, 0.6 + 1.5 * tall)
     axes = figure.subplots(tall, COLUMNS, sharex=True, squeeze=False).reshape(-1)
     for ax, band in zip(axes, shown, strict=False):
         ax.fill_between(p, *band.interval(level), color=LINE, alpha=0.25, linewidth=0)

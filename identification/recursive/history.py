@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,8 @@ from symheli.values.arrays import Array
 from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from identification.recursive.rls_state import RLSState
 
 
@@ -87,3 +90,22 @@ class History:
         if kin is None or self.trim is None:
             return regression
         return KinematicModel(structure=kin, aerodynamics=regression, trim=self.trim)
+
+    @property
+    def regressor_names(self) -> tuple[str, ...]:
+        """Those of the rows of the coefficients, such as "q(k-1) f0(airspeed(k-1))"."""
+        return self.state.configuration.structure.regressor_names
+
+    def plot(
+        self,
+        ax: Axes | None = None,
+        output: str | None = None,
+        regressors: Sequence[str] | None = None,
+    ) -> Axes:
+        """How the coefficients of `output` (default: the first) settle: those of all regressors, or
+        of some of `regressor_names`, over time (s), each by its last value. The frame is that of
+        the end; early estimates may leave it. Returns the axes; raises `UnknownNameError`.
+        """
+        from identification.recursive.history_plot import plot_history
+
+        return plot_history(self, ax, output, regressors)

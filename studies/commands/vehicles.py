@@ -34,6 +34,8 @@ def run(arguments: argparse.Namespace) -> Output:
     """Name, title, source and assumptions of each; a vehicle file; the reference."""
     from symheli.airframe.vehicle import load_vehicle
     from symheli.airframe.written import as_toml, reference
+    from symheli.helicopter import Helicopter
+    from symheli.steady.validity import Validity, warn
 
     if arguments.reference:
         text = reference()
@@ -43,6 +45,7 @@ def run(arguments: argparse.Namespace) -> Output:
         return Output(text.rstrip("\n"), {"toml": text})
     if arguments.vehicle:
         v = load_vehicle(arguments.vehicle)
+        warn(Validity.of(Helicopter(v)).in_hover())
         listed = (v.name, v.title, v.source, len(v.quantities), v.assumed)
         return Output(_lines(listed), _data(listed))
     return _list()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import symheli
-from identification import KinematicModel, fit_for_control
+from identification import FitForControl, KinematicModel, fit_for_control
 from studies.controllers.identified_plant import identified_model
 from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import (
@@ -179,7 +179,7 @@ def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Pla
 
 def verdict(identified: KinematicModel, controller: LPVStateSpace, record: FlightRecord) -> str:
     """Whether the identified model is fit for a loop with this controller, by the flight that it
-    was identified from, and what stands against it.
+    was identified from, and what stands against it: a sentence.
     """
     rest = (0.0,) * (len(identified.parameters) - 1)
     found = fit_for_control(
@@ -190,8 +190,21 @@ def verdict(identified: KinematicModel, controller: LPVStateSpace, record: Fligh
         points=[(v, *rest) if rest else v for v in JUDGED_AT],
         draws=DRAWS,
     )
-    doubts = [row.name for row in found.criteria if row.decides and row.verdict != "fit"]
-    return f"{found.verdict}{': ' + ', '.join(doubts) if doubts else ''}"
+    return verdict_in_words(found)
+
+
+def verdict_in_words(found: FitForControl) -> str:
+    """The verdict on the model of a design, and by which criteria it falls."""
+    by = ", ".join(row.name for row in found.criteria if row.decides and row.verdict != "fit")
+    by_its_flight = "by the flight that it was identified from"
+    if found.verdict == "fit":
+        return f"The identified model is fit for this loop, {by_its_flight}."
+    if found.verdict == "not fit":
+        return f"The identified model is not fit for this loop, {by_its_flight}: {by}."
+    return (
+        "The flight that the model was identified from leaves open whether it is fit for this"
+        f" loop: {by}."
+    )
 
 
 def lqr_schedule(heli: Helicopter) -> LPVStateSpace:

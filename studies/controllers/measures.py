@@ -11,6 +11,7 @@ from symheli.flight import FlightBatch, FlightPlan
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Readings
 from symheli.flight.flight_data import WIND, FlightData
+from symheli.steady.validity import Validity
 from symheli.values.arrays import Array
 
 AT_THE_STOP = 0.999
@@ -25,7 +26,8 @@ class Measures:
     performance signals, 1 as large as `SIZES`, all together, and of each in `deviations`;
     `attitude`: largest bank or pitch, rad; `stops`: share of the time with a command at a stop;
     `ratio`: see `energy_ratio`; `outside`, `faster`: share of the time with a forward airspeed
-    outside the range and with a change of it above the permitted rate.
+    outside the range and with a change of it above the permitted rate; `beyond`: share of the time
+    with an airspeed that the equations of the helicopter are not known to hold for.
     """
 
     lost: bool
@@ -37,6 +39,7 @@ class Measures:
     ratio: float
     outside: float
     faster: float
+    beyond: float
 
 
 def measured(batch: FlightBatch) -> list[Measures]:
@@ -64,6 +67,7 @@ def of_flight(flown: FlightData) -> Measures:
         ratio=energy_ratio(z, w),
         outside=float(np.mean((forward < 0.0) | (forward > TOP))),
         faster=float(np.mean(np.abs(change) > RATE)),
+        beyond=float(np.mean(column["airspeed"] > Validity.of(flown.heli).harmless[0])),
     )
 
 

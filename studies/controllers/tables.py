@@ -76,8 +76,7 @@ def designed(found: Designs, proofs: CertifiedControllers | None) -> Table:
     )
     for design in found.designs:
         if design.remark:
-            said = f"{design.name}: is that model fit for this loop? {design.remark}."
-            table.remarks.append(said)
+            table.remarks.append(f"{design.name}: {design.remark}")
     return table
 
 
@@ -105,7 +104,20 @@ def flown(found: FlownControllers, proofs: CertifiedControllers | None) -> Table
         " proven gain does; what the transition itself asks for (the trim that moves, the governor)"
         " is in the performance and not among the disturbances."
     )
+    table.remarks.extend(beyond(found))
     return table
+
+
+def beyond(found: FlownControllers) -> list[str]:
+    """How many flights went faster than the equations of the helicopter are known to hold for."""
+    every = [flight.beyond for one in found.flown for flight in one.flights]
+    if not any(every):
+        return []
+    return [
+        f"In {sum(share > 0 for share in every)} of the {len(every)} flights in gusts of all sizes"
+        " the airspeed passed what the equations of the helicopter are known to hold for, in one"
+        f" for {100 * max(every):.0f} % of the time."
+    ]
 
 
 def ranking(found: FlownControllers) -> Table:

@@ -11,8 +11,8 @@ import numpy as np
 from identification import AgainstConstant
 from identification.judge.against_constant import Scored
 from identification.judge.scores import percent, predicted, steps
-from symheli.records.record_plot import draw, empty_figure, shade_missing
-from symheli.values.drawing import label
+from symheli.records.record_plot import draw, shade_missing
+from symheli.values.drawing import label, windowless_figure
 from symheli.values.whole_files import write_bytes
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def figure(result: AgainstConstant) -> Figure:
     """
     model, parts = result.scheduled, [r for r in (result.training, result.test) if r is not None]
     heights = [1.9] * len(model.outputs) + [1.2]
-    picture = empty_figure(11.0, 0.8 + sum(heights))
+    picture = windowless_figure(11.0, 0.8 + sum(heights))
     axes = picture.subplots(
         len(heights),
         2,

@@ -119,7 +119,7 @@ def mode_misses(heli: Helicopter, model: LPVARXModel, mode: str) -> dict[float, 
 
 
 def judged(heli: Helicopter, axis: Axis, model: LPVARXModel, test: FlightRecord) -> Judged:
-    """Judge `model` on a record it has not seen."""
+    """Validity `model` on a record it has not seen."""
     return Judged(
         scores=scores(model, test, horizon=HORIZON), mode_miss=mode_misses(heli, model, axis.mode)
     )

@@ -18,7 +18,7 @@ from studies.transition.axes import AXES
 from studies.transition.conclusions import abstract, certificates, conclusions
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
-from studies.transition.saved_proofs import save_proofs
+from studies.transition.saved_proofs import linked_proofs, save_proofs
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
@@ -39,11 +39,12 @@ def write_results(study: Outcome, out: Path) -> Path:
 
 
 def write_report(study: Outcome, out: Path) -> Path:
-    """results.json, figures (PNG, SVG, PDF) and report.html (self-contained), in this order: no
-    number waits for a picture.
+    """The proofs, results.json, figures (PNG, SVG, PDF) and report.html, in this order: no number
+    waits for a picture, and what the page links is there.
     """
     from studies.transition.figures import figures
 
+    save_proofs(study, out)
     results = to_dict(study)
     _written(results, out)
     pictures = {one.name: one for one in drawn(figures(study), out / "figures")}
@@ -116,6 +117,7 @@ def _headline(study: Outcome) -> dict[str, object]:
         "curves": curves(study.bounds),
         "gain_tables": gain_tables.every(study.bounds),
         "certificates": certificates(study),
+        "proofs": linked_proofs(study),
         "controller_tables": controllers.every(study),
         "frozen_gain": next((b.certificate.frozen for b in gust), None),
         "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),

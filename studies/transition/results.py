@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from studies.transition.recovery import Recovery
     from symheli import Signal
 
-SCHEMA = "symheli study 5"
+SCHEMA = "symheli study 6"
 LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
-from studies.transition.guarantees import Bound
+from studies.transition.guarantees import Bound, rate_text
+from studies.transition.tables import gain
 from synthesis import Certificate
 
 if TYPE_CHECKING:
@@ -32,11 +34,36 @@ def proof_file(b: Bound) -> str | None:
 
 def save_proofs(study: Outcome, out: Path) -> list[Path]:
     """Write every proof that the study has reached below `out`; the files."""
-    found = [*study.bounds]
-    if study.certified_controllers is not None:
-        found += study.certified_controllers.bounds
-    named = ((proof_file(b), b.certificate) for b in found)
-    return [_saved(certificate, out / name) for name, certificate in named if name is not None]
+    return [_saved(b.certificate, out / name) for name, b in _proven(study)]
+
+
+class LinkedProof(NamedTuple):
+    """A file of a proof, from where results.json lies, and what it proves."""
+
+    file: str
+    claim: str
+
+
+def linked_proofs(study: Outcome) -> dict[str, list[LinkedProof]]:
+    """Every file of `save_proofs` by the loop that it is about."""
+    out: dict[str, list[LinkedProof]] = {}
+    for name, b in _proven(study):
+        what = (
+            "stable"
+            if b.certificate.kind == "stability"
+            else f"gain of at most {gain(b.certificate.gamma)}"
+        )
+        claim = f"{b.model}, {b.form}, {rate_text(b.rate)}: {what}"
+        out.setdefault(b.channel, []).append(LinkedProof(name, claim))
+    return out
+
+
+def _proven(study: Outcome) -> Iterator[tuple[str, Bound]]:
+    """Every bound that is proven, with its file."""
+    certified = study.certified_controllers
+    for b in (*study.bounds, *(certified.bounds if certified is not None else ())):
+        if (name := proof_file(b)) is not None:
+            yield name, b
 
 
 def _saved(certificate: Certificate, path: Path) -> Path:

@@ -179,7 +179,7 @@ def _doubt(q: Quantity, kind: Range, compared: float, scale: Scale | None) -> st
         else "is outside of every helicopter's range"
     )
     plausible = f"plausible is {kind.low:g} to {kind.high:g} {kind.unit}".rstrip()
-    return f"{written} {means}, {plausible}{_meant(q, kind, scale)} (unusual = true if it is meant)"
+    return f"{written} {means}, {plausible}{_meant(q, kind, scale)}"
 
 
 def _meant(q: Quantity, kind: Range, scale: Scale | None) -> str:

@@ -1,14 +1,21 @@
-"""The text of a TOML file that was typed by hand: every line that is no TOML is found in one go."""
+"""The text of a TOML file that was typed by hand: every line that is no TOML is found in one go,
+and one message says everything that is wrong, line by line.
+"""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+from symheli.errors import InputError
 
 UNREADABLE: Mapping[str, Any] = {"unreadable": True}
 """Stands for the value of an entry whose line is no TOML."""
+
+Problem = tuple[int, str]
+"""Line (0: of none) and what is wrong, with its place."""
 
 _MOST = 50
 """So many broken lines are looked for."""
@@ -64,3 +71,51 @@ def _hint(line: str, what: str) -> str:
     if line.lstrip().startswith("[") and "]" not in line:
         return ": a section is named as in [body]"
     return ': write NAME = { value = ..., unit = "...", source = "..." }'
+
+
+def broken_lines(unread: list[tuple[int, str]]) -> list[Problem]:
+    """What `readable` found, with its place."""
+    return [(line, f"line {line}, not valid TOML: {wrong}") for line, wrong in unread]
+
+
+def problem(lines: Sequence[str], section: str, entry: str, wrong: str, name: str = "") -> Problem:
+    """What is wrong with an entry of a section, or with the section; `name`: what the section is
+    called, where it is misspelt.
+    """
+    line = _line(lines, section, entry) or _line(lines, section, "")
+    called = f"{name or section}.{entry}" if entry else f"[{name or section}]"
+    return line or 0, f"line {line}, {called}: {wrong}" if line else f"{called}: {wrong}"
+
+
+def refuse(path: str, problems: list[Problem]) -> None:
+    """Raise one `InputError` with everything that is wrong, in the order of the file, where there
+    is anything.
+    """
+    said = [text for _, text in sorted(problems, key=lambda problem: problem[0])]
+    if len(said) == 1:
+        raise InputError(f"{path}, {said[0]}")
+    if said:
+        raise InputError("\n  ".join([f"{path}: {len(said)} things to put right", *said]))
+
+
+def _line(lines: Sequence[str], section: str, entry: str) -> int | None:
+    """Line of `entry =` below [section], of `section.entry =`, or of [section.entry]; of [section]
+    without an entry.
+    """
+    wanted = [section, entry] if entry else [section]
+    header: list[str] = []
+    for number, line in enumerate(lines, 1):
+        if found := re.match(r"\s*\[+([^\[\]]+)\]+\s*(#.*)?$", line):
+            header = _keys(found[1])
+            path = header
+        elif found := re.match(r"\s*([\w\-.\"' ]+?)\s*=", line):
+            path = header + _keys(found[1])
+        else:
+            continue
+        if path[: len(wanted)] == wanted:
+            return number
+    return None
+
+
+def _keys(dotted: str) -> list[str]:
+    return [key.strip().strip("\"'") for key in dotted.split(".")]

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
 from symheli.airframe.part import Part
-from symheli.airframe.plausibility import impossibilities
+from symheli.airframe.plausibility import implausibilities, impossibilities
 from symheli.airframe.quantity import Quantity
 from symheli.airframe.vehicle_file import LINEAR, VehicleFile, entries_of
 from symheli.components import Entry
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import DataWarning, InputError, UnknownNameError
+from symheli.values.caller import level_of_caller
 from symheli.values.summary import summarized
 from symheli.values.text_file import text_of
 from symheli.values.units import dimension
@@ -58,7 +60,8 @@ class Vehicle:
 
     def with_values(self, changes: Mapping[str, float], source: str = "set by hand") -> Vehicle:
         """The same airframe with other values (SI), {"body.mass": 9.0}; entries that refer to a
-        changed one follow it.
+        changed one follow it. Raises `InputError` for what no airframe can be, warns
+        (`DataWarning`) of what none is.
         """
         for name, value in changes.items():
             if name not in self.quantities:
@@ -70,13 +73,16 @@ class Vehicle:
                 )
         changed = self._map(
             lambda name, q: (
-                q._replace(value=float(changes[name]), source=f"{source}, was {q.value:g}")
+                q._replace(
+                    value=float(changes[name]), source=f"{source}, was {q.value:g}", given=""
+                )
                 if name in changes
                 else q
             )
         )
         for section, entry, wrong in impossibilities(changed.sections, changed.entries):
             raise InputError(f"{self.title}, {section}.{entry}: {wrong}")
+        self._warn_of(changed)
         return changed
 
     def scaled(self, factor: float) -> Vehicle:
@@ -84,7 +90,8 @@ class Vehicle:
         gravity and air density stay.
 
         The exponent of each entry follows from its unit: mass 3, length 1, time 1/2, so inertias
-        N^5, stiffness N^4, power N^3.5, rotor speed N^-0.5, while angles and ratios stay.
+        N^5, stiffness N^4, power N^3.5, rotor speed N^-0.5, while angles and ratios stay. Warns
+        (`DataWarning`) of a copy that no helicopter is like.
         """
         if not (math.isfinite(factor) and factor > 0):
             raise InputError(
@@ -99,7 +106,27 @@ class Vehicle:
                 value=q.value * factor**exponent, source=f"{q.source}; Froude-scaled by {factor:g}"
             )
 
-        return replace(self._map(scale), title=f"{self.title}, Froude-scaled by {factor:g}")
+        copy = replace(self._map(scale), title=f"{self.title}, Froude-scaled by {factor:g}")
+        self._warn_of(copy)
+        return copy
+
+    def _warn_of(self, changed: Vehicle) -> None:
+        """One `DataWarning` of every number that became implausible, or was and is now another."""
+        doubts = {
+            (section, entry): wrong
+            for section, entry, wrong in implausibilities(changed.sections, changed.entries)
+        }
+        if not doubts:
+            return
+        known = {
+            (section, entry)
+            for section, entry, _ in implausibilities(self.sections, self.entries)
+            if self.sections[section][entry].value == changed.sections[section][entry].value
+        }
+        said = [f"{s}.{e}: {wrong}" for (s, e), wrong in doubts.items() if (s, e) not in known]
+        if said:
+            head = f"{changed.title} has numbers that no helicopter has:"
+            warnings.warn("\n  ".join([head, *said]), DataWarning, level_of_caller())
 
     def _map(self, change: Callable[[str, Quantity], Quantity]) -> Vehicle:
         """Every quantity changed; one that refers to another is changed as the other."""

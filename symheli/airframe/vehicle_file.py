@@ -12,7 +12,14 @@ from typing import Any
 from symheli.airframe.part import Part
 from symheli.airframe.plausibility import implausibilities, impossibilities
 from symheli.airframe.quantity import Quantity, read_quantity
-from symheli.airframe.readable import UNREADABLE, readable
+from symheli.airframe.readable import (
+    UNREADABLE,
+    Problem,
+    broken_lines,
+    problem,
+    readable,
+    refuse,
+)
 from symheli.airframe.sections import CONTROLS, FIXED, PLACE
 from symheli.components import Component, Entry, find, packaged
 from symheli.errors import InputError, UnknownNameError
@@ -39,9 +46,7 @@ class VehicleFile:
         """{(section, entry): name it has in the text}, where that is misspelt."""
         self._doubted: set[tuple[str, str]] = set()
         self._asked: Mapping[str, Mapping[str, Entry]] = {}
-        self.problems: list[tuple[int, str]] = [
-            (line, f"line {line}, not valid TOML: {wrong}") for line, wrong in unread
-        ]
+        self.problems: list[Problem] = broken_lines(unread)
 
     def read(self) -> tuple[dict[str, Part], dict[str, dict[str, Quantity]]]:
         """The parts in the order of the file, and every number of every section.
@@ -56,12 +61,8 @@ class VehicleFile:
         for section, entry, wrong in impossibilities(quantities, entries):
             self._problem(section, entry, wrong)
         for section, entry, wrong in implausibilities(self._sound(quantities), entries):
-            self._problem(section, entry, wrong)
-        if self.problems:
-            said = [text for _, text in sorted(self.problems, key=lambda problem: problem[0])]
-            if len(said) == 1:
-                raise InputError(f"{self.path}, {said[0]}")
-            raise InputError("\n  ".join([f"{self.path}: {len(said)} things to put right", *said]))
+            self._problem(section, entry, f"{wrong} (unusual = true if it is meant)")
+        refuse(self.path, self.problems)
         return parts, quantities
 
     def _parts(self, tables: Mapping[str, dict[str, Any]]) -> dict[str, Part]:
@@ -159,25 +160,6 @@ class VehicleFile:
                         pass
         return out
 
-    def _line(self, section: str, entry: str) -> int | None:
-        """Line of `entry =` below [section], of `section.entry =`, or of [section.entry]; of
-        [section] without an entry.
-        """
-        section = self._written.get(section, section)
-        wanted = [section, entry] if entry else [section]
-        header: list[str] = []
-        for number, line in enumerate(self.lines, 1):
-            if found := re.match(r"\s*\[+([^\[\]]+)\]+\s*(#.*)?$", line):
-                header = _keys(found[1])
-                path = header
-            elif found := re.match(r"\s*([\w\-.\"' ]+?)\s*=", line):
-                path = header + _keys(found[1])
-            else:
-                continue
-            if path[: len(wanted)] == wanted:
-                return number
-        return None
-
     def _sections(self) -> dict[str, dict[str, Any]]:
         """The sections; one whose name is nearly that of a missing fixed or a packaged one is taken
         for that, and noted.
@@ -205,10 +187,9 @@ class VehicleFile:
     def _problem(self, section: str, entry: str, wrong: str) -> None:
         """Note what is wrong with an entry (or a section)."""
         self._doubted.add((section, entry))
-        line = self._line(section, entry) or self._line(section, "")
-        name = f"{section}.{entry}" if entry else f"[{section}]"
-        place = f"line {line}, {name}" if line else name
-        self.problems.append((line or 0, f"{place}: {wrong}"))
+        self.problems.append(
+            problem(self.lines, self._written.get(section, section), entry, wrong, section)
+        )
 
     def _sound(
         self, quantities: Mapping[str, dict[str, Quantity]]
@@ -352,7 +333,3 @@ def _read(table: Any, unit: str) -> Quantity:
 
 def _refers(table: Any) -> bool:
     return isinstance(table, Mapping) and "ref" in table
-
-
-def _keys(dotted: str) -> list[str]:
-    return [key.strip().strip("\"'") for key in dotted.split(".")]

@@ -18,7 +18,7 @@ from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Scheduling
-from symheli.steady.airspeed_sweep import sweep
+from symheli.steady.airspeed_sweep import design_family
 from symheli.values.arrays import frozen
 from symheli.values.numbers import whole
 from symheli.values.signal import Signal, signals
@@ -166,7 +166,7 @@ def gain_scheduled_lqr(
     >>> bool(np.abs(record["phi"]).max() < 0.2)
     True
     """
-    family = sweep(heli, np.linspace(low, high, whole(points, "points", 2)))  # type: ignore[arg-type]
+    family = design_family(heli, np.linspace(low, high, whole(points, "points", 2)))
     design = family.residualize([s for s in UNMEASURED if s in family.states])
     designs, plants = (
         [design[k].discretize(dt) for k in range(len(design))],

@@ -16,6 +16,7 @@ from symheli.flight.flight_data import FlightData
 from symheli.flight.flights import Flights
 from symheli.flight.plan import FlightPlan, Options, plan_of
 from symheli.flight.schedule import AirspeedSchedule
+from symheli.flight.validity import warn_of_flown
 from symheli.helicopter import Helicopter
 from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers_of
 from symheli.progress import task
@@ -141,6 +142,11 @@ def fly_batch(
     TrimError
         There is no trim to be held to.
 
+    Warns
+    -----
+    ValidityWarning
+        Flights go faster than the equations are known to hold for, gusts included.
+
     Examples
     --------
     >>> climb = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=0.5)
@@ -157,7 +163,9 @@ def fly_batch(
             flying.to(len(found))
             if progress is not None:
                 progress(len(found), len(plans))
-    return FlightBatch(tuple(found[i] for i in range(len(plans))))
+    flights = FlightBatch(tuple(found[i] for i in range(len(plans))))
+    warn_of_flown(heli, flights.data)
+    return flights
 
 
 def plans_of(

@@ -22,6 +22,7 @@ from symheli.flight.flight_data import FlightData, signals_of
 from symheli.flight.flight_dataset import FlightDataset
 from symheli.flight.plan import FlightPlan, Options
 from symheli.flight.plan_text import described
+from symheli.flight.validity import warn_of_plans
 from symheli.helicopter import Helicopter
 from symheli.integrate.side_by_side import as_done, workers_of
 from symheli.progress import task
@@ -73,6 +74,11 @@ def fly_campaign(
     SymheliError
         The disk is full or the folder cannot be written; what is finished stays.
 
+    Warns
+    -----
+    ValidityWarning
+        Faster flights are commanded than the equations are known to hold for.
+
     Examples
     --------
     >>> import tempfile, pathlib
@@ -86,6 +92,7 @@ def fly_campaign(
     periods = {plan.dt for plan in plans}
     if len(periods) > 1:
         raise InputError(f"one dataset has one sample period, got dt = {sorted(periods)} s")
+    warn_of_plans(heli, plans)
     kept = _kept(heli, plans, signals)
     dataset = _dataset(heli, plans, Path(path), kept)
     missing = sum(len(dataset.flights_of(chunk)) for chunk in dataset.missing_chunks)

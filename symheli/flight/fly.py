@@ -10,6 +10,7 @@ from symheli.flight.flight_data import ADVICE
 from symheli.flight.flights import Flights
 from symheli.flight.plan import FlightPlan, Options, plan_of
 from symheli.flight.schedule import AirspeedSchedule
+from symheli.flight.validity import warn_of_flown
 from symheli.helicopter import Helicopter
 from symheli.records.flight_record import FlightRecord
 
@@ -53,6 +54,11 @@ def fly(
     TrimError
         There is no trim to be held to.
 
+    Warns
+    -----
+    ValidityWarning
+        It is flown faster than the equations are known to hold for, gusts included.
+
     Examples
     --------
     >>> transition = symheli.AirspeedSchedule.transition(4.0, 6.0, acceleration=2.0, hold=1.0)
@@ -63,6 +69,7 @@ def fly(
     if not isinstance(heli, Helicopter):
         raise InputError(f"expected a Helicopter, got {heli!r:.80}; try Helicopter.load('xcell60')")
     (data,) = Flights(heli).fly([plan_of(schedule, options)], Layout())
+    warn_of_flown(heli, [data])
     record = data.record()
     if data.lost >= 0 or record is None:
         raise FlightLostError(f"{data.cause()}: {ADVICE}", record)

@@ -6,7 +6,9 @@ import numpy as np
 
 from symheli.errors import TrimError
 from symheli.helicopter import Helicopter
-from symheli.steady.trim_batch import trim_batch
+from symheli.steady.flight_conditions import FlightConditions
+from symheli.steady.steady_flights import SteadyFlights
+from symheli.steady.trim_batch import hover, one_after_another, trimmed
 from symheli.values.signal import Signal
 
 LARGEST_MISS = 0.3
@@ -29,9 +31,9 @@ def references(
         np.column_stack([speed, rate])[knots], axis=0, return_index=True, return_inverse=True
     )[1:]
     order = np.sort(asked)  # in the order of the flight, each started from one before
-    points = trim_batch(
-        heli, speed[knots[order]], acceleration=rate[knots[order]], wind=wind, throw=False
-    )
+    conditions = FlightConditions(speed[knots[order]], acceleration=rate[knots[order]], wind=wind)
+    flights = SteadyFlights.of(heli, conditions)
+    points = trimmed(flights, hover(flights), one_after_another(len(flights)), throw=False)
     misses = np.abs(points.residual[:, :6]).max(axis=1)
     if misses.max() > LARGEST_MISS:
         worst = int(misses.argmax())

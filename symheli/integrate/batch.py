@@ -16,6 +16,7 @@ from symheli.integrate.feedback import Feedback
 from symheli.integrate.problem import many_flights
 from symheli.integrate.rk4 import Flights, RungeKutta4
 from symheli.integrate.side_by_side import SIDE_BY_SIDE, over_the_cores, workers_of
+from symheli.integrate.validity import warn_of_flights
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 from symheli.values.summary import summarized
@@ -135,6 +136,11 @@ def simulate_batch(
     InputError
         Something does not fit.
 
+    Warns
+    -----
+    ValidityWarning
+        Flights leave what the equations are known to hold for, judged at the states that are kept.
+
     Examples
     --------
     >>> point = symheli.trim(heli, airspeed=5.0)
@@ -166,5 +172,6 @@ def simulate_batch(
     chunks = [(first, min(first + chunk, count)) for first in range(0, count, chunk)]
     for _ in over_the_cores(lambda c: flights.run(*c), chunks, threads, flights.stop):
         pass
+    warn_of_flights(heli, problem, flights.states, every)
     slots = np.arange(flights.states.shape[1]) + flights.skip_start
     return Batch(dt * every * slots, flights.states, heli.flight_states, flights.inputs)

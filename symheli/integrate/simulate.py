@@ -15,6 +15,7 @@ from symheli.integrate.problem import Problem, one_flight
 from symheli.integrate.radau import Radau
 from symheli.integrate.rk4 import Flights, RungeKutta4
 from symheli.integrate.trajectory import Trajectory
+from symheli.integrate.validity import warn_of_flights
 from symheli.values.arrays import Array
 
 Method = RungeKutta4 | Adaptive | Radau
@@ -72,6 +73,11 @@ def simulate(
     SymheliError
         The flight leaves the range of numbers, or the method gives up.
 
+    Warns
+    -----
+    ValidityWarning
+        The flight leaves what the equations are known to hold for.
+
     References
     ----------
     Hairer, Norsett and Wanner (1993), Solving Ordinary Differential Equations I, II.4; Hairer and
@@ -96,6 +102,7 @@ def simulate(
             f"the flight left the range of numbers at {dt * int(lost.argmax()):.6g} s: milder"
             " inputs, or a shorter step, please"
         )
+    warn_of_flights(heli, problem, states[None])
     wind_flown = np.broadcast_to(problem.wind[0], (problem.samples, 3))
     times = problem.dt * np.arange(problem.samples + 1)
     return Trajectory(

@@ -8,12 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli.lpv.entries import Entry, Names, Stacked, chosen, entries
+from symheli.lpv.linear_family import AIRSPEED
 from symheli.values.arrays import Array
 from symheli.values.drawing import GREY, axes_of, label, legend_beside, plain
 from symheli.values.signal import Signal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from symheli.lpv.linear_grid import LinearGrid
+
+PALEST = 0.15
+"""Strength of the first of many curves."""
 
 
 def plot_entries(
@@ -28,23 +34,55 @@ def plot_entries(
     """The `wanted` entries (default: the diagonal of A, what damps each state by itself) against
     `values` (K,) of `over`, each by its largest magnitude, which the legend gives with its unit.
     """
+    return draw_scaled(axes_of(ax), over, values, _wanted(names, matrices, wanted), marker)
+
+
+def plot_grid(ax: Axes | None, grid: LinearGrid, wanted: Sequence[str] | None) -> Axes:
+    """The `wanted` entries of a grid as `plot_entries` has them, a curve a combination of the other
+    axes' values, the last one the strongest.
+    """
+    along = grid.axes.index(AIRSPEED) if AIRSPEED in grid.axes else 0
+    values = grid.values[along]
+    drawn = [
+        Entry(e.name, np.moveaxis(e.values, along, 0).reshape(len(values), -1))
+        for e in _wanted(grid, grid, wanted)
+    ]
+    ax = draw_scaled(axes_of(ax), grid.axes[along], values, drawn)
+    others = [
+        f"{axis} {nodes[0]:g} (pale) to {nodes[-1]:g}{'' if axis.unit == '1' else f' {axis.unit}'}"
+        for axis, nodes in zip(grid.axes, grid.values, strict=True)
+        if axis != grid.axes[along]
+    ]
+    ax.set_title(", ".join(others), fontsize=9, loc="left")
+    return ax
+
+
+def _wanted(names: Names, matrices: Stacked, wanted: Sequence[str] | None) -> list[Entry]:
     every = list(entries(names, matrices))
-    wanted = [f"A[{s}, {s}]" for s in names.states] if wanted is None else wanted
-    return draw_scaled(axes_of(ax), over, values, chosen(every, wanted), marker)
+    return chosen(every, [f"A[{s}, {s}]" for s in names.states] if wanted is None else wanted)
 
 
 def draw_scaled(
     ax: Axes, over: Signal, values: Array, drawn: Sequence[Entry], marker: str = "."
 ) -> Axes:
     """Quantities of different units on one axis: each divided by its largest magnitude, which the
-    legend gives with its unit.
+    legend gives with its unit. Of several curves (K, m) of one quantity the last has the label, the
+    others are paler.
     """
-    for name, along in drawn:
+    for number, (name, along) in enumerate(drawn):
         largest = float(np.abs(along).max())
         unit = "" if name.unit == "1" else f" {name.unit}"
-        ax.plot(
-            values, along / (largest or 1.0), marker=marker, label=f"{name}, {largest:.3g}{unit}"
-        )
+        curves = along.reshape(len(values), -1).T / (largest or 1.0)
+        for curve, alpha in zip(curves, np.linspace(PALEST, 1.0, len(curves) + 1)[1:], strict=True):
+            last = alpha == 1.0
+            ax.plot(
+                values,
+                curve,
+                color=f"C{number % 10}",
+                alpha=alpha,
+                marker=marker,
+                label=f"{name}, {largest:.3g}{unit}" if last else None,
+            )
     ax.axhline(0.0, color=GREY, linewidth=0.8)
     ax.set_xlabel(label(over))
     ax.set_ylabel("entry by its largest magnitude")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symheli.lpv.entries import Names, Stacked, entries, rates
-from symheli.values.arrays import Array
+from symheli.values.arrays import Array, frozen
 from symheli.values.labelled import dataset, frame
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal
@@ -16,6 +16,11 @@ from symheli.values.signal import Signal
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+    from symheli.lpv.lpv_state_space import LPVStateSpace
+
+VALUES = 21
+"""Of a scheduling parameter where none are named."""
 
 MATRICES = {
     "A": ("equation", "state"),
@@ -33,6 +38,23 @@ def models_frame(
     index = [(s, grid.reshape(-1)) for (s, _), grid in zip(axes, grids, strict=True)]
     columns = [(name, values.reshape(-1)) for name, values in entries(names, matrices)]
     return frame(index, columns)
+
+
+def values_frame(model: LPVStateSpace, p: object) -> pandas.DataFrame:
+    """A row a value of the scheduling parameters (K,) or (K, d), a column an entry A[q, u] ...;
+    None: an even grid over their ranges.
+    """
+    ranges = model.parameters
+    if p is None:
+        each = np.meshgrid(*(np.linspace(s.low, s.high, VALUES) for s in ranges), indexing="ij")
+        p = np.stack([values.reshape(-1) for values in each], axis=-1)
+    values = frozen(p, "p")
+    if values.ndim == 1 and len(ranges) == 1:
+        values = values[:, None]
+    values = frozen(values, "p", (None, len(ranges)))
+    matrices = model.matrices(values if len(ranges) > 1 else values[:, 0])
+    index = [(Signal(s.name, s.unit), column) for s, column in zip(ranges, values.T, strict=True)]
+    return frame(index, list(entries(model, matrices)))
 
 
 def models_dataset(

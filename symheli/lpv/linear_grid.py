@@ -26,6 +26,7 @@ from symheli.values.summary import as_table, summarized
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +190,16 @@ class LinearGrid:
         airspeed beside an acceleration changes as that says.
         """
         return interpolated(self.models, self.axes, self.values, kind, degree, rate)
+
+    def plot(self, ax: Axes | None = None, entries: Sequence[str] | None = None) -> Axes:
+        """Entries such as "A[q, u]" over airspeed (without one: over the first axis), a curve a
+        combination of the other axes' values, paler the earlier it comes; each entry by its largest
+        magnitude on the grid, which the legend gives; default the diagonal of A. Returns the axes;
+        raises `UnknownNameError` for an entry that is not there.
+        """
+        from symheli.lpv.entry_plot import plot_grid
+
+        return plot_grid(ax, self, entries)
 
     def to_frame(self) -> pandas.DataFrame:
         """A row a model by the values of the axes, a column an entry A[q, u] ..., their units in

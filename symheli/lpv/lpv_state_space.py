@@ -23,6 +23,7 @@ from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import as_table, summarized
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
     from matplotlib.axes import Axes
 
@@ -539,6 +540,17 @@ class LPVStateSpace:
         s = self.scheduling
         p = np.linspace(s.low, s.high, 201)
         return plot_entries(ax, Signal(s.name, s.unit), p, self, self.matrices(p), entries, "")
+
+    def to_frame(self, p: object = None) -> pandas.DataFrame:
+        """A row a value of the scheduling parameters, a column an entry A[q, u] ... there; the
+        units of all of them in attrs["units"].
+
+        p: (K,) values of one parameter, (K, d) of several; default 21 of each evenly over its
+        range, in every combination. Raises `InputError` for values outside, or without pandas.
+        """
+        from symheli.lpv.labelled_models import values_frame
+
+        return values_frame(self, p)
 
     def to_xarray(self) -> xarray.Dataset:
         """The coefficients of A, B, C, D over "function" (j of f_j), "equation", "state", "input"

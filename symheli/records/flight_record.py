@@ -447,7 +447,7 @@ class FlightRecord:
         """A pandas DataFrame with a "t" column (s) and one column a signal, units in
         attrs["units"]. Raises `InputError` without pandas.
         """
-        with extra("logs", "a data frame"):
+        with extra("labelled", "a data frame"):
             import pandas as pd
 
         made = pd.DataFrame(

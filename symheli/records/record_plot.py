@@ -10,11 +10,10 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.values.arrays import Array
-from symheli.values.drawing import GRID, LINE, SHADE, label
+from symheli.values.drawing import GRID, LINE, SHADE, label, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from symheli.records.flight_record import FlightRecord
 
@@ -27,9 +26,9 @@ def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Arr
     matplotlib's Axes.
 
     Shaded: gaps, and where a sample of that signal is missing; no line crosses them. A sample
-    between two missing ones is a dot. Their figure belongs to no window:
-    `axes[0].figure.savefig("record.png")`. Raises `InputError` for no
-    signals, `UnknownNameError` for those the record lacks.
+    between two missing ones is a dot. A notebook shows their figure, a script at `pyplot.show()`;
+    `axes[0].figure.savefig("record.png")` writes it. Raises `InputError` for no signals,
+    `UnknownNameError` for those the record lacks.
     """
     shown = record.select(
         record.signals if names is None else [names] if isinstance(names, str) else list(names)
@@ -38,7 +37,7 @@ def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Arr
         raise InputError("name at least one signal to plot")
     wide = 2 if len(shown.signals) > PANELS else 1
     tall = -(-len(shown.signals) // wide)
-    figure = empty_figure(7.5 * (1.5 if wide == 2 else 1), 0.6 + 1.3 * tall)
+    figure = new_figure(7.5 * (1.5 if wide == 2 else 1), 0.6 + 1.3 * tall)
     axes = figure.subplots(tall, wide, sharex=True, squeeze=False).T.reshape(-1)
     for ax, signal, column in zip(axes, shown.signals, shown.values.T, strict=False):
         draw(ax, shown, column, color=LINE, linewidth=0.9)
@@ -52,13 +51,6 @@ def plot_record(record: FlightRecord, names: Sequence[str] | None = None) -> Arr
     if record.note:
         figure.suptitle(record.note, fontsize=9)
     return axes[: len(shown.signals)]
-
-
-def empty_figure(width: float, height: float) -> Figure:
-    """A figure of this size (inches) that belongs to no window."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def draw(ax: Axes, record: FlightRecord, column: Array, **style: object) -> None:

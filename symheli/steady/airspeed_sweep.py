@@ -14,7 +14,13 @@ from symheli.steady.flight_conditions import FlightConditions
 from symheli.steady.kinks import kink_speeds
 from symheli.steady.linearization import linear_models
 from symheli.steady.steady_flights import ALONE, SteadyFlights
-from symheli.steady.trim_batch import hover, one_after_another, trimmed
+from symheli.steady.trim_batch import (
+    TrimBatch,
+    hover,
+    one_after_another,
+    trimmed,
+    warn_of_trims,
+)
 from symheli.values.arrays import Array
 
 
@@ -57,6 +63,11 @@ def sweep(
     InputError
         Airspeeds that do not increase.
 
+    Warns
+    -----
+    ValidityWarning
+        The equations are not known to hold at all of them, once for all.
+
     Examples
     --------
     >>> family = symheli.sweep(heli, [2.0, 5.0, 8.0])
@@ -67,7 +78,7 @@ def sweep(
     if start and not np.array_equal(start.airspeeds, speeds):
         raise InputError("the family to start from has other airspeeds")
     conditions = FlightConditions(speeds, climb_rate=climb_rate, acceleration=acceleration)
-    flights = SteadyFlights([heli], np.zeros(len(speeds), int), conditions)
+    flights = SteadyFlights.of(heli, conditions)
     if start:
         known = start.known_trims("a sweep from a family")
         problems = [Equilibrium(heli, condition) for condition in conditions]
@@ -76,8 +87,24 @@ def sweep(
     else:
         z, after = hover(flights), one_after_another(len(flights))
     trims = trimmed(flights, z, after)
+    warn_of_trims(flights, trims)
+    return _family(flights, trims, inputs)
+
+
+def design_family(heli: Helicopter, airspeeds: Sequence[float] | Array) -> LinearFamily:
+    """`sweep` of level flight for a controller: what the equations are not known to hold for is
+    said of the flight.
+    """
+    flights = SteadyFlights.of(heli, FlightConditions(increasing(airspeeds)))
+    return _family(flights, trimmed(flights, hover(flights), one_after_another(len(flights))))
+
+
+def _family(
+    flights: SteadyFlights, trims: TrimBatch, inputs: Sequence[str] | None = None
+) -> LinearFamily:
     models = linear_models(flights, trims, inputs)
-    return LinearFamily.from_models(speeds, models, kink_speeds(heli, trims))
+    kinks = kink_speeds(flights.helis[0], trims)
+    return LinearFamily.from_models(flights.conditions.airspeed, models, kinks)
 
 
 def increasing(airspeeds: Sequence[float] | Array) -> Array:

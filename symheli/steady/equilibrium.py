@@ -14,6 +14,7 @@ from symheli.helicopter import Helicopter
 from symheli.steady.equations import numeric, steady_equations
 from symheli.steady.flight_condition import FlightCondition
 from symheli.steady.newton import TOLERANCE, newton
+from symheli.steady.validity import Validity, in_a_ring, warn
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_point import OperatingPoint
@@ -134,6 +135,11 @@ def trim(
     InputError
         A flight condition that is none.
 
+    Warns
+    -----
+    ValidityWarning
+        The equations are not known to hold there; see `symheli.steady.validity`.
+
     Examples
     --------
     >>> point = symheli.trim(heli, airspeed=5.0)
@@ -158,7 +164,24 @@ def trim(
     best = problem.point(z)
     if throw and not best.success:
         raise problem.failure(z)
+    warn_of_point(problem.heli, best)
     return best
+
+
+def warn_of_point(heli: Helicopter, point: TrimPoint) -> None:
+    """A `ValidityWarning` where the equations of the helicopter are not known to hold for it."""
+    warn(_beyond(heli, point))
+
+
+def _beyond(heli: Helicopter, point: TrimPoint) -> list[str]:
+    """What it asks too much of the equations."""
+    velocity = point.x.array[:3] - point.wind.array
+
+    def where(_: int) -> str:
+        return f"at {point.condition}"
+
+    ring = np.array([point.vortex_ring])
+    return Validity.of(heli).beyond(where, velocity[None]) + in_a_ring(where, ring)
 
 
 def on_stops(u: Array, travel: Array) -> Array:
@@ -306,7 +329,7 @@ class Equilibrium:
             *([_stops(best)] if best.on_stops else []),
             *_throttle(self.heli, best),
             *self._jumps(z),
-            *(["in a vortex ring"] if best.vortex_ring else []),
+            *(f"and beyond validity, {one}" for one in _beyond(self.heli, best)),
             "try a nearer condition as `start`, or throw=False for the best point",
         ]
         return TrimError("; ".join(said), best)

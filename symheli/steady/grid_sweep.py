@@ -17,7 +17,7 @@ from symheli.steady.airspeed_sweep import increasing
 from symheli.steady.flight_conditions import FlightConditions
 from symheli.steady.linearization import linear_models
 from symheli.steady.steady_flights import SteadyFlights
-from symheli.steady.trim_batch import hover, one_after_another, trimmed
+from symheli.steady.trim_batch import hover, one_after_another, trimmed, warn_of_trims
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 
@@ -74,6 +74,11 @@ def sweep_grid(
     InputError
         No axis, values that do not increase, density and altitude both.
 
+    Warns
+    -----
+    ValidityWarning
+        The equations are not known to hold at all of them, once for all.
+
     Examples
     --------
     >>> import symheli
@@ -110,6 +115,7 @@ def sweep_grid(
     flights = SteadyFlights(helis, each, FlightConditions(np.tile(speeds, len(points)), **asked))
     shape = [len(values) for values in given.values()]
     trims = trimmed(flights, hover(flights), _after_neighbours(shape, len(speeds)))
+    warn_of_trims(flights, trims)
     airspeed_first = np.arange(len(flights)).reshape(len(points), -1).T.ravel()
     return LinearGrid(
         (AIRSPEED, *(AXES[name] for name in given)),

@@ -11,7 +11,7 @@ from symheli.helicopter import Helicopter
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.linear_models import LinearModels
 from symheli.steady.equations import numeric
-from symheli.steady.equilibrium import TrimPoint
+from symheli.steady.equilibrium import TrimPoint, warn_of_point
 from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import SteadyFlights
 from symheli.steady.trim_batch import TrimBatch
@@ -51,6 +51,11 @@ def linearize(
     InputError
         A point that is no equilibrium, unless `allow_accelerating`.
 
+    Warns
+    -----
+    ValidityWarning
+        As in `trim`.
+
     Examples
     --------
     >>> model = symheli.linearize(heli, symheli.trim(heli, airspeed=5.0))
@@ -68,6 +73,7 @@ def linearize(
             f" {', '.join(heli.states)}: trim this helicopter"
         )
     heli = heli.in_air(point.density)
+    warn_of_point(heli, point)
     found = numeric(heli, "slopes")(point.x.array, point.u.array, point.wind.array)
     n, (columns, names) = len(heli.states), _columns(heli, inputs)
     A, B, E = (matrix.reshape(n, -1) for matrix in found)

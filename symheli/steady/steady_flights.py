@@ -49,6 +49,11 @@ class SteadyFlights:
     which: Array
     conditions: FlightConditions
 
+    @classmethod
+    def of(cls, heli: Helicopter, conditions: FlightConditions) -> SteadyFlights:
+        """Those of one helicopter."""
+        return cls([heli], np.zeros(len(conditions), int), conditions)
+
     @cached_property
     def equations(self) -> SteadyEquations:
         """Those they share."""
@@ -59,8 +64,8 @@ class SteadyFlights:
         return np.ascontiguousarray(self.conditions.demand)
 
     @cached_property
-    def _parameters(self) -> Array:
-        """A row for each flight, or one for all."""
+    def parameters(self) -> Array:
+        """Those of `Helicopter.parameters`, a row for each flight, or one for all."""
         rows = np.stack([heli.parameters.array for heli in self.helis])
         return rows if len(rows) == 1 else rows[self.which]
 
@@ -149,9 +154,9 @@ class SteadyFlights:
 
     def _shared(self, part: slice = slice(0, 0)) -> tuple[ctypes.c_void_p, ctypes.c_long]:
         """Parameters from the first flight of a part on, and how far apart they are."""
-        if len(self._parameters) == 1:
-            return _at(self._parameters), ctypes.c_long(0)
-        return _at(self._parameters[part.start :]), ctypes.c_long(self._parameters.shape[1])
+        if len(self.parameters) == 1:
+            return _at(self.parameters), ctypes.c_long(0)
+        return _at(self.parameters[part.start :]), ctypes.c_long(self.parameters.shape[1])
 
 
 def _length(part: slice) -> ctypes.c_long:

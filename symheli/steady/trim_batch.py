@@ -23,6 +23,7 @@ from symheli.steady.flight_condition import FlightCondition
 from symheli.steady.flight_conditions import FlightConditions
 from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import ALONE, SteadyFlights
+from symheli.steady.validity import Validity, in_a_ring, warn
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_points import OperatingPoints
@@ -197,6 +198,11 @@ def trim_batch(
     InputError
         A flight condition that is none, lengths that differ.
 
+    Warns
+    -----
+    ValidityWarning
+        The equations are not known to hold at all of them, once for all.
+
     Examples
     --------
     >>> found = symheli.trim_batch(heli, [4.0, 5.0, 6.0], climb_rate=[0.0, 0.5, 1.0])
@@ -207,12 +213,27 @@ def trim_batch(
         airspeed, climb_rate, turn_rate, sideslip, wind, acceleration, altitude
     )
     heli = heli if altitude is None else heli.at_altitude(altitude)
-    flights = SteadyFlights([heli], np.zeros(len(conditions), int), conditions)
+    flights = SteadyFlights.of(heli, conditions)
     z = hover(flights) if start is None else unknowns(heli, start)
     if z.ndim == 2 and len(z) != len(flights):
         raise InputError(f"expected a start for each of {len(flights)} conditions, got {len(z)}")
     after = ALONE if isinstance(start, TrimBatch) else one_after_another(len(flights))
-    return trimmed(flights, z, after, throw, continuation)
+    found = trimmed(flights, z, after, throw, continuation)
+    warn_of_trims(flights, found)
+    return found
+
+
+def warn_of_trims(flights: SteadyFlights, trims: TrimBatch, ring: bool = True) -> None:
+    """One `ValidityWarning` where the equations are not known to hold at all of these; `ring`:
+    also where a rotor is in a vortex ring.
+    """
+    validity, velocity = Validity(flights.helis[0], flights.parameters), trims.x[:, :3] - trims.wind
+
+    def where(k: int) -> str:
+        return f"at {trims.conditions[k]}"
+
+    found = validity.beyond(where, velocity)
+    warn(found + in_a_ring(where, trims.vortex_ring) if ring else found)
 
 
 def one_after_another(count: int) -> Array:

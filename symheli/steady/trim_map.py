@@ -13,7 +13,7 @@ from symheli.helicopter import Helicopter
 from symheli.steady.equilibrium import TrimPoint
 from symheli.steady.flight_conditions import FlightConditions
 from symheli.steady.steady_flights import SteadyFlights
-from symheli.steady.trim_batch import hover, one_after_another, trimmed
+from symheli.steady.trim_batch import hover, one_after_another, trimmed, warn_of_trims
 from symheli.values.arrays import Array, frozen
 from symheli.values.comma_separated import comma_separated
 from symheli.values.labelled import dataset, frame
@@ -202,6 +202,12 @@ def trim_map(
     InputError
         Values that do not increase.
 
+    Warns
+    -----
+    ValidityWarning
+        The equations are not known to hold at all of them, once for all; the vortex ring is a flag
+        of the result.
+
     Examples
     --------
     >>> found = symheli.trim_map(heli, [4.0, 8.0], [-2.0, 0.0])
@@ -216,8 +222,9 @@ def trim_map(
         [(i, j) for j in outwards for i, speed in enumerate(speeds) if abs(rates[j]) <= speed]
     ).T
     conditions = FlightConditions(speeds[i], climb_rate=rates[j])
-    flights = SteadyFlights([heli], np.zeros(len(i), int), conditions)
+    flights = SteadyFlights.of(heli, conditions)
     found = trimmed(flights, hover(flights), _after_inner(i, j, outwards[0]), throw=False)
+    warn_of_trims(flights, found, ring=False)
     points: list[list[TrimPoint | None]] = [[None] * len(rates) for _ in speeds]
     for point, *at in zip(found, i, j, strict=True):
         points[at[0]][at[1]] = point

@@ -8,6 +8,7 @@ from symheli.values.signal import Signal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 INK, BLUE, ORANGE, GREEN, RED, GREY = (
     "#1b1f24",
@@ -21,14 +22,25 @@ LINE, SHADE, GRID = BLUE, "#eceff1", "#e6e9ec"
 
 
 def axes_of(ax: Axes | None, width: float = 7.0, height: float = 4.5) -> Axes:
-    """The axes given, else those of a new figure of this size (inches), which a notebook shows at
-    the end of its cell.
+    """The axes given, else those of a `new_figure` of this size (inches)."""
+    return new_figure(width, height).subplots() if ax is None else ax
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """A figure of this size (inches), which a notebook shows at the end of its cell and a script at
+    `pyplot.show()`; nothing is on the screen before. Where there can be no window, matplotlib
+    takes one of its backends for files.
     """
-    if ax is not None:
-        return ax
     import matplotlib.pyplot as plt
 
-    return plt.subplots(figsize=(width, height), layout="constrained")[1]
+    return plt.figure(figsize=(width, height), layout="constrained")
+
+
+def windowless_figure(width: float, height: float) -> Figure:
+    """A figure of this size (inches) that belongs to no window: for a file."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
 
 
 def label(signal: Signal) -> str:

@@ -6,6 +6,7 @@ from known_vehicles import Vehicle
 
 import identification as idn
 from symheli import FlightRecord
+from symheli.errors import UnknownNameError
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +67,45 @@ def test_a_measured_response_is_drawn_with_its_error(record, pd):
     np.testing.assert_array_equal(frame["y from u"], found.G[:, 0, 0])
     np.testing.assert_array_equal(frame["coherence of y from u"], found.coherence[:, 0, 0])
     assert frame.attrs["units"]["omega"] == "rad/s"
+
+
+def test_a_history_is_drawn_as_its_coefficients_settle(record):
+    basis = idn.Polynomial(1, -1.0, 1.0)
+    arx = idn.LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=basis)
+    history = idn.RecursiveLeastSquares(arx).run(record)
+    ax = history.plot()
+    *curves, _ = ax.lines
+    assert len(curves) == history.coefficients.shape[1] == len(history.regressor_names)
+    for curve, along in zip(curves, history.coefficients[:, :, 0].T, strict=True):
+        np.testing.assert_allclose(curve.get_ydata(), along / along[-1], rtol=1e-12)
+        assert curve.get_ydata()[-1] == 1.0
+    legend = [text.get_text() for text in ax.get_legend().get_texts()]
+    last = history.coefficients[-1, 2, 0]
+    assert legend[2] == f"{history.regressor_names[2]}, {last:.3g}"
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (
+        "time (s)",
+        "coefficients of y by their last value",
+    )
+    given = ax.figure.add_subplot()
+    assert history.plot(given, regressors=history.regressor_names[:1]) is given
+    assert len(given.lines) == 2
+    with pytest.raises(UnknownNameError, match="output"):
+        history.plot(output="q")
+    with pytest.raises(UnknownNameError, match="regressor"):
+        history.plot(regressors=["y(k-7)"])
+
+
+def test_a_history_with_known_kinematics_is_drawn():
+    vehicle = Vehicle(degree=1, na={"p": 1}, nb={"d_lon": 1, "d_lat": 1, "d_col": 1, "d_ped": 1})
+    data = vehicle.record(400, sensors=np.full(8, 1e-3))
+    history = idn.RecursiveLeastSquares(vehicle.kin).run(data)
+    ax = history.plot(output=str(history.outputs[1]))
+    assert len(ax.lines) == 1 + len(history.regressor_names)
+    assert ax.get_legend() is None  # more curves than a legend holds
+
+
+def test_bands_wait_to_be_shown(record, model):
+    import matplotlib.pyplot as plt
+
+    axes = idn.uncertainty(model, record).plot()
+    assert [plt.figure(n) for n in plt.get_fignums()] == [axes[0].figure]

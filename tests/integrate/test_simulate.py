@@ -115,6 +115,7 @@ def test_without_a_compiler_the_same_switches_are_stepped_to(ideal, monkeypatch,
     np.testing.assert_allclose(plain.states, compiled.states, rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.filterwarnings("ignore:.*numbers that no helicopter has")
 def test_flapping_too_fast_for_explicit_steps_is_flown_by_the_implicit_method(ideal):
     """A light bar follows the swash plate in a tenth of a millisecond: nothing else changes, 5 ms
     steps of order 4 explode.

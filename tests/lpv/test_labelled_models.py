@@ -51,6 +51,57 @@ def test_a_grid_keeps_its_axes(ideal, xr):
     assert frame.loc[(6.0, 1.0), "A[q, u]"] == float(found)
 
 
+def test_an_lpv_model_is_a_frame_of_its_entries_over_its_parameter(family, pd):
+    lpv = family.interpolate(degree=2)
+    frame = lpv.to_frame()
+    assert frame.index.name == "airspeed"
+    np.testing.assert_allclose(frame.index, np.linspace(4.0, 8.0, 21), rtol=1e-15)
+    np.testing.assert_allclose(frame.loc[6.0, "A[p, v]"], lpv.at(6.0).A[1, 0], rtol=1e-12)
+    assert frame.attrs["units"] == family.to_frame().attrs["units"]
+    own = lpv.to_frame([5.0, 4.5])  # as they are given
+    assert own.index.tolist() == [5.0, 4.5]
+    np.testing.assert_allclose(own["B[r, d_ped]"], [lpv.at(v).B[2, 1] for v in (5.0, 4.5)])
+    for wrong, said in (([9.0], "9"), ([[4.0, 5.0]], "expected shape"), (["fast"], "numbers")):
+        with pytest.raises(InputError, match=said):
+            lpv.to_frame(wrong)
+
+
+def test_an_lpv_model_of_two_parameters_is_a_frame_over_both(ideal, pd):
+    lpv = symheli.sweep_grid(ideal, [4.0, 6.0], acceleration=[-1.0, 1.0]).interpolate(degree=1)
+    frame = lpv.to_frame()
+    assert frame.index.names == ["airspeed", "acceleration"]
+    assert len(frame) == 21**2
+    assert frame.attrs["units"]["acceleration"] == "m/s^2"
+    at = frame.index[30]
+    np.testing.assert_allclose(frame.iloc[30]["A[q, u]"], lpv.at(*at).A[4, 0], rtol=1e-12)
+    np.testing.assert_allclose(
+        lpv.to_frame([[5.0, 0.5]])["A[q, u]"], lpv.at(5.0, 0.5).A[4, 0], rtol=1e-12
+    )
+    with pytest.raises(InputError, match="expected shape"):
+        lpv.to_frame([5.0, 0.5])
+
+
+def test_a_grid_is_drawn_a_curve_a_value_of_its_other_axes(ideal):
+    grid = symheli.sweep_grid(ideal, [4.0, 6.0, 8.0], acceleration=[-2.0, 0.0, 2.0])
+    ax = grid.plot(entries=["A[q, u]", "B[q, d_lon]"])
+    curves = [line for line in ax.lines if len(line.get_xdata()) == 3]
+    assert len(curves) == 2 * 3
+    entry = grid.A[:, :, grid.states.index("q"), 0]
+    drawn = np.stack([line.get_ydata() for line in curves[:3]], axis=1)
+    np.testing.assert_allclose(drawn, entry / np.abs(entry).max(), rtol=1e-12)
+    strengths = [line.get_alpha() for line in curves[:3]]
+    assert strengths == sorted(strengths)
+    assert ax.get_xlabel() == "airspeed (m/s)"
+    assert ax.get_title(loc="left") == "acceleration -2 (pale) to 2 m/s^2"
+    legend = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert [text.partition(",")[0] for text in legend] == ["A[q", "B[q"]
+    assert legend[0].endswith(f"{np.abs(entry).max():.3g} rad/m/s")
+    given = ax.figure.add_subplot()
+    assert grid.plot(given) is given
+    with pytest.raises(UnknownNameError, match="entry"):
+        grid.plot(entries=["A[q, q0]"])
+
+
 def test_the_coefficients_of_an_lpv_model_give_it_back(xr):
     lpv, _ = random_lpv()
     data = lpv.to_xarray()

@@ -69,6 +69,7 @@ def test_more_blades_of_less_chord_are_the_same_rotor(ideal):
         )  # rounding of the solidity through Newton's method
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 @pytest.mark.parametrize("factor", [0.3, 5.0])
 @pytest.mark.parametrize("name", vehicles())
 def test_froude_scaling_is_exact_similarity(name, factor):
@@ -194,6 +195,98 @@ def test_a_wrong_model_file_says_what_is_wrong(tmp_path, old, new, message):
     path.write_text(R50.replace(old, new, 1))
     with pytest.raises(symheli.InputError, match=message):
         symheli.identified_model(path)
+
+
+MISTAKES = (
+    ('u = "ft/s"', 'u = "ft/sek"', "states.u: unknown unit 'ft/sek'"),
+    ('phi = "rad"', "phi = 1", "states.phi: unit: expected a text"),
+    ('ped = "1"', "ped = 1,0", "not valid TOML"),
+    ("Y_v*v + g*phi", "Y_v*v + G*phi", "equations.v: unknown name 'G'"),
+    ("M_u*u + M_v*v", "M_u*u*M_v*v", "equations.q: must be linear"),
+    ("+ A_b*b + A_c*c", "+ A_b*b + (A_c*c", "equations.a: '-q + (-a"),
+    ('phi = "p"\n', 'phy = "p"\n', "equations.phy: unknown state 'phy'"),
+    (
+        'Y_b = { value = 32.2, unit = "ft/s^2/rad", source = "MTK, held at g" }',
+        'Y_b = { value = "32.2", unit = "ft/s^2/rad" }',
+        "parameters.Y_b: expected a finite number as value, got '32.2'; every number",
+    ),
+    (
+        'L_v = { value = 0.143, unit = "rad/ft/s"',
+        'L_v = { value = 0.143, unit = "rad/s"',
+        "equations.p: the units do not fit: the term with v",
+    ),
+    (
+        'M_a = { value = 82.57, unit = "1/s^2", source = "MTK" }',
+        "M_a = 82.57",
+        "parameters.M_a: write { value = ..., unit = ..., source = ... }, got 82.57",
+    ),
+)
+"""What is right, what was typed, and what is said of it."""
+
+
+def test_ten_mistakes_in_a_model_file_are_one_message_of_ten(tmp_path):
+    text = R50
+    for right, typed, _ in MISTAKES:
+        assert right in text
+        text = text.replace(right, typed, 1)
+    path = tmp_path / "typed.linear.toml"
+    path.write_text(text)
+    with pytest.raises(symheli.InputError) as caught:
+        symheli.identified_model(path)
+    head, *said = str(caught.value).split("\n  ")
+    assert head == f"{path}: {len(MISTAKES)} things to put right"
+    assert len(said) == len(MISTAKES)
+    for *_, words in MISTAKES:
+        assert sum(words in line for line in said) == 1, words
+    lines = [int(re.match(r"line (\d+), ", line)[1]) for line in said]
+    assert lines == sorted(lines)
+    for line, words in zip(lines, said, strict=True):
+        entry = re.search(r"(?:states|parameters|equations)\.(\w+):", words)
+        assert text.splitlines()[line - 1].startswith(entry[1] if entry else "ped")
+    for right, typed, _ in MISTAKES:
+        text = text.replace(typed, right, 1)
+    path.write_text(text)
+    np.testing.assert_array_equal(
+        symheli.identified_model(path).A, symheli.identified_model("r50_hover").A
+    )
+
+
+@pytest.mark.parametrize(("right", "typed", "words"), MISTAKES, ids=lambda text: text[:12])
+def test_each_mistake_alone_is_said_alone(tmp_path, right, typed, words):
+    path = tmp_path / "typed.linear.toml"
+    path.write_text(R50.replace(right, typed, 1))
+    with pytest.raises(symheli.InputError) as caught:
+        symheli.identified_model(path)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('lat = "1"', 'u = "1"', r"inputs\.u: is the name of one of \[states\], too"),
+        ('lat = "1"', '"d-lat" = "1"', "'d-lat' cannot stand in an equation"),
+        ("X_u*u", "X_u*u/(1 - 1)", "cannot be evaluated: .*division by zero"),
+        ("X_u*u", "1e200*1e200*u", "must be linear"),
+        ("X_u*u", f"{'9' * 400}*u", "cannot be evaluated: .*too large"),
+        ("X_u*u", "(" * 5000 + "u" + ")" * 5000, "cannot be evaluated"),
+        ("[equations]", "[equation]", r"did you mean \[equations\] by \[equation\]"),
+    ],
+    ids=lambda text: text[:20],
+)
+def test_what_else_a_model_file_may_say(tmp_path, old, new, message):
+    path = tmp_path / "typed.linear.toml"
+    path.write_text(R50.replace(old, new, 1))
+    with pytest.raises(symheli.InputError, match=message):
+        symheli.identified_model(path)
+
+
+def test_the_equations_may_stand_in_any_order(tmp_path):
+    first = next(line for line in R50.splitlines(True) if line.startswith('u = "X_u'))
+    path = tmp_path / "turned.linear.toml"
+    path.write_text(R50.replace(first, "").replace("\n[parameters]", first + "\n[parameters]"))
+    model = symheli.identified_model(path)
+    np.testing.assert_array_equal(model.A, symheli.identified_model("r50_hover").A)
 
 
 def test_an_unknown_model_is_named():

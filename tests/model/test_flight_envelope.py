@@ -65,6 +65,7 @@ def test_right_hand_side_and_jacobian_are_finite_everywhere_short_of_gimbal_lock
         assert np.all(np.isfinite(block))
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 @settings(max_examples=60, deadline=None)
 @given(
     st.floats(0.0, 20.0),
@@ -116,6 +117,7 @@ def test_a_trim_holds_or_says_what_is_missing(
     assert np.all(np.isfinite(model.A))
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_a_control_beyond_its_travel_is_said_not_hidden(ideal):
     """28 m/s holds in the equations with more collective than the servo has: a success that cannot
     be attained.

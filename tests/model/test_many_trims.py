@@ -51,6 +51,7 @@ ASKED = (
 )
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 @pytest.mark.parametrize(
     ("name", "asked"),
     [  # by default every airframe, and every condition twice
@@ -196,6 +197,7 @@ def test_a_trim_from_the_command_line_loads_no_scipy():
     assert said.strip().endswith("[]")
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_one_that_fails_among_many_says_so_and_harms_no_other(ideal):
     speeds = [5.0, 60.0, 6.0, 61.0, *np.linspace(7.0, 12.0, 20)]
     with pytest.raises(symheli.TrimError, match="no trim at 60 m/s") as caught:
@@ -210,11 +212,13 @@ def test_one_that_fails_among_many_says_so_and_harms_no_other(ideal):
     np.testing.assert_allclose(found.x[good], alone.x, atol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_the_first_may_fail(ideal):
     found = symheli.trim_batch(ideal, [60.0, 5.0, 6.0], throw=False)
     assert found.success.tolist() == [False, True, True]
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_flags_of_a_batch_are_those_of_its_points(ideal):
     """The stops of a control, and a rotor in its own wake."""
     found = symheli.trim_batch(ideal, [4.0, 4.0, 8.0], climb_rate=[0.0, -4.0, 0.0])

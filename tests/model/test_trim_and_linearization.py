@@ -28,6 +28,7 @@ def test_trimmed_velocity_is_what_was_asked(ideal):
     assert climb == pytest.approx(1.5, rel=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 @pytest.mark.parametrize(
     "asked",
     [
@@ -42,6 +43,7 @@ def test_turn_descent_sideways_rearward_and_wind_trim(heli, asked):
     assert symheli.trim(heli, 5.0, **asked).success
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_an_impossible_trim_says_why_and_keeps_the_best_point(ideal):
     with pytest.raises(symheli.TrimError, match="du/dt") as caught:
         symheli.trim(ideal, 60.0)

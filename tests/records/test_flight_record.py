@@ -1,6 +1,8 @@
 """Records: one time axis, gaps and missing samples respected, messages that say where."""
 
 import io
+import os
+import subprocess
 import sys
 
 import numpy as np
@@ -167,10 +169,54 @@ def test_a_plot_of_many_signals_stands_in_two_columns_and_of_named_ones_shows_th
         many.plot(["q"])
 
 
+SCRIPT = """
+import sys
+import warnings
+import numpy as np
+warnings.simplefilter("error")
+import symheli
+time = 0.1 * np.arange(9)
+record = symheli.FlightRecord.from_arrays(time, {"q": "rad/s", "n": "1"}, q=np.sin(time), n=time)
+axes = record.plot()
+import matplotlib
+import matplotlib.pyplot as plt
+axes[0].figure.savefig(sys.argv[1])
+print(matplotlib.get_backend().lower(), len(axes), len(plt.get_fignums()))
+"""
+
+
+@pytest.mark.parametrize("backend", ["agg", "", "tkagg"])
+def test_a_script_without_a_display_draws(tmp_path, backend):
+    """Told nothing, or to use windows, matplotlib falls back on a backend for files."""
+    kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-c", SCRIPT, str(tmp_path / "record.png")]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env=kept | {"MPLBACKEND": backend}
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["agg", "2", "1"]
+    assert (tmp_path / "record.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_picture_waits_to_be_shown(monkeypatch):
+    """It is one of pyplot's, so that a notebook and `pyplot.show()` find it, and nothing is shown
+    before.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    monkeypatch.setattr(plt, "show", lambda *_, **__: pytest.fail("shown"))
+    monkeypatch.setattr(plt, "pause", lambda *_: pytest.fail("shown"))
+    axes = holed().plot()
+    assert [plt.figure(n) for n in plt.get_fignums()] == [axes[0].figure]
+
+
 def test_without_pandas_a_data_frame_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(
-        InputError, match=r"a data frame needs pandas: pip install 'symheli\[logs\]'"
+        InputError, match=r"a data frame needs pandas: pip install 'symheli\[labelled\]'"
     ):
         record().to_frame()
 

@@ -71,6 +71,7 @@ def test_trim_takes_an_altitude(run, ideal):
     assert run("trim", "--altitude", "90000")[0] == 1
 
 
+@pytest.mark.filterwarnings("ignore::symheli.errors.ValidityWarning")
 def test_figures_draw_on_the_axes_they_are_given(ideal):
     import matplotlib
 

@@ -4,8 +4,11 @@ slider moves.
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import pytest
 
@@ -173,3 +176,17 @@ def test_without_scripts_the_figures_stay(opened, browser, address):
     assert not page.locator("#explorer").is_visible()
     assert page.locator("noscript p").is_visible()
     context.close()
+
+
+def test_the_links_to_the_proofs_open_files(opened):
+    page, said = opened(1280)
+    listed = page.locator("details.proofs")
+    for k in range(listed.count()):
+        listed.nth(k).locator("summary").click()
+    links = page.locator("details.proofs a")
+    assert links.count() == len(set(links.evaluate_all("all => all.map((a) => a.href)"))) > 0
+    assert page.evaluate(CUT) == []
+    for address in links.evaluate_all("all => all.map((a) => a.href)"):
+        proof = json.loads(Path(unquote(urlsplit(address).path)).read_text(encoding="utf-8"))
+        assert proof
+    assert not said

@@ -14,6 +14,7 @@ import pytest
 
 from studies.controllers import tables as controllers
 from studies.controllers.flown import WINDS
+from studies.report import held
 from studies.report.labels import Labels
 from studies.report.references import REFERENCES
 from studies.report.shortfalls import shortfalls
@@ -218,3 +219,17 @@ def hardly_changing():
     )
     asked = guarantees.bounds("baseline", "gust", lag, (0.0, math.inf), Spline(), GLIMPSE)
     return tuple(guarantees.answered([*asked, *guarantees.lft_bounds("baseline", "gust", lag)]))
+
+
+def test_models_at_a_held_airspeed_are_computed_once_until_they_change(full, monkeypatch):
+    asked = []
+    monkeypatch.setattr(held, "_kept", [])
+    monkeypatch.setattr(held, "axes", lambda study: asked.append(study) or [])
+    first = held.held_to_dict(full)
+    assert held.held_to_dict(replace(full, flown_controllers=None, complete=True)) is first
+    assert len(asked) == 1
+    without = replace(full, known_kinematics=None)
+    assert held.held_to_dict(without) is not first
+    assert held.held_to_dict(replace(full, baseline=None)) is None
+    assert held.held_to_dict(without) is held.held_to_dict(without)
+    assert asked == [full, without]

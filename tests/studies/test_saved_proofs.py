@@ -1,6 +1,7 @@
 """The proofs of a study lie beside its results, and each proves its bound again."""
 
 import json
+import re
 
 import pytest
 from json_schema import faults
@@ -76,3 +77,31 @@ def test_a_proof_about_a_model_that_jumps_travels_too(tmp_path):
     back = Certificate.load(bound.certificate.save(tmp_path / "proof.json"))
     assert back.verify(rigorous=True)
     assert back.gamma == bound.certificate.gamma
+
+
+def links(page):
+    """What a page leads to outside of itself."""
+    found = re.findall(r'(?:href|src)="([^"#][^"]*)"', page)
+    return [target for target in found if not target.startswith("data:")]
+
+
+def test_the_report_links_every_proof_and_every_link_is_there(outcome, tmp_path):
+    page = report.write_report(outcome, tmp_path).read_text(encoding="utf-8")
+    targets = links(page)
+    assert sorted(targets) == sorted(filter(None, map(proof_file, outcome.bounds)))
+    for target in targets:
+        assert (tmp_path / target).is_file()
+        assert Certificate.load(tmp_path / target).verified
+    section = page[page.index("What can be proven</h2>") :]
+    listed = section[: section.index("<h2")]
+    assert links(listed) == targets
+    fast = next(b for b in outcome.bounds if b.rate == 3.0)
+    said = f"baseline, P(p), 3 m/s²: gain of at most {fast.certificate.gamma:.3g}"
+    assert f'href="{proof_file(fast)}">{proof_file(fast)[7:]}</a> {said}</li>' in listed
+
+
+def test_without_a_proof_there_is_nothing_to_link(tmp_path):
+    nothing = Outcome(vehicle="xcell60", quick=True, seed=0)
+    page = report.write_report(nothing, tmp_path).read_text(encoding="utf-8")
+    assert "symheli verify" not in page
+    assert links(page) == []

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import symheli
+from identification import Criterion, FitForControl
 from studies.controllers import tables
 from studies.controllers.certified import CertifiedControllers, bounded
 from studies.controllers.designs import (
@@ -21,6 +22,7 @@ from studies.controllers.designs import (
     hinf_schedule,
     lqr_schedule,
     simplest,
+    verdict_in_words,
 )
 from studies.controllers.flown import (
     NOISE_SHARE,
@@ -57,7 +59,14 @@ from studies.controllers.plant import (
 from studies.transition.guarantees import PLAIN, Bound
 from studies.transition.outcome import Outcome
 from studies.transition.stored_stages import Stored, StoredStages
-from symheli import AirspeedSchedule, LPVStateSpace, Scheduling, Sensor, fly_batch
+from symheli import (
+    AirspeedSchedule,
+    LPVStateSpace,
+    Scheduling,
+    Sensor,
+    ValidityWarning,
+    fly_batch,
+)
 from symheli.errors import SynthesisError
 from symheli.flight import XCELL_SERVOS
 from synthesis.design.sampling import tustin
@@ -144,6 +153,34 @@ def test_a_synthesis_that_finds_none_is_a_design_with_its_reason(base):
     table = tables.designed(Designs(designs=(found,), plant=flown_plant(base)), None)
     assert table.rows[0][2] == "none exists"
     assert "nothing moves it" in table.remarks[0]
+
+
+def judged(*criteria):
+    """A `FitForControl` of rows (name, verdict, decides)."""
+    rows = tuple(
+        Criterion(name=n, value=1.0, threshold=1.0, verdict=v, source="", decides=d)
+        for n, v, d in criteria
+    )
+    one = np.ones(1)
+    return FitForControl(
+        criteria=rows, points=(0.0,), margin=one, gap=one, second_gap=one, true_gap=None
+    )
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [
+        ("fit", "The identified model is fit for this loop, by the flight that it was identified"),
+        ("not fit", "is not fit for this loop, by the flight that it was identified from: gap."),
+        ("not known", "leaves open whether it is fit for this loop: gap."),
+    ],
+)
+def test_the_verdict_on_a_model_is_a_sentence(verdict, said):
+    rows = ("gap", verdict, True), ("slow modes", "not fit", False), ("record", "fit", True)
+    text = verdict_in_words(judged(*rows))
+    assert said in text
+    assert text.endswith(".")
+    assert "slow modes" not in text
 
 
 def test_the_schedule_of_point_designs_keeps_their_gain_at_each_point(base):
@@ -248,7 +285,7 @@ def test_measures_of_a_flight_are_those_of_its_record(lqr, base):
 # --- what is said of flights --------------------------------------------------------------------
 
 
-def flight(ratio, lost=False, outside=0.0):
+def flight(ratio, lost=False, outside=0.0, beyond=0.0):
     return Measures(
         lost=lost,
         speed=1.0,
@@ -259,11 +296,32 @@ def flight(ratio, lost=False, outside=0.0):
         ratio=ratio,
         outside=outside,
         faster=0.0,
+        beyond=beyond,
     )
 
 
 def flights(name, wind, *each):
     return Flown(name=name, wind=wind, gust=wind / 5, flights=each)
+
+
+def test_the_table_says_how_many_flights_the_equations_do_not_promise():
+    some = flights("a", WINDS[0], flight(1.0), flight(1.0, beyond=0.25))
+    none = flights("b", WINDS[0], flight(1.0), flight(1.0))
+    (said,) = tables.beyond(FlownControllers(flown=(some, none), seeds=2, duration=9.0))
+    assert said.startswith("In 1 of the 4 flights")
+    assert said.endswith("in one for 25 % of the time.")
+    assert tables.beyond(FlownControllers(flown=(none,), seeds=2, duration=9.0)) == []
+
+
+def test_the_share_beyond_the_equations_is_that_of_the_true_airspeed(lqr, base, ideal):
+    designs = Designs(designs=(lqr,), plant=flown_plant(base))
+    plan = next(plan for _, wind, plan in plans(designs) if wind == 0.0)
+    fast = AirspeedSchedule.transition(18.0, 22.0, acceleration=2.0, hold=1.0)
+    with pytest.warns(ValidityWarning, match="advance ratio"):
+        batch = fly_batch(ideal, replace(plan, schedule=fast, controller=None))
+    share = float(np.mean(batch[0]["airspeed"] > 0.155 * 167.0 * 0.775))
+    assert 0.2 < share < 0.8
+    assert of_flight(batch.data[0]).beyond == share
 
 
 @pytest.fixture

@@ -1,0 +1,50 @@
+"""How the coefficients of a recursive estimate settle, as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from identification.recursive.history import History
+from symheli.errors import UnknownNameError
+from symheli.values.drawing import GREY, axes_of, label, legend_beside, plain
+from symheli.values.signal import Signal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FRAME = (-1.0, 3.0)
+"""Of the last value: what is shown; the first samples of an estimate may be anywhere."""
+LISTED = 12
+"""So many curves have their names in the legend."""
+
+
+def plot_history(
+    history: History, ax: Axes | None, output: str | None, regressors: Sequence[str] | None
+) -> Axes:
+    """The coefficients of `output` (default: the first), of all regressors or of these, over time
+    (s), each by its last value, which the legend gives for up to `LISTED` of them.
+    """
+    outputs, names = [str(y) for y in history.outputs], history.regressor_names
+    column = _position(outputs[0] if output is None else output, outputs, "output")
+    wanted = names if regressors is None else regressors
+    rows = [_position(name, names, "regressor") for name in wanted]
+    ax = axes_of(ax)
+    for row in rows:
+        along = history.coefficients[:, row, column]
+        last = along[-1]
+        said = f"{names[row]}, {last:.3g}" if len(rows) <= LISTED else None
+        ax.plot(history.time, along / (last or 1.0), linewidth=0.9, label=said)
+    ax.axhline(1.0, color=GREY, linewidth=0.8)
+    ax.set_ylim(*FRAME)
+    ax.set_xlabel(label(Signal("time", "s")))
+    ax.set_ylabel(f"coefficients of {outputs[column]} by their last value")
+    ax.margins(x=0.0)
+    legend_beside(ax)
+    return plain(ax)
+
+
+def _position(name: str, known: Sequence[str], kind: str) -> int:
+    if name not in known:
+        raise UnknownNameError(kind, name, known)
+    return list(known).index(name)
