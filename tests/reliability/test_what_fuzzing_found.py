@@ -11,12 +11,13 @@ from scipy.io import savemat
 import identification as idn
 import symheli
 import synthesis
-from symheli.errors import DataWarning, InputError, SolverError, UnknownNameError
+from symheli.errors import AccuracyError, DataWarning, InputError, SolverError, UnknownNameError
 from symheli.lpv import LinearModel
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
 from synthesis.design.back_off import levels_above
 from synthesis.program.panic import no_panic
+from synthesis.worst.frozen import norm
 
 T = np.arange(0.0, 4.0, 0.02)
 RNG = np.random.default_rng(0)
@@ -260,3 +261,29 @@ def test_designs_refuse_what_they_cannot_mean():
     ):
         with pytest.raises(InputError, match="expected"):
             design()
+
+
+@pytest.mark.parametrize("gain", [5e-324, 1e-300, 1e-200, 1.0, 1e200, 1e300])
+def test_margins_of_an_integrator_are_those_of_any_units(gain):
+    """k/s: 90 deg at k rad/s, a disk of 2, whatever the unit of time. The squares of k left the
+    range of numbers: an infinite phase at 1e-200, an exception of NumPy at 5e-324 and 1e300.
+    """
+    integrator = LinearModel([[0.0]], [[1.0]], [[gain]], [[0.0]], ["x"], ["u"], ["y"])
+    found = synthesis.margins(integrator)
+    assert (found.phase, found.disk) == pytest.approx((math.pi / 2, 2.0))
+    assert found.crossover == pytest.approx((gain,))
+    assert found.delay == pytest.approx(math.pi / 2 / gain)
+    assert synthesis.disk_margin(integrator) == pytest.approx(2.0)
+
+
+def test_a_response_beyond_the_range_of_numbers_is_refused():
+    with pytest.raises(AccuracyError, match="other units"):
+        norm(np.diag([-1.0, -5e-324]), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
+
+
+def test_a_constant_parameter_has_no_growth_in_a_cycle():
+    """It was NaN, and nothing said so."""
+    p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    lag = symheli.LPVStateSpace.polynomial([[[-1.5]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    found = synthesis.lower_bound(lag)
+    assert (found.trajectory, found.growth) == (None, None)
