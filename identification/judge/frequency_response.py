@@ -145,6 +145,8 @@ def frequency_response(
 
     Raises
     ------
+    InputError
+        A window of less than eight samples, a band that holds no frequency of it.
     ExcitationError
         The inputs move together, or too few windows remain.
 
@@ -241,6 +243,12 @@ def windows(
     dt = records[0].dt
     if not 7.5 * dt < window < np.inf:
         raise InputError(f"window: expected at least eight samples, {8 * dt:.3g} s, got {window} s")
+    longest = max(map(len, records))
+    if window > (longest + 0.5) * dt:
+        raise ExcitationError(
+            f"a window of {window} s is longer than every record; the longest lasts"
+            f" {longest * dt:.4g} s; shorten the window or record longer"
+        )
     n = round(window / dt)
     omega = 2 * np.pi * np.fft.rfftfreq(n, dt)
     low, high = band or (2 * np.pi / window, np.pi / dt)

@@ -215,7 +215,7 @@ def _judge(
             refused=str(error),
         )
     data = stacked(structure, train)
-    error = data.y - data.phi @ model.theta
+    error = data.residuals(model.theta)
     n = len(error)
     sign, logdet = np.linalg.slogdet(error.T @ error / n)
     bic = n * logdet + int(structure.free.sum()) * np.log(n) if sign > 0 else -np.inf

@@ -1,7 +1,7 @@
 """Inputs that once ended in another exception, in NaN without a word or in no answer at all."""
 
 import math
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,14 @@ from scipy.io import savemat
 import identification as idn
 import symheli
 import synthesis
-from symheli.errors import AccuracyError, DataWarning, InputError, SolverError, UnknownNameError
+from symheli.errors import (
+    AccuracyError,
+    DataWarning,
+    ExcitationError,
+    InputError,
+    SolverError,
+    UnknownNameError,
+)
 from symheli.lpv import LinearModel
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
@@ -140,19 +147,27 @@ def test_counts_of_the_judges_are_whole(model, record):
                 judge(count)
 
 
-def test_an_output_that_is_none_is_named():
-    found = SimpleNamespace(scheduled=SimpleNamespace(outputs=("q", "theta")))
-    with pytest.raises(UnknownNameError, match="did you mean 'theta'"):
-        idn.AgainstConstant.pays(found, "thetax")  # type: ignore[arg-type]
+def test_a_verdict_is_on_an_output_of_models_that_can_differ(model, record):
+    """KeyError for a name that is none, ValueError for a structure that is itself constant."""
+    found = idn.against_constant(model.structure, *record.split(0.7))
+    constant = idn.against_constant(model.structure.lti(), *record.split(0.7))
+    for ask in (idn.AgainstConstant.pays, idn.AgainstConstant.verdict_on):
+        with pytest.raises(UnknownNameError, match="unknown output 'yx'; did you mean 'y'"):
+            ask(found, "yx")
+        with pytest.raises(InputError, match="basis of degree 1"):
+            ask(constant, "y")
 
 
 def test_iterations_are_counted():
+    simulator = symheli.SimulatedFlight(symheli.Helicopter.load("xcell60", governor="ideal"))
     for make in (
         lambda n: idn.RefinedInstruments(iterations=n),
         lambda n: idn.OutputError(evaluations=n),
+        lambda n: idn.FilterError(simulator, steps=n),
     ):
-        with pytest.raises(InputError, match="whole number"):
-            make(math.nan)
+        for count in (math.nan, 1.5, 0):
+            with pytest.raises(InputError, match="whole number"):
+                make(count)
 
 
 @pytest.mark.parametrize("back_off", [-1e300, 0.5, math.nan, 1.6e16, ()])
@@ -287,3 +302,101 @@ def test_a_constant_parameter_has_no_growth_in_a_cycle():
     lag = symheli.LPVStateSpace.polynomial([[[-1.5]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     found = synthesis.lower_bound(lag)
     assert (found.trajectory, found.growth) == (None, None)
+
+
+def test_frozen_models_are_compared_below_the_fastest_frequency(model):
+    """No frequency was left to compare: ValueError of an empty maximum."""
+    p = symheli.Scheduling("p", "1", -1.0, 1.0)
+    lag = symheli.LPVStateSpace.polynomial(
+        [[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p, states=["y"], inputs=["u"], outputs=["y"]
+    )
+    asked = {"mode": {0.0: -1.0}, "scales": {"y": 1.0, "u": 1.0}, "channel": ("u", "y")}
+    for fast in (1e300, math.inf, math.nan, 0.81 * math.pi / model.dt):
+        with pytest.raises(InputError, match="fast: expected at most"):
+            idn.frozen_models({0.0: lag.at(0.0)}, lag, model, **asked, fast=fast)
+
+
+@pytest.fixture(scope="module")
+def slow_plant():
+    p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.1)
+    lag = symheli.LPVStateSpace.polynomial(
+        [[[-1.0]], [[-1.0]]], [[[1.0, 1.0]]], [[[1.0]]], [[[0.0, 0.0]]], p, inputs=["w", "u"]
+    )
+    return synthesis.Plant(
+        lag, disturbances=["w"], performance=lag.outputs, controls=["u"], measurements=lag.outputs
+    )
+
+
+@pytest.mark.parametrize("order", [math.nan, math.inf, 1.5, 0, 11])
+def test_a_delay_has_an_order(slow_plant, order):
+    for delayed in (slow_plant.with_delay, lambda t, order: symheli.lpv.pade_delay("u", t, order)):
+        with pytest.raises(InputError, match="order"):
+            delayed(0.1, order=order)
+
+
+@pytest.mark.parametrize("samples", [math.nan, math.inf, 1.5, 0, True])
+def test_a_delay_in_samples_is_counted(samples):
+    with pytest.raises(InputError, match="samples: expected a whole number"):
+        symheli.lpv.sample_delay("u", samples, 0.1)
+
+
+@pytest.mark.parametrize("tolerance", [1e-300, 0.0, -1.0, 1.0, math.nan, math.inf])
+def test_how_far_a_proof_reaches_is_found_to_a_tolerance(slow_plant, tolerance):
+    """1e-300 was bisected to, a proof each time."""
+    with pytest.raises(InputError, match="tolerance"):
+        synthesis.proven_around(slow_plant, {("u", "y1"): -1.0}, 0.5, tolerance=tolerance)
+
+
+@pytest.mark.parametrize("size", [1e100, -1e300, 1.7e308])
+def test_residuals_that_cannot_be_squared_are_refused(model, record, size):
+    """Coefficients of 1e300 made NaN of the share that p explains, and of standard errors."""
+    large = replace(model, theta=np.full(model.theta.shape, size))
+    for judge in (idn.dependence_report, idn.uncertainty, idn.slow_modes):
+        with pytest.raises(InputError, match="residuals of"):
+            judge(large, record)
+
+
+def test_records_that_determine_nothing_say_nothing_of_certainty(model, record):
+    """LinAlgError, where nothing moved; standard errors made of rounding, where p did not."""
+    y, u, p = record["y"], record["u"], np.zeros(len(record))
+    rest = record.with_signals(dict.fromkeys("yup", "1"), y=p, u=p, p=p)
+    held = record.with_signals(dict.fromkeys("yup", "1"), y=y, u=u, p=p)
+    for one in (rest, held):
+        for judge in (idn.uncertainty, idn.slow_modes):
+            with pytest.raises(ExcitationError, match="distinct values"):
+                judge(model, one)
+
+
+@pytest.mark.parametrize("count", [math.nan, -1, 1.5, 1e300])
+def test_samples_of_a_fit_are_counted(model, count):
+    for which in ("rows_used", "rows_dropped"):
+        with pytest.raises(InputError, match=which):
+            replace(model, **{which: count})
+
+
+@pytest.mark.parametrize("window", [1e16, 1e300, 1.7e308])
+def test_a_window_beyond_the_record_is_refused_at_once(record, window):
+    """NumPy was asked for an array of that size, or for the integer of infinity."""
+    with pytest.raises(ExcitationError, match="longer than every record"):
+        idn.frequency_response(record, ["y"], ["u"], window=window)
+
+
+@pytest.mark.parametrize("horizon", [4e16, 12.0, 0.0, -1.0, math.nan, math.inf])
+def test_a_model_is_judged_over_a_horizon_within_the_record(model, record, horizon):
+    """11.9 s of record: a horizon beyond gave NaN for Theil's coefficient."""
+    with pytest.raises(InputError, match=r"horizon: .* up to 11\.9 of the longest record"):
+        idn.fit_for_control(
+            model,
+            record,
+            {("u", "y"): -0.1},
+            scales={"y": 1.0, "u": 1.0},
+            window=4.0,
+            horizon=horizon,
+        )
+
+
+def test_theils_coefficient_is_that_of_numbers_that_can_be_squared():
+    """1e300 beside 1 counted as rounding, a perfect prediction; nothing at all as NaN."""
+    for y, guess in (([1.0, 2.0], [1e300, 2.0]), ([1e300, 2.0], [1.0, 2.0]), ([], [])):
+        with pytest.raises(InputError, match="two finite arrays"):
+            idn.theil(np.array(y), np.array(guess))
