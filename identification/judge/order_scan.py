@@ -30,7 +30,8 @@ class Trial:
         Bayesian information criterion of the training residuals, smaller is better; NaN where
         refused.
     one_step, ahead, free_run : array (ny,)
-        Fits one step, `OrderScan.horizon` samples and a free run ahead, %.
+        Fits one step, `OrderScan.horizon` samples and a free run ahead, %; NaN where refused, and
+        where a validation record is too short for one.
     refused : str
         Why the data do not determine it, empty where they do.
 

@@ -56,7 +56,8 @@ class Scores:
     ) -> Scores:
         """Of predictions (n, ny) beside what was `measured`, a column an output.
 
-        Raises `InputError` unless every output has one column.
+        NaN for an output of which no row has both a measurement and a prediction. Raises
+        `InputError` unless every output has one column, and as `fit_percent`.
         """
         columns = 1 if measured.ndim < 2 else measured.shape[1]
         if len(set(outputs)) != len(outputs) or len(outputs) != columns:

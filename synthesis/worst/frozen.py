@@ -21,7 +21,7 @@ Array = np.ndarray
 
 class FrozenGain(NamedTuple):
     """The largest frozen gain `gamma`, the `p` and frequency `omega` (rad/s) where it occurs; inf
-    where unstable.
+    and NaN where unstable.
     """
 
     gamma: float
@@ -45,7 +45,8 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     Returns
     -------
     FrozenGain
-        `gamma` (inf where a frozen model is unstable), `p` and `omega` (rad/s) where it occurs.
+        `gamma` (inf where a frozen model is unstable), `p` and `omega` (rad/s; then NaN) where it
+        occurs.
 
     References
     ----------
