@@ -29,6 +29,7 @@ sys.path.append(str(ROOT / "tests" / "reliability"))
 import damaged_files  # noqa: E402
 import entries  # noqa: E402
 import fuzzed  # noqa: E402
+import good_files  # noqa: E402
 from valid_calls import PACKAGES, ValidCall, caught  # noqa: E402
 
 OUTCOMES = ("refused", "refused by Python", "result", "another exception", "too long", "crash")
@@ -40,7 +41,7 @@ def rows(package: str, quick: bool) -> dict[str, fuzzed.Tally]:
         with tempfile.TemporaryDirectory() as folder:
             return {
                 reader.entry: damaged_files.tally(reader, 16 if quick else damaged_files.USUAL)
-                for reader in damaged_files.readers(Path(folder))
+                for reader in good_files.readers(Path(folder))
             }
     calls: dict[str, list[ValidCall]] = {}
     for call in caught(lambda name: name.startswith(package + ".")):

@@ -130,8 +130,8 @@ class BaselinePredictor:
         )
 
     def predict(self, outputs: Sequence[str], horizon: int) -> Array:
-        """Outputs (n, ny) `horizon` samples ahead from every sample, NaN for the first `horizon` and
-        where a state so long before is missing.
+        """Outputs (n, ny) `horizon` samples ahead from every sample, NaN for the first `horizon`
+        and where a state so long before is missing.
 
         Raises `InputError` for a horizon that is no number of samples within the record,
         `UnknownNameError` for an output that is neither a state nor an output of the model.

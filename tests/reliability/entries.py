@@ -8,6 +8,7 @@ ERRORS = "raised or warned with, not called"
 PROTOCOL = "a protocol: nothing to call"
 CHOICE = "a choice of the package: its values are listed"
 ARITHMETIC = "computes with what it is given, NaN too; what comes in is checked by its users"
+CONTEXT = "a context manager, entered by contextlib and not by the example; its check has a test"
 RESULT = "made by the package alone, from what it has checked: see the entry that returns it"
 
 EXEMPT: dict[str, str] = {
@@ -72,6 +73,7 @@ EXEMPT: dict[str, str] = {
         )
     },
     "synthesis.PolynomialMatrix": ARITHMETIC,
+    "symheli.watched": CONTEXT,
 }
 """Public callables whose making is not fuzzed; their methods are, where an example calls them."""
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from verdict import NotANumber, not_a_number
 
-from identification.judge.scores import predicted, steps
+from identification.judge.scores import steps
 from identification.structure.kinematic_arx import STATES
 from identification.structure.regressors import as_records
 from synthesis import Certificate, Grid
@@ -155,7 +155,10 @@ def _nothing_predicted(found: NotANumber, arguments: Arguments) -> bool:
     if name:
         names = ("one_step", "ahead", "free_run")
         horizon = dict(zip(names, steps(model.dt, horizon).values(), strict=True))[name]
-    guess = predicted(model, record, horizon, **_held(arguments))
+    if horizon is None:
+        guess = model.simulate(record)
+    else:
+        guess = model.predict(record, horizon, **_held(arguments))
     return _nothing_shared(record[output], _column(guess, model.outputs, output))
 
 

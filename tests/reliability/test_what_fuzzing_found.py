@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from damaged_files import damaged, ulog_of
+from damaged_files import damaged
+from good_files import ulog_of
 from scipy.io import savemat
 
 import identification as idn
@@ -327,6 +328,24 @@ def slow_plant():
     )
 
 
+@pytest.fixture(scope="module")
+def sampled_plant():
+    p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.1)
+    lag = symheli.LPVStateSpace.polynomial(
+        [[[0.9]], [[0.3]]],
+        [[[0.1, 0.1]]],
+        [[[1.0]]],
+        [[[0.0, 0.0]]],
+        p,
+        dt=0.1,
+        inputs=["w", "u"],
+        outputs=["y"],
+    )
+    return synthesis.Plant(
+        lag, disturbances=["w"], performance=["y"], controls=["u"], measurements=["y"]
+    )
+
+
 @pytest.mark.parametrize("order", [math.nan, math.inf, 1.5, 0, 11])
 def test_a_delay_has_an_order(slow_plant, order):
     for delayed in (slow_plant.with_delay, lambda t, order: symheli.lpv.pade_delay("u", t, order)):
@@ -400,3 +419,29 @@ def test_theils_coefficient_is_that_of_numbers_that_can_be_squared():
     for y, guess in (([1.0, 2.0], [1e300, 2.0]), ([1e300, 2.0], [1.0, 2.0]), ([], [])):
         with pytest.raises(InputError, match="two finite arrays"):
             idn.theil(np.array(y), np.array(guess))
+
+
+def test_a_listener_can_be_called():
+    """TypeError in the middle of the work that was told of."""
+    with pytest.raises(InputError, match="listener"), symheli.watched("progress"):  # type: ignore[arg-type]
+        pytest.fail("entered")
+
+
+@pytest.mark.parametrize("error", [1.0, 1e16, 1e300])
+def test_a_reading_is_wrong_by_the_range_at_most(sampled_plant, error):
+    """LinAlgError at 1e300; a reading beyond the range counts as its end, so that all of these are
+    one. u = -(1 + 3 p) y is wrong by at most 3 y.
+    """
+    nothing, through, p = np.zeros((0, 0)), np.zeros((0, 1)), sampled_plant.parameters[0]
+    gain = symheli.LPVStateSpace.polynomial(
+        [nothing],
+        [through],
+        [np.zeros((1, 0))],
+        [[[-1.0]], [[-3.0]]],
+        p,
+        inputs=["y"],
+        outputs=["u"],
+    )
+    wrong = synthesis.with_wrong_parameter(sampled_plant, gain, error)
+    _, B, C, _ = wrong.model.matrices(0.5)
+    assert abs(float(C[1, 0] * B[0, 1])) == pytest.approx(0.1 * 3.0)
