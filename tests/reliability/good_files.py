@@ -7,6 +7,7 @@ import pickle
 import shutil
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +23,10 @@ from studies.campaigns.dataset import CampaignDataset
 from studies.campaigns.trial import Outcome, Trial
 from studies.transition.stored_stages import Stored, StoredStages
 from symheli.logs.signal_map import SignalMap
+from symheli.lpv.linear_models import LinearModels
+from symheli.values import NamedVector, Signal, signals
+from symheli.values.operating_point import OperatingPoint
+from symheli.values.operating_points import OperatingPoints
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -47,7 +52,7 @@ class Reader(NamedTuple):
 
 def readers(folder: Path) -> list[Reader]:
     """Every reader, each with a good file in `folder`."""
-    found = [*_logs(folder), *_saved(folder), *_families(folder), *_folders(folder)]
+    found = [*_logs(folder), *_saved(folder), *_families(folder), *folders(folder)]
     vehicle = folder / "vehicle.toml"
     packaged = ROOT / "symheli" / "airframe" / "vehicles" / "xcell60.toml"
     vehicle.write_bytes(packaged.read_bytes())
@@ -137,7 +142,8 @@ def _saved(folder: Path) -> list[Reader]:
         q=np.sin(np.arange(40)),
         u=np.where(np.arange(40) % 7, 0.1, np.nan),
     )
-    record.with_meta(mass=8.2, trim=np.arange(3.0), plan={"laps": (1, 2)}).save(folder / "r.npz")
+    meta = {"mass": 8.2, "trim": np.arange(3.0), "plan": {"laps": (1, 2)}}
+    replace(record, meta=meta).save(folder / "r.npz")
     return [
         Reader("controller table", folder / "table.json", symheli.TableController.load),
         Reader("kinematic model", folder / "kinematic.json", identification.KinematicModel.load),
@@ -157,17 +163,28 @@ def _of_record(record: symheli.FlightRecord) -> bytes:
 
 def _families(folder: Path) -> list[Reader]:
     """Linear models over airspeed, and over climb rate too."""
-    speeds, rates = [2.0, 5.0, 8.0], [0.0, 1.0]
-    names = {"states": ("v", "p"), "inputs": ("d_lat",), "outputs": ("v", "p")}
+    speeds = np.array([2.0, 5.0, 8.0])
+    states, inputs = signals(("v", "p")), signals(("d_lat",))
 
-    def models(count: int) -> symheli.lpv.LinearModels:
-        rng = np.random.default_rng(0)
+    def models(at: np.ndarray) -> LinearModels:
+        rng, count = np.random.default_rng(0), len(at)
         shapes = {"A": (2, 2), "B": (2, 1), "C": (2, 2), "D": (2, 1)}
         arrays = {name: rng.standard_normal((count, *shape)) for name, shape in shapes.items()}
-        return symheli.lpv.LinearModels(**arrays, **names)
+        points = [
+            OperatingPoint(
+                NamedVector(states, [0.1 * speed, 0.0]),
+                NamedVector(inputs, [0.01 * speed]),
+                NamedVector(states, [0.0, 0.0]),
+                speed,
+            )
+            for speed in at.tolist()
+        ]
+        trims = OperatingPoints.of(points)
+        return LinearModels(**arrays, states=states, inputs=inputs, outputs=states, points=trims)
 
-    family = symheli.LinearFamily.from_models(speeds, models(3), {"stall": (3.5,)})
-    grid = symheli.LinearGrid.from_models({"airspeed": speeds, "climb_rate": rates}, models(6))
+    family = symheli.LinearFamily.from_models(speeds, models(speeds), {"stall": (3.5,)})
+    axes = (Signal("airspeed"), Signal("climb_rate", "m/s"))
+    grid = symheli.LinearGrid(axes, (speeds, [0.0, 1.0]), models(np.repeat(speeds, 2)))
     family.save(folder / "family.json")
     family.save(folder / "family.npz")
     grid.save(folder / "grid.json")
@@ -185,7 +202,7 @@ def _of_family(family: symheli.LinearFamily) -> bytes:
     return pickle.dumps((arrays, groups, models.dt, family.kinks))
 
 
-def _folders(folder: Path) -> list[Reader]:
+def folders(folder: Path) -> list[Reader]:
     """Campaigns, a row a case, and flights, a row a flight."""
     trial = Trial(_pendulum, {"period": "s"})
     campaign = Campaign(trial, grid={"length": [0.5, 1.0, -1.0], "kind": ["rod"]})
@@ -208,16 +225,16 @@ def _folders(folder: Path) -> list[Reader]:
         flights=2,
         chunk=1,
         time=np.arange(3.0),
-        signals=(symheli.lpv.Signal("u"), symheli.lpv.Signal("w")),
+        signals=(Signal("u"), Signal("w")),
         seeds=[3, 4],
         attributes={"vehicle": "xcell60"},
     )
     for chunk in (0, 1):
         flown.write(chunk, np.ones((1, 3, 2)), np.array([2.0]), np.array([False]))
     return [
-        Reader("campaign", path, _rows),
-        Reader("campaign, resumed", path, resumed),
-        Reader("flights", flights, _flights),
+        Reader("campaign", path, _rows, content=_what_was_asked),
+        Reader("campaign, resumed", path, resumed, content=_what_was_asked),
+        Reader("flights", flights, _flights, content=lambda found: found["u"].shape),
     ]
 
 
@@ -236,6 +253,10 @@ def _rows(path: Path) -> dict[str, Any]:
         "units": dataset.units,
         "seconds": dataset["seconds"],
     }
+
+
+def _what_was_asked(found: dict[str, Any]) -> bytes:
+    return pickle.dumps((found["length"], found["units"], found["finished"]))
 
 
 def _flights(path: Path) -> dict[str, Any]:

@@ -3,10 +3,10 @@
 import math
 from dataclasses import replace
 
+import good_files
 import numpy as np
 import pytest
 from damaged_files import damaged
-from good_files import ulog_of
 from scipy.io import savemat
 
 import identification as idn
@@ -232,7 +232,7 @@ def test_a_topic_of_a_ulog_without_time_stamps_is_left_out_and_said(tmp_path):
     """One flipped bit in the name of the field ended in KeyError."""
     pytest.importorskip("pyulog")
     path = tmp_path / "log.ulg"
-    path.write_bytes(ulog_of(T).replace(b"timestamp;", b"tilestamp;"))
+    path.write_bytes(good_files.ulog_of(T).replace(b"timestamp;", b"tilestamp;"))
     with pytest.warns(DataWarning, match="damaged"), pytest.raises(InputError, match="armed"):
         symheli.FlightRecord.from_ulog(path, {"q": ("rates", "xyz[1]", "rad/s")}, dt=0.02)
 
@@ -445,3 +445,49 @@ def test_a_reading_is_wrong_by_the_range_at_most(sampled_plant, error):
     wrong = synthesis.with_wrong_parameter(sampled_plant, gain, error)
     _, B, C, _ = wrong.model.matrices(0.5)
     assert abs(float(C[1, 0] * B[0, 1])) == pytest.approx(0.1 * 3.0)
+
+
+def test_an_empty_archive_of_models_is_refused(tmp_path):
+    """EOFError of NumPy."""
+    (tmp_path / "family.npz").write_bytes(b"")
+    with pytest.raises(InputError, match="not a whole file"):
+        symheli.LinearFamily.load(tmp_path / "family.npz")
+
+
+@pytest.mark.parametrize(
+    ("file", "content"),
+    [
+        ("duration/.zarray", b'{"shape": [2'),
+        ("duration/.zarray", b'{"shape": [2], "chunks": [[]], "dtype": "<f8", "fill_value": 0}'),
+        ("time/.zarray", b'{"shape": [3], "chunks": [3], "dtype": "|O", "fill_value": null}'),
+        (
+            "values/.zarray",
+            b'{"shape": [9, 3, 2], "chunks": [1, 3, 2], "dtype": "<f8", "fill_value": "NaN"}',
+        ),
+    ],
+)
+def test_a_damaged_description_of_flights_is_refused(tmp_path, file, content):
+    """JSONDecodeError, TypeError, or seven flights more than there were."""
+    path = next(one for one in good_files.folders(tmp_path) if one.entry == "flights").path
+    (path / file).write_bytes(content)
+    with pytest.raises(InputError, match="damaged"):
+        symheli.FlightDataset(path)
+
+
+def test_damaged_parameters_of_a_campaign_are_refused_and_damaged_descriptions_said_anew(tmp_path):
+    campaign = next(one for one in good_files.folders(tmp_path) if one.entry == "campaign")
+    (campaign.path / "values" / ".zarray").write_bytes(b"{")
+    assert campaign.read(campaign.path)["period"][:2].tolist() == [1.4, 2.0]
+    cases = campaign.path / "cases.json"
+    cases.write_bytes(cases.read_bytes().replace(b"0.5", b"0.7"))
+    with pytest.raises(InputError, match="digest"):
+        campaign.read(campaign.path)
+
+
+def test_a_reason_that_is_no_text_is_refused(tmp_path):
+    """ValueError of a character beyond the last one."""
+    campaign = next(one for one in good_files.folders(tmp_path) if one.entry == "campaign")
+    reason = campaign.path / "reason" / "2"
+    reason.write_bytes(b"\xff" * len(reason.read_bytes()))
+    with pytest.raises(InputError, match="no text"):
+        campaign.read(campaign.path)
