@@ -178,7 +178,7 @@ def fit_for_control(
     ------
     InputError
         Scales that are not positive or name no output or no input; points that are missing; a
-        horizon that is not positive or longer than every record.
+        horizon or a window that is not positive or longer than every record.
     UnknownNameError
         A signal of the loop that is not in the plant.
 
@@ -200,11 +200,12 @@ def fit_for_control(
         if not (np.isfinite(size) and size > 0):
             raise InputError(f"scales: expected sizes greater than 0, got {name} = {size!r}")
     longest = (max(map(len, records)) - 1) * model.dt
-    if not 0 < horizon <= longest:
-        raise InputError(
-            f"horizon: expected seconds greater than 0, up to {longest:g} of the longest record,"
-            f" got {horizon}"
-        )
+    for name, seconds in (("horizon", horizon), ("window", window)):
+        if not 0 < seconds <= longest:
+            raise InputError(
+                f"{name}: expected seconds greater than 0, up to {longest:g} of the longest"
+                f" record, got {seconds}"
+            )
     outputs = tuple(str(y) for y in model.outputs if y in scales)
     inputs = tuple(str(u) for u in model.inputs if u in scales)
     if not outputs or not inputs:

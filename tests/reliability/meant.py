@@ -78,6 +78,11 @@ def _as_given(_: NotANumber, arguments: Arguments) -> bool:
     return any(True for _ in not_a_number(dict(arguments)))
 
 
+def _no_point(found: NotANumber, _: Arguments) -> bool:
+    there = [[point is not None for point in row] for row in found.owners[-1].points]
+    return _none_where(np.array(there), found)
+
+
 def _lost(found: NotANumber, _: Arguments) -> bool:
     """From an instant on, to the end of the flight."""
     bad = ~np.isfinite(found.value).all(axis=2)
@@ -197,6 +202,7 @@ BY_FIELD: dict[str, Rule] = {
     "Bandwidth.phase_delay": _no_phase_delay,
     "FlightRecord.values": _as_given,
     "Batch.states": _lost,
+    "TrimMap.power": _no_point,
     "RLSInfo.innovation": lambda found, _: not found.owners[-1].available,
     "RLSInfo.gain": lambda found, _: not found.owners[-1].available,
     "History.innovations": _past_is_incomplete,

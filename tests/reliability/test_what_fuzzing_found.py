@@ -400,17 +400,16 @@ def test_a_window_beyond_the_record_is_refused_at_once(record, window):
         idn.frequency_response(record, ["y"], ["u"], window=window)
 
 
-@pytest.mark.parametrize("horizon", [4e16, 12.0, 0.0, -1.0, math.nan, math.inf])
-def test_a_model_is_judged_over_a_horizon_within_the_record(model, record, horizon):
-    """11.9 s of record: a horizon beyond gave NaN for Theil's coefficient."""
-    with pytest.raises(InputError, match=r"horizon: .* up to 11\.9 of the longest record"):
+@pytest.mark.parametrize("seconds", [4e16, 12.0, 0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("name", ["horizon", "window"])
+def test_a_model_is_judged_over_a_horizon_and_windows_within_the_record(
+    model, record, name, seconds
+):
+    """11.9 s of record: what lies beyond gave NaN for Theil's coefficient and for J."""
+    within = {"horizon": 1.0, "window": 4.0, name: seconds}
+    with pytest.raises(InputError, match=rf"{name}: .* up to 11\.9 of the longest record"):
         idn.fit_for_control(
-            model,
-            record,
-            {("u", "y"): -0.1},
-            scales={"y": 1.0, "u": 1.0},
-            window=4.0,
-            horizon=horizon,
+            model, record, {("u", "y"): -0.1}, scales={"y": 1.0, "u": 1.0}, **within
         )
 
 
@@ -491,3 +490,26 @@ def test_a_reason_that_is_no_text_is_refused(tmp_path):
     reason.write_bytes(b"\xff" * len(reason.read_bytes()))
     with pytest.raises(InputError, match="no text"):
         campaign.read(campaign.path)
+
+
+def test_gusts_are_forgotten_however_far_apart_the_samples_are():
+    """inf exp(-inf), NaN, at 1e300 m/s; what lies 1000 lengths apart is white already."""
+    gust = symheli.Dryden(wind=5.0, altitude=50.0)
+    far, farther = (gust.history(T, speed, 1) for speed in (1e12, 1.7e308))
+    np.testing.assert_array_equal(far, farther)
+    assert np.all(np.isfinite(far))
+
+
+def test_information_of_an_experiment_is_finite():
+    """LinAlgError where experiments were chosen among."""
+    for factor, seconds in ((np.full((2, 2), np.nan), 1.0), (np.eye(2)[:1], 1.0), (np.eye(2), 0.0)):
+        with pytest.raises(InputError, match=r"factor|duration"):
+            idn.Experiment("one", seconds, factor, {})
+
+
+def test_controls_are_on_their_stops_or_not(ideal):
+    """NaN was carried on, as true."""
+    trims = symheli.trim_batch(ideal, airspeed=[4.0, 5.0])
+    for name in ("on_stops", "vortex_ring"):
+        with pytest.raises(InputError, match=f"{name}: expected truth values"):
+            replace(trims, **{name: np.full(getattr(trims, name).shape, np.nan)})
