@@ -21,7 +21,7 @@ from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.lpv.stability_margin import Feedback
 from symheli.records import FlightRecord
-from symheli.values.arrays import Array
+from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
 
 POINTS = 9
@@ -178,7 +178,8 @@ def fit_for_control(
     ------
     InputError
         Scales that are not positive or name no output or no input; points that are missing; a
-        horizon or a window that is not positive or longer than every record.
+        horizon or a window that is not positive or longer than every record; a covariance of
+        another shape.
     UnknownNameError
         A signal of the loop that is not in the plant.
 
@@ -217,6 +218,8 @@ def fit_for_control(
     joint = covariance
     if joint is None and isinstance(model, KinematicModel):
         joint = model.coefficient_covariance
+    if joint is not None:
+        joint = frozen(joint, "covariance", 2 * model.theta.shape[::-1])
     plant = FrozenPlant(model, outputs, inputs)
     thetas = None
     if joint is not None:

@@ -120,6 +120,11 @@ def norm(
     peak = _Peak(float(np.linalg.norm(D, 2)), math.inf).or_higher(response, start)
     if peak.gain == 0.0:
         return 0.0, 0.0
+    # the response in units in which it is about 1, whose squares are within the range of numbers
+    size = round(math.log2(peak.gain))
+    D, peak = np.ldexp(D, -size), _Peak(math.ldexp(peak.gain, -size), peak.omega)
+    B, C = of_one_size(B, C, -size)
+    response = response.scaled(-size)
     peak = peak.climbed(response, poles)
     for _ in range(50):
         named = np.unique(
@@ -136,7 +141,7 @@ def norm(
     omega = math.ldexp(peak.omega, pace)
     if dt is not None:
         omega = 2.0 * math.atan(omega) / dt if math.isfinite(omega) else math.pi / dt
-    return peak.gain, omega
+    return math.ldexp(peak.gain, size), omega
 
 
 class _Response(NamedTuple):
@@ -149,6 +154,11 @@ class _Response(NamedTuple):
     C: Array
     D: Array
     discrete: bool
+
+    def scaled(self, power: int) -> _Response:
+        """2^`power` times this one."""
+        B, C = of_one_size(self.B, self.C, power)
+        return self._replace(B=B, C=C, D=np.ldexp(self.D, power))
 
     def gain(self, omega: Array) -> Array:
         """At each omega (k,), refined once with residuals in extended precision: at light damping

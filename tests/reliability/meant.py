@@ -78,6 +78,11 @@ def _as_given(_: NotANumber, arguments: Arguments) -> bool:
     return any(True for _ in not_a_number(dict(arguments)))
 
 
+def _not_finite_given(_: NotANumber, arguments: Arguments) -> bool:
+    given = (arguments[name] for name in ("x", "u", "wind", "lookup"))
+    return any(one is not None and not np.isfinite(one).all() for one in given)
+
+
 def _no_point(found: NotANumber, _: Arguments) -> bool:
     there = [[point is not None for point in row] for row in found.owners[-1].points]
     return _none_where(np.array(there), found)
@@ -215,7 +220,7 @@ BY_FIELD: dict[str, Rule] = {
 
 BY_ENTRY: dict[str, tuple[tuple[str, Rule], ...]] = {
     "symheli.NamedVector": ((r"\[.*\]", _as_given),),
-    "symheli.StitchedModel.rhs": (("", _as_given),),
+    "symheli.StitchedModel.rhs": (("", _not_finite_given),),
     "identification.BaselinePredictor.predict": (("", _first_of_the_horizon),),
     "identification.LPVARXModel.predict": (("", _past_is_incomplete),),
     "identification.KinematicModel.predict": (("", _past_is_incomplete),),

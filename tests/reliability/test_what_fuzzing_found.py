@@ -12,6 +12,7 @@ from scipy.io import savemat
 import identification as idn
 import symheli
 import synthesis
+from identification.estimators.block_banded import Whitening
 from symheli.errors import (
     AccuracyError,
     DataWarning,
@@ -255,9 +256,14 @@ def test_scores_have_a_name_a_column():
     for names in ([], ["y", "y"]):
         with pytest.raises(InputError, match="outputs"):
             idn.Scores.of(y, names, one_step=y, ahead=y, free_run=y)
+    for horizon in (math.nan, 0.0, -1.0, math.inf):
+        with pytest.raises(InputError, match="horizon"):
+            idn.Scores.of(y, ["y"], one_step=y, ahead=y, free_run=y, horizon=horizon)
 
 
-@pytest.mark.parametrize("lags", [{"nb": 1.5}, {"nb": math.nan}, {"na": (1,) * 12}])
+@pytest.mark.parametrize(
+    "lags", [{"na": 1.5}, {"na": math.nan}, {"nb": 1.5}, {"nb": math.nan}, {"na": (1,) * 12}]
+)
 def test_lags_of_a_vehicle_are_counted(lags):
     given = {"nb": 1, **lags}
     with pytest.raises(InputError, match=r"na:|nb:"):
@@ -513,3 +519,69 @@ def test_controls_are_on_their_stops_or_not(ideal):
     for name in ("on_stops", "vortex_ring"):
         with pytest.raises(InputError, match=f"{name}: expected truth values"):
             replace(trims, **{name: np.full(getattr(trims, name).shape, np.nan)})
+
+
+@pytest.mark.parametrize("shape", [(0, 2, 1, 2), (1, 2, 2), (2, 2, 2, 2)])
+def test_a_covariance_is_that_of_the_coefficients(model, record, shape):
+    with pytest.raises(InputError, match="covariance: expected shape"):
+        idn.fit_for_control(
+            model,
+            record,
+            {("u", "y"): -0.1},
+            scales={"y": 1.0, "u": 1.0},
+            covariance=np.zeros(shape),
+            window=4.0,
+            horizon=1.0,
+        )
+
+
+@pytest.mark.parametrize("seconds", [1e8, 5.6e16, 1e300])
+def test_a_flight_of_a_billion_samples_is_refused_and_not_begun(ideal, seconds):
+    schedule = symheli.AirspeedSchedule((5.0,), (1.0,), (0.5,), start=4.0, lead=seconds)
+    with pytest.raises(InputError, match="samples"):
+        symheli.fly(ideal, schedule)
+
+
+def test_an_operating_point_has_an_airspeed(ideal):
+    point = symheli.trim(ideal, airspeed=5.0)
+    for speed in (math.nan, math.inf):
+        with pytest.raises(InputError, match="airspeed"):
+            replace(point, airspeed=speed)
+
+
+def test_the_misfit_of_a_table_is_a_number(ideal):
+    lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=0.02, points=3)
+    table = symheli.TableController.of(lqr.scheduled_controller.model, 5)
+    for misfit in (math.nan, -1.0):
+        with pytest.raises(InputError, match="misfit"):
+            replace(table, misfit=misfit)
+
+
+def test_noise_that_cannot_be_weighed_is_refused():
+    """Gusts of 3e10 m/s ended in LinAlgError."""
+    ones = np.ones((5, 2, 1))
+    for large in (1e40, math.inf):
+        with pytest.raises(AccuracyError, match="check their units"):
+            Whitening.of([([np.tile(np.eye(2), (5, 1, 1))], np.ones(2)), ([ones], [large])])
+
+
+@pytest.mark.parametrize("scale", [5e-324, 1e-300, 1e-160, 1.0, 1e160, 1e300])
+def test_a_norm_is_that_of_any_units(scale):
+    """1/(s^2 + s + 1): 2/sqrt(3) at sqrt(1/2). Squares of 1e-160 made a singular matrix."""
+    A, B, C = np.array([[-1.0, 1.0], [-1.0, 0.0]]), np.array([[0.0], [1.0]]), np.array([[scale, 0]])
+    gain, omega = norm(A, B, C, np.zeros((1, 1)))
+    assert (gain, omega) == pytest.approx((2 / math.sqrt(3) * scale, math.sqrt(0.5)), rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [5e-324, 1e-300, 1e-160, 1e160, 1e300])
+def test_designs_refuse_weights_that_cannot_be_squared(size):
+    """LinAlgError and OverflowError; the least H2 norm of a plant of 1e300 was 0."""
+    lag = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
+    with pytest.raises(InputError, match=r"other units|below what squares"):
+        synthesis.mixed_sensitivity(lag, 1.0, size)
+    D = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, size], [0.0, 1.0, 0.0]])
+    B, C = np.array([[1.0, 0.0, 3.0]]), np.array([[1.0], [0.0], [2.0]])
+    plant = LinearModel([[0.0]], B, C, D, ["x"], ["w1", "w2", "u"], ["z1", "z2", "y"])
+    for design in (synthesis.hinf, synthesis.h2):
+        with pytest.raises(InputError, match=r"other units|price of u"):
+            design(plant, ["u"], ["y"])
