@@ -134,6 +134,11 @@ def _not_predicted(found: NotANumber, arguments: Arguments) -> bool:
     return _none_where(_unbroken(record, record.signals, samples), found)
 
 
+def _not_measured(found: NotANumber, arguments: Arguments) -> bool:
+    measured = arguments["record"].columns(STATES)
+    return not (np.isnan(found.value) & ~np.isnan(measured)).any()
+
+
 def _nothing_shared(measured: Any, guess: Any) -> bool:
     return not np.any(~np.isnan(measured) & ~np.isnan(guess))
 
@@ -224,6 +229,7 @@ BY_ENTRY: dict[str, tuple[tuple[str, Rule], ...]] = {
     "identification.BaselinePredictor.predict": (("", _first_of_the_horizon),),
     "identification.LPVARXModel.predict": (("", _past_is_incomplete),),
     "identification.KinematicModel.predict": (("", _past_is_incomplete),),
+    "identification.KinematicObserver.run": (("", _not_measured),),
     "identification.LPVARXModel.score": ((r"\['\w+'\]", _nothing_predicted),),
     "identification.KinematicModel.score": ((r"\['\w+'\]", _nothing_predicted),),
     "identification.Scores.of": ((r"\.(one_step|ahead|free_run)\['\w+'\]", _nothing_to_compare),),
