@@ -165,8 +165,6 @@ def frequency_response(
     outputs, inputs = units_of(outputs, records), units_of(inputs, records)
     if not (outputs and inputs):
         raise InputError("outputs, inputs: name at least one of each")
-    if band is not None and len(band) != 2:
-        raise InputError(f"band: expected (low, high) in rad/s, got {band!r:.80}")
     omega, pieces = windows(records, (*inputs, *outputs), window, band)
     mean = np.mean([S for S, _ in pieces], axis=0)
     return response_of(omega, mean, len(pieces), outputs, inputs, window)
@@ -240,6 +238,8 @@ def windows(
     Raises `InputError` for a window or a band that holds nothing, `ExcitationError` where no window
     is unbroken.
     """
+    if band is not None and len(band) != 2:
+        raise InputError(f"band: expected (low, high) in rad/s, got {band!r:.80}")
     dt = records[0].dt
     if not 7.5 * dt < window < np.inf:
         raise InputError(f"window: expected at least eight samples, {8 * dt:.3g} s, got {window} s")

@@ -184,9 +184,10 @@ def _held(arguments: Arguments) -> dict[str, bool]:
 def _refused_or_too_short(found: NotANumber, arguments: Arguments) -> bool:
     """Of a `Trial`: its mean over the records, of which one that predicts nothing makes NaN."""
     trial = found.owners[-1]
+    horizon = arguments["horizon"] if found.where.endswith(".ahead") else 1
     known = (
-        _unbroken(one, _names(trial.structure), trial.structure.memory + arguments["horizon"])
-        for one in as_records(arguments["test"])
+        _unbroken(one, _names(trial.structure), trial.structure.memory + horizon)
+        for one in as_records(arguments["validation"])
     )
     return bool(trial.refused) or any(not one.any() for one in known)
 

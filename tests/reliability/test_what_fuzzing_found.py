@@ -21,7 +21,7 @@ from symheli.errors import (
     SolverError,
     UnknownNameError,
 )
-from symheli.lpv import LinearModel
+from symheli.lpv import LinearModel, LinearModels
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
 from synthesis.design.back_off import levels_above
@@ -585,3 +585,33 @@ def test_designs_refuse_weights_that_cannot_be_squared(size):
     for design in (synthesis.hinf, synthesis.h2):
         with pytest.raises(InputError, match=r"other units|price of u"):
             design(plant, ["u"], ["y"])
+
+
+@pytest.mark.parametrize("size", [0.0, -1.0, 1e-300, 1e300])
+def test_gaps_are_those_of_channels_in_some_scale(size):
+    """0 and 1e300 made NaN of the responses, and ValueError of their winding number."""
+    lag = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"], 0.1)
+    many = LinearModels.of([lag])
+    for scales in ({"input_scale": size}, {"output_scale": size}):
+        for gap in (
+            lambda **s: symheli.lpv.nu_gap(lag, lag, **s),
+            lambda **s: symheli.lpv.nu_gaps(lag, many, **s),
+            lambda **s: symheli.lpv.chordal_distance(lag, lag, [1.0], **s),
+            lambda **s: symheli.lpv.stability_margin(lag, {("u", "y"): -0.1}, **s),
+        ):
+            with pytest.raises(InputError, match="scale"):
+                gap(**scales)
+
+
+@pytest.mark.parametrize("band", [(0.3,), (0.3, 1.0, 2.0), ()])
+def test_a_model_is_judged_over_a_band_of_two_ends(model, record, band):
+    with pytest.raises(InputError, match="band"):
+        idn.fit_for_control(
+            model,
+            record,
+            {("u", "y"): -0.1},
+            scales={"y": 1.0, "u": 1.0},
+            window=4.0,
+            horizon=1.0,
+            band=band,
+        )
