@@ -24,6 +24,9 @@ from symheli.records import FlightRecord
 from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
 
+HORIZON, WINDOW = 5.0, 8.0
+"""Seconds that a model is judged over, and windows of its spectra, unless told otherwise."""
+
 POINTS = 9
 """Values of one scheduling parameter at which a model is judged unless told otherwise."""
 
@@ -108,8 +111,8 @@ def fit_for_control(
     covariance: Array | None = None,
     second: Model | Sequence[Model] = (),
     truth: Mapping[Any, LinearModel] | None = None,
-    horizon: float = 5.0,
-    window: float = 8.0,
+    horizon: float | None = None,
+    window: float | None = None,
     band: tuple[float, float] = (0.3, 20.0),
     draws: int = 200,
     seed: int = 0,
@@ -158,10 +161,10 @@ def fit_for_control(
         covariance knows nothing of what the basis cannot hold; a fit with one degree more does.
     truth : mapping, optional
         {point: LinearModel}, continuous or at the sample period. Stands beside and decides nothing.
-    horizon : float
-        Of the predictions, s.
-    window : float
-        Of the spectral estimate, s.
+    horizon : float, optional
+        Of the predictions, s; default 5 s, or what a shorter record has.
+    window : float, optional
+        Of the spectral estimate, s; default 8 s, or what a shorter record has.
     band : (float, float)
         rad/s, of the spectral estimate.
     draws : int
@@ -201,6 +204,8 @@ def fit_for_control(
         if not (np.isfinite(size) and size > 0):
             raise InputError(f"scales: expected sizes greater than 0, got {name} = {size!r}")
     longest = (max(map(len, records)) - 1) * model.dt
+    horizon = min(HORIZON, longest) if horizon is None else horizon
+    window = min(WINDOW, longest) if window is None else window
     for name, seconds in (("horizon", horizon), ("window", window)):
         if not 0 < seconds <= longest:
             raise InputError(

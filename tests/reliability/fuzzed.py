@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+import hypothesis
 from altered_values import ANOTHER, altered, made
 from entries import LARGER
 from hypothesis import HealthCheck, Phase, assume, settings
@@ -37,8 +38,8 @@ class Tally(NamedTuple):
     faults: list[Fault]
 
 
-def tally(calls: Iterable[ValidCall], inputs: int) -> Tally:
-    """`inputs` changed calls of one entry, the same ones every time.
+def tally(calls: Iterable[ValidCall], inputs: int, seed: int | None = None) -> Tally:
+    """`inputs` changed calls of one entry, the same ones every time, others with each `seed`.
 
     A good call that has no arguments, or fails by itself (an example of a refusal), is left out.
     """
@@ -54,7 +55,7 @@ def tally(calls: Iterable[ValidCall], inputs: int) -> Tally:
     @settings(
         max_examples=inputs,
         database=None,
-        derandomize=True,
+        derandomize=seed is None,
         deadline=None,
         phases=[Phase.generate],
         suppress_health_check=list(HealthCheck),
@@ -90,5 +91,5 @@ def tally(calls: Iterable[ValidCall], inputs: int) -> Tally:
                 Fault(call.entry, name, kind, " ".join(repr(new).split())[:300], verdict.fault)
             )
 
-    ask()
+    (ask if seed is None else hypothesis.seed(seed)(ask))()
     return found

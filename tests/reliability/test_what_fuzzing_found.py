@@ -419,6 +419,13 @@ def test_a_model_is_judged_over_a_horizon_and_windows_within_the_record(
         )
 
 
+def test_a_short_record_is_judged_as_far_as_it_goes(model, record):
+    """Shorter than the usual window of 8 s: what that would tell is not known."""
+    short = record.rows(slice(0, 60))
+    found = idn.fit_for_control(model, short, {("u", "y"): -0.1}, scales={"y": 1.0, "u": 1.0})
+    assert (found["J"].verdict, found["TIC"].verdict) == ("not known", "fit")
+
+
 def test_theils_coefficient_is_that_of_numbers_that_can_be_squared():
     """1e300 beside 1 counted as rounding, a perfect prediction; nothing at all as NaN."""
     for y, guess in (([1.0, 2.0], [1e300, 2.0]), ([1e300, 2.0], [1.0, 2.0]), ([], [])):
@@ -615,3 +622,15 @@ def test_a_model_is_judged_over_a_band_of_two_ends(model, record, band):
             horizon=1.0,
             band=band,
         )
+
+
+@pytest.mark.parametrize("dt", [5e-324, 1e-300])
+def test_an_autopilot_samples_at_a_pace_of_the_plant(ideal, dt):
+    with pytest.raises(InputError, match="dt = "):
+        symheli.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=dt, points=2)
+
+
+def test_no_flights_are_refused(ideal):
+    point = symheli.trim(ideal, airspeed=5.0)
+    with pytest.raises(InputError, match="N >= 1"):
+        symheli.simulate_batch(ideal, np.zeros((0, 10)), [point.u.array] * 2, dt=0.02)
