@@ -190,7 +190,8 @@ def gain_scheduled_lqr(
 def _lqr(model: LinearModel, input_scale: float) -> np.ndarray:
     Q, R = np.diag([1 / SCALE[s] ** 2 for s in model.states]), np.eye(4) / input_scale**2
     try:
-        P = solve_discrete_are(model.A, model.B, Q, R)
+        with np.errstate(all="ignore"):
+            P = solve_discrete_are(model.A, model.B, Q, R)
     except np.linalg.LinAlgError as error:
         raise InputError(
             f"no LQR at dt = {model.dt} s ({error}): the plant hardly moves from sample to sample,"
