@@ -3,7 +3,8 @@ often what came back, and what failed.
 
     python benchmarks/fuzz.py --write
 
-The inputs are the same ones every time. --write keeps a table a package in docs/reliability.md.
+The inputs are the same ones every time, others with each --seed. --write keeps a table a package in
+docs/reliability.md.
 """
 
 from __future__ import annotations
@@ -29,25 +30,30 @@ sys.path.append(str(ROOT / "tests" / "reliability"))
 import damaged_files  # noqa: E402
 import entries  # noqa: E402
 import fuzzed  # noqa: E402
+import good_files  # noqa: E402
 from valid_calls import PACKAGES, ValidCall, caught  # noqa: E402
 
 OUTCOMES = ("refused", "refused by Python", "result", "another exception", "too long", "crash")
 
 
-def rows(package: str, quick: bool) -> dict[str, fuzzed.Tally]:
+def rows(package: str, quick: bool, seed: int | None) -> dict[str, fuzzed.Tally]:
     """{entry: tally} of a package, or of the readers."""
     if package == "readers":
         with tempfile.TemporaryDirectory() as folder:
             return {
-                reader.entry: damaged_files.tally(reader, 16 if quick else damaged_files.USUAL)
-                for reader in damaged_files.readers(Path(folder))
+                reader.entry: damaged_files.tally(
+                    reader,
+                    16 if quick else damaged_files.USUAL,
+                    first=damaged_files.USUAL * (seed or 0),
+                )
+                for reader in good_files.readers(Path(folder))
             }
     calls: dict[str, list[ValidCall]] = {}
     for call in caught(lambda name: name.startswith(package + ".")):
         if entries.asked(call.entry) and not (quick and call.entry in entries.SLOW):
             calls.setdefault(call.entry, []).append(call)
     return {
-        entry: fuzzed.tally(of, 2 if quick else entries.inputs(entry))
+        entry: fuzzed.tally(of, 2 if quick else entries.inputs(entry), seed)
         for entry, of in sorted(calls.items())
     }
 
@@ -81,14 +87,17 @@ def main() -> None:
     parser.add_argument(
         "--only", choices=(*PACKAGES, "readers"), action="append", help="default: all"
     )
+    parser.add_argument("--seed", type=int, help="other inputs than the usual ones; no --write")
     options = parser.parse_args()
+    if options.write and options.seed is not None:
+        parser.error("--write keeps the usual inputs: leave out --seed")
     warnings.simplefilter("ignore")
     found: dict[str, fuzzed.Tally] = {}
     home = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)  # what is saved by a changed path stays here
         for package in options.only or (*PACKAGES, "readers"):
-            one = rows(package, options.quick)
+            one = rows(package, options.quick, options.seed)
             if options.write:
                 keep(DOCS / "reliability.md", f"fuzzing {package}", table(one), processor())
             found |= one

@@ -12,6 +12,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from symheli.errors import InputError
+
 T = TypeVar("T")
 
 
@@ -76,8 +78,13 @@ def watched(listener: Listener | None) -> Iterator[None]:
 
     Parameters
     ----------
-    listener : callable
+    listener : callable or None
         Called with a `Progress`.
+
+    Raises
+    ------
+    InputError
+        Another listener.
 
     Examples
     --------
@@ -85,6 +92,8 @@ def watched(listener: Listener | None) -> Iterator[None]:
     ...     trims = symheli.trim_batch(heli, airspeed=[2.0, 5.0, 8.0])
     trimming: 3 of 3
     """
+    if listener is not None and not callable(listener):
+        raise InputError(f"listener: expected a function of a Progress, or None, got {listener!r}")
     before = _listener.get(), _depth.get()
     _listener.set(listener)
     _depth.set(0)

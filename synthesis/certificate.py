@@ -70,7 +70,7 @@ class Seconds(NamedTuple):
 
 class Attempt(NamedTuple):
     """One cone program: what it asked for, its margin, the solver's word, and the bound verified
-    from it (inf: none).
+    from it (inf: none; NaN: stability has none).
     """
 
     program: str
@@ -146,12 +146,13 @@ class Certificate:
     gamma : float
         Proven upper bound of a gain; inf where nothing was proven, NaN for the other kinds.
     lower : float
-        No upper bound can be smaller: from trajectories actually computed (inf: the state grows).
+        No upper bound can be smaller: from trajectories actually computed (inf: the state grows);
+        NaN for the other kinds.
     alpha : float
         Proven decay rate, 1/s: |x(t)| <= c exp(-alpha t) |x(0)|; -inf where nothing was proven, NaN
         for the other kinds.
     upper : float
-        No larger decay rate can be proven, 1/s.
+        No larger decay rate can be proven, 1/s; NaN for the other kinds.
     frozen : float
         The same from p constant alone; NaN for stability.
     status : Status

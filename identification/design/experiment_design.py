@@ -14,8 +14,8 @@ from identification.structure.lpvarx import LPVARX
 from identification.structure.regressors import as_records, regression
 from symheli.errors import ExcitationError, InputError
 from symheli.records import FlightRecord
-from symheli.values.arrays import Array
-from symheli.values.numbers import whole
+from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import positive, whole
 from symheli.values.summary import summarized
 
 
@@ -35,6 +35,11 @@ class Experiment:
     exceeded : mapping
         {signal: largest value} beyond its limit.
 
+    Raises
+    ------
+    InputError
+        A factor that is not square or not finite, a duration that is not positive.
+
     Examples
     --------
     >>> whole, half = idn.compare_experiments(
@@ -50,6 +55,13 @@ class Experiment:
     exceeded: Mapping[str, float]
 
     __repr__ = summarized
+
+    def __post_init__(self) -> None:
+        factor = frozen(self.factor, "factor", (None, None))
+        if factor.shape[0] != factor.shape[1]:
+            raise InputError(f"factor: expected a square matrix, got {factor.shape}")
+        object.__setattr__(self, "factor", factor)
+        object.__setattr__(self, "duration", positive(self.duration, "duration"))
 
     @property
     def allowed(self) -> bool:

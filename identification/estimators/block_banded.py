@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 
+from symheli.errors import AccuracyError
 from symheli.values.arrays import Array
 
 
@@ -25,7 +26,9 @@ class Whitening:
 
     @classmethod
     def of(cls, terms: Sequence[tuple[Sequence[Array], Array]]) -> Whitening:
-        """From each term's blocks L_0, L_1, .. (m, size, inputs) and variances (inputs,)."""
+        """From each term's blocks L_0, L_1, .. (m, size, inputs) and variances (inputs,); raises
+        `AccuracyError` where the sum is singular to rounding, or no longer finite.
+        """
         reach = max(len(L) for L, _ in terms) - 1
         m, size = terms[0][0][0].shape[:2]
         band = np.zeros(((reach + 1) * size, m * size))
@@ -36,7 +39,13 @@ class Whitening:
                     block[d:] += (L[i][d:] * variances) @ L[i - d][: m - d].swapaxes(1, 2)
             for row, column, offset in _below(d, size):
                 band[offset, column : (m - d) * size : size] = block[d:, row, column]
-        band = cholesky_banded(band, lower=True)
+        try:
+            band = cholesky_banded(band, lower=True)
+        except ValueError as error:  # LinAlgError among them
+            raise AccuracyError(
+                f"the covariance of the errors is not positive definite in rounding ({error}):"
+                " noise or gusts of such different sizes cannot be weighed; check their units"
+            ) from error
         G = [np.zeros((m, size, size)) for _ in range(reach + 1)]
         for d in range(reach + 1):
             for row, column, offset in _below(d, size):

@@ -140,8 +140,11 @@ class AgainstConstant:
         return sentences
 
     def verdict_on(self, output: str) -> Verdict:
-        """What scheduling is worth for this output on held-out data; see `Verdict` and `PAYS`."""
-        self._known(output)
+        """What scheduling is worth for this output on held-out data; see `Verdict` and `PAYS`.
+
+        Raises `UnknownNameError` for an output the models do not have, `InputError` where nothing
+        was held out, or the structure is itself a constant one.
+        """
         ahead, free = (self._differences(output)[h] for h in HORIZONS[1:])
         if free == "better" and ahead != "worse":
             return "pays"
@@ -149,20 +152,21 @@ class AgainstConstant:
 
     def pays(self, output: str) -> bool:
         """Whether scheduling is better 1 s ahead or in free run on held-out data, and worse in
-        neither; see `PAYS`. `verdict_on` says which.
+        neither; see `PAYS`. `verdict_on` says which, and raises the same.
         """
-        AgainstConstant._known(self, output)
         found = self._differences(output).values()
         return "better" in found and "worse" not in found
-
-    def _known(self, output: str) -> None:
-        if output not in self.scheduled.outputs:
-            raise UnknownNameError("output", output, map(str, self.scheduled.outputs))
 
     def _differences(self, output: str) -> dict[str, str]:
         """{horizon: better, worse or no different}; free runs that are told their answer, or of no
         use either way, are no different.
         """
+        if output not in self.scheduled.outputs:
+            raise UnknownNameError("output", output, map(str, self.scheduled.outputs))
+        if len(self.judged) < 2:
+            raise InputError(
+                "the structure is a constant one itself: give one with a basis of degree 1 or more"
+            )
         lpv, lti = self._fits(output)
         out = {h: difference(lpv[h], lti[h]) for h in HORIZONS[1:]}
         return {**out, HORIZONS[-1]: "not counted"} if self.told else out

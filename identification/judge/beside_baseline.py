@@ -130,8 +130,11 @@ class BaselinePredictor:
         )
 
     def predict(self, outputs: Sequence[str], horizon: int) -> Array:
-        """Outputs (n, ny) `horizon` samples ahead from every sample, NaN for the first
-        `horizon`.
+        """Outputs (n, ny) `horizon` samples ahead from every sample, NaN for the first `horizon`
+        and where a state so long before is missing.
+
+        Raises `InputError` for a horizon that is no number of samples within the record,
+        `UnknownNameError` for an output that is neither a state nor an output of the model.
         """
         return self._seen(outputs, self._flight.ahead(horizon))
 
@@ -189,7 +192,7 @@ def _scheduled(
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prediction:
     """What one model achieved on the unseen flight: its scores, and its prediction `Scores.horizon`
-    seconds ahead (n, ny) for a figure.
+    seconds ahead (n, ny) for a figure, NaN where its past is incomplete.
     """
 
     name: str

@@ -11,6 +11,7 @@ from identification.judge.criterion import TISCHLER, Criterion, judged
 from identification.judge.frozen_plant import FrozenPlant
 from identification.judge.residuals import theil
 from identification.judge.response_match import response_match
+from identification.model.prediction import LARGEST
 from symheli.errors import ExcitationError
 from symheli.records import FlightRecord
 
@@ -91,7 +92,7 @@ def predictions(
     if measured:
         a, b = np.concatenate(measured), np.concatenate(guessed)
         where = ""
-        if not np.isfinite(b).all():
+        if not np.all(np.abs(b) < LARGEST):
             value, verdict, where = 1.0, "not fit", "predictions diverge"
         else:
             value = theil(a, b).coefficient

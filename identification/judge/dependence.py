@@ -124,7 +124,7 @@ def dependence_report(
     Raises
     ------
     InputError
-        Another sample period or unit.
+        Another sample period or unit, coefficients that leave residuals beyond all measure.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def dependence_report(
     data, extra = stacked(arx, records), stacked(other, records)
     common, mine, theirs = np.intersect1d(data.rows, extra.rows, return_indices=True)
     phi, y, psi = data.phi[mine], data.y[mine], extra.phi[theirs]
-    error, m = y - phi @ model.theta, len(common)
+    error, m = data.residuals(model.theta)[mine], len(common)
     explained, probability = np.zeros(arx.ny), np.ones(arx.ny)
     for group in arx.groups:
         regressors = arx.regressors(group)

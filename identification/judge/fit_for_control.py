@@ -21,8 +21,11 @@ from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.lpv.stability_margin import Feedback
 from symheli.records import FlightRecord
-from symheli.values.arrays import Array
+from symheli.values.arrays import Array, frozen
 from symheli.values.summary import summarized
+
+HORIZON, WINDOW = 5.0, 8.0
+"""Seconds that a model is judged over, and windows of its spectra, unless told otherwise."""
 
 POINTS = 9
 """Values of one scheduling parameter at which a model is judged unless told otherwise."""
@@ -108,8 +111,8 @@ def fit_for_control(
     covariance: Array | None = None,
     second: Model | Sequence[Model] = (),
     truth: Mapping[Any, LinearModel] | None = None,
-    horizon: float = 5.0,
-    window: float = 8.0,
+    horizon: float | None = None,
+    window: float | None = None,
     band: tuple[float, float] = (0.3, 20.0),
     draws: int = 200,
     seed: int = 0,
@@ -158,10 +161,10 @@ def fit_for_control(
         covariance knows nothing of what the basis cannot hold; a fit with one degree more does.
     truth : mapping, optional
         {point: LinearModel}, continuous or at the sample period. Stands beside and decides nothing.
-    horizon : float
-        Of the predictions, s.
-    window : float
-        Of the spectral estimate, s.
+    horizon : float, optional
+        Of the predictions, s; default 5 s, or what a shorter record has.
+    window : float, optional
+        Of the spectral estimate, s; default 8 s, or what a shorter record has.
     band : (float, float)
         rad/s, of the spectral estimate.
     draws : int
@@ -177,7 +180,9 @@ def fit_for_control(
     Raises
     ------
     InputError
-        Scales that are not positive or name no output or no input; points that are missing.
+        Scales that are not positive or name no output or no input; points that are missing; a
+        horizon or a window that is not positive or longer than every record; a covariance of
+        another shape.
     UnknownNameError
         A signal of the loop that is not in the plant.
 
@@ -198,6 +203,15 @@ def fit_for_control(
     for name, size in scales.items():
         if not (np.isfinite(size) and size > 0):
             raise InputError(f"scales: expected sizes greater than 0, got {name} = {size!r}")
+    longest = (max(map(len, records)) - 1) * model.dt
+    horizon = min(HORIZON, longest) if horizon is None else horizon
+    window = min(WINDOW, longest) if window is None else window
+    for name, seconds in (("horizon", horizon), ("window", window)):
+        if not 0 < seconds <= longest:
+            raise InputError(
+                f"{name}: expected seconds greater than 0, up to {longest:g} of the longest"
+                f" record, got {seconds}"
+            )
     outputs = tuple(str(y) for y in model.outputs if y in scales)
     inputs = tuple(str(u) for u in model.inputs if u in scales)
     if not outputs or not inputs:
@@ -209,6 +223,8 @@ def fit_for_control(
     joint = covariance
     if joint is None and isinstance(model, KinematicModel):
         joint = model.coefficient_covariance
+    if joint is not None:
+        joint = frozen(joint, "covariance", 2 * model.theta.shape[::-1])
     plant = FrozenPlant(model, outputs, inputs)
     thetas = None
     if joint is not None:

@@ -145,6 +145,8 @@ def frequency_response(
 
     Raises
     ------
+    InputError
+        A window of less than eight samples, a band that holds no frequency of it.
     ExcitationError
         The inputs move together, or too few windows remain.
 
@@ -163,8 +165,6 @@ def frequency_response(
     outputs, inputs = units_of(outputs, records), units_of(inputs, records)
     if not (outputs and inputs):
         raise InputError("outputs, inputs: name at least one of each")
-    if band is not None and len(band) != 2:
-        raise InputError(f"band: expected (low, high) in rad/s, got {band!r:.80}")
     omega, pieces = windows(records, (*inputs, *outputs), window, band)
     mean = np.mean([S for S, _ in pieces], axis=0)
     return response_of(omega, mean, len(pieces), outputs, inputs, window)
@@ -238,9 +238,17 @@ def windows(
     Raises `InputError` for a window or a band that holds nothing, `ExcitationError` where no window
     is unbroken.
     """
+    if band is not None and len(band) != 2:
+        raise InputError(f"band: expected (low, high) in rad/s, got {band!r:.80}")
     dt = records[0].dt
     if not 7.5 * dt < window < np.inf:
         raise InputError(f"window: expected at least eight samples, {8 * dt:.3g} s, got {window} s")
+    longest = max(map(len, records))
+    if window > (longest + 0.5) * dt:
+        raise ExcitationError(
+            f"a window of {window} s is longer than every record; the longest lasts"
+            f" {longest * dt:.4g} s; shorten the window or record longer"
+        )
     n = round(window / dt)
     omega = 2 * np.pi * np.fft.rfftfreq(n, dt)
     low, high = band or (2 * np.pi / window, np.pi / dt)

@@ -30,7 +30,8 @@ class Trial:
         Bayesian information criterion of the training residuals, smaller is better; NaN where
         refused.
     one_step, ahead, free_run : array (ny,)
-        Fits one step, `OrderScan.horizon` samples and a free run ahead, %.
+        Fits one step, `OrderScan.horizon` samples and a free run ahead, %; NaN where refused, and
+        where a validation record is too short for one.
     refused : str
         Why the data do not determine it, empty where they do.
 
@@ -215,7 +216,7 @@ def _judge(
             refused=str(error),
         )
     data = stacked(structure, train)
-    error = data.y - data.phi @ model.theta
+    error = data.residuals(model.theta)
     n = len(error)
     sign, logdet = np.linalg.slogdet(error.T @ error / n)
     bic = n * logdet + int(structure.free.sum()) * np.log(n) if sign > 0 else -np.inf

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from identification.model.lpvarx_model import LPVARXModel
+from identification.model.prediction import LARGEST
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
@@ -198,7 +199,7 @@ def theil(measured: Array, predicted: Array) -> Theil:
     Raises
     ------
     InputError
-        The shapes differ, or an entry is not finite.
+        The shapes differ, nothing is in them, or an entry is not finite or too large to be squared.
 
     References
     ----------
@@ -213,9 +214,13 @@ def theil(measured: Array, predicted: Array) -> Theil:
     if (
         measured.shape != predicted.shape
         or measured.ndim != 1
-        or not np.all(np.isfinite([measured, predicted]))
+        or not len(measured)
+        or not np.all(np.abs([measured, predicted]) < LARGEST)
     ):
-        raise InputError("theil: expected two finite arrays (n,) of one length")
+        raise InputError(
+            "theil: expected two finite arrays (n,) of one length, a number in each at least, all"
+            f" below {LARGEST:.0e} in magnitude"
+        )
     square = float(np.mean((measured - predicted) ** 2))
     size = float(np.sqrt(np.mean(measured**2)) + np.sqrt(np.mean(predicted**2)))
     if np.sqrt(square) <= ROUNDING * size:

@@ -12,6 +12,7 @@ from identification.model.prediction import fit_percent
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
+from symheli.values.numbers import positive
 
 HORIZON = 1.0
 """Seconds ahead at which models are judged unless said otherwise."""
@@ -37,6 +38,9 @@ class Scores:
     ahead: Mapping[str, float]
     free_run: Mapping[str, float]
 
+    def __post_init__(self) -> None:
+        positive(self.horizon, "horizon")
+
     @property
     def by_horizon(self) -> dict[str, Mapping[str, float]]:
         """{name of the horizon: {output: percent}}, shortest first."""
@@ -56,7 +60,9 @@ class Scores:
     ) -> Scores:
         """Of predictions (n, ny) beside what was `measured`, a column an output.
 
-        Raises `InputError` unless every output has one column.
+        NaN for an output of which no row has both a measurement and a prediction. Raises
+        `InputError` unless every output has one column, for a horizon that is not greater than 0
+        and as `fit_percent`.
         """
         columns = 1 if measured.ndim < 2 else measured.shape[1]
         if len(set(outputs)) != len(outputs) or len(outputs) != columns:

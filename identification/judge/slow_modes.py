@@ -150,6 +150,8 @@ def slow_modes(
     ------
     InputError
         A model that is not of least squares.
+    ExcitationError
+        Records that do not determine its coefficients.
 
     References
     ----------
@@ -196,7 +198,7 @@ def _compensated(model: LPVARXModel, data: Regression) -> list[Array]:
     gain = np.eye(arx.ny)
     for block, channel in lagged:
         gain[:, channel] += np.mean((f @ theta[block]) ** 2, axis=0)
-    variance = nnls(gain, np.mean((data.y - phi @ theta) ** 2, axis=0))[0]
+    variance = nnls(gain, np.mean(data.residuals(theta) ** 2, axis=0))[0]
     scale = column_scale(phi)
     P, Q, N = (
         phi.T @ phi / np.outer(scale, scale),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
+from identification.design.excitation import excitation_of
 from identification.judge.coefficient_covariance import covariances
 from identification.judge.draws import drawn
 from identification.judge.response_band import ResponseBand, response_band
@@ -225,7 +226,10 @@ def uncertainty(
     ------
     InputError
         A model that is not of least squares (instrumental-variable estimates are less certain than
-        this says), or lags beyond the longest run.
+        this says), lags beyond the longest run, coefficients that leave residuals beyond all
+        measure.
+    ExcitationError
+        Records that do not determine the coefficients.
 
     References
     ----------
@@ -252,12 +256,13 @@ def uncertainty(
             f"{len(data.phi)} usable samples say nothing about the certainty of {arx.n_regressors}"
             " coefficients an output"
         )
+    excitation_of(arx, data).require()
     runs = _runs(data)
     longest = max(run.stop - run.start for run in runs)
     reach = min(max(longest // 5, 1), longest - 1) if lags is None else lags
     if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
-    error, reach = data.y - data.phi @ model.theta, int(reach)
+    error, reach = data.residuals(model.theta), int(reach)
     joint, white, freedom = covariances(arx, data.phi, error, runs, reach)
     return Uncertainty(
         model=model, joint=joint, white=white, freedom=freedom, lags=reach, samples=len(error)

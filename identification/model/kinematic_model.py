@@ -157,7 +157,9 @@ class KinematicModel:
         )
 
     def score(self, record: FlightRecord, horizon: int | None) -> NamedVector:
-        """Fit of each state in percent, `horizon` samples ahead or with None in free run."""
+        """Fit of each state in percent, `horizon` samples ahead or with None in free run; see
+        `fit_percent`.
+        """
         guess = self.simulate(record) if horizon is None else self.predict(record, horizon)
         fit = fit_percent(record.columns(STATES), guess)
         return NamedVector(tuple(Signal(s, "%") for s in self.outputs), fit)

@@ -20,6 +20,7 @@ from symheli.lpv import BalancedTruncation, FunctionSpace, LinearModel, LPVState
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal, signals
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import whole
 from symheli.values.sample_period import JITTER, same_period
 from symheli.values.summary import as_table, summarized
 
@@ -61,7 +62,8 @@ class LPVARXModel:
     Raises
     ------
     InputError
-        Shapes or signals that are not those of the structure, a period that is not positive.
+        Shapes or signals that are not those of the structure, a period that is not positive,
+        samples that are not counted.
 
     Examples
     --------
@@ -119,6 +121,8 @@ class LPVARXModel:
             raise InputError("theta: coefficients that the structure leaves out must be zero")
         if not (isinstance(self.dt, int | float | np.floating) and 0 < self.dt < np.inf):
             raise InputError(f"dt must be a positive number of seconds, got {self.dt!r}")
+        for count in ("rows_used", "rows_dropped"):
+            object.__setattr__(self, count, whole(getattr(self, count), count))
 
     @property
     def parameters(self) -> tuple[Signal, ...]:

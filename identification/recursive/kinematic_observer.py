@@ -13,7 +13,7 @@ from identification.model.kinematic_run import stepped
 from identification.recursive.online import vector
 from identification.structure.kinematic_arx import MOVING, STATES
 from identification.structure.regressors import scheduling_values
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import AccuracyError, InputError, UnknownNameError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.kinematics import kinematic_jacobian
@@ -86,7 +86,8 @@ class KinematicObserver:
         """The states (8,) at one instant from y (8,), u (nu,) and p as measured there; NaN where
         a start lacks a measurement.
 
-        Raises `InputError` for wrong shapes and p outside the basis.
+        Raises `InputError` for wrong shapes and p outside the basis, `AccuracyError` where the
+        estimate leaves the range of numbers; the next samples are then a start.
         """
         y, u = vector(y, WIDE, "y"), vector(u, len(self._model.inputs), "u")
         p = vector(p, len(self._model.parameters), "p")
@@ -95,12 +96,24 @@ class KinematicObserver:
             return y
         if self._x is None:
             return self._starting(y, u, p)
-        self._x = x = self._corrected(self._predicted(self._x, p), y)
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                self._x = x = self._corrected(self._predicted(self._x, p), y)
+        except np.linalg.LinAlgError:
+            self._x = x = np.full(WIDE, np.nan)
+        if not np.isfinite(x).all():
+            self.reset()
+            raise AccuracyError(
+                "the estimate left the range of numbers: the measurements are far from anything"
+                " the model describes; check their units"
+            )
         self._u, self._p = u, p
         return x[:WIDE].copy()
 
     def run(self, record: FlightRecord) -> Array:
-        """States (n, 8) along a record, each from the samples up to it; a gap resets."""
+        """States (n, 8) along a record, each from the samples up to it; a gap resets. NaN and
+        errors as of `step`.
+        """
         kin = self._model.structure
         prepared = kin.aerodynamics.prepared(record)
         self._model.aerodynamics.require_same_kind(prepared)

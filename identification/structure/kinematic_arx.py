@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -157,7 +157,7 @@ class KinematicARX:
         """The regression: `INCREMENTS` from lagged velocities and inputs, as any method takes
         it.
         """
-        na = self.na if isinstance(self.na, Mapping | int) else _of_each(self.na)
+        na = self.na if isinstance(self.na, Mapping) else _of_each(self.na)
         orders = {z: na if isinstance(na, int) else na.get(z, FLAPPING[z]) for z in MOVING}
         nb = self.nb if isinstance(self.nb, Mapping) else whole(self.nb, "nb", 1)
         more = {u: nb if isinstance(nb, int) else nb[u] for u in self.inputs}  # type: ignore[index,call-overload]
@@ -190,7 +190,9 @@ class KinematicARX:
         return self.aerodynamics.memory
 
 
-def _of_each(na: tuple[int, ...]) -> dict[str, int]:
+def _of_each(na: int | tuple[int, ...]) -> dict[str, int] | int:
+    if not isinstance(na, Sequence):
+        return whole(na, "na")
     if len(na) != len(MOVING):
         raise InputError(f"na: expected lags of {', '.join(MOVING)}, got {len(na)} numbers")
     return dict(zip(MOVING, na, strict=True))

@@ -70,6 +70,20 @@ class Regression:
     rows: Array
     dropped: int
 
+    def residuals(self, theta: Array) -> Array:
+        """e (m, ny) of coefficients theta (n_regressors, ny); raises `InputError` where they are
+        too large to be squared.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            error = self.y - self.phi @ theta
+        size = float(np.max(np.abs(error), initial=0.0))
+        if not size <= SIZES[1]:
+            raise InputError(
+                f"the model leaves residuals of {size:.3g} on these records, beyond what squares"
+                " can express; check its coefficients and the units of the records"
+            )
+        return error
+
 
 def scheduling_values(arx: LPVARX, record: FlightRecord) -> Array:
     """p of a record: (n,) for one parameter, (n, parameters) for several."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -50,10 +51,16 @@ class CampaignDataset:
         object.__setattr__(self, "_folder", ZarrFolder(self.path, remade=True))
         try:
             content = json.loads((self.path / CASES).read_text(encoding="utf-8"))
+            digest = content.pop("digest", None)
             object.__setattr__(self, "attributes", content["attributes"])
             object.__setattr__(self, "cases", tuple(map(Case, content["cases"])))
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
             raise InputError(f"{self.path}: no dataset of a campaign ({error})") from error
+        if digest != _digest(content):
+            raise InputError(
+                f"{self.path / CASES} does not match its digest: it was damaged or edited, or an"
+                " older version wrote it; take an older copy, or remove the folder"
+            )
 
     @classmethod
     def open(
@@ -78,7 +85,7 @@ class CampaignDataset:
             cases = campaign.cases
             about = {**about, "trial": campaign.trial.name, "units": units}
         content = {"attributes": about, "cases": [case.parameters for case in cases]}
-        write_text(folder / CASES, json.dumps(content))
+        write_text(folder / CASES, json.dumps({**content, "digest": _digest(content)}))
         dataset = cls(folder)
         dataset._describe()
         return dataset
@@ -87,10 +94,10 @@ class CampaignDataset:
         """The case in that row, in one file; why it failed before."""
         reason = self.path / "reason" / str(row)
         if outcome.reason:
-            self._folder.write("reason", row, np.array([outcome.reason]))
+            self._folder.write("reason", row, np.array([outcome.reason]), self._reasons)
         else:
             reason.unlink(missing_ok=True)
-        self._folder.write("values", row, np.array([outcome.values]))
+        self._folder.write("values", row, np.array([outcome.values]), self._rows)
 
     # --- reading ---------------------------------------------------------------------------------
 
@@ -105,19 +112,19 @@ class CampaignDataset:
     @property
     def values(self) -> Array:
         """(case, quantity)."""
-        return self._folder.whole("values")
+        return self._folder.whole("values", self._rows)
 
     @property
     def finished(self) -> Array:
         """Which cases are there, the failed ones too."""
         out = np.ones(len(self), bool)
-        out[self._folder.missing("values")] = False
+        out[self._folder.missing("values", self._rows)] = False
         return out
 
     @property
     def reasons(self) -> dict[int, str]:
         """{row: why the case failed}."""
-        found = self._folder.whole("reason").tolist()
+        found = self._folder.whole("reason", self._reasons).tolist()
         return {row: reason for row, reason in enumerate(found) if reason}
 
     def rows_of(self, cases: Sequence[Case]) -> list[int]:
@@ -142,7 +149,7 @@ class CampaignDataset:
         return pandas.DataFrame(
             {name: self._parameter(name) for name in self.cases[0].parameters}
             | {name: values[:, i] for i, name in enumerate(units)}
-            | {"reason": self._folder.whole("reason")}
+            | {"reason": self._folder.whole("reason", self._reasons)}
         )
 
     def to_xarray(self) -> xarray.Dataset:
@@ -156,7 +163,7 @@ class CampaignDataset:
                     name: ("case", values[:, i], {"units": unit})
                     for i, (name, unit) in enumerate(self.units.items())
                 },
-                "reason": ("case", self._folder.whole("reason")),
+                "reason": ("case", self._folder.whole("reason", self._reasons)),
             },
             coords={name: ("case", self._parameter(name)) for name in self.cases[0].parameters},
             attrs=dict(self.attributes) | {"units": json.dumps(self.units)},
@@ -166,7 +173,7 @@ class CampaignDataset:
 
     def _describe(self) -> None:
         """The arrays for the cases there are; chunks that are there stay."""
-        units, n, parameters = self.units, len(self), tuple(self.cases[0].parameters)
+        units, parameters = self.units, self.cases[0].parameters
         labels = {
             "quantity": ("quantity", np.array(list(units))),
             "unit": ("quantity", np.array(list(units.values()))),
@@ -176,25 +183,34 @@ class CampaignDataset:
             self._folder.keep(name, values)
         self._folder.describe(
             {
-                "values": ZarrArray(
-                    dimensions=("case", "quantity"),
-                    shape=(n, len(units)),
-                    chunks=(1, len(units)),
-                    dtype="<f8",
-                    fill=np.nan,
-                    coordinates=("unit", *parameters),
-                ),
-                "reason": ZarrArray(
-                    dimensions=("case",),
-                    shape=(n,),
-                    chunks=(1,),
-                    dtype=f"<U{LONGEST_REASON}",
-                    coordinates=parameters,
-                ),
+                "values": self._rows,
+                "reason": self._reasons,
                 **{name: ZarrArray.whole(*label) for name, label in labels.items()},
             }
         )
         self._folder.say(self.attributes)
+
+    @property
+    def _rows(self) -> ZarrArray:
+        count = len(self.units)
+        return ZarrArray(
+            dimensions=("case", "quantity"),
+            shape=(len(self), count),
+            chunks=(1, count),
+            dtype="<f8",
+            fill=np.nan,
+            coordinates=("unit", *self.cases[0].parameters),
+        )
+
+    @property
+    def _reasons(self) -> ZarrArray:
+        return ZarrArray(
+            dimensions=("case",),
+            shape=(len(self),),
+            chunks=(1,),
+            dtype=f"<U{LONGEST_REASON}",
+            coordinates=tuple(self.cases[0].parameters),
+        )
 
     def _parameter(self, name: str) -> Array:
         column: list[Value] = [case.parameters[name] for case in self.cases]
@@ -212,3 +228,7 @@ class CampaignDataset:
                 f"{self.path} holds cases of {trial.name} with other parameters or quantities: an"
                 " older version wrote it; give another folder, or remove it"
             )
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -116,14 +116,15 @@ class Dryden:
             raise InputError("time: expected increasing finite seconds (n,)")
         if not np.all(np.isfinite(speed)) or np.any(speed < 0):
             raise InputError("airspeed: expected finite numbers >= 0 m/s")
-        flown = 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)
+        with np.errstate(over="ignore"):
+            flown = (0.5 * speed[1:] + 0.5 * speed[:-1]) * np.diff(time)
         white = np.random.default_rng(whole(seed, "seed")).standard_normal((len(time), 5))
         sigma, length = self.intensities, self.lengths
         return np.column_stack(
             [
-                sigma[0] * _first_order(flown / length[0], white[:, 0]),
-                sigma[1] * _second_order(flown / (2 * length[1]), white[:, 1:3]),
-                sigma[2] * _second_order(flown / (2 * length[2]), white[:, 3:]),
+                sigma[0] * _first_order(_steps(flown, length[0]), white[:, 0]),
+                sigma[1] * _second_order(_steps(flown, 2 * length[1]), white[:, 1:3]),
+                sigma[2] * _second_order(_steps(flown, 2 * length[2]), white[:, 3:]),
             ]
         )
 
@@ -132,6 +133,8 @@ STATIONARY = np.array([[1.0, 0.5], [0.5, 0.5]])
 """Covariance of the states z1 = 1/(1+s), z2 = z1/(1+s) of white noise of intensity 2."""
 OUTPUT = np.array([math.sqrt(3.0), 1 - math.sqrt(3.0)]) / math.sqrt(2.0)
 """sqrt(3) z1 + (1 - sqrt(3)) z2 has the variance 2."""
+FORGOTTEN = 1e3
+"""Lengths after which nothing is left of a gust: exp(-1000) is 0, and 1000 exp(-1000) is."""
 
 
 @functools.cache
@@ -139,6 +142,10 @@ def _machine_code() -> ctypes.CDLL | None:
     source = (resources.files("symheli.environment") / "dryden.c").read_text(encoding="utf-8")
     path = library(source, "dryden")
     return None if path is None else ctypes.CDLL(str(path))
+
+
+def _steps(flown: np.ndarray, length: float) -> np.ndarray:
+    return np.minimum(flown / length, FORGOTTEN)
 
 
 def _first_order(steps: np.ndarray, white: np.ndarray) -> np.ndarray:

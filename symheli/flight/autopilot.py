@@ -152,7 +152,7 @@ def gain_scheduled_lqr(
     Raises
     ------
     InputError
-        No softening makes it stable.
+        No softening makes it stable, or a sample period at which there is no LQR.
 
     References
     ----------
@@ -189,7 +189,14 @@ def gain_scheduled_lqr(
 
 def _lqr(model: LinearModel, input_scale: float) -> np.ndarray:
     Q, R = np.diag([1 / SCALE[s] ** 2 for s in model.states]), np.eye(4) / input_scale**2
-    P = solve_discrete_are(model.A, model.B, Q, R)
+    try:
+        with np.errstate(all="ignore"):
+            P = solve_discrete_are(model.A, model.B, Q, R)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            f"no LQR at dt = {model.dt} s ({error}): the plant hardly moves from sample to sample,"
+            " or beyond measure; choose dt near its own pace"
+        ) from error
     return np.linalg.solve(R + model.B.T @ P @ model.B, model.B.T @ P @ model.A)
 
 

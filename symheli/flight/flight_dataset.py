@@ -61,6 +61,7 @@ class FlightDataset:
             object.__setattr__(self, "_values", folder.array("values"))
         except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
             raise InputError(f"{self.path}: no dataset of flights ({error})") from error
+        self._check()
 
     @classmethod
     def create(
@@ -108,6 +109,29 @@ class FlightDataset:
         self._folder.write("values", chunk, values)
         self._folder.write("lost", chunk, lost)
         self._folder.write("duration", chunk, duration)
+
+    def _check(self) -> None:
+        """Raises `InputError` unless all arrays are said to be of one size and kind."""
+        values = self._values
+        if len(values.shape) != 3:
+            raise InputError(f"{self.path}: no dataset of flights (values {values.shape})")
+        flights, samples, width = values.shape
+        each, whole = values.chunks[:1], {"duration": "<f8", "lost": "|b1"}
+        expected = {name: ((flights,), each, dtype) for name, dtype in whole.items()}
+        for name, count, dtype in (
+            ("seed", flights, "<i8"),
+            ("time", samples, "<f8"),
+            ("signal", width, None),
+            ("unit", width, None),
+        ):
+            expected[name] = (count,), (count,), dtype or self._folder.array(name).dtype
+        found = {name: self._folder.array(name) for name in expected}
+        wrong = [n for n, a in found.items() if (a.shape, a.chunks, a.dtype) != expected[n]]
+        if wrong or values.dtype != "<f8":
+            raise InputError(
+                f"{self.path}: what is said of {', '.join(wrong or ['values'])} does not fit the"
+                " rest, a file of the dataset is damaged; take an older copy"
+            )
 
     # --- reading ---------------------------------------------------------------------------------
 

@@ -158,7 +158,8 @@ class StitchedModel:
         self, x: object, u: object, wind: object = (0.0, 0.0, 0.0), *, lookup: object | None = None
     ) -> Array:
         """xdot (..., nx) at x (..., nx), u (..., nu), wind in body axes (..., 3); read at `lookup`
-        (...), m/s, or at the airspeed.
+        (...), m/s, or at the airspeed. Not finite where one of these is
+        not.
         """
         x, u, wind = np.asarray(x, float), np.asarray(u, float), np.asarray(wind, float)
         for name, given, size in (

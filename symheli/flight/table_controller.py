@@ -136,6 +136,8 @@ class TableController:
             raise InputError(f"fade: expected a time constant in s > 0, got {self.fade}")
         if not self.rate >= 0:
             raise InputError(f"rate: expected a number of m/s^2 >= 0, got {self.rate}")
+        if not self.misfit >= 0:
+            raise InputError(f"misfit: expected a number >= 0, got {self.misfit}")
         if self.follow not in get_args(Follow):
             raise UnknownNameError("way to schedule", self.follow, get_args(Follow))
         object.__setattr__(self, "limits", _limits(self.limits, self.outputs))

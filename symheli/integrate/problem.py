@@ -79,10 +79,10 @@ def many_flights(
     lengths = {len(start)} if start.ndim == 2 else set()
     lengths |= {len(a) for a in (u, w) if a.ndim == 3 and len(a) > 1}
     lengths |= {len(v) for v in values.values() if v.ndim == 1}
-    if len(lengths) != 1:
+    if len(lengths) != 1 or 0 in lengths:
         raise InputError(
             "x0 (N, nx), u (N, n, 4), wind (N, n, 3) and parameters (N,) must say one number of"
-            f" flights N, got {sorted(lengths) or 'none'}"
+            f" flights N >= 1, got {sorted(lengths) or 'none'}"
         )
     count = lengths.pop()
     u = u if u.ndim == 3 else frozen(u, "u", (None, 4))[None]

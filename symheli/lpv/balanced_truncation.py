@@ -14,8 +14,8 @@ from symheli.errors import InputError
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lpv_state_space import LPVStateSpace
-from symheli.lpv.nu_gap import angles, nu_gap
-from symheli.values.arrays import Array, frozen
+from symheli.lpv.nu_gap import angles, channel_scales, nu_gap
+from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 from symheli.values.summary import summarized
 
@@ -105,8 +105,8 @@ def balanced_truncation(
             f"order: expected an integer from 1 to {nx - 1} (the model has {nx} states), got"
             f" {order!r}"
         )
-    su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(model.inputs),))
-    sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(model.outputs),))
+    su = channel_scales(input_scale, "input_scale", len(model.inputs))
+    sy = channel_scales(output_scale, "output_scale", len(model.outputs))
     balanced = _nodes(model, nodes)
     gramians = [_gramians(m, su, sy, p) for p, m in balanced]
     X, Y = (np.mean(parts, axis=0) for parts in zip(*gramians, strict=True))

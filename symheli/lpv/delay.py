@@ -8,6 +8,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
+from symheli.values.numbers import whole
 from symheli.values.signal import Signal
 
 
@@ -45,7 +46,8 @@ def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:
     >>> round(float(np.angle(delay.frequency_response([50.0])[0, 0, 0])), 6)
     -1.0
     """
-    if not (math.isfinite(seconds) and seconds > 0) or not 1 <= order <= 10:
+    order = whole(order, "order", 1)
+    if not (math.isfinite(seconds) and seconds > 0) or order > 10:
         raise InputError(
             f"expected a delay > 0 s and an order from 1 to 10, got {seconds} s and {order}"
         )
@@ -97,9 +99,7 @@ def sample_delay(name: str, samples: int, dt: float) -> LinearModel:
     >>> bool(np.isclose(late.frequency_response([5.0])[0, 0, 0], s**-2))
     True
     """
-    if isinstance(samples, bool) or int(samples) != samples or samples < 1:
-        raise InputError(f"samples: expected an integer >= 1, got {samples!r:.60}")
-    n, unit = int(samples), Signal(name).unit
+    n, unit = whole(samples, "samples", 1), Signal(name).unit
     return LinearModel(
         np.eye(n, k=1),
         np.eye(n)[:, [-1]],

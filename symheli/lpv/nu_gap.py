@@ -7,7 +7,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.linear_models import LinearModels
-from symheli.values.arrays import frozen
+from symheli.values.arrays import Array, frozen
 from symheli.values.sample_period import same_period
 
 ON_THE_CIRCLE = 1e3 * np.finfo(float).eps
@@ -19,6 +19,9 @@ REFINEMENTS = 30
 """How often an interval of frequency is halved, at most, until the determinant turns little in
 it.
 """
+
+SIZES = 1e-60, 1e60
+"""Scales of channels: the squares of what is left are numbers."""
 
 
 def nu_gap(
@@ -52,7 +55,8 @@ def nu_gap(
     Raises
     ------
     InputError
-        Models with poles on the unit circle, as far as rounding can tell, or with other signals.
+        Models with poles on the unit circle, as far as rounding can tell, or with other signals;
+        scales that are not positive.
 
     References
     ----------
@@ -70,8 +74,8 @@ def nu_gap(
             f" {second.dt} s; discretize them"
         )
     require_same_signals(first, second)
-    su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
-    sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
+    su = channel_scales(input_scale, "input_scale", len(first.inputs))
+    sy = channel_scales(output_scale, "output_scale", len(first.outputs))
     unstable, poles = [], []
     for model in (first, second):
         found = model.poles()
@@ -103,6 +107,18 @@ def nu_gap(
     if _winding(P1, P2) + unstable[0] - unstable[1] != 0:
         return 1.0
     return float(_chordal(P1, P2).max())
+
+
+def channel_scales(given: object, name: str, channels: int) -> Array:
+    """One for each channel; raises `InputError` unless they are positive and within `SIZES`."""
+    scales = frozen(given, name)
+    if scales.shape not in ((), (1,), (channels,)):
+        raise InputError(f"{name}: expected a number or {channels} of them, got {scales.shape}")
+    if not np.all((scales >= SIZES[0]) & (scales <= SIZES[1])):
+        raise InputError(
+            f"{name}: expected numbers from {SIZES[0]:.0e} to {SIZES[1]:.0e}, got {given!r:.60}"
+        )
+    return np.broadcast_to(scales, (channels,))
 
 
 def chordal_distance(
@@ -147,8 +163,8 @@ def chordal_distance(
     array([0.08, 0.14])
     """
     require_same_signals(first, second)
-    su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(first.inputs),))
-    sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(first.outputs),))
+    su = channel_scales(input_scale, "input_scale", len(first.inputs))
+    sy = channel_scales(output_scale, "output_scale", len(first.outputs))
     return _chordal(
         *(
             m.frequency_response(omega) * su[None, None, :] / sy[None, :, None]

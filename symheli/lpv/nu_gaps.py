@@ -7,8 +7,8 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.linear_models import LinearModels
-from symheli.lpv.nu_gap import ON_THE_CIRCLE, angles, nu_gap, require_same_signals
-from symheli.values.arrays import Array, frozen
+from symheli.lpv.nu_gap import ON_THE_CIRCLE, angles, channel_scales, nu_gap, require_same_signals
+from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 
 AT_ONCE = 2_000_000
@@ -64,8 +64,8 @@ def nu_gaps(
             f" {others.dt} s; discretize them"
         )
     require_same_signals(model, others)
-    su = np.broadcast_to(frozen(input_scale, "input_scale"), (len(model.inputs),))
-    sy = np.broadcast_to(frozen(output_scale, "output_scale"), (len(model.outputs),))
+    su = channel_scales(input_scale, "input_scale", len(model.inputs))
+    sy = channel_scales(output_scale, "output_scale", len(model.outputs))
     poles, many = model.poles(), np.linalg.eigvals(others.A)
     if any(np.any(np.abs(np.abs(each) - 1) < ON_THE_CIRCLE) for each in (poles, many)):
         raise InputError("nu_gaps: a pole lies on the unit circle")

@@ -11,8 +11,8 @@ from scipy.linalg import block_diag
 from symheli.errors import InputError
 from symheli.lpv.equilibration import loop_inverse
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
-from symheli.lpv.nu_gap import angles
-from symheli.values.arrays import Array, frozen
+from symheli.lpv.nu_gap import angles, channel_scales
+from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import indices
 
@@ -74,8 +74,8 @@ def stability_margin(
     if plant.dt is None:
         raise InputError("stability_margin: expected a discrete plant; discretize it")
     nu, ny = len(plant.inputs), len(plant.outputs)
-    su = np.broadcast_to(frozen(input_scale, "input_scale"), (nu,))
-    sy = np.broadcast_to(frozen(output_scale, "output_scale"), (ny,))
+    su = channel_scales(input_scale, "input_scale", nu)
+    sy = channel_scales(output_scale, "output_scale", ny)
     controller = as_controller(feedback, plant)
     A, B, C, D = closed_loop(plant, controller)
     poles = np.linalg.eigvals(A)

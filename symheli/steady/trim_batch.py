@@ -81,6 +81,9 @@ class TrimBatch(OperatingPoints):
     _repr_html_ = as_table
 
     def __post_init__(self) -> None:
+        for name in ("on_stops", "vortex_ring"):
+            if getattr(self, name).dtype != bool:
+                raise InputError(f"{name}: expected truth values, got {getattr(self, name).dtype}")
         for array in (*vars(self).values(), *self.switches.values()):
             if isinstance(array, np.ndarray):
                 array.flags.writeable = False

@@ -17,6 +17,7 @@ from symheli.values.arrays import Array
 from symheli.values.whole_files import write_bytes
 
 FORMAT = 2
+LAST_CHARACTER = 0x10FFFF
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +42,23 @@ class ZarrArray:
     def filled(self, shape: tuple[int, ...]) -> Array:
         """What is read where nothing was written."""
         return np.zeros(shape, self.dtype) if self.fill is None else np.full(shape, self.fill)
+
+    @property
+    def fault(self) -> str | None:
+        """What cannot be of an array in chunks along its first dimension, None where nothing."""
+        counts = [*self.shape, *self.chunks]
+        if not all(type(n) is int and n >= 0 for n in counts) or not self.shape:
+            return f"shape {self.shape}, chunks {self.chunks}"
+        sizes = {len(self.dimensions), len(self.shape), len(self.chunks)}
+        if len(sizes) > 1 or self.chunks[1:] != self.shape[1:]:
+            return f"dimensions {self.dimensions}, shape {self.shape}, chunks {self.chunks}"
+        if self.shape[0] and not self.chunks[0]:
+            return "chunks of nothing"
+        if np.dtype(self.dtype).kind not in "biufU" or not np.dtype(self.dtype).itemsize:
+            return f"dtype {self.dtype}"
+        if not isinstance(self.fill, bool | int | float | None):
+            return f"fill_value {self.fill!r}"
+        return None
 
     def along(self) -> range:
         """Chunks along the first dimension."""
@@ -86,9 +104,9 @@ class ZarrFolder:
         """An array of one chunk."""
         write_bytes(self.path / name / "0", values.tobytes(), forced=not self.remade)
 
-    def write(self, name: str, chunk: int, values: Array) -> None:
+    def write(self, name: str, chunk: int, values: Array, array: ZarrArray | None = None) -> None:
         """The chunk along the first dimension, filled up where `values` has fewer rows."""
-        array = self.array(name)
+        array = array or self.array(name)
         whole = array.filled(array.chunks)
         whole[: len(values)] = values
         write_bytes(self._file(name, chunk, array), whole.tobytes())
@@ -102,21 +120,29 @@ class ZarrFolder:
         return found
 
     def array(self, name: str) -> ZarrArray:
-        """What is said of an array."""
-        about = json.loads((self.path / name / ".zarray").read_text(encoding="utf-8"))
-        along = json.loads((self.path / name / ".zattrs").read_text(encoding="utf-8"))
-        return ZarrArray(
-            dimensions=tuple(along["_ARRAY_DIMENSIONS"]),
-            shape=tuple(about["shape"]),
-            chunks=tuple(about["chunks"]),
-            dtype=about["dtype"],
-            fill=float("nan") if about["fill_value"] == "NaN" else about["fill_value"],
-            coordinates=tuple(along.get("coordinates", "").split()),
-        )
+        """What is said of an array; `InputError` where that is damaged."""
+        try:
+            about = json.loads((self.path / name / ".zarray").read_text(encoding="utf-8"))
+            along = json.loads((self.path / name / ".zattrs").read_text(encoding="utf-8"))
+            found = ZarrArray(
+                dimensions=tuple(along["_ARRAY_DIMENSIONS"]),
+                shape=tuple(about["shape"]),
+                chunks=tuple(about["chunks"]),
+                dtype=np.dtype(about["dtype"]).str,
+                fill=float("nan") if about["fill_value"] == "NaN" else about["fill_value"],
+                coordinates=tuple(along.get("coordinates", "").split()),
+            )
+        except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+            raise self._damaged(name, str(error)) from error
+        if (why := found.fault) is not None:
+            raise self._damaged(name, why)
+        return found
 
-    def missing(self, name: str) -> list[int]:
+    # What an owner knows of an array itself it gives as `array`; otherwise it is read.
+
+    def missing(self, name: str, array: ZarrArray | None = None) -> list[int]:
         """Chunks along the first dimension that are not there."""
-        array = self.array(name)
+        array = array or self.array(name)
         return [k for k in array.along() if not self._file(name, k, array).is_file()]
 
     def chunk(self, name: str, chunk: int) -> Array | None:
@@ -125,9 +151,11 @@ class ZarrFolder:
         """
         return self._read(name, chunk, self.array(name))
 
-    def whole(self, name: str) -> Array:
-        """All of an array, with what it is filled with where chunks are not there."""
-        array = self.array(name)
+    def whole(self, name: str, array: ZarrArray | None = None) -> Array:
+        """All of an array, with what it is filled with where chunks are not there; `InputError`
+        where one is damaged.
+        """
+        array = array or self.array(name)
         out, step = array.filled(array.shape), array.chunks[0]
         for k in array.along():
             block = self._read(name, k, array)
@@ -150,7 +178,15 @@ class ZarrFolder:
             raise InputError(
                 f"{path}: {len(content)} bytes, expected {wanted}; remove it and resume"
             )
+        if dtype.kind == "U" and np.any(np.frombuffer(content, "<u4") > LAST_CHARACTER):
+            raise InputError(f"{path}: no text; remove it and resume")
         return np.frombuffer(content, dtype).reshape(array.chunks)
+
+    def _damaged(self, name: str, why: str) -> InputError:
+        return InputError(
+            f"{self.path / name}: what is said of the array is damaged ({why}); resume, which says"
+            " it anew, or take an older copy"
+        )
 
     def _file(self, name: str, chunk: int, array: ZarrArray) -> Path:
         return self.path / name / ".".join([str(chunk), *["0"] * (len(array.shape) - 1)])

@@ -15,6 +15,9 @@ from symheli.values.summary import summarized
 
 Array = np.ndarray
 
+SIZES = 1e-100, 1e100
+"""Riccati equations square what a control costs and a measurement errs, and invert the squares."""
+
 
 class Generalized(NamedTuple):
     """x' = A x + B1 w + B2 u, z = C1 x + D11 w + D12 u, y = C2 x + D21 w + D22 u, or sampled.
@@ -51,14 +54,37 @@ class Generalized(NamedTuple):
 
     @classmethod
     def between(cls, model: LinearModel, channels: Channels) -> Generalized:
-        """The matrices of a model that has these channels."""
+        """The matrices of a model that has these channels.
+
+        Raises `InputError` for numbers whose squares are no numbers: an entry beyond the second of
+        `SIZES`, a price of a control or noise of a measurement below the first.
+        """
         w = indices(channels.disturbances, model.inputs, "input")
         u = indices(channels.controls, model.inputs, "input")
         z = indices(channels.performance, model.outputs, "output")
         y = indices(channels.measurements, model.outputs, "output")
         B, C, D = model.B, model.C, model.D
         through = (D[np.ix_(rows, columns)] for rows in (z, y) for columns in (w, u))
-        return cls(model.A, B[:, w], B[:, u], C[z], C[y], *through)
+        plant = cls(model.A, B[:, w], B[:, u], C[z], C[y], *through)
+        prices, noises = (
+            np.abs(M).max(axis=axis, initial=0.0) for M, axis in ((plant.D12, 0), (plant.D21, 1))
+        )
+        for what, signals, sizes in (
+            ("price", channels.controls, prices),
+            ("noise", channels.measurements, noises),
+        ):
+            for signal, size in zip(signals, sizes, strict=True):
+                if 0 < size < SIZES[0]:
+                    raise InputError(
+                        f"the {what} of {signal} is {size:.3g}, below what squares can express;"
+                        " weigh it more"
+                    )
+        if max(np.abs(M).max(initial=0.0) for M in plant) > SIZES[1]:
+            raise InputError(
+                f"a model with entries beyond {SIZES[1]:.0e} cannot be squared; choose other units"
+                " or weights"
+            )
+        return plant
 
     @classmethod
     def split(

@@ -5,6 +5,7 @@ it.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -243,7 +244,8 @@ def _smallest(normal: Normalised, start: float) -> tuple[float, Obstacle | None]
             good = min(good, trial.gamma)
         elif trial.gamma > bad.gamma:
             bad = trial
-        return min(trial.slack, 1.0)
+        # 0, a root met exactly, would end the search with `good` wherever above it was
+        return min(trial.slack, 1.0) or -sys.float_info.min
 
     optimize.brentq(slack, math.log(low), math.log(high), xtol=ACCURACY)
     return good, bad.obstacle

@@ -12,7 +12,6 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, pade_delay, sample_delay
 from symheli.lpv.linear_model import is_control_system
-from symheli.values.numbers import whole as whole_number
 from symheli.values.sample_period import SAME
 from symheli.values.signal import Signal
 
@@ -62,7 +61,7 @@ def sensor_filter(given: object, name: str, dt: float | None) -> Part:
 def delay(seconds: float, name: str, order: int, dt: float | None) -> LinearModel:
     """Whole samples on a sampled plant, Pade's approximation on a continuous one."""
     if dt is None:
-        return pade_delay(name, seconds, whole_number(order, "order", 1))
+        return pade_delay(name, seconds, order)
     samples = positive(seconds, "the delay") / dt
     whole = round(samples)
     if whole < 1 or abs(samples - whole) > SAME * samples:

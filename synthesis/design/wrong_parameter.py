@@ -104,17 +104,19 @@ def with_wrong_parameter(
         )
     K = _scheduled(as_controller(controller, plant.controls, plant.measurements), plant)
     loop = _Opened.of(plant, K)
-    S = _slopes(K, plant.parameters[0], error, divisions)
+    s = plant.parameters[0]
+    reach = min(error, s.high - s.low)  # of a reading that ends where the range does
+    S = _slopes(K, s, reach, divisions)
     U = _reached([each.coefficients for each in S])
     seen = [MatrixFunction(each.basis, U.T @ each.coefficients, each.box) for each in S]
-    enter = np.hstack([error * U] * len(seen))
+    enter = np.hstack([reach * U] * len(seen))
     rows = np.concatenate([each.coefficients for each in seen], axis=1)
     leave = MatrixFunction(seen[0].basis, rows, seen[0].box)
     open_loop = loop.closed(enter, leave)
     ends = len(plant.disturbances), len(plant.performance)
     points = leave.basis.points(3) if isinstance(leave.basis, Patches) else np.zeros(0)
     model = _in_balanced_units(open_loop, ends, points, U.shape[1], len(seen))
-    said, probability, s = "", 1.0, plant.parameters[0]
+    said, probability = "", 1.0
     if isinstance(plant.model, UncertainStateSpace):
         said, probability = f"{plant.model.source}; ", plant.model.probability
     said += f"the controller reads {s.name} wrong by at most {error:g} {s.unit}, in any motion"

@@ -15,7 +15,7 @@ from symheli.errors import InputError
 from symheli.lpv import LinearModel
 from symheli.lpv.linear_model import feedback_matrix
 from symheli.values.signal import indices
-from synthesis.worst.frozen import crossings, norm, to_continuous
+from synthesis.worst.frozen import crossings, norm, of_one_size, pace_of, to_continuous
 
 Array = np.ndarray
 
@@ -154,19 +154,23 @@ def margins(loop: LinearModel) -> Margins:
             f"margins need a loop of one input and one output, got {len(loop.inputs)} and"
             f" {len(loop.outputs)}; break it with loop()"
         )
-    if not _closed(loop).is_stable():
+    closed = _closed(loop)
+    if not closed.is_stable():
         return UNSTABLE
-    A, B, C, D = (
-        (loop.A, loop.B, loop.C, loop.D)
-        if loop.dt is None
-        else to_continuous(loop.A, loop.B, loop.C, loop.D)
-    )
+    # continuous: time in units in which the fastest pole of the closed loop is about 1
+    pace = pace_of(closed.poles()) if loop.dt is None else 0
+    B, C = of_one_size(loop.B, loop.C, -pace)
+    paced = replace(loop, A=np.ldexp(loop.A, -pace), B=B, C=C)
+    A, D = paced.A, paced.D
+    if loop.dt is not None:
+        A, B, C, D = to_continuous(A, B, C, D)
 
     def physical(omega: Array) -> Array:
-        return omega if loop.dt is None else 2 * np.arctan(omega) / loop.dt
+        return np.ldexp(omega, pace) if loop.dt is None else 2 * np.arctan(omega) / loop.dt
 
     def response(omega: Array) -> Array:
-        return loop.frequency_response(physical(omega))[:, 0, 0]
+        at = omega if loop.dt is None else physical(omega)
+        return paced.frequency_response(at)[:, 0, 0]
 
     unit = crossings(A, B, C, D, 1.0)
     unit = unit[unit > 0]
@@ -178,8 +182,9 @@ def margins(loop: LinearModel) -> Margins:
     real = _real_axis(A, B, C)
     values = np.real(response(real)) if len(real) else real
     values = np.concatenate([values, D[0]])
-    factors = -1 / values[values < 0]
-    delays = np.mod(lag, 2 * np.pi) / physical(unit) if len(unit) else np.zeros(0)
+    with np.errstate(over="ignore"):  # beyond the range of numbers is as good as never
+        factors = -1 / values[values < 0]
+        delays = np.mod(lag, 2 * np.pi) / physical(unit) if len(unit) else np.zeros(0)
     return Margins(
         True,
         (

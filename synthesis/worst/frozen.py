@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from symheli.errors import AccuracyError
 from symheli.lpv import LPVStateSpace
 from symheli.values.numbers import positive, whole
 from synthesis.worst.over_box import worst_over
@@ -20,7 +21,7 @@ Array = np.ndarray
 
 class FrozenGain(NamedTuple):
     """The largest frozen gain `gamma`, the `p` and frequency `omega` (rad/s) where it occurs; inf
-    where unstable.
+    and NaN where unstable.
     """
 
     gamma: float
@@ -44,7 +45,8 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     Returns
     -------
     FrozenGain
-        `gamma` (inf where a frozen model is unstable), `p` and `omega` (rad/s) where it occurs.
+        `gamma` (inf where a frozen model is unstable), `p` and `omega` (rad/s; then NaN) where it
+        occurs.
 
     References
     ----------
@@ -86,7 +88,7 @@ def norm(
     all and between them. And a peak is climbed on the response, to the last digits: two eigenvalues
     that meet at its top are known to a root of the rounding only. The value is attained, up to the
     rounding of one response, and at the end no frequency that the level set 1 + `tolerance` higher
-    names lies above it.
+    names lies above it. Raises `AccuracyError` where a response exceeds the range of numbers.
     """
     if min(B.shape[1], C.shape[0]) == 0:
         return 0.0, 0.0
@@ -96,7 +98,11 @@ def norm(
     if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
         return math.inf, math.nan
     balanced, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
-    response = _Response(balanced, B / units[:, None], C * units, D, dt is not None)
+    # continuous: time in units in which the fastest pole is about 1
+    pace = pace_of(poles) if dt is None else 0
+    balanced = np.ldexp(balanced, -pace)
+    scaled = of_one_size(B / units[:, None], C * units, -pace)
+    response = _Response(balanced, *scaled, D, dt is not None)
     A, B, C, D = (
         (balanced, response.B, response.C, D)
         if dt is None
@@ -114,6 +120,11 @@ def norm(
     peak = _Peak(float(np.linalg.norm(D, 2)), math.inf).or_higher(response, start)
     if peak.gain == 0.0:
         return 0.0, 0.0
+    # the response in units in which it is about 1, whose squares are within the range of numbers
+    size = round(math.log2(peak.gain))
+    D, peak = np.ldexp(D, -size), _Peak(math.ldexp(peak.gain, -size), peak.omega)
+    B, C = of_one_size(B, C, -size)
+    response = response.scaled(-size)
     peak = peak.climbed(response, poles)
     for _ in range(50):
         named = np.unique(
@@ -127,10 +138,10 @@ def norm(
             peak = higher
             break
         peak = higher.climbed(response, poles)
-    omega = peak.omega
+    omega = math.ldexp(peak.omega, pace)
     if dt is not None:
         omega = 2.0 * math.atan(omega) / dt if math.isfinite(omega) else math.pi / dt
-    return peak.gain, omega
+    return math.ldexp(peak.gain, size), omega
 
 
 class _Response(NamedTuple):
@@ -144,6 +155,11 @@ class _Response(NamedTuple):
     D: Array
     discrete: bool
 
+    def scaled(self, power: int) -> _Response:
+        """2^`power` times this one."""
+        B, C = of_one_size(self.B, self.C, power)
+        return self._replace(B=B, C=C, D=np.ldexp(self.D, power))
+
     def gain(self, omega: Array) -> Array:
         """At each omega (k,), refined once with residuals in extended precision: at light damping
         rounding is magnified by its inverse.
@@ -153,8 +169,16 @@ class _Response(NamedTuple):
         exact = points[:, None, None] * np.eye(len(self.A)) - self.A
         pencil = exact.astype(complex)
         X = np.linalg.solve(pencil, np.broadcast_to(self.B, (len(omega), *self.B.shape)))
-        X = X + np.linalg.solve(pencil, (self.B - exact @ X).astype(complex))
-        return np.linalg.svd(self.C @ X + self.D, compute_uv=False)[:, 0]
+        with np.errstate(over="ignore", invalid="ignore"):
+            X = X + np.linalg.solve(pencil, (self.B - exact @ X).astype(complex))
+            found = self.C @ X + self.D
+        if not np.isfinite(found).all():
+            raise AccuracyError(
+                "a frozen response exceeds the range of numbers: a pole so near the limit of"
+                " stability, or channels of such units, leave nothing to compute with; choose other"
+                " units"
+            )
+        return np.linalg.svd(found, compute_uv=False)[:, 0]
 
 
 class _Peak(NamedTuple):
@@ -198,6 +222,23 @@ class _Peak(NamedTuple):
 
 WINDOW = np.linspace(-1.0, 1.0, 9)
 """Where a response is looked at, in units of the half-width of a window."""
+
+
+def pace_of(poles: Array) -> int:
+    """The power of two next to the fastest pole, 0 where all rest."""
+    fastest = np.abs(poles).max(initial=0.0)
+    return round(math.log2(fastest)) if fastest > 0 else 0
+
+
+def of_one_size(B: Array, C: Array, power: int = 0) -> tuple[Array, Array]:
+    """B and C whose product is 2^`power` times the given one, their largest entries of one size: so
+    their squares stay within the range of numbers. All factors are powers of two, no digit is lost.
+    """
+    b, c = np.abs(B).max(initial=0.0), np.abs(C).max(initial=0.0)
+    if min(b, c) == 0:
+        return B, C
+    k = round(0.5 * (power + math.log2(c) - math.log2(b)))
+    return np.ldexp(B, k), np.ldexp(C, power - k)
 
 
 def _hamiltonian_eigenvalues(A: Array, B: Array, C: Array, D: Array, level: float) -> Array:

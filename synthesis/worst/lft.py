@@ -24,7 +24,7 @@ Array = np.ndarray
 
 class BoxGain(NamedTuple):
     """The largest frozen gain `gamma`, the `p` (m,) and frequency `omega` (rad/s) where it occurs;
-    inf where unstable.
+    inf and NaN where unstable.
     """
 
     gamma: float

@@ -108,13 +108,14 @@ class LowerBound(NamedTuple):
 
     `trajectory` None: p constant, the frozen gain is the best found; in discrete time it has one p
     a sample. `input` (n, nu): the input with |y| = gamma |u|, held from each time of the trajectory
-    to the next; None where none was computed. `growth`: factor of the state in one cycle.
+    to the next; None where none was computed. `growth`: factor of the state in one cycle; None
+    without a trajectory.
     """
 
     gamma: float
     trajectory: Trajectory | None
     input: Array | None = None
-    growth: float = math.nan
+    growth: float | None = None
 
     __repr__ = summarized
 

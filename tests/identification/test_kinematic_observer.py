@@ -6,7 +6,7 @@ from known_vehicles import CONTROLS, STATES, Vehicle
 
 import identification as idn
 import symheli
-from symheli.errors import InputError, UnknownNameError
+from symheli.errors import AccuracyError, InputError, UnknownNameError
 
 SENSORS = np.array([0.05] * 3 + [0.02] * 3 + [0.01] * 2)
 NOISE = dict(zip(STATES, SENSORS.tolist(), strict=True))
@@ -121,3 +121,16 @@ def test_what_it_must_be_told_is_asked_for(vehicle, flown):
         model.observer(NOISE, PROCESS).run(
             flown[1].with_signals({"airspeed_command": "m/s"}, airspeed_command=np.full(900, 99.0))
         )
+
+
+@pytest.mark.parametrize("size", [1e100, 1e300])
+def test_an_estimate_that_leaves_the_range_of_numbers_is_refused_and_begun_anew(
+    vehicle, flown, size
+):
+    """NaN from there on, or LinAlgError."""
+    _, measured = flown
+    observer = model_of(vehicle, measured).observer(NOISE, PROCESS)
+    with pytest.raises(AccuracyError, match="range of numbers"):
+        observer.run(measured.with_signals({"q": "rad/s"}, q=np.full(len(measured), size)))
+    y, u, p = (measured.columns(c)[0] for c in (STATES, CONTROLS, ["airspeed_command"]))
+    np.testing.assert_array_equal(observer.step(y, u, p), y)

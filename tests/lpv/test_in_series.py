@@ -131,7 +131,7 @@ def test_a_delay_of_samples_is_a_power_of_the_shift():
     np.testing.assert_allclose(late.frequency_response(OMEGA)[:, 0, 0], z**-3, rtol=1e-13)
     assert (late.outputs[0].unit, late.dt, len(late.states)) == ("rad", 0.02, 3)
     for wrong in (0, 1.5, True):
-        with pytest.raises(InputError, match="integer >= 1"):
+        with pytest.raises(InputError, match="whole number >= 1"):
             sample_delay("d_lat", wrong, 0.02)
 
 

@@ -1,4 +1,4 @@
-"""What is fuzzed how often, what is not and why, and where NaN is an answer."""
+"""What is fuzzed how often, and what is not and why."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ ERRORS = "raised or warned with, not called"
 PROTOCOL = "a protocol: nothing to call"
 CHOICE = "a choice of the package: its values are listed"
 ARITHMETIC = "computes with what it is given, NaN too; what comes in is checked by its users"
+CONTEXT = "a context manager, entered by contextlib and not by the example; its check has a test"
 RESULT = "made by the package alone, from what it has checked: see the entry that returns it"
 
 EXEMPT: dict[str, str] = {
@@ -31,7 +32,15 @@ EXEMPT: dict[str, str] = {
         f"symheli.{name}": RESULT
         for name in (
             *("Air", "Autopilot", "Batch", "DerivativeTable", "FlightBatch", "Helicopter"),
-            *("Trajectory", "TrimBatch", "TrimMap", "TrimPoint", "FlightDataset", "StepResponse"),
+            *(
+                "Progress",
+                "Trajectory",
+                "TrimBatch",
+                "TrimMap",
+                "TrimPoint",
+                "FlightDataset",
+                "StepResponse",
+            ),
         )
     },
     **{
@@ -64,47 +73,9 @@ EXEMPT: dict[str, str] = {
         )
     },
     "synthesis.PolynomialMatrix": ARITHMETIC,
+    "symheli.watched": CONTEXT,
 }
 """Public callables whose making is not fuzzed; their methods are, where an example calls them."""
-
-CERTIFICATE = (".alpha", ".gamma", ".lower", ".certificate.alpha")
-NAN_IS_SAID: dict[str, tuple[str, ...]] = {
-    "symheli.FlightRecord": (".values",),
-    "symheli.FlightRecord.with_signals": (".values",),
-    "symheli.FlightRecord.from_arrays": (".values",),
-    "symheli.NamedVector": ("",),
-    "symheli.StitchedModel.rhs": ("",),
-    "symheli.simulate_batch": (".states",),
-    "symheli.fly_batch": (".states",),
-    "symheli.trim_map": (".power",),
-    "identification.RecursiveLeastSquares.update": ("[1].innovation",),
-    "identification.RecursiveLeastSquares.run": (".innovations",),
-    "identification.Online.update": (".innovation", "[1].innovation"),
-    "identification.RigidBodyOnline.update": (".innovation",),
-    "identification.beside_baseline": (".predictions",),
-    "identification.fit_for_control": (".second_gap",),
-    "identification.KinematicModel.score": ("[",),
-    "identification.LPVARXModel.score": ("[",),
-    "identification.LPVARXModel.predict": ("",),
-    "identification.KinematicModel.predict": ("",),
-    "identification.order_scan": (".trials",),
-    "identification.BaselinePredictor.predict": ("",),
-    "identification.Scores.of": (".one_step", ".ahead", ".free_run"),
-    "identification.scores": (".one_step", ".ahead", ".free_run"),
-    "synthesis.frozen_box_gain": (".omega",),
-    "synthesis.bandwidth": (".phase_delay",),
-    "synthesis.gain_against_rate": (".certificates",),
-    **{f"synthesis.{name}": (".optimum",) for name in ("h2", "hinf", "ncf", "mixed_sensitivity")},
-    **{
-        f"synthesis.{name}": CERTIFICATE
-        for name in (
-            *("stability", "l2_gain", "decay_rate", "generalized_h2", "lft_gain", "lft_stability"),
-            *("Certificate.load", "Certificate.verify", "Controller.certify", "Estimator.certify"),
-            *("certify_flown", "proven_around"),
-        )
-    },
-}
-"""Where a result may hold NaN, by entry and the start of the place, as its documentation says."""
 
 USUAL = 60
 FEW = 12

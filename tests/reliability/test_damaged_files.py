@@ -1,6 +1,7 @@
 """A damaged file is refused, or read as what it still is; nothing else, and it stays as it was."""
 
 import damaged_files
+import good_files
 import pytest
 
 # pyulog leaves a file open that it cannot read
@@ -11,7 +12,7 @@ pytestmark = pytest.mark.filterwarnings(
 
 @pytest.fixture(scope="module")
 def readers(tmp_path_factory):
-    return damaged_files.readers(tmp_path_factory.mktemp("files"))
+    return good_files.readers(tmp_path_factory.mktemp("files"))
 
 
 def test_no_damage_of_a_file_fails_silently(readers):

@@ -76,16 +76,7 @@ def test_no_changed_argument_of_quick_entries_fails_silently():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "package",
-    [
-        "symheli",
-        *(
-            pytest.param(name, marks=pytest.mark.xfail(reason="faults of docs/reliability.md"))
-            for name in ("identification", "synthesis")
-        ),
-    ],
-)
+@pytest.mark.parametrize("package", PACKAGES)
 def test_no_changed_argument_fails_silently(package):
     told, calls = [], _calls(lambda name: name.startswith(package + "."))
     names = {entry for entry, _ in exported() if entry.startswith(package + ".")}

@@ -1,22 +1,32 @@
 """Inputs that once ended in another exception, in NaN without a word or in no answer at all."""
 
 import math
-from types import SimpleNamespace
+from dataclasses import replace
 
+import good_files
 import numpy as np
 import pytest
-from damaged_files import damaged, ulog_of
+from damaged_files import damaged
 from scipy.io import savemat
 
 import identification as idn
 import symheli
 import synthesis
-from symheli.errors import DataWarning, InputError, SolverError, UnknownNameError
-from symheli.lpv import LinearModel
+from identification.estimators.block_banded import Whitening
+from symheli.errors import (
+    AccuracyError,
+    DataWarning,
+    ExcitationError,
+    InputError,
+    SolverError,
+    UnknownNameError,
+)
+from symheli.lpv import LinearModel, LinearModels
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
 from synthesis.design.back_off import levels_above
 from synthesis.program.panic import no_panic
+from synthesis.worst.frozen import norm
 
 T = np.arange(0.0, 4.0, 0.02)
 RNG = np.random.default_rng(0)
@@ -139,19 +149,27 @@ def test_counts_of_the_judges_are_whole(model, record):
                 judge(count)
 
 
-def test_an_output_that_is_none_is_named():
-    found = SimpleNamespace(scheduled=SimpleNamespace(outputs=("q", "theta")))
-    with pytest.raises(UnknownNameError, match="did you mean 'theta'"):
-        idn.AgainstConstant.pays(found, "thetax")  # type: ignore[arg-type]
+def test_a_verdict_is_on_an_output_of_models_that_can_differ(model, record):
+    """KeyError for a name that is none, ValueError for a structure that is itself constant."""
+    found = idn.against_constant(model.structure, *record.split(0.7))
+    constant = idn.against_constant(model.structure.lti(), *record.split(0.7))
+    for ask in (idn.AgainstConstant.pays, idn.AgainstConstant.verdict_on):
+        with pytest.raises(UnknownNameError, match="unknown output 'yx'; did you mean 'y'"):
+            ask(found, "yx")
+        with pytest.raises(InputError, match="basis of degree 1"):
+            ask(constant, "y")
 
 
 def test_iterations_are_counted():
+    simulator = symheli.SimulatedFlight(symheli.Helicopter.load("xcell60", governor="ideal"))
     for make in (
         lambda n: idn.RefinedInstruments(iterations=n),
         lambda n: idn.OutputError(evaluations=n),
+        lambda n: idn.FilterError(simulator, steps=n),
     ):
-        with pytest.raises(InputError, match="whole number"):
-            make(math.nan)
+        for count in (math.nan, 1.5, 0):
+            with pytest.raises(InputError, match="whole number"):
+                make(count)
 
 
 @pytest.mark.parametrize("back_off", [-1e300, 0.5, math.nan, 1.6e16, ()])
@@ -215,7 +233,7 @@ def test_a_topic_of_a_ulog_without_time_stamps_is_left_out_and_said(tmp_path):
     """One flipped bit in the name of the field ended in KeyError."""
     pytest.importorskip("pyulog")
     path = tmp_path / "log.ulg"
-    path.write_bytes(ulog_of(T).replace(b"timestamp;", b"tilestamp;"))
+    path.write_bytes(good_files.ulog_of(T).replace(b"timestamp;", b"tilestamp;"))
     with pytest.warns(DataWarning, match="damaged"), pytest.raises(InputError, match="armed"):
         symheli.FlightRecord.from_ulog(path, {"q": ("rates", "xyz[1]", "rad/s")}, dt=0.02)
 
@@ -238,9 +256,14 @@ def test_scores_have_a_name_a_column():
     for names in ([], ["y", "y"]):
         with pytest.raises(InputError, match="outputs"):
             idn.Scores.of(y, names, one_step=y, ahead=y, free_run=y)
+    for horizon in (math.nan, 0.0, -1.0, math.inf):
+        with pytest.raises(InputError, match="horizon"):
+            idn.Scores.of(y, ["y"], one_step=y, ahead=y, free_run=y, horizon=horizon)
 
 
-@pytest.mark.parametrize("lags", [{"nb": 1.5}, {"nb": math.nan}, {"na": (1,) * 12}])
+@pytest.mark.parametrize(
+    "lags", [{"na": 1.5}, {"na": math.nan}, {"nb": 1.5}, {"nb": math.nan}, {"na": (1,) * 12}]
+)
 def test_lags_of_a_vehicle_are_counted(lags):
     given = {"nb": 1, **lags}
     with pytest.raises(InputError, match=r"na:|nb:"):
@@ -260,3 +283,354 @@ def test_designs_refuse_what_they_cannot_mean():
     ):
         with pytest.raises(InputError, match="expected"):
             design()
+
+
+@pytest.mark.parametrize("gain", [5e-324, 1e-300, 1e-200, 1.0, 1e200, 1e300])
+def test_margins_of_an_integrator_are_those_of_any_units(gain):
+    """k/s: 90 deg at k rad/s, a disk of 2, whatever the unit of time. The squares of k left the
+    range of numbers: an infinite phase at 1e-200, an exception of NumPy at 5e-324 and 1e300.
+    """
+    integrator = LinearModel([[0.0]], [[1.0]], [[gain]], [[0.0]], ["x"], ["u"], ["y"])
+    found = synthesis.margins(integrator)
+    assert (found.phase, found.disk) == pytest.approx((math.pi / 2, 2.0))
+    assert found.crossover == pytest.approx((gain,))
+    assert found.delay == pytest.approx(math.pi / 2 / gain)
+    assert synthesis.disk_margin(integrator) == pytest.approx(2.0)
+
+
+def test_a_response_beyond_the_range_of_numbers_is_refused():
+    with pytest.raises(AccuracyError, match="other units"):
+        norm(np.diag([-1.0, -5e-324]), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
+
+
+def test_a_constant_parameter_has_no_growth_in_a_cycle():
+    """It was NaN, and nothing said so."""
+    p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    lag = symheli.LPVStateSpace.polynomial([[[-1.5]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    found = synthesis.lower_bound(lag)
+    assert (found.trajectory, found.growth) == (None, None)
+
+
+def test_frozen_models_are_compared_below_the_fastest_frequency(model):
+    """No frequency was left to compare: ValueError of an empty maximum."""
+    p = symheli.Scheduling("p", "1", -1.0, 1.0)
+    lag = symheli.LPVStateSpace.polynomial(
+        [[[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p, states=["y"], inputs=["u"], outputs=["y"]
+    )
+    asked = {"mode": {0.0: -1.0}, "scales": {"y": 1.0, "u": 1.0}, "channel": ("u", "y")}
+    for fast in (1e300, math.inf, math.nan, 0.81 * math.pi / model.dt):
+        with pytest.raises(InputError, match="fast: expected at most"):
+            idn.frozen_models({0.0: lag.at(0.0)}, lag, model, **asked, fast=fast)
+
+
+@pytest.fixture(scope="module")
+def slow_plant():
+    p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.1)
+    lag = symheli.LPVStateSpace.polynomial(
+        [[[-1.0]], [[-1.0]]], [[[1.0, 1.0]]], [[[1.0]]], [[[0.0, 0.0]]], p, inputs=["w", "u"]
+    )
+    return synthesis.Plant(
+        lag, disturbances=["w"], performance=lag.outputs, controls=["u"], measurements=lag.outputs
+    )
+
+
+@pytest.fixture(scope="module")
+def sampled_plant():
+    p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.1)
+    lag = symheli.LPVStateSpace.polynomial(
+        [[[0.9]], [[0.3]]],
+        [[[0.1, 0.1]]],
+        [[[1.0]]],
+        [[[0.0, 0.0]]],
+        p,
+        dt=0.1,
+        inputs=["w", "u"],
+        outputs=["y"],
+    )
+    return synthesis.Plant(
+        lag, disturbances=["w"], performance=["y"], controls=["u"], measurements=["y"]
+    )
+
+
+@pytest.mark.parametrize("order", [math.nan, math.inf, 1.5, 0, 11])
+def test_a_delay_has_an_order(slow_plant, order):
+    for delayed in (slow_plant.with_delay, lambda t, order: symheli.lpv.pade_delay("u", t, order)):
+        with pytest.raises(InputError, match="order"):
+            delayed(0.1, order=order)
+
+
+@pytest.mark.parametrize("samples", [math.nan, math.inf, 1.5, 0, True])
+def test_a_delay_in_samples_is_counted(samples):
+    with pytest.raises(InputError, match="samples: expected a whole number"):
+        symheli.lpv.sample_delay("u", samples, 0.1)
+
+
+@pytest.mark.parametrize("tolerance", [1e-300, 0.0, -1.0, 1.0, math.nan, math.inf])
+def test_how_far_a_proof_reaches_is_found_to_a_tolerance(slow_plant, tolerance):
+    """1e-300 was bisected to, a proof each time."""
+    with pytest.raises(InputError, match="tolerance"):
+        synthesis.proven_around(slow_plant, {("u", "y1"): -1.0}, 0.5, tolerance=tolerance)
+
+
+@pytest.mark.parametrize("size", [1e100, -1e300, 1.7e308])
+def test_residuals_that_cannot_be_squared_are_refused(model, record, size):
+    """Coefficients of 1e300 made NaN of the share that p explains, and of standard errors."""
+    large = replace(model, theta=np.full(model.theta.shape, size))
+    for judge in (idn.dependence_report, idn.uncertainty, idn.slow_modes):
+        with pytest.raises(InputError, match="residuals of"):
+            judge(large, record)
+
+
+def test_records_that_determine_nothing_say_nothing_of_certainty(model, record):
+    """LinAlgError, where nothing moved; standard errors made of rounding, where p did not."""
+    y, u, p = record["y"], record["u"], np.zeros(len(record))
+    rest = record.with_signals(dict.fromkeys("yup", "1"), y=p, u=p, p=p)
+    held = record.with_signals(dict.fromkeys("yup", "1"), y=y, u=u, p=p)
+    for one in (rest, held):
+        for judge in (idn.uncertainty, idn.slow_modes):
+            with pytest.raises(ExcitationError, match="distinct values"):
+                judge(model, one)
+
+
+@pytest.mark.parametrize("count", [math.nan, -1, 1.5, 1e300])
+def test_samples_of_a_fit_are_counted(model, count):
+    for which in ("rows_used", "rows_dropped"):
+        with pytest.raises(InputError, match=which):
+            replace(model, **{which: count})
+
+
+@pytest.mark.parametrize("window", [1e16, 1e300, 1.7e308])
+def test_a_window_beyond_the_record_is_refused_at_once(record, window):
+    """NumPy was asked for an array of that size, or for the integer of infinity."""
+    with pytest.raises(ExcitationError, match="longer than every record"):
+        idn.frequency_response(record, ["y"], ["u"], window=window)
+
+
+@pytest.mark.parametrize("seconds", [4e16, 12.0, 0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("name", ["horizon", "window"])
+def test_a_model_is_judged_over_a_horizon_and_windows_within_the_record(
+    model, record, name, seconds
+):
+    """11.9 s of record: what lies beyond gave NaN for Theil's coefficient and for J."""
+    within = {"horizon": 1.0, "window": 4.0, name: seconds}
+    with pytest.raises(InputError, match=rf"{name}: .* up to 11\.9 of the longest record"):
+        idn.fit_for_control(
+            model, record, {("u", "y"): -0.1}, scales={"y": 1.0, "u": 1.0}, **within
+        )
+
+
+def test_a_short_record_is_judged_as_far_as_it_goes(model, record):
+    """Shorter than the usual window of 8 s: what that would tell is not known."""
+    short = record.rows(slice(0, 60))
+    found = idn.fit_for_control(model, short, {("u", "y"): -0.1}, scales={"y": 1.0, "u": 1.0})
+    assert (found["J"].verdict, found["TIC"].verdict) == ("not known", "fit")
+
+
+def test_theils_coefficient_is_that_of_numbers_that_can_be_squared():
+    """1e300 beside 1 counted as rounding, a perfect prediction; nothing at all as NaN."""
+    for y, guess in (([1.0, 2.0], [1e300, 2.0]), ([1e300, 2.0], [1.0, 2.0]), ([], [])):
+        with pytest.raises(InputError, match="two finite arrays"):
+            idn.theil(np.array(y), np.array(guess))
+
+
+def test_a_listener_can_be_called():
+    """TypeError in the middle of the work that was told of."""
+    with pytest.raises(InputError, match="listener"), symheli.watched("progress"):  # type: ignore[arg-type]
+        pytest.fail("entered")
+
+
+@pytest.mark.parametrize("error", [1.0, 1e16, 1e300])
+def test_a_reading_is_wrong_by_the_range_at_most(sampled_plant, error):
+    """LinAlgError at 1e300; a reading beyond the range counts as its end, so that all of these are
+    one. u = -(1 + 3 p) y is wrong by at most 3 y.
+    """
+    nothing, through, p = np.zeros((0, 0)), np.zeros((0, 1)), sampled_plant.parameters[0]
+    gain = symheli.LPVStateSpace.polynomial(
+        [nothing],
+        [through],
+        [np.zeros((1, 0))],
+        [[[-1.0]], [[-3.0]]],
+        p,
+        inputs=["y"],
+        outputs=["u"],
+    )
+    wrong = synthesis.with_wrong_parameter(sampled_plant, gain, error)
+    _, B, C, _ = wrong.model.matrices(0.5)
+    assert abs(float(C[1, 0] * B[0, 1])) == pytest.approx(0.1 * 3.0)
+
+
+def test_an_empty_archive_of_models_is_refused(tmp_path):
+    """EOFError of NumPy."""
+    (tmp_path / "family.npz").write_bytes(b"")
+    with pytest.raises(InputError, match="not a whole file"):
+        symheli.LinearFamily.load(tmp_path / "family.npz")
+
+
+@pytest.mark.parametrize(
+    ("file", "content"),
+    [
+        ("duration/.zarray", b'{"shape": [2'),
+        ("duration/.zarray", b'{"shape": [2], "chunks": [[]], "dtype": "<f8", "fill_value": 0}'),
+        ("time/.zarray", b'{"shape": [3], "chunks": [3], "dtype": "|O", "fill_value": null}'),
+        (
+            "values/.zarray",
+            b'{"shape": [9, 3, 2], "chunks": [1, 3, 2], "dtype": "<f8", "fill_value": "NaN"}',
+        ),
+    ],
+)
+def test_a_damaged_description_of_flights_is_refused(tmp_path, file, content):
+    """JSONDecodeError, TypeError, or seven flights more than there were."""
+    path = next(one for one in good_files.folders(tmp_path) if one.entry == "flights").path
+    (path / file).write_bytes(content)
+    with pytest.raises(InputError, match="damaged"):
+        symheli.FlightDataset(path)
+
+
+def test_damaged_parameters_of_a_campaign_are_refused_and_damaged_descriptions_said_anew(tmp_path):
+    campaign = next(one for one in good_files.folders(tmp_path) if one.entry == "campaign")
+    (campaign.path / "values" / ".zarray").write_bytes(b"{")
+    assert campaign.read(campaign.path)["period"][:2].tolist() == [1.4, 2.0]
+    cases = campaign.path / "cases.json"
+    cases.write_bytes(cases.read_bytes().replace(b"0.5", b"0.7"))
+    with pytest.raises(InputError, match="digest"):
+        campaign.read(campaign.path)
+
+
+def test_a_reason_that_is_no_text_is_refused(tmp_path):
+    """ValueError of a character beyond the last one."""
+    campaign = next(one for one in good_files.folders(tmp_path) if one.entry == "campaign")
+    reason = campaign.path / "reason" / "2"
+    reason.write_bytes(b"\xff" * len(reason.read_bytes()))
+    with pytest.raises(InputError, match="no text"):
+        campaign.read(campaign.path)
+
+
+def test_gusts_are_forgotten_however_far_apart_the_samples_are():
+    """inf exp(-inf), NaN, at 1e300 m/s; what lies 1000 lengths apart is white already."""
+    gust = symheli.Dryden(wind=5.0, altitude=50.0)
+    far, farther = (gust.history(T, speed, 1) for speed in (1e12, 1.7e308))
+    np.testing.assert_array_equal(far, farther)
+    assert np.all(np.isfinite(far))
+
+
+def test_information_of_an_experiment_is_finite():
+    """LinAlgError where experiments were chosen among."""
+    for factor, seconds in ((np.full((2, 2), np.nan), 1.0), (np.eye(2)[:1], 1.0), (np.eye(2), 0.0)):
+        with pytest.raises(InputError, match=r"factor|duration"):
+            idn.Experiment("one", seconds, factor, {})
+
+
+def test_controls_are_on_their_stops_or_not(ideal):
+    """NaN was carried on, as true."""
+    trims = symheli.trim_batch(ideal, airspeed=[4.0, 5.0])
+    for name in ("on_stops", "vortex_ring"):
+        with pytest.raises(InputError, match=f"{name}: expected truth values"):
+            replace(trims, **{name: np.full(getattr(trims, name).shape, np.nan)})
+
+
+@pytest.mark.parametrize("shape", [(0, 2, 1, 2), (1, 2, 2), (2, 2, 2, 2)])
+def test_a_covariance_is_that_of_the_coefficients(model, record, shape):
+    with pytest.raises(InputError, match="covariance: expected shape"):
+        idn.fit_for_control(
+            model,
+            record,
+            {("u", "y"): -0.1},
+            scales={"y": 1.0, "u": 1.0},
+            covariance=np.zeros(shape),
+            window=4.0,
+            horizon=1.0,
+        )
+
+
+@pytest.mark.parametrize("seconds", [1e8, 5.6e16, 1e300])
+def test_a_flight_of_a_billion_samples_is_refused_and_not_begun(ideal, seconds):
+    schedule = symheli.AirspeedSchedule((5.0,), (1.0,), (0.5,), start=4.0, lead=seconds)
+    with pytest.raises(InputError, match="samples"):
+        symheli.fly(ideal, schedule)
+
+
+def test_an_operating_point_has_an_airspeed(ideal):
+    point = symheli.trim(ideal, airspeed=5.0)
+    for speed in (math.nan, math.inf):
+        with pytest.raises(InputError, match="airspeed"):
+            replace(point, airspeed=speed)
+
+
+def test_the_misfit_of_a_table_is_a_number(ideal):
+    lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=0.02, points=3)
+    table = symheli.TableController.of(lqr.scheduled_controller.model, 5)
+    for misfit in (math.nan, -1.0):
+        with pytest.raises(InputError, match="misfit"):
+            replace(table, misfit=misfit)
+
+
+def test_noise_that_cannot_be_weighed_is_refused():
+    """Gusts of 3e10 m/s ended in LinAlgError."""
+    ones = np.ones((5, 2, 1))
+    for large in (1e40, math.inf):
+        with pytest.raises(AccuracyError, match="check their units"):
+            Whitening.of([([np.tile(np.eye(2), (5, 1, 1))], np.ones(2)), ([ones], [large])])
+
+
+@pytest.mark.parametrize("scale", [5e-324, 1e-300, 1e-160, 1.0, 1e160, 1e300])
+def test_a_norm_is_that_of_any_units(scale):
+    """1/(s^2 + s + 1): 2/sqrt(3) at sqrt(1/2). Squares of 1e-160 made a singular matrix."""
+    A, B, C = np.array([[-1.0, 1.0], [-1.0, 0.0]]), np.array([[0.0], [1.0]]), np.array([[scale, 0]])
+    gain, omega = norm(A, B, C, np.zeros((1, 1)))
+    assert (gain, omega) == pytest.approx((2 / math.sqrt(3) * scale, math.sqrt(0.5)), rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [5e-324, 1e-300, 1e-160, 1e160, 1e300])
+def test_designs_refuse_weights_that_cannot_be_squared(size):
+    """LinAlgError and OverflowError; the least H2 norm of a plant of 1e300 was 0."""
+    lag = LinearModel([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
+    with pytest.raises(InputError, match=r"other units|below what squares"):
+        synthesis.mixed_sensitivity(lag, 1.0, size)
+    D = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, size], [0.0, 1.0, 0.0]])
+    B, C = np.array([[1.0, 0.0, 3.0]]), np.array([[1.0], [0.0], [2.0]])
+    plant = LinearModel([[0.0]], B, C, D, ["x"], ["w1", "w2", "u"], ["z1", "z2", "y"])
+    for design in (synthesis.hinf, synthesis.h2):
+        with pytest.raises(InputError, match=r"other units|price of u"):
+            design(plant, ["u"], ["y"])
+
+
+@pytest.mark.parametrize("size", [0.0, -1.0, 1e-300, 1e300])
+def test_gaps_are_those_of_channels_in_some_scale(size):
+    """0 and 1e300 made NaN of the responses, and ValueError of their winding number."""
+    lag = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"], 0.1)
+    many = LinearModels.of([lag])
+    for scales in ({"input_scale": size}, {"output_scale": size}):
+        for gap in (
+            lambda **s: symheli.lpv.nu_gap(lag, lag, **s),
+            lambda **s: symheli.lpv.nu_gaps(lag, many, **s),
+            lambda **s: symheli.lpv.chordal_distance(lag, lag, [1.0], **s),
+            lambda **s: symheli.lpv.stability_margin(lag, {("u", "y"): -0.1}, **s),
+        ):
+            with pytest.raises(InputError, match="scale"):
+                gap(**scales)
+
+
+@pytest.mark.parametrize("band", [(0.3,), (0.3, 1.0, 2.0), ()])
+def test_a_model_is_judged_over_a_band_of_two_ends(model, record, band):
+    with pytest.raises(InputError, match="band"):
+        idn.fit_for_control(
+            model,
+            record,
+            {("u", "y"): -0.1},
+            scales={"y": 1.0, "u": 1.0},
+            window=4.0,
+            horizon=1.0,
+            band=band,
+        )
+
+
+@pytest.mark.parametrize("dt", [5e-324, 1e-300])
+def test_an_autopilot_samples_at_a_pace_of_the_plant(ideal, dt):
+    with pytest.raises(InputError, match="dt = "):
+        symheli.gain_scheduled_lqr(ideal, 0.0, 4.0, dt=dt, points=2)
+
+
+def test_no_flights_are_refused(ideal):
+    point = symheli.trim(ideal, airspeed=5.0)
+    with pytest.raises(InputError, match="N >= 1"):
+        symheli.simulate_batch(ideal, np.zeros((0, 10)), [point.u.array] * 2, dt=0.02)

@@ -37,6 +37,23 @@ class Verdict(NamedTuple):
     fault: str = ""
 
 
+class NotANumber(NamedTuple):
+    """A number or an array that is or holds NaN: where it is in a result, and what it is a part of,
+    the result itself first.
+    """
+
+    where: str
+    value: Any
+    owners: tuple[Any, ...]
+
+    @property
+    def field(self) -> str:
+        """Class and field that hold it, such as "Certificate.alpha"; empty where none does."""
+        name = self.where.rpartition(".")[2]
+        owner = self.owners[-1] if self.owners else None
+        return f"{type(owner).__name__}.{name}" if hasattr(owner, name) else ""
+
+
 class TooLong(BaseException):
     """Above every `except Exception`."""
 
@@ -47,9 +64,10 @@ def judged(
     given: Any = (),
     types: tuple[type, ...] = (),
     seconds: float = SECONDS,
+    meant: Callable[[NotANumber], bool] = lambda _: False,
 ) -> Verdict:
     """The verdict on one call with a value changed in the way of `kind`; `types` are those that
-    its result may have (none: any).
+    its result may have (none: any), `meant` says where NaN is an answer.
     """
     before = {id(a): (a, a.tobytes()) for a in _arrays(given)}
     told: list[warnings.WarningMessage] = []
@@ -76,7 +94,7 @@ def judged(
         )
     else:
         said = kind == ANOTHER or any(issubclass(w.category, DOCUMENTED) for w in told)
-        verdict = _of(result, types, said)
+        verdict = _of(result, types, (lambda _: True) if said else meant)
     changed = [a for a, was in before.values() if a.tobytes() != was]
     return Verdict(verdict.outcome, "an argument was changed") if changed else verdict
 
@@ -85,25 +103,28 @@ def _refused(error: SymheliError) -> Verdict:
     return Verdict("refused", "" if str(error).strip() else "an error without a word")
 
 
-def _of(result: Any, types: tuple[type, ...], said: bool) -> Verdict:
+def _of(result: Any, types: tuple[type, ...], meant: Callable[[NotANumber], bool]) -> Verdict:
     if types and not isinstance(result, types):
         return Verdict("result", f"a {type(result).__name__} and no {types[0].__name__}")
-    where = next(not_a_number(result), None)
-    silent = where is not None and not said
-    return Verdict("result", f"NaN in the result{where}, and nothing says so" if silent else "")
+    silent = [found.where for found in not_a_number(result) if not meant(found)]
+    where = " and ".join(f"the result{place}" for place in silent)
+    return Verdict("result", f"NaN in {where}, and nothing says so" if silent else "")
 
 
-def not_a_number(value: Any, where: str = "", depth: int = 6) -> Iterator[str]:
-    """The places of NaN in a value."""
+def not_a_number(
+    value: Any, where: str = "", owners: tuple[Any, ...] = (), depth: int = 6
+) -> Iterator[NotANumber]:
+    """Every NaN in a value, but not in its private fields."""
     if isinstance(value, float | complex | np.floating | np.complexfloating):
         if math.isnan(value.real) or math.isnan(value.imag):
-            yield where
+            yield NotANumber(where, value, owners)
     elif isinstance(value, np.ndarray):
         if value.dtype.kind in "fc" and np.isnan(value).any():
-            yield where
+            yield NotANumber(where, value, owners)
     elif depth:
         for name, part in _named(value):
-            yield from not_a_number(part, f"{where}{name}", depth - 1)
+            if not name.startswith("._"):
+                yield from not_a_number(part, f"{where}{name}", (*owners, value), depth - 1)
 
 
 def _named(value: Any) -> Iterator[tuple[str, Any]]:
