@@ -177,15 +177,16 @@ DEG = 180 / np.pi
 @pytest.mark.parametrize(
     ("factors", "said"),
     [
-        pytest.param({"p": DEG}, {"p": "it is in deg/s"}, marks=pytest.mark.slow),
+        ({"p": DEG}, {"p": "it is in deg/s"}),
         pytest.param(
             {"phi": DEG, "theta": DEG},
             {"phi": "it is in deg,", "theta": "it is in deg,"},
             marks=pytest.mark.slow,
         ),
-        (
+        pytest.param(
             {"p": DEG, "q": DEG, "r": DEG, "phi": DEG, "theta": DEG, "psi": DEG},
             {n: "it is in deg" for n in ("p", "q", "r", "phi", "theta", "psi")},
+            marks=pytest.mark.slow,
         ),
         ({"q": -1.0}, {"q": "its sign is turned, or that of theta"}),
         pytest.param(

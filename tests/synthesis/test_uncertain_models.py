@@ -124,7 +124,7 @@ def test_of_a_time_invariant_model_it_is_the_norm_with_the_best_scaling(seed, dt
     assert l2_gain(still, form=COARSE, search=None).gamma == pytest.approx(expected, rel=CLOSE)
 
 
-@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("dt", [None, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_without_perturbation_it_is_the_certificate_of_the_model(dt):
     for bound in (0.0, 1e-9):
         unc = random_uncertain(2, bound, dt)
