@@ -53,7 +53,8 @@ class LinearModels(Sequence[LinearModel]):
     def __post_init__(self) -> None:
         for group in ("states", "inputs", "outputs"):
             object.__setattr__(self, group, signals(getattr(self, group)))
-        K, nx, nu, ny = len(self.A), len(self.states), len(self.inputs), len(self.outputs)
+        nx, nu, ny = len(self.states), len(self.inputs), len(self.outputs)
+        K = len(frozen(self.A, "A", (None, nx, nx)))
         shapes = {"A": (K, nx, nx), "B": (K, nx, nu), "C": (K, ny, nx), "D": (K, ny, nu)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))

@@ -24,7 +24,7 @@ from symheli.steady.flight_conditions import FlightConditions
 from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import ALONE, SteadyFlights
 from symheli.steady.validity import Validity, in_a_ring, warn
-from symheli.values.arrays import Array
+from symheli.values.arrays import Array, frozen
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal, indices
@@ -54,6 +54,11 @@ class TrimBatch(OperatingPoints):
     torque : array (N,)
         Of the engine, N m.
 
+    Raises
+    ------
+    InputError
+        Other shapes, numbers that are not finite, flags that are no truth values.
+
     Examples
     --------
     >>> found = symheli.trim_batch(heli, np.linspace(2.0, 8.0, 50), acceleration=1.0)
@@ -81,6 +86,12 @@ class TrimBatch(OperatingPoints):
     _repr_html_ = as_table
 
     def __post_init__(self) -> None:
+        n, nx = len(self.conditions), len(self.states)
+        widths = {"x": nx, "u": len(self.inputs), "xdot": nx, "residual": nx}
+        shapes = {name: (n, width) for name, width in widths.items()}
+        shapes |= {"wind": (n, len(self.winds)), "density": (n,), "torque": (n,)}
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
         for name in ("on_stops", "vortex_ring"):
             if getattr(self, name).dtype != bool:
                 raise InputError(f"{name}: expected truth values, got {getattr(self, name).dtype}")

@@ -520,9 +520,13 @@ def test_information_of_an_experiment_is_finite():
             idn.Experiment("one", seconds, factor, {})
 
 
-def test_controls_are_on_their_stops_or_not(ideal):
+def test_trims_are_numbers_with_controls_on_their_stops_or_not(ideal):
     """NaN was carried on, as true."""
     trims = symheli.trim_batch(ideal, airspeed=[4.0, 5.0])
+    for name in ("x", "u", "xdot", "residual", "wind", "density", "torque"):
+        for wrong in (np.full(getattr(trims, name).shape, np.nan), np.zeros((1, 1))):
+            with pytest.raises(InputError, match=name):
+                replace(trims, **{name: wrong})
     for name in ("on_stops", "vortex_ring"):
         with pytest.raises(InputError, match=f"{name}: expected truth values"):
             replace(trims, **{name: np.full(getattr(trims, name).shape, np.nan)})
@@ -634,3 +638,10 @@ def test_no_flights_are_refused(ideal):
     point = symheli.trim(ideal, airspeed=5.0)
     with pytest.raises(InputError, match="N >= 1"):
         symheli.simulate_batch(ideal, np.zeros((0, 10)), [point.u.array] * 2, dt=0.02)
+
+
+@pytest.mark.parametrize("A", [1.0, np.zeros((2, 2)), np.zeros((0, 3, 3))])
+def test_matrices_of_models_stand_in_a_row(A):
+    """TypeError of a number that has no length."""
+    with pytest.raises(InputError, match="A: expected shape"):
+        LinearModels(A, [[[1.0]]], [[[1.0]]], [[[0.0]]], ["x"], ["u"], ["y"])
