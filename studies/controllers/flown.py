@@ -16,6 +16,7 @@ from symheli import (
     Dryden,
     FlightPlan,
     Helicopter,
+    LPVStateSpace,
     ScheduledController,
     Wind,
     fly_batch,
@@ -111,17 +112,16 @@ def plans(designs: Designs) -> Iterator[tuple[str, float, FlightPlan]]:
     for design in designs.designs:
         if design.controller is None:
             continue
-        controller = ScheduledController(design.controller)
         for wind in sorted((*WINDS, *BEYOND)):
-            yield design.name, wind, plan(controller, wind)
+            yield design.name, wind, plan(design.controller, wind)
 
 
-def plan(controller: ScheduledController, wind: float) -> FlightPlan:
+def plan(controller: LPVStateSpace, wind: float) -> FlightPlan:
     """The transition with that controller in turbulence of one size, servos, noise and delay."""
     return FlightPlan(
         transition(),
         dt=PERIOD,
-        controller=controller,
+        controller=ScheduledController(controller),
         wind=Wind(STEADY, turbulence=Dryden(wind, ALTITUDE)),
         servos={u: replace(XCELL_SERVOS[u], rate=SERVO_RATE) for u in CONTROLS},
         sensors={y: Sensor(noise=NOISE_SHARE * NOISE[y]) for y in MEASUREMENTS},
@@ -133,9 +133,7 @@ def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> Flo
     """Every controller and size with every seed: the same gusts and noise for all of them."""
     heli = Helicopter.load(vehicle, governor="pi")
     asked = list(plans(designs))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ValidityWarning)  # measured, and said in the report
-        each = measured(fly_batch(heli, [p for *_, p in asked], seeds=seeds)) if asked else []
+    each = measures(heli, [p for *_, p in asked], seeds) if asked else []
     n = len(seeds)
     return FlownControllers(
         flown=tuple(
@@ -150,3 +148,12 @@ def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> Flo
         seeds=n,
         duration=transition().duration,
     )
+
+
+def measures(
+    heli: Helicopter, plans: Sequence[FlightPlan], seeds: Sequence[int], workers: int | None = None
+) -> list[Measures]:
+    """Of every plan with every seed; how long a flight was beyond the equations is one of them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ValidityWarning)
+        return measured(fly_batch(heli, plans, seeds=seeds, workers=workers))
