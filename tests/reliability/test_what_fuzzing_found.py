@@ -669,3 +669,9 @@ def test_certificates_are_of_models_that_can_be_squared():
     for analysis in (synthesis.stability, synthesis.l2_gain):
         with pytest.raises(InputError, match="other units"):
             analysis(fast, search=None)
+
+
+def test_a_horizon_is_a_number_of_samples(model, record):
+    """OverflowError of the integer of infinity."""
+    with pytest.raises(InputError, match="number of samples"):
+        idn.scores(replace(model, dt=5e-324), record)
