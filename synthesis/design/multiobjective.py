@@ -27,7 +27,7 @@ from synthesis.design.in_plant_units import in_plant_units, packed
 from synthesis.design.motions import motions, used
 from synthesis.design.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
 from synthesis.design.recovery import Transformed, controller
-from synthesis.design.refusals import failed
+from synthesis.design.refusals import failed, require_channels
 from synthesis.design.search import Dependence, functions, limited
 from synthesis.program.cone_program import Solver
 from synthesis.program.panic import no_panic
@@ -110,6 +110,7 @@ def multiobjective(
     >>> bool(made.closed().at(0.5).poles().real.max() <= -1.2)
     True
     """
+    require_channels(plant)
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)
     every = (objectives,) if isinstance(objectives, L2 | H2 | EnergyToPeak) else tuple(objectives)

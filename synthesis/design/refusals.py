@@ -14,6 +14,7 @@ from synthesis.design.conditions import conditions
 from synthesis.design.diagnosis import reasons, unpriced
 
 if TYPE_CHECKING:
+    from synthesis.design.generalized import Channels
     from synthesis.design.plant import Plant
 
 
@@ -21,6 +22,19 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
     """Raises `InputError` where a control costs nothing or a measurement is free of disturbances at
     some p, and where the plant has none.
     """
+    named = require_channels(plant, controls=controls, measurements=measurements)
+    at = plant.matrices(conditions(plant)[0])
+    found: list[str] = []
+    if controls:
+        found += unpriced(at.D12, named.controls)
+    if measurements:
+        found += unpriced(np.swapaxes(at.D21, 1, 2), named.measurements, dual=True)
+    if found:
+        raise InputError("; ".join(found))
+
+
+def require_channels(plant: Plant, *, controls: bool = True, measurements: bool = True) -> Channels:
+    """The channels of a plant; raises `InputError` where a group has none."""
     named = plant.channels
     for wanted, group in (
         (True, "disturbances"),
@@ -30,14 +44,7 @@ def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = Tru
     ):
         if wanted and not getattr(named, group):
             raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
-    at = plant.matrices(conditions(plant)[0])
-    found: list[str] = []
-    if controls:
-        found += unpriced(at.D12, named.controls)
-    if measurements:
-        found += unpriced(np.swapaxes(at.D21, 1, 2), named.measurements, dual=True)
-    if found:
-        raise InputError("; ".join(found))
+    return named
 
 
 def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from scipy import linalg
 
+from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Matrices
 from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial import structure
@@ -20,6 +21,9 @@ from synthesis.polynomial.symmetric import symmetrized
 from synthesis.worst.frozen import norm
 
 Array = np.ndarray
+
+LARGEST = 1e100
+"""Gramians square the entries of a model."""
 
 UNSEEN = 0.3
 """Every state is driven and seen by this fraction of what inputs and outputs do: what they do not
@@ -149,6 +153,10 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     """
     n, continuous = len(model.states), model.dt is None
     every = elsewhere or Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D)))
+    if max(np.abs(M).max(initial=0.0) for M in every) > LARGEST:
+        raise InputError(
+            f"a model with entries beyond {LARGEST:.0e} cannot be squared; choose other units"
+        )
     B, C = np.hstack([*every.B]), np.vstack([*every.C])
     D = balance(np.abs(every.A).max(axis=0), B, C)
     A, B, C = model.A * D / D[:, None], B / D[:, None], C * D

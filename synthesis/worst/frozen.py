@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from symheli.errors import AccuracyError
+from symheli.errors import AccuracyError, InputError
 from symheli.lpv import LPVStateSpace
-from symheli.values.numbers import positive, whole
+from symheli.values.numbers import whole
 from synthesis.worst.over_box import worst_over
 from synthesis.worst.scheduled import Scheduled
 
@@ -40,7 +40,7 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     points : int
         Of the grid whose highest peaks are climbed; the breaks of a spline are on it too.
     tolerance : float
-        Relative accuracy of each norm, from below.
+        Relative accuracy of each norm, from below; less than 1.
 
     Returns
     -------
@@ -62,7 +62,8 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     FrozenGain(gamma=1.0, p=0.0, omega=0.0)
     """
     low, high = lpv.scheduling.low, lpv.scheduling.high
-    positive(tolerance, "tolerance")
+    if not 0 < tolerance < 1:
+        raise InputError(f"tolerance: expected a number between 0 and 1, got {tolerance!r:.60}")
     grid = np.linspace(low, high, whole(points, "points", 2))
     if isinstance(lpv, LPVStateSpace):
         ends = [p for piece in lpv.basis.pieces() for p in (piece.low, piece.high)]

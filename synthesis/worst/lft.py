@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symheli.errors import InputError
 from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
-from symheli.values.numbers import positive
 from synthesis.worst.frozen import FrozenGain, norm
 from synthesis.worst.lines import Line, alone, directions, growing_on, shared
 from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
@@ -40,7 +40,7 @@ def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
     lft : LFT
         The model; without channels 0 where every model of the grid is stable.
     tolerance : float
-        Relative accuracy of each norm, from below.
+        Relative accuracy of each norm, from below; less than 1.
 
     Returns
     -------
@@ -56,7 +56,8 @@ def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
     (0.0,)
     """
 
-    positive(tolerance, "tolerance")
+    if not 0 < tolerance < 1:
+        raise InputError(f"tolerance: expected a number between 0 and 1, got {tolerance!r:.60}")
 
     def at(delta: Array) -> tuple[float, float]:
         M, x = lft.matrix(delta), len(lft.states)

@@ -197,8 +197,11 @@ def test_grids_and_tolerances_of_the_analysis_are_checked():
     for points in (0, -1):
         with pytest.raises(InputError, match="points"):
             synthesis.frozen_gain(lpv, points=points)
-    with pytest.raises(InputError, match="tolerance"):
-        synthesis.frozen_box_gain(lpv.to_lft(), tolerance=math.nan)
+    for tolerance in (math.nan, 0.0, 1.0, 1e300):
+        with pytest.raises(InputError, match="tolerance"):
+            synthesis.frozen_box_gain(lpv.to_lft(), tolerance=tolerance)
+        with pytest.raises(InputError, match="tolerance"):
+            synthesis.frozen_gain(lpv, tolerance=tolerance)
 
 
 def test_a_text_file_with_flipped_bytes_is_refused(tmp_path):
@@ -645,3 +648,30 @@ def test_matrices_of_models_stand_in_a_row(A):
     """TypeError of a number that has no length."""
     with pytest.raises(InputError, match="A: expected shape"):
         LinearModels(A, [[[1.0]]], [[[1.0]]], [[[0.0]]], ["x"], ["u"], ["y"])
+
+
+@pytest.mark.parametrize("group", ["controls", "measurements"])
+def test_designs_want_channels_of_every_group(slow_plant, group):
+    bare = replace(slow_plant, **{group: ()})
+    for design in (
+        lambda: synthesis.multiobjective(bare, synthesis.L2()),
+        lambda: synthesis.output_feedback(bare),
+    ):
+        with pytest.raises(InputError, match=f"the plant has no {group}"):
+            design()
+
+
+def test_certificates_are_of_models_that_can_be_squared():
+    """ValueError of an infinite Gramian."""
+    p = symheli.Scheduling("p", "1", 0.0, 1.0, rate=0.5)
+    A = np.full((2, 1, 1), -1e300)
+    fast = symheli.LPVStateSpace.polynomial(A, [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
+    for analysis in (synthesis.stability, synthesis.l2_gain):
+        with pytest.raises(InputError, match="other units"):
+            analysis(fast, search=None)
+
+
+def test_a_horizon_is_a_number_of_samples(model, record):
+    """OverflowError of the integer of infinity."""
+    with pytest.raises(InputError, match="number of samples"):
+        idn.scores(replace(model, dt=5e-324), record)
