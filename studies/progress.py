@@ -168,7 +168,7 @@ def duration(seconds: float) -> str:
     """Whole seconds, minutes, hours.
 
     >>> duration(7.2), duration(95.0), duration(4000.0)
-    ('7 s', '1:35 min', '1:07 h')
+    ('7 s', '1:35 min', '1:06 h')
     """
     whole = round(seconds)
     if whole < 60:

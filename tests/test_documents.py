@@ -1,6 +1,8 @@
 """The pages: what their blocks print, what runs them, and what makes the site of them."""
 
+import itertools
 import re
+import shlex
 import subprocess
 import sys
 
@@ -12,11 +14,36 @@ from executed import DOCS, PageError, check, difference, pages, write
 
 from studies import cli
 
+README = DOCS.parent / "README.md"
+SHOWN = re.compile(
+    r"^ *(?:\.venv/bin/|python -m )?symheli ([a-z].*)$|`symheli ([a-z][^`]*)`", re.MULTILINE
+)
+"""A command of a line of its own, or within a sentence."""
+
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [str(path.relative_to(DOCS)) for path in pages()])
+@pytest.mark.parametrize(
+    "page", ["../README.md", *(str(path.relative_to(DOCS)) for path in pages())]
+)
 def test_the_blocks_of_a_page_run_and_print_what_it_says(page):
     check(DOCS / page)
+
+
+@pytest.mark.parametrize(
+    "page",
+    [README, *sorted(DOCS.rglob("*.md"))],
+    ids=lambda path: str(path.relative_to(DOCS.parent)),
+)
+def test_every_command_that_a_page_shows_is_one_of_the_command_line(page):
+    """Its verb and options are there and take what is shown; a verb alone is a name."""
+    text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+    for found in SHOWN.finditer(text):
+        words = shlex.split(found[1] or found[2], comments=True)
+        words = list(itertools.takewhile(lambda word: word not in (">", "|", "&&"), words))
+        if len(words) == 1:
+            assert words[0] in cli.VERBS
+        else:
+            cli.parser().parse_args(words)
 
 
 PAGE = """# A page

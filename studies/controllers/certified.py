@@ -53,15 +53,16 @@ def controller_questions(designs: Designs, effort: Effort) -> Questions:
     none without effort.
     """
     asked = [
-        partial(
-            jumping if design.name == LFT else bounded,
-            design.name,
-            closed(designs.plant, design.controller),
-        )
+        partial(proofs, design.name, closed(designs.plant, design.controller))
         for design in designs.designs
         if effort.certified_controllers and design.controller is not None
     ]
     return Questions(asked, lambda bounds: CertifiedControllers(bounds=bounds))
+
+
+def proofs(name: str, loop: LPVStateSpace) -> list[Bound]:
+    """What a controller of that name is asked for."""
+    return (jumping if name == LFT else bounded)(name, loop)
 
 
 def bounded(name: str, loop: LPVStateSpace) -> list[Bound]:

@@ -52,6 +52,8 @@ BACK_OFFS, FASTEST = (BACK_OFF, 1.6, 2.0), np.pi / PERIOD
 (rad/s) than half the sample frequency: polynomials in airspeed do not follow those that are.
 """
 
+SLOW: dict[str, Any] = {"back_off": BACK_OFFS, "fastest": FASTEST}
+
 AIRSPEEDS = 14
 """Points of the schedules, evenly over the range."""
 
@@ -110,22 +112,31 @@ def design_questions(
     model is judged.
     """
     base = baseline(heli)
-    own, flown = design_plant(base), flown_plant(base)
-    theirs = design_plant(identified_model(identified), held=0.0)
-    record = None
+    flown, record = flown_plant(base), None
     if effort.certified_controllers:
         record = symheli.fly(heli, flights.aggressive(seed, autopilot_for(heli)))
-    slow: Any = {"back_off": BACK_OFFS, "fastest": FASTEST}
-    from_the_model = partial(output_feedback, theirs, RATE, **slow)
-    last = partial(from_flights, from_the_model, flown, identified, record)
-    ways: dict[str, Callable[[], Controller | LPVStateSpace]] = {
-        LQR: partial(lqr_schedule, heli),
-        HINF: partial(hinf_schedule, own, effort.design_points),
-        LFT: partial(lft_feedback, own, **slow),
-        BASELINE: partial(output_feedback, own, RATE, **slow),
-    }
+    last = partial(from_flights, from_data(identified), flown, identified, record)
+    ways = from_equations(heli, base, effort.design_points)
     asked = [partial(design, name, make, flown) for name, make in ways.items()]
     return Questions([*asked, last], lambda designs: Designs(designs=designs, plant=flown), [last])
+
+
+def from_equations(
+    heli: Helicopter, base: LPVStateSpace, points: int = AIRSPEEDS
+) -> dict[str, Callable[[], Controller | LPVStateSpace]]:
+    """How each of `NAMES` is made that needs no flight; the H-infinity schedule at `points`."""
+    plant = design_plant(base)
+    return {
+        LQR: partial(lqr_schedule, heli),
+        HINF: partial(hinf_schedule, plant, points),
+        LFT: partial(lft_feedback, plant, **SLOW),
+        BASELINE: partial(output_feedback, plant, RATE, **SLOW),
+    }
+
+
+def from_data(identified: KinematicModel) -> Callable[[], Controller]:
+    """How the last of `NAMES` is made."""
+    return partial(output_feedback, design_plant(identified_model(identified), 0.0), RATE, **SLOW)
 
 
 def from_flights(

@@ -106,26 +106,25 @@ def transition() -> AirspeedSchedule:
 
 def plans(designs: Designs) -> Iterator[tuple[str, float, FlightPlan]]:
     """(controller, wind, plan) of every controller that exists, for every size."""
-    servos = {u: replace(XCELL_SERVOS[u], rate=SERVO_RATE) for u in CONTROLS}
-    sensors = {y: Sensor(noise=NOISE_SHARE * NOISE[y]) for y in MEASUREMENTS}
     for design in designs.designs:
         if design.controller is None:
             continue
         controller = ScheduledController(design.controller)
         for wind in sorted((*WINDS, *BEYOND)):
-            yield (
-                design.name,
-                wind,
-                FlightPlan(
-                    transition(),
-                    dt=PERIOD,
-                    controller=controller,
-                    wind=Wind(STEADY, turbulence=Dryden(wind, ALTITUDE)),
-                    servos=servos,
-                    sensors=sensors,
-                    delay=DELAY,
-                ),
-            )
+            yield design.name, wind, plan(controller, wind)
+
+
+def plan(controller: ScheduledController, wind: float) -> FlightPlan:
+    """The transition with that controller in turbulence of one size, servos, noise and delay."""
+    return FlightPlan(
+        transition(),
+        dt=PERIOD,
+        controller=controller,
+        wind=Wind(STEADY, turbulence=Dryden(wind, ALTITUDE)),
+        servos={u: replace(XCELL_SERVOS[u], rate=SERVO_RATE) for u in CONTROLS},
+        sensors={y: Sensor(noise=NOISE_SHARE * NOISE[y]) for y in MEASUREMENTS},
+        delay=DELAY,
+    )
 
 
 def fly_controllers(vehicle: str, designs: Designs, seeds: Sequence[int]) -> FlownControllers:

@@ -1,4 +1,6 @@
-"""Figures as files and as what a page holds: SVG inside the page, of dense ones a small PNG."""
+"""Figures as files and as what a page holds: SVG inside the page, of dense ones a small PNG with
+the points of its curves.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +14,9 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from symheli.values.arrays import Array
 from symheli.values.whole_files import write_bytes
 
 if TYPE_CHECKING:
@@ -22,6 +27,9 @@ LARGEST = 110_000
 
 COLOURS = 64
 """Of a PNG in the page."""
+
+APART = 3.0
+"""Of a curve in a PNG the highest and the lowest point of every so many points of the width."""
 
 STABLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -56,15 +64,17 @@ def drawn(pictures: Iterable[tuple[str, str, str, Figure]], folder: Path) -> lis
         figure.set_layout_engine("none")  # laid out once, for every kind of file
         with matplotlib.rc_context(STABLE):
             files = {ending: _saved(figure, ending) for ending in ("png", "svg", "pdf")}
-        described = json.dumps(_axes(figure), separators=(",", ":"))
+        axes, points = _axes(figure), _points(figure)
         plt.close(figure)
         for ending, content in files.items():
             write_bytes(folder / f"{name}.{ending}", content)
         svg = inside_a_page(files["svg"].decode("utf-8"), name)
-        fits = len(svg) <= LARGEST
-        words = f'<svg role="img" aria-label="{escape(caption)}" data-axes="{escape(described)}"'
-        element = svg.replace("<svg", words, 1) if fits else _image(files["png"], caption)
-        out.append(Drawn(name, caption, source, element))
+        told: dict[str, Any] = {"axes": axes}
+        if len(svg) > LARGEST:
+            svg, told["points"] = _pixels(svg, files["png"]), points
+        data = "".join(f' data-{key}="{escape(_packed(what))}"' for key, what in told.items())
+        words = f'<svg role="img" aria-label="{escape(caption)}"{data}'
+        out.append(Drawn(name, caption, source, svg.replace("<svg", words, 1)))
     return out
 
 
@@ -126,11 +136,50 @@ def _saved(figure: Figure, ending: str) -> bytes:
     return stream.getvalue()
 
 
-def _image(png: bytes, caption: str) -> str:
+def _points(figure: Figure) -> list[list[list[int]]]:
+    """Of each curve of each panel: x, y and the steps from one point to the next, in tenths of a
+    point from the upper left corner. No more than `APART` asks for, and none outside the panel.
+    """
+    height = figure.bbox.height
+    out = []
+    for ax in figure.axes:
+        (left, low), (right, high) = ax.get_window_extent().get_points()
+        panel = []
+        for line in ax.lines:
+            at = line.get_transform().transform(np.column_stack(line.get_data()).astype(float))
+            shown = (at >= (left, low)) & (at <= (right, high))  # not NaN either
+            at = at[shown.all(axis=1)]
+            at = np.column_stack([at[:, 0], height - at[:, 1]]) * 72 / figure.dpi
+            tenths = np.rint(10 * _extremes(at)).astype(int)
+            panel.append(np.diff(tenths, axis=0, prepend=0).ravel().tolist())
+        out.append(panel)
+    return out
+
+
+def _extremes(at: Array) -> Array:
+    """The highest and the lowest of the points (n, 2) in every `APART` of the width, in order."""
+    column = np.floor(at[:, 0] / APART)
+    kept: set[int] = set()
+    for here in np.split(np.arange(len(at)), np.flatnonzero(np.diff(column)) + 1):
+        if len(here):
+            kept |= {int(here[at[here, 1].argmin()]), int(here[at[here, 1].argmax()])}
+    return at[sorted(kept)]
+
+
+def _pixels(svg: str, png: bytes) -> str:
+    """The figure of an SVG element as a picture of few colours."""
     from PIL import Image
 
     small = io.BytesIO()
     with Image.open(io.BytesIO(png)) as picture:
         picture.convert("RGB").quantize(COLOURS).save(small, "PNG", optimize=True)
     data = base64.b64encode(small.getvalue()).decode("ascii")
-    return f'<img src="data:image/png;base64,{data}" alt="{escape(caption)}">'
+    box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', svg)
+    assert box is not None  # noqa: S101
+    width, height = box.groups()
+    picture = f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/>'
+    return f'<svg viewBox="0 0 {width} {height}">{picture}</svg>'
+
+
+def _packed(content: Any) -> str:
+    return json.dumps(content, separators=(",", ":"))

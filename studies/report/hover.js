@@ -41,6 +41,14 @@ function vertices(group) {
   return found;
 }
 
+// Points of a curve of which the page has a picture: steps in tenths of a point.
+function unpacked(steps) {
+  const found = [];
+  for (let i = 0, x = 0, y = 0; i < steps.length; i += 2)
+    found.push([(x += steps[i]) / 10, (y += steps[i + 1]) / 10]);
+  return found;
+}
+
 function value(share, [low, high, log]) {
   return log ? low * (high / low) ** share : low + share * (high - low);
 }
@@ -50,8 +58,10 @@ for (const svg of document.querySelectorAll("svg[data-axes]")) {
   const prefix = svg.closest("figure").dataset.name;
   let curves = null;
   svg.addEventListener("pointermove", (event) => {
+    const packed = svg.dataset.points && !curves ? JSON.parse(svg.dataset.points) : null;
     curves ??= axes.map((ax, a) =>
       ax.names.map((name, k) => {
+        if (packed) return { name, points: unpacked(packed[a][k]) };
         const group = svg.getElementById(`${prefix}-curve-${a}-${k}`);
         return { name, points: group ? vertices(group) : [] };
       }),

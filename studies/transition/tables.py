@@ -60,7 +60,11 @@ class Table:
 
 
 def diverges(fit: float) -> bool:
-    """Whether a fit in percent means nothing any more."""
+    """Whether a fit in percent means nothing any more: an error eleven times the signal.
+
+    >>> diverges(-998.0), diverges(-1000.0), diverges(float("nan"))
+    (False, True, True)
+    """
     return not math.isfinite(fit) or fit < -999
 
 

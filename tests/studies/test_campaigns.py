@@ -1,10 +1,9 @@
 """Campaigns: the same numbers wherever they run, nothing finished is lost, a failure is a row."""
 
-import doctest
 import errno
-import importlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -53,16 +52,6 @@ def importable(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(PATHS))
 
 
-@pytest.mark.parametrize(
-    "module",
-    ["campaign", "campaign_file", "run", "trial", "trials"],
-)
-def test_what_the_examples_show_is_so(module):
-    found = importlib.import_module(f"studies.campaigns.{module}")
-    names = {"np": np, "Here": Here, "Trial": Trial, "Campaign": Campaign}
-    assert doctest.testmod(found, extraglobs=names).failed == 0
-
-
 # --- what is declared ----------------------------------------------------------------------------
 
 
@@ -99,6 +88,17 @@ def test_a_normal_parameter_is_drawn_as_it_says():
     # four standard errors of a mean and of a deviation
     assert lengths.mean() == pytest.approx(5.0, abs=4 * 0.5 / 20)
     assert lengths.std() == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(800))
+
+
+def test_parameters_of_a_case_are_drawn_independently_of_each_other():
+    def plane(*, x: float = 0.0, y: float = 0.0, seed: int = 0) -> dict[str, float]:
+        return {"sum": x + y}
+
+    both = {"x": Normal(0.0, 1.0), "y": Normal(0.0, 1.0)}
+    many = Campaign(Trial(plane, {"sum": "1"}), random=both, draws=400)
+    x, y = ([case.parameters[name] for case in many.cases] for name in ("x", "y"))
+    # four standard errors of the correlation of independent draws
+    assert abs(np.corrcoef(x, y)[0, 1]) < 4 / np.sqrt(400)
 
 
 @pytest.mark.parametrize(
@@ -167,6 +167,16 @@ def test_every_trial_that_has_a_name_says_what_it_gives(name):
     found = trial(name)
     assert found.quantities
     assert len(campaign_of({"trial": name}).cases) == 1
+
+
+def test_the_campaigns_of_the_page_can_be_run(tmp_path):
+    page = (HERE.parents[1] / "docs" / "campaigns.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^```toml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    for k, text in enumerate(shown):
+        file = tmp_path / f"{k}.toml"
+        file.write_text(text, encoding="utf-8")
+        assert len(read_campaign(file).cases) > 1
+    assert len(shown) == 3
 
 
 # --- what is kept --------------------------------------------------------------------------------
@@ -397,6 +407,26 @@ def test_a_case_that_ends_every_worker_is_a_row_with_its_reason(tmp_path, cluste
     assert [(k, why[:12]) for k, why in deaths(tmp_path, cluster, 99).items()] == [
         (3, "KilledWorker")
     ]
+
+
+@pytest.mark.slow
+def test_eight_workers_fly_and_identify_the_numbers_of_one_process(tmp_path):
+    pytest.importorskip("distributed", reason="needs dask: pip install 'symheli[campaigns]'")
+    declared = {
+        "trial": "identification",
+        "draws": 4,
+        "paired": ["order"],
+        "grid": {"order": [2, 3]},
+        "random": {"noise_db": {"low": 20.0, "high": 40.0}},
+        "fixed": {"ramps": 3, "axis": "lateral"},
+    }
+    with Here() as here, Cluster.local(8) as eight:
+        one, many = (
+            run(campaign_of(declared), tmp_path / f"{kind}.zarr", on).values[:, :-1]
+            for kind, on in (("here", here), ("eight", eight))
+        )
+    assert np.isfinite(one).any(axis=1).all()
+    np.testing.assert_array_equal(many, one)
 
 
 @pytest.mark.slow

@@ -83,12 +83,15 @@ def test_every_figure_is_drawn(opened):
     page, _ = opened(1280)
     figures = page.evaluate(
         """() => [...document.querySelectorAll("figure")].map((figure) => {
-            const one = figure.querySelector("svg, img"), box = one.getBoundingClientRect();
-            const marks = one.querySelectorAll("path").length;
-            return [figure.id, box.width, box.height, one.naturalWidth || 0, marks];
+            const one = figure.querySelector("svg"), box = one.getBoundingClientRect();
+            const picture = one.querySelector("image"), marks = one.querySelectorAll("path").length;
+            const pixels = new Image();
+            pixels.src = picture ? picture.getAttribute("href") : "";
+            return [figure.id, box.width, box.height, pixels.naturalWidth, marks];
         })"""
     )
     assert len(figures) > 10
+    assert any(pixels for *_, pixels, _ in figures)
     for name, width, height, pixels, marks in figures:
         assert min(width, height) > 50, name
         assert pixels > 500 or marks > 10, name
@@ -135,11 +138,38 @@ def test_pointing_at_a_curve_tells_its_value(opened, full):
     assert pitch == pytest.approx(math.degrees(full.baseline.nodes.trims[0].x["theta"]), abs=0.01)
 
 
+def test_pointing_at_a_curve_of_a_picture_tells_its_value(opened, full):
+    """A figure too dense for curves in the page: the airspeed of the training flight midway."""
+    page, _ = opened(1280)
+    record = next(iter(full.flights.training.values()))
+    middle = len(record.time) // 2
+    place = page.evaluate(
+        """([time, airspeed]) => {
+            const svg = document.querySelector("#figure-flights svg[data-points]");
+            svg.scrollIntoView({block: "center"});
+            const {box: [x, y, w, h], x: [left, right], y: [low, high]} =
+                JSON.parse(svg.dataset.axes)[0];
+            const on = new DOMPoint(
+                x + w * (time - left) / (right - left), y + h * (high - airspeed) / (high - low));
+            const at = on.matrixTransform(svg.getScreenCTM());
+            return [at.x, at.y];
+        }""",
+        [float(record.time[middle]), float(record["airspeed"][middle])],
+    )
+    page.mouse.move(*place)
+    name, numbers = page.locator(".tip").inner_text().splitlines()
+    time, airspeed = map(float, numbers.split(","))
+    assert name in ("airspeed", "command")
+    # three points of the figure apart, and the airspeed changes by a few m/s^2
+    assert time == pytest.approx(record.time[middle], abs=0.01 * record.time[-1])
+    assert airspeed == pytest.approx(record["airspeed"][middle], abs=0.5)
+
+
 def test_without_scripts_the_figures_stay(opened, browser, address):
     context = browser.new_context(java_script_enabled=False, viewport={"width": 390, "height": 900})
     page = context.new_page()
     page.goto(address)
-    assert page.locator("figure svg, figure img").count() > 10
+    assert page.locator("figure svg").count() > 10
     assert not page.locator("#explorer").is_visible()
     assert page.locator("noscript p").is_visible()
     context.close()

@@ -408,7 +408,7 @@ static INLINED void eliminate(const rls_real *block, int stride, int rows, lanes
    nothing has changed. */
 static INLINED int weigh(lanes lead, rls_real *d, rls_real kept, weight *w, lanes *gain)
 {
-    lanes old = load(d), ratio, sum, over;
+    lanes old = load(d), ratio, sum, over = old;
     rls_real least = 1, value;
     LANEWISE EACH(old) *= kept;
     for (int i = 0; i < LANES; i++) least = LANE(old, i) < least ? LANE(old, i) : least;

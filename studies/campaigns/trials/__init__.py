@@ -7,7 +7,7 @@ import importlib
 from studies.campaigns.trial import Trial
 from symheli.errors import InputError, UnknownNameError
 
-NAMES = ("identification", "flight", "gain", "marks", "pays")
+NAMES = ("identification", "flight", "control", "gain", "marks", "pays")
 """Each is the module of that name here."""
 
 

@@ -6,15 +6,16 @@ from functools import cache
 
 from studies.transition.flights import autopilot_for
 from symheli import Helicopter
+from symheli.dynamics import Governor
 from symheli.flight import Autopilot
 
 INERTIAS = ("Ixx", "Iyy", "Izz")
 
 
 @cache
-def helicopter(vehicle: str) -> Helicopter:
-    """With its rotor speed held."""
-    return Helicopter.load(vehicle, governor="ideal")
+def helicopter(vehicle: str, governor: Governor = "ideal") -> Helicopter:
+    """With its rotor speed held, or another governor."""
+    return Helicopter.load(vehicle, governor=governor)
 
 
 @cache
@@ -23,8 +24,10 @@ def autopilot(vehicle: str, period: float = 0.02) -> Autopilot:
     return autopilot_for(helicopter(vehicle), period)
 
 
-def scattered(vehicle: str, mass: float, inertia: float) -> Helicopter:
+def scattered(
+    vehicle: str, mass: float, inertia: float, governor: Governor = "ideal"
+) -> Helicopter:
     """With `mass` and `inertia` times what its file says."""
-    known = helicopter(vehicle)
+    known = helicopter(vehicle, governor)
     factors = {"body.mass": mass} | {f"body.{name}": inertia for name in INERTIAS}
     return known.with_parameters({n: f * known.parameters[n] for n, f in factors.items()})
