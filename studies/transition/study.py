@@ -32,7 +32,7 @@ from studies.transition.stored_stages import (
 from studies.transition.summary import summary
 from symheli.progress import Task, task, tracked
 
-LONG = 6
+LONG = 5
 """So many others take as long as one of those questions that take longest."""
 REPORT = 10.0
 """Of figures and report, which keep one core busy, s."""
