@@ -142,7 +142,7 @@ def stored_stages(
     configuration: Configuration, stages: Iterable[Stage], heli: Helicopter | None = None
 ) -> StoredStages:
     """Those in the folder of a run that were computed from what it asks for."""
-    content = content_key(heli or loaded(configuration), configuration.seed)
+    content = content_key(heli or loaded(configuration), configuration.vehicle, configuration.seed)
     keys = stage_keys(stages, content, configuration.effort)
     return StoredStages(configuration.out / STAGES, keys)
 
@@ -164,9 +164,10 @@ def stage_keys(stages: Iterable[Stage], content: str, effort: Effort) -> dict[st
     return keys
 
 
-def content_key(heli: Helicopter, seed: int) -> str:
-    """A digest of what decides what every stage finds: the code of this project, the libraries, the
-    equations and data of the helicopter, and the seed.
+def content_key(heli: Helicopter, vehicle: str, seed: int) -> str:
+    """A digest of what decides what every stage finds: the code and vehicles of this project, the
+    libraries, the equations and data of the helicopter, its name, by which the simulator is chosen,
+    and the seed.
     """
     parts = (
         code_digest(),
@@ -176,6 +177,7 @@ def content_key(heli: Helicopter, seed: int) -> str:
         heli.rhs.serialize(),
         heli.flight_rhs.serialize(),
         repr((heli.governor, heli.density, heli.travel.tolist())),
+        vehicle,
         str(seed),
     )
     return _digest(parts)
@@ -187,10 +189,10 @@ def _digest(parts: Iterable[str]) -> str:
 
 @cache
 def code_digest() -> str:
-    """Of every source file of the four packages."""
+    """Of every source file of the four packages, and of the packaged vehicles."""
     root, digest = Path(__file__).resolve().parents[2], hashlib.sha256()
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*")):
-            if path.suffix in (".py", ".c", ".h"):
+            if path.suffix in (".py", ".c", ".h", ".toml"):
                 digest.update(f"{path.relative_to(root)}\n".encode() + path.read_bytes())
     return digest.hexdigest()

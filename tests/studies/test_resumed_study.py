@@ -7,11 +7,12 @@ from __future__ import annotations
 import json
 from dataclasses import fields, replace
 from functools import cache, partial
+from pathlib import Path
 
 import pytest
 
 from studies.processes import Processes
-from studies.transition import stages, study
+from studies.transition import stages, stored_stages, study
 from studies.transition.configuration import Configuration
 from studies.transition.effort import Effort
 from studies.transition.outcome import Outcome
@@ -133,8 +134,6 @@ def test_stages_of_another_seed_or_vehicle_are_computed_again(stopped, short, ca
 
 
 def test_stages_of_other_code_are_computed_again(stopped, short, monkeypatch):
-    from studies.transition import stored_stages
-
     monkeypatch.setattr(stored_stages, "code_digest", lambda: "another day")
     run(stopped, resume=True)
     assert tuple(short) == FIRST
@@ -170,9 +169,21 @@ def test_a_stage_under_the_name_of_another_is_refused(tmp_path):
 
 
 def test_the_key_is_that_of_the_content(ideal, pi):
-    own = content_key(ideal, 0)
-    assert own == content_key(ideal, 0)
-    assert len({own, content_key(pi, 0), content_key(ideal, 1)}) == 3
+    own = content_key(ideal, "xcell60", 0)
+    assert own == content_key(ideal, "xcell60", 0)
+    others = (pi, "xcell60", 0), (ideal, "my.toml", 0), (ideal, "xcell60", 1)
+    assert len({own, *(content_key(*other) for other in others)}) == 4
+
+
+def test_the_digest_of_the_code_is_that_of_the_packaged_vehicles_too(monkeypatch):
+    """One of them simulates the flights that another is identified from."""
+    before, read = stored_stages.code_digest.__wrapped__(), Path.read_bytes
+
+    def changed(path):
+        return read(path) + (b"# a change" if path.suffix == ".toml" else b"")
+
+    monkeypatch.setattr(Path, "read_bytes", changed)
+    assert stored_stages.code_digest.__wrapped__() != before
 
 
 AFTER_KINEMATICS = {"robust", "controllers", "flown_controllers", "certified_controllers"}
