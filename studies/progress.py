@@ -116,7 +116,8 @@ class Lines:
         left = next((task.remaining(now) for task in tasks if task.at.total), None)
         self._next, self._last = now + EVERY, said
         words = "" if left is None else f", about {duration(left)} left"
-        print(f"symheli: {said}{words}", file=sys.stderr, flush=True)
+        sys.stderr.write(f"symheli: {said}{words}\n")  # at once: other threads write there, too
+        sys.stderr.flush()
 
     def close(self) -> None:
         """Nothing to put back."""

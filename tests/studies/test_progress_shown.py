@@ -19,7 +19,7 @@ with displayed():
     for k in tracked("outer [of it]", range({steps})):
         for _ in tracked("inner", range(2)):
             time.sleep({pause})
-        print(f"  printed {{k}}", file=sys.stderr)
+        sys.stderr.write(f"  printed {{k}}\\n")
 print("the answer")
 """
 
