@@ -59,13 +59,15 @@ WORK = {
         HELI
         + "symheli.trim_batch(heli, airspeed=[5.0, 6.0])\n"
         + BEGIN
-        + "speeds = np.linspace(0, 15, 300_000)\nsymheli.trim_batch(heli, airspeed=speeds)"
+        + "speeds = np.linspace(0, 15, 300_000)\n"
+        + "while True:\n    symheli.trim_batch(heli, airspeed=speeds)"
     ),
     "a sweep": (
         HELI
         + "symheli.sweep(heli, [5.0, 6.0])\n"
         + BEGIN
-        + "symheli.sweep_grid(heli, np.linspace(0, 15, 200), acceleration=np.linspace(-2, 2, 300))"
+        + "speeds, accelerations = np.linspace(0, 15, 200), np.linspace(-2, 2, 300)\n"
+        + "while True:\n    symheli.sweep_grid(heli, speeds, acceleration=accelerations)"
     ),
     "one long flight": (
         HELI
