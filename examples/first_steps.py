@@ -5,7 +5,7 @@ import symheli
 
 heli = symheli.Helicopter.load("xcell60", governor="ideal")
 point = symheli.trim(heli, airspeed=5.0)
-print(f"{point}: theta {point.x['theta']:.4f} rad, collective {point.u['d_col']:.4f} rad")
+print(f"{point.outcome}: theta {point.x['theta']:.4f} rad, collective {point.u['d_col']:.4f} rad")
 print("poles, rad/s:", symheli.linearize(heli, point).poles().round(2))
 
 family = symheli.sweep(heli, [0.0, 2.0, 4.0, 6.0, 8.0])

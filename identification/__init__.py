@@ -230,8 +230,10 @@ __all__ = [
     "unseen_flight",
 ]
 
+__version__ = "0.1.0"
+
 __getattr__ = lazily(__name__, _ROOMS)
 
 
 def __dir__() -> list[str]:
-    return list(__all__)
+    return [*__all__, "__version__"]

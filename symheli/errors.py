@@ -36,13 +36,14 @@ class UnknownNameError(InputError):
 
 
 class TrimError(SymheliError):
-    """No equilibrium was found; `result` holds the best point and the residual of every
-    equation.
+    """No equilibrium was found; `result` holds the best point and the residual of every equation,
+    `reason` is the message without the advice to a program.
     """
 
-    def __init__(self, message: str, result: Any = None):
-        super().__init__(message)
+    def __init__(self, message: str, result: Any = None, advice: str = ""):
+        super().__init__(f"{message}; {advice}" if advice else message)
         self.result = result
+        self.reason = message
 
 
 class FlightLostError(SymheliError):

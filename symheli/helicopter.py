@@ -22,13 +22,22 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.physics import inflow
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, signals
-from symheli.values.summary import as_table, summarized
+from symheli.values.summary import as_table
 
 if TYPE_CHECKING:
     from symheli.equations import RightHandSide
 
 WIND = signals(("u_w", "v_w", "w_w"))
 DENSITY = Signal("density", "kg/m^3")
+
+
+def require(heli: object, call: str) -> None:
+    """Raises `InputError` that shows `call` as it is meant, where this is no helicopter."""
+    if not isinstance(heli, Helicopter):
+        raise InputError(
+            f"expected a Helicopter first, got {heli!r:.80}: {call}, with heli ="
+            " Helicopter.load('xcell60')"
+        )
 
 
 @dataclass(frozen=True)
@@ -77,8 +86,15 @@ class Helicopter:
     printed: frozenset[str] = frozenset()
     smoothing: float = 0.0
 
-    __repr__ = summarized
     _repr_html_ = as_table
+
+    def __repr__(self) -> str:
+        options = "".join(
+            f", {field.name}={value!r}"
+            for field in fields(self)[1:]
+            if (value := getattr(self, field.name)) != field.default or field.name == "governor"
+        )
+        return f"Helicopter({self.vehicle.name!r}{options}): {self.vehicle.title}"
 
     def __post_init__(self) -> None:
         if self.governor not in ("pi", "ideal"):

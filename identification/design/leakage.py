@@ -74,6 +74,43 @@ def share_from_outputs(arx: LPVARX, records: FlightRecord | Iterable[FlightRecor
     )
 
 
+def warn_of_own_past(arx: LPVARX, record: FlightRecord) -> None:
+    """Warns (`DataWarning`) where a scheduling parameter is the outputs, their squares or products,
+    now or up to two samples ago: a free run that follows the measured one is told its answer.
+    """
+    y = record.columns(arx.outputs)
+    y = (y - np.nanmean(y, axis=0)) / np.maximum(np.nanstd(y, axis=0), np.finfo(float).tiny)
+    p = scheduling_values(arx, record).reshape(len(record), -1)
+    for j, name in enumerate(arx.parameters):
+        for lag in range(PAST + 1):
+            rows = [
+                np.arange(part.start + lag, part.stop)
+                for part in record.segments()
+                if part.stop - part.start > lag
+            ]
+            at = np.concatenate(rows) if rows else np.zeros(0, int)
+            of = y[at - lag]
+            products = (of[:, :, None] * of[:, None, :]).reshape(len(at), of.shape[1] ** 2)
+            known = np.column_stack([np.ones(len(at)), of, products, p[at, j]])
+            known = known[np.isfinite(known).all(axis=1)]
+            if len(known) <= known.shape[1] or not np.ptp(known[:, -1]):
+                continue
+            left = (
+                known[:, -1]
+                - known[:, :-1] @ np.linalg.lstsq(known[:, :-1], known[:, -1], rcond=None)[0]
+            )
+            if np.std(left) < NOTHING_NEW * np.std(known[:, -1]):
+                when = "now" if lag == 0 else f"{lag} sample{'s' if lag > 1 else ''} ago"
+                warnings.warn(
+                    f"{name} is made of the outputs {when}: a free run here follows the measured"
+                    " one and is told what it has to predict; on its own outputs it may be far"
+                    " worse",
+                    DataWarning,
+                    stacklevel=3,
+                )
+                break
+
+
 def warn_of_leakage(arx: LPVARX, records: Sequence[FlightRecord]) -> None:
     """Warns (`DataWarning`) where y(k) stands among its own regressors, or an input at k that it
     depends on is left out of them.

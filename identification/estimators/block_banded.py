@@ -39,8 +39,12 @@ class Whitening:
                     block[d:] += (L[i][d:] * variances) @ L[i - d][: m - d].swapaxes(1, 2)
             for row, column, offset in _below(d, size):
                 band[offset, column : (m - d) * size : size] = block[d:, row, column]
+        whole = band[0].copy()
         try:
             band = cholesky_banded(band, lower=True)
+            # what rounding leaves of a pivot has either sign, by the library that computes it
+            if np.any(band[0] ** 2 <= len(band) * np.finfo(float).eps * whole):
+                raise ValueError("a pivot is rounding")
         except ValueError as error:  # LinAlgError among them
             raise AccuracyError(
                 f"the covariance of the errors is not positive definite in rounding ({error}):"

@@ -40,6 +40,9 @@ EXACT = 1e-9
 ABOVE = 0.8
 """Share of the Nyquist frequency above which a signal is taken to be noise."""
 
+NEIGHBOURS = 1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2
+"""Lines of a Hann window's spectrum that count as one: neighbours are correlated."""
+
 LAGS = 25
 """Samples over which scores are taken to be correlated."""
 
@@ -63,8 +66,8 @@ class FilterError(Method):
     simulator : FlightSource
         `symheli.SimulatedFlight(heli)`: the flight again without noise. It may be wrong.
     noise : mapping of str to float, optional
-        Standard deviation of the sensor of each of u v w p q r phi theta, in its unit; default from
-        the spectrum above 0.8 of the Nyquist frequency.
+        Standard deviation of the sensor of each of u v w p q r phi theta, in its unit; default of
+        each record from its spectrum above 0.8 of the Nyquist frequency.
     misfit : float
         Q as a multiple of the variance the structure leaves unexplained in the simulated flight.
     gust : float
@@ -145,42 +148,45 @@ class FilterError(Method):
                 " method for LPVARX"
             )
         theta, _ = instrumental_variables(arx, records, data, self.simulator)
-        flights = [
-            Stretch.of(arx, record, part) for record in records for part in unbroken(arx, record)
-        ]
-        R = self._variances(records)
-        Q = np.append(self.misfit * self._unexplained(arx, records), EXACT * R[6:])
-        noise = Noise(R, Q, self.gust**2, float(np.exp(-records[0].dt / self.gust_time)))
+        left = self.misfit * self._unexplained(arx, records)
+        air = self.gust**2, float(np.exp(-records[0].dt / self.gust_time))
+        flights = []
+        for record, R in zip(records, self._variances(records), strict=True):
+            noise = Noise.of(R, left, *air)
+            flights += [(Stretch.of(arx, record, part), noise) for part in unbroken(arx, record)]
+        weights = [len(s.y) for s, _ in flights]
+        R = np.average([noise.R for _, noise in flights], axis=0, weights=weights)
         count, settled = 0, False
         for _ in tracked("filter error", range(self.steps)):
             count += 1
-            normal, right = map(sum, zip(*(s.normal(theta, noise) for s in flights), strict=True))
+            parts = [s.normal(theta, noise) for s, noise in flights]
+            normal, right = map(sum, zip(*parts, strict=True))
             step, inverse = _solved(normal, right)  # type: ignore[arg-type]
             change = step.reshape(6, -1).T
-            for s in flights:
+            for s, noise in flights:
                 s.smooth(theta, change, noise)
             theta = theta + change
             spread = np.sqrt(np.diag(inverse))
             settled = bool(np.all(np.abs(step) < 0.1 * spread))
             if settled:
                 break
-        scores = sum(s.scores(theta, noise) for s in flights)
+        scores = sum(s.scores(theta, noise) for s, noise in flights)
         covariance = inverse @ scores @ inverse  # type: ignore[operator]
         covariance = 0.5 * (covariance + covariance.T)
         n = arx.n_regressors
-        weights = [len(s.y) for s in flights]
-        residual = np.average([s.residual(theta) for s in flights], axis=0, weights=weights)
+        residual = np.average([s.residual(theta) for s, _ in flights], axis=0, weights=weights)
         return Estimate(
             theta=theta,
             details={
                 "steps": count,
                 "sensor_noise": dict(zip(STATES, np.sqrt(R).tolist(), strict=True)),
+                "sensor_noise_given": list(self.noise or {}),
                 "process_noise": dict(
-                    zip(map(str, VELOCITIES), np.sqrt(Q[:6]).tolist(), strict=True)
+                    zip(map(str, VELOCITIES), np.sqrt(left).tolist(), strict=True)
                 ),
-                "equation_variances": Q.tolist(),
+                "equation_variances": Noise.of(R, left, *air).Q.tolist(),
                 "gust": self.gust,
-                "gust_remains": noise.remains,
+                "gust_remains": air[1],
             },
             remarks=()
             if settled or self.steps == 1
@@ -189,17 +195,17 @@ class FilterError(Method):
             covariance=covariance.reshape(6, n, 6, n),
         )
 
-    def _variances(self, records: Sequence[FlightRecord]) -> Array:
-        given = self.noise or {}
-        found = np.zeros(len(STATES))
-        for i, name in enumerate(STATES):
-            if name in given:
-                found[i] = given[name] ** 2
-                continue
-            parts = [(len(r), noise_variance(r[name], r.segments())) for r in records]
-            found[i] = sum(n * v for n, v in parts) / sum(n for n, _ in parts)
+    def _variances(self, records: Sequence[FlightRecord]) -> list[Array]:
+        """Of the sensors (8,) in each record; where one is too short to tell, as in the others."""
+        found = np.array([noise_of_flight(r, self.noise or {}).variances for r in records])
+        known = np.isfinite(found)
+        weights = known * np.array([len(r) for r in records], float)[:, None]
+        pooled = np.sum(np.where(known, found, 0.0) * weights, axis=0) / np.maximum(
+            weights.sum(axis=0), 1.0
+        )
         largest = np.max([np.nanvar(r.columns(STATES), axis=0) for r in records], axis=0)
-        return np.maximum(found, 1e-12 * largest + np.finfo(float).tiny)
+        least = 1e-12 * largest + np.finfo(float).tiny
+        return list(np.maximum(np.where(known, found, pooled), least))
 
     def _unexplained(self, arx: Aerodynamics, records: Sequence[FlightRecord]) -> Array:
         """Variance (6,) of what the structure leaves of the simulated flights, by least squares."""
@@ -214,9 +220,39 @@ class FilterError(Method):
         return np.var(T - F @ least_squares(F, T), axis=0) + 1e-14 * np.var(T, axis=0)
 
 
+class FlightNoise(NamedTuple):
+    """Variances (8,) of the sensors' noise in one flight, NaN where it is too short to tell, and of
+    each the relative standard error (8,), 0 where it was given.
+    """
+
+    variances: Array
+    errors: Array
+
+
+def noise_of_flight(record: FlightRecord, given: Mapping[str, float]) -> FlightNoise:
+    """Of the sensors of u v w p q r phi theta: the standard deviations given, else from the
+    spectrum of the record.
+    """
+    segments = record.segments()
+    found = [
+        (given[name] ** 2, 0.0) if name in given else noise_level(record[name], segments)
+        for name in STATES
+    ]
+    variances, errors = np.array(found).T
+    return FlightNoise(variances, errors)
+
+
 def noise_variance(signal: Array, segments: Sequence[slice]) -> float:
-    """Variance of white noise with the power a signal has above 0.8 of the Nyquist frequency."""
-    power, weight = 0.0, 0.0
+    """Variance of white noise with the power a signal has above 0.8 of the Nyquist frequency; 0
+    where no segment is long enough to tell.
+    """
+    found, _ = noise_level(signal, segments)
+    return found if np.isfinite(found) else 0.0
+
+
+def noise_level(signal: Array, segments: Sequence[slice]) -> tuple[float, float]:
+    """The same with its relative standard error; NaN and infinity where nothing tells."""
+    power, weight, spread = 0.0, 0.0, 0.0
     for part in segments:
         x = signal[part]
         x = x[np.isfinite(x)]
@@ -228,7 +264,8 @@ def noise_variance(signal: Array, segments: Sequence[slice]) -> float:
         high = spectrum[int(ABOVE * len(spectrum)) :]
         power += len(x) * float(np.mean(high)) / float(np.sum(window**2))
         weight += len(x)
-    return power / weight if weight else 0.0
+        spread += len(x) ** 2 * NEIGHBOURS / len(high)
+    return (power / weight, float(np.sqrt(spread)) / weight) if weight else (np.nan, np.inf)
 
 
 def unbroken(arx: Aerodynamics, record: FlightRecord) -> list[slice]:
@@ -253,6 +290,11 @@ class Noise(NamedTuple):
     Q: Array
     gust: float
     remains: float
+
+    @classmethod
+    def of(cls, R: Array, left: Array, gust: float, remains: float) -> Noise:
+        """Of sensors R, equations that leave (6,) and Euler's, which are exact."""
+        return cls(R, np.append(left, EXACT * R[6:]), gust, remains)
 
 
 class Linearized(NamedTuple):

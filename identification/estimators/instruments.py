@@ -104,6 +104,10 @@ Instruments = str | Sequence[str] | InstrumentSource | FlightSource
 """
 
 
+USUAL_WINDOW, FEWEST = 1.0, 10
+"""s, and samples where they lie further apart than such a window can hold."""
+
+
 @dataclass(frozen=True)
 class LaggedSignals:
     """Signals of the record as instruments, at lags evenly over a window.
@@ -115,8 +119,8 @@ class LaggedSignals:
     ----------
     signals : str or sequence of str
         Their names in the record.
-    window : float
-        How far back they instrument, s.
+    window : float, optional
+        How far back they instrument, s; default 1 s, or ten samples where those are longer.
     lags : int
         Most of them in the window.
 
@@ -132,7 +136,7 @@ class LaggedSignals:
     """
 
     signals: tuple[str, ...]
-    window: float = 1.0
+    window: float | None = None
     lags: int = 24
 
     def __post_init__(self) -> None:
@@ -144,7 +148,7 @@ class LaggedSignals:
                 f" stabilised inputs, got {given!r:.80}"
             )
         whole(self.lags, "lags", 1)
-        if not (np.isfinite(self.window) and self.window > 0):
+        if self.window is not None and not (np.isfinite(self.window) and self.window > 0):
             raise InputError(f"instruments need a window > 0 s, got {self.window} s")
 
     def __str__(self) -> str:
@@ -156,13 +160,13 @@ class LaggedSignals:
 
     def instrument_lags(self, dt: float, first: int, memory: int) -> tuple[int, ...]:
         """Evenly over the window, whatever the memory of the structure."""
-        if not self.window / MOST < dt < np.inf:
+        window = max(USUAL_WINDOW, FEWEST * dt) if self.window is None else self.window
+        if not window / MOST < dt < np.inf:
             raise InputError(
-                f"dt: expected seconds, at least a {MOST}th of the window of {self.window:g} s, got"
-                f" {dt}"
+                f"dt: expected seconds, at least a {MOST}th of the window of {window:g} s, got {dt}"
             )
         first = whole(first, "first")
-        last = max(first + 1, round(self.window / dt))
+        last = max(first + 1, round(window / dt))
         count = min(self.lags, last - first + 1)
         return tuple(int(i) for i in np.unique(np.round(np.linspace(first, last, count))))
 

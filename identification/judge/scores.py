@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.design.leakage import warn_of_own_past
 from identification.model.lpvarx_model import LPVARXModel
 from identification.model.prediction import fit_percent
 from symheli.errors import InputError
@@ -113,6 +114,11 @@ def scores(
     InputError
         For a horizon that is not greater than 0 and a record the model does not fit.
 
+    Warns
+    -----
+    DataWarning
+        The scheduling is a function of the outputs or their past.
+
     Examples
     --------
     >>> import numpy as np, identification as idn, symheli
@@ -128,6 +134,7 @@ def scores(
     >>> round(found.ahead["y"], 6), list(found.by_horizon)
     (100.0, ['one step', '0.5 s', 'free run'])
     """
+    warn_of_own_past(model.structure, record)
     one, ahead, free = (
         predicted(model, record, n, hold_p) for n in steps(model.dt, horizon).values()
     )
@@ -164,14 +171,12 @@ def predicted(
     )
 
 
+DIVERGES = -1e4
+"""Percent: a prediction off by a hundred times what the signal varies has left it for good."""
+
+
 def percent(value: float) -> str:
-    """A fit in words where it is no number."""
-    return (
-        "diverges"
-        if np.isneginf(value)
-        else "no data"
-        if np.isnan(value)
-        else f"{value:.1f}"
-        if value > -1e4
-        else f"{value:.1e}"
-    )
+    """A fit in words where it is no number, or one that says no more than the word."""
+    if np.isnan(value):
+        return "no data"
+    return "diverges" if value <= DIVERGES else f"{value:.1f}"

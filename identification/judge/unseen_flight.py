@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.estimators.filter_error import Noise, Stretch, unbroken
+from identification.estimators.filter_error import Noise, Stretch, noise_of_flight, unbroken
 from identification.model.kinematic_model import KinematicModel
 from identification.structure.kinematic_arx import STATES
 from symheli.errors import InputError
@@ -54,13 +54,15 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     covariance of sensor noise and of what the structure leaves out, with what errors of the
     coefficients add on this flight.
 
+    How loud the sensors are is read off this flight's own spectrum, as it was off each flight
+    identified from, unless `FilterError` was told; what its error may add is allowed for.
+
     Parameters
     ----------
     model : KinematicModel
         Fitted by `FilterError`, which says how large both are.
     record : FlightRecord
-        With the signals of the model, at its sample period; sensors as in the flights it was
-        identified from.
+        With the signals of the model, at its sample period.
 
     Returns
     -------
@@ -101,23 +103,32 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     aero = model.structure.aerodynamics
     prepared = aero.prepared(record)
     model.aerodynamics.require_same_kind(prepared)
-    R = np.array([details["sensor_noise"][s] for s in STATES]) ** 2
-    noise = Noise(
-        R, np.array(details["equation_variances"]), details["gust"] ** 2, details["gust_remains"]
-    )
+    pooled = np.array([details["sensor_noise"][s] for s in STATES]) ** 2
+    said = details.get("sensor_noise_given", ())
+    found = noise_of_flight(prepared, {s: details["sensor_noise"][s] for s in said})
+    told = np.isfinite(found.variances)
+    R = np.where(told, found.variances, pooled)
+    left = np.array(details["equation_variances"])[:6]
+    air = details["gust"] ** 2, details["gust_remains"]
+    noise = Noise.of(R, left, *air)
     covariance = model.coefficient_covariance
     assert covariance is not None  # noqa: S101  what says its noise says this too
     C = covariance.reshape(model.theta.size, -1)
     power, unknown, spread, count, samples = 0.0, 0.0, 0.0, 0, 0
+    louder = np.zeros(len(R))  # how much less is left where one sensor is louder by its error
+    errors = np.where(told, found.errors, 0.0)
     for part in unbroken(aero, prepared):
         s = Stretch.of(aero, prepared, part)
         white = s.whitened(model.theta, noise)
         power += float(np.sum(white**2))
-        said = s.normal(model.theta, noise)[0] @ C  # what errors of the coefficients add
-        unknown, spread = unknown + np.trace(said), spread + np.sum(said * said.T)
+        known = s.normal(model.theta, noise)[0] @ C  # what errors of the coefficients add
+        unknown, spread = unknown + np.trace(known), spread + np.sum(known * known.T)
+        for i in np.flatnonzero(errors):
+            other = Noise.of(R * (1 + errors[i] * (np.arange(len(R)) == i)), left, *air)
+            louder[i] += np.sum(white**2) - np.sum(s.whitened(model.theta, other) ** 2)
         count, samples = count + white.size, samples + len(white)
     if samples * model.dt < 1.0:
         raise InputError("the record has no complete second to judge by")
-    chance = SURE * float(np.sqrt(2 * (count + spread)))
+    chance = SURE * float(np.sqrt(2 * (count + spread) + np.sum(louder**2)))
     largest = (count + float(unknown) + chance) / count
     return UnseenFlight(power=power / count, largest=largest, samples=samples)

@@ -60,6 +60,8 @@ class Regression:
     """y = phi theta + e, one row a usable sample: phi (m, n_regressors), y (m, ny), p (m,) or (m,
     parameters), `rows` (m,) in the record.
 
+    p is that of the sample, or where it is missing there, the latest one in the sample's regressor:
+    it is never NaN.
     `dropped` counts the samples without a complete regressor: the first ones after a start or a
     gap, and those NaN touches.
     """
@@ -144,7 +146,18 @@ def regression(arx: LPVARX, record: FlightRecord) -> Regression:
     index = np.concatenate(rows) if rows else np.zeros(0, dtype=int)
     keep = np.isfinite(phi).all(axis=1) & np.isfinite(s.y[index]).all(axis=1)
     index = index[keep]
-    return Regression(phi[keep], s.y[index], s.p[index], index, len(record) - len(index))
+    return Regression(
+        phi[keep], s.y[index], _latest(arx, s.p, index), index, len(record) - len(index)
+    )
+
+
+def _latest(arx: LPVARX, p: Array, rows: Array) -> Array:
+    """p at each row, or where it is missing there, the latest one that the row's regressor uses."""
+    lags = {0, *(term.p_lag for term in arx.terms)}
+    points = p.reshape(len(p), p.size // max(len(p), 1))
+    choices = np.stack([points[rows - lag] for lag in sorted(lags)])
+    first = np.argmax(np.isfinite(choices).all(axis=-1), axis=0)
+    return choices[first, np.arange(len(rows))].reshape(len(rows), *p.shape[1:])
 
 
 def stacked(arx: LPVARX, records: Sequence[FlightRecord]) -> Regression:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -72,8 +73,8 @@ def read(
 
 def _undeclared(name: str) -> str:
     raise InputError(
-        f"the unit of {name!r} is not known: --units {name}=UNIT, such as rad, deg/s, m/s, or 1"
-        " where it has none"
+        f"the unit of {name!r} is not known: --units {shlex.quote(f'{name}=UNIT')}, such as rad,"
+        " deg/s, m/s, or 1 where it has none"
     )
 
 

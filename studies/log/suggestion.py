@@ -18,8 +18,13 @@ AXES = (
 """What drives what, the best first."""
 
 SLOW = 0.03
-"""s: samples closer than this are averaged to about this; three lags then reach over what a
-helicopter does, not over noise.
+"""s: samples closer than this, or than those of the input, are averaged to about this; three lags
+then reach over what a helicopter does, not over noise.
+"""
+
+COARSE = 1.5
+"""Times that step: an output sampled more seldom would be made of samples that are still to come,
+and is left out.
 """
 
 
@@ -57,15 +62,24 @@ def suggestion(
     scheduling = (
         ["airspeed"] if "airspeed" in there else ["u", "v"] if {"u", "v"} <= there.keys() else []
     )
-    used = [there[name] for name in (*outputs, control, *scheduling)]
     step = dt or (found.clock.step if found.clock else found.step) or 0.0
-    by_map = found.format in OWN_CLOCKS
+    by_map, means = found.format in OWN_CLOCKS, SLOW
+    if by_map:
+        steps = {n: found.motions[there[n].column].step or 0.0 for n in (*outputs, control)}
+        step = dt or float(f"{steps[outputs[0]]:.2g}")
+        means = max(SLOW, steps[control])
+        late = [y for y in outputs[1:] if steps[y] > COARSE * max(means, step)]
+        outputs = [y for y in outputs if y not in late]
+        missing += tuple(
+            f"{y} more often: {1 / steps[y]:.2g} Hz tells less than the input's"
+            f" {1 / max(means, step):.2g} Hz, it is left out"
+            for y in late
+        )
+    used = [there[name] for name in (*outputs, control, *scheduling)]
     named = {g.signal: g.signal if by_map else g.column for g in used}
     command = ["symheli", "identify", str(found.log)]
     content = None
     if by_map:
-        steps = [found.motions[there[n].column].step or 0.0 for n in (*outputs, control)]
-        step = dt or float(f"{max(steps):.2g}")
         content = _map(used, found, step)
         command += ["--map", "aircraft.toml"]
     elif signal_map is not None:
@@ -79,9 +93,18 @@ def suggestion(
         command += ["--scheduling-from", ",".join(named[s] for s in scheduling)]
     else:
         command += ["--degree", "0"]
-    if (means := int(SLOW / step + 1e-9)) > 1:
-        command += ["--decimate", str(means)]
+    if found.flight is not None:
+        start = _beginning(found, used) if by_map else 0.0
+        command += ["--start", f"{max(found.flight.start - start, 0.0):.4g}"]
+        command += ["--stop", f"{found.flight.stop - start:.4g}"]
+    if (together := int(means / step + 0.01)) > 1:
+        command += ["--decimate", str(together)]
     return Suggestion(missing, content, tuple(command))
+
+
+def _beginning(found: Survey, used: list[Guess]) -> float:
+    """Where columns with clocks of their own begin to be known together, from where time counts."""
+    return max(found.motions[guess.column].start or 0.0 for guess in used)
 
 
 def _reading(found: Survey, used: list[Guess], dt: float | None) -> list[str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from studies.log.stretches import Stretch, longest, stretches
 from symheli.logs.column import Column, forward
 from symheli.logs.contents import Contents
 from symheli.logs.meaning import Guess, guesses, moves, plain_name
@@ -45,7 +46,7 @@ class Clock:
 @dataclass(frozen=True)
 class Motion:
     """How much a column moves: samples and those missing, range, mean and standard deviation in the
-    unit it is guessed or declared to have, its own median step (s).
+    unit it is guessed or declared to have, its own median step and first instant (s).
     """
 
     samples: int
@@ -56,11 +57,14 @@ class Motion:
     deviation: float
     moves: bool
     step: float | None
+    start: float | None
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What was found; `step` is the sample period that is suggested where the log has no clock."""
+    """What was found; `step` is the sample period that is suggested where the log has no clock,
+    `stretches` what the log is from when to when, on its own clock.
+    """
 
     log: Path
     format: str
@@ -69,6 +73,12 @@ class Survey:
     motions: Mapping[str, Motion]
     units: Mapping[str, str | None]
     guesses: Mapping[str, Guess]
+    stretches: tuple[Stretch, ...] = ()
+
+    @property
+    def flight(self) -> Stretch | None:
+        """The longest stretch of flight, None where all is flight, or nothing long enough."""
+        return longest(self.stretches)
 
     @property
     def moving(self) -> dict[str, Guess]:
@@ -114,6 +124,7 @@ def survey(
         {n: _motion(c) for n, c in held.items()},
         {n: c.unit for n, c in held.items()},
         guessed,
+        stretches(held, guessed),
     )
 
 
@@ -152,9 +163,10 @@ def _clock(name: str, unit: str, stamps: np.ndarray) -> Clock:
 
 def _motion(column: Column) -> Motion:
     known = column.values[np.isfinite(column.values)]
-    step = None
+    step = start = None
     if column.time is not None and np.sum(forward(column.time)) > 1:
-        step = float(np.median(np.diff(column.time[forward(column.time)])))
+        time = column.time[forward(column.time)]
+        step, start = float(np.median(np.diff(time))), float(time[0])
     shown = known if len(known) else np.array([np.nan])
     return Motion(
         samples=len(column.values),
@@ -165,6 +177,7 @@ def _motion(column: Column) -> Motion:
         deviation=float(shown.std()),
         moves=moves(column.values),
         step=step,
+        start=start,
     )
 
 

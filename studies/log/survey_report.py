@@ -11,6 +11,9 @@ from studies.log.survey import OWN_CLOCKS, Survey
 from studies.output import columns
 from symheli.values.units import to_si
 
+MOST = 12
+"""Stretches that are printed."""
+
 LISTED = 60
 """Names of other columns that are printed."""
 
@@ -35,6 +38,8 @@ def text(found: Survey, hint: Suggestion) -> str:
         ]
     else:
         parts.append("no column has a name that says what it is")
+    if len(found.stretches) > 1:
+        parts += ["", "from when to when (s on the log's clock):", *_stretches(found)]
     if others:
         parts += ["", f"other columns that move: {_listed(others)}"]
     if still:
@@ -66,6 +71,7 @@ def data(found: Survey, hint: Suggestion) -> dict[str, Any]:
             }
             for name, motion in found.motions.items()
         ],
+        "stretches": [asdict(one) for one in found.stretches],
         "missing": list(hint.missing),
         "suggested_map": hint.map,
         "suggested_command": None if hint.command is None else list(hint.command),
@@ -110,6 +116,24 @@ def _table(found: Survey) -> str:
             ]
         )
     return "\n".join(f"  {line}" for line in columns(rows, left=4).splitlines())
+
+
+def _stretches(found: Survey) -> list[str]:
+    """The longest, in order of time, with a mark at what is suggested."""
+    kept = sorted(found.stretches, key=lambda one: one.start - one.stop)[:MOST]
+    rows = [
+        [
+            f"{one.start:.5g}",
+            f"{one.stop:.5g}",
+            one.what,
+            "suggested" if one is found.flight else "",
+        ]
+        for one in found.stretches
+        if one in kept
+    ]
+    more = len(found.stretches) - len(rows)
+    lines = [f"  {line.rstrip()}" for line in columns(rows, left=4).splitlines()]
+    return lines + ([f"  and {more} shorter ones (--json)"] if more else [])
 
 
 def _airspeed(found: Survey) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,9 +51,14 @@ class Wind:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if len(self.steady) != 3 or not all(math.isfinite(v) for v in self.steady):
+        if (
+            not isinstance(self.steady, Sequence | np.ndarray)
+            or len(self.steady) != 3
+            or not all(math.isfinite(v) for v in self.steady)
+        ):
             raise InputError(
-                f"steady: expected a finite wind (north, east, down), m/s, got {self.steady}"
+                "steady: expected three finite numbers (north, east, down), m/s, such as (-5.0,"
+                f" 0.0, 0.0) for 5 m/s from the north, got {self.steady}"
             )
         whole(self.seed, "seed")
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Unpack
 
 from symheli.codegen import Layout
-from symheli.errors import FlightLostError, InputError
+from symheli.errors import FlightLostError
 from symheli.flight.flight_data import ADVICE
 from symheli.flight.flights import Flights
 from symheli.flight.plan import FlightPlan, Options, plan_of
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.validity import warn_of_flown
-from symheli.helicopter import Helicopter
+from symheli.helicopter import Helicopter, require
 from symheli.records.flight_record import FlightRecord
 
 
@@ -66,8 +66,7 @@ def fly(
     >>> round(record.dt, 3), bool(np.abs(record["airspeed"] - record["airspeed_command"]).max() < 1)
     (0.02, True)
     """
-    if not isinstance(heli, Helicopter):
-        raise InputError(f"expected a Helicopter, got {heli!r:.80}; try Helicopter.load('xcell60')")
+    require(heli, "fly(heli, schedule)")
     (data,) = Flights(heli).fly([plan_of(schedule, options)], Layout())
     warn_of_flown(heli, [data])
     record = data.record()

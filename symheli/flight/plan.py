@@ -22,6 +22,9 @@ from symheli.values.numbers import whole
 SHORTEST = 1e-6
 """Seconds between samples."""
 
+LONGEST_DELAY = 1.0
+"""s, from command to servo."""
+
 LOUDEST = 1000
 """Decibels, above or below the signal."""
 
@@ -137,6 +140,11 @@ class FlightPlan:
             one_each(self.servos, INPUTS)
         if not _number("delay", self.delay, "a number of seconds >= 0") >= 0:
             raise InputError(f"delay: expected a number of seconds >= 0, got {self.delay}")
+        if self.delay > LONGEST_DELAY:
+            raise InputError(
+                f"delay: {self.delay:g} s is more than any computer and link take; it is in"
+                f" seconds: {self.delay:g} ms are delay={self.delay / 1000:g}"
+            )
         if self.trims not in get_args(Trims):
             raise UnknownNameError("kind of trims", self.trims, get_args(Trims))
 

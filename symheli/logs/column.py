@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.values.units import to_si
 
 SILENCE = 5.0
 """A column that pauses for more than this many of its median steps is missing (NaN) in between."""
+
+A_TURN = 0.9
+"""Part of a turn that no angle moves by from one sample to the next."""
 
 FINER = 1e4
 """A step that makes this many times as many samples as the column with most is refused."""
@@ -32,6 +36,19 @@ class Column:
 def forward(time: np.ndarray) -> np.ndarray:
     """Mask of the samples whose instant is later than all before: repeats and steps back go."""
     return np.concatenate([[True], np.diff(np.maximum.accumulate(time)) > 0])
+
+
+def continuous(column: Column, unit: str) -> Column:
+    """An angle in `unit` goes on where it jumped by a turn, as headings do that end at 360 degrees;
+    what is no angle stays as it is.
+    """
+    factor, si = to_si(unit)
+    turn, known = 2 * np.pi / factor, np.isfinite(column.values)
+    if si != "rad" or not np.any(np.abs(np.diff(column.values[known])) > A_TURN * turn):
+        return column
+    values = np.array(column.values, float)
+    values[known] = np.unwrap(values[known], period=turn)
+    return replace(column, values=values)
 
 
 def on_one_axis(

@@ -1,9 +1,12 @@
-"""ArduPilot DataFlash logs, binary (.bin) and text (.log).
+"""ArduPilot DataFlash logs, binary (.bin) and text (.log), and PX4's older ones of the same form
+(sdlog2, .px4log).
 
 A column is "message.field", such as "IMU.GyrY", of the first instance of the message, or
 "IMU[1].GyrY" of another. Logs written since 2018 declare the unit of most fields (their FMTU, UNIT
-and MULT messages); those are used. Headings count to 360 degrees and are made continuous where the
-log says that they are headings.
+and MULT messages); those are used. Headings count to 360 degrees and are made continuous.
+
+The instant of a message is in itself, on the autopilot's clock; in the logs of sdlog2 it is that of
+the latest message TIME.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
-from symheli.logs.column import Column, on_one_axis
+from symheli.logs.column import Column, continuous, on_one_axis
 from symheli.logs.files import Table, existing, positive, quiet, said_by, warn_of_damage
 from symheli.values.units import to_si
 
@@ -57,6 +60,14 @@ INSTANCE = "#"
 CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields that hold the time, in s of one count."""
 
+BATCH = "TIME", "StartTime", 1e-6
+"""Message and field with the time of all messages that follow it, in s of one count (sdlog2)."""
+
+BESIDE_THE_WEEK = "T"
+"""Field of a GPS message with the autopilot's clock, in ms, where TimeMS beside it counts from the
+beginning of the GPS week (until the end of 2014).
+"""
+
 HEADING = "degheading"
 
 MODE = "M"
@@ -93,6 +104,7 @@ def read_dataflash(
         name: _unit(name, fields[name], column.unit, units.get(name))
         for name, column in columns.items()
     }
+    columns = {name: continuous(column, known[name]) for name, column in columns.items()}
     time, values = on_one_axis(columns, dt, path)
     return time, values, known
 
@@ -104,7 +116,7 @@ def dataflash_columns(path: str | os.PathLike[str]) -> dict[str, Column]:
         for message, instances in _read(path, None).items()
         for i, (instance, columns) in enumerate(instances.items())
         for field, column in columns.items()
-        if column.time is not None
+        if column.time is not None and (message, field) != BATCH[:2]
     }
 
 
@@ -122,22 +134,28 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
     file = existing(path)
     with file.open("rb") as opened:
         reader = DFReader_binary if opened.read(2) == b"\xa3\x95" else DFReader_text
-    rows: dict[tuple[str, str], list[Any]] = {}
+    rows: dict[tuple[str, str], list[_Row]] = {}
+    now: float | None = None
     try:
         with quiet() as said, _closing(reader) as log:
             log.__init__(str(file))
             declared = _declared(log)
             names = dict.fromkeys(form.name for form in log.formats.values())
             present = [name for name in names if name not in ABOUT_THE_LOG]
-            for message in _messages(log, present if wanted is None else wanted):
+            asked = present if wanted is None else wanted
+            for message in _messages(log, {*asked, BATCH[0]}):
                 name, known = message.get_type(), declared.get(message.fmt.type, {})
+                if name == BATCH[0]:
+                    now = BATCH[2] * float(getattr(message, BATCH[1], np.nan))
+                    if name not in asked:
+                        continue
                 field = next((f for f, ids in known.items() if ids.unit == INSTANCE), None)
                 key = "" if field is None else str(getattr(message, field))
-                rows.setdefault((name, key), []).append(message)
+                rows.setdefault((name, key), []).append(_Row(message, now))
             out: _Found = {}
-            for (name, key), messages in rows.items():
-                known = declared.get(messages[0].fmt.type, {})
-                out.setdefault(name, {})[key] = _columns(messages, known)
+            for (name, key), found in rows.items():
+                known = declared.get(found[0].message.fmt.type, {})
+                out.setdefault(name, {})[key] = _columns(found, known)
     except Exception as error:
         raise InputError(
             f"{file}: not an ArduPilot log, or one that was damaged"
@@ -221,16 +239,29 @@ def _declared(log: Any) -> dict[int, dict[str, _Said]]:
     }
 
 
-def _columns(messages: list[Any], known: Mapping[str, _Said]) -> dict[str, Column]:
+class _Row(NamedTuple):
+    """A message, and the time of the batch it stands in (s), if the log writes one."""
+
+    message: Any
+    now: float | None
+
+
+def _columns(rows: list[_Row], known: Mapping[str, _Said]) -> dict[str, Column]:
     """The fields of numbers of messages of one kind."""
-    form = messages[0].fmt
+    form = rows[0].message.fmt
     clock = next((name for name in CLOCKS if name in form.columns), None)
+    factor = CLOCKS.get(clock or "", 1.0)
+    if clock == "TimeMS" and form.name.startswith("GPS") and BESIDE_THE_WEEK in form.columns:
+        clock = BESIDE_THE_WEEK
     time = None
     if clock is not None:
-        time = CLOCKS[clock] * np.array([float(getattr(m, clock)) for m in messages])
-    out = {}
+        time = factor * np.array([float(getattr(row.message, clock)) for row in rows])
+    elif any(row.now is not None for row in rows):
+        rows = [row for row in rows if row.now is not None]
+        time = np.array([row.now for row in rows], float)
+    messages, out = [row.message for row in rows], {}
     for name, kind, letter in zip(form.columns, form.msg_types, form.msg_fmts, strict=False):
-        if name in CLOCKS or kind not in (int, float) or letter == MODE:
+        if name in (*CLOCKS, clock) or kind not in (int, float) or letter == MODE:
             continue
         values = np.array([float(getattr(m, name)) for m in messages])
         said = known.get(name)
@@ -264,8 +295,8 @@ def _pick(found: _Found, message: str, instance: str | None, field: str, path: o
         raise UnknownNameError(f"field of {message} that holds numbers", field, columns)
     if columns[field].time is None:
         raise InputError(
-            f"{path}: {message} carries no time (logs from before 2014); it cannot be placed beside"
-            " other messages"
+            f"{path}: {message} carries no time (logs from before 2014), and no message TIME stands"
+            " before it; it cannot be placed beside other messages"
         )
     return columns[field]
 

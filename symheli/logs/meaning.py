@@ -78,12 +78,32 @@ DATAFLASH = {
 the rate controller sends to the swashplate.
 """
 
+SDLOG2 = {
+    **{
+        signal: ((f"ATT.{name}Rate", "rad/s"), (f"IMU.Gyro{axis}", "rad/s"))
+        for signal, name, axis in zip(RATES, ("Roll", "Pitch", "Yaw"), "XYZ", strict=True)
+    },
+    **{
+        signal: ((f"ATT.{name}", "rad"),)
+        for signal, name in zip(ANGLES, ("Roll", "Pitch", "Yaw"), strict=True)
+    },
+    "airspeed": (("AIRS.TrueSpeed", "m/s"), ("AIRS.AirSpeed", "m/s")),
+    "lat": (("ATTC.Roll", "1"),),
+    "lon": (("ATTC.Pitch", "1"),),
+    "ped": (("ATTC.Yaw", "1"),),
+    "col": (("ATTC.Thrust", "1"),),
+}
+"""Columns of PX4's logs before ULog (src/modules/sdlog2/sdlog2_messages.h), the best first; known
+by their rates, which ArduPilot's attitude lacks.
+"""
+
 ULOG = {
     **{
         signal: (
             (f"vehicle_angular_velocity.xyz[{i}]", "rad/s"),
             (f"vehicle_attitude.{name}speed", "rad/s"),
             (f"sensor_combined.gyro_rad[{i}]", "rad/s"),
+            (f"sensor_gyro.{'xyz'[i]}", "rad/s"),
         )
         for i, (signal, name) in enumerate(zip(RATES, ("roll", "pitch", "yaw"), strict=True))
     },
@@ -119,7 +139,8 @@ def guesses(columns: Mapping[str, Column], format: str) -> dict[str, Guess]:
     """{signal: the column that it probably is}, for p q r phi theta psi airspeed u v w and the
     controls lon lat col ped; what moves before what stays where it is.
     """
-    tables = {"dataflash": DATAFLASH, "ulog": ULOG, "xplane": XPLANE}
+    older = "ATT.RollRate" in columns
+    tables = {"dataflash": SDLOG2 if older else DATAFLASH, "ulog": ULOG, "xplane": XPLANE}
     if format in tables:
         found = {
             signal: [Guess(signal, name, unit, "name") for name, unit in named if name in columns]

@@ -17,7 +17,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.logs.files import text
 from symheli.values.units import to_si
 
-SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
+SEPARATORS = {"\t": "tab", "|": "bar", ";": "semicolon", ",": "comma", " ": "blanks"}
 """Tried in this order: what stands in names and numbers too comes last."""
 
 LOOKED_AT = 20

@@ -16,7 +16,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.extras import extra
-from symheli.logs.column import Column, on_one_axis
+from symheli.logs.column import Column, continuous, on_one_axis
 from symheli.logs.files import Table, existing, positive, quiet, said_by, warn_of_damage
 
 QUATERNION = tuple(f"q[{i}]" for i in range(4))
@@ -46,7 +46,10 @@ def read_ulog(
             ' "rad/s")}'
         )
     logged = _topics(path)
-    columns = {name: _column(logged, *where[:2]) for name, where in topics.items()}
+    columns = {
+        name: continuous(_column(logged, topic, field), unit)
+        for name, (topic, field, unit) in topics.items()
+    }
     time, values = on_one_axis(columns, dt, path)
     return time, values, {name: unit for name, (_, _, unit) in topics.items()}
 

@@ -146,7 +146,7 @@ def _is_header(line: str) -> bool:
 
 
 def _fields(line: str) -> list[str]:
-    fields = [field.strip() for field in line.split("|")]
+    fields = [field.strip(" \t,") for field in line.split("|")]  # spreadsheets leave commas
     return fields[:-1] if fields[-1] == "" else fields
 
 

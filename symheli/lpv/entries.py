@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
-from symheli.errors import UnknownNameError
+from symheli.errors import InputError, UnknownNameError
 from symheli.values.arrays import Array
 from symheli.values.labelled import per
 from symheli.values.signal import Signal
@@ -87,6 +87,18 @@ def rates(names: Names) -> list[str]:
     x' is the next sample.
     """
     return [s.unit if names.dt is not None else per(s.unit, "s") for s in names.states]
+
+
+def entry_called(models: Any, name: str) -> Array:
+    """The values (...) of one entry such as "A[q, u]"; raises `UnknownNameError`, and `InputError`
+    for a derivative, which is not an entry: kinematic terms are taken off it.
+    """
+    if name[:2] in ("X_", "Y_", "Z_", "L_", "M_", "N_"):
+        raise InputError(
+            f"{name!r} is a derivative: symheli.derivatives(family)[{name!r}]; an entry of the"
+            ' matrices is called as family["A[q, u]"]'
+        )
+    return chosen(list(entries(models, models)), [name])[0].values
 
 
 def chosen(every: Sequence[Entry], wanted: Sequence[str]) -> list[Entry]:

@@ -6,11 +6,12 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.lpv.entries import entry_called
 from symheli.lpv.interpolation import Kind, interpolated
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.linear_models import LinearModels
@@ -33,12 +34,12 @@ AIRSPEED = Signal("airspeed", "m/s")
 
 @dataclass(frozen=True, eq=False)
 class LinearFamily:
-    """K linear models at increasing airspeeds.
+    """K linear models at increasing airspeeds, or values of another `parameter`.
 
     Parameters
     ----------
     airspeeds : array_like
-        (K,), m/s, increasing.
+        (K,), m/s or the unit of `parameter`, increasing.
     A, B, C, D : array_like
         (K, nx, nx), (K, nx, nu), (K, ny, nx), (K, ny, nu), in SI units and radians.
     states, inputs, outputs : sequence of str
@@ -51,6 +52,8 @@ class LinearFamily:
     kinks : mapping
         From a name of the physics (a saturation, an edge of a wake) to the airspeeds at which the
         models change with a corner.
+    parameter : Signal
+        What the models are over, with its unit: an LPV model made of them is scheduled on it.
 
     Raises
     ------
@@ -78,6 +81,7 @@ class LinearFamily:
     trims: Sequence[OperatingPoint] | OperatingPoints = ()
     dt: float | None = None
     kinks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    parameter: Signal = AIRSPEED
     models: LinearModels = field(init=False, repr=False)
 
     __repr__ = summarized
@@ -85,6 +89,7 @@ class LinearFamily:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
+        object.__setattr__(self, "parameter", Signal(self.parameter))
         if np.any(np.diff(self.airspeeds) <= 0):
             raise InputError("airspeeds must increase strictly")
         if self.dt is not None:
@@ -116,9 +121,10 @@ class LinearFamily:
         airspeeds: Sequence[float] | Array,
         models: Sequence[LinearModel],
         kinks: Mapping[str, tuple[float, ...]] | None = None,
+        parameter: Signal = AIRSPEED,
     ) -> LinearFamily:
-        """From linear models with equal names and sample period, one an airspeed (m/s); all with
-        their operating point, or none.
+        """From linear models with equal names and sample period, one an airspeed (m/s), or a value
+        of another `parameter`; all with their operating point, or none.
         """
         if not len(models) or len(models) != len(np.atleast_1d(np.asarray(airspeeds))):
             raise InputError(f"expected one model an airspeed, got {len(models)} models")
@@ -130,13 +136,21 @@ class LinearFamily:
             models.points,
             models.dt,
             kinks or {},
+            parameter,
         )
 
     def __len__(self) -> int:
         return len(self.airspeeds)
 
-    def __getitem__(self, k: int) -> LinearModel:
-        return self.models[k]
+    @overload
+    def __getitem__(self, k: int) -> LinearModel: ...
+    @overload
+    def __getitem__(self, k: str) -> Array: ...
+    def __getitem__(self, k: int | str) -> LinearModel | Array:
+        """Model k, or one entry of all models (K,) by its name: family["A[q, u]"]. Raises
+        `UnknownNameError` for one that is not there.
+        """
+        return entry_called(self, k) if isinstance(k, str) else self.models[k]
 
     def known_trims(self, purpose: str) -> OperatingPoints:
         """The trims; raises `InputError` where there are none, which `purpose` needs."""
@@ -178,7 +192,7 @@ class LinearFamily:
         always the cubic spline (linear below four nodes), none without trims: its slope is the
         drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2 (None: as fast as it likes).
         """
-        return interpolated(self.models, (AIRSPEED,), (self.airspeeds,), kind, degree, rate)
+        return interpolated(self.models, (self.parameter,), (self.airspeeds,), kind, degree, rate)
 
     def plot(self, ax: Axes | None = None, entries: Sequence[str] | None = None) -> Axes:
         """Entries such as "A[q, u]" or "B[q, d_lon]" over airspeed, each by its largest magnitude,
@@ -187,7 +201,7 @@ class LinearFamily:
         """
         from symheli.lpv.entry_plot import plot_entries
 
-        return plot_entries(ax, AIRSPEED, self.airspeeds, self, self, entries, ".")
+        return plot_entries(ax, self.parameter, self.airspeeds, self, self, entries, ".")
 
     def to_frame(self) -> pandas.DataFrame:
         """A row an airspeed (m/s), a column an entry A[q, u] ..., their units in attrs["units"].
@@ -195,7 +209,7 @@ class LinearFamily:
         """
         from symheli.lpv.labelled_models import models_frame
 
-        return models_frame([(AIRSPEED, self.airspeeds)], self, self)
+        return models_frame([(self.parameter, self.airspeeds)], self, self)
 
     def to_xarray(self) -> xarray.Dataset:
         """A, B, C, D over "airspeed", "equation", "state", "input" and "output", and x0, u0 where
@@ -204,7 +218,7 @@ class LinearFamily:
         """
         from symheli.lpv.labelled_models import models_dataset
 
-        return models_dataset([(AIRSPEED, self.airspeeds)], self, self, self.models.points)
+        return models_dataset([(self.parameter, self.airspeeds)], self, self, self.models.points)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the models with names, units and trims, as JSON or NPZ by the ending of the name,
@@ -213,23 +227,23 @@ class LinearFamily:
         """
         from symheli.lpv.family_file import Content, write
 
-        return write(Content((AIRSPEED,), (self.airspeeds,), self.models, self.kinks), path)
+        return write(Content((self.parameter,), (self.airspeeds,), self.models, self.kinks), path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> LinearFamily:
         """The models in a file that `save`, another program or somebody wrote. Raises `InputError`
-        for a file that is none, or whose models are not over airspeed alone.
+        for a file that is none, or whose models are over several parameters.
         """
         from symheli.lpv.family_file import read
 
         found = read(path)
-        if found.axes != (AIRSPEED,) or found.axes[0].unit != AIRSPEED.unit:
+        if len(found.axes) != 1:
             axes = ", ".join(f"{s} ({s.unit})" for s in found.axes)
             raise InputError(
-                f"{path}: expected models over airspeed (m/s), got {axes}: read them with"
+                f"{path}: expected models over one parameter, got {axes}: read them with"
                 " LinearGrid.load"
             )
-        return cls.from_models(found.values[0], found.models, found.kinks)
+        return cls.from_models(found.values[0], found.models, found.kinks, found.axes[0])
 
     def _of(self, models: LinearModels) -> LinearFamily:
-        return LinearFamily.from_models(self.airspeeds, models, self.kinks)
+        return LinearFamily.from_models(self.airspeeds, models, self.kinks, self.parameter)

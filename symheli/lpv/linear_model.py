@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.equilibration import is_singular, loop_inverse
+from symheli.values.aligned import matrix
 from symheli.values.arrays import Array, frozen
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.sample_period import same_period
@@ -72,6 +73,25 @@ class LinearModel:
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
         if self.dt is not None and not self.dt > 0:
             raise InputError(f"dt must be a positive number of seconds or None, got {self.dt}")
+
+    def __str__(self) -> str:
+        """The matrices that are not trivial with the names of rows and columns."""
+        time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
+        rows = "derivative of the state" if self.dt is None else "state at the next sample"
+        around = "" if self.point is None else f", about {self.point.airspeed:g} m/s"
+        lines = [
+            f"linear model, {time}{around}: {len(self.states)} states, {len(self.inputs)} inputs,"
+            f" {len(self.outputs)} outputs; SI and radians",
+            f"A (rows: {rows})",
+            matrix(self.A, self.states, self.states),
+            "B",
+            matrix(self.B, self.states, self.inputs),
+        ]
+        if self.outputs != self.states or not np.array_equal(self.C, np.eye(len(self.C))):
+            lines += ["C (rows: outputs)", matrix(self.C, self.outputs, self.states)]
+        if np.any(self.D):
+            lines += ["D", matrix(self.D, self.outputs, self.inputs)]
+        return "\n".join(lines)
 
     def poles(self) -> np.ndarray:
         """Eigenvalues of A (nx,), complex; rad/s where continuous."""

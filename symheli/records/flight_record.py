@@ -123,8 +123,18 @@ class FlightRecord:
         signal.
 
         Warns (`DataWarning`), as all readers do, where samples lie further apart than 1 s or closer
-        than 0.1 ms.
+        than 0.1 ms. Raises `InputError` for a signal without a unit, units without a signal, and
+        samples that are not as many as there are instants.
         """
+        if not columns and units:
+            named = ", ".join(f"{name}={name}" for name in units)
+            said = ", ".join(
+                f"{n!r}: {u if isinstance(u, str) else '...'!r}" for n, u in units.items()
+            )
+            raise InputError(
+                "no signals: the second argument is their units, the arrays are given by name:"
+                f" from_arrays(t, {{{said}}}, {named})"
+            )
         record = cls._in_si(time, units, note, columns)
         warn_of_odd_steps(record.time)
         return record

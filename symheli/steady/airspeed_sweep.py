@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.helicopter import Helicopter
+from symheli.helicopter import Helicopter, require
 from symheli.lpv.linear_family import LinearFamily
 from symheli.steady.equilibrium import Equilibrium
 from symheli.steady.flight_conditions import FlightConditions
@@ -74,6 +74,7 @@ def sweep(
     >>> family.A.shape, len(family.trims)
     ((3, 10, 10), 3)
     """
+    require(heli, "sweep(heli, [0.0, 5.0, 10.0])")
     speeds = increasing(airspeeds)
     if start and not np.array_equal(start.airspeeds, speeds):
         raise InputError("the family to start from has other airspeeds")

@@ -10,17 +10,17 @@ import numpy as np
 
 from symheli.codegen.numeric import Numeric
 from symheli.errors import TrimError
-from symheli.helicopter import Helicopter
+from symheli.helicopter import Helicopter, require
 from symheli.steady.equations import numeric, steady_equations
 from symheli.steady.flight_condition import FlightCondition
 from symheli.steady.newton import TOLERANCE, newton
 from symheli.steady.validity import Validity, in_a_ring, warn
+from symheli.values.aligned import columns, vector
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.operating_point import OperatingPoint
-from symheli.values.signal import Signal
+from symheli.values.signal import Signal, rates
 from symheli.values.summary import as_table, summarized
-from symheli.values.units import quotient
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +75,9 @@ class TrimPoint(OperatingPoint):
         """An equilibrium with every control within its travel: one that can be flown."""
         return self.success and not self.on_stops
 
-    def __str__(self) -> str:
+    @property
+    def outcome(self) -> str:
+        """In one line: whether it is trimmed, where, and what limits it."""
         worst = max(zip(np.abs(self.residual.array), self.residual.signals, strict=True))
         notes = [_stops(self)] if self.on_stops else []
         notes += ["vortex ring: no accuracy promised"] if self.vortex_ring else []
@@ -86,6 +88,13 @@ class TrimPoint(OperatingPoint):
                 *notes,
             ]
         )
+
+    def __str__(self) -> str:
+        rows = [["", "value", "unit", ""]]
+        for title, found in (("states", self.x), ("inputs", self.u)):
+            rows.append([title])
+            rows += [["  " + name, *rest] for name, *rest in vector(found.array, found.signals)]
+        return f"{self.outcome}\n{columns(rows)}"
 
 
 def trim(
@@ -146,6 +155,7 @@ def trim(
     >>> round(float(np.degrees(point.x["theta"])), 1), round(float(point.u["d_col"]), 3)
     (-1.2, 0.088)
     """
+    require(heli, "trim(heli, airspeed=5.0)")
     condition = FlightCondition(
         float(airspeed),
         climb_rate=float(climb_rate),
@@ -306,10 +316,10 @@ class Equilibrium:
         return TrimPoint(
             x=NamedVector(heli.states, x),
             u=NamedVector(heli.inputs, u),
-            xdot=NamedVector(heli.states, xdot),
+            xdot=NamedVector(rates(heli.states), xdot),
             airspeed=self.condition.airspeed,
             condition=self.condition,
-            residual=NamedVector(heli.states, residual),
+            residual=NamedVector(rates(heli.states), residual),
             wind=NamedVector(heli.wind, wind),
             on_stops=stops(heli.inputs, on_stops(u, heli.travel)),
             vortex_ring=bool(in_vortex_ring(switches, self.equations.switches)),
@@ -323,16 +333,16 @@ class Equilibrium:
             zip(best.residual.array, best.residual.signals, strict=True),
             key=lambda miss: -abs(miss[0]),
         )
-        table = ", ".join(f"d{s}/dt = {r:.2e} {quotient(s.unit, 's')}" for r, s in misses)
+        table = ", ".join(f"d{s}/dt = {r:.2e} {s.unit}" for r, s in misses)
         said = [
             f"no trim at {best.condition}: the best point leaves {table}",
             *([_stops(best)] if best.on_stops else []),
             *_throttle(self.heli, best),
             *self._jumps(z),
             *(f"and beyond validity, {one}" for one in _beyond(self.heli, best)),
-            "try a nearer condition as `start`, or throw=False for the best point",
         ]
-        return TrimError("; ".join(said), best)
+        advice = "try a nearer condition as `start`, or throw=False for the best point"
+        return TrimError("; ".join(said), best, advice)
 
     def _jumps(self, z: Array) -> list[str]:
         """Jumps of the equations beside a point that is no trim: within 0.1 of the switch (m/s), as

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.helicopter import Helicopter
+from symheli.helicopter import Helicopter, require
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.linear_models import LinearModels
 from symheli.steady.equations import numeric
-from symheli.steady.equilibrium import TrimPoint, warn_of_point
+from symheli.steady.equilibrium import TrimPoint, trim, warn_of_point
 from symheli.steady.newton import TOLERANCE
 from symheli.steady.steady_flights import SteadyFlights
 from symheli.steady.trim_batch import TrimBatch
@@ -20,8 +20,9 @@ from symheli.values.signal import Signal, indices
 
 def linearize(
     heli: Helicopter,
-    point: TrimPoint,
+    point: TrimPoint | float | None = None,
     *,
+    airspeed: float | None = None,
     inputs: Sequence[str] | None = None,
     allow_accelerating: bool = False,
 ) -> LinearModel:
@@ -34,8 +35,10 @@ def linearize(
     ----------
     heli : Helicopter
         The model.
-    point : TrimPoint
-        Of that model.
+    point : TrimPoint or float
+        Of that model; a number is an airspeed.
+    airspeed : float
+        In place of a point, m/s: about the trim of level flight.
     inputs : sequence of str, optional
         Default the four controls; gust velocities u_w v_w w_w (body axes, m/s) may be named too.
     allow_accelerating : bool
@@ -49,7 +52,8 @@ def linearize(
     Raises
     ------
     InputError
-        A point that is no equilibrium, unless `allow_accelerating`.
+        A point that is no equilibrium, unless `allow_accelerating`; both or neither of point and
+        airspeed.
 
     Warns
     -----
@@ -61,11 +65,31 @@ def linearize(
     >>> model = symheli.linearize(heli, symheli.trim(heli, airspeed=5.0))
     >>> model.A.shape, model.B.shape, model.is_stable()
     ((10, 10), (10, 4), True)
+    >>> np.array_equal(symheli.linearize(heli, airspeed=5.0).A, model.A)
+    True
     """
+    require(heli, "linearize(heli, trim(heli, airspeed=5.0))")
+    if (point is None) is (airspeed is None):
+        raise InputError(
+            "give a trim or an airspeed: linearize(heli, trim(heli, airspeed=5.0)) or"
+            " linearize(heli, airspeed=5.0)"
+        )
+    if not isinstance(point, TrimPoint):
+        if not isinstance(point, int | float | None) or isinstance(point, bool):
+            raise InputError(
+                f"point: expected a TrimPoint or an airspeed in m/s, got {point!r:.80}; write"
+                " linearize(heli, trim(heli, airspeed=5.0))"
+            )
+        return linearize(
+            heli,
+            trim(heli, float(airspeed if point is None else point)),  # type: ignore[arg-type]
+            inputs=inputs,
+            allow_accelerating=allow_accelerating,
+        )
     if not allow_accelerating and not np.all(np.abs(point.xdot.array) < TOLERANCE):
         raise InputError(
-            f"linearize needs an equilibrium: {point}; pass allow_accelerating=True for a model"
-            " about a trajectory point"
+            f"linearize needs an equilibrium: {point.outcome}; pass allow_accelerating=True for a"
+            " model about a trajectory point"
         )
     if point.x.signals != heli.states:
         raise InputError(

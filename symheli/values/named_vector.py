@@ -16,7 +16,7 @@ from symheli.values.signal import Signal, signals
 @dataclass(frozen=True, eq=False)
 class NamedVector(Mapping[str, float]):
     """Values with a `Signal` each: `x["theta"]` is a float, `x.array` (or `np.asarray(x)`) the
-    vector, `x.signals` names and units.
+    vector, `x.signals` names and units. In arithmetic it is its array: `2 * x` has no names.
 
     Parameters
     ----------
@@ -35,6 +35,8 @@ class NamedVector(Mapping[str, float]):
     >>> x = symheli.trim(heli, airspeed=5.0).x
     >>> x["theta"] == float(x.array[7]), x.signals[7].unit
     (True, 'rad')
+    >>> (2 * x)[7] == 2 * x["theta"]
+    np.True_
     """
 
     signals: tuple[Signal, ...]
@@ -62,6 +64,26 @@ class NamedVector(Mapping[str, float]):
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(self.array, dtype=dtype) if copy or dtype is not None else self.array
+
+    def __add__(self, other: Any) -> Array:
+        return self.array + np.asarray(other)
+
+    def __sub__(self, other: Any) -> Array:
+        return self.array - np.asarray(other)
+
+    def __rsub__(self, other: Any) -> Array:
+        return np.asarray(other) - self.array
+
+    def __mul__(self, other: Any) -> Array:
+        return self.array * np.asarray(other)
+
+    def __truediv__(self, other: Any) -> Array:
+        return self.array / np.asarray(other)
+
+    def __neg__(self) -> Array:
+        return -self.array
+
+    __radd__, __rmul__ = __add__, __mul__
 
     def __repr__(self) -> str:
         return (

@@ -62,6 +62,13 @@ def signals(names: Iterable[str], units: Mapping[str, str] | None = None) -> tup
     return out
 
 
+def rates(names: Iterable[Signal]) -> tuple[Signal, ...]:
+    """Derivatives in time: the same names, with the units per second."""
+    from symheli.values.units import quotient  # which knows no signals
+
+    return tuple(Signal(str(n), quotient(n.unit, "s")) for n in names)
+
+
 def indices(wanted: Iterable[str], known: Sequence[str], kind: str) -> list[int]:
     """Position of each wanted name among the known ones; raises `UnknownNameError`."""
     if isinstance(wanted, str):

@@ -2,6 +2,7 @@
 period, whose signals are called otherwise than a helicopter's.
 """
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ import symheli
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.bases import Polynomial
 from symheli.lpv.trim_schedule import TrimSchedule
+from symheli.records import FlightRecord
 
 DT, N = 0.02, 1500
 UNITS = {
@@ -236,3 +238,29 @@ def test_scheduling_pays_where_the_aeroplane_is_told_by_it():
     assert "nothing was held out" in alone.verdict()[0]
     with pytest.raises(InputError, match="nothing was held out"):
         alone.pays("pitch_rate")
+
+
+@pytest.mark.parametrize(("own", "lag"), [(True, 1), (True, 2), (False, 1)])
+def test_a_free_run_on_its_own_measured_past_is_warned_of(own, lag):
+    """p(k) = y(k-1)^2: measured, it tells a free run the answer."""
+    rng = np.random.default_rng(0)
+    u, y, p = rng.standard_normal(400), np.zeros(400), np.zeros(400)
+    for k in range(lag, 400):
+        p[k] = y[k - lag] ** 2 if own else np.sin(0.1 * k)
+        y[k] = (0.6 - 0.1 * min(p[k - 1], 2.0)) * y[k - 1] + u[k - 1] if k else 0.0
+    units = dict.fromkeys("yup", "1")
+    record = FlightRecord.from_arrays(0.1 * np.arange(400), units, y=y, u=u, p=p)
+    basis = idn.Polynomial(1, float(p.min()), float(p.max()))
+    model = idn.fit(idn.LPVARX("y", "u", "p", na=1, nb=1, delay=1, basis=basis), record)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        idn.scores(model, record)
+    words = [str(w.message) for w in said if "is made of the outputs" in str(w.message)]
+    assert len(words) == own
+    assert not own or f"{lag} sample" in words[0]
+
+
+def test_instruments_reach_over_ten_samples_where_a_second_holds_fewer():
+    """A record of 5 s a sample had two lags, too few for any model."""
+    assert idn.LaggedSignals("u").instrument_lags(dt=5.0, first=1, memory=1) == (*range(1, 11),)
+    assert idn.LaggedSignals("u").instrument_lags(dt=0.02, first=1, memory=1)[-1] == 50

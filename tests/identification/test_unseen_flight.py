@@ -46,6 +46,24 @@ def test_louder_sensors_and_another_vehicle_are_not(vehicle, model):
         found.require()
 
 
+def test_noise_of_its_own_size_in_every_flight_is_no_other_vehicle(vehicle):
+    """Noise so many decibels below the signals is louder in a livelier flight: two flights pooled
+    to one level made every third unlikely.
+    """
+    method = idn.FilterError(vehicle.without_noise(seed=1))
+    flights = [vehicle.record(800, seed=s, sensors=k * SENSORS) for s, k in ((1, 1.0), (2, 2.0))]
+    model = idn.fit(vehicle.kin, flights, method)
+    other = Vehicle(na=1, nb=1)
+    other.theta = vehicle.theta * 1.3
+    for loud in (0.7, 1.5, 3.0):
+        found, wrong = (
+            idn.unseen_flight(model, one.record(600, seed=7, sensors=loud * SENSORS))
+            for one in (vehicle, other)
+        )
+        assert 0.7 < found.power < found.largest < 1.5
+        assert not wrong.explained
+
+
 def test_a_model_that_does_not_know_its_noise_is_refused(vehicle, model):
     record = vehicle.record(300, seed=5, sensors=SENSORS)
     with pytest.raises(InputError, match="fit by FilterError"):

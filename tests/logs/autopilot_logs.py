@@ -88,30 +88,53 @@ TYPES = {
 }
 
 
-def dataflash(rows, *, text=False, units=True):
+SDLOG2 = {
+    "FMT": FORMATS["FMT"],
+    "TIME": (129, "Q", "StartTime"),
+    "ATT": (2, "ffffff", "Roll,Pitch,Yaw,RollRate,PitchRate,YawRate"),
+    "ATTC": (9, "ffff", "Roll,Pitch,Yaw,Thrust"),
+}
+"""Of PX4's logs before ULog: the time stands in a message of its own, before those of its instant
+(src/modules/sdlog2/sdlog2_messages.h).
+"""
+
+BEFORE_2015 = {
+    "FMT": FORMATS["FMT"],
+    "ATT": (1, "IcC", "TimeMS,Pitch,Yaw"),
+    "IMU": (2, "Ifff", "TimeMS,GyrX,GyrY,GyrZ"),
+    "RATE": (3, "If", "TimeMS,POut"),
+    "GPS": (130, "BIfI", "Status,TimeMS,Spd,T"),
+    "EV": (4, "IB", "TimeMS,Id"),
+}
+"""Of ArduPilot until 2014: TimeMS is the autopilot's, but of GPS that of the week, with the
+autopilot's in T.
+"""
+
+
+def dataflash(rows, *, text=False, units=True, formats=FORMATS):
     """A DataFlash log of [(message, (field, ...)), ...], values as the log stores them (an angle of
     type c in 1/100 degrees); `units`: with the messages that declare them.
     """
-    messages = []
-    for kind, (number, letters, names) in FORMATS.items():
+    messages, units = [], units and "UNIT" in formats
+    write = _line if text else _packet
+    for kind, (number, letters, names) in formats.items():
         size = 3 + struct.calcsize("<" + "".join(TYPES[c] for c in letters))
         messages.append(("FMT", (number, size, kind, letters, names)))
     if units:
         messages += [("UNIT", (0, ord(key), label)) for key, label in UNITS.items()]
         messages += [("MULT", (0, ord(key), value)) for key, value in MULTIPLIERS.items()]
         messages += [("FMTU", (0, FORMATS[kind][0], *ids)) for kind, ids in DECLARED.items()]
-    write = _line if text else _packet
-    return b"".join(write(kind, values) for kind, values in [*messages, *rows])
+    return b"".join(write(formats[kind], kind, values) for kind, values in [*messages, *rows])
 
 
-def _packet(kind, values):
-    number, letters, _ = FORMATS[kind]
+def _packet(form, _, values):
+    number, letters, _ = form
     values = [v.encode() if isinstance(v, str) else v for v in values]
     form = "<" + "".join(TYPES[c] for c in letters)
     return struct.pack("<BBB", 0xA3, 0x95, number) + struct.pack(form, *values)
 
 
-def _line(kind, values):
-    letters = FORMATS[kind][1]
+def _line(form, kind, values):
+    letters = form[1]
     shown = (v / 100 if c in "cC" else v for c, v in zip(letters, values, strict=True))
     return (", ".join([kind, *map(str, shown)]) + "\n").encode()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from autopilot_logs import dataflash, quaternions, ulog
+from autopilot_logs import BEFORE_2015, SDLOG2, dataflash, quaternions, ulog
 from scipy.spatial.transform import Rotation
 
 from symheli.errors import DataWarning, InputError, UnknownNameError
@@ -15,6 +15,7 @@ from symheli.logs.column import Column, on_one_axis
 from symheli.logs.dataflash import dataflash_columns
 from symheli.logs.format import format_of
 from symheli.logs.mat import mat_columns
+from symheli.logs.meaning import guesses
 from symheli.logs.ulog import ulog_columns
 from symheli.records import FlightRecord
 
@@ -381,3 +382,76 @@ def test_dataflash_columns_are_named_with_the_instance_where_there_are_two(ardup
     columns = dataflash_columns(ardupilot())
     assert {"IMU.GyrY", "IMU[1].GyrY", "ATT.Pitch"} <= set(columns)
     assert (columns["IMU.T"].unit, columns["ATT.Yaw"].unit) == (None, "deg")
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_the_time_of_a_batch_is_that_of_the_message_before_it(tmp_path, text):
+    """sdlog2: no message has a time but TIME, which stands before those of its instant."""
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    t = 3.0 + 0.02 * np.arange(200)
+    rows = [("ATTC", (9.0, 9.0, 9.0, 9.0))]  # before any time: of no use
+    for now in t:
+        rows += [
+            ("TIME", (round(1e6 * now),)),
+            ("ATT", (0.1 * now, 0.2 * now, 0.3 * now, 0.1, 0.2, 0.3)),
+            ("ATTC", (now, 2 * now, 3 * now, 4 * now)),
+        ]
+    path = tmp_path / "flight.px4log"
+    path.write_bytes(dataflash(rows, text=text, formats=SDLOG2))
+    columns = dataflash_columns(path)
+    np.testing.assert_allclose(columns["ATT.Pitch"].time, t, atol=1e-6)
+    np.testing.assert_allclose(columns["ATTC.Pitch"].values, 2 * t, rtol=1e-6)
+    assert not [name for name in columns if name.startswith("TIME.")]
+    record = FlightRecord.from_dataflash(
+        path,
+        {"theta": "ATT.Pitch", "lon": "ATTC.Pitch"},
+        0.02,
+        {"theta": "rad", "lon": "1"},
+    )
+    np.testing.assert_allclose(record["theta"], 0.1 * record["lon"], rtol=1e-5)
+    found = guesses(columns, "dataflash")
+    assert (found["q"].column, found["q"].unit) == ("ATT.PitchRate", "rad/s")
+    assert (found["theta"].unit, found["lon"].column) == ("rad", "ATTC.Pitch")
+
+
+def old_arducopter(path, n=400):
+    """Airspeed from a GPS whose TimeMS counts from the beginning of the week; yaw through north."""
+    rows = []
+    for k in range(n):
+        now = 60_000 + 20 * k
+        yaw = (350.0 + 0.1 * k) % 360.0
+        rows.append(("IMU", (now, 0.0, 0.3 * np.sin(0.1 * k), 0.0)))
+        if k % 5 == 0:
+            rows.append(("ATT", (now, round(100 * np.sin(0.03 * k)), round(100 * yaw))))
+            rows.append(("RATE", (now, float(np.cos(0.2 * k)))))
+            rows.append(("GPS", (3, 604_091_000 + 20 * k, 5.0 + 0.01 * k, now)))
+    path.write_bytes(dataflash(rows, formats=BEFORE_2015))
+    return path
+
+
+def test_the_clock_of_an_old_gps_is_the_autopilots_not_that_of_the_week(tmp_path):
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    path = old_arducopter(tmp_path / "log171.bin")
+    columns = dataflash_columns(path)
+    assert columns["GPS.Spd"].time[0] == columns["IMU.GyrY"].time[0] == 60.0
+    assert "GPS.T" not in columns
+    record = FlightRecord.from_dataflash(
+        path,
+        {"q": "IMU.GyrY", "airspeed": "GPS.Spd", "psi": "ATT.Yaw"},
+        0.02,
+        {"q": "rad/s", "airspeed": "m/s", "psi": "deg"},
+    )
+    np.testing.assert_allclose(record["airspeed"], 5.0 + 0.01 * np.arange(len(record)), atol=1e-5)
+    # through north the heading goes on: nothing is interpolated between 359 and 1 degrees
+    np.testing.assert_allclose(np.degrees(np.diff(record["psi"])), 0.1, atol=1e-9)
+
+
+def test_the_gyro_of_a_sensor_is_guessed_where_nothing_better_is_logged(tmp_path):
+    pytest.importorskip("pyulog", reason="needs pyulog: pip install 'symheli[logs]'")
+    t = 1e-6 * STAMPS
+    gyro = {axis: np.sin(t + i) for i, axis in enumerate("xyz")}
+    path = tmp_path / "log1.ulg"
+    path.write_bytes(ulog({("sensor_gyro", 0): {"timestamp": STAMPS, **gyro}}))
+    found = guesses(ulog_columns(path), "ulog")
+    assert [found[s].column for s in "pqr"] == [f"sensor_gyro.{axis}" for axis in "xyz"]
+    assert {found[s].unit for s in "pqr"} == {"rad/s"}

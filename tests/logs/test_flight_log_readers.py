@@ -40,6 +40,18 @@ def row(*values):
 # --- X-Plane -------------------------------------------------------------------------------------
 
 
+def test_commas_that_a_spreadsheet_left_beside_the_bars_are_no_part_of_numbers(tmp_path):
+    path = write(
+        tmp_path,
+        "Vtrue,_ktas ,|_elev,yoke1 ,|____Q,rad/s ,|pitch,__deg ,|,",
+        *(f"{v:.5f},|0.10000,|-0.02,|-184.87347,|," for v in range(1, 9)),
+        name="Forward.csv",
+    )
+    record = FlightRecord.from_xplane(path, dt=0.1)
+    np.testing.assert_allclose(record["airspeed"], np.arange(1, 9) * 1852 / 3600)
+    np.testing.assert_allclose(record["theta"], np.radians(-184.87347))
+
+
 @pytest.mark.parametrize(("name", "lengths"), [("Forward.txt", [4, 935]), ("Data.txt", [602])])
 def test_a_real_xplane_log_splits_at_its_headers_and_comes_out_in_si(name, lengths):
     path = real(f"xplane/{name}")
@@ -325,3 +337,17 @@ def test_without_pyulog_the_message_names_the_extra(tmp_path, monkeypatch):
         FlightRecord.from_ulog(
             write(tmp_path, "x", name="log.ulg"), {"q": ("rates", "xyz[1]", "rad/s")}, dt=0.02
         )
+
+
+@pytest.mark.parametrize("end", ["", "|"])
+def test_columns_may_be_separated_by_bars(tmp_path, end):
+    lines = [f"{k / 10} | {k} | {k * k:.1f}{end}" for k in range(6)]
+    path = write(tmp_path, f"t | q [rad/s] | u [m/s]{end}", *lines, name="log.csv")
+    record = FlightRecord.from_csv(path, "t", {"q": "rad/s", "u": "m/s"})
+    np.testing.assert_allclose(record["u"], np.arange(6.0) ** 2)
+    # a comma is then the decimal sign
+    comma = [line.replace(".", ",") for line in lines]
+    path = write(tmp_path, f"t | q [rad/s] | u [m/s]{end}", *comma, name="comma.csv")
+    np.testing.assert_array_equal(
+        FlightRecord.from_csv(path, "t", {"u": "m/s"})["u"], np.arange(6.0) ** 2
+    )

@@ -1,14 +1,16 @@
 """A log alone: what it holds is said, nothing is used, and what is suggested works."""
 
 import json
+import re
 import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
-from autopilot_logs import dataflash, ulog
+from autopilot_logs import BEFORE_2015, SDLOG2, dataflash, ulog
 from scipy.io import savemat
 
+from identification.judge.scores import percent
 from studies import cli
 from symheli.logs.column import Column
 from symheli.logs.meaning import guesses
@@ -252,8 +254,10 @@ def test_ardupilot_columns_are_guessed_with_the_units_of_the_log(look, tmp_path)
             rows += [("ATT", (stamp, pitch, 0)), ("RATE", (stamp, round(100 * f["lon"][k])))]
     (tmp_path / "log.bin").write_bytes(dataflash(rows))
     seen, _ = look(tmp_path / "log.bin")
+    # read at the rate of the gyro, then means over the steps of the input
+    assert seen["suggested_command"][-2:] == ["--decimate", "5"]
     assert seen["suggested_map"].splitlines() == [
-        "dt = 0.1",
+        "dt = 0.02",
         "[signals]",
         'q = { column = "IMU.GyrY" }',
         'theta = { column = "ATT.Pitch" }',
@@ -278,3 +282,118 @@ def test_a_latitude_is_no_stick_and_large_numbers_are_degrees():
         "theta": ("pitch", "deg"),
         "ped": ("rudder", "us"),
     }
+
+
+def before_2015(path, crash=False):
+    """20 s on the ground, 18 s of flight, the ground again; the airspeed from a GPS that counts the
+    week, the heading without a declared unit.
+    """
+    f, rows, none = flight(), [], np.zeros(1000)
+    q, theta, lon = (np.concatenate([none, f[n], none]) for n in ("q", "theta", "lon"))
+    if crash:
+        q[1600:1610] = -20.0
+    for k in range(2900):
+        now = 60_000 + 20 * k
+        rows.append(("IMU", (now, 0.0, q[k], 0.0)))
+        rows += [("EV", (now, event))] if (event := {950: 10, 1000: 28, 1900: 18}.get(k)) else []
+        if k % 5 == 0:
+            rows.append(("ATT", (now, round(100 * np.degrees(theta[k])), 100 * (k % 360))))
+            rows.append(("RATE", (now, lon[k])))
+            speed = 8 + 5 * np.sin(2 * np.pi * k / 600)
+            rows.append(("GPS", (3, 604_091_000 + 20 * k, speed, now)))
+    path.write_bytes(dataflash(rows, formats=BEFORE_2015))
+    return path
+
+
+def runs(seen, answer):
+    """What the suggested command answers."""
+    Path("aircraft.toml").write_text(seen["suggested_map"])
+    return answer(*seen["suggested_command"][2:])
+
+
+def test_ground_and_flight_of_an_old_log_are_told_apart_and_the_flight_is_suggested(
+    look, answer, tmp_path, monkeypatch
+):
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    monkeypatch.chdir(tmp_path)
+    seen, text = look(before_2015(tmp_path / "log171.bin"))
+    words = [one["what"] for one in seen["stretches"]]
+    assert words == [
+        "disarmed, on the ground, at rest",
+        "armed, on the ground, at rest",
+        "armed, airborne",
+        "armed, on the ground, at rest",
+    ]
+    flown = seen["stretches"][2]
+    assert (flown["start"], flown["stop"]) == (pytest.approx(80, abs=2), pytest.approx(98, abs=2))
+    assert re.search(r"\n  80\.?\d* +98\.?\d* +armed, airborne +suggested\n", text)
+    found = runs(seen, answer)
+    assert 16 < found["read"]["stop"] - found["read"]["start"] < 19
+    assert found["read"]["scheduling_range"] == [
+        pytest.approx(3, abs=0.1),
+        pytest.approx(13, abs=0.1),
+    ]
+
+
+def test_what_is_behind_a_crash_is_no_flight(look, answer, tmp_path, monkeypatch):
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    monkeypatch.chdir(tmp_path)
+    seen, text = look(before_2015(tmp_path / "log.bin", crash=True))
+    assert "crashed" in text
+    (flown,) = (one for one in seen["stretches"] if one["flown"])
+    assert (flown["start"], flown["stop"]) == (80.0, pytest.approx(60 + 0.02 * 1600))
+    assert runs(seen, answer)["read"]["stop"] <= 32.0
+
+
+def test_armed_and_modes_of_px4(look, tmp_path):
+    pytest.importorskip("pyulog", reason="needs pyulog: pip install 'symheli[logs]'")
+    f = flight()
+    stamps = np.round(1e6 * f["t"]).astype(int)
+    gyro = {"timestamp": stamps, "x": f["q"], "y": f["q"], "z": f["q"]}
+    status = {
+        "timestamp": stamps[::100],
+        "arming_state": np.array([1, 2, 2, 2, 2, 2, 2, 2, 1]),
+        "nav_state": np.array([0, 0, 0, 2, 2, 2, 2, 2, 2]),
+    }
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulog({("sensor_gyro", 0): gyro, ("vehicle_status", 0): status}))
+    seen, _ = look(path)
+    assert [(one["what"], one["flown"]) for one in seen["stretches"]] == [
+        ("disarmed, mode 0", False),
+        ("armed, mode 0", True),
+        ("armed, mode 2", True),
+        ("disarmed, mode 2", False),
+    ]
+
+
+def test_sdlog2_is_looked_at_and_identified(look, answer, tmp_path, monkeypatch):
+    pytest.importorskip("pymavlink", reason="needs pymavlink: pip install 'symheli[logs]'")
+    monkeypatch.chdir(tmp_path)
+    f, rows = flight(), []
+    for k, t in enumerate(f["t"]):
+        rows.append(("TIME", (round(1e6 * t),)))
+        rows.append(("ATT", (0.0, f["theta"][k], 0.0, 0.0, f["q"][k], 0.0)))
+        rows.append(("ATTC", (0.0, f["lon"][k], 0.0, 0.5)))
+    path = tmp_path / "sess001.px4log"
+    path.write_bytes(dataflash(rows, formats=SDLOG2))
+    seen, _ = look(path)
+    found = runs(seen, answer)
+    assert list(found["models"]) == ["LTI"]
+    assert found["read"]["rows_read"] == len(f["t"])
+    assert found["models"]["LTI"]["fit_percent"]["held_out"]["one step"]["q"] > 80
+
+
+def test_a_command_that_would_fail_is_not_printed_but_why_it_would(look, tmp_path):
+    """Three seconds: not enough for the model that is suggested."""
+    f = {name: values[:40] for name, values in flight().items()}
+    seen, text = look(table(tmp_path / "log.csv", f))
+    assert seen["suggested_command"] is None
+    (why,) = (sentence for sentence in seen["missing"] if "the obvious command" in sentence)
+    assert "usable samples cannot determine" in why
+    assert why in text
+
+
+def test_a_fit_beyond_all_measure_is_called_by_its_word():
+    assert [percent(v) for v in (-1.3e29, -np.inf, -250.0, 98.76, np.nan)] == [
+        *("diverges", "diverges", "-250.0", "98.8", "no data")
+    ]

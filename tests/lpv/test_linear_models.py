@@ -156,3 +156,18 @@ def test_a_signal_is_its_name_and_knows_its_unit():
     assert Signal("unknown").unit == "1"
     with pytest.raises(InputError, match="repeated: a"):
         signals(["a", "b", "a"])
+
+
+def test_a_family_may_be_over_any_parameter(tmp_path):
+    """Two parameters, silently, where a loop was closed with a plant over "v"."""
+    models = [random_model(seed=s) for s in range(4)]
+    speed = Signal("v", "km/h")
+    family = symheli.LinearFamily.from_models([8.0, 9.0, 10.0, 12.0], models, parameter=speed)
+    for one in (family, family.select(inputs=["u0"]), family.discretize(0.1)):
+        (parameter,) = one.interpolate(degree=2).parameters
+        assert (parameter.name, parameter.unit) == ("v", "km/h")
+    again = symheli.LinearFamily.load(family.save(tmp_path / "family.json"))
+    assert (again.parameter, again.parameter.unit) == ("v", "km/h")
+    np.testing.assert_array_equal(again.A, family.A)
+    swept = symheli.LinearFamily.from_models([1.0, 2.0, 3.0, 4.0], models)
+    assert swept.interpolate(degree=2).parameters[0].name == "airspeed"

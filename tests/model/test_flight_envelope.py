@@ -126,7 +126,7 @@ def test_a_control_beyond_its_travel_is_said_not_hidden(ideal):
     assert point.success
     assert not point.attainable
     assert point.on_stops == ("d_col",)
-    assert "at or beyond the stop: d_col = 0.218 rad" in str(point)
+    assert "at or beyond the stop: d_col = 0.218 rad" in point.outcome
 
 
 def test_where_nothing_holds_the_best_point_stays_within_the_travel(ideal):

@@ -230,6 +230,33 @@ def test_a_moving_trim_is_tried_and_kept_where_it_predicts_better(identify):
     assert "offset_rate" not in text
 
 
+@pytest.mark.parametrize(
+    ("column", "options"),
+    [
+        ("y", ()),
+        ("u", ()),
+        ("p", ()),
+        ("p", ("--degree", 0)),
+        ("p", ("--smooth-scheduling", 0.1)),
+        ("p", ("--offset-rate", "no")),
+        ("p", ("--scheduling-at", "now")),
+        ("p", ("--method", "rls")),
+        ("p", ("--decimate", 2)),
+        ("p", ("--plot", "fits.png", "--bands", "bands.png", "--save", "model.json")),
+    ],
+)
+def test_empty_cells_of_any_column_are_skipped(identify, tmp_path, monkeypatch, column, options):
+    monkeypatch.chdir(tmp_path)
+    head, *rows = about_a_trim(1500).splitlines()
+    cells = [row.split(",") for row in rows]
+    for k in np.random.default_rng(0).choice(len(cells), 100, replace=False):
+        cells[k]["tyup".index(column)] = ""
+    found, text = identify("\n".join([head, *map(",".join, cells)]), *options)
+    assert found["read"]["samples_with_missing_values"] >= 95
+    assert "slow modes" in text
+    assert "nan" not in text
+
+
 def test_a_measured_p_is_held_from_the_start_of_each_prediction(identify):
     """The trim's motion within a second is news to whoever schedules on a measurement."""
     ahead = {c: identify(about_a_trim(), *c)[0] for c in ((), ("--commanded",))}
