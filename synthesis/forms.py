@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from symheli.errors import InputError
+
+MOST = 1024
+"""Segments of a parameter, at most: each has its inequalities, and a program of more takes hours to
+write, let alone to solve.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,14 +35,16 @@ class _InP:
             isinstance(segments, tuple | list)
             and segments
             and all(
-                isinstance(k, int | np.integer) and k >= 1
+                isinstance(k, int | np.integer) and 1 <= k <= MOST
                 for each in segments
                 for k in (each if isinstance(each, tuple) else (each,))
             )
         ):
             raise InputError(
-                "segments must be an integer >= 1, or a tuple of them to try in turn, got"
-                f" {self.segments!r}"
+                f"segments must be an integer from 1 to {MOST}, or a tuple of them to try in turn,"
+                f" got {self.segments!r:.80}; each segment has inequalities of its own, and a"
+                " program of more is not solved in any time: grade the knots (grading=2) towards"
+                " where P changes most, or narrow the range"
             )
         object.__setattr__(self, "segments", None if segments is None else tuple(segments))
         if self.grading is not None and not self.grading >= 1:
@@ -55,7 +63,15 @@ class _InP:
         usual ones.
         """
         segments: Any = self.segments
-        return segments and [_each(k, parameters, "segments") for k in segments]
+        tried = segments and [_each(k, parameters, "segments") for k in segments]
+        for each in tried or ():
+            if math.prod(each) > MOST:
+                raise InputError(
+                    f"segments: {' x '.join(map(str, each))} of {parameters} parameters are"
+                    f" {math.prod(each)}, each with inequalities of its own; expected {MOST} at"
+                    " most"
+                )
+        return tried
 
     @property
     def near(self) -> float:
@@ -154,11 +170,13 @@ class Memory(_InP):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (
-            self.seconds > 0 and self.across_segments >= 1 and self.across_degree in (1, 2, 3, 4)
+            self.seconds > 0
+            and 1 <= self.across_segments <= MOST
+            and self.across_degree in (1, 2, 3, 4)
         ):
             raise InputError(
-                "expected seconds > 0, across_segments >= 1 and across_degree 1 .. 4, got"
-                f" {self.seconds!r}, {self.across_segments!r} and {self.across_degree!r}"
+                f"expected seconds > 0, across_segments from 1 to {MOST} and across_degree 1 .. 4,"
+                f" got {self.seconds!r}, {self.across_segments!r} and {self.across_degree!r}"
             )
 
 

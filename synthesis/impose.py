@@ -41,10 +41,19 @@ class _Strictly:
         return FLOOR if self.floor is None else self.floor
 
 
-def _counted(**counts: tuple[int, int]) -> None:
-    for name, (value, least) in counts.items():
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise InputError(f"{name} must be an integer >= {least}, got {value!r}")
+ELEVATION, SUBDIVISION, POINTS = 64, 10, 1024
+"""The most of each: beyond it the inequalities are too many for any solver, two to the power of a
+`subdivision` a parameter.
+"""
+
+
+def _counted(**counts: tuple[int, int, int]) -> None:
+    for name, (value, least, most) in counts.items():
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise InputError(
+                f"{name} must be an integer from {least} to {most} (a program of more is not"
+                f" solved in any time), got {value!r}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +90,9 @@ class Bernstein(_Strictly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _counted(elevation=(self.elevation, 0), subdivision=(self.subdivision, 0))
+        _counted(
+            elevation=(self.elevation, 0, ELEVATION), subdivision=(self.subdivision, 0, SUBDIVISION)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +128,7 @@ class SumOfSquares(_Strictly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _counted(elevation=(self.elevation, 0))
+        _counted(elevation=(self.elevation, 0, ELEVATION))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,7 +182,7 @@ class Grid(_Strictly):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _counted(points=(self.points, 2))
+        _counted(points=(self.points, 2, POINTS))
 
 
 Imposed = Bernstein | SumOfSquares | Vertices | Grid

@@ -28,7 +28,7 @@ from synthesis.lyapunov.lag import LagRegion
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov, graded_knots
 from synthesis.norm_bounded import NormBounded, open_block
 from synthesis.polynomial.cells import Strip, cells, strips
-from synthesis.polynomial.pieces import ModelPiece, model_pieces
+from synthesis.polynomial.pieces import ModelPiece, model_pieces, rounded
 from synthesis.polynomial.symmetric import extended, length, smat, svec
 from synthesis.polynomial.symmetric_power import generator, monomials, null_matrix, null_size
 from synthesis.program.lyapunov_program import MANY, LyapunovBlocks, Sizes
@@ -39,7 +39,9 @@ Array = np.ndarray
 
 
 class Problem(NamedTuple):
-    """What every attempt shares: the model in physical and in scaled units."""
+    """What every attempt shares: the model in physical units for the proof, in scaled ones for the
+    search.
+    """
 
     lpv: LPVStateSpace
     rate: float
@@ -63,6 +65,15 @@ class Problem(NamedTuple):
         d = 0 if self.block is None else self.block.inputs
         return Sizes(form.size, len(self.lpv.inputs) - d, form.unknowns, d, form.multipliers)
 
+    def in_units(self, units: Scaling) -> Problem:
+        """The same in other units."""
+        return self._replace(units=units, scaled=units.of_pieces(self.pieces, self.block))
+
+    def frozen(self, p: float) -> Problem:
+        """That of the model frozen at p, without a block, in the same units."""
+        lpv = LPVStateSpace.constant(self.lpv.at(p), self.lpv.scheduling)
+        return self._replace(lpv=lpv, rate=0.0, pieces=model_pieces(lpv)).in_units(self.units)
+
     @property
     def step(self) -> float:
         """Largest change of p in one sample."""
@@ -80,7 +91,8 @@ def scaled_problem(
         lpv, block = model if with_gain else model.select(inputs=(), outputs=()), None
         units = scaling(lpv, gain)
     pieces = model_pieces(lpv)
-    return Problem(lpv, rate, pieces, units.of_pieces(pieces, block), units, with_gain, block)
+    searched = units.of_pieces(rounded(lpv, pieces), block)
+    return Problem(lpv, rate, pieces, searched, units, with_gain, block)
 
 
 class Unknown(ABC):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -26,9 +27,21 @@ Array = np.ndarray
 DIRECT = 1e-9
 """Direct gain from disturbances to performance below this part of its terms is none."""
 
+AGREED = 1e-6
+"""To this fraction a mean square is known, or none is told."""
+CANCELLED = 1e-12
+"""Of the terms of a mean square: what is left of them is rounding, and small whatever it is."""
+REFINED = 3
+"""Steps by which the solution of a Lyapunov equation is refined."""
+
 DIRECT_NOISE = (
     "the performance feels the disturbances directly (D11), in continuous time white noise of"
     " infinite variance: filter the one or the other"
+)
+
+INACCURATE = (
+    "the norm of the loop is lost in rounding: its states move by far more than the performance"
+    " shows; bring slow and fast modes closer, or leave out what hardly matters"
 )
 
 
@@ -100,6 +113,8 @@ def h2(
     if model.dt is None:  # cancelled, to rounding
         loop = replace(loop, D=np.zeros(loop.D.shape))
     size = h2_norm(loop)
+    if math.isnan(size):
+        return PointDesign.without(DesignStatus.FAILED, [INACCURATE])
     if not math.isfinite(size):
         return PointDesign.without(DesignStatus.FAILED, ["the loop is not stable"])
     return PointDesign(DesignStatus.SOLVED, controller, loop, size, size)
@@ -132,14 +147,79 @@ def _around(P: Generalized, static: Array, dt: float | None) -> Matrices | None:
 
 
 def h2_norm(model: LinearModel) -> float:
-    """Root of the variance of the outputs with white noise of unit intensity at the inputs; inf
-    where it is not stable, or continuous with a direct way.
+    """Root of the variance of the outputs with white noise of unit intensity at the inputs, in any
+    units of the states; inf where it is not stable, or continuous with a direct way.
+
+    From what drives the states and from what shows them, each with what rounding leaves open. Of
+    what all but cancels in the outputs (`CANCELLED`) the most it may be; NaN where rounding decides
+    over more, or the two contradict each other.
     """
-    if not model.is_stable():
+    if not model.is_stable() or (model.dt is None and np.any(model.D)):
         return math.inf
-    A, B, C, D = model.A, model.B, model.C, model.D
-    if model.dt is not None:
-        W = linalg.solve_discrete_lyapunov(A, B @ B.T)
-        return math.sqrt(max(float(np.trace(C @ W @ C.T) + np.sum(D**2)), 0.0))
-    W = linalg.solve_continuous_lyapunov(A, -B @ B.T)
-    return math.inf if np.any(D) else math.sqrt(max(float(np.trace(C @ W @ C.T)), 0.0))
+    A, B, C = _in_units_of_one_size(model.A, model.B, model.C)
+    through = 0.0 if model.dt is None else float(np.sum(model.D**2))
+    found = _variance(A, B, C, model.dt), _variance(A.T, C.T, B.T, model.dt)
+    if None in found:
+        return math.nan
+    every = [v for v in found if v is not None]
+    least, most = min(v.value for v in every), max(v.value for v in every)
+    unknown = most - least + max(v.doubt for v in every)
+    if unknown <= AGREED * (least + through):
+        return math.sqrt(through + 0.5 * (least + most))
+    cancelled = most + unknown <= CANCELLED * min(v.terms for v in every)
+    return math.sqrt(through + most + unknown) if cancelled else math.nan
+
+
+def _in_units_of_one_size(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
+    """A, B and C with the states in units, powers of two, in which what drives and what shows each
+    is of the size of the rest: no digit is lost.
+    """
+    n = len(A)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n] = A
+    whole[:n, n], whole[n, :n] = np.linalg.norm(B, axis=1), np.linalg.norm(C, axis=0)
+    _, (units, _) = linalg.matrix_balance(whole, permute=False, separate=True)
+    units = units[:n] / units[n]
+    return A * units / units[:, None], B / units[:, None], C * units
+
+
+class _Variance(NamedTuple):
+    """The `value` and by how much it may be off; `terms`: the sizes of what it is the sum of."""
+
+    value: float
+    doubt: float
+    terms: float
+
+
+def _variance(A: Array, B: Array, C: Array, dt: float | None) -> _Variance | None:
+    """tr C W C' with A W + W A' + B B' = 0, sampled A W A' - W + B B' = 0; None where there is no
+    W of a variance.
+
+    W is refined; what the steps still change, and the rounding of the sum, is what is not known.
+    """
+
+    def solved(Q: Array) -> Array:
+        if dt is None:
+            return linalg.solve_continuous_lyapunov(A, -Q)
+        return linalg.solve_discrete_lyapunov(A, Q)
+
+    def shown(M: Array) -> Any:
+        return np.sum((C @ M) * C)
+
+    W, values = np.zeros(A.shape, dtype=np.longdouble), []
+    driven = B.astype(np.longdouble) @ B.T
+    try:
+        for _ in range(1 + REFINED):
+            left = (A @ W + W @ A.T if dt is None else A @ W @ A.T - W) + driven
+            more = solved(np.asarray(left, dtype=float))
+            W = W + 0.5 * (more + more.T)
+            values.append(float(shown(W)))
+    except (np.linalg.LinAlgError, ValueError):
+        return None
+    value = values[-1]
+    terms = float(np.sum((np.abs(C) @ np.abs(W)) * np.abs(C)))
+    rounding = len(W) * float(np.finfo(np.longdouble).eps) * terms
+    doubt = max(rounding, *(abs(value - v) for v in values[1:]))
+    if not (np.all(np.diag(W) >= -rounding) and math.isfinite(doubt)):
+        return None
+    return _Variance(max(value, 0.0), doubt + max(-value, 0.0), terms)

@@ -63,8 +63,9 @@ def strips(
 
     The range is cut at the knots, at the ends of the span to either side of them and at the extra
     `cuts`; over each such cell the limits of p(k+1) are straight lines that cross no knot, and the
-    knots between them cut the band into strips. The span is widened by 1e-12 of the range, which
-    absorbs the rounding of the cuts.
+    knots between them cut the band into strips. The span is widened by 1e-12 of the range, and by
+    some units in the last place of p: more than the rounding of the cuts, however far from zero the
+    range is.
     """
     if span == (0, 0):
         return tuple(
@@ -72,7 +73,7 @@ def strips(
             for c in cells(pieces, knots, cuts)
         )
     low, high = float(knots[0]), float(knots[-1])
-    slack = 1e-12 * (high - low)
+    slack = 1e-12 * (high - low) + 8 * float(np.spacing(max(abs(low), abs(high))))
     back, on = max(span[0], low - high) - slack, min(span[1], high - low) + slack
     out = []
     every = [*cuts, *(float(k) - side for k in knots for side in (back, on))]

@@ -12,15 +12,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, LPVStateSpace, Matrices, Piece, Product, Scheduling
+from symheli.lpv import (
+    FunctionSpace,
+    LPVStateSpace,
+    Matrices,
+    Piece,
+    Polynomial,
+    Product,
+    Scheduling,
+)
 from synthesis.polynomial.bernstein import restriction
 from synthesis.polynomial.matrix import PolynomialMatrix
 
 Array = np.ndarray
 
 CONSTANT = 1e-14
-"""Coefficients that differ by less than this fraction of the largest are one constant: the rounding
-of the basis itself.
+"""In the search for a proof alone, coefficients of an entry that differ by less than this fraction
+of its terms are one constant: the rounding of the basis itself. A proof knows nothing of it.
 """
 
 
@@ -57,23 +65,55 @@ def model_pieces(lpv: LPVStateSpace) -> tuple[ModelPiece, ...]:
     """The pieces of the model over its scheduling range, in order of p.
 
     The coefficients are doubles: an exact proof is about the model they define, which is the given
-    one to rounding.
+    one but for the rounding of each. What varies with p in the last place only varies there too; a
+    matrix is constant where its coefficients in the basis say so exactly.
     """
     s = lpv.scheduling
+    every = []
+    for M in (lpv.A, lpv.B, lpv.C, lpv.D):
+        basis, least = _in_least_degree(lpv.basis, M)
+        if basis is None:
+            every.append(None)
+            continue
+        found = function_pieces(basis, s.low, s.high)
+        every.append([np.tensordot(functions.T, least, axes=1) for _, _, functions in found])
     return tuple(
-        ModelPiece(a, b, *(_coefficients(M, functions) for M in (lpv.A, lpv.B, lpv.C, lpv.D)))
-        for a, b, functions in function_pieces(lpv.basis, s.low, s.high)
+        ModelPiece(a, b, *_each(every, k, lpv))
+        for k, (a, b, _) in enumerate(function_pieces(lpv.basis, s.low, s.high))
     )
 
 
-def function_pieces(basis: FunctionSpace, low: float, high: float) -> tuple[Piece, ...]:
-    """The pieces of the functions of a basis between `low` and `high`."""
-    slack = 1e-9 * (high - low)
+def rounded(lpv: LPVStateSpace, exactly: Sequence[ModelPiece]) -> tuple[ModelPiece, ...]:
+    """The pieces with a constant for every matrix that changes by rounding alone: fewer
+    inequalities for the search.
+    """
+    s = lpv.scheduling
     out = []
-    for piece in basis.pieces():
-        a, b = max(piece.low, low), min(piece.high, high)
-        a, b = (low if abs(a - low) <= slack else a), (high if abs(b - high) <= slack else b)
-        if b - a <= slack:
+    for piece, (_, _, functions) in zip(
+        exactly, function_pieces(lpv.basis, s.low, s.high), strict=True
+    ):
+        largest = np.abs(functions).max()
+        own = []
+        for coefficients, M in zip(piece[2:], (lpv.A, lpv.B, lpv.C, lpv.D), strict=True):
+            # entry by entry: states and channels may differ in size by orders of magnitude
+            terms = np.abs(M).sum(axis=0) * largest
+            same = np.all(np.ptp(coefficients, axis=0) <= CONSTANT * terms)
+            own.append(coefficients.mean(axis=0)[None] if same else coefficients)
+        out.append(ModelPiece(piece.low, piece.high, *own))
+    return tuple(out)
+
+
+def function_pieces(basis: FunctionSpace, low: float, high: float) -> tuple[Piece, ...]:
+    """The pieces of the functions of a basis between `low` and `high`, however narrow: none is left
+    out. Where the basis ends before the range does, by rounding, its first and last polynomial go
+    on, as its values do.
+    """
+    every = basis.pieces()
+    out = []
+    for k, piece in enumerate(every):
+        a = low if k == 0 else max(piece.low, low)
+        b = high if k == len(every) - 1 else min(piece.high, high)
+        if not a < b:
             continue
         functions = piece.bernstein
         if (a, b) != (piece.low, piece.high):
@@ -97,13 +137,36 @@ def same_pieces(a: Sequence[ModelPiece], b: Sequence[ModelPiece]) -> bool:
     )
 
 
-def _coefficients(M: Array, functions: Array) -> Array:
-    coefficients = np.tensordot(functions.T, M, axes=1)
-    spread = np.ptp(coefficients, axis=0)
-    # entry by entry: states and channels may differ in size by orders of magnitude
-    if np.all(spread <= CONSTANT * np.abs(M).sum(axis=0) * np.abs(functions).max()):
-        return coefficients.mean(axis=0)[None]
-    return coefficients
+def _each(every: Sequence[list[Array] | None], k: int, lpv: LPVStateSpace) -> list[Array]:
+    """Of the piece k: coefficients, of a constant one alone."""
+    return [
+        found[k] if found is not None else _constant(lpv.basis, M)[None]  # type: ignore[index]
+        for found, M in zip(every, (lpv.A, lpv.B, lpv.C, lpv.D), strict=True)
+    ]
+
+
+def _in_least_degree(basis: FunctionSpace, M: Array) -> tuple[FunctionSpace | None, Array]:
+    """The same function of one parameter in as few functions as the zeros of M allow; None and the
+    matrix (1, ...) of a constant. Exact: no number is small.
+    """
+    constant = _constant(basis, M)
+    if constant is not None:
+        return None, constant[None]
+    if isinstance(basis, Polynomial):
+        degree = int(np.flatnonzero(np.any(M.reshape(len(M), -1) != 0, axis=1))[-1])
+        return Polynomial(degree, basis.low, basis.high), M[: degree + 1]
+    return basis, M
+
+
+def _constant(basis: FunctionSpace, M: Array) -> Array | None:
+    """The matrix that the coefficients M are those of at every p, None where they are of none."""
+    try:
+        one = basis.constant()
+    except InputError:
+        return None
+    k = int(np.argmax(np.abs(one)))
+    same = one[k] == 1.0 and np.array_equal(M, np.multiply.outer(one, M[k]))
+    return M[k] if same else None
 
 
 class Pieces(NamedTuple):
@@ -145,6 +208,22 @@ class Pieces(NamedTuple):
             for key in own.models
             for M, N in zip(self.models[key], own.models[key], strict=True)
         )
+
+    @property
+    def rounded(self) -> Pieces:
+        """The same, each matrix in the degrees that it has but for rounding: fewer inequalities for
+        the search.
+        """
+        models = {}
+        for key, matrices in self.models.items():
+            lower = []
+            for M in matrices:
+                coefficients = M.coefficients
+                for i in range(len(M.box)):
+                    coefficients = _lowered(coefficients, i)
+                lower.append(PolynomialMatrix(M.box, coefficients))
+            models[key] = tuple(lower)
+        return self._replace(models=models)
 
     @property
     def sizes(self) -> tuple[int, int, int]:
@@ -195,24 +274,40 @@ def pieces(model: LPVStateSpace) -> Pieces:
             " use a Product of one-parameter bases"
         )
     axes = [function_pieces(f, q.low, q.high) for f, q in zip(basis.factors, s, strict=True)]
+    every = [_along_axes(basis, M, s) for M in (model.A, model.B, model.C, model.D)]
     models = {}
     for key in product(*(range(len(axis)) for axis in axes)):
-        chosen = [axis[k] for axis, k in zip(axes, key, strict=True)]
+        box = tuple((axis[k].low, axis[k].high) for axis, k in zip(axes, key, strict=True))
         models[key] = tuple(
-            _over_box(basis.tensor(M), chosen) for M in (model.A, model.B, model.C, model.D)
+            _over_box(tensor, [each[k] for each, k in zip(functions, key, strict=True)], box)
+            for tensor, functions in every
         )
     breaks = tuple((axis[0].low, *(piece.high for piece in axis)) for axis in axes)
     return Pieces(model, s, breaks, models, model.dt)
 
 
-def _over_box(tensor: Array, chosen: Sequence[Piece]) -> PolynomialMatrix:
+def _along_axes(
+    basis: Product, M: Array, s: Sequence[Scheduling]
+) -> tuple[Array, list[list[Array]]]:
+    """M as a tensor, in as few functions of each parameter as its zeros allow, and the Bernstein
+    coefficients of those on every piece of each.
+    """
+    tensor, functions = basis.tensor(M), []
+    for i, (factor, q) in enumerate(zip(basis.factors, s, strict=True)):
+        own, least = _in_least_degree(factor, np.moveaxis(tensor, i, 0))
+        tensor = np.moveaxis(least, 0, i)
+        found = function_pieces(factor if own is None else own, q.low, q.high)
+        one = np.ones((1, 1))
+        functions.append([one if own is None else piece.bernstein for piece in found])
+    return tensor, functions
+
+
+def _over_box(tensor: Array, functions: Sequence[Array], box: Any) -> PolynomialMatrix:
     """Bernstein coefficients of sum_j f_j M_j, f_j products of functions on one piece each."""
     coefficients = tensor
-    for i, piece in enumerate(chosen):
-        coefficients = np.moveaxis(np.tensordot(piece.bernstein.T, coefficients, axes=(1, i)), 0, i)
-    for i in range(len(chosen)):
-        coefficients = _lowered(coefficients, i)
-    return PolynomialMatrix(tuple((q.low, q.high) for q in chosen), coefficients)
+    for i, bernstein in enumerate(functions):
+        coefficients = np.moveaxis(np.tensordot(bernstein.T, coefficients, axes=(1, i)), 0, i)
+    return PolynomialMatrix(box, coefficients)
 
 
 def _lowered(coefficients: Array, axis: int) -> Array:

@@ -57,3 +57,11 @@ def extended(M: Array, by: int) -> Array:
 def basis(n: int) -> Array:
     """The matrices (n (n + 1) / 2, n, n) with smat(v) = sum_i v_i basis_i."""
     return smat(np.eye(length(n)), n)
+
+
+def powered(M: Array, exponent: float) -> Array:
+    """M^exponent of a symmetric M (n, n), its eigenvalues no less than 1e-12 of the largest."""
+    values, vectors = np.linalg.eigh(symmetrized(M))
+    return symmetrized(
+        (vectors * np.maximum(values, 1e-12 * abs(values[-1])) ** exponent) @ vectors.T
+    )

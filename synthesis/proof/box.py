@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv import Matrices, Scheduling
+from symheli.lpv.bases.polynomials import factors_of
 from symheli.progress import tracked
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.polynomial import structure
@@ -27,7 +28,7 @@ from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import convert, regions
 from synthesis.polynomial.symmetric import symmetrized
 from synthesis.proof import pointwise
-from synthesis.proof.inequalities import Demand, Pair, decrease, peak, positivity
+from synthesis.proof.inequalities import Demand, Pair, decrease, growth_of, peak, positivity
 
 Array = np.ndarray
 
@@ -231,9 +232,14 @@ class Evidence(NamedTuple):
         """
         model, demand, dt = self.model, self.demand, self.model.dt
         box = [(s.low, s.high) for s in model.parameters]
+        # the breaks of the model's own functions, whatever the pieces say
         axes = [
-            pointwise.inside([*breaks, *knots])
-            for breaks, knots in zip(model.breaks, P.knots, strict=True)
+            pointwise.inside(
+                [*knots, *(q.low for q in factor.pieces() if s.low < q.low < s.high), *breaks]
+            )
+            for factor, s, breaks, knots in zip(
+                factors_of(model.source.basis), model.parameters, model.breaks, P.knots, strict=True
+            )
         ]
         # all of a single axis, of several a diagonal through their product
         count = WITNESSES if len(axes) > 1 else len(axes[0])
@@ -282,9 +288,7 @@ class Evidence(NamedTuple):
                     forms.append(pointwise.dissipation(through, here, drift, None, level))
             else:
                 growth = (
-                    number(math.exp(2.0 * bound * dt))
-                    if demand.kind == "decay rate"
-                    else number(1.0)
+                    number(growth_of(bound, dt)) if demand.kind == "decay rate" else number(1.0)
                 )
                 spans = pointwise.spans(p, demand.rates, demand.motion.ties, P.degrees, box, dt)
                 for q in pointwise.reached(p, spans, box):

@@ -79,6 +79,17 @@ class Pair(NamedTuple):
     there: PolynomialMatrix
 
 
+def growth_of(alpha: float, dt: float) -> float:
+    """exp(2 alpha dt) or a few units in the last place more: what is proven with it holds for
+    alpha, however exp and its argument are rounded.
+    """
+    if alpha == 0.0:
+        return 1.0
+    exponent = 2.0 * alpha * dt
+    exponent += 4.0 * math.ulp(exponent)
+    return math.exp(exponent) * (1.0 + 8.0 * math.ulp(1.0))
+
+
 def positivity(P: PolynomialMatrix) -> PolynomialMatrix:
     """-P, which must be negative definite."""
     return -P
@@ -100,7 +111,7 @@ def decrease(
         there = successor(P.there, region, number, moving)
         unit = there.box[m:]
         A, B, C, D, here = (M.extend(unit) for M in (A, B, C, D, here))
-        growth = number(math.exp(2.0 * demand.shift * model.dt))
+        growth = number(growth_of(demand.shift, model.dt))
         top = there.congruence(A) * growth - here
         side, corner = A.T @ there @ B, there.congruence(B)
         drifts: list[Any] = [None]

@@ -83,20 +83,20 @@ def holds_on_grid(
     P: Lyapunov,
     rate: float,
     gamma: float,
-    transform: Array,
+    units: Scaling,
     block: NormBounded | None = None,
 ) -> bool:
     """The LMI at some hundred points and the extreme rates, from the model's own matrices; g =
     gamma^2.
 
-    `transform` (n, n) is a constant change of coordinates for the sake of rounding; gamma NaN tests
-    stability alone.
+    In the coordinates of the `units` for the sake of rounding; gamma NaN tests stability alone.
     """
+    transform = units.right @ units.weight
     if isinstance(P, MemoryLyapunov):
         return _holds_with_memory(lpv, P, rate, gamma, transform)
     if P.order > 1:
         return _decreases_on_states(lpv, P, rate, transform)
-    return _holds_in_p(lpv, P, rate, gamma, transform, block)
+    return _holds_in_p(lpv, P, rate, gamma, units, block)
 
 
 def _holds_in_p(
@@ -104,14 +104,22 @@ def _holds_in_p(
     P: SplineLyapunov,
     rate: float,
     gamma: float,
-    transform: Array,
+    units: Scaling,
     block: NormBounded | None,
 ) -> bool:
     low, high = lpv.scheduling.low, lpv.scheduling.high
     grid = np.unique(np.concatenate([np.linspace(low, high, 201), P.knots]))
     A, B, C, D = lpv.matrices(grid)
+    # in these coordinates from the start: rounding is relative to what is computed
+    A, B, C, P = (
+        units.left @ A @ units.right,
+        units.left @ B,
+        C @ units.right,
+        P.in_units(units.right),
+    )
+    whole = extended(units.weight, B.shape[2])
     now = P.at(grid)
-    if np.linalg.eigvalsh(transform.T @ now @ transform).min() <= 0:
+    if np.linalg.eigvalsh(now).min() <= 0:
         return False
     moving = P.degree > 0 and rate > 0
     outer = np.concatenate([C, D], 2)
@@ -133,7 +141,6 @@ def _holds_in_p(
         step = min(rate * lpv.dt, high - low) if moving else 0.0
         after = [P.at(np.clip(grid + side, low, high)) for side in (-step, 0.0, step)]
         moves = [np.swapaxes(M, -1, -2) @ Q @ M - state.T @ now @ state for Q in after]
-    whole = extended(transform, B.shape[2])
     for move in moves:
         move = move + supply
         F = (
@@ -141,8 +148,7 @@ def _holds_in_p(
             if math.isnan(gamma)
             else move + np.swapaxes(outer, -1, -2) @ outer - gamma**2 * inputs.T @ inputs
         )
-        F = whole.T @ F @ whole
-        if np.linalg.eigvalsh(0.5 * (F + np.swapaxes(F, -1, -2))).max() >= 0:
+        if np.linalg.eigvalsh(symmetrized(whole.T @ symmetrized(F) @ whole)).max() >= 0:
             return False
     return True
 
@@ -323,8 +329,7 @@ class Evidence(NamedTuple):
         claim = self._claim(P)
         if not (enough and claim.meaningful and claim.invariant(rational())):
             return False
-        transform = self.units.right @ self.units.weight
-        return holds_on_grid(self.lpv, P, self.rate, gamma, transform, self.block)
+        return holds_on_grid(self.lpv, P, self.rate, gamma, self.units, self.block)
 
     def exact(self, P: Lyapunov, gamma: float) -> bool:
         """The same over the whole interval in rational arithmetic, and again at some p through the

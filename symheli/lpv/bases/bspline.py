@@ -41,7 +41,7 @@ class BSpline(PiecewisePolynomial):
     Examples
     --------
     >>> from symheli.lpv import BSpline
-    >>> BSpline(2, (0.0, 6.0, 13.0))([0.0, 6.0, 13.0]).round(2)
+    >>> BSpline(2, (0.0, 6.0, 13.0))([0.0, 6.0, 13.0]).round(2) + 0.0
     array([[1.  , 0.  , 0.  , 0.  ],
            [0.  , 0.54, 0.46, 0.  ],
            [0.  , 0.  , 0.  , 1.  ]])

@@ -33,7 +33,8 @@ class PiecewisePolynomial(Basis):
 
     def _values(self, p: Array, derivative: Any) -> Array:
         f = self._functions
-        return np.asarray(f(np.clip(p, self.low, self.high), nu=min(derivative, len(f.c))))
+        # beyond the ends, where rounding may take p, the end pieces go on
+        return np.asarray(f(p, nu=min(derivative, len(f.c))))
 
     def pieces(self) -> tuple[Piece, ...]:
         """One piece between every two breakpoints."""

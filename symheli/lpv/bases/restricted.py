@@ -41,6 +41,10 @@ class Restricted(Basis):
         """As many as there are functions."""
         return self.size
 
+    def constant(self) -> Array:
+        """That of the basis, which is 1 on every line."""
+        return self.basis.constant()
+
     def points(self, s: Array) -> Array:
         """Where on the line s is: (...) or (..., d) as the basis takes them."""
         first, last = np.array(self.start), np.array(self.end)
@@ -69,7 +73,7 @@ class Restricted(Basis):
             found = factor.pieces()
             degree += max(piece.bernstein.shape[1] - 1 for piece in found)
             crossings = [2 * (piece.low - a) / (b - a) - 1 for piece in found[1:]]
-            cuts |= {s for s in crossings if -1 + 1e-9 < s < 1 - 1e-9}
+            cuts |= {s for s in crossings if -1 < s < 1}
         out = []
         for low, high in pairwise(sorted(cuts)):
             inner = Polynomial(degree, low, high)

@@ -4,21 +4,28 @@ the coefficients of a function there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv.bases.basis import Basis
-from symheli.lpv.bases.function_space import FunctionSpace, tensor_grid
+from symheli.lpv.bases.function_space import FunctionSpace, Piece, tensor_grid
 from symheli.lpv.bases.patches import Patches
 from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.polynomials import factors_of
 from symheli.lpv.bases.product import Product
 from symheli.values.arrays import Array
 
-SAME_BREAK = 1e-9
-"""Breaks nearer to one another than this fraction of the range are one."""
+TWICE = 4
+"""Breaks of two bases that differ by at most this many units in the last place of the larger end of
+the range are one number, computed twice.
+"""
+WIDER = 1e6
+"""Such breaks are joined only where the pieces on both sides are wider than they are apart by this
+factor, and the functions do not jump: what joining changes is then below the rounding of p.
+"""
 
 
 def sum_space(a: FunctionSpace, b: FunctionSpace) -> FunctionSpace:
@@ -81,11 +88,52 @@ def _either(f: FunctionSpace, g: FunctionSpace, degree: Callable[[int, int], int
             " interpolate with kind='polynomial' or 'spline'"
         ) from error
     first, second = (max(p.bernstein.shape[1] - 1 for p in each) for each in pieces)
+    total = degree(first, second)
+    return Patches(total, _breaks(pieces, low, high, total))
+
+
+def _breaks(
+    spaces: Sequence[Sequence[Piece]], low: float, high: float, degree: int
+) -> tuple[float, ...]:
+    """Those of every space between `low` and `high`; equal ones count once, and those that two
+    spaces computed of one number.
+    """
+    unit = float(np.spacing(max(abs(low), abs(high))))
+    # room for degree + 1 values of p that can be told apart
+    least = unit * max(TWICE, 8 * (degree + 1))
     breaks = [low]
-    for at in sorted(p.low for each in pieces for p in each):
-        if at - breaks[-1] > SAME_BREAK * (high - low) and high - at > SAME_BREAK * (high - low):
+    for at in sorted({low, high, *(p.low for each in spaces for p in each)}):
+        apart = at - breaks[-1]
+        if not low < at <= high or apart == 0:
+            continue
+        if apart > least:
             breaks.append(at)
-    return Patches(degree(first, second), (*breaks, high))
+        elif apart > TWICE * unit or not all(_joins(each, breaks[-1], at) for each in spaces):
+            raise InputError(
+                f"the functions have breaks at {breaks[-1]!r} and at {at!r}, too near to one"
+                " another to tell the polynomial between them, and they are not the same: give"
+                " the same number for both, or move them apart"
+            )
+        elif at == high:
+            breaks[-1] = high
+    if len(breaks) < 2:
+        raise InputError(f"a basis needs low < high, got [{low!r}, {high!r}]")
+    return tuple(breaks)
+
+
+def _joins(pieces: Sequence[Piece], a: float, b: float) -> bool:
+    """Whether the functions change by no more than the rounding of p does where a break of theirs
+    moves from `a` to `b` or back.
+    """
+    for left, right in pairwise(pieces):
+        if not a <= right.low <= b:
+            continue
+        jump = np.abs(left.bernstein[:, -1] - right.bernstein[:, 0])
+        size = max(np.abs(left.bernstein).max(), np.abs(right.bernstein).max())
+        narrow = min(left.high - left.low, right.high - right.low)
+        if jump.max() > 64 * np.finfo(float).eps * size or narrow < WIDER * (b - a):
+            return False
+    return True
 
 
 def _basis(factor: FunctionSpace) -> Basis:

@@ -1,13 +1,17 @@
 """H2 designs: the norm by other routes, and that no other controller has a smaller one."""
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
 from design_plants import matrices, named, random_plant
 from scipy import linalg
 
+from symheli import LinearModel
 from synthesis import DesignStatus, h2
 from synthesis.design.generalized import Generalized
+from synthesis.design.h2 import h2_norm
 
 SEEDS = range(10)
 
@@ -96,3 +100,54 @@ def test_white_noise_that_comes_through_is_said():
     assert design.status is DesignStatus.IMPOSSIBLE
     assert design.controller is None
     assert "infinite variance" in design.reasons[0]
+
+
+def mean_square(A, B, C, D, dt):
+    """Of the outputs in white noise: the integral of the squared response over all frequencies, by
+    the trapezoidal rule on the circle, which converges exponentially.
+    """
+    poles = np.abs(np.linalg.eigvals(A))
+    pace = np.exp(np.log(poles).mean()) if dt is None else 1.0
+    found = [np.inf]
+    for count in 2 ** np.arange(9, 17):
+        angle = np.pi * (2 * np.arange(count) + 1) / count
+        if dt is None:
+            omega = pace * np.tan(angle / 2)
+            at, weight = 1j * omega, 0.5 * pace * (1 + np.tan(angle / 2) ** 2)
+        else:
+            at, weight = np.exp(1j * angle), np.ones(count)
+        G = C @ np.linalg.solve(at[:, None, None] * np.eye(len(A)) - A, B) + D
+        found.append(float(np.mean(weight * (np.abs(G) ** 2).sum(axis=(1, 2)))))
+        if abs(found[-1] - found[-2]) <= 1e-11 * found[-1]:
+            return found[-1]
+    raise AssertionError(f"the integral does not converge: {found}")
+
+
+@pytest.mark.parametrize("dt", [None, 0.1])
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("spread", [3, 6])
+def test_the_norm_is_that_of_the_loop_in_any_units_of_the_states(seed, dt, spread):
+    """Units from 10^-spread to 10^spread; the integral is taken of the loop in plain units."""
+    model, u, y = random_plant(seed, dt, direct=dt is not None)
+    units = 10.0 ** np.random.default_rng(seed).uniform(-spread, spread, len(model.A))
+    other = replace(
+        model, A=model.A * units / units[:, None], B=model.B / units[:, None], C=model.C * units
+    )
+    plain, far = h2(model, u, y), h2(other, u, y)
+    A, B, C, D = Generalized.of(model, u, y).closed(*matrices(plain.controller))
+    truth = np.sqrt(mean_square(A, B, C, D if dt else 0.0 * D, dt))
+    assert plain.gamma == pytest.approx(truth, rel=1e-8)
+    assert far.gamma == pytest.approx(truth, rel=1e-8)
+
+
+@pytest.mark.parametrize("apart", [1e-15, 1e-12, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-2])
+def test_what_all_but_cancels_is_never_told_too_small(apart):
+    """Two modes, 1e9 (e^-t - e^-at), whose squares are 1e36 in size."""
+    a = 1.0 + apart
+    names = ["x1", "x2"], ["w"], ["z"]
+    A, B, C = [[-1.0, 0.0], [0.0, -a]], [[1e9], [1e9]], [[1e9, -1e9]]
+    found = h2_norm(LinearModel(A, B, C, [[0.0]], *names))
+    truth = 1e18 * (a - 1.0) / np.sqrt(2 * a * (1 + a))
+    no_longer = np.finfo(np.longdouble).eps > 1e-18  # a processor without more digits
+    assert truth * (1 - 1e-6) <= found <= truth + 1e11 or (no_longer and np.isnan(found))
+    assert apart < 1e-3 or found == pytest.approx(truth, rel=1e-9)
