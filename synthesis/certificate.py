@@ -372,6 +372,19 @@ class Certificate:
             return f"the evidence is none that an analysis made: {error}"
 
     def __str__(self) -> str:
+        """What is proven, in three lines; `details` says the rest."""
+        lines = self._claim()
+        if self.lyapunov is not None:
+            lines.append(
+                f"  {self.lyapunov.form}; {len(self.hypotheses)} hypotheses and the programs tried"
+                " in .details"
+            )
+        elif self.attempts or self.hypotheses:
+            lines.append(f"  {len(self.attempts)} programs tried, in .details")
+        return "\n".join(lines)
+
+    def _claim(self) -> list[str]:
+        """The first lines: of which kind, how it came out, in numbers."""
         lines = [f"{self.kind}, {self.method}: {self.status.value}"]
         if self.kind.endswith("gain"):
             lines.append(
@@ -384,6 +397,14 @@ class Certificate:
             )
         if not math.isnan(self.indicative):
             lines.append(f"  at the points of the grid {self.indicative:.6g}, which proves nothing")
+        return lines
+
+    @property
+    def details(self) -> str:
+        """All of it: numbers, the form of the Lyapunov function, solver and times, every program
+        that was tried, every hypothesis.
+        """
+        lines = self._claim()
         if self.lyapunov is not None:
             lines.append(f"  {self.lyapunov.form}, condition number {self.conditioning:.2g}")
         lines.append(f"  {self.solver}; {self.seconds}")

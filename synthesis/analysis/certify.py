@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.errors import InputError
+from synthesis.analysis.apart import apart
 from synthesis.analysis.fine_sampling import fine_sampling
 from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
-from synthesis.analysis.ladder import Found, Ladder
+from synthesis.analysis.ladder import CLOSE, Found, Ladder
 from synthesis.analysis.one_parameter_search import OneParameter
 from synthesis.analysis.question import Question
 from synthesis.certificate import Certificate, Seconds, Status
@@ -167,7 +168,7 @@ class _Report:
                 asked.model.parameters,
                 asked.demand.rates,
                 asked.uncertain or asked.model.source,
-                (*self._how(best, status), *self._sampling(bounds)),
+                (*self._how(best, status), *self._distance(bounds, best, ladder)),
             ),
             method=f"{type(asked.form).__name__}, {asked.impose.found_by}",
             solver=str(asked.solver),
@@ -201,6 +202,16 @@ class _Report:
             " and every admissible rate",
             VERIFIED.format(what=what, shared=shared),
         )
+
+    def _distance(
+        self, bounds: dict[str, float], best: Found, ladder: Ladder | None
+    ) -> tuple[str, ...]:
+        """What keeps the bounds of a gain apart, where they are."""
+        if "gamma" not in bounds or ladder is None:
+            return ()
+        cause = apart(bounds["gamma"], bounds["lower"], ladder.rounding, best.answer)
+        # numbers that suffice for the frozen model suffice for its sample period
+        return cause if ladder.rounding <= CLOSE else (*cause, *self._sampling(bounds))
 
     def _sampling(self, bounds: dict[str, float]) -> tuple[str, ...]:
         if "gamma" not in bounds:

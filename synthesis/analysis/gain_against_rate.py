@@ -23,6 +23,12 @@ MOVING, CONSTANT = "P(p)", "constant P"
 """How the Lyapunov function of a bounded rate, and that of a parameter that jumps, are called."""
 
 
+REDUCED = (
+    "of the LFT that reduce() makes of the model: a dependence on the parameter below 1e-12 of the"
+    " size that row and column give an entry counts as rounding"
+)
+
+
 def gain_against_rate(
     model: LPVStateSpace | UncertainStateSpace,
     rates: Sequence[float],
@@ -88,7 +94,12 @@ def gain_against_rate(
         assert isinstance(model, LPVStateSpace)  # noqa: S101
         reduced = model.to_lft().reduce()
         found += [
-            (f"LFT {scaling}", math.inf, lft_gain(reduced, scaling, search=None)) for scaling in lft
+            (
+                f"LFT {scaling}",
+                math.inf,
+                lft_gain(reduced, scaling, search=None).resting_on([REDUCED]),
+            )
+            for scaling in lft
         ]
     unit = per(_units(model.outputs), _units(model.inputs))
     return GainCurve.of(found, title, unit, s.name, per(s.unit, "s"))

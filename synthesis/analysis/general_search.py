@@ -36,7 +36,8 @@ class General(Ladder):
         """Set the units; the unit of gains."""
         model, demand = self.asked.model, self.asked.demand
         self.evidence = Evidence(model, _units(model, demand.kind, bound), demand)
-        self.scaled, self.scaled_demand = self.evidence.scaled
+        searched = self.evidence._replace(model=model.rounded)
+        self.scaled, self.scaled_demand = searched.scaled
         return 1.0 / self.evidence.in_units(1.0)
 
     def constant(self) -> Shape:

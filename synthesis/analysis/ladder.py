@@ -67,13 +67,25 @@ class Ladder(ABC):
         self.asked = asked
         self.attempts: list[Attempt] = []
         self.spent = np.zeros(3)
-        self.expect(1.0)
+        self.rounding = math.nan
+        """By which fraction a gain of a frozen model was missed in the units of the programs, NaN
+        where that was not asked.
+        """
+        self.unit = self.expect(1.0)
 
     @abstractmethod
     def expect(self, bound: float) -> float:
         """Set the units in which numbers are of order one where the bound is near this one; the
         unit of gains.
         """
+
+    def proposed(self) -> Found:
+        """What is proven of a gain without a program."""
+        return Found(math.inf)
+
+    def settle(self) -> float:
+        """Choose the units of the programs where there is a choice; the unit of gains."""
+        return self.unit
 
     @abstractmethod
     def shapes(self) -> list[Any]:
@@ -108,9 +120,9 @@ class Ladder(ABC):
             return self._least(limit)
 
         def found(expected: float) -> tuple[Found, float, float]:
-            scale = self.expect(expected)
+            self.unit = self.expect(expected)
             best = self._least(limit)
-            return best, best.bound, scale
+            return best, best.bound, self.unit
 
         best = min(in_its_own_scale(found, limit), key=lambda tried: tried.bound)
         if best.proof is None and best.answer not in (Answer.INFEASIBLE, Answer.UNTRIED):
@@ -130,7 +142,11 @@ class Ladder(ABC):
 
     def _least(self, limit: float) -> Found:
         gains = self.asked.gains
-        best, shape, near = Found(math.inf if gains else math.nan), None, self.asked.form.near
+        best = self.proposed() if gains else Found(math.nan)
+        if best.proof is not None and best.bound <= (1 + CLOSE) * limit:
+            return best
+        self.unit = self.settle() if gains else self.unit
+        shape, near = None, self.asked.form.near
         for shape in self.shapes():
             best = self._margins(shape, best)
             if best.proof is not None and not best.bound > near * limit:

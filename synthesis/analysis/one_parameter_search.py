@@ -8,19 +8,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from synthesis.analysis.ladder import NOTHING, Found, Ladder, inflated
+from synthesis.analysis.ladder import CLOSE, NOTHING, Found, Ladder, inflated
 from synthesis.assemble.bounded_real import assemble
-from synthesis.assemble.unknowns import Quadratic, Unknown, constant, scaled_problem, unknowns
+from synthesis.assemble.unknowns import (
+    Problem,
+    Quadratic,
+    Unknown,
+    constant,
+    scaled_problem,
+    unknowns,
+)
 from synthesis.certificate import Attempt, Proof
 from synthesis.impose import Bernstein
+from synthesis.lyapunov.spline import Lyapunov, SplineLyapunov
 from synthesis.program import interior_point
 from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, solve
 from synthesis.program.lyapunov_program import LyapunovProgram
+from synthesis.program.scaling import dissipative
+from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
 VIOLATED = 1e-8
 """A block left out of the program joins it when its largest eigenvalue (scaled) exceeds this."""
+ABOVE = (1e-6, 1e-5, 1e-4, 5e-4, 2e-3, 1e-2)
+"""Fractions above the expected gain at which a storage function of a frozen model is tried."""
+TOWARDS = (1e-3, 1e-2, 0.1, 0.5)
+"""Shares of the way to P = I."""
 ROUNDS = 12
 """Most rounds of adding violated blocks; what then remains violated only makes the recomputed gain
 larger.
@@ -36,7 +50,13 @@ class OneParameter(Ladder):
         """Set the units; the unit of gains."""
         model, (rate,) = self.asked.uncertain or self.asked.model.source, self.asked.demand.rates
         self.problem = scaled_problem(model, rate, bound, with_gain=self.asked.gains)
-        return self.problem.units.channel
+        self.dissipating: Problem | None = None
+        self.rounding = math.inf
+        lpv, units = self.problem.lpv, self.problem.units
+        if self.asked.gains and self.problem.block is None:
+            other = dissipative(units, lpv.at(lpv.scheduling.middle), bound)
+            self.dissipating = None if other is None else self.problem.in_units(other)
+        return units.channel
 
     def shapes(self) -> list[Unknown]:
         """Those of the form, each number of knots once."""
@@ -131,22 +151,77 @@ class OneParameter(Ladder):
         message = f"{candidate.message} ({rounds} round(s))"
         return replace(candidate, seconds=seconds, message=message)
 
+    def proposed(self) -> Found:
+        """What a constant P proves, a storage function of the model at mid-range."""
+        start, problem, best = time.perf_counter(), self.dissipating, Found(math.inf)
+        if problem is not None:
+            knots, middle = self.constant().knots, problem.lpv.at(problem.lpv.scheduling.middle)
+            for above in ABOVE:
+                P = problem.units.storage(middle, above)
+                if P is None:
+                    continue
+                lyapunov = SplineLyapunov(knots, 0, P[None])
+                best = self._proven(problem, lyapunov, Answer.UNTRIED)
+                if best.proof is not None:
+                    word = f"verified, gamma {best.bound:.6g}"
+                    self.attempts.append(Attempt("a Riccati equation", 0.0, word, best.bound))
+                    self.unit = problem.units.channel
+                    break
+        self.spent[2] += time.perf_counter() - start
+        return best
+
+    def settle(self) -> float:
+        """Programs are solved in the first units in which the gain of the model frozen at mid-range
+        is found, or nearly: whether numbers limit a bound is told by that.
+        """
+        start, shape, p = time.perf_counter(), self.constant(), self.problem.lpv.scheduling.middle
+        if self.dissipating is not None and isinstance(shape, Quadratic):
+            gain = norm(*self.problem.lpv.matrices(p), self.problem.lpv.dt)[0]
+            for problem in (self.problem, self.dissipating):
+                excess = self._frozen_gain(problem, shape, p) / gain - 1 if gain > 0 else 0.0
+                if not excess >= self.rounding:
+                    self.problem, self.rounding = problem, excess
+                if excess <= CLOSE:
+                    break
+        self.spent[1] += time.perf_counter() - start
+        return self.problem.units.channel
+
+    def _frozen_gain(self, problem: Problem, shape: Quadratic, p: float) -> float:
+        """What is proven of the model frozen at p by a program in the units of this problem."""
+        whole, self.problem = self.problem, problem.frozen(p)
+        margin = self.asked.impose.tried[0]
+        solve = (
+            self._solve_by_products if self.asked.solver.name == LYAPUNOV else self._solve_by_rounds
+        )
+        found = self._judged(solve(shape, margin), shape)
+        self.problem = whole
+        return found.bound
+
     def _judged(self, candidate: Candidate, shape: Unknown) -> Found:
         """The gain that P itself admits, whatever the solver said."""
-        problem, answer = self.problem, candidate.answer
+        answer = candidate.answer
         if candidate.x is None:
             return Found(math.inf, None, answer)
         # a largest margin of nothing, for fewer blocks or for all of them: there is no P
         if not self.asked.gains and candidate.x[-1] <= NOTHING and answer is Answer.SOLVED:
             answer = Answer.INFEASIBLE
-        # judged as it is stored, in physical units
-        units = problem.units
-        P = shape.lyapunov(candidate.x).in_units(
-            units.left, units.channel**2, 1.0 / units.time, units.multiplier
-        )
-        evidence = problem.evidence(self.elevation)
+        P = shape.lyapunov(candidate.x)
+        found = self._proven(self.problem, P, answer)
+        if self.problem is self.dissipating:
+            # nearer to P = I, which has margins of one, where rounding leaves this one none
+            for share in TOWARDS:
+                if found.proof is not None:
+                    break
+                inner = (1 - share) * P.coefficients + share * np.eye(P.coefficients.shape[-1])
+                found = self._proven(self.problem, replace(P, coefficients=inner), answer)
+        return found
+
+    def _proven(self, problem: Problem, P: Lyapunov, answer: Answer) -> Found:
+        """What P in scaled units proves, judged as it is stored: in physical units."""
+        units, evidence = problem.units, problem.evidence(self.elevation)
+        P = P.in_units(units.left, units.channel**2, 1.0 / units.time, units.multiplier)
         least, conditioning = evidence.least_gain(P)
-        gamma = inflated(least, problem.units.channel)
+        gamma = inflated(least, units.channel)
         if math.isinf(least) or not evidence.floating(P, gamma):
             return Found(math.inf, None, answer)
         return Found(gamma, Proof(evidence, P), answer, conditioning)

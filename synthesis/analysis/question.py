@@ -13,7 +13,7 @@ from synthesis.impose import Bernstein, Grid, Imposed, SumOfSquares, Vertices
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import Pieces, pieces
 from synthesis.program.cone_program import LYAPUNOV, Solver, general_solver
-from synthesis.program.lyapunov_program import MANY
+from synthesis.program.lyapunov_program import GENERAL
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.lower_bound import Search
 from synthesis.worst.rates import Rate
@@ -98,7 +98,7 @@ def question(
 def _solver(asked: Question, solver: Solver | str | None) -> Solver:
     by_products = asked.one_parameter and isinstance(asked.form, Spline)
     if solver is None:
-        return Solver(LYAPUNOV if by_products and asked.model.sizes[0] > MANY else "CLARABEL")
+        return Solver(LYAPUNOV if by_products and asked.model.sizes[0] > GENERAL else "CLARABEL")
     if by_products:
         return solver if isinstance(solver, Solver) else Solver(solver)
     return general_solver(solver)

@@ -40,7 +40,7 @@ def stability(
         How the inequalities are imposed for every p; Bernstein coefficients by default.
     solver : Solver or str, optional
         Which solver, and when it stops; by default Clarabel, for a `Spline` in one parameter and
-        more than 12 states this package's own, "LYAPUNOV".
+        more than 9 states this package's own, "LYAPUNOV".
     search : Search or None
         How hard to look for bad trajectories; None: not at all.
 

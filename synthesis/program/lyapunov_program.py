@@ -15,7 +15,9 @@ import numpy as np
 Array = np.ndarray
 
 MANY = 12
-"""States beyond which a P costs a general solver minutes."""
+"""States beyond which fewer coefficients of P are tried."""
+GENERAL = 9
+"""States up to which a general solver is as fast."""
 
 
 class Sizes(NamedTuple):

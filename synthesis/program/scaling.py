@@ -17,7 +17,8 @@ from symheli.lpv import LinearModel, LPVStateSpace, Matrices
 from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial import structure
 from synthesis.polynomial.pieces import ModelPiece
-from synthesis.polynomial.symmetric import symmetrized
+from synthesis.polynomial.symmetric import powered, symmetrized
+from synthesis.program.storage import least_storage, strict_storage
 from synthesis.worst.frozen import norm
 
 Array = np.ndarray
@@ -43,6 +44,8 @@ FAR = 30.0
 """A bound this many times larger or smaller than the scale it was found in deserves its own."""
 RESCALED = 3
 """Most changes of scale."""
+LEVELS = (1.01, 2.0, 10.0)
+"""Multiples of the expected gain at which a storage function is sought in turn."""
 SWEEPS = 100
 """Most sweeps of balancing."""
 
@@ -54,8 +57,8 @@ class Scaling(NamedTuple):
     """x = right z, left = right^-1, outputs in units of `channel`, time in units of `time` (s; 1 in
     discrete time).
 
-    `weight` (n, n): in the coordinates weight^-1 z the state block of the LMI is near -I where P is
-    near I: slow and fast states then count alike. `multiplier` is the unit of that of a
+    `weight` (n, n): in the coordinates weight^-1 z the state block of the LMI is near -I, or below,
+    where P is near I: slow and fast states then count alike. `multiplier` is the unit of that of a
     norm-bounded block, squared outputs per squared v.
     """
 
@@ -88,6 +91,21 @@ class Scaling(NamedTuple):
             return piece.scaled(self.left, self.right, inputs, outputs, self.time)
 
         return tuple(map(scaled, pieces))
+
+    def storage(self, model: LinearModel, above: float) -> Array | None:
+        """P of a frozen model in these units, which dissipates strictly at the level 1 + `above` of
+        the channel; None where there is none.
+        """
+        inner = linalg.inv(self.weight)
+        share = 0.5 * above / (LEVELS[0] - 1.0)
+        return least_storage(
+            *self.of_model(model), 1.0 + above, share * inner @ inner, discrete=model.dt is not None
+        )
+
+    def of_model(self, model: LinearModel) -> Matrices:
+        """A frozen model in these units."""
+        pieces = [ModelPiece(0.0, 1.0, *(M[None] for M in (model.A, model.B, model.C, model.D)))]
+        return Matrices(*(M[0] for M in self.of_pieces(pieces)[0][2:]))
 
     def to_physical(self, P: Array) -> Array:
         """Lyapunov matrices in physical units from those in z."""
@@ -177,7 +195,7 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
         side @ side.T if continuous else inverse - A.T @ inverse @ A
     )
     root = linalg.inv(linalg.cholesky(X))
-    weight = _inverse_root(root.T @ symmetrized(Q) @ root * (time if continuous else 1.0))
+    weight = powered(root.T @ symmetrized(Q) @ root * (time if continuous else 1.0), -0.5)
     channel = _channel(gain, float(np.sqrt(np.trace(Wc) * np.trace(Wo))))
     size_B, size_C = (
         np.linalg.norm(weight @ linalg.solve(root, B)),
@@ -187,6 +205,28 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     alpha = size_C / size_B if size_B > 0 and size_C > 0 else 1.0
     right = D[:, None] * root / np.sqrt(alpha)
     return Scaling(np.sqrt(alpha) * linalg.inv(root) / D, right, channel, time, weight)
+
+
+def dissipative(units: Scaling, model: LinearModel, gain: float) -> Scaling | None:
+    """Units in which P = I is a storage function of a frozen model that dissipates strictly just
+    above the expected `gain`, and weight^-2 what it dissipates; None where there is none.
+
+    At that level a margin of one is reached, and by convexity a smaller one costs that share of
+    what the level is above the norm.
+    """
+    if not (model.inputs and model.outputs and 0 < gain < math.inf):
+        return None
+    scaled = units._replace(channel=gain).of_model(model)
+    for level in LEVELS:
+        storage = strict_storage(*scaled, level, discrete=model.dt is not None)
+        if storage is not None:
+            return units._replace(
+                left=linalg.solve(storage.T, units.left),
+                right=units.right @ storage.T,
+                channel=gain,
+                weight=powered(storage.W, -0.5),
+            )
+    return None
 
 
 def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected: float) -> list[T]:
@@ -273,8 +313,3 @@ def _gramian(A: Array, B: Array, continuous: bool) -> Array:
     )
     values, vectors = linalg.eigh(symmetrized(X))
     return (vectors * np.maximum(values, 1e-12 * abs(values[-1]))) @ vectors.T
-
-
-def _inverse_root(Q: Array) -> Array:
-    values, vectors = linalg.eigh(symmetrized(Q))
-    return symmetrized((vectors / np.sqrt(np.maximum(values, 1e-12 * abs(values[-1])))) @ vectors.T)

@@ -73,7 +73,7 @@ def test_a_stiff_model_has_the_same_bound_in_any_units(route, speeds, coupling, 
         ROUTES[route](model, None, None)
         for model in (lpv, in_units(lpv, 10.0 ** np.array(exponents)))
     ]
-    assert all(cert.verified for cert in bounds), [str(cert) for cert in bounds]
+    assert all(cert.verified for cert in bounds), [cert.details for cert in bounds]
     assert bounds[1].verify(rigorous=True)
     # 3e-3: the decay rate is bisected to 2e-3 of its limit; a gain to the solver's gap, 1e-4 on the
     # stiffest

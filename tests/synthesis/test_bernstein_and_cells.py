@@ -3,6 +3,7 @@ value.
 """
 
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from synthesis.lyapunov.spline import graded_knots
 from synthesis.polynomial.bernstein import blossom, composition, restriction
 from synthesis.polynomial.cells import strips
 from synthesis.polynomial.matrix import PolynomialMatrix
-from synthesis.polynomial.pieces import model_pieces
+from synthesis.polynomial.pieces import ModelPiece, model_pieces
 from synthesis.polynomial.symmetric import smat, svec
 from synthesis.proof.claim import Claim, lmi_polynomials
 
@@ -88,6 +89,36 @@ def test_strips_cover_every_p_and_next_p_inside_the_right_segment(step):
         assert hit, (p, after)
         assert all(knots[s.next_segment] <= after <= knots[s.next_segment + 1] for s in hit)
         assert all(knots[s.cell.segment] <= p <= knots[s.cell.segment + 1] for s in hit)
+
+
+@pytest.mark.parametrize("low", [0.0, 1e6, -3e9])
+def test_strips_cover_every_next_p_in_exact_arithmetic_however_far_from_zero(low):
+    """Of a band that is only as wide as some digits of p, no sliver is left out by rounding."""
+    width = 1024 * float(np.spacing(max(abs(low), 1.0)))
+    knots = low + width * np.array([0.0, 0.25, 0.5, 1.0])
+    nothing = np.zeros((1, 0, 0))
+    piece = ModelPiece(knots[0], knots[-1], nothing, nothing, nothing, nothing)
+    step = width * 0.1008  # 103.2 units in the last place of p
+    regions = strips((piece,), knots, (-step, step))
+    rng = np.random.default_rng(0)
+    ends = Fraction(knots[0]), Fraction(knots[-1])
+    for p in (*rng.uniform(*knots[[0, -1]], 60), *(s.cell.low for s in regions)):
+        p = Fraction(float(p))
+        reached = []
+        for strip in regions:
+            a, b = Fraction(strip.cell.low), Fraction(strip.cell.high)
+            if a <= p <= b:
+                (c, d), (e, f) = strip.corners
+                x = (p - a) / (b - a)
+                reached.append(
+                    tuple((1 - x) * Fraction(at) + x * Fraction(to) for at, to in ((c, e), (d, f)))
+                )
+        least, most = max(p - Fraction(step), ends[0]), min(p + Fraction(step), ends[1])
+        cells_at_p = sorted(reached)
+        assert cells_at_p[0][0] <= least
+        assert max(top for _, top in cells_at_p) >= most
+        for below, above in pairwise(cells_at_p):
+            assert above[0] <= below[1]
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])

@@ -22,22 +22,20 @@ def test_the_misfit_of_a_fitted_model_is_among_the_hypotheses(analysis, options)
     # the family had 2 % more in A at one node, and only that: A is -1 .. -2
     off = [np.zeros((3, *M.shape[1:])) for M in (lpv.A, lpv.B, lpv.C, lpv.D)]
     off[0][1, 0, 0] = 0.04
-    text = str(
-        analysis(
-            replace(lpv, residuals=Residuals(np.linspace(s.low, s.high, 3), *off)),
-            **options,
-            search=None,
-        )
-    )
+    text = analysis(
+        replace(lpv, residuals=Residuals(np.linspace(s.low, s.high, 3), *off)),
+        **options,
+        search=None,
+    ).details
     assert (
         "differs from what it was fitted to by at most 2 % of its largest value, in A[1, 1]" in text
     )
-    assert "fitted to" not in str(analysis(lpv, **options, search=None))
+    assert "fitted to" not in analysis(lpv, **options, search=None).details
 
 
 def test_the_misfit_of_a_sampled_model_is_measured_from_its_own_samples():
     lpv = spring(damping=0.4).discretize(1.0)
-    text = str(l2_gain(lpv, 0.1, form=COARSE, search=None))
+    text = l2_gain(lpv, 0.1, form=COARSE, search=None).details
     # by another route: the zero-order hold at the nodes of the fit
     p = -np.cos(np.pi * np.arange(41) / 40)
     exact = np.array([spring(damping=0.4).at(q).discretize(1.0).A for q in p])
@@ -71,7 +69,7 @@ def test_the_misfit_survives_closing_a_loop_and_sampling(change):
         )
         off = changed.at(p).A - change(plain).at(p).A
         np.testing.assert_allclose(changed.residuals.A[k - len(nodes)], off, atol=1e-12)
-    assert "fitted to by at most" in str(stability(changed, form=COARSE, search=None))
+    assert "fitted to by at most" in stability(changed, form=COARSE, search=None).details
 
 
 def test_what_is_trusted_is_said():
@@ -79,8 +77,8 @@ def test_what_is_trusted_is_said():
         l2_gain(lag(), form=COARSE, search=None),
         decay_rate(lag(), **SOS, search=None),
     ):
-        assert "through the model's own matrices" in str(cert)
-        assert "are shared by the search for P and the proof" in str(cert)
-    assert "only the matrices of the LFT are shared" in str(
-        lft_gain(lag().to_lft().reduce(), search=None)
+        assert "through the model's own matrices" in cert.details
+        assert "are shared by the search for P and the proof" in cert.details
+    assert "only the matrices of the LFT are shared" in (
+        lft_gain(lag().to_lft().reduce(), search=None).details
     )

@@ -220,7 +220,7 @@ def test_a_spline_that_holds_no_products_is_certified_too():
 
 def test_a_certificate_says_for_which_perturbations_and_with_what_promise():
     cert = l2_gain(uncertain_pole(0.5, 0.2, 0.1))
-    text = str(cert)
+    text = cert.details
     assert "for every Delta (1 x 1) with |Delta|_2 <= 0.2, constant or moving in any way" in text
     assert "the bound on Delta holds with probability 0.95: a pole read off a plot" in text
     assert "multiplier of degree 2" in text

@@ -1,0 +1,76 @@
+"""The proven gain of a loop that does not depend on p is its norm, whatever its poles and units."""
+
+import math
+
+import pytest
+
+from benchmarks.loops_over_decades import loop
+from symheli.lpv import LPVStateSpace, Scheduling
+from synthesis import Spline, l2_gain
+from synthesis.analysis.apart import apart
+from synthesis.program.cone_program import Answer
+
+RATE = 0.1
+CLOSE = 1.01
+QUICK = (2, 3, 7, 11)
+"""Of every kind, with units of many decades."""
+
+
+def proven(seed, dependence):
+    own = loop(seed)
+    return l2_gain(own.scheduled(dependence, RATE, seed), search=None), own.norm
+
+
+@pytest.mark.parametrize("seed", QUICK)
+def test_the_proven_gain_of_a_time_invariant_loop_is_its_norm(seed):
+    certificate, norm = proven(seed, "none")
+    # the response at one frequency is below the norm, a proof above it
+    assert norm * (1 - 1e-12) <= certificate.gamma <= CLOSE * norm
+    assert certificate.verify(rigorous=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, 1000, 50))
+def test_a_thousand_loops_are_proven_within_a_hundredth(first):
+    found = {seed: proven(seed, "none") for seed in range(first, first + 50)}
+    far = {s: c.gamma / norm for s, (c, norm) in found.items() if not c.gamma <= CLOSE * norm}
+    assert not far
+    assert all(c.gamma >= norm * (1 - 1e-12) for c, norm in found.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, 100, 10))
+def test_a_dependence_on_p_that_leaves_the_gain_leaves_the_proof(first):
+    found = {seed: proven(seed, "hidden") for seed in range(first, first + 10)}
+    assert not {s: c.gamma / n for s, (c, n) in found.items() if not c.gamma <= CLOSE * n}
+    assert all(math.isfinite(c.gamma) for c, _ in found.values())
+
+
+def test_a_bound_far_above_what_trajectories_show_names_its_cause():
+    p = Scheduling("p", "1", 0.0, 1.0, rate=0.01)
+    # a spring that stiffens slowly
+    A = [[[0.0, 1.0], [-1.0, -0.5]], [[0.0, 0.0], [-1.0, 0.0]]]
+    constant = ([[[0.0], [1.0]]], [[[1.0, 0.0]]], [[[0.0]]])
+    lpv = LPVStateSpace.polynomial(A, *constant, p)
+    certificate = l2_gain(lpv, form=Spline(degree=0), search=None)
+    assert certificate.gamma > 1.05 * certificate.lower
+    (cause,) = [h for h in certificate.hypotheses if "apart" in h]
+    assert "of the model frozen at mid-range the same program finds the gain" in cause
+    # as P varies the bound falls: it was its class
+    assert l2_gain(lpv, search=None).gamma < 0.99 * certificate.gamma
+
+
+@pytest.mark.parametrize(
+    ("rounding", "answer", "cause"),
+    [
+        (0.5, Answer.SOLVED, "rounding limits the bound"),
+        (math.inf, Answer.SOLVED, "rounding limits the bound"),
+        (1e-4, Answer.FAILED, "the search did not converge"),
+        (1e-4, Answer.SOLVED, "P of a higher degree"),
+    ],
+)
+def test_the_causes_are_told_apart(rounding, answer, cause):
+    (said,) = apart(2.0, 1.0, rounding, answer)
+    assert cause in said
+    assert not apart(1.04, 1.0, rounding, answer)
+    assert not apart(math.inf, 1.0, rounding, answer)
