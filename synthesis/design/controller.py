@@ -45,13 +45,15 @@ class Controller:
     method : str
         By which it was made, in some words.
     optimum : float or None
-        The least gamma of its inequalities; None where gamma is not one gain.
+        The least gamma of its inequalities; None where it is not known.
     misfit : float
         Of the functions of p in the model to the gains that were computed, relative.
     attempts : tuple of Attempt
         Every program that was solved.
     by_adjoint : bool
         Whether `certify` looks at the adjoint of the loop.
+    notes : tuple of str
+        What kept the synthesis from a lower gamma, or the controller from a limit that was asked.
 
     Examples
     --------
@@ -73,6 +75,7 @@ class Controller:
     misfit: float = 0.0
     attempts: tuple[Attempt, ...] = ()
     by_adjoint: bool = False
+    notes: tuple[str, ...] = ()
 
     __repr__ = summarized
     _repr_html_ = as_table
@@ -134,15 +137,21 @@ class Controller:
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
-        """Why `optimum` says little of the controller, a sentence each: what no controller can
+        """The `notes`, and why `optimum` says little of the controller: what no controller can
         lower, at some frozen p, is all of it. Empty where it earns its gamma.
         """
         if self.optimum is None:
-            return ()
+            return self.notes
         p, said = conditions(self.plant)
-        return decided(
-            self.plant.matrices(p), self.plant.channels, self.optimum, said, self.plant.dt
+        about = decided(
+            self.plant.matrices(p),
+            self.plant.channels,
+            self.gamma,
+            self.optimum,
+            said,
+            self.plant.dt,
         )
+        return (*self.notes, *about)
 
     @cached_property
     def scheduled_controller(self) -> ScheduledController:
@@ -164,8 +173,11 @@ class Controller:
 
     def __str__(self) -> str:
         names = ", ".join(s.name for s in self.model.parameters)
-        first = (
-            f"{self.method}: {self.order} states, {', '.join(self.model.inputs)} ->"
-            f" {', '.join(self.model.outputs)} over {names}; gamma {self.gamma:.6g} in synthesis"
-        )
-        return "\n".join([first, *self.reasons])
+        time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
+        least = "" if self.optimum is None else f", at best {self.optimum:.6g}"
+        lines = [
+            f"{self.method}: {self.order} states, {time}, {', '.join(self.model.inputs)} ->"
+            f" {', '.join(self.model.outputs)} over {names}",
+            f"  gamma {self.gamma:.6g} in synthesis{least}: no proof, .certify() proves",
+        ]
+        return "\n".join([*lines, *(f"  {reason}" for reason in self.reasons)])

@@ -208,14 +208,25 @@ def _zero(mode: Mode, names: Channels, dt: float | None, *, dual: bool) -> str:
 
 
 def decided(
-    family: Generalized, names: Channels, gamma: float, at: Sequence[str], dt: float | None = None
+    family: Generalized,
+    names: Channels,
+    reached: float,
+    gamma: float,
+    at: Sequence[str],
+    dt: float | None = None,
 ) -> tuple[str, ...]:
-    """What of a level that a scheduled controller keeps no controller can lower, at which of the
-    frozen models (leading axis, called `at`); and whether all keep it with the controls at rest.
+    """What of a level `gamma` no scheduled controller can lower, at which of the frozen models
+    (leading axis, called `at`); and whether all keep it with the controls at rest.
+
+    One is known that keeps `reached`: a floor above that is rounding.
     """
     each = [Generalized(*M) for M in zip(*family, strict=True)]
     floors = [unreachable_gain(P, dt) for P in each]
-    close = [k for k, floor in enumerate(floors) if gamma <= floor.gamma * (1 + CLOSE)]
+    close = [
+        k
+        for k, floor in enumerate(floors)
+        if gamma <= floor.gamma * (1 + CLOSE) and floor.gamma <= reached * (1 + CLOSE)
+    ]
     close.sort(key=lambda k: -floors[k].gamma)
     out = []
     if close:
@@ -224,9 +235,19 @@ def decided(
     return (*out, *_idle(max(_at_rest(P, dt) for P in each), gamma))
 
 
-def decided_by(P: Generalized, names: Channels, gamma: float, dt: float | None = None) -> list[str]:
-    """What of a level `gamma` no controller can lower, where that is all of it or more."""
-    return [*_unreachable(unreachable_gain(P, dt), names, gamma), *_idle(_at_rest(P, dt), gamma)]
+def decided_by(
+    P: Generalized,
+    names: Channels,
+    gamma: float,
+    dt: float | None = None,
+    reached: float = math.inf,
+) -> list[str]:
+    """What of a level `gamma` no controller can lower, where that is all of it or more.
+
+    Where a controller that keeps `reached` is known, a floor above that is rounding.
+    """
+    floor, idle = unreachable_gain(P, dt), _idle(_at_rest(P, dt), gamma)
+    return [*(_unreachable(floor, names, gamma) if floor.gamma <= reached else ()), *idle]
 
 
 def _unreachable(floor: Unreachable, names: Channels, gamma: float) -> list[str]:

@@ -17,13 +17,13 @@ from synthesis.certificate import Attempt, Certificate
 from synthesis.design.back_off import levels_above
 from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
-from synthesis.design.fitted import fitted
-from synthesis.design.in_plant_units import ACCURACY
+from synthesis.design.fitted import Fitted
+from synthesis.design.frozen_stability import frozen_stability
 from synthesis.design.output_feedback import USUAL
 from synthesis.design.recovery import control_gain
 from synthesis.design.refusals import failed, least_ranks
 from synthesis.design.sampled_recovery import state_gain
-from synthesis.design.search import BACK_OFF, Dependence, Gains, Shape, dependence, least, settled
+from synthesis.design.search import BACK_OFF, Dependence, Gains, Shape, best, dependence, settled
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
@@ -126,14 +126,23 @@ def estimator(
     plant = plant.with_scheduling(parameters)
     least_ranks(plant, controls=False)
     attempts: list[Attempt] = []
-    shape = Shape(dependence(X, parameters, "X", depends(plant), still=plant.dt is not None), None)
-    start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
+    matters, still = depends(plant), plant.dt is not None
+
+    def every(degree: int) -> list[Shape]:
+        return [Shape(dependence(X, parameters, "X", matters, degree, still=still), None)]
+
+    start = best(lambda channel: coordinates_of(plant, channel), every, divisions, USUAL, attempts)
     factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts, _error):
-        model, error, misfit = _observer(plant, design.coordinates, design.gains)
-        return Estimator(
-            model=model, error=error, gamma=design.gamma, misfit=misfit, attempts=tuple(attempts)
-        )
+        model, error = _observer(plant, design.coordinates, design.fit)
+        if frozen_stability(error).stable is not False:
+            return Estimator(
+                model=model,
+                error=error,
+                gamma=design.gamma,
+                misfit=design.fit.misfit,
+                attempts=tuple(attempts),
+            )
     raise failed(plant, attempts)
 
 
@@ -160,14 +169,10 @@ def _error(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...
     return at.A - L @ at.C2, at.B1 - L @ at.D21, at.C1, at.D11
 
 
-def _observer(
-    plant: Plant, c: Coordinates, gains: Gains
-) -> tuple[LPVStateSpace, LPVStateSpace, float]:
-    """The observer, its error, and how far its gain is from what was computed."""
+def _observer(plant: Plant, c: Coordinates, fit: Fitted) -> tuple[LPVStateSpace, LPVStateSpace]:
+    """The observer and its error."""
     rows, columns = c.right / math.sqrt(c.time), c.measurements
-
-    basis, scaled, misfit = fitted(gains, plant.parameters, ACCURACY)
-    coefficients = rows @ scaled * columns
+    basis, coefficients = fit.basis, rows @ fit.coefficients * columns
     at: Any = plant.functions()
     box = plant.nominal.box
     L = MatrixFunction(basis, -coefficients, box)
@@ -181,7 +186,7 @@ def _observer(
     error = _model(
         plant, (A, at.B1 + L @ at.D21, at.C1, at.D11), plant.disturbances, plant.performance
     )
-    return observer, error, misfit
+    return observer, error
 
 
 def _model(

@@ -1,5 +1,10 @@
 """Whether there is a controller: the two halves of `elimination` and what couples them, as a
-program for every p of the range.
+program whose blocks are imposed at points of the range of p.
+
+The points are few at first; between them the blocks are looked at on a finer grid, and where one is
+violated a point is added. Nothing is proven by that, and nothing need be: the certificate of the
+closed loop proves. Blocks between points cost nothing in gamma, as the hull of their Bernstein
+coefficients would where an entry of B2 or C2 passes through zero.
 """
 
 from __future__ import annotations
@@ -13,9 +18,9 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace
+from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of
 from symheli.values.numbers import whole
-from synthesis.design.cells import Cell, cells, degrees_of
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.elimination import Half, controlled, observed
 from synthesis.design.motions import motions, moves, used
@@ -27,10 +32,14 @@ from synthesis.program.lyapunov_program import LyapunovBlocks, Sizes
 
 Array = np.ndarray
 
-LARGEST = 1e6
-"""X and Y are kept below this multiple of the identity, in scaled coordinates."""
-WIDE = (1e2, 1e3, 1e4, LARGEST)
-"""The same once g is settled, tried in turn."""
+LARGEST = (1e8, 1e10)
+"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second where the
+first decides.
+"""
+NEAR = 0.1
+"""A bound decides where X or Y comes to more than this part of it."""
+WIDE = (1e2, 1e3, 1e4, 1e6, 1e8)
+"""The bounds once g is settled, tried in turn."""
 GROWS = 1.03
 """A larger bound that separates X Y from I by less than this factor more is not worth it."""
 MARGIN = 1e-8
@@ -39,7 +48,21 @@ SETTLED = (1e-3, 1e-5, 1e-8)
 """The same once g is settled, tried in turn: at a block that is singular gains have no bound."""
 
 FINEST = 1000
-"""Parts that an interval of p may be divided into: each is an LMI of its own."""
+"""Parts that an interval of p may be divided into."""
+LEAST_POINTS = {1: 13, 2: 5}
+"""Of each parameter, at least (more parameters: 3)."""
+FINER = {1: 8, 2: 3}
+"""Points in which blocks are looked at for each at which they are imposed (more parameters: 2)."""
+ROUNDS = 8
+"""Most additions of points."""
+ADDED = 8
+"""Most points that are added at a time."""
+VIOLATED = 1e-5
+"""Excess of g, relative, with which a block between the points must be negative."""
+RISEN = 1e-4
+"""A round that raises g by no more than this part is the last."""
+ROUNDING = 1e-8
+"""An eigenvalue up to this size is zero there, in scaled coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +96,9 @@ class Existence:
         X: FunctionSpace | None,
         Y: FunctionSpace | None,
         divisions: int = 1,
+        largest: float = LARGEST[0],
     ):
-        self.plant = plant
+        self.plant, self.largest = plant, largest
         both = [b for b in (X, Y) if b is not None]
         if plant.dt is not None and Y is not None and Y.size > 1 and moves(plant.parameters):
             both.append(Y)  # the bound of Y at the next sample
@@ -84,33 +108,73 @@ class Existence:
         self.S: Unknown | None = each.pop(0) if each else self.Y
         self.count = sum(b.size for b in both)
         self.states = plant.at(np.array([[s.middle for s in plant.parameters]])).A.shape[-1]
-        self._cells = self._over_cells(divisions)
+        self.points = self._first(divisions)
 
-    def _over_cells(self, divisions: int) -> list[Cell]:
-        breaks = [sorted(set(b)) for b in self.plant.breaks]
-        most = np.zeros(len(breaks), int)
+    def _first(self, divisions: int) -> Array:
+        """Points (K, m) at which blocks are imposed at first."""
+        if not 1 <= whole(divisions, "divisions", 1) <= FINEST:
+            raise InputError(f"divisions: expected 1 to {FINEST}, got {divisions}")
+        breaks = [set(b) for b in self.plant.breaks]
+        m = len(breaks)
+        most = np.zeros(m, int)
         for basis in (u.basis for u in (self.X, self.Y) if u is not None):
             for i, factor in enumerate(factors_of(basis)):
                 for piece in factor.pieces():
                     most[i] = max(most[i], piece.bernstein.shape[1] - 1)
-                    if breaks[i][0] < piece.high < breaks[i][-1]:
-                        breaks[i] = sorted({*breaks[i], piece.high})
-        if not 1 <= whole(divisions, "divisions", 1) <= FINEST:
-            raise InputError(f"divisions: expected 1 to {FINEST}, got {divisions}")
-        if divisions > 1:
-            breaks = [_divided(b, divisions) for b in breaks]
-        degrees = np.array(degrees_of(self._data, breaks)) + most
-        return cells(breaks, [int(d) for d in degrees])
-
-    def _data(self, p: Array) -> list[Array]:
-        plant = self.plant.at(p)
-        halves = [f(plant) for f, u in ((observed, self.X), (controlled, self.Y)) if u is not None]
-        return [M for half in halves for M in half]
+                    if min(breaks[i]) < piece.high < max(breaks[i]):
+                        breaks[i].add(piece.high)
+        axes = []
+        for ends, degree in zip(breaks, most, strict=True):
+            parts = [
+                a + (b - a) * np.arange(divisions) / divisions for a, b in pairwise(sorted(ends))
+            ]
+            knots = [*np.concatenate(parts), max(ends)]
+            least = LEAST_POINTS.get(m, 3)
+            count = max(-(-(least - 1) // (len(knots) - 1)), 2 * int(degree) + (m == 1))
+            axes.append(_lobatto(knots, count))
+        return tensor_grid(axes)
 
     def least_gamma(self, solver: Solver) -> Found:
-        """Minimise g."""
-        blocks = [*self._halves(None, MARGIN), *self._coupling(False, LARGEST)]
-        return self._solved(blocks, 1.0, solver)
+        """Minimise g, with points added where a block is violated between them."""
+        before = 0.0
+        for _ in range(ROUNDS):
+            blocks = [*self._halves(None, MARGIN), *self._coupling(False, self.largest)]
+            found = self._solved(blocks, 1.0, solver)
+            if not np.isfinite(found.gamma) or found.gamma <= before * (1 + RISEN):
+                break
+            before = found.gamma
+            if not len(new := self._violated(found)):
+                break
+            self.points = np.concatenate([self.points, new])
+        return found
+
+    def bounded(self, found: Found) -> bool:
+        """Whether the bound on X and Y decides."""
+        each = (u.at(found.coefficients, self.points) for u in (self.X, self.Y) if u is not None)
+        return any(np.linalg.eigvalsh(M).max() > NEAR * self.largest for M in each)
+
+    def _violated(self, found: Found) -> Array:
+        """Points (k, m) where a block is violated most, one in each cell of the present ones."""
+        axes = [np.unique(x) for x in self.points.T]
+        between = tensor_grid([_lobatto(x.tolist(), FINER.get(len(axes), 2)) for x in axes])
+        worst = self._excess(between, found)
+        allowed = max(ROUNDING, 2 * float(self._excess(self.points, found).max()))
+        chosen: dict[tuple[int, ...], Array] = {}
+        for k in np.argsort(-worst):
+            if worst[k] <= allowed or len(chosen) == ADDED:
+                break
+            cell = tuple(int(np.searchsorted(x, q)) for x, q in zip(axes, between[k], strict=True))
+            chosen.setdefault(cell, between[k])
+        return np.reshape(list(chosen.values()), (-1, len(axes)))
+
+    def _excess(self, points: Array, found: Found) -> Array:
+        """The largest eigenvalue (K,) of any half at each point, at a g a little larger."""
+        gamma = (1 + VIOLATED) * found.gamma
+        values = [
+            np.linalg.eigvalsh(b.linear(found.coefficients) + b.constant)[:, -1]
+            for b in self._halves_at(points, gamma, 0.0)
+        ]
+        return np.max(values, axis=0)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
         """For this g the X and Y whose product is farthest from one: first within the least bound
@@ -141,21 +205,23 @@ class Existence:
         return Found(float(candidate.x[-1]), coefficients, candidate.message)
 
     def _halves(self, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
-        """Those of every cell, for this g or for one that is sought."""
+        """Those of every point, for this g or for one that is sought."""
+        return self._halves_at(self.points, gamma, margin)
+
+    def _halves_at(self, p: Array, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
         out = []
-        for cell in self._cells:
-            plant = self.plant.at(cell.nodes)
-            if self.X is not None:
-                out += self._half(cell, observed(plant), self.X, self.X, 1.0, gamma, margin)
-            if self.Y is not None and self.S is not None:
-                out += self._half(cell, controlled(plant), self.Y, self.S, -1.0, gamma, margin)
-            if self.S is not self.Y:
-                out += self._next(cell, margin)
+        plant = self.plant.at(p)
+        if self.X is not None:
+            out += self._half(p, observed(plant), self.X, self.X, 1.0, gamma, margin)
+        if self.Y is not None and self.S is not None:
+            out += self._half(p, controlled(plant), self.Y, self.S, -1.0, gamma, margin)
+        if self.S is not self.Y:
+            out += self._next(p, margin)
         return out
 
     def _half(
         self,
-        cell: Cell,
+        p: Array,
         half: Half,
         ahead: Unknown,
         now: Unknown,
@@ -167,40 +233,38 @@ class Existence:
         constant, level = half.constant, half.level
         if gamma is not None:
             constant, level = constant - gamma * level, 0.0 * level
-        f = ahead.values(cell.nodes)
+        f = ahead.values(p)
         if self.plant.dt is not None:
             L, own = selector(n, 0, n + N), selector(n, n, n + N)
             flow = np.concatenate([np.zeros((len(f), n, n)), half.flow], axis=-1)
-            blocks = Blocks(n + N, len(f), cell.to_bernstein)
-            blocks.add(ahead, f, L, flow - 0.5 * L).add(
-                now, now.values(cell.nodes), own, -0.5 * own
-            )
+            blocks = Blocks(n + N, len(f))
+            blocks.add(ahead, f, L, flow - 0.5 * L).add(now, now.values(p), own, -0.5 * own)
             return [blocks.finished(_below(constant, n) + margin * np.eye(n + N), _below(level, n))]
         L = selector(n, 0, N)
         out = []
-        for motion in self._motions(ahead, cell):
-            blocks = Blocks(N, len(f), cell.to_bernstein).add(ahead, f, L, half.flow)
+        for motion in self._motions(ahead, p):
+            blocks = Blocks(N, len(f)).add(ahead, f, L, half.flow)
             if np.any(motion):
-                blocks.add(ahead, sign * ahead.slopes(cell.nodes, motion), L, 0.5 * L)
+                blocks.add(ahead, sign * ahead.slopes(p, motion), L, 0.5 * L)
             out.append(blocks.finished(constant + margin * np.eye(N), level))
         return out
 
-    def _motions(self, unknown: Unknown, cell: Cell) -> list[Array]:
-        """Every extreme dp/dt (K, m) at the nodes of a cell, per scaled time."""
+    def _motions(self, unknown: Unknown, p: Array) -> list[Array]:
+        """Every extreme dp/dt (K, m) at these points, per scaled time."""
         if not unknown.moves:
-            return [np.zeros(cell.nodes.shape)]
-        return motions(self.plant.parameters, cell.nodes, self.plant.time, used(unknown.basis))
+            return [np.zeros(p.shape)]
+        return motions(self.plant.parameters, p, self.plant.time, used(unknown.basis))
 
-    def _next(self, cell: Cell, margin: float) -> list[LyapunovBlocks]:
+    def _next(self, p: Array, margin: float) -> list[LyapunovBlocks]:
         """S(p) <= Y(p(k+1)) to first order in the step, at its ends."""
-        assert self.S is not None  # noqa: S101 - see `_halves`
+        assert self.S is not None  # noqa: S101 - see `_halves_at`
         assert self.Y is not None  # noqa: S101
         out, one = [], np.eye(self.states)
-        for motion in self._motions(self.Y, cell):
+        for motion in self._motions(self.Y, p):
             step = motion * (self.plant.dt or 0.0)
-            there = self.Y.values(cell.nodes) + self.Y.slopes(cell.nodes, step)
-            blocks = Blocks(self.states, len(there), cell.to_bernstein)
-            blocks.add(self.S, self.S.values(cell.nodes), one, 0.5 * one)
+            there = self.Y.values(p) + self.Y.slopes(p, step)
+            blocks = Blocks(self.states, len(there))
+            blocks.add(self.S, self.S.values(p), one, 0.5 * one)
             blocks.add(self.Y, there, one, -0.5 * one)
             out.append(blocks.finished(margin * one, 0.0 * one))
         return out
@@ -210,36 +274,33 @@ class Existence:
 
         Without one of the two the other is positive, or apart from zero by g.
         """
-        return [b for cell in self._cells for b in self._coupled(cell, apart, largest)]
-
-    def _coupled(self, cell: Cell, apart: bool, largest: float) -> list[LyapunovBlocks]:
-        n, K, one = self.states, len(cell.nodes), np.eye(self.states)
+        p = self.points
+        n, K, one = self.states, len(p), np.eye(self.states)
         every = list({id(u): u for u in (self.X, self.Y, self.S) if u is not None}.values())
         out = []
         for unknown in every:
-            f = unknown.values(cell.nodes)
-            blocks = Blocks(n, K, cell.to_bernstein).add(unknown, f, one, 0.5 * one)
+            blocks = Blocks(n, K).add(unknown, unknown.values(p), one, 0.5 * one)
             out.append(blocks.finished(-largest * one, 0 * one))
         if self.X is None or self.Y is None:
             for unknown in every:
-                blocks = Blocks(n, K, cell.to_bernstein)
-                blocks.add(unknown, unknown.values(cell.nodes), one, -0.5 * one)
-                out.append(blocks.finished((0.0 if apart else 1 / LARGEST) * one, -one * apart))
+                blocks = Blocks(n, K).add(unknown, unknown.values(p), one, -0.5 * one)
+                out.append(blocks.finished((0.0 if apart else 1 / largest) * one, -one * apart))
             return out
         first, second = selector(n, 0, 2 * n), selector(n, n, 2 * n)
         cross = first.T @ second
         cross = cross + cross.T
         for Y in every[1:]:
-            blocks = Blocks(2 * n, K, cell.to_bernstein)
-            blocks.add(self.X, self.X.values(cell.nodes), first, -0.5 * first)
-            blocks.add(Y, Y.values(cell.nodes), second, -0.5 * second)
+            blocks = Blocks(2 * n, K)
+            blocks.add(self.X, self.X.values(p), first, -0.5 * first)
+            blocks.add(Y, Y.values(p), second, -0.5 * second)
             out.append(blocks.finished(cross * (not apart), -cross * apart))
         return out
 
 
-def _divided(breaks: Sequence[float], parts: int) -> list[float]:
-    inner = [a + (b - a) * k / parts for a, b in pairwise(breaks) for k in range(parts)]
-    return [*inner, breaks[-1]]
+def _lobatto(knots: Sequence[float], parts: int) -> Array:
+    """The knots, and the Chebyshev-Lobatto points that cut every interval in so many parts."""
+    inner = 0.5 - 0.5 * np.cos(np.pi * np.arange(parts) / parts)
+    return np.r_[np.concatenate([a + (b - a) * inner for a, b in pairwise(knots)]), knots[-1]]
 
 
 def _below(M: Array, n: int) -> Array:

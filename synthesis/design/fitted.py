@@ -2,34 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from symheli.lpv import FunctionSpace, Scheduling
+from symheli.lpv import BSpline, FunctionSpace, Scheduling
 from symheli.lpv.bases.polynomials import lobatto_points, polynomials
 
 Array = np.ndarray
 
-DEGREES = {1: (0, 1, 2, 3, 4, 5, 6, 8, 10, 12), 2: (0, 1, 2, 3, 4, 5, 6)}
-"""Of the polynomials that are tried in turn (more parameters: those of two, up to 4)."""
+DEGREES = {1: (0, 1, 2, 3, 4, 5, 6, 8, 10), 2: (0, 1, 2, 3, 4, 5, 6, 8)}
+"""Of the polynomials that are tried in turn (more parameters: up to 4)."""
+SEGMENTS = (4, 8, 16, 32)
+"""Of the cubic splines of one parameter that are tried after them."""
 NEGLIGIBLE = 0.01
 """Of the geometric mean of the largest entries of its row and column an entry matters from here."""
-NODES = {1: 41, 2: 13}
+NODES = {1: 129, 2: 17}
 """Values of each parameter at which the gains are computed (more parameters: 7)."""
 
 
-def fitted(
-    gains: Callable[[Array], Array],
-    parameters: Sequence[Scheduling],
-    accuracy: float,
-) -> tuple[FunctionSpace, Array, float]:
-    """(basis, coefficients, misfit): polynomials of the least degree that are within `accuracy` of
-    every gain, or of the highest that is tried.
+class Fitted(NamedTuple):
+    """Gains (r, c) as functions of p: sum_j f_j(p) coefficients[j].
 
-    `gains` (K, r, c) at p (K, m). The misfit is the largest of an entry relative to that entry, one
-    that is small in its row and column relative to `NEGLIGIBLE` of those.
+    `misfit` is the largest error of an entry relative to that entry, one that is small in its row
+    and column relative to `NEGLIGIBLE` of those.
     """
+
+    basis: FunctionSpace
+    coefficients: Array
+    misfit: float
+
+    def __call__(self, p: Array) -> Array:
+        """The gains (K, r, c) at p (K, m)."""
+        values = self.basis(p[:, 0] if p.shape[1] == 1 else p)
+        return np.tensordot(values, self.coefficients, axes=1)
+
+
+def fits(gains: Callable[[Array], Array], parameters: Sequence[Scheduling]) -> Iterator[Fitted]:
+    """`gains` (K, r, c) at p (K, m) as polynomials of rising degree, then as splines."""
     m = len(parameters)
     box = [(s.low, s.high) for s in parameters]
     p = lobatto_points(NODES.get(m, 7), box)
@@ -38,13 +49,29 @@ def fitted(
     rows, columns = (size.max(axis=k, keepdims=True, initial=0.0) for k in (1, 0))
     size = np.maximum(size, NEGLIGIBLE * np.sqrt(rows * columns))
     size[size == 0] = 1.0
-    best: tuple[FunctionSpace, Array, float] | None = None
-    for degree in DEGREES.get(m, tuple(range(5))):
-        basis = polynomials([degree] * m, box)
+    for basis in _bases(box):
         coefficients = basis.fit(p, values)
         off = np.abs(np.tensordot(basis(p), coefficients, axes=1) - values)
-        best = basis, coefficients, float((off / size).max(initial=0.0))
-        if best[2] <= accuracy:
+        yield Fitted(basis, coefficients, float((off / size).max(initial=0.0)))
+
+
+def _bases(box: Sequence[tuple[float, float]]) -> Iterator[FunctionSpace]:
+    m = len(box)
+    for degree in DEGREES.get(m, tuple(range(5))):
+        yield polynomials([degree] * m, box)
+    if m == 1:
+        for segments in SEGMENTS:
+            yield BSpline(3, tuple(np.linspace(*box[0], segments + 1)))
+
+
+def fitted(
+    gains: Callable[[Array], Array], parameters: Sequence[Scheduling], accuracy: float
+) -> Fitted:
+    """The first of the `fits` that is within `accuracy` of every gain, or the nearest of all."""
+    best: Fitted | None = None
+    for fit in fits(gains, parameters):
+        best = fit if best is None or fit.misfit < best.misfit else best
+        if fit.misfit <= accuracy:
             break
-    assert best is not None  # noqa: S101 - some degree is always tried
+    assert best is not None  # noqa: S101 - some basis is always tried
     return best

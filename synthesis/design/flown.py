@@ -24,8 +24,10 @@ from synthesis.worst.rates import Rate
 if TYPE_CHECKING:
     from synthesis.design.plant import Plant
 
-ROUNDING = 1e-10
-"""A misfit of the performance below this fraction of its largest entry is one of rounding."""
+ROUNDING = 256 * np.finfo(float).eps
+"""A misfit of an entry of the performance below this fraction of the terms that the entry is the
+sum of, at the same p, is one of their rounding: of its own terms, whatever the units.
+"""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -165,13 +167,16 @@ def certify_flown(
 def _covered(loop: LPVStateSpace) -> tuple[LPVStateSpace | UncertainStateSpace, float]:
     """The set of models around a fit, and the largest entry of [A B] that is missed."""
     assert loop.residuals is not None  # noqa: S101
-    _, A, B, C, D = loop.residuals
+    nodes, A, B, C, D = loop.residuals
+    functions = np.abs(loop.basis(nodes))
     for missed, of in ((C, loop.C), (D, loop.D)):
-        if np.abs(missed).max(initial=0.0) > ROUNDING * np.abs(of).max(initial=1.0):
+        left = np.abs(missed) > ROUNDING * np.tensordot(functions, np.abs(of), axes=1)
+        if np.any(left):
+            _, i, _ = np.argwhere(left)[0]
             raise InputError(
-                "the performance of the plant is a fit too, by"
-                f" {np.abs(missed).max():.2g}: put what varies behind a state (a servo, a filter),"
-                " or give cover=False for a proof of the fit alone"
+                f"the performance of the plant is a fit too, {loop.outputs[i]} by"
+                f" {np.abs(missed[:, i]).max():.2g}: put what varies behind a state (a servo, a"
+                " filter), or give cover=False for a proof of the fit alone"
             )
     missed = np.concatenate([A, B], axis=2)
     largest = float(np.abs(missed).max(initial=0.0))

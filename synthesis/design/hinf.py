@@ -34,6 +34,9 @@ Array = np.ndarray
 ACCURACY = 1e-10
 """Of the optimum, relative."""
 
+ROUGH = 1e-3
+"""The same where it is a number to compare with."""
+
 NOTHING = 1e-9
 """A level below this part of that of the LQG controller counts as zero."""
 
@@ -160,6 +163,20 @@ class _Levels(NamedTuple):
         return (A, B, C, D) if self.dt is None else sampled_controller(A, B, C, D)
 
 
+def optimum_above(plant: Generalized, level: float, dt: float | None) -> float:
+    """The smallest level of a plant to a part in a thousand, or `level` where that can be reached
+    or no level is found; without its controller.
+    """
+    try:
+        normal = _Levels.of(plant, dt).normal
+        if level > 0 and normal.trial(level).obstacle is None:
+            return level
+        found = _smallest(normal, level or 1.0, ROUGH)
+    except (np.linalg.LinAlgError, InputError):
+        return level
+    return level if found is None else max(level, found[0])
+
+
 def _at(levels: _Levels, plant: Generalized, names: Channels, gamma: float) -> PointDesign:
     """The central controller of this level, or why it cannot be reached."""
     obstacle = levels.normal.trial(gamma).obstacle
@@ -189,7 +206,7 @@ def _optimal(levels: _Levels, plant: Generalized, names: Channels, back_off: flo
     for more in BACK_OFFS:
         design = _kept(levels, plant, names, optimum * back_off * more)
         if design is not None:
-            about = decided_by(plant, names, optimum, levels.dt)
+            about = decided_by(plant, names, optimum, levels.dt, reached=design.gamma)
             optimum = min(optimum, design.gamma)  # within rounding, where the norm cannot move
             return replace(design, optimum=optimum, limit=limit, reasons=tuple(about))
     level = optimum * back_off * BACK_OFFS[-1]
@@ -216,7 +233,9 @@ def _kept(levels: _Levels, plant: Generalized, names: Channels, gamma: float) ->
     return design if design is not None and design.gamma <= gamma * (1 + KEPT) else None
 
 
-def _smallest(normal: Normalised, start: float) -> tuple[float, Obstacle | None] | None:
+def _smallest(
+    normal: Normalised, start: float, accuracy: float = ACCURACY
+) -> tuple[float, Obstacle | None] | None:
     """The smallest level, and what stands against a lower one; 0 where none is too low, None where
     none was found.
 
@@ -247,5 +266,5 @@ def _smallest(normal: Normalised, start: float) -> tuple[float, Obstacle | None]
         # 0, a root met exactly, would end the search with `good` wherever above it was
         return min(trial.slack, 1.0) or -sys.float_info.min
 
-    optimize.brentq(slack, math.log(low), math.log(high), xtol=ACCURACY)
+    optimize.brentq(slack, math.log(low), math.log(high), xtol=accuracy)
     return good, bad.obstacle

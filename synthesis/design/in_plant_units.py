@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,16 +10,13 @@ import numpy as np
 from symheli.lpv import LPVStateSpace
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates
-from synthesis.design.fitted import fitted
+from synthesis.design.fitted import Fitted
 from synthesis.design.recovery import Gains
 
 if TYPE_CHECKING:
     from synthesis.design.plant import Plant
 
 Array = np.ndarray
-
-ACCURACY = 3e-3
-"""Of the functions of p fitted to the gains, relative, entry by entry."""
 
 
 def packed(gains: Gains) -> Array:
@@ -30,22 +26,15 @@ def packed(gains: Gains) -> Array:
 
 
 def in_plant_units(
-    plant: Plant,
-    c: Coordinates,
-    gains: Callable[[Array], Array],
-    gamma: float,
-    method: str,
+    plant: Plant, c: Coordinates, fit: Fitted, gamma: float, method: str
 ) -> Controller:
-    """The controller in the units of the plant, of `gains` (K, ..) at p (K, m) in the scaled ones,
-    as functions of p.
-    """
+    """The controller in the units of the plant, of gains in the scaled ones as functions of p."""
+    basis, M, misfit = fit
     ny = len(plant.measurements)
-    n = gains(np.array([[s.middle for s in plant.parameters]])).shape[-1] - ny
+    n = M.shape[-1] - ny
     pace = np.full(n, 1 / math.sqrt(c.time))
     rows = np.concatenate([pace, c.controls])
     columns = np.concatenate([pace, c.measurements])
-
-    basis, M, misfit = fitted(gains, plant.parameters, ACCURACY)
     M = rows[:, None] * M * columns
     names = tuple(f"k{i + 1}" for i in range(n))
     model = LPVStateSpace(

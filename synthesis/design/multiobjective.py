@@ -22,13 +22,14 @@ from synthesis.design.back_off import levels_above
 from synthesis.design.cells import Cell, cells, degrees_of
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates, coordinates_of
+from synthesis.design.fitted import fitted
 from synthesis.design.generalized import Generalized
 from synthesis.design.in_plant_units import in_plant_units, packed
 from synthesis.design.motions import motions, used
 from synthesis.design.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
 from synthesis.design.recovery import Transformed, controller
 from synthesis.design.refusals import failed, require_channels
-from synthesis.design.search import Dependence, functions, limited
+from synthesis.design.search import ACCURACY, Dependence, functions, limited
 from synthesis.program.cone_program import Solver
 from synthesis.program.panic import no_panic
 from synthesis.worst.rates import Rate
@@ -46,7 +47,7 @@ NEAR = 3.0
 ROUNDS = 3
 """Most changes of units."""
 MARGIN = 1e-8
-LARGEST = 1e4
+LARGEST = 1e5
 WIDE = 1e3
 
 
@@ -89,7 +90,8 @@ def multiobjective(
     Returns
     -------
     Controller
-        `gamma` is the root of the weighted sum; the gains one by one are in `attempts`.
+        `gamma` is the root of the weighted sum of the gains as they are settled, `back_off` in
+        them, and `optimum` the least without it; one by one they are in `attempts`.
 
     Raises
     ------
@@ -135,13 +137,16 @@ def multiobjective(
     values = problem.best(solver, attempts)
     if values is None:
         raise failed(plant, attempts)
-    found = problem.settled([factor * v for v in values], solver, attempts)
+    levels = [factor * v for v in values]
+    found = problem.settled(levels, solver, attempts)
     if found is None:
         raise failed(plant, attempts)
-    total = math.sqrt(sum(o.soft * v * v for o, v in zip(every, values, strict=True)))
+    total = math.sqrt(sum(o.soft * v * v for o, v in zip(every, levels, strict=True)))
+    least = total / factor
     words = ", ".join(type(o).__name__ for o in every)
-    made = in_plant_units(plant, problem.coordinates, found, total, f"output feedback for {words}")
-    return replace(made, attempts=tuple(attempts))
+    fit = fitted(found, plant.parameters, ACCURACY)
+    made = in_plant_units(plant, problem.coordinates, fit, total, f"output feedback for {words}")
+    return replace(made, optimum=least, attempts=tuple(attempts))
 
 
 class _Loop(NamedTuple):

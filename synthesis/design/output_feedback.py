@@ -9,19 +9,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from symheli.lpv import LPVStateSpace, UncertainStateSpace
+from symheli.lpv import UncertainStateSpace
+from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certificate import Attempt
 from synthesis.design.back_off import levels_above
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates, coordinates_of, depends
-from synthesis.design.existence import Existence, Found
-from synthesis.design.in_plant_units import ACCURACY, in_plant_units, packed
+from synthesis.design.existence import LARGEST, Existence, Found
+from synthesis.design.frozen_stability import frozen_stability
+from synthesis.design.in_plant_units import in_plant_units, packed
 from synthesis.design.motions import motions, used
 from synthesis.design.recovery import controller, split
 from synthesis.design.refusals import failed, least_ranks
 from synthesis.design.robust import scaled_plant
 from synthesis.design.sampled_recovery import joined
-from synthesis.design.search import BACK_OFF, Dependence, Shape, least, settled, shapes
+from synthesis.design.search import (
+    BACK_OFF,
+    CHECKED,
+    DEGREES,
+    Dependence,
+    Shape,
+    Start,
+    best,
+    least,
+    settled,
+    shapes,
+)
+from synthesis.design.worst_optimum import worst_optimum
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
@@ -32,6 +46,8 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
+FAR_ABOVE = 1.05
+"""A gamma this many times the least one is said to be."""
 
 
 def output_feedback(
@@ -59,15 +75,18 @@ def output_feedback(
     rate : float, sequence or mapping, optional
         Largest |dp/dt|, as for `l2_gain`; by default the plant's own; math.inf: p may jump.
     X, Y : int, tuple or FunctionSpace, optional
-        Degree in every parameter, one each, or functions; by default 2 for the one that moves.
+        Degree in every parameter, one each, or functions; by default one of the two moves, with a
+        degree that rises from 2 while that lowers gamma and gamma is above the worst optimum of the
+        frozen models, which no controller can beat.
     back_off : float or sequence
         Multiples of the least gamma at which X and Y are settled, tried in turn until the gains are
         smooth functions of p: at the least itself a controller has poles without limit.
     fastest : float
-        Largest modulus of a pole of the controller, rad/s (continuous time): a reason to back off
-        further.
+        Largest modulus of a pole of the controller, rad/s (continuous time): a reason to try other
+        values of `back_off`.
     divisions : int
-        In so many parts every range is cut where the inequalities are imposed.
+        In so many parts every range is cut at first where the inequalities are imposed; where they
+        are violated between, points are added.
 
     Returns
     -------
@@ -100,9 +119,13 @@ def output_feedback(
     least_ranks(plant)
     factors = levels_above(back_off)
     attempts: list[Attempt] = []
-    every = shapes(parameters, X, Y, plant.dt is not None, depends(plant))
+    matters = depends(plant)
+
+    def every(degree: int) -> list[Shape]:
+        return shapes(parameters, X, Y, plant.dt is not None, matters, degree)
+
     if isinstance(plant.model, UncertainStateSpace):
-        return _robust(plant, every, factors, fastest, divisions, attempts)
+        return _robust(plant, every(DEGREES[1][0]), factors, fastest, divisions, attempts)
     return _nominal(plant, every, factors, fastest, divisions, attempts)
 
 
@@ -115,54 +138,72 @@ def _robust(
     attempts: list[Attempt],
 ) -> Controller:
     """For all models of the set, by the one of the shapes that serves the nominal one best."""
-    gammas = [_gamma(_start(plant, shape, divisions, attempts)) for shape in every]
+    gammas = [_start(plant, shape, divisions, attempts).gamma for shape in every]
     start = min(gammas)
     best = every[gammas.index(start)]
-    found = scaled_plant(plant, start, lambda p: _gamma(_start(p, best, divisions, attempts)))
+    found = scaled_plant(plant, start, lambda p: _start(p, best, divisions, attempts).gamma)
     if found is None:
         raise failed(plant, attempts)
-    made = _nominal(found, [best], factors, fastest, divisions, attempts)
+    made = _nominal(found, lambda degree: [best], factors, fastest, divisions, attempts)
     return replace(made, plant=plant, method=f"robust {made.method}")
 
 
-def _start(
-    plant: Plant, shape: Shape, divisions: int, attempts: list[Attempt]
-) -> tuple[Coordinates, Existence, Found]:
+def _start(plant: Plant, shape: Shape, divisions: int, attempts: list[Attempt]) -> Start:
     return least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
-
-
-def _gamma(start: tuple[Coordinates, Existence, Found]) -> float:
-    return start[0].channel * start[2].gamma
 
 
 def _nominal(
     plant: Plant,
-    every: Sequence[Shape],
+    every: Callable[[int], Sequence[Shape]],
     factors: Sequence[float],
     fastest: float,
     divisions: int,
     attempts: list[Attempt],
 ) -> Controller:
     """For one model, by the best of the shapes."""
-    started = [(_start(plant, shape, divisions, attempts), shape) for shape in every]
-    started = [each for each in started if math.isfinite(_gamma(each[0]))]
-    if not started:
+    floor = worst_optimum(plant)
+    start = best(
+        lambda channel: coordinates_of(plant, channel), every, divisions, USUAL, attempts, floor
+    )
+    if not math.isfinite(start.gamma):
         raise failed(plant, attempts)
-    start, shape = min(started, key=lambda each: _gamma(each[0]))
-    best: Controller | None = None
+    slowest: Controller | None = None
     for design in settled(start, factors, _recover, USUAL, attempts):
-        made = in_plant_units(
-            plant, design.coordinates, design.gains, design.gamma, f"output feedback, {shape}"
-        )
-        made = replace(made, by_adjoint=shape.by_y)
-        # rough gains of p, or fast ones, are those of a block that is nearly singular
-        good = made.misfit <= ACCURACY and _fastest(made.model) <= fastest
-        best = made if best is None or good or made.misfit < best.misfit else best
-        if good:
+        method = f"output feedback, {start.shape}"
+        made = in_plant_units(plant, design.coordinates, design.fit, design.gamma, method)
+        made = replace(made, optimum=start.gamma, by_adjoint=start.shape.by_y)
+        frozen = frozen_stability(made.closed())
+        if frozen.stable is False:
+            attempts.append(Attempt("frozen loop", 0.0, f"not stable at {frozen.p}", math.inf))
+            continue
+        slowest = made if slowest is None or _fastest(made) < _fastest(slowest) else slowest
+        if _fastest(made) <= fastest:
             break
-    if best is None:
+    if slowest is None:
         raise failed(plant, attempts)
-    return replace(best, optimum=_gamma(start), attempts=tuple(attempts))
+    notes = _limited(start, slowest, floor, fastest)
+    return replace(slowest, notes=notes, attempts=tuple(attempts))
+
+
+def _limited(start: Start, made: Controller, floor: float, fastest: float) -> tuple[str, ...]:
+    """What may have kept the controller from a lower gamma, or from its limits, a sentence each."""
+    out = []
+    if start.existence.bounded(start.found) and start.existence.largest >= LARGEST[-1]:
+        out.append(
+            f"the bound {start.existence.largest:g} on X and Y decides gamma: some measurement is"
+            " almost free of noise or some control almost free of cost; give it more"
+        )
+    if made.gamma > FAR_ABOVE * start.gamma:
+        out.append(
+            f"gamma is {made.gamma / start.gamma:.2f} times the least one of the inequalities: no"
+            " nearer controller had gains that are smooth in the scheduling parameters"
+        )
+    if _fastest(made) > fastest:
+        out.append(
+            f"the fastest pole of the controller is at {_fastest(made):.4g} rad/s, asked was"
+            f" {fastest:g}: give larger values of back_off, or weights that ask for less bandwidth"
+        )
+    return tuple(out)
 
 
 def _recover(
@@ -194,10 +235,11 @@ def _recover(
     return gains
 
 
-def _fastest(model: LPVStateSpace) -> float:
+def _fastest(made: Controller) -> float:
     """The largest modulus of a pole, rad/s, of a continuous controller; 0 of another."""
+    model = made.model
     if model.dt is not None:
         return 0.0
-    p = np.stack([np.linspace(s.low, s.high, 9) for s in model.parameters], axis=1)
-    A = model.matrices(p[:, 0] if p.shape[1] == 1 else p).A
+    p = lobatto_points(CHECKED.get(len(model.parameters), 3), model.box)
+    A = model.matrices(p).A
     return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))

@@ -50,7 +50,8 @@ def require_channels(plant: Plant, *, controls: bool = True, measurements: bool 
 def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
     """The error that says why: modes, directions and weights, and every program that was tried."""
     p, said = conditions(plant)
-    least = min((a.bound for a in attempts), default=math.inf)
+    # what a solve that ran out of digits left is no level of this plant
+    least = min((a.bound for a in attempts if a.answer.startswith("solved")), default=math.inf)
     why = reasons(
         plant.matrices(p),
         plant.channels,

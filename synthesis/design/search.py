@@ -1,5 +1,5 @@
-"""From a plant to X(p), Y(p) and the gains they promise: which of them moves, how far from the
-least gamma, in a stated order.
+"""From a plant to X(p), Y(p) and the gains they promise: which of them moves and of what degree,
+how far from the least gamma, in a stated order.
 """
 
 from __future__ import annotations
@@ -8,16 +8,19 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace, Scheduling
+from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import polynomials
 from symheli.progress import tracked
 from synthesis.certificate import Attempt
 from synthesis.design.coordinates import Coordinates
-from synthesis.design.existence import Existence, Found
+from synthesis.design.existence import LARGEST, Existence, Found
+from synthesis.design.fitted import Fitted, fits
 from synthesis.design.motions import used
 from synthesis.program.cone_program import Solver
 from synthesis.worst.frozen import norm
@@ -27,12 +30,28 @@ Array = np.ndarray
 Dependence = int | tuple[int, ...] | FunctionSpace
 """Of X or Y on the parameters: a degree for all, one each, or the functions themselves."""
 
-BACK_OFF = (1.02, 1.05, 1.2, 1.5)
+BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
 """Multiples of the least gamma at which X and Y are settled, tried in turn."""
 SLACK = 1e-3
 """By which the frozen gain of a controller may exceed what was promised: rounding."""
-USUAL = 2
-"""Degree of the one that moves."""
+ROUGH = 0.3
+"""Functions of p farther from the gains than this are not looked at."""
+BETTER = 0.7
+"""Part of the error of functions of p to which others must lower it to be looked at."""
+ACCURACY = 3e-3
+"""Of functions of p fitted to the gains, relative, entry by entry."""
+NEAR = 2e-2
+"""Polynomials as accurate as this are preferred to splines."""
+CHECKED = {1: 33, 2: 7}
+"""Values of each parameter at which frozen loops are judged, beside those where the inequalities
+were imposed (more parameters: 3).
+"""
+DEGREES = {1: (2, 4, 6, 8), 2: (2, 4)}
+"""Of the one that moves, tried in turn while gamma falls (more parameters: 2)."""
+CLOSE = 1.008
+"""A gamma within this factor of what no controller can beat is not worth another program."""
+WORTH = 0.995
+"""Part of gamma to which a richer program must lower it to be worth another."""
 FAR = 30.0
 """A gamma this many times larger or smaller than the unit of performance asks for another unit."""
 
@@ -43,6 +62,11 @@ class Shape:
 
     X: FunctionSpace | None
     Y: FunctionSpace | None
+
+    @property
+    def size(self) -> int:
+        """Number of functions of both."""
+        return sum(basis.size for basis in (self.X, self.Y) if basis is not None)
 
     @property
     def by_y(self) -> bool:
@@ -100,17 +124,18 @@ def shapes(
     Y: Dependence | None,
     sampled: bool,
     matters: Sequence[bool],
+    degree: int = DEGREES[1][0],
 ) -> list[Shape]:
-    """The pairs that are tried: what was asked for, else one of the two moving, then the other,
-    with the parameters that the plant depends on.
+    """The pairs that are tried: what was asked for, else one of the two moving, of this degree,
+    then the other, with the parameters that the plant depends on.
 
     Both may move with a parameter that stands still, and with one whose rate is another parameter:
     then the controller knows how they move. Raises `InputError` where it would need dp/dt.
     """
     free = [isinstance(s.rate, str) or s.rate == 0 for s in parameters]
     jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
-    both = tuple(USUAL if f and m else 0 for f, m in zip(free, matters, strict=True))
-    one = tuple(USUAL if m and not j else 0 for j, m in zip(jumps, matters, strict=True))
+    both = tuple(degree if f and m else 0 for f, m in zip(free, matters, strict=True))
+    one = tuple(degree if m and not j else 0 for j, m in zip(jumps, matters, strict=True))
     pairs: list[tuple[Dependence, Dependence]] = []
     if X is not None or Y is not None:
         pairs = [(both if X is None else X, both if Y is None else Y)]
@@ -146,14 +171,30 @@ Loop = Callable[[Coordinates, Gains, Array], tuple[Array, ...]]
 """A, B, C, D (K, ..) of what is judged, at p (K, m)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Design:
-    """X and Y with the gamma they hold for, in these coordinates; `gains` at p (K, m), scaled."""
+class Start(NamedTuple):
+    """The least gamma of a shape."""
 
     coordinates: Coordinates
     existence: Existence
     found: Found
-    gains: Gains
+    shape: Shape
+
+    @property
+    def gamma(self) -> float:
+        """In the units of the plant; inf where none was found."""
+        return self.coordinates.channel * self.found.gamma
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """X and Y with the gamma they hold for, in these coordinates; `fit` are the gains (K, ..) at p
+    (K, m), scaled, as functions of p.
+    """
+
+    coordinates: Coordinates
+    existence: Existence
+    found: Found
+    fit: Fitted
 
     @property
     def gamma(self) -> float:
@@ -164,73 +205,160 @@ class Design:
 Recover = Callable[[Coordinates, Existence, Found], Gains]
 
 
+def best(
+    coordinates: Callable[[float], Coordinates],
+    every: Callable[[int], Sequence[Shape]],
+    divisions: int,
+    solver: Solver,
+    attempts: list[Attempt],
+    floor: float = 0.0,
+) -> Start:
+    """The shape of the least gamma: of those of the lowest degree the best, then of higher degrees
+    while that lowers it, then with a larger bound on X and Y where that decides. No controller has
+    a gamma below `floor`.
+    """
+    channel = floor if 0 < floor < math.inf else 1.0
+    degrees = DEGREES.get(len(coordinates(1.0).parameters), (2,))
+    starts = [
+        least(coordinates, shape, divisions, solver, attempts, channel)
+        for shape in every(degrees[0])
+    ]
+    chosen = min(range(len(starts)), key=lambda k: starts[k].gamma)
+    start = starts[chosen]
+
+    def worth(other: Start) -> bool:
+        return other.gamma < WORTH * start.gamma
+
+    for degree in degrees[1:]:
+        shape = every(degree)[chosen]
+        if start.gamma <= CLOSE * floor or shape.size == start.shape.size:
+            break
+        richer = least(coordinates, shape, divisions, solver, attempts, channel)
+        more = worth(richer)
+        start = richer if richer.gamma < start.gamma else start
+        if not more and math.isfinite(start.gamma):
+            break
+    for largest in LARGEST[1:]:
+        if start.gamma <= CLOSE * floor or not start.existence.bounded(start.found):
+            break
+        wider = least(
+            coordinates, start.shape, divisions, solver, attempts, start.gamma, largest=largest
+        )
+        if not worth(wider):
+            break
+        start = wider
+    return start
+
+
 def least(
     coordinates: Callable[[float], Coordinates],
     shape: Shape,
     divisions: int,
     solver: Solver,
     attempts: list[Attempt],
-) -> tuple[Coordinates, Existence, Found]:
-    """The least gamma, in a unit of performance that suits it."""
-    channel = 1.0
+    channel: float = 1.0,
+    *,
+    largest: float = LARGEST[0],
+) -> Start:
+    """The least gamma of a shape, in a unit of performance that suits it, at first `channel`."""
     for _ in tracked(f"least gamma, {shape}", range(3)):
         own = coordinates(channel)
-        existence = Existence(own, shape.X, shape.Y, divisions)
+        existence = Existence(own, shape.X, shape.Y, divisions, largest)
         found = existence.least_gamma(solver)
         gamma = channel * found.gamma
         attempts.append(Attempt(f"least gamma, {shape}", 0.0, found.message, gamma))
         if not math.isfinite(found.gamma) or 1 / FAR < found.gamma < FAR:
             break
         channel = gamma
-    return own, existence, found
+    return Start(own, existence, found, shape)
 
 
 def settled(
-    start: tuple[Coordinates, Existence, Found],
+    start: Start,
     back_off: Sequence[float],
     recover: Recover,
     solver: Solver,
     attempts: list[Attempt],
     loop: Loop | None = None,
 ) -> Iterator[Design]:
-    """Designs at ever larger multiples of the least gamma, whose frozen `loop` keeps it."""
-    coordinates, existence, lowest = start
+    """Designs at these multiples of the least gamma, whose frozen `loop` keeps it with the gains
+    as functions of p.
+    """
+    coordinates, existence, lowest, _ = start
     if not math.isfinite(lowest.gamma):
         return
+    points = _judged(existence)
     for factor in tracked("backing off", back_off):
         gamma = factor * lowest.gamma
         for found in tracked(f"at {factor:g} of the least gamma", existence.widest(gamma, solver)):
             gains = recover(coordinates, existence, found) if np.any(found.coefficients) else None
-            reached = math.inf
+            reached, fit = math.inf, None
             if gains is not None:
                 # X and Y of a solver that stopped short may not be positive
                 with contextlib.suppress(np.linalg.LinAlgError):
-                    reached = frozen_gain(coordinates, gains, loop or closed)
+                    reached = frozen_gains(coordinates, gains, loop or closed, points).max()
+                    if reached <= gamma * (1 + SLACK):
+                        fit = _fit(coordinates, gains, loop or closed, points, gamma)
             kept = "none" if math.isinf(reached) else f"worst frozen gain {reached / gamma:.4f}"
+            apart = "" if fit is None else f", functions of p within {fit.misfit:.1e}"
             attempts.append(
                 Attempt(
                     f"back-off {factor:g}",
                     0.0,
-                    f"{found.message}, {kept} of it",
+                    f"{found.message}, {kept} of it{apart}",
                     gamma * coordinates.channel,
                 )
             )
-            if gains is not None and reached <= gamma * (1 + SLACK):
-                yield Design(coordinates, existence, found, gains)
+            if fit is not None:
+                yield Design(coordinates, existence, found, fit)
                 break
 
 
-def frozen_gain(coordinates: Coordinates, gains: Gains, loop: Loop) -> float:
-    """Of the loop at some frozen p, scaled, where a parameter that is the rate of another is zero;
-    inf where one is unstable.
+def _fit(
+    coordinates: Coordinates, gains: Gains, loop: Loop, points: Array, gamma: float
+) -> Fitted | None:
+    """The simplest functions that keep gamma and are accurate, else the most accurate of those that
+    keep it; None where none does.
     """
-    parameters = coordinates.parameters
-    low, high = np.array([(s.low, s.high) for s in parameters]).T
-    p = low + np.linspace(0.0, 1.0, 7)[:, None] * (high - low)
+    best: Fitted | None = None
+    for fit in fits(gains, coordinates.parameters):
+        if best is not None and best.misfit <= NEAR and not fit.basis.degrees:
+            break
+        if fit.misfit > (ROUGH if best is None else BETTER * best.misfit):
+            continue
+        if frozen_gains(coordinates, fit, loop, points).max() > gamma * (1 + SLACK):
+            continue
+        best = fit
+        if fit.misfit <= ACCURACY:
+            break
+    return best
+
+
+def _judged(existence: Existence) -> Array:
+    """Points (K, m) at which frozen loops are judged; a parameter that is the rate of another is
+    zero there.
+    """
+    parameters = existence.plant.parameters
+    count = CHECKED.get(len(parameters), 3)
+    axes = [np.linspace(s.low, s.high, count) for s in parameters]
+    p = np.unique(np.concatenate([tensor_grid(axes), existence.points]), axis=0)
     rates = [s.name in {other.rate for other in parameters} for s in parameters]
+    low, high = np.array([(s.low, s.high) for s in parameters]).T
     p[:, rates] = np.clip(0.0, low, high)[rates]
+    return np.unique(p, axis=0)
+
+
+def frozen_gains(coordinates: Coordinates, gains: Gains, loop: Loop, p: Array) -> Array:
+    """Of the loop frozen at each p (K, m), scaled; inf where it is unstable, and then at all."""
     A, B, C, D = loop(coordinates, gains, p)
-    return max(norm(A[i], B[i], C[i], D[i], coordinates.dt, 1e-6)[0] for i in range(len(p)))
+    if any(_unstable(M, coordinates.dt) for M in A):
+        return np.full(len(p), math.inf)
+    return np.array([norm(*each, coordinates.dt, 1e-4)[0] for each in zip(A, B, C, D, strict=True)])
+
+
+def _unstable(A: Array, dt: float | None) -> bool:
+    poles = np.linalg.eigvals(A)
+    return bool(np.any(poles.real >= 0 if dt is None else np.abs(poles) >= 1))
 
 
 def closed(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:
@@ -245,14 +373,15 @@ def dependence(
     parameters: Sequence[Scheduling],
     name: str,
     matters: Sequence[bool],
+    degree: int = DEGREES[1][0],
     *,
     still: bool = False,
 ) -> FunctionSpace:
-    """Functions of X or Y where there is only one of them: by default of degree `USUAL` in what the
+    """Functions of X or Y where there is only one of them: by default of this degree in what the
     plant depends on and may not jump; `still`: nor move.
     """
     degrees = tuple(
-        USUAL if m and (s.rate == 0 if still else s.rate != math.inf) else 0
+        degree if m and (s.rate == 0 if still else s.rate != math.inf) else 0
         for s, m in zip(parameters, matters, strict=True)
     )
     basis = limited(

@@ -15,12 +15,13 @@ from synthesis.design.conditions import conditions
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates, coordinates_of, depends
 from synthesis.design.existence import Existence, Found
+from synthesis.design.frozen_stability import frozen_stability
 from synthesis.design.in_plant_units import in_plant_units
 from synthesis.design.output_feedback import USUAL
 from synthesis.design.recovery import control_gain
 from synthesis.design.refusals import failed, least_ranks
 from synthesis.design.sampled_recovery import state_gain
-from synthesis.design.search import BACK_OFF, Dependence, Shape, dependence, least, settled
+from synthesis.design.search import BACK_OFF, Dependence, Shape, best, dependence, settled
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
@@ -86,15 +87,19 @@ def state_feedback(
     least_ranks(plant, measurements=False)
     _check_measured(plant)
     attempts: list[Attempt] = []
-    shape = Shape(None, dependence(Y, parameters, "Y", depends(plant)))
-    start = least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
+    matters = depends(plant)
+
+    def every(degree: int) -> list[Shape]:
+        return [Shape(None, dependence(Y, parameters, "Y", matters, degree))]
+
+    start = best(lambda channel: coordinates_of(plant, channel), every, divisions, USUAL, attempts)
     factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts):
-        made = in_plant_units(
-            plant, design.coordinates, design.gains, design.gamma, f"state feedback, {shape}"
-        )
-        optimum = start[0].channel * start[2].gamma
-        return replace(made, optimum=optimum, attempts=tuple(attempts))
+        method = f"state feedback, {start.shape}"
+        made = in_plant_units(plant, design.coordinates, design.fit, design.gamma, method)
+        made = replace(made, optimum=start.gamma)
+        if frozen_stability(made.closed()).stable is not False:
+            return replace(made, attempts=tuple(attempts))
     raise failed(plant, attempts)
 
 

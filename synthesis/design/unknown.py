@@ -54,12 +54,12 @@ class Unknown:
 
 
 class Blocks:
-    """Blocks F(p) = sum of left' X(p) right(p) and its transpose + constant - g level on one cell,
-    collected term by term at its nodes.
+    """Blocks F(p) = sum of left' X(p) right(p) and its transpose + constant - g level, one for each
+    of `count` points p, collected term by term.
     """
 
-    def __init__(self, size: int, nodes: int, to_bernstein: Array):
-        self.shape, self.to_bernstein = (nodes, size, size), to_bernstein
+    def __init__(self, size: int, count: int):
+        self.shape = (count, size, size)
         self.terms: list[tuple[Array, Array, Array]] = []
 
     def add(self, unknown: Unknown, weights: Array, left: Array, right: Array) -> Blocks:
@@ -70,20 +70,19 @@ class Blocks:
 
     def finished(self, constant: Array | float, level: Array | float) -> LyapunovBlocks:
         """With what is known: (K, N, N) or (N, N)."""
-        T = self.to_bernstein
         lefts: list[Array] = []
         where = [_place(lefts, left) for _, left, _ in self.terms]
         columns = np.unique(np.concatenate([c for c, _, _ in self.terms]))
         n = lefts[0].shape[0]
-        varying = np.zeros((len(T), len(columns), len(lefts), n, self.shape[1]))
+        varying = np.zeros((self.shape[0], len(columns), len(lefts), n, self.shape[1]))
         for (own, _, values), r in zip(self.terms, where, strict=True):
-            varying[:, np.searchsorted(columns, own), r] += np.tensordot(T, values, axes=1)
-
-        def spread(M: Array | float) -> Array:
-            return np.tensordot(T, np.broadcast_to(M, self.shape), axes=1)
-
+            varying[:, np.searchsorted(columns, own), r] += values
         return LyapunovBlocks(
-            columns, np.stack(lefts), varying, spread(constant), level=spread(level)
+            columns,
+            np.stack(lefts),
+            varying,
+            np.broadcast_to(constant, self.shape),
+            level=np.broadcast_to(level, self.shape),
         )
 
 

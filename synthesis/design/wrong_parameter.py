@@ -23,6 +23,8 @@ from scipy import linalg
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Patches, Scheduling, UncertainStateSpace
+from symheli.lpv.bases.function_space import Piece
+from symheli.lpv.equilibration import equilibrate
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.lower_feedback import Partition, Positions
 from symheli.lpv.matrix_function import MatrixFunction, block, functions_of, in_one_basis
@@ -30,17 +32,21 @@ from symheli.values.sample_period import same_period
 from symheli.values.signal import signals
 from synthesis.design.as_controller import as_controller
 from synthesis.design.balanced_block import balanced
+from synthesis.design.existence import FINEST
 from synthesis.polynomial.bernstein import restriction
+from synthesis.polynomial.pieces import function_pieces
 
 if TYPE_CHECKING:
     from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
-JUMP = 1e-9
-"""A controller that changes by more than this fraction of its size at one p has no slope there."""
-RANK = 1e-12
-"""Directions that the slope reaches by less than this fraction are those of rounding."""
+ROUNDING = 64 * np.finfo(float).eps
+"""What an entry may be off by, as a fraction of the terms that it is the sum of: of its own, so
+that the units of controls and measurements play no part.
+"""
+LOST = 0.1
+"""Coordinates whose inverse is not known to this fraction are not used."""
 
 
 def with_wrong_parameter(
@@ -95,8 +101,9 @@ def with_wrong_parameter(
     """
     if not (np.isfinite(error) and error >= 0):
         raise InputError(f"error: expected a number >= 0 in the unit of p, got {error!r}")
-    if isinstance(divisions, bool) or not isinstance(divisions, int) or divisions < 1:
-        raise InputError(f"divisions: expected an integer >= 1, got {divisions!r}")
+    whole = isinstance(divisions, int) and not isinstance(divisions, bool)
+    if not whole or not 1 <= divisions <= FINEST:
+        raise InputError(f"divisions: expected an integer from 1 to {FINEST}, got {divisions!r}")
     if len(plant.parameters) != 1:
         raise InputError(
             "a wrong reading is that of one parameter; the plant has"
@@ -107,8 +114,8 @@ def with_wrong_parameter(
     s = plant.parameters[0]
     reach = min(error, s.high - s.low)  # of a reading that ends where the range does
     S = _slopes(K, s, reach, divisions)
-    U = _reached([each.coefficients for each in S])
-    seen = [MatrixFunction(each.basis, U.T @ each.coefficients, each.box) for each in S]
+    U, rows_kept = _reached([each.coefficients for each in S])
+    seen = [each[rows_kept, :] for each in S]
     enter = np.hstack([reach * U] * len(seen))
     rows = np.concatenate([each.coefficients for each in seen], axis=1)
     leave = MatrixFunction(seen[0].basis, rows, seen[0].box)
@@ -243,9 +250,26 @@ def _in_balanced_units(
         for at in (1j * omega if dt is None else np.exp(1j * omega * dt))
     ]
     left, right, _ = balanced(np.concatenate(responses), size, count)
+    left, right = _inverse(left, right, size * count)
     right = linalg.block_diag(np.eye(w), right)
-    left = linalg.block_diag(np.eye(z), np.linalg.inv(left))
+    left = linalg.block_diag(np.eye(z), left)
     return replace(model, B=model.B @ right, C=left @ model.C, D=left @ model.D @ right)
+
+
+def _inverse(left: Array, right: Array, own: int) -> tuple[Array, Array]:
+    """(left^-1, right) with the `own` first columns of `right` enlarged by what rounding takes from
+    the inverse: b T^-1 (T^-1)^-1 is then within the error for every b. No change of coordinates
+    where that is too much.
+    """
+    inverse, T = np.linalg.inv(left), left[:own, :own]
+    L = inverse[:own, :own]
+    computed = np.abs(L @ T - np.eye(own))
+    missed = np.linalg.norm(computed + own * np.finfo(float).eps * np.abs(L) @ np.abs(T))
+    if not missed < LOST:
+        return np.eye(len(left)), np.eye(len(right))
+    grown = right * (1.0 + 4 * np.finfo(float).eps)
+    grown[:, :own] /= 1.0 - missed
+    return inverse, grown
 
 
 def _constant(M: Array, like: MatrixFunction) -> MatrixFunction:
@@ -311,34 +335,63 @@ def _slopes(K: LPVStateSpace, s: Scheduling, error: float, divisions: int) -> li
 
 def _box(hull: Array) -> list[Array]:
     """S_0, S_1 .. of which S_0 + sum_i m_i S_i, |m_i| <= 1, holds all of the hull: its principal
-    directions, each as long as the hull reaches that way.
+    directions where each entry is measured by its own spread, each as long as the hull reaches that
+    way. As many as leave nothing of any entry but rounding.
     """
     centre = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
     flat = (hull - centre).reshape(len(hull), -1)
-    _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
-    largest = np.linalg.norm(hull.reshape(len(hull), -1), axis=1).max()
-    kept = directions[sizes > RANK * max(largest, sizes[0])]
-    reach = np.abs(flat @ kept.T).max(axis=0, initial=0.0)
-    return [centre, *(r * d.reshape(centre.shape) for r, d in zip(reach, kept, strict=True))]
+    spread = np.abs(flat).max(axis=0)
+    moves = spread > 0
+    unit = flat[:, moves] / spread[moves]
+    _, _, directions = np.linalg.svd(unit, full_matrices=False)
+    out = [centre]
+    for d in directions:
+        if np.abs(unit).max(initial=0.0) <= ROUNDING:
+            break
+        share = unit @ d
+        whole = np.zeros(centre.size)
+        whole[moves] = np.abs(share).max() * d * spread[moves]
+        out.append(whole.reshape(centre.shape))
+        unit = unit - np.outer(share, d)
+    return out
 
 
 def _derivative(K: LPVStateSpace, M: Array, s: Scheduling) -> tuple[list[float], list[Array]]:
-    """Ends of the pieces of K, and the Bernstein coefficients (degree, ..) of its slope on each."""
-    cuts, slopes, end = [], [], None
-    size = np.abs(M).max(initial=0.0)
-    for piece in K.basis.pieces():
-        values = np.tensordot(piece.bernstein.T, M, axes=1)
-        if end is not None and np.abs(values[0] - end).max(initial=0.0) > JUMP * size:
+    """Ends of the pieces of K, and the Bernstein coefficients (degree, ..) of its slope on each.
+
+    A jump is one of an entry beside its own terms, whatever stands in the others.
+    """
+    pieces = function_pieces(K.basis, s.low, s.high)
+    slopes, end = [], None
+    for piece in pieces:
+        first, last = (
+            (
+                np.tensordot(piece.bernstein[:, at], M, axes=1),
+                np.tensordot(np.abs(piece.bernstein[:, at]), np.abs(M), axes=1),
+            )
+            for at in (0, -1)
+        )
+        if end is not None and np.any(np.abs(first[0] - end[0]) > ROUNDING * (first[1] + end[1])):
             raise InputError(
                 f"the controller jumps at {s.name} = {piece.low:g} {s.unit}: a wrong reading there"
                 " changes it at once; make a table of it, or give it a continuous basis"
             )
-        end = values[-1]
-        degree = len(values) - 1
-        slope = degree * np.diff(values, axis=0) if degree else np.zeros_like(values)
-        slopes.append(slope / (piece.high - piece.low))
-        cuts.append(piece.low)
-    return [*cuts, K.basis.pieces()[-1].high], slopes
+        end = last
+        slopes.append(_slope(piece, M, K.basis.constant()))
+    return [*(piece.low for piece in pieces), pieces[-1].high], slopes
+
+
+def _slope(piece: Piece, M: Array, one: Array) -> Array:
+    """Bernstein coefficients (degree, ..) of the slope on a piece; exactly zero for an entry that
+    is one number there.
+    """
+    degree, width = piece.bernstein.shape[1] - 1, piece.high - piece.low
+    if degree == 0:
+        return np.zeros((1, *M.shape[1:]))
+    of_each = degree * np.diff(piece.bernstein, axis=1) / width
+    if np.all(one == 1.0):  # the slopes add up to zero, so that any matrix may be taken away
+        M = M - M[int(np.argmax(np.abs(of_each).max(axis=1)))]
+    return np.tensordot(of_each.T, M, axes=1)
 
 
 def _hull(cuts: list[float], slopes: list[Array], low: float, high: float) -> Array:
@@ -352,8 +405,30 @@ def _hull(cuts: list[float], slopes: list[Array], low: float, high: float) -> Ar
     return np.concatenate(found)
 
 
-def _reached(S: list[Array]) -> Array:
-    """An orthonormal basis (rows, r) of all that the slopes reach, r >= 1."""
-    side_by_side = np.concatenate(list(np.concatenate(S)), axis=1)
-    U, values, _ = np.linalg.svd(side_by_side, full_matrices=False)
-    return U[:, : max(1, int(np.sum(values > RANK * values[0])))]
+def _reached(S: list[Array]) -> tuple[Array, list[int]]:
+    """U (rows, r) and r rows with S = U S[those rows] for every slope, r >= 1.
+
+    A row is left out where the others give all its entries, each to its own rounding.
+    """
+    whole = np.concatenate(list(np.concatenate(S)), axis=1)
+    used = np.flatnonzero(np.any(whole != 0, axis=1))
+    if not len(used):
+        return np.eye(len(whole), 1), [0]
+    size, column = equilibrate(np.abs(whole[used]))
+    scaled = size[:, None] * whole[used] * column
+    _, R, order = linalg.qr(scaled.T, mode="economic", pivoting=True)  # type: ignore[misc]
+    U = np.zeros((len(whole), len(used)))
+    U[used, np.arange(len(used))] = 1.0
+    kept = list(used)
+    for r in range(1, min(len(used), *scaled.shape)):
+        if R[r - 1, r - 1] == 0.0:
+            break
+        few, rest = order[:r], order[r:]
+        share = linalg.solve_triangular(R[:r, :r], R[:r, r:]).T
+        missed = np.abs(scaled[rest] - share @ scaled[few])
+        if np.all(missed <= ROUNDING * np.abs(scaled[rest])):
+            U, kept = np.zeros((len(whole), r)), [int(k) for k in used[few]]
+            U[used[few], np.arange(r)] = 1.0
+            U[used[rest]] = share * size[few] / size[rest][:, None]
+            break
+    return U, [int(k) for k in kept]

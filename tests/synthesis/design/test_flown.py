@@ -89,6 +89,36 @@ def test_a_performance_that_is_missed_too_is_refused():
         certify_flown(table(), plant, search=None)
 
 
+@pytest.mark.parametrize("unit", [1e-200, 1e-12, 1e-3, 1.0, 1e6, 1e12])
+@pytest.mark.parametrize("of", ["C", "D"])
+def test_a_missed_performance_is_refused_in_any_unit_and_beside_any_other(unit, of):
+    """Of y, of which half is left out, beside z of size one, which is exact."""
+    model = LPVStateSpace.polynomial(
+        [[[0.9]], [[0.01]]],
+        [[[0.1, 0.1]]],
+        [[[unit], [1.0], [1.0]]],
+        [[[unit, 0.0], [1.0, 0.0], [0.0, 0.0]]],
+        P,
+        DT,
+        ("phi",),
+        ("w", "d_lat"),
+        ("y", "z", "phi"),
+    )
+    at = np.array([5.0])
+    exact = model.matrices(at)
+    more = getattr(exact, of) * np.array([[1.5], [1.0], [1.0]])
+    off = model.with_residuals(at, exact._replace(**{of: more}))
+    plant = Plant(
+        off,
+        disturbances=["w"],
+        performance=["y", "z"],
+        controls=["d_lat"],
+        measurements=["phi"],
+    )
+    with pytest.raises(InputError, match="is a fit too"):
+        certify_flown(table(), plant, search=None)
+
+
 def test_a_plant_in_continuous_time_is_refused():
     with pytest.raises(InputError, match="sampled\\(dt\\)"):
         certify_flown({("d_lat", "phi"): -1.0}, roll(dt=None))

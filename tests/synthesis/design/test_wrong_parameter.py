@@ -12,7 +12,7 @@ from synthesis import Plant, Spline, frozen_gain, l2_gain, proven_around, with_w
 from synthesis.cover import Remainder, covering
 from synthesis.design.balanced_block import balanced
 from synthesis.design.largest import largest
-from synthesis.design.wrong_parameter import _slopes
+from synthesis.design.wrong_parameter import _reached, _slopes
 
 P = Scheduling("p", "1", 0.0, 1.0, rate=0.1)
 CLOSE = 1e-4
@@ -110,16 +110,13 @@ def test_every_divided_difference_is_within_the_slopes(basis, error):
     there, here = (np.block([[M.A, M.B], [M.C, M.D]]) for M in (K.matrices(q), K.matrices(p)))
     far = np.abs(q - p) > 1e-3
     slope = (there - here)[far] / (q - p)[far, None, None]
-    rest = slope - S[0](p[far])
-    for each in S[1:]:
-        direction = each(p[far])
-        square = (direction**2).sum(axis=(1, 2))
-        known = np.where(square > 0, square, 1.0)
-        m = (rest * direction).sum(axis=(1, 2)) / known
+    rest = (slope - S[0](p[far])).reshape(len(slope), -1)
+    directions = np.stack([each(p[far]).reshape(len(slope), -1) for each in S[1:]], axis=-1)
+    for wanted, along in zip(rest, directions, strict=True):
+        m = np.linalg.lstsq(along, wanted)[0]
         assert np.abs(m).max() <= 1 + 1e-9
-        rest = rest - m[:, None, None] * direction
-    # the directions left out are those of rounding, which a quotient by 1e-3 makes larger
-    assert np.abs(rest).max() < 1e-9 * np.abs(slope).max()
+        # what no direction gives is rounding, which a quotient by 1e-3 makes larger
+        assert np.abs(wanted - along @ m).max() < 1e-9 * np.abs(slope).max()
 
 
 @pytest.mark.parametrize(
@@ -200,6 +197,94 @@ def test_a_controller_that_jumps_is_refused():
     jumps = scheduled(Patches(1, (0.0, 0.5, 1.0)))
     with pytest.raises(InputError, match=r"jumps at p = 0\.5"):
         with_wrong_parameter(pendulum(), jumps, 0.1)
+
+
+def two_lags(size):
+    """Two lags of one state, seen in units `size` times finer and coarser."""
+    model = LPVStateSpace.polynomial(
+        [np.diag([0.9, 0.9]), np.diag([0.3, 0.1])],
+        [np.hstack([0.1 * np.eye(2), 0.1 * np.eye(2)])],
+        [np.vstack([np.eye(2), np.diag([size, 1.0 / size])])],
+        [np.zeros((4, 4))],
+        P,
+        0.1,
+        inputs=("w", "x", "u", "v"),
+        outputs=("y", "z", "a", "b"),
+    )
+    return Plant(
+        model,
+        disturbances=["w", "x"],
+        performance=["y", "z"],
+        controls=["u", "v"],
+        measurements=["a", "b"],
+    )
+
+
+def two_gains(*coefficients, basis=None):
+    """u = (c0 + c1 p + ..) y for 2 x 2 matrices c, or coefficients of a `basis`."""
+    D = np.array(coefficients)
+    if basis is None:
+        return LPVStateSpace.polynomial(
+            [np.zeros((0, 0))],
+            [np.zeros((0, 2))],
+            [np.zeros((2, 0))],
+            D,
+            P,
+            inputs=("a", "b"),
+            outputs=("u", "v"),
+        )
+    n = basis.size
+    nothing = np.zeros((n, 0, 0)), np.zeros((n, 0, 2)), np.zeros((n, 2, 0))
+    return LPVStateSpace(basis, *nothing, D, (P,), (), ("a", "b"), ("u", "v"), None)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e3, 1e7, 1e12])
+def test_the_bound_covers_the_worst_reading_in_any_units_of_the_measurements(size):
+    """Where p is 1 and read as 0.75 the first pole is 1.2 - 0.325: a gain of 0.8."""
+    K = two_gains(-np.diag([1 / size, size / 2]), -np.diag([3 / size, size / 2]))
+    found = l2_gain(
+        with_wrong_parameter(two_lags(size), K, 0.25), 0.1, form=Spline(degree=0), search=None
+    )
+    assert found.verified
+    assert found.gamma >= 0.8
+    same = l2_gain(
+        with_wrong_parameter(
+            two_lags(1.0), two_gains(-np.diag([1.0, 0.5]), -np.diag([3.0, 0.5])), 0.25
+        ),
+        0.1,
+        form=Spline(degree=0),
+        search=None,
+    )
+    assert found.gamma == pytest.approx(same.gamma, rel=1e-4)
+
+
+@pytest.mark.parametrize("beside", [0.0, 1.0, 1e11, -1e200])
+def test_a_jump_of_one_entry_is_seen_beside_any_other(beside):
+    basis = Patches(0, (0.0, 0.5, 1.0))
+    jumps = two_gains([[-1.0, 0.0], [0.0, beside]], [[-3.0, 0.0], [0.0, beside]], basis=basis)
+    with pytest.raises(InputError, match=r"jumps at p = 0\.5"):
+        with_wrong_parameter(two_lags(1.0), jumps, 0.05)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_slopes_hold_every_entry_to_its_own_size(seed):
+    """Entries from 1e-12 to 1e12: each divided difference is within the slopes, entry by entry."""
+    rng = np.random.default_rng(seed)
+    basis = PiecewiseLinear((0.0, 0.2, 0.45, 1.0))
+    size = 10.0 ** rng.uniform(-12, 12, (3, 3))
+    K = scheduled(basis, seed)
+    whole = rng.standard_normal((4, 3, 3)) * size
+    K = replace(K, A=whole[:, :2, :2], B=whole[:, :2, 2:], C=whole[:, 2:, :2], D=whole[:, 2:, 2:])
+    S = _slopes(K, P, 0.05, 8)
+    U, rows = _reached([each.coefficients for each in S])
+    for p, q in ((0.17, 0.19), (0.19, 0.23), (0.44, 0.46), (0.5, 0.55), (0.0, 0.05)):
+        there, here = (np.block([[M.A, M.B], [M.C, M.D]]) for M in (K.matrices(q), K.matrices(p)))
+        at = np.array([p])
+        kept = [U @ each(at)[0][rows] for each in S]
+        for whole, rebuilt in zip(S, kept, strict=True):
+            np.testing.assert_allclose(rebuilt, whole(at)[0], rtol=1e-12)
+        room = sum(np.abs(each) for each in kept[1:])
+        assert np.all(np.abs((there - here) / (q - p) - kept[0]) <= room + 1e-9 * size)
 
 
 def test_a_wrong_error_or_controller_is_refused():
