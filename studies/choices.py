@@ -18,7 +18,7 @@ Table = Mapping[str, Any]
 
 
 def about(said: str, least: float | None = None, empty: bool = False) -> dict[str, Any]:
-    """Metadata of a field: numbers are at least `least`, lists may be `empty`."""
+    """Metadata of a field: numbers are at least `least`, lists and texts may be `empty`."""
     return {"said": said, "least": least, "empty": empty}
 
 
@@ -65,6 +65,8 @@ def toml(value: Any) -> str:
         return json.dumps(str(value), ensure_ascii=False)
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(toml, value))}]"
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key} = {toml(item)}' for key, item in value.items())}}}"
     if isinstance(value, float) and math.isfinite(value) and value.is_integer():
         return f"{value:.1f}" if abs(value) < 1e15 else repr(value)
     return str(value)
@@ -102,7 +104,7 @@ def _number(value: Any, limits: Mapping[str, Any], whole: bool) -> Any:
 
 
 def _list(item: Any, value: Any, limits: Mapping[str, Any]) -> tuple[Any, ...]:
-    least, what = limits.get("least"), "whole numbers" if item is int else "numbers"
+    least, what = limits.get("least"), _KINDS.get(item, "numbers")
     bound = "" if least is None else f" >= {least:g}"
     expected = f"a list of {what}{bound}{'' if limits.get('empty') else ', one at least'}"
     if not isinstance(value, list | tuple) or not (value or limits.get("empty")):
@@ -113,8 +115,8 @@ def _list(item: Any, value: Any, limits: Mapping[str, Any]) -> tuple[Any, ...]:
         raise _Wrong(expected) from None
 
 
-def _text(value: Any) -> str:
-    if not isinstance(value, str) or not value:
+def _text(value: Any, limits: Mapping[str, Any]) -> str:
+    if not isinstance(value, str) or not (value or limits.get("empty")):
         raise _Wrong("a text in quotes")
     return value
 
@@ -125,12 +127,26 @@ def _truth(value: Any) -> bool:
     return value
 
 
+def _table(item: Any, value: Any, limits: Mapping[str, Any]) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise _Wrong("a table, NAME = value")
+    found = {}
+    for key, each in value.items():
+        try:
+            found[str(key)] = _converted(item, each, limits)
+        except _Wrong as expected:
+            raise _Wrong(f"of {key} {expected}") from None
+    return found
+
+
+_KINDS = {int: "whole numbers", str: "texts in quotes"}
+
 _PLAIN: dict[Any, Callable[[Any, Mapping[str, Any]], Any]] = {
     bool: lambda value, _: _truth(value),
     int: lambda value, about: _number(value, about, whole=True),
     float: lambda value, about: _number(value, about, whole=False),
-    str: lambda value, _: _text(value),
-    Path: lambda value, _: value if isinstance(value, Path) else Path(_text(value)),
+    str: _text,
+    Path: lambda value, about: value if isinstance(value, Path) else Path(_text(value, about)),
 }
 
 
@@ -139,6 +155,8 @@ def _converted(hint: Any, value: Any, limits: Mapping[str, Any]) -> Any:
         return _PLAIN[hint](value, limits)
     if get_origin(hint) is tuple:
         return _list(get_args(hint)[0], value, limits)
+    if get_origin(hint) is Mapping:
+        return _table(get_args(hint)[1], value, limits)
     if is_dataclass(hint):
         if not isinstance(value, hint):  # type: ignore[arg-type]
             raise _Wrong(f"a table with any of {', '.join(f.name for f in fields(hint))}")

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import importlib
 import os
+import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from typing import Any, NoReturn
 from studies.output import Output, as_json
 from studies.progress import displayed
 from studies.threads import one_thread
-from symheli.errors import SymheliError
+from symheli.errors import SymheliError, TrimError, UnknownNameError
 
 VERBS = (
     "study",
@@ -25,6 +26,7 @@ VERBS = (
     "envelope",
     "identify",
     "margins",
+    "synthesize",
     "certify",
     "verify",
     "export",
@@ -43,9 +45,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     one_thread()
     arguments = None
-    asks_json = "--json" in (sys.argv[1:] if argv is None else argv)
+    words = list(sys.argv[1:] if argv is None else argv)
+    asks_json = "--json" in words
     try:
-        arguments = parser().parse_args(argv)
+        arguments = parsed(words)
         return _run(arguments)
     except UsageError as error:
         return _fail(error, asks_json, status=2)
@@ -65,6 +68,8 @@ def _run(arguments: argparse.Namespace) -> int:
                 output: Output = arguments.run(arguments)
             print(as_json(output.data) if arguments.json else output.text, flush=True)
             return output.status
+        except TrimError as error:
+            return _fail(error, arguments.json, f"{error.reason}; try a lower airspeed")
         except SymheliError as error:
             return _fail(error, arguments.json)
         except BrokenPipeError:  # the reader, such as head, has seen enough
@@ -73,6 +78,28 @@ def _run(arguments: argparse.Namespace) -> int:
         except OSError as error:
             sentence = f"{error.filename or 'a file'}: {error.strerror or error}"
             return _fail(error, arguments.json, sentence)
+
+
+def parsed(words: Sequence[str]) -> argparse.Namespace:
+    """The arguments of a verb; raises `UsageError`, with the nearest names for one that is unknown.
+
+    Without a verb the verbs are shown.
+    """
+    whole = parser()
+    verb = next((word for word in words if not word.startswith("-")), None)
+    if verb is None and not {"-h", "--help", "--version"} & set(words):
+        whole.print_help(sys.stderr)
+        raise UsageError("name a verb; `symheli VERB --help` tells its options")
+    if verb is not None and verb not in VERBS:
+        raise UsageError(str(UnknownNameError("verb", verb, VERBS)))
+    arguments, left = whole.parse_known_args(words)
+    if not left:
+        return arguments
+    option = next((word.partition("=")[0] for word in left if word.startswith("-")), None)
+    if option is None:
+        raise UsageError(f"symheli {verb} does not take {left[0]!r}; see symheli {verb} --help")
+    known = dict.fromkeys(re.findall(r"--[a-z][a-z-]*", arguments.usage()))
+    raise UsageError(str(UnknownNameError("option", option, known)))
 
 
 class UsageError(SymheliError):
@@ -102,6 +129,7 @@ def parser() -> Parser:
         sub = verbs.add_parser(verb, help=module.HELP, description=module.HELP)
         sub.set_defaults(
             run=module.run,
+            usage=sub.format_usage,
             kept=lambda _: "nothing was written, files that were there are unchanged",
         )
         module.configure(sub)

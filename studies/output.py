@@ -48,12 +48,6 @@ def progress(message: str) -> None:
 
 def columns(rows: list[list[str]], left: int = 1, gap: str = "  ") -> str:
     """Rows of text as aligned columns, the first `left` flush left, the others flush right."""
-    widths = [max(len(row[i]) for row in rows if i < len(row)) for i in range(max(map(len, rows)))]
-    lines = (
-        gap.join(
-            c.ljust(w) if i < left else c.rjust(w)
-            for i, (c, w) in enumerate(zip(row, widths, strict=False))
-        )
-        for row in rows
-    )
-    return "\n".join(line.rstrip() for line in lines)
+    from symheli.values import aligned  # with NumPy, which the command line starts without
+
+    return aligned.columns(rows, left, gap)

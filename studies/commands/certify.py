@@ -115,7 +115,7 @@ def run(arguments: argparse.Namespace) -> Output:
         exact = cert.verify(rigorous=True)
     if arguments.save:
         cert.save(arguments.save)
-    text = f"{head}\n{cert}" + (
+    text = f"{head}\n{cert.details}" + (
         "" if exact is None else f"\n  exact verification: {'passed' if exact else 'not passed'}"
     )
     data = {

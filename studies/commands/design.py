@@ -7,7 +7,10 @@ import argparse
 from studies.commands import options
 from studies.output import Output
 
-HELP = "compare excitations and airspeed schedules by what an identification would learn from them"
+HELP = (
+    "design an experiment, not a controller (symheli synthesize does that): compare excitations and"
+    " airspeed schedules by what an identification would learn from them"
+)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import tempfile
+import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,10 +14,13 @@ import numpy as np
 
 from studies.commands import options
 from studies.output import Output
-from symheli.errors import InputError
+from symheli.errors import InputError, SymheliError
 from symheli.logs.format import FORMATS, Format, format_of
+from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
+    from identification import LPVARX
+    from studies.log.suggestion import Suggestion
     from symheli.logs.contents import Contents
     from symheli.records import FlightRecord, KinematicCheck
 
@@ -219,42 +224,22 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Output:
     """Read, prepare, fit, judge; or look, where nothing says what to fit."""
-    from identification import LPVARX, Polynomial, against_constant
+    from identification import against_constant
     from studies.log import in_feedback, report
-    from studies.log.reading import scheduling_range
 
+    if arguments.log.suffix.lower() == ".toml":
+        raise InputError(
+            f"{arguments.log}: expected a flight log, got a TOML file; a signal map goes with"
+            " --map FILE.toml beside the log, and a vehicle is shown by `symheli vehicles"
+            " FILE.toml`"
+        )
     kind = "mapped" if arguments.map else _format(arguments)
     if not any(getattr(arguments, name) for name in ASKED):
         seen = _contents(arguments, kind)
         if not _at_once(arguments, kind, seen):
             return _survey(arguments, seen)
-    signals = _signals(arguments, kind)
-    prepared = _prepared(arguments, arguments.log, signals, cut=True)
+    structure, training, test, prepared = _asked(arguments, kind)
     record = prepared.record
-    if arguments.test is None:
-        training, test = record.split(arguments.train or 0.7)
-    elif arguments.train is None:
-        training, test = record, _prepared(arguments, arguments.test, signals, cut=False).record
-    else:
-        raise InputError(
-            "--test holds out another log, --train a part of this one: give one of the two"
-        )
-    p = np.concatenate([part[prepared.scheduling] for part in (training, test) if part is not None])
-    basis = Polynomial(arguments.degree, *scheduling_range(p, arguments.degree))
-    delay, nb = arguments.delay, arguments.nb
-    if delay is None:  # u(k) comes to the lags that there are
-        delay, nb = (0, nb + 1) if record.resampled else (1, nb)
-    structure = LPVARX(
-        signals.outputs,
-        signals.inputs,
-        prepared.scheduling,
-        na=arguments.na,
-        nb=nb,
-        delay=delay,
-        basis=basis,
-        scheduling_at=arguments.scheduling_at,
-        offset=not arguments.no_offset,
-    )
     hold = not (arguments.commanded or prepared.scheduling.endswith("_command"))
     trim: Any = {"yes": "moving", "no": "still"}.get(
         arguments.offset_rate, "still" if arguments.no_offset else "auto"
@@ -301,6 +286,43 @@ def run(arguments: argparse.Namespace) -> Output:
     return Output(text, data)
 
 
+def _asked(
+    arguments: argparse.Namespace, kind: str
+) -> tuple[LPVARX, FlightRecord, FlightRecord | None, _Prepared]:
+    """The structure that is asked for, what it is fitted to, what is held out, and the record."""
+    from identification import LPVARX, Polynomial
+    from studies.log.reading import scheduling_range
+
+    signals = _signals(arguments, kind)
+    prepared = _prepared(arguments, arguments.log, signals, cut=True)
+    record = prepared.record
+    if arguments.test is None:
+        training, test = record.split(arguments.train or 0.7)
+    elif arguments.train is None:
+        training, test = record, _prepared(arguments, arguments.test, signals, cut=False).record
+    else:
+        raise InputError(
+            "--test holds out another log, --train a part of this one: give one of the two"
+        )
+    p = np.concatenate([part[prepared.scheduling] for part in (training, test) if part is not None])
+    basis = Polynomial(arguments.degree, *scheduling_range(p, arguments.degree))
+    delay, nb = arguments.delay, arguments.nb
+    if delay is None:  # u(k) comes to the lags that there are
+        delay, nb = (0, nb + 1) if record.resampled else (1, nb)
+    structure = LPVARX(
+        signals.outputs,
+        signals.inputs,
+        prepared.scheduling,
+        na=arguments.na,
+        nb=nb,
+        delay=delay,
+        basis=basis,
+        scheduling_at=arguments.scheduling_at,
+        offset=not arguments.no_offset,
+    )
+    return structure, training, test, prepared
+
+
 def _format(arguments: argparse.Namespace) -> Format:
     """What the log is said to be, or is by its content."""
     return format_of(arguments.log) if arguments.format == "auto" else arguments.format
@@ -329,7 +351,7 @@ def _at_once(arguments: argparse.Namespace, kind: str, seen: Contents) -> bool:
 def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
     """What the log holds, and a command that would identify."""
     from studies.log import survey_report
-    from studies.log.suggestion import suggestion
+    from studies.log.suggestion import Suggestion, suggestion
     from studies.log.survey import survey
 
     found = survey(
@@ -340,7 +362,32 @@ def _survey(arguments: argparse.Namespace, seen: Contents) -> Output:
         dt=arguments.dt,
     )
     hint = suggestion(found, dt=arguments.dt, signal_map=arguments.map)
+    if hint.command is not None and (why := _refused(hint)):
+        hint = Suggestion((*hint.missing, f"the obvious command ends in: {why}"))
     return Output(survey_report.text(found, hint), survey_report.data(found, hint))
+
+
+def _refused(hint: Suggestion) -> str:
+    """Why a command that would be suggested cannot fit its model; empty where it can."""
+    from identification import fit
+
+    parser = argparse.ArgumentParser()
+    configure(parser)
+    assert hint.command is not None  # noqa: S101  asked by the caller
+    arguments = parser.parse_args(hint.command[2:])
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        if hint.map is not None:
+            arguments.map = Path(folder) / "aircraft.toml"
+            write_text(arguments.map, hint.map)
+        try:
+            structure, training, _, _ = _asked(
+                arguments, "mapped" if arguments.map else _format(arguments)
+            )
+            fit(structure, training)
+        except SymheliError as error:
+            return str(error).replace(f"{folder}/", "")
+    return ""
 
 
 class _Signals(NamedTuple):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-import numpy as np
-
 from studies.commands import options
 from studies.output import Output, columns
+from symheli.values.aligned import matrix
 
 HELP = "linear model about a trim: A, B with names, poles"
 
@@ -27,16 +26,16 @@ def run(arguments: argparse.Namespace) -> Output:
     poles = sorted(lin.poles(), key=lambda z: (abs(z), z.imag))
     text = "\n\n".join(
         (
-            str(point),
+            point.outcome,
             "A (rows: derivative of the state, SI and radians)\n"
-            + _matrix(lin.A, lin.states, lin.states),
-            "B\n" + _matrix(lin.B, lin.states, lin.inputs),
+            + matrix(lin.A, lin.states, lin.states),
+            "B\n" + matrix(lin.B, lin.states, lin.inputs),
             "poles\n" + _poles([z for z in poles if z.imag >= 0]),
             "stable" if lin.is_stable() else "not stable",
         )
     )
     data = {
-        "status": str(point),
+        "status": point.outcome,
         "A": lin.A,
         "B": lin.B,
         "states": [str(s) for s in lin.states],
@@ -46,15 +45,6 @@ def run(arguments: argparse.Namespace) -> Output:
         "stable": lin.is_stable(),
     }
     return Output(text, data)
-
-
-def _matrix(M: np.ndarray, rows: tuple, cols: tuple) -> str:
-    return columns(
-        [
-            ["", *map(str, cols)],
-            *([str(r), *(f"{v:.5g}" for v in line)] for r, line in zip(rows, M, strict=True)),
-        ]
-    )
 
 
 def _poles(poles: list) -> str:

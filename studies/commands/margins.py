@@ -18,6 +18,15 @@ if TYPE_CHECKING:
 HELP = "gain, phase, delay and disk margins and attitude bandwidths over airspeed"
 HOLD_COLUMNS = f"{'gain':>7s}{'phase':>7s}{'delay':>8s}{'disk':>6s}"
 HOLD_UNITS = f"{'x':>7s}{'deg':>7s}{'ms':>8s}{'':>6s}"
+LEGEND = """\
+gain, phase, delay: by how much the loop gain may grow, how much lag and how much more delay the
+  loop bears, each alone, before it is unstable
+disk: largest disk of changes of gain and phase together that leaves it stable; 0.5: a gain of 0.6
+  to 1.67 and a phase of 28 deg, 2: any gain and 90 deg"""
+VEHICLE_LEGEND = """\
+roll BW, pitch BW: ADS-33 bandwidth, up to which the attitude follows the stick with 45 deg of phase
+  and 6 dB of gain in reserve; lag: phase delay of the roll above it
+gap: nu-gap of the two lateral models, 0 to 1: a controller whose margin b is larger holds both"""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -72,6 +81,7 @@ def _of_model(arguments: argparse.Namespace) -> Output:
     lines += [
         f"{row.p:14.4g}" + "".join(f"  {_margins(row.margins[u])}" for u in names) for row in rows
     ]
+    lines += ["", LEGEND]
     data = {
         "loop": head,
         "parameter": s.name,
@@ -125,6 +135,7 @@ def _of_vehicle(arguments: argparse.Namespace) -> Output:
     lines += [f"{'V, m/s':>7s}{columns}  {columns}{'gap':>7s}", f"{'':7s}{units}  {units}"]
     for exact, near, gap in zip(tables["exact"], tables["interpolated"], gaps, strict=True):
         lines.append(f"{exact.airspeed:7.2f}{_row(exact)}  {_row(near)}{gap:7.3f}")
+    lines += ["", LEGEND, VEHICLE_LEGEND]
     data = {
         "loop": head,
         "nu_gap": gaps,

@@ -7,6 +7,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from symheli.airframe.printed_forms import PRINTED
+from symheli.errors import InputError
+
 if TYPE_CHECKING:
     from symheli import Helicopter
     from symheli.steady.equilibrium import TrimPoint
@@ -26,14 +29,18 @@ def vehicle(parser: argparse.ArgumentParser, governor: str = "ideal") -> None:
         "--governor",
         choices=("ideal", "pi"),
         default=governor,
-        help="rotor speed held exactly, or engine and governor",
+        help="ideal: rotor speed held exactly; pi: engine and governor (default: %(default)s)",
     )
     parser.add_argument(
         "--printed",
         type=names,
         default=(),
         metavar="A,B",
-        help="forms of the source in place of this project's decisions",
+        help=(
+            "equations as the source prints them, where this project found the print wrong or"
+            f" ambiguous and departs from it: any of {', '.join(PRINTED)} (default: none;"
+            " docs/model.md has the reasons)"
+        ),
     )
 
 
@@ -46,9 +53,15 @@ def condition(parser: argparse.ArgumentParser) -> None:
         metavar="M/S",
         help="true airspeed, m/s (default: hover)",
     )
-    parser.add_argument("--climb-rate", type=number, default=0.0, metavar="M/S", help="m/s, up")
     parser.add_argument(
-        "--turn-rate", type=number, default=0.0, metavar="RAD/S", help="rad/s, to the right"
+        "--climb-rate", type=number, default=0.0, metavar="M/S", help="m/s, up (default: level)"
+    )
+    parser.add_argument(
+        "--turn-rate",
+        type=number,
+        default=0.0,
+        metavar="RAD/S",
+        help="rad/s, to the right (default: none)",
     )
     parser.add_argument(
         "--altitude",
@@ -61,7 +74,7 @@ def condition(parser: argparse.ArgumentParser) -> None:
         type=number,
         default=0.0,
         metavar="DEG",
-        help="degrees, airspeed from the right",
+        help="degrees, airspeed from the right; 180: rearward (default: 0)",
     )
 
 
@@ -112,6 +125,18 @@ def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
     """The helicopter and its trim at the flight condition of the options."""
     from symheli import trim
 
+    speed, climb = arguments.airspeed, arguments.climb_rate
+    if speed < 0:
+        raise InputError(
+            f"--airspeed must be >= 0 m/s, got {speed:g}; rearward flight is --airspeed"
+            f" {-speed:g} --sideslip-deg 180"
+        )
+    if abs(climb) > speed:
+        raise InputError(
+            f"--climb-rate {climb:g} exceeds the --airspeed of {speed:g} m/s, which is that of the"
+            f" whole motion; straight {'up' if climb > 0 else 'down'} is --airspeed"
+            f" {abs(climb):g} --climb-rate {climb:g}"
+        )
     heli = helicopter(arguments)
     point = trim(
         heli,

@@ -90,7 +90,8 @@ def run(arguments: argparse.Namespace) -> Output:
         configuration, resume=arguments.resume, only=arguments.only, since=arguments.since
     )
     report = configuration.out / "report.html"
-    return Output(f"{result.summary()}\nreport: {report}", result.to_dict())
+    told = f"\nnumbers: {configuration.out / 'results.json'}\nreport: {report}"
+    return Output(f"{result.summary()}\n{told}", result.to_dict())
 
 
 def _asked(arguments: argparse.Namespace) -> Configuration:

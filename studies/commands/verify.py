@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> Output:
     """Load, verify in rational arithmetic; exit status 1 where a proof fails."""
     if len(arguments.files) == 1:
         cert, verdict, data = _verified(arguments.files[0])
-        return Output(f"{cert}\n{verdict}", data, status=0 if data["exact"] else 1)
+        return Output(f"{cert.details}\n{verdict}", data, status=0 if data["exact"] else 1)
     lines, proofs = [], []
     for file in arguments.files:
         _, verdict, data = _verified(file)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import synthesis
-from studies.controllers.designs import LFT, Designs
-from studies.controllers.plant import RATE, closed
+from studies.controllers.asked import RATE
+from studies.controllers.designs import BASELINE, LFT, NAMES, Designs
+from studies.controllers.plant import closed
 from studies.transition.effort import Effort
 from studies.transition.guarantees import CONSTANT, PLAIN, Bound
 from studies.transition.proofs import Questions
@@ -50,12 +51,13 @@ class CertifiedControllers:
 
 def controller_questions(designs: Designs, effort: Effort) -> Questions:
     """One proof a controller at the permitted acceleration, of the LFT at an airspeed that jumps;
-    none without effort.
+    with less effort of the LPV controller from the baseline alone, or none.
     """
+    names = NAMES if effort.certified_controllers else (BASELINE,) * effort.first_certificate
     asked = [
         partial(proofs, design.name, closed(designs.plant, design.controller))
         for design in designs.designs
-        if effort.certified_controllers and design.controller is not None
+        if design.name in names and design.controller is not None
     ]
     return Questions(asked, lambda bounds: CertifiedControllers(bounds=bounds))
 

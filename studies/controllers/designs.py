@@ -13,20 +13,19 @@ import numpy as np
 
 import symheli
 from identification import FitForControl, KinematicModel, fit_for_control
-from studies.controllers.identified_plant import identified_model
-from studies.controllers.in_airspeed import of_degree
-from studies.controllers.plant import (
+from studies.controllers.asked import (
+    BACK_OFF,
+    BACK_OFFS,
     CONTROLS,
     MEASUREMENTS,
     PERIOD,
     RATE,
     SIZES,
     TOP,
-    baseline,
-    closed,
-    design_plant,
-    flown_plant,
 )
+from studies.controllers.identified_plant import identified_model
+from studies.controllers.in_airspeed import of_degree
+from studies.controllers.plant import baseline, closed, design_plant, flown_plant
 from studies.marks import flights
 from studies.transition.effort import Effort
 from studies.transition.flights import autopilot_for
@@ -46,11 +45,8 @@ LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
 BASELINE, IDENTIFIED = "LPV from the baseline", "LPV from the identified model"
 NAMES = (LQR, HINF, LFT, BASELINE, IDENTIFIED)
 
-BACK_OFF = 1.3
-BACK_OFFS, FASTEST = (BACK_OFF, 1.6, 2.0), np.pi / PERIOD
-"""Levels are so much above the least, tried in turn until no pole of the controller is faster
-(rad/s) than half the sample frequency: polynomials in airspeed do not follow those that are.
-"""
+FASTEST = np.pi / PERIOD
+"""Of a pole of the controller, rad/s: half the sample frequency."""
 
 SLOW: dict[str, Any] = {"back_off": BACK_OFFS, "fastest": FASTEST}
 

@@ -8,9 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from studies.controllers.asked import (
+    CONTROLS,
+    DELAY,
+    MEASUREMENTS,
+    NOISE,
+    NOISE_SHARE,
+    PERIOD,
+    RATE,
+    SERVO_RATE,
+)
 from studies.controllers.designs import Designs
 from studies.controllers.measures import Measures, measured
-from studies.controllers.plant import CONTROLS, DELAY, MEASUREMENTS, NOISE, PERIOD, RATE
 from symheli import (
     AirspeedSchedule,
     Dryden,
@@ -27,9 +36,6 @@ from symheli.flight import XCELL_SERVOS, Sensor
 LOW, HIGH = 0.5, 12.0
 """Ends of the transition, m/s; at the permitted acceleration between."""
 
-SERVO_RATE = 3.0
-"""Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
-
 STEADY, ALTITUDE = (-2.0, 1.0, 0.0), 20.0
 """The steady wind (north, east, down, m/s), and the height of the turbulence, m."""
 
@@ -40,9 +46,6 @@ BEYOND = (0.0, 1.9, 3.9, 34.8, 52.2)
 """Further sizes at which the proven gains are tried: from still air, where noise is all that
 disturbs, to more than any weather.
 """
-
-NOISE_SHARE = 1 / 3
-"""Of the noise that counts as 1, the standard deviation that is flown."""
 
 SEEDS, FEW_SEEDS = 20, 4
 
@@ -156,4 +159,4 @@ def measures(
     """Of every plan with every seed; how long a flight was beyond the equations is one of them."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
-        return measured(fly_batch(heli, plans, seeds=seeds, workers=workers))
+        return measured(fly_batch(heli, plans, seeds=seeds, workers=workers).data)

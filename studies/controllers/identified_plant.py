@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from identification import KinematicModel
+from studies.controllers.asked import GUSTS, MEASUREMENTS, RATE, TOP
 from studies.controllers.in_airspeed import of_degree
-from studies.controllers.plant import GUSTS, MEASUREMENTS, RATE, TOP
 from symheli import LPVStateSpace, Scheduling
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
@@ -23,10 +23,14 @@ DEGREE = 4
 
 def identified_model(model: KinematicModel) -> LPVStateSpace:
     """Continuous over airspeed, with controls and gusts, at no commanded acceleration."""
-    moves = {str(s): 0.0 for s in model.parameters if s == ACCELERATION}
-    sampled = model.to_state_space(held=moves)
+    sampled = model.to_state_space(held=moving_with_commands(model))
     airspeed = Scheduling("airspeed", "m/s", 0.0, TOP, rate=RATE)
     return of_degree(continuous(with_gusts(sampled)), DEGREE).with_scheduling(airspeed)
+
+
+def moving_with_commands(model: KinematicModel) -> dict[str, float]:
+    """The commanded acceleration, held at none, where the model is scheduled by it."""
+    return {str(s): 0.0 for s in model.parameters if s == ACCELERATION}
 
 
 def with_gusts(model: LPVStateSpace) -> LPVStateSpace:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from studies.controllers.plant import CONTROLS, GUST, MEASUREMENTS, NOISE, RATE, SIZES, TOP
-from symheli.flight import FlightBatch, FlightPlan
+from studies.controllers.asked import CONTROLS, GUSTS, MEASUREMENTS, Asked
+from studies.controllers.plant import STUDY
+from symheli.flight import FlightPlan
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Readings
 from symheli.flight.flight_data import WIND, FlightData
@@ -23,7 +25,7 @@ class Measures:
     """One flight, until it was lost where it was.
 
     `speed`: rms of forward airspeed minus the commanded one, m/s; `deviation`: rms of the
-    performance signals, 1 as large as `SIZES`, all together, and of each in `deviations`;
+    performance signals, 1 as large as its size, all together, and of each in `deviations`;
     `attitude`: largest bank or pitch, rad; `stops`: share of the time with a command at a stop;
     `ratio`: see `energy_ratio`; `outside`, `faster`: share of the time with a forward airspeed
     outside the range and with a change of it above the permitted rate; `beyond`: share of the time
@@ -42,39 +44,45 @@ class Measures:
     beyond: float
 
 
-def measured(batch: FlightBatch) -> list[Measures]:
+def measured(flights: Iterable[FlightData], asked: Asked = STUDY) -> list[Measures]:
     """Of every flight."""
-    return [of_flight(flown) for flown in batch.data]
+    return [of_flight(flown, asked) for flown in flights]
 
 
-def of_flight(flown: FlightData) -> Measures:
-    """Of one flight."""
+def of_flight(flown: FlightData, asked: Asked = STUDY) -> Measures:
+    """Of one flight, with the performance and the disturbances that a controller was asked for."""
     column, travel = flown.columns(), flown.heli.travel
     noise = noise_of(flown)
     true = {y: column[y] - noise[:, i] for i, y in enumerate(MEASUREMENTS)}
     gusts, forward = air(column, true, flown.plan)
-    z = performance(column, true)
-    w = np.column_stack([gusts / GUST, noise / [NOISE[y] for y in MEASUREMENTS]])
+    z = performance(column, true, asked)
+    felt = [gusts[:, GUSTS.index(g)] / asked.sizes[g] for g in asked.disturbances if g in GUSTS]
+    heard = [noise[:, MEASUREMENTS.index(y)] / asked.noise[y] for y in asked.measurements]
+    w = np.column_stack([*felt, *heard])
     commands = np.column_stack([column[f"{u}_command"] for u in CONTROLS])
+    low, high = asked.airspeeds
     change = np.gradient(forward, flown.plan.dt) if len(forward) > 1 else np.zeros(len(forward))
     return Measures(
         lost=flown.lost >= 0,
         speed=rms(forward - column["airspeed_command"]),
         deviation=rms(np.linalg.norm(z, axis=1)),
-        deviations={name: rms(z[:, i]) for i, name in enumerate((*MEASUREMENTS, *CONTROLS))},
+        deviations={name: rms(z[:, i]) for i, name in enumerate(asked.sizes_of_performance)},
         attitude=float(max(np.abs(true["phi"]).max(), np.abs(true["theta"]).max())),
         stops=float(np.any(np.abs(commands) >= AT_THE_STOP * travel, axis=1).mean()),
         ratio=energy_ratio(z, w),
-        outside=float(np.mean((forward < 0.0) | (forward > TOP))),
-        faster=float(np.mean(np.abs(change) > RATE)),
+        outside=float(np.mean((forward < low) | (forward > high))),
+        faster=float(np.mean(np.abs(change) > asked.acceleration)),
         beyond=float(np.mean(column["airspeed"] > Validity.of(flown.heli).harmless[0])),
     )
 
 
-def performance(column: dict[str, Array], true: dict[str, Array]) -> Array:
-    """Deviations from the reference (n, 12), each in its size: states, then commands."""
-    parts = [(true[y] - column[f"{y}_reference"]) / SIZES[y] for y in MEASUREMENTS]
-    parts += [(column[f"{u}_command"] - column[f"{u}_reference"]) / SIZES[u] for u in CONTROLS]
+def performance(column: dict[str, Array], true: dict[str, Array], asked: Asked = STUDY) -> Array:
+    """Deviations from the reference (n, 12 of the study), each in its size: measured states, then
+    commands.
+    """
+    size = asked.sizes
+    parts = [(true[y] - column[f"{y}_reference"]) / size[y] for y in asked.measurements]
+    parts += [(column[f"{u}_command"] - column[f"{u}_reference"]) / size[u] for u in asked.controls]
     return np.column_stack(parts)
 
 

@@ -5,57 +5,48 @@ All signals are deviations from the trim of the commanded airspeed.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import symheli
-from symheli import Helicopter, LinearModel, LPVStateSpace
-from symheli.flight import XCELL_SERVOS, Servo
-from symheli.values.signal import Signal, signals
+from studies.controllers.asked import AT_INPUT, PERIOD, SAMPLED_DEGREE, Asked
+from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace
+from symheli.flight import Servo
+from symheli.values.signal import Signal, indices, signals
 from synthesis import Plant
 
-TOP, RATE = 13.0, 3.0
-"""Of the airspeed, m/s, and of its change, m/s^2."""
-
-PERIOD, DELAY = 0.02, 0.02
-"""Of the controller's samples, and from a command to its servo, s."""
-
-CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
-GUSTS = ("u_w", "v_w", "w_w")
-MEASUREMENTS = ("u", "v", "w", "p", "q", "r", "phi", "theta")
-
-SIZES = {
-    **dict.fromkeys(("u", "v", "w"), 2.0),
-    **dict.fromkeys(("p", "q"), 2.0),
-    "r": 0.3,
-    **dict.fromkeys(("phi", "theta"), 0.2),
-    **dict.fromkeys(("d_lon", "d_lat", "d_col"), 0.009),
-    "d_ped": 0.03,
-}
-"""A deviation of this size (m/s, rad/s, rad) counts as 1; of a control that of the command."""
-
-GUST = 2.0
-"""A gust of this size (m/s) counts as 1."""
-
-NOISE = {
-    **dict.fromkeys(("u", "v", "w"), 0.9),
-    **dict.fromkeys(("p", "q", "r"), 0.09),
-    **dict.fromkeys(("phi", "theta"), 0.03),
-}
-"""Noise of a measurement (m/s, rad/s, rad) that counts as 1: three times what is flown, or the
-controllers become faster than the servos.
-"""
-
-POINTS = 27
-DEGREE = 3
-SAMPLED_DEGREE = 3
-"""Airspeeds linearized; degree in airspeed of the model and of the sampled one."""
+STUDY = Asked()
 
 
-def baseline(heli: Helicopter) -> LPVStateSpace:
-    """The helicopter over airspeed with its controls and gusts, element-wise cubic."""
-    speeds = np.linspace(0.0, TOP, POINTS).tolist()
-    family = symheli.sweep(heli, speeds, inputs=(*CONTROLS, *GUSTS))
-    return family.interpolate("polynomial", DEGREE, rate=RATE)
+def baseline(heli: Helicopter, asked: Asked = STUDY) -> LPVStateSpace:
+    """The helicopter over airspeed with its controls and gusts, interpolated element by element."""
+    speeds = np.linspace(asked.airspeeds[0], asked.airspeeds[1], asked.points).tolist()
+    inputs = dict.fromkeys((*asked.controls, *asked.disturbances))
+    family = symheli.sweep(heli, speeds, inputs=tuple(inputs))
+    return disturbed(of_family(family, asked), asked)
+
+
+def of_family(family: LinearFamily, asked: Asked) -> LPVStateSpace:
+    """Linear models along airspeed, those states of them that are asked for, interpolated."""
+    kept = family.select(asked.states) if asked.states else family
+    return kept.interpolate("polynomial", asked.degree, rate=asked.acceleration)
+
+
+def disturbed(model: LPVStateSpace, asked: Asked) -> LPVStateSpace:
+    """With what is added to a control as an input of its own, where that is asked for."""
+    both = [name for name in asked.disturbances if name in asked.controls]
+    if not both:
+        return model
+    at = indices(both, model.inputs, "input")
+    return replace(
+        model,
+        B=np.concatenate([model.B, model.B[:, :, at]], axis=2),
+        D=np.concatenate([model.D, model.D[:, :, at]], axis=2),
+        inputs=(*model.inputs, *(Signal(f"{name}{AT_INPUT}", "rad") for name in both)),
+        trim=None,
+        residuals=None,
+    )
 
 
 def actuator(servo: Servo, name: str, late: float) -> LinearModel:
@@ -84,39 +75,48 @@ def actuator(servo: Servo, name: str, late: float) -> LinearModel:
     )
 
 
-def unweighted(model: LPVStateSpace) -> Plant:
+def unweighted(model: LPVStateSpace, asked: Asked = STUDY) -> Plant:
     """With gusts, controls, and the measured states and commands as performance."""
     return Plant(
         model,
-        disturbances=signals(GUSTS),
-        performance=signals((*MEASUREMENTS, *CONTROLS)),
-        controls=signals(CONTROLS),
-        measurements=signals(MEASUREMENTS),
+        disturbances=signals(asked.sizes_of_disturbances),
+        performance=signals(asked.sizes_of_performance),
+        controls=signals(asked.controls),
+        measurements=signals(asked.measurements),
     )
 
 
-def weighted(plant: Plant) -> Plant:
+def weighted(plant: Plant, asked: Asked = STUDY) -> Plant:
     """With every signal in its size, and noise on the measurements."""
-    sizes = {name: 1 / size for name, size in SIZES.items()}
-    return plant.weighted({**dict.fromkeys(GUSTS, GUST), **sizes}).with_noise(NOISE)
+    sizes = {name: 1 / size for name, size in asked.sizes_of_performance.items()}
+    noise = {name: asked.noise[name] for name in asked.measurements}
+    return plant.weighted({**asked.sizes_of_disturbances, **sizes}).with_noise(noise)
 
 
-def design_plant(model: LPVStateSpace, held: float = PERIOD / 2) -> Plant:
+def design_plant(model: LPVStateSpace, held: float = PERIOD / 2, asked: Asked = STUDY) -> Plant:
     """What is designed for: continuous, with actuators of low order behind the delay and the half
     sample that a command is `held` for, where the model does not have that already.
     """
-    actuators = {u: actuator(XCELL_SERVOS[u], u, DELAY + held) for u in CONTROLS}
-    return weighted(unweighted(model).with_servo(actuators))
+    servos = {u: asked.servo(u) for u in asked.controls}
+    late = asked.delay + held
+    actuators = {u: actuator(servo, u, late) for u, servo in servos.items() if servo is not None}
+    behind = unweighted(model, asked).with_servo(actuators)
+    bare = [u for u, servo in servos.items() if servo is None]
+    return weighted(behind.with_delay(late, bare, order=1) if bare and late else behind, asked)
 
 
-def flown_plant(model: LPVStateSpace) -> Plant:
-    """What is certified: the servos as they are, the delay exact, sampled at 50 Hz."""
-    servos = {u: XCELL_SERVOS[u] for u in CONTROLS}
-    sampled = unweighted(model).with_servo(servos).sampled(PERIOD, degree=SAMPLED_DEGREE)
-    return weighted(sampled.with_delay(DELAY))
+def flown_plant(model: LPVStateSpace, asked: Asked = STUDY) -> Plant:
+    """What is certified: the servos as they are, the delay exact, sampled; a model that is sampled
+    stays as it is.
+    """
+    servos = {u: asked.servo(u) for u in asked.controls}
+    behind = unweighted(model, asked).with_servo({u: s for u, s in servos.items() if s is not None})
+    if model.dt is None:
+        behind = behind.sampled(asked.period, degree=SAMPLED_DEGREE)
+    return weighted(behind.with_delay(asked.delay) if asked.delay else behind, asked)
 
 
-def closed(plant: Plant, controller: LPVStateSpace) -> LPVStateSpace:
+def closed(plant: Plant, controller: object) -> LPVStateSpace:
     """The loop, from gusts and noise to performance."""
     loop = plant.close(controller)
     assert isinstance(loop, LPVStateSpace)  # noqa: S101

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from studies.controllers.asked import RATE, TOP
 from studies.controllers.designs import LQR
 from studies.controllers.flown import WINDS
-from studies.controllers.plant import RATE, TOP
 from studies.transition.guarantees import CONSTANT, PLAIN, proven
 from studies.transition.tables import Table, gain
 

@@ -7,6 +7,8 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 import symheli
 from identification import (
     LPVARX,
@@ -28,6 +30,9 @@ HORIZON = 1.0
 """Seconds ahead at which predictions are judged."""
 
 FROZEN_SPEEDS = (2.0, 7.0, 12.0)
+
+RATES = {"pitch/flap": "q", "roll/flap": "p"}
+"""The angular rate of each rotor mode."""
 
 
 @dataclass(frozen=True)
@@ -103,11 +108,17 @@ class Judged:
 
 
 def rotor_mode(model: LinearModel, name: str) -> complex:
-    """The eigenvalue (rad/s) of the pitch/flap or roll/flap mode of the exact linear model: the two
-    fastest oscillations.
+    """The eigenvalue (rad/s) of the pitch/flap or roll/flap mode of the exact linear model: the one
+    in which the rate of pitch or roll participates most.
+
+    With a stabiliser bar it is an oscillation, of which this is the half with positive frequency.
+    A rotor that flaps fast (no bar) follows, and the mode is the damping of that rate: real.
     """
-    fast = sorted((z for z in model.poles() if z.imag > 8), key=abs)
-    return complex(fast[0] if name == "pitch/flap" else fast[-1])
+    values, right = np.linalg.eig(model.A)
+    rate = [str(s) for s in model.states].index(RATES[name])
+    share = np.abs(right[rate] * np.linalg.pinv(right)[:, rate])  # its participation factors
+    foremost = values[int(np.argmax(share))]
+    return complex(foremost.real, abs(foremost.imag))
 
 
 def mode_misses(heli: Helicopter, model: LPVARXModel, mode: str) -> dict[float, float]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import symheli
+from studies.transition.first_look import FirstLook, first_look
 from studies.transition.flights import TOP
 from symheli import LFT, Helicopter, LinearFamily, LPVStateSpace
 
@@ -47,7 +48,7 @@ class EntryError:
 @dataclass(frozen=True)
 class Baseline:
     """The family at `nodes`, the one to check against between them, the interpolations and their
-    errors, the LFT.
+    errors, the LFT, and what the helicopter is like by itself.
     """
 
     nodes: LinearFamily
@@ -60,6 +61,7 @@ class Baseline:
     """Largest difference of any entry of the LFT, whole and reduced, to the polynomial family,
     relative to the largest entry.
     """
+    look: FirstLook
 
     @property
     def unfit(self) -> list[EntryError]:
@@ -93,6 +95,7 @@ def build_baseline(heli: Helicopter, points: int = 27, degree: int = 3) -> Basel
         lft,
         reduced,
         _lft_error(lpv[f"polynomial {degree}"], lft, reduced, between),
+        first_look(family, dict(zip(map(str, heli.inputs), map(float, heli.travel), strict=True))),
     )
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from studies.controllers.asked import RATE
 from studies.controllers.designs import BASELINE, LFT
 from studies.controllers.flown import WINDS
 from studies.controllers.tables import hypotheses
@@ -37,12 +38,83 @@ CHEAP = 0.1
 matter little.
 """
 
+STUDIED = "xcell60"
+"""The vehicle of the published model; of another one its own questions come first."""
+
 LOOP_NAMES = {
     "gust": "the lateral loop under attitude hold",
     "longitudinal": "the longitudinal loop under attitude hold",
     "robust": "the lateral loop with a margin",
 }
 """By channel."""
+
+GAIN_OF = {
+    "gust": "yaw rate and roll (rad/s, rad) by a lateral gust (m/s)",
+    "longitudinal": "pitch rate and pitch (rad/s, rad) by gusts (m/s)",
+    "robust": "outputs of 0.1 by inputs of 0.01 and 0.02",
+}
+"""By channel: what the gain of its loop is of."""
+
+
+def of_its_own(study: Outcome) -> bool:
+    """Whether this is another vehicle than the study was made for."""
+    return study.vehicle != STUDIED
+
+
+def question(study: Outcome) -> str:
+    """What a reader wants to know first."""
+    if of_its_own(study):
+        return "Does it hover, where does it trim, is it stable, and can a controller be certified?"
+    return (
+        "Is an LFT enough for a helicopter between hover and 13 m/s, or must the rate of the"
+        " airspeed be bounded (LPV)?"
+    )
+
+
+def answer(study: Outcome) -> str:
+    """The answer in a sentence or two; empty where nothing was reached that gives one."""
+    if not of_its_own(study):
+        return " ".join(_where_lft_is_enough(study))
+    look = [] if study.baseline is None else [study.baseline.look.answer]
+    return " ".join([*look, *_first_controller(study)])
+
+
+def of_the_vehicle(study: Outcome) -> list[str]:
+    """The helicopter by itself, and a first controller for it."""
+    if study.baseline is None:
+        return list(_first_controller(study))
+    look = study.baseline.look
+    first = [] if of_its_own(study) else [look.answer]
+    own = [] if of_its_own(study) else list(_first_controller(study))
+    return [*first, *look.sentences(), *own]
+
+
+def _first_controller(study: Outcome) -> Iterator[str]:
+    """The LPV controller from the baseline: promised, proven, flown."""
+    found = study.controllers
+    made = found and next((d for d in found.designs if d.name == BASELINE), None)
+    if not made:
+        return
+    if made.controller is None:
+        yield f"A first controller was not found: {made.reason}."
+        return
+    proofs, flown = study.certified_controllers, study.flown_controllers
+    proof = math.inf if proofs is None else proofs.gain(BASELINE)
+    proven = (
+        f"proven for a gain of {gain(proof)} at up to {RATE:g} m/s^2"
+        if math.isfinite(proof)
+        else f"not proven (frozen gain {gain(made.frozen)})"
+    )
+    said = f"A first controller of {made.order} states, behind servos and delay at 50 Hz, is"
+    flights = (
+        [one for wind in WINDS for one in flown.at(wind) if one.name == BASELINE] if (flown) else []
+    )
+    if not flights:
+        yield f"{said} {proven}."
+        return
+    lost, count = sum(one.lost for one in flights), sum(len(one.flights) for one in flights)
+    told = "lost none of" if not lost else f"lost {lost} of"
+    yield f"{said} {proven} and {told} {count} flights in turbulence."
 
 
 def abstract(study: Outcome) -> list[str]:
@@ -76,14 +148,14 @@ def loops(study: Outcome) -> dict[str, GainCurve]:
 
 def _answer(study: Outcome) -> Iterator[str]:
     """LFT or LPV, loop by loop."""
-    for curve in loops(study).values():
+    for channel, curve in loops(study).items():
         if math.isinf(curve.frozen):
             yield f"In {curve.title} no gain can be proven: it is unstable at an airspeed held."
             continue
         rate, most = curve.fastest
         bounded = (
-            f"an LPV certificate proves a gain of {gain(most)} for every acceleration up to"
-            f" {rate:g} m/s^2"
+            f"an LPV certificate proves a gain of {gain(most)} ({GAIN_OF[channel]}) for every"
+            f" acceleration up to {rate:g} m/s^2"
             if rate > 0 and math.isfinite(most)
             else ""
         )
@@ -310,7 +382,7 @@ def _told(own: list[Bound]) -> Iterator[str]:
         yield f"for the estimate alone {gain(proven(estimate))}"
     if exact is not None:
         truth = proven(exact), exact.certificate.lower
-        yield f"for the exact models {gain(truth[0])}, and {gain(truth[1])} is flown"
+        yield f"for the exact models {gain(truth[0])}, and {gain(truth[1])} is attained"
         words = {
             "holds": "holds for the helicopter",
             "fails": "FAILS for the helicopter",

@@ -61,6 +61,9 @@ class Effort:
     certified_controllers: bool = choice(
         True, "prove gains of the loops that fly, and ask for the verdict on the identified model"
     )
+    first_certificate: bool = choice(
+        True, "prove the gain of the LPV controller from the baseline, whatever the other loops"
+    )
     controller_seeds: int = choice(
         20, "flights of each controller in turbulence of each size", least=1
     )

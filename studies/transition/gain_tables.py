@@ -29,7 +29,7 @@ CHANNELS = {
 
 
 def guarantee(found: Sequence[Bound], channel: str) -> Table:
-    """Gain against permitted acceleration: flown, and proven by each form; tests that let the
+    """Gain against permitted acceleration: attained, and proven by each form; tests that let the
     airspeed jump hold at every acceleration.
     """
     own = [b for b in found if b.channel == channel]
@@ -37,7 +37,7 @@ def guarantee(found: Sequence[Bound], channel: str) -> Table:
     forms = [form for form in FORMS if any(b.form == form for b in gains)]
     table = Table(
         CHANNELS[channel],
-        ["model", "acceleration", "stable", "frozen", "flown", *forms],
+        ["model", "acceleration", "stable", "frozen", "attained", *forms],
         name=f"gain-{channel}",
         source="guarantees.bounds",
     )
@@ -60,7 +60,7 @@ def guarantee(found: Sequence[Bound], channel: str) -> Table:
                 ]
             )
     table.remarks.append(
-        "Flown: the gain of a computed airspeed history, no bound can be smaller; none: nothing"
+        "Attained: the gain of a computed airspeed history, no bound can be smaller; none: nothing"
         " proven; blank: not tried."
     )
     return table

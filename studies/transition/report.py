@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +15,19 @@ from studies.report.references import REFERENCES
 from studies.report.shortfalls import shortfalls
 from studies.transition import gain_tables, tables
 from studies.transition.axes import AXES
-from studies.transition.conclusions import abstract, certificates, conclusions
+from studies.transition.conclusions import (
+    abstract,
+    answer,
+    certificates,
+    conclusions,
+    of_its_own,
+    of_the_vehicle,
+    question,
+)
 from studies.transition.guarantees import curves
 from studies.transition.results import to_dict
 from studies.transition.saved_proofs import linked_proofs, save_proofs
+from symheli.progress import tracked
 from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
@@ -27,7 +36,18 @@ if TYPE_CHECKING:
     from studies.transition.outcome import Outcome
 
 FOLDER = Path(__file__).parents[1] / "report"
-TEMPLATE, STYLE, SCRIPTS = "page.html.j2", "page.css", ("hover.js", "explorer.js")
+TEMPLATE, STYLE, SCRIPTS = "page.html.j2", "page.css", ("hover.js", "explorer.js", "fit.js")
+ORDER = (
+    *("question", "definitions", "vehicle", "baseline", "experiment", "identified", "terms"),
+    *("known", "proven", "controllers", "failed", "conclusion", "provenance"),
+)
+OWN_ORDER = (
+    *("vehicle", "controllers", "question", "definitions", "baseline", "identified", "terms"),
+    *("known", "proven", "experiment", "failed", "conclusion", "provenance"),
+)
+"""Sections of the page; of another vehicle than the study's own questions about it come first, and
+the published experiment late.
+"""
 DIGITS = 4
 """Significant ones of the numbers that the slider moves over."""
 
@@ -47,7 +67,7 @@ def write_report(study: Outcome, out: Path) -> Path:
     save_proofs(study, out)
     results = to_dict(study)
     _written(results, out)
-    pictures = {one.name: one for one in drawn(figures(study), out / "figures")}
+    pictures = {one.name: one for one in drawn(tracked("figures", figures(study)), out / "figures")}
     return write_text(out / "report.html", page(study, pictures, results))
 
 
@@ -63,6 +83,7 @@ def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) ->
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
+    environment.filters["whole"] = whole
     template = environment.get_template(TEMPLATE)
     said = {
         "study": study,
@@ -81,6 +102,22 @@ def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) ->
     template.render(labels=first, contents=[], **said)
     text = template.render(labels=Labels(first.given), contents=first.contents, **said)
     return text.replace("m/s^2", "m/s²")
+
+
+def whole(cell: str) -> str:
+    """Numbers that belong together stay on one line.
+
+    >>> whole("0.85, 1.36") == "0.85,\\N{NO-BREAK SPACE}1.36"
+    True
+    """
+    return re.sub(r"(?<=\d)(,| /) (?=[-\d])", "\\1\N{NO-BREAK SPACE}", cell)
+
+
+def title(study: Outcome) -> str:
+    """Of the page."""
+    if not of_its_own(study):
+        return "LFT against LPV along the transition"
+    return study.heli.vehicle.title if study.heli else Path(study.vehicle).stem
 
 
 def compact(data: object) -> str:
@@ -111,6 +148,13 @@ def _headline(study: Outcome) -> dict[str, object]:
     proven = [b for b in gust if b.certificate.verified]
     hypotheses = list(dict.fromkeys(h for b in proven for h in b.certificate.hypotheses))
     return {
+        "title": title(study),
+        "question": question(study),
+        "answer": answer(study),
+        "own": of_its_own(study),
+        "lead": "trim" if of_its_own(study) else "gain-against-rate",
+        "order": OWN_ORDER if of_its_own(study) else ORDER,
+        "vehicle": of_the_vehicle(study),
         "abstract": abstract(study),
         "conclusions": conclusions(study),
         "shortfalls": shortfalls(study),
@@ -119,14 +163,6 @@ def _headline(study: Outcome) -> dict[str, object]:
         "certificates": certificates(study),
         "proofs": linked_proofs(study),
         "controller_tables": controllers.every(study),
-        "frozen_gain": next((b.certificate.frozen for b in gust), None),
-        "fastest": max(proven, key=lambda b: (b.rate, -b.certificate.gamma), default=None),
-        "jump": min(
-            (b for b in gust if math.isinf(b.rate)),
-            key=lambda b: (b.certificate.gamma, -b.certificate.lower),
-            default=None,
-        ),
-        "inf": math.inf,
         "hypotheses": hypotheses,
         "notes": {
             name: model.excitation

@@ -4,6 +4,7 @@ what is where.
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from identification import FrozenModels, Scores
     from studies.transition.baseline import Baseline
     from studies.transition.comparison import Comparison
+    from studies.transition.first_look import FirstLook
     from studies.transition.flights import Flights
     from studies.transition.identified import Identification
     from studies.transition.known_kinematics import KnownKinematics
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
     from studies.transition.recovery import Recovery
     from symheli import Signal
 
-SCHEMA = "symheli study 6"
+SCHEMA = "symheli study 7"
 LIBRARIES = ("symheli", "casadi", "numpy", "scipy", "cvxpy", "clarabel")
 
 
@@ -106,7 +108,44 @@ def _baseline(b: Baseline) -> dict[str, Any]:
         "trim": {
             str(name): _trim(b, name) for name in (*b.nodes.states, *b.nodes.trims[0].u.signals)
         },
+        "first_look": _first_look(b.look),
     }
+
+
+def _first_look(look: FirstLook) -> dict[str, Any]:
+    return {
+        "answer": look.answer,
+        "travel": named({u: math.degrees(t) for u, t in look.travel.items()}, "deg"),
+        "stopped": [
+            {"airspeed": value(v, "m/s"), "controls": list(names)}
+            for v, names in look.stopped.items()
+        ],
+        "airspeeds": [
+            {
+                "airspeed": value(one.trim.airspeed, "m/s"),
+                "attitude": named(
+                    {s: math.degrees(one.trim.x[s]) for s in ("theta", "phi")}, "deg"
+                ),
+                "controls": named(
+                    {str(u): math.degrees(one.trim.u[u]) for u in one.trim.u.signals}, "deg"
+                ),
+                "least_stable": _pole(one.least_stable),
+                "modes": {name: _pole(z) for name, z in one.modes.items()},
+                "roll_hold": one.margins
+                and {
+                    "stable": one.margins.hold.stable,
+                    "gain": value(one.margins.hold.gain[1], "1"),
+                    "phase": value(math.degrees(one.margins.hold.phase), "deg"),
+                    "delay": value(1000 * one.margins.hold.delay, "ms"),
+                },
+            }
+            for one in look.shown
+        ],
+    }
+
+
+def _pole(z: complex) -> dict[str, Any]:
+    return {"real": value(z.real, "rad/s"), "imaginary": value(z.imag, "rad/s")}
 
 
 def _trim(b: Baseline, name: Signal) -> dict[str, Any]:

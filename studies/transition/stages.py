@@ -211,9 +211,11 @@ def stages(effort: Effort) -> tuple[Stage, ...]:
             CertifiedControllers,
             ("controllers",),
             lambda s, effort: controller_questions(_there(s.controllers), effort),
-            reads=("certified_controllers",),
+            reads=("certified_controllers", "first_certificate"),
             asks=True,
-            cost=1 + 106 * effort.certified_controllers,
+            cost=1
+            + 21 * (effort.first_certificate or effort.certified_controllers)
+            + 85 * effort.certified_controllers,
         ),
     )
 

@@ -169,12 +169,14 @@ class _Run:
                         kept = self.stored.answers(stage.name)
                         asked[stage.name] = Asked.of(questions, processes, kept, self.resume)
                 stage = next((stage for stage in ready if not stage.asks), ready[0])
-                with _shown(stage.title):
+                with task(stage.title):
                     found = (
                         asked[stage.name].stored(tell)
                         if stage.asks
                         else computed(stage, study, study.effort)
                     )
+                work = " of work" if stage.asks else ""
+                _say(f"{stage.title}: {found.seconds:.1f} s{work}")
                 self.stored.save(stage.name, found)
                 self.stored.answers(stage.name).clear()
                 study = with_stage(study, stage, found)

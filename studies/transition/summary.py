@@ -1,62 +1,45 @@
-"""The short table printed when the study is done."""
+"""What is printed when the study is done: the answer, and what it rests on."""
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from studies.controllers import tables as controllers
-from studies.transition import gain_tables, tables
-from studies.transition.axes import AXES
-from studies.transition.conclusions import conclusions
-from studies.transition.flights import NOISES
+from studies.report.shortfalls import shortfalls
+from studies.transition.conclusions import answer, conclusions, of_the_vehicle, question
 
 if TYPE_CHECKING:
     from studies.transition.outcome import Outcome
 
+WIDTH = 98
+
 
 def summary(study: Outcome) -> str:
-    """Baseline, identification, comparison and guarantees in about forty lines."""
-    if study.baseline is None:
+    """Question, answer, the vehicle and the conclusions, in lines that a terminal holds."""
+    if not study.seconds and study.baseline is None:
         return "nothing was finished"
-    b = study.baseline
-    lines = [
-        f"Baseline: LFT of order {b.lft.order}, {b.reduced.order} when reduced, equal to the"
-        f" polynomial family within {b.lft_error:.0e}; {len(b.unfit)} entries no polynomial fits,"
-        f" worst {', '.join(e.name for e in b.unfit[:4])}"
-    ]
-    for r in study.exact_recovery.runs if study.exact_recovery else ():
-        lines.append(
-            f"Exact recovery at {r.period:g} s: A(p) within {r.A_error:.0e}, B(p) within"
-            f" {r.B_error:.0e}"
-        )
-    known = study.known_kinematics
-    sections = [_marks(study)]
-    sections += [table.text() for table in tables.known_kinematics(known)] if known else []
-    sections += [*(table.text() for table in gain_tables.every(study.bounds))]
-    sections += [
-        "\n".join(gain_tables.not_about_the_helicopter(study.bounds)),
-        "\n".join(tables.verdicts(study)),
-        *(table.text() for table in controllers.every(study)),
-        "\n".join(conclusions(study)),
-    ]
-    return "\n\n".join(["\n".join(lines), *(s for s in sections if s)])
+    return "\n".join(_lines(study))
 
 
-def _marks(study: Outcome) -> str:
-    table = tables.Table(
-        "Identified on one transition, judged 1 s ahead on another (fit in percent)",
-        ["output", "noise-free", "mark", "30 dB", "mark"],
-    )
-    found = study.identification
-    if found is None:
-        return ""
-    for axis in AXES:
-        pair = [found.of(axis, noise).scores for noise in NOISES]
-        for output in axis.outputs:
-            marks = axis.marks.get(output)
-            cells = []
-            for k, score in enumerate(pair):
-                cells.append(tables.percent(score.ahead[output]))
-                cells.append(f">= {marks[k]:.0f}" if marks else "")
-            table.rows.append([f"{output} ({axis.name})", *cells])
-    return table.text()
+def _lines(study: Outcome) -> Iterator[str]:
+    yield from _wrapped(question(study))
+    yield from _wrapped(answer(study) or "Nothing was reached that answers this.", "  ")
+    for title, sentences in (
+        ("The helicopter", of_the_vehicle(study)),
+        ("What was found", conclusions(study)),
+    ):
+        own = [sentence for sentence in sentences if sentence not in answer(study)]
+        if own:
+            yield ""
+            yield title
+        for sentence in own:
+            yield from _wrapped(sentence, "  - ")
+    if failed := len(shortfalls(study).rows):
+        yield ""
+        things = "thing" if failed == 1 else "things"
+        yield f"{failed} {things} failed; the report says which and why."
+
+
+def _wrapped(sentence: str, mark: str = "") -> list[str]:
+    return textwrap.wrap(sentence, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark))

@@ -14,6 +14,7 @@ from studies.transition.axes import (
     FROZEN_SPEEDS,
     LATERAL,
     LATERAL_WITH_COLLECTIVE,
+    RATES,
 )
 from studies.transition.campaign import MODE_MARK
 from studies.transition.comparison import DRIFT_LEFT_OUT
@@ -24,10 +25,14 @@ LEVEL = 3.0
 """Points between fits that are called level: what another seed changes."""
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from studies.transition.comparison import ComparedAxis
+    from studies.transition.first_look import FirstLook
     from studies.transition.identified import Identification
     from studies.transition.known_kinematics import KnownKinematics
     from studies.transition.outcome import Outcome
+    from synthesis import Margins
 
 
 @dataclass
@@ -76,6 +81,49 @@ def percent(number: float) -> str:
 def gain(number: float) -> str:
     """A gain with three digits."""
     return "none" if math.isinf(number) else "-" if math.isnan(number) else f"{number:.3g}"
+
+
+def first_look(look: FirstLook) -> Table:
+    """The helicopter by itself, a column an airspeed."""
+    shown = look.shown
+    table = Table(
+        "The helicopter by itself: trim, modes, and margins of a roll hold, over airspeed",
+        ["", *(f"{one.trim.airspeed:g} m/s" for one in shown)],
+        name="first-look",
+        source="baseline.first_look",
+    )
+    for name, s in (("pitch", "theta"), ("bank", "phi")):
+        cells = [f"{math.degrees(one.trim.x[s]):.1f}" for one in shown]
+        table.rows.append([f"{name} (deg)", *cells])
+    for u, travel in look.travel.items():
+        cells = [
+            f"{math.degrees(one.trim.u[u]):.1f}{' (stop)' if u in one.trim.on_stops else ''}"
+            for one in shown
+        ]
+        table.rows.append([f"{u} of {math.degrees(travel):.1f} (deg)", *cells])
+    table.rows.append(["least stable pole (rad/s)", *(_pole(one.least_stable) for one in shown)])
+    for name in RATES:
+        table.rows.append([f"{name} (rad/s)", *(_pole(one.modes[name]) for one in shown)])
+    for name, of in (
+        ("gain margin", lambda hold: hold.gain[1]),
+        ("phase margin (deg)", lambda hold: math.degrees(hold.phase)),
+        ("delay margin (ms)", lambda hold: 1000 * hold.delay),
+    ):
+        cells = ["" if one.margins is None else _margin(one.margins.hold, of) for one in shown]
+        table.rows.append([f"roll hold: {name}", *cells])
+    table.remarks.append(
+        "Pole: real part, imaginary part; a positive real part grows. The margins of the roll hold"
+        " are each alone."
+    )
+    return table
+
+
+def _margin(hold: Margins, of: Callable[[Margins], float]) -> str:
+    return f"{of(hold):.3g}" if hold.stable else "unstable"
+
+
+def _pole(z: complex) -> str:
+    return f"{z.real:.2g} ± {abs(z.imag):.2g}i" if abs(z.imag) > 1e-6 else f"{z.real:.2g}"
 
 
 def interpolation(study: Outcome) -> Table:

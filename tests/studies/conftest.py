@@ -65,6 +65,7 @@ def full():
         servo_segments=(2,),
         design_points=4,
         certified_controllers=False,
+        first_certificate=False,
         controller_seeds=2,
         search=GLIMPSE,
     )

@@ -1,6 +1,7 @@
 """What a user types, what comes back, and how it fails."""
 
 import json
+import re
 import subprocess
 import sys
 import warnings
@@ -438,8 +439,10 @@ def test_a_real_flight_is_identified_and_scheduling_does_not_pay(answer):
     ("arguments", "sentence"),
     [
         (["trim", "--vehicle", "xcel60"], "did you mean 'xcell60'?"),
-        (["trim", "--airspeed", "-1"], "airspeed must be >= 0"),
+        (["trim", "--airspeed", "-1"], "rearward flight is --airspeed 1 --sideslip-deg 180"),
+        (["trim", "--climb-rate", "-3"], "straight down is --airspeed 3 --climb-rate -3"),
         (["trim", "--airspeed", "90"], "no trim at"),
+        (["identify", "map.toml"], "a signal map goes with --map FILE.toml"),
         (["identify", "nowhere.csv"], "there is no such file"),
         (["export", "c", "--out", "model.cpp"], "ends in .c"),
         (["export", "mat", "--airspeeds", "5", "2"], "LOW < HIGH"),
@@ -451,6 +454,7 @@ def test_a_failure_is_one_sentence_and_status_1(run, arguments, sentence):
     assert out == ""
     assert sentence in err
     assert len(err.splitlines()) == 1
+    assert not re.search(r"throw|`start`|sideslip = pi", err), "words of Python"
 
 
 @pytest.mark.parametrize(
@@ -491,6 +495,52 @@ def test_identify_says_what_is_missing(run, tmp_path, options, sentence):
 )
 def test_wrong_usage_is_status_2(run, arguments):
     assert run(*arguments)[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["tirm"], "unknown verb 'tirm'; did you mean 'trim'"),
+        (["trim", "--airspeeed", "5"], "unknown option '--airspeeed'; did you mean '--airspeed'"),
+        (["study", "--quik"], "unknown option '--quik'; did you mean '--quick'"),
+        (["trim", "5"], "symheli trim does not take '5'"),
+    ],
+)
+def test_a_misspelt_verb_or_option_gets_the_nearest_name(run, arguments, sentence):
+    status, _, err = run(*arguments)
+    assert status == 2
+    assert sentence in err
+
+
+def test_without_a_verb_the_verbs_are_shown(run):
+    status, out, err = run()
+    assert (status, out) == (2, "")
+    assert all(f"\n    {verb}" in err for verb in cli.VERBS)
+
+
+def test_options_of_a_vehicle_tell_their_defaults_and_what_may_be_named(run):
+    said = " ".join(run("trim", "--help")[1].split())
+    assert "(default: ideal)" in said
+    assert "tail_rotor_linear" in said
+
+
+def test_the_columns_of_margins_are_explained_below_them(run):
+    status, out, _ = run("margins", "--airspeeds", 0, 5, "--points", 2, "--degree", 1)
+    assert status == 0
+    head, _, legend = out.partition("\n\ngain, phase, delay:")
+    for column in ("disk", "roll BW", "pitch BW", "lag", "gap"):
+        assert column in head
+        assert column in legend
+
+
+def test_a_suggested_unit_can_be_typed_into_a_shell(run, tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("t,GyroY dps,u\n" + "".join(f"{k / 50},{k % 7},{k % 5}\n" for k in range(99)))
+    status, _, err = run(
+        *("identify", log, "--outputs", "GyroY dps", "--inputs", "u", "--degree", 0)
+    )
+    assert status == 1
+    assert "--units 'GyroY dps=UNIT'" in err
 
 
 def test_help_and_version_succeed(run):

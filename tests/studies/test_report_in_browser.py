@@ -82,6 +82,26 @@ def test_nothing_is_cut_and_the_console_is_silent(opened, width):
     assert said == []
 
 
+SCROLLS = """() => [...document.querySelectorAll("figure .scroll, .equation .scroll")]
+    .filter((e) => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1)
+    .map((e) => (e.closest("[id]") || {}).id)"""
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_figures_and_equations_fit_the_page_without_scrolling(opened, width):
+    page, said = opened(width)
+    assert page.evaluate(SCROLLS) == []
+    panels = page.locator("svg.panel").count()
+    assert (panels > 10) == (width == 390)
+    page.set_viewport_size({"width": 1670 - width, "height": 900})  # the other way, and back
+    page.wait_for_function(
+        "n => (document.querySelectorAll('svg.panel').length > 0) === n", arg=width != 390
+    )
+    page.set_viewport_size({"width": width, "height": 900})
+    page.wait_for_function("n => document.querySelectorAll('svg.panel').length === n", arg=panels)
+    assert said == []
+
+
 def test_every_figure_is_drawn(opened):
     page, _ = opened(1280)
     figures = page.evaluate(

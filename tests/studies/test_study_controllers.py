@@ -12,6 +12,16 @@ import pytest
 import symheli
 from identification import Criterion, FitForControl
 from studies.controllers import tables
+from studies.controllers.asked import (
+    CONTROLS,
+    DELAY,
+    GUSTS,
+    MEASUREMENTS,
+    NOISE,
+    NOISE_SHARE,
+    PERIOD,
+    TOP,
+)
 from studies.controllers.certified import CertifiedControllers, bounded
 from studies.controllers.designs import (
     AIRSPEEDS,
@@ -25,7 +35,6 @@ from studies.controllers.designs import (
     verdict_in_words,
 )
 from studies.controllers.flown import (
-    NOISE_SHARE,
     WINDS,
     Flown,
     FlownControllers,
@@ -42,20 +51,7 @@ from studies.controllers.measures import (
     of_flight,
     to_body,
 )
-from studies.controllers.plant import (
-    CONTROLS,
-    DELAY,
-    GUSTS,
-    MEASUREMENTS,
-    NOISE,
-    PERIOD,
-    TOP,
-    actuator,
-    baseline,
-    closed,
-    design_plant,
-    flown_plant,
-)
+from studies.controllers.plant import actuator, baseline, closed, design_plant, flown_plant
 from studies.transition.guarantees import PLAIN, Bound
 from studies.transition.outcome import Outcome
 from studies.transition.stored_stages import Stored, StoredStages

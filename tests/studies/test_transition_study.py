@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+import symheli
 import synthesis
 from identification import beside_baseline
 from studies.campaigns.runners import runner
@@ -85,6 +86,23 @@ def test_identified_models_meet_their_marks_on_a_transition_they_have_not_seen(
         assert result.scores.ahead[output] >= marks[noise != "noise-free"]
     if noise == "noise-free":
         assert max(result.mode_miss.values()) < 3.0
+
+
+@pytest.mark.parametrize("lock", [0.01, 0.8, 3.0, 5.0, 50.0])
+def test_rotor_modes_are_found_whether_they_oscillate_or_not(ideal, lock):
+    """Of q' = k a1, a1' = -q - a1/tau, to which the modes come down: a bar that flaps slowly makes
+    them oscillate, a rotor without one damps. Two oscillations above 8 rad/s were expected once.
+    """
+    heli = ideal.with_parameters({"main_rotor.bar_lock_number": lock})
+    exact = symheli.linearize(heli, symheli.trim(heli, 2.0))
+    for mode, rate, angle in (("pitch/flap", "q", "a1"), ("roll/flap", "p", "b1")):
+        own = exact.select((rate, angle)).poles()
+        slow = own[np.argmin(abs(own))]
+        found = axes.rotor_mode(exact, mode)
+        assert min(abs(exact.poles() - found)) < 1e-9
+        assert (found.imag > 8) == (slow.imag != 0) == (lock < (3.0 if rate == "q" else 5.0))
+        # the other axes and, where it is slow, gravity move it
+        assert abs(found - complex(slow.real, abs(slow.imag))) < 0.01 * abs(slow) or lock > 3
 
 
 def test_instruments_find_the_modes_that_noise_hides_from_least_squares(ideal, flown):

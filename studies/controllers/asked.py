@@ -1,0 +1,248 @@
+"""What a controller is designed for: the choices of `symheli synthesize`, whose defaults are those
+of the study.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from studies.choices import about, check, checked, choice, sentence, toml
+from symheli import Servo
+from symheli.errors import InputError
+from symheli.flight import XCELL_SERVOS
+from symheli.values.whole_files import write_text
+
+TOP, RATE = 13.0, 3.0
+"""Of the airspeed, m/s, and of its change, m/s^2."""
+
+PERIOD, DELAY = 0.02, 0.02
+"""Of the controller's samples, and from a command to its servo, s."""
+
+CONTROLS = ("d_lon", "d_lat", "d_col", "d_ped")
+GUSTS = ("u_w", "v_w", "w_w")
+MEASUREMENTS = ("u", "v", "w", "p", "q", "r", "phi", "theta")
+
+SIZES = {
+    **dict.fromkeys(("u", "v", "w"), 2.0),
+    **dict.fromkeys(("p", "q"), 2.0),
+    "r": 0.3,
+    **dict.fromkeys(("phi", "theta"), 0.2),
+    **dict.fromkeys(("d_lon", "d_lat", "d_col"), 0.009),
+    "d_ped": 0.03,
+}
+"""A deviation of this size (m/s, rad/s, rad) counts as 1; of a control that of the command."""
+
+GUST = 2.0
+"""A gust of this size (m/s) counts as 1."""
+
+NOISE = {
+    **dict.fromkeys(("u", "v", "w"), 0.9),
+    **dict.fromkeys(("p", "q", "r"), 0.09),
+    **dict.fromkeys(("phi", "theta"), 0.03),
+}
+"""Noise of a measurement (m/s, rad/s, rad) that counts as 1: three times what is flown, or the
+controllers become faster than the servos.
+"""
+
+POINTS = 27
+DEGREE = 3
+SAMPLED_DEGREE = 3
+"""Airspeeds linearized; degree in airspeed of the model and of the sampled one."""
+
+BACK_OFF = 1.3
+BACK_OFFS = (BACK_OFF, 1.6, 2.0)
+"""Levels are so much above the least, tried in turn until no pole of the controller is faster than
+half the sample frequency: polynomials in airspeed do not follow those that are.
+"""
+
+SERVO_RATE = 3.0
+"""Rate limit of every servo, rad/s of blade pitch; assumed, the source of the servos gives none."""
+
+NOISE_SHARE = 1 / 3
+"""Of the noise that counts as 1, the standard deviation that is flown."""
+
+AT_INPUT = "_disturbance"
+"""Ends the name of a disturbance that is added to a control."""
+
+WIDTH = 100
+
+
+def _numbers(servo: Servo) -> tuple[float, ...]:
+    pair = () if servo.zero is None or servo.pole is None else (servo.zero, servo.pole)
+    return (round(servo.natural_frequency, 3), servo.damping, *pair)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What is designed, certified and flown. Raises `InputError` for what is of another type, out
+    of range, or without a size.
+    """
+
+    vehicle: str = choice(
+        "xcell60", 'packaged airframe, or a vehicle file; with a model "": no flight', empty=True
+    )
+    model: str = field(
+        default="",
+        metadata=about(
+            "design for this model (symheli identify --save, or a family of linear models) instead",
+            empty=True,
+        ),
+    )
+    out: Path = field(default=Path("controller"), metadata=about("folder of what is written"))
+    airspeeds: tuple[float, ...] = choice((0.0, TOP), "lowest and highest, m/s", least=0)
+    acceleration: float = choice(RATE, "largest |dV/dt| that is permitted, m/s^2", least=0)
+    points: int = choice(POINTS, "airspeeds at which the vehicle is linearized", least=4)
+    degree: int = choice(DEGREE, "of the interpolation, entry by entry", least=1)
+    states: tuple[str, ...] = choice(
+        (),
+        'of the model that are kept, []: all; sideways alone ["v", "p", "r", "phi", "b1"]',
+        empty=True,
+    )
+    controls: tuple[str, ...] = choice(CONTROLS, "what the controller commands")
+    measurements: tuple[str, ...] = choice(MEASUREMENTS, "what it reads")
+    disturbances: tuple[str, ...] = choice(
+        GUSTS, "gusts, m/s; the name of a control: what is added to it"
+    )
+    period: float = choice(PERIOD, "of the controller's samples, s")
+    delay: float = choice(DELAY, "from a command to its servo, s: whole samples", least=0)
+    back_off: tuple[float, ...] = choice(
+        BACK_OFFS, "multiples of the least gain at which the controller is taken, tried in turn"
+    )
+    order: int = choice(0, "states of the controller; 0: the fewest that cost 3 %", least=0)
+    knots: int = choice(0, "airspeeds of its table; 0: the fewest that cost 3 %", least=0)
+    flights: int = choice(4, "transitions flown in turbulence, each with its own gusts", least=1)
+    turbulence: float = choice(7.7, "mean wind at 20 ft of it (Dryden), m/s: light", least=0)
+    sizes: Mapping[str, float] = field(
+        default_factory=lambda: {**dict.fromkeys(GUSTS, GUST), **SIZES},
+        metadata=about(
+            "what counts as 1 (m/s, rad/s, rad): disturbances expected, deviations, commands"
+        ),
+    )
+    noise: Mapping[str, float] = field(
+        default_factory=lambda: dict(NOISE),
+        metadata=about("of each measurement, what counts as 1; a third of it is flown"),
+    )
+    servos: Mapping[str, tuple[float, ...]] = field(
+        default_factory=lambda: {u: _numbers(servo) for u, servo in XCELL_SERVOS.items()},
+        metadata=about(
+            "natural frequency (rad/s), damping; zero and pole (rad/s) if any; left out: none"
+        ),
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+        wrong = []
+        if not (self.vehicle or self.model):
+            wrong.append("vehicle: expected a name or a file, or a model")
+        if len(self.airspeeds) != 2 or not self.airspeeds[0] < self.airspeeds[1]:
+            wrong.append(f"airspeeds: expected [LOW, HIGH], got {list(self.airspeeds)}")
+        if not self.period > 0:
+            wrong.append(f"period: expected seconds > 0, got {self.period:g}")
+        samples = self.delay / self.period if self.period > 0 else 0.0
+        if abs(samples - round(samples)) > 1e-6:
+            wrong.append(f"delay: {self.delay:g} s are no whole samples of {self.period:g} s")
+        if min(self.back_off) <= 1:
+            wrong.append(f"back_off: expected numbers > 1, got {list(self.back_off)}")
+        for y in self.measurements:
+            wrong += [] if self.noise.get(y, 0) > 0 else [f"noise: give {y} a number > 0"]
+        for name in (*self.disturbances, *self.measurements, *self.controls):
+            wrong += [] if self.sizes.get(name, 0) > 0 else [f"sizes: give {name} a number > 0"]
+        for u, numbers in self.servos.items():
+            if len(numbers) not in (2, 4):
+                wrong.append(f"servos: {u} expected 2 or 4 numbers, got {list(numbers)}")
+        if wrong:
+            raise InputError("; ".join(wrong))
+
+    @classmethod
+    def read(cls, path: Path | None, options: Mapping[str, Any]) -> Asked:
+        """The file (None: only defaults) with `options` in place of its entries of these names;
+        paths of the file are relative to it.
+
+        Raises `InputError` for a file that cannot be read, or with everything that is wrong in it.
+        """
+        entries = {} if path is None else _entries(path)
+        complaints: list[str] = []
+        found = checked(cls, {**entries, **options}, complaints)
+        if complaints:
+            raise InputError(f"{path or 'options'}: {'; '.join(complaints)}")
+        try:
+            return cls(**found)
+        except InputError as error:
+            raise InputError(f"{path or 'options'}: {error}") from None
+
+    def write(self, path: Path) -> Path:
+        """Write everything that was asked for, defaults too."""
+        return write_text(path, self.text())
+
+    def text(self) -> str:
+        """The choices as a TOML file with a sentence on each."""
+        return "\n".join(self._lines()) + "\n"
+
+    def _lines(self) -> Iterator[str]:
+        yield "# symheli synthesize FILE designs, certifies and flies what this file asks for."
+        yield "# Paths are relative to this file; options of the command line win. SI and radians."
+        yield ""
+        tables = [f.name for f in fields(self) if isinstance(getattr(self, f.name), Mapping)]
+        for f in fields(self):
+            if f.name in tables:
+                continue
+            value = getattr(self, f.name)
+            mark = "# " if f.name == "model" and not value else ""
+            entry = f"{mark}{f.name} = {toml(value or 'model.json' if mark else value)}"
+            said = sentence(type(self), f.name)
+            if len(entry) + len(said) + 4 <= WIDTH:
+                yield f"{entry}  # {said}"
+            else:
+                yield from (f"# {said}:", entry)
+        for name in tables:
+            yield ""
+            yield f"[{name}]  # {sentence(type(self), name)}"
+            yield from (f"{key} = {toml(value)}" for key, value in getattr(self, name).items())
+
+    # --- what follows from it --------------------------------------------------------------------
+
+    @property
+    def sizes_of_performance(self) -> dict[str, float]:
+        """Of measurements, then commands."""
+        return {name: self.sizes[name] for name in (*self.measurements, *self.controls)}
+
+    @property
+    def sizes_of_disturbances(self) -> dict[str, float]:
+        """By the name that each has in the plant."""
+        return {self.disturbance(name): self.sizes[name] for name in self.disturbances}
+
+    def disturbance(self, name: str) -> str:
+        """The name in the plant: of one that is added to a control its own."""
+        return f"{name}{AT_INPUT}" if name in self.controls else name
+
+    def servo(self, control: str) -> Servo | None:
+        """As it was given, with the rate limit that is flown; None where there is none."""
+        if control not in self.servos:
+            return None
+        return replace(
+            Servo(**dict(zip(_OF_A_SERVO, self.servos[control], strict=False))), rate=SERVO_RATE
+        )
+
+
+_OF_A_SERVO = ("natural_frequency", "damping", "zero", "pole")
+
+
+def _entries(path: Path) -> dict[str, Any]:
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(
+            f"{path} is not there; symheli synthesize --write-config {path} writes one with the"
+            " defaults"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is no TOML file: {error}") from error
+    for name in ("out", "vehicle", "model"):
+        said = found.get(name)
+        if isinstance(said, str) and (name == "out" or (path.parent / said).is_file()):
+            found[name] = str(path.parent / said)
+    return found

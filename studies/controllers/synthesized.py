@@ -1,0 +1,289 @@
+"""A controller that was asked for: designed, reduced, sampled, tabulated, certified as it flies,
+flown.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import symheli
+import synthesis
+from identification import KinematicModel, LPVARXModel
+from studies.controllers.asked import NOISE_SHARE, Asked
+from studies.controllers.certified import FORM, SOLVER
+from studies.controllers.designs import NEAR
+from studies.controllers.flown import ALTITUDE, STEADY
+from studies.controllers.identified_plant import (
+    DEGREE,
+    continuous,
+    moving_with_commands,
+    with_gusts,
+)
+from studies.controllers.in_airspeed import of_degree
+from studies.controllers.measures import Measures, measured
+from studies.controllers.plant import (
+    baseline,
+    closed,
+    design_plant,
+    disturbed,
+    flown_plant,
+    of_family,
+)
+from symheli import (
+    AirspeedSchedule,
+    Dryden,
+    FlightPlan,
+    Helicopter,
+    LinearFamily,
+    LPVStateSpace,
+    ScheduledController,
+    Scheduling,
+    Sensor,
+    TableController,
+    Wind,
+    fly_batch,
+)
+from symheli.dynamics import INPUTS
+from symheli.errors import CompilerWarning, InputError, SynthesisError, ValidityWarning
+from symheli.flight.flight_data import FlightData
+from symheli.progress import task
+from symheli.values.arrays import Array
+from symheli.values.named_vector import NamedVector
+from synthesis import Flown, Plant
+from synthesis.worst.frozen import norm
+
+ORDERS = (*range(2, 11), 12, 14, 16, 20, 24, 28)
+KNOTS = (2, 3, 5, 9, 17, 33)
+"""States and airspeeds of the table that are tried in turn."""
+LOOKED_AT = 9
+"""Airspeeds at which the frozen gain of the loop is."""
+MANY = 12
+"""With more states in the loop, its P(p) is straight in airspeed."""
+INSIDE = (0.04, 0.08)
+"""So much of the range, beside its ends, the transition that is flown leaves free."""
+
+Given = LinearFamily | LPVARXModel | KinematicModel
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Synthesized:
+    """What came of it.
+
+    `made`: the controller of the synthesis; `table`: what flies; `flown`: the proof of its loop;
+    `flights`, `measures`: each transition; none without a vehicle; `seconds` of each step.
+    """
+
+    asked: Asked
+    made: synthesis.Controller
+    table: TableController
+    flown: Flown
+    flights: tuple[FlightData, ...] = ()
+    measures: tuple[Measures, ...] = ()
+    seconds: Mapping[str, float]
+
+    @property
+    def lost(self) -> int:
+        """How many flights were lost."""
+        return sum(one.lost for one in self.measures)
+
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """Median and largest energy ratio of the flights; NaN where none has one: no flight, or
+        disturbances that no flight has.
+        """
+        gusts = set(self.asked.disturbances) - set(self.asked.controls)
+        if not self.measures or not gusts:
+            return math.nan, math.nan
+        each = [one.ratio for one in self.measures]
+        return float(np.median(each)), max(each)
+
+
+class BesideAutopilot:
+    """A controller of some controls, the others flown by the LQR schedule."""
+
+    def __init__(self, own: TableController, autopilot: ScheduledController):
+        """`autopilot` commands all four, as often."""
+        self._own, self._autopilot, self.dt = own, autopilot, own.dt
+        names = list(map(str, INPUTS))
+        self._rows = [names.index(str(u)) for u in own.outputs]
+
+    def reset(self) -> None:
+        """Both."""
+        self._own.reset()
+        self._autopilot.reset()
+
+    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> Array:
+        """Commands (4,), rad."""
+        u = np.array(self._autopilot.step(measured, reference, p), dtype=float)
+        u[self._rows] = self._own.step(measured, reference, p)[self._rows]
+        return u
+
+
+def synthesized(asked: Asked, given: Given | None = None) -> Synthesized:
+    """Everything, step by step; `given` in place of the linearizations of the vehicle, which then
+    is only flown. Raises `SynthesisError` where there is no controller, with the reason.
+    """
+    seconds: dict[str, float] = {}
+    with _timed("trimming and linearizing", seconds):
+        model = model_of(asked, given)
+        design, flying = plants(model, asked)
+    with _timed("designing", seconds):
+        made = synthesis.output_feedback(
+            design, back_off=asked.back_off, fastest=math.pi / asked.period
+        )
+    with _timed("reducing, sampling, tabulating", seconds):
+        table = tabulated(made, flying, asked)
+    with _timed("certifying", seconds):
+        flown = certified(table, flying, made.gamma)
+    flights: tuple[FlightData, ...] = ()
+    if asked.vehicle:
+        with _timed("flying", seconds):
+            flights = flights_of(table, asked)
+    return Synthesized(
+        asked=asked,
+        made=made,
+        table=table,
+        flown=flown,
+        flights=flights,
+        measures=tuple(measured(flights, asked)),
+        seconds=seconds,
+    )
+
+
+def model_of(asked: Asked, given: Given | None = None) -> LPVStateSpace:
+    """What is designed for, over airspeed, with its disturbances; sampled where it was identified.
+
+    Raises `InputError` for a model sampled otherwise than the controller.
+    """
+    if given is None:
+        return baseline(Helicopter.load(asked.vehicle, governor="ideal"), asked)
+    low, high = asked.airspeeds
+    airspeed = Scheduling("airspeed", "m/s", low, high, rate=asked.acceleration)
+    if isinstance(given, LinearFamily):
+        model = of_family(given, asked)
+    elif isinstance(given, KinematicModel):
+        model = with_gusts(given.to_state_space(held=moving_with_commands(given)))
+    else:
+        model = given.to_state_space()
+    if model.dt is not None and abs(model.dt - asked.period) > 1e-9:
+        raise InputError(
+            f"period: the model is sampled every {model.dt:g} s, the controller every"
+            f" {asked.period:g} s; give the same"
+        )
+    return disturbed(model.with_scheduling(airspeed), asked)
+
+
+def plants(model: LPVStateSpace, asked: Asked) -> tuple[Plant, Plant]:
+    """What is designed for, in continuous time, and what is flown, sampled."""
+    if model.dt is None:
+        return design_plant(model, asked.period / 2, asked), flown_plant(model, asked)
+    smooth = of_degree(continuous(model), DEGREE)  # the half sample of the hold is in it
+    return design_plant(smooth, 0.0, asked), flown_plant(model, asked)
+
+
+def tabulated(made: synthesis.Controller, plant: Plant, asked: Asked) -> TableController:
+    """The sampled controller of fewest states and then fewest airspeeds whose frozen gain on the
+    plant is `NEAR` that of all states; as many as are asked for.
+
+    Raises `SynthesisError` where the loop that flies is not stable at some frozen airspeed.
+    """
+    speeds = np.linspace(asked.airspeeds[0], asked.airspeeds[1], LOOKED_AT)
+
+    def gain(controller: object) -> float:
+        loop = closed(plant, controller)
+        return max(norm(*loop.matrices(float(v)), loop.dt)[0] for v in speeds)
+
+    limits = _limits(asked)
+    whole = made.discretize(asked.period)
+    most = NEAR * gain(whole.model)
+    if not math.isfinite(most):
+        raise SynthesisError(
+            f"sampled every {asked.period:g} s, behind its servos and a delay of {asked.delay:g} s,"
+            " the loop of the controller is unstable at a frozen airspeed: ask for less (larger"
+            " sizes of the deviations, smaller ones of the commands, more noise)"
+        )
+    sampled = whole
+    if asked.order:
+        sampled = made.reduce(asked.order).discretize(asked.period)
+    else:
+        for order in (n for n in ORDERS if n < made.order):
+            fewer = _reduced(made, order, asked.period)
+            if fewer is not None and gain(fewer.model) <= most:
+                sampled = fewer
+                break
+    for knots in (asked.knots,) if asked.knots else KNOTS:
+        table = TableController.of(sampled.model, knots, limits=limits)
+        if asked.knots or gain(table) <= most:
+            break
+    return table
+
+
+def certified(table: TableController, plant: Plant, promised: float) -> Flown:
+    """The proven gain of the loop that flies, on the fit of its plant."""
+    states = len(closed(plant, table).states)
+    options: dict[str, Any] = {"form": FORM, "solver": SOLVER} if states > MANY else {}
+    return synthesis.certify_flown(
+        table, plant, synthesized=promised, cover=False, search=None, **options
+    )
+
+
+def flights_of(table: TableController, asked: Asked) -> tuple[FlightData, ...]:
+    """Transitions of the nonlinear helicopter, its engine governed, in turbulence, the table with
+    its arithmetic and limits.
+    """
+    heli = Helicopter.load(asked.vehicle, governor="pi")
+    low, high = asked.airspeeds
+    ends = low + INSIDE[0] * (high - low), high - INSIDE[1] * (high - low)
+    controller: object = table
+    if len(table.outputs) < len(heli.inputs):
+        ideal = Helicopter.load(asked.vehicle, governor="ideal")
+        lqr = symheli.gain_scheduled_lqr(ideal, low, high, asked.period)
+        controller = BesideAutopilot(table, lqr.scheduled_controller)
+    servos = {u: asked.servo(u) for u in map(str, heli.inputs)}
+    plan = FlightPlan(
+        AirspeedSchedule.transition(*ends, acceleration=asked.acceleration or 1.0, hold=3.0),
+        dt=asked.period,
+        controller=controller,
+        wind=Wind(STEADY, turbulence=Dryden(asked.turbulence, ALTITUDE))
+        if asked.turbulence
+        else Wind(),
+        servos=servos if all(servos.values()) else None,  # type: ignore[arg-type]
+        sensors={y: Sensor(noise=NOISE_SHARE * asked.noise[y]) for y in asked.measurements},
+        delay=asked.delay,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ValidityWarning)
+        warnings.simplefilter("ignore", CompilerWarning)
+        return fly_batch(heli, [plan], seeds=range(asked.flights)).data
+
+
+def _limits(asked: Asked) -> dict[str, tuple[float, float]]:
+    """The travel of the controls, where there is a vehicle."""
+    if not asked.vehicle:
+        return {}
+    heli = Helicopter.load(asked.vehicle, governor="ideal")
+    travel = dict(zip(map(str, heli.inputs), map(float, heli.travel), strict=True))
+    return {u: (-travel[u], travel[u]) for u in asked.controls}
+
+
+def _reduced(made: synthesis.Controller, order: int, period: float) -> synthesis.Controller | None:
+    try:
+        return made.reduce(order).discretize(period)
+    except SynthesisError:
+        return None
+
+
+@contextmanager
+def _timed(step: str, seconds: dict[str, float]) -> Iterator[None]:
+    begin = time.perf_counter()
+    with task(step):
+        yield
+    seconds[step] = time.perf_counter() - begin

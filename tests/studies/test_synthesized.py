@@ -1,0 +1,214 @@
+"""symheli synthesize: a controller asked for in a file, designed, certified as it flies, flown."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import symheli
+import synthesis
+from studies import cli
+from studies.controllers.asked import Asked
+from studies.controllers.synthesized import (
+    BesideAutopilot,
+    model_of,
+    plants,
+    synthesized,
+    tabulated,
+)
+from studies.controllers.synthesized_report import TABLE, gains, text
+from symheli.errors import InputError, SynthesisError
+
+SMALL = """
+vehicle = ""
+model = "family.json"
+out = "made"
+airspeeds = [0.0, 8.0]
+acceleration = 2.0
+degree = 1
+controls = ["d_lat"]
+measurements = ["v"]
+disturbances = ["v_w", "d_lat"]
+delay = 0.0
+sizes = { v = 1.0, d_lat = 0.05, v_w = 1.0 }
+noise = { v = 0.3 }
+servos = {}
+"""
+"""A lag over airspeed, from gusts and what is added to the control."""
+
+MEASURED = ("speed", "attitude", "outside", "faster", "ratio")
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("small")
+    models = [
+        symheli.LinearModel(
+            [[0.2 - 0.1 * V]], [[5.0, 1.0]], [[1.0]], [[0.0, 0.0]], ["v"], ["d_lat", "v_w"], ["v"]
+        )
+        for V in (0.0, 4.0, 8.0)
+    ]
+    symheli.LinearFamily.from_models([0.0, 4.0, 8.0], models).save(folder / "family.json")
+    (folder / "my.toml").write_text(SMALL)
+    return folder / "my.toml"
+
+
+@pytest.fixture(scope="module")
+def family(small):
+    return symheli.LinearFamily.load(small.parent / "family.json")
+
+
+@pytest.fixture(scope="module")
+def found(small, family):
+    return synthesized(Asked.read(small, {}), family)
+
+
+def test_what_is_written_with_the_defaults_asks_for_the_defaults(tmp_path):
+    path = Asked().write(tmp_path / "my.toml")
+    assert Asked.read(path, {"out": Asked().out}) == Asked()
+    assert max(map(len, path.read_text().splitlines())) <= 120
+
+
+def test_everything_that_is_wrong_in_the_file_is_said_at_once(tmp_path):
+    path = tmp_path / "my.toml"
+    path.write_text(
+        'airspeeds = [5, 2]\ndelay = 0.03\nmeasurements = ["v", "xi"]\nsizes = { v = 1 }\n'
+        "servos = { d_lon = [36] }\nback_off = [1.0]\n"
+    )
+    with pytest.raises(InputError) as told:
+        Asked.read(path, {})
+    for said in (
+        "airspeeds: expected [LOW, HIGH], got [5.0, 2.0]",
+        "delay: 0.03 s are no whole samples of 0.02 s",
+        "noise: give xi a number > 0",
+        "sizes: give d_ped a number > 0",
+        "servos: d_lon expected 2 or 4 numbers, got [36.0]",
+        "back_off: expected numbers > 1",
+    ):
+        assert said in str(told.value)
+    path.write_text("[sizes]\nv = 'large'\n")
+    with pytest.raises(InputError, match="sizes: expected of v a number, got"):
+        Asked.read(path, {})
+    path.write_text("ordre = 4\n")
+    with pytest.raises(InputError, match="ordre is unknown; did you mean order"):
+        Asked.read(path, {})
+
+
+def test_the_table_the_proof_and_the_page_are_of_what_was_asked_for(
+    small, family, found, capsys, monkeypatch
+):
+    """A lag that is unstable in hover: no loop is without a controller."""
+    monkeypatch.setattr("studies.controllers.synthesized.synthesized", lambda *_: found)
+    status = cli.main(["synthesize", str(small), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    out = small.parent / "made"
+    assert status == 0
+    assert told["verified"]
+    assert told["flown"] is None
+    assert told["frozen"] <= told["proven"] < math.inf
+    assert {path.name for path in out.iterdir()} == {
+        *("certificate.json", "controller.json", "numbers.json", "report.html", "synthesize.toml")
+    }
+    assert symheli.TableController.load(out / TABLE).matrices.tobytes() == (
+        found.table.matrices.tobytes()
+    )
+    assert synthesis.Certificate.load(out / "certificate.json").verify()
+    assert "keeps a gain of" in (out / "report.html").read_text()
+    assert Asked.read(out / "synthesize.toml", {}).sizes == found.asked.sizes
+    # the loop of the proof is this table around this plant
+    _, plant = plants(model_of(found.asked, family), found.asked)
+    assert "d_lat_disturbance" in plant.disturbances
+    loop = plant.close(found.table)
+    for p in (0.0, 3.0, 8.0):
+        np.testing.assert_allclose(found.flown.loop.at(p).A, loop.at(p).A, atol=1e-12)
+
+
+def test_what_is_shown_fits_a_terminal_and_names_what_is_known(found):
+    assert [name for name, *_ in gains(found)] == ["promised", "frozen", "proven"]
+    said = text(found, [])
+    assert max(map(len, said.splitlines())) <= 100
+    assert f"{found.flown.gamma:.3g}" in said.splitlines()[0]
+    lost = replace(found, measures=(SimpleNamespace(**dict.fromkeys(MEASURED, 0.5), lost=True),))
+    assert "1 of 1 were lost" in text(lost, [])
+
+
+def test_as_many_states_and_airspeeds_as_are_asked_for(family, found):
+    _, plant = plants(model_of(found.asked, family), found.asked)
+    for asked in (replace(found.asked, knots=5), replace(found.asked, order=1)):
+        table = tabulated(found.made, plant, asked)
+        assert len(table.knots) == (asked.knots or len(found.table.knots))
+        assert table.order == (asked.order or found.table.order)
+
+
+def test_a_model_sampled_otherwise_than_the_controller_is_refused(small, family):
+    asked = Asked.read(small, {})
+    whole = model_of(asked, family)
+
+    class Sampled:
+        def to_state_space(self):
+            return whole.discretize(0.1)
+
+    with pytest.raises(InputError, match=r"sampled every 0\.1 s, the controller every 0\.02 s"):
+        model_of(asked, Sampled())  # type: ignore[arg-type]
+
+
+def test_a_controller_whose_loop_does_not_stand_the_delay_is_refused_with_what_to_change(
+    family, found
+):
+    """Designed without a delay, flown so late."""
+    late = replace(found.asked, delay=1.2)
+    _, plant = plants(model_of(late, family), late)
+    with pytest.raises(SynthesisError, match=r"a delay of 1\.2 s.*unstable.*ask for less"):
+        tabulated(found.made, plant, late)
+
+
+def test_what_is_not_commanded_is_flown_by_the_autopilot():
+    class Four:
+        dt = 0.02
+
+        def __init__(self, *u):
+            self.u, self.outputs = np.array(u), ("d_lat", "d_ped")
+
+        def reset(self):
+            self.u = 0 * self.u
+
+        def step(self, *_):
+            return self.u
+
+    own, rest = Four(0.0, 2.0, 0.0, 4.0), Four(10.0, 20.0, 30.0, 40.0)
+    both = BesideAutopilot(own, rest)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(both.step(None, None, None), [10.0, 2.0, 30.0, 4.0])  # type: ignore[arg-type]
+    both.reset()
+    assert not both.step(None, None, None).any()  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_the_defaults_give_a_proven_controller_that_flies(tmp_path, capsys):
+    """What --write-config writes works as it is."""
+    assert cli.main(["synthesize", "--write-config", str(tmp_path / "my.toml")]) == 0
+    capsys.readouterr()
+    assert cli.main(["synthesize", str(tmp_path / "my.toml"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verified"]
+    assert told["flown"]["largest"] < told["proven"] < 1.3 * told["frozen"]
+    assert told["states"]["flown"] < told["states"]["designed"]
+    assert not any(flight["lost"] for flight in told["flights"])
+
+
+@pytest.mark.slow
+def test_sideways_alone_the_rest_is_flown_by_an_autopilot(tmp_path):
+    asked = Asked(
+        out=tmp_path / "lateral",
+        states=("v", "p", "r", "phi", "b1"),
+        controls=("d_lat", "d_ped"),
+        measurements=("v", "p", "r", "phi"),
+        disturbances=("v_w",),
+    )
+    found = synthesized(asked)
+    assert found.flown.certificate.verified
+    assert found.lost == 0
