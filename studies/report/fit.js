@@ -42,7 +42,7 @@
   function stacked(svg) {
     const parts = cells(svg, JSON.parse(svg.dataset.axes).map((ax) => ax.box));
     if (!parts.length) return;
-    const NS = "http://www.w3.org/2000/svg";
+    const NS = svg.namespaceURI;
     const whole = document.createElementNS(NS, "g");
     whole.id = svg.closest("figure").dataset.name + "-whole";
     whole.append(...svg.childNodes);

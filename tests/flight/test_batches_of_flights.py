@@ -181,7 +181,7 @@ def test_plans_say_what_does_not_fit(ideal):
         ({"noise_db": "30 dB"}, "noise_db: expected a number of decibels"),
         ({"noise_db": np.nan}, "noise_db: expected a number of decibels"),
         ({"seed": -1}, "seed: expected a whole number"),
-        ({"wind": (np.nan, 0.0, 0.0)}, "steady: expected a finite wind"),
+        ({"wind": (np.nan, 0.0, 0.0)}, "steady: expected three finite numbers"),
         ({"wind": "north"}, "wind: expected a Wind or"),
         ({"dt": "fast"}, "dt: expected a positive number of seconds"),
         ({"dt": -0.02}, "dt must be a positive number of seconds"),
