@@ -9,8 +9,8 @@ coefficients would where an entry of B2 or C2 passes through zero.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
-from symheli.lpv.bases.polynomials import factors_of
+from symheli.lpv.bases.polynomials import factors_of, piecewise_lobatto
 from symheli.values.numbers import whole
 from synthesis.design.coordinates import Coordinates
 from synthesis.design.elimination import Half, controlled, observed
@@ -42,6 +42,12 @@ WIDE = (1e2, 1e3, 1e4, 1e6, 1e8)
 """The bounds once g is settled, tried in turn."""
 GROWS = 1.03
 """A larger bound that separates X Y from I by less than this factor more is not worth it."""
+COARSE, FINE = 1e-3, 1e-5
+"""Tolerances of g while points are added and at the end, where p moves: points leave RISEN."""
+CENTRAL = 0.1
+"""Tolerance to which X and Y are separated once g is settled: near the middle of what is feasible,
+where gains change slowly with p; at the end of the search they turn steeply at the ends of a range.
+"""
 MARGIN = 1e-8
 """Blocks are kept below minus this multiple of the identity."""
 SETTLED = (1e-3, 1e-5, 1e-8)
@@ -59,7 +65,7 @@ ADDED = 8
 """Most points that are added at a time."""
 VIOLATED = 1e-5
 """Excess of g, relative, with which a block between the points must be negative."""
-RISEN = 1e-4
+RISEN = 1e-3
 """A round that raises g by no more than this part is the last."""
 ROUNDING = 1e-8
 """An eigenvalue up to this size is zero there, in scaled coordinates."""
@@ -131,22 +137,27 @@ class Existence:
             knots = [*np.concatenate(parts), max(ends)]
             least = LEAST_POINTS.get(m, 3)
             count = max(-(-(least - 1) // (len(knots) - 1)), 2 * int(degree) + (m == 1))
-            axes.append(_lobatto(knots, count))
+            axes.append(piecewise_lobatto(knots, count))
         return tensor_grid(axes)
 
     def least_gamma(self, solver: Solver) -> Found:
         """Minimise g, with points added where a block is violated between them."""
-        before = 0.0
+        before, rough = 0.0, replace(solver, tolerance=COARSE)
+        if len(self.points) == 1:
+            return self._least(solver)
         for _ in range(ROUNDS):
-            blocks = [*self._halves(None, MARGIN), *self._coupling(False, self.largest)]
-            found = self._solved(blocks, 1.0, solver)
+            found = self._least(rough)
             if not np.isfinite(found.gamma) or found.gamma <= before * (1 + RISEN):
                 break
             before = found.gamma
             if not len(new := self._violated(found)):
                 break
             self.points = np.concatenate([self.points, new])
-        return found
+        return self._least(replace(solver, tolerance=FINE))
+
+    def _least(self, solver: Solver) -> Found:
+        blocks = [*self._halves(None, MARGIN), *self._coupling(False, self.largest)]
+        return self._solved(blocks, 1.0, solver)
 
     def bounded(self, found: Found) -> bool:
         """Whether the bound on X and Y decides."""
@@ -156,7 +167,9 @@ class Existence:
     def _violated(self, found: Found) -> Array:
         """Points (k, m) where a block is violated most, one in each cell of the present ones."""
         axes = [np.unique(x) for x in self.points.T]
-        between = tensor_grid([_lobatto(x.tolist(), FINER.get(len(axes), 2)) for x in axes])
+        between = tensor_grid(
+            [piecewise_lobatto(x.tolist(), FINER.get(len(axes), 2)) for x in axes]
+        )
         worst = self._excess(between, found)
         allowed = max(ROUNDING, 2 * float(self._excess(self.points, found).max()))
         chosen: dict[tuple[int, ...], Array] = {}
@@ -180,6 +193,7 @@ class Existence:
         """For this g the X and Y whose product is farthest from one: first within the least bound
         beyond which that hardly grows, then within larger ones.
         """
+        solver = replace(solver, tolerance=CENTRAL)
         for margin in SETTLED:
             halves = self._halves(gamma, margin)
             before: Found | None = None
@@ -295,12 +309,6 @@ class Existence:
             blocks.add(Y, Y.values(p), second, -0.5 * second)
             out.append(blocks.finished(cross * (not apart), -cross * apart))
         return out
-
-
-def _lobatto(knots: Sequence[float], parts: int) -> Array:
-    """The knots, and the Chebyshev-Lobatto points that cut every interval in so many parts."""
-    inner = 0.5 - 0.5 * np.cos(np.pi * np.arange(parts) / parts)
-    return np.r_[np.concatenate([a + (b - a) * inner for a, b in pairwise(knots)]), knots[-1]]
 
 
 def _below(M: Array, n: int) -> Array:

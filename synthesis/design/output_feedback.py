@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
-FAR_ABOVE = 1.05
-"""A gamma this many times the least one is said to be."""
+FAR_ABOVE = 1.01
+"""A gamma this many times the least one, with the back-off that was asked for, is said to be."""
 
 
 def output_feedback(
@@ -181,11 +181,11 @@ def _nominal(
             break
     if slowest is None:
         raise failed(plant, attempts)
-    notes = _limited(start, slowest, floor, fastest)
+    notes = _limited(start, slowest, min(factors), fastest)
     return replace(slowest, notes=notes, attempts=tuple(attempts))
 
 
-def _limited(start: Start, made: Controller, floor: float, fastest: float) -> tuple[str, ...]:
+def _limited(start: Start, made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
     """What may have kept the controller from a lower gamma, or from its limits, a sentence each."""
     out = []
     if start.existence.bounded(start.found) and start.existence.largest >= LARGEST[-1]:
@@ -193,7 +193,7 @@ def _limited(start: Start, made: Controller, floor: float, fastest: float) -> tu
             f"the bound {start.existence.largest:g} on X and Y decides gamma: some measurement is"
             " almost free of noise or some control almost free of cost; give it more"
         )
-    if made.gamma > FAR_ABOVE * start.gamma:
+    if made.gamma > FAR_ABOVE * asked * start.gamma:
         out.append(
             f"gamma is {made.gamma / start.gamma:.2f} times the least one of the inequalities: no"
             " nearer controller had gains that are smooth in the scheduling parameters"

@@ -8,13 +8,15 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Matrices
-from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto
 from symheli.values.numbers import positive
 
 Array = np.ndarray
 
 NODES = {1: 41, 2: 13}
-"""Values of each parameter at which the rule is applied (more parameters: 7)."""
+"""Values of each parameter at which the rule is applied, at least (more parameters: 7)."""
+EACH = 5
+"""Parts of every piece of the functions of one parameter, at least."""
 
 
 def tustin(model: LPVStateSpace, dt: float) -> LPVStateSpace:
@@ -43,10 +45,18 @@ def resampled(
     dt: float | None,
 ) -> LPVStateSpace:
     """The model with its matrices (K, ..) changed at every p, by the same functions of p."""
-    p = lobatto_points(NODES.get(len(model.parameters), 7), model.box)
+    p = _nodes(model)
     exact = Matrices(*change(*model.matrices(p)))
     A, B, C, D = (model.basis.fit(p, M) for M in exact)
     sampled = LPVStateSpace(
         model.basis, A, B, C, D, model.parameters, model.states, model.inputs, model.outputs, dt
     )
     return sampled.with_residuals(p, exact)
+
+
+def _nodes(model: LPVStateSpace) -> Array:
+    if len(model.parameters) > 1:
+        return lobatto_points(NODES.get(len(model.parameters), 7), model.box)
+    pieces = model.basis.pieces()
+    knots = [pieces[0].low, *(piece.high for piece in pieces)]
+    return piecewise_lobatto(knots, max(EACH, -(-NODES[1] // len(pieces))))

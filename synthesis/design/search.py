@@ -23,7 +23,7 @@ from synthesis.design.existence import LARGEST, Existence, Found
 from synthesis.design.fitted import Fitted, fits
 from synthesis.design.motions import used
 from synthesis.program.cone_program import Solver
-from synthesis.worst.frozen import norm
+from synthesis.worst.frozen import below
 
 Array = np.ndarray
 
@@ -48,7 +48,7 @@ were imposed (more parameters: 3).
 """
 DEGREES = {1: (2, 4, 6, 8), 2: (2, 4)}
 """Of the one that moves, tried in turn while gamma falls (more parameters: 2)."""
-CLOSE = 1.008
+CLOSE = 1.01
 """A gamma within this factor of what no controller can beat is not worth another program."""
 WORTH = 0.995
 """Part of gamma to which a richer program must lower it to be worth another."""
@@ -219,10 +219,11 @@ def best(
     """
     channel = floor if 0 < floor < math.inf else 1.0
     degrees = DEGREES.get(len(coordinates(1.0).parameters), (2,))
-    starts = [
-        least(coordinates, shape, divisions, solver, attempts, channel)
-        for shape in every(degrees[0])
-    ]
+    starts: list[Start] = []
+    for shape in every(degrees[0]):
+        starts.append(least(coordinates, shape, divisions, solver, attempts, channel))
+        if starts[-1].gamma <= CLOSE * floor:
+            break
     chosen = min(range(len(starts)), key=lambda k: starts[k].gamma)
     start = starts[chosen]
 
@@ -292,20 +293,26 @@ def settled(
         gamma = factor * lowest.gamma
         for found in tracked(f"at {factor:g} of the least gamma", existence.widest(gamma, solver)):
             gains = recover(coordinates, existence, found) if np.any(found.coefficients) else None
-            reached, fit = math.inf, None
+            holds, fit = False, None
             if gains is not None:
                 # X and Y of a solver that stopped short may not be positive
                 with contextlib.suppress(np.linalg.LinAlgError):
-                    reached = frozen_gains(coordinates, gains, loop or closed, points).max()
-                    if reached <= gamma * (1 + SLACK):
+                    level = gamma * (1 + SLACK)
+                    holds = kept(coordinates, gains, loop or closed, points, level)
+                    if holds:
                         fit = _fit(coordinates, gains, loop or closed, points, gamma)
-            kept = "none" if math.isinf(reached) else f"worst frozen gain {reached / gamma:.4f}"
-            apart = "" if fit is None else f", functions of p within {fit.misfit:.1e}"
+            outcome = "frozen loops keep it" if holds else "frozen loops do not keep it"
+            if holds:
+                outcome += (
+                    ", no functions of p do"
+                    if fit is None
+                    else f", functions of p within {fit.misfit:.1e}"
+                )
             attempts.append(
                 Attempt(
                     f"back-off {factor:g}",
                     0.0,
-                    f"{found.message}, {kept} of it{apart}",
+                    f"{found.message}, {outcome}",
                     gamma * coordinates.channel,
                 )
             )
@@ -317,21 +324,18 @@ def settled(
 def _fit(
     coordinates: Coordinates, gains: Gains, loop: Loop, points: Array, gamma: float
 ) -> Fitted | None:
-    """The simplest functions that keep gamma and are accurate, else the most accurate of those that
-    keep it; None where none does.
+    """The simplest functions that are accurate and keep gamma, else the most accurate of those that
+    keep it, splines only where polynomials are far off; None where none does.
     """
-    best: Fitted | None = None
-    for fit in fits(gains, coordinates.parameters):
-        if best is not None and best.misfit <= NEAR and not fit.basis.degrees:
-            break
-        if fit.misfit > (ROUGH if best is None else BETTER * best.misfit):
-            continue
-        if frozen_gains(coordinates, fit, loop, points).max() > gamma * (1 + SLACK):
-            continue
-        best = fit
-        if fit.misfit <= ACCURACY:
-            break
-    return best
+    every = list(fits(gains, coordinates.parameters))
+    polynomials = [fit for fit in every if fit.basis.degrees]
+    near = any(fit.misfit <= NEAR for fit in polynomials)
+    accurate = [fit for fit in every if fit.misfit <= ACCURACY]
+    rest = [fit for fit in (polynomials if near else every) if ACCURACY < fit.misfit <= ROUGH]
+    for fit in (*accurate, *sorted(rest, key=lambda fit: fit.misfit)):
+        if kept(coordinates, fit, loop, points, gamma * (1 + SLACK)):
+            return fit
+    return None
 
 
 def _judged(existence: Existence) -> Array:
@@ -348,17 +352,10 @@ def _judged(existence: Existence) -> Array:
     return np.unique(p, axis=0)
 
 
-def frozen_gains(coordinates: Coordinates, gains: Gains, loop: Loop, p: Array) -> Array:
-    """Of the loop frozen at each p (K, m), scaled; inf where it is unstable, and then at all."""
-    A, B, C, D = loop(coordinates, gains, p)
-    if any(_unstable(M, coordinates.dt) for M in A):
-        return np.full(len(p), math.inf)
-    return np.array([norm(*each, coordinates.dt, 1e-4)[0] for each in zip(A, B, C, D, strict=True)])
-
-
-def _unstable(A: Array, dt: float | None) -> bool:
-    poles = np.linalg.eigvals(A)
-    return bool(np.any(poles.real >= 0 if dt is None else np.abs(poles) >= 1))
+def kept(coordinates: Coordinates, gains: Gains, loop: Loop, p: Array, gamma: float) -> bool:
+    """Whether the loop frozen at each p (K, m), scaled, is stable and its gain below gamma."""
+    every = zip(*loop(coordinates, gains, p), strict=True)
+    return all(below(*each, gamma, coordinates.dt) for each in every)
 
 
 def closed(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:

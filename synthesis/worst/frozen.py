@@ -145,6 +145,27 @@ def norm(
     return math.ldexp(peak.gain, size), omega
 
 
+def below(A: Array, B: Array, C: Array, D: Array, level: float, dt: float | None = None) -> bool:
+    """Whether every pole is strictly stable and the response below `level` at, and between, the
+    frequencies where eigenvalues of the Hamiltonian of that level come near the axis: a quick look
+    in double precision, no bound.
+    """
+    if min(B.shape[1], C.shape[0]) == 0:
+        return True
+    poles = np.linalg.eigvals(A)
+    if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
+        return False
+    if dt is not None:
+        A, B, C, D = to_continuous(A, B, C, D)
+    if not np.linalg.norm(D, 2) < level:
+        return False
+    named = np.unique(np.abs(np.imag(_hamiltonian_eigenvalues(A, B, C, D, level))))
+    omega = np.concatenate([[0.0], named, 0.5 * (named[1:] + named[:-1])])
+    pencil = 1j * omega[:, None, None] * np.eye(len(A)) - A
+    found = C @ np.linalg.solve(pencil, np.broadcast_to(B, (len(omega), *B.shape))) + D
+    return bool(np.linalg.norm(found, 2, axis=(1, 2)).max() < level)
+
+
 class _Response(NamedTuple):
     """The largest singular value over frequency; of a discrete model over omega = tan(theta/2),
     theta the angle of z.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,6 +41,12 @@ def lobatto_points(count: int, ranges: Sequence[Range]) -> Array:
         for low, high in ranges
     ]
     return axes[0] if len(axes) == 1 else tensor_grid(axes)
+
+
+def piecewise_lobatto(knots: Sequence[float], parts: int) -> Array:
+    """The knots, and the Chebyshev-Lobatto points that cut every interval in so many parts."""
+    inner = 0.5 - 0.5 * np.cos(np.pi * np.arange(parts) / parts)
+    return np.r_[np.concatenate([a + (b - a) * inner for a, b in pairwise(knots)]), knots[-1]]
 
 
 def factors_of(basis: FunctionSpace) -> tuple[FunctionSpace, ...]:
