@@ -32,12 +32,10 @@ Dependence = int | tuple[int, ...] | FunctionSpace
 
 BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
 """Multiples of the least gamma at which X and Y are settled, tried in turn."""
-SLACK = 1e-3
+SLACK = 1e-6
 """By which the frozen gain of a controller may exceed what was promised: rounding."""
 ROUGH = 0.3
 """Functions of p farther from the gains than this are not looked at."""
-BETTER = 0.7
-"""Part of the error of functions of p to which others must lower it to be looked at."""
 ACCURACY = 3e-3
 """Of functions of p fitted to the gains, relative, entry by entry."""
 NEAR = 2e-2
@@ -355,7 +353,7 @@ def _judged(existence: Existence) -> Array:
 def kept(coordinates: Coordinates, gains: Gains, loop: Loop, p: Array, gamma: float) -> bool:
     """Whether the loop frozen at each p (K, m), scaled, is stable and its gain below gamma."""
     every = zip(*loop(coordinates, gains, p), strict=True)
-    return all(below(*each, gamma, coordinates.dt) for each in every)
+    return all(below(A, B, C, D, gamma, coordinates.dt) for A, B, C, D in every)
 
 
 def closed(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:
