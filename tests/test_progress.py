@@ -145,8 +145,9 @@ def test_a_design_tells_the_digits_of_its_gamma(heard):
     assert well_formed(heard)
     digits = [p for p in heard.of("digits of the least level") if p.over]
     assert digits
-    assert all(p.total == 7 for p in digits)  # of a tolerance of 1e-7
-    assert max(p.done for p in digits) == 7
+    # of tolerances of 1e-3 while points are added, 1e-5 at the end, 0.1 once gamma is settled
+    assert {p.total for p in digits} == {1, 3, 5}
+    assert max(p.done for p in digits) == 5
 
 
 @pytest.mark.parametrize("method", ["rls", "lasso", "ridge"])

@@ -43,7 +43,7 @@ WIDE = (1e2, 1e3, 1e4, 1e6, 1e8)
 GROWS = 1.03
 """A larger bound that separates X Y from I by less than this factor more is not worth it."""
 COARSE, FINE = 1e-3, 1e-5
-"""Tolerances of g while points are added and at the end, where p moves: points leave RISEN."""
+"""Tolerances of g while points are added and at the end, where p moves: points leave VIOLATED."""
 CENTRAL = 0.1
 """Tolerance to which X and Y are separated once g is settled: near the middle of what is feasible,
 where gains change slowly with p; at the end of the search they turn steeply at the ends of a range.
@@ -63,10 +63,8 @@ ROUNDS = 8
 """Most additions of points."""
 ADDED = 8
 """Most points that are added at a time."""
-VIOLATED = 1e-5
+VIOLATED = 1e-4
 """Excess of g, relative, with which a block between the points must be negative."""
-RISEN = 1e-3
-"""A round that raises g by no more than this part is the last."""
 ROUNDING = 1e-8
 """An eigenvalue up to this size is zero there, in scaled coordinates."""
 
@@ -142,17 +140,12 @@ class Existence:
 
     def least_gamma(self, solver: Solver) -> Found:
         """Minimise g, with points added where a block is violated between them."""
-        before, rough = 0.0, replace(solver, tolerance=COARSE)
         if len(self.points) == 1:
             return self._least(solver)
         for _ in range(ROUNDS):
-            found = self._least(rough)
-            if not np.isfinite(found.gamma) or found.gamma <= before * (1 + RISEN):
+            found = self._least(replace(solver, tolerance=COARSE))
+            if not np.isfinite(found.gamma) or not self._added(found, found.gamma):
                 break
-            before = found.gamma
-            if not len(new := self._violated(found)):
-                break
-            self.points = np.concatenate([self.points, new])
         return self._least(replace(solver, tolerance=FINE))
 
     def _least(self, solver: Solver) -> Found:
@@ -164,25 +157,27 @@ class Existence:
         each = (u.at(found.coefficients, self.points) for u in (self.X, self.Y) if u is not None)
         return any(np.linalg.eigvalsh(M).max() > NEAR * self.largest for M in each)
 
-    def _violated(self, found: Found) -> Array:
-        """Points (k, m) where a block is violated most, one in each cell of the present ones."""
+    def _added(self, found: Found, gamma: float) -> bool:
+        """Whether a block is violated between the points at this g: then there are more of them,
+        where it is most, one in each cell of the present ones.
+        """
         axes = [np.unique(x) for x in self.points.T]
-        between = tensor_grid(
-            [piecewise_lobatto(x.tolist(), FINER.get(len(axes), 2)) for x in axes]
-        )
-        worst = self._excess(between, found)
-        allowed = max(ROUNDING, 2 * float(self._excess(self.points, found).max()))
+        finer = FINER.get(len(axes), 2)
+        between = tensor_grid([piecewise_lobatto(x.tolist(), finer) for x in axes])
+        gamma = (1 + VIOLATED) * gamma
+        worst = self._excess(between, found, gamma)
+        allowed = max(ROUNDING, 2 * float(self._excess(self.points, found, gamma).max()))
         chosen: dict[tuple[int, ...], Array] = {}
         for k in np.argsort(-worst):
             if worst[k] <= allowed or len(chosen) == ADDED:
                 break
             cell = tuple(int(np.searchsorted(x, q)) for x, q in zip(axes, between[k], strict=True))
             chosen.setdefault(cell, between[k])
-        return np.reshape(list(chosen.values()), (-1, len(axes)))
+        self.points = np.concatenate([self.points, *(p[None] for p in chosen.values())])
+        return bool(chosen)
 
-    def _excess(self, points: Array, found: Found) -> Array:
-        """The largest eigenvalue (K,) of any half at each point, at a g a little larger."""
-        gamma = (1 + VIOLATED) * found.gamma
+    def _excess(self, points: Array, found: Found, gamma: float) -> Array:
+        """The largest eigenvalue (K,) of any half at each point."""
         values = [
             np.linalg.eigvalsh(b.linear(found.coefficients) + b.constant)[:, -1]
             for b in self._halves_at(points, gamma, 0.0)
@@ -193,13 +188,10 @@ class Existence:
         """For this g the X and Y whose product is farthest from one: first within the least bound
         beyond which that hardly grows, then within larger ones.
         """
-        solver = replace(solver, tolerance=CENTRAL)
         for margin in SETTLED:
-            halves = self._halves(gamma, margin)
             before: Found | None = None
             for largest in WIDE:
-                blocks = [*halves, *self._coupling(True, largest)]
-                found = self._solved(blocks, -1.0, solver)
+                found = self._widest(gamma, margin, largest, replace(solver, tolerance=CENTRAL))
                 if not np.any(found.coefficients):
                     continue
                 if before is not None and found.gamma < GROWS * before.gamma:
@@ -207,6 +199,17 @@ class Existence:
                 before = found
             if before is not None:
                 yield before._replace(gamma=gamma)
+
+    def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Found:
+        """The same within this bound, with points added as for the least g."""
+        for _ in range(ROUNDS):
+            blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
+            found = self._solved(blocks, -1.0, solver)
+            if not np.any(found.coefficients) or len(self.points) == 1:
+                break
+            if not self._added(found, gamma):
+                break
+        return found
 
     def _solved(self, blocks: list[LyapunovBlocks], cost: float, solver: Solver) -> Found:
         n, count = self.states, self.count
