@@ -20,7 +20,7 @@ from synthesis.design.frozen_stability import frozen_stability
 from synthesis.design.in_plant_units import in_plant_units, packed
 from synthesis.design.motions import motions, used
 from synthesis.design.recovery import controller, split
-from synthesis.design.refusals import failed, least_ranks
+from synthesis.design.refusals import NOTHING_WRONG, failed, least_ranks
 from synthesis.design.robust import scaled_plant
 from synthesis.design.sampled_recovery import joined
 from synthesis.design.search import (
@@ -162,6 +162,8 @@ def _nominal(
 ) -> Controller:
     """For one model, by the best of the shapes."""
     floor = worst_optimum(plant)
+    if floor == 0 and (refusal := failed(plant, attempts)).reasons != (NOTHING_WRONG,):
+        raise refusal  # no frozen model has a controller, and it is known why
     start = best(
         lambda channel: coordinates_of(plant, channel), every, divisions, USUAL, attempts, floor
     )

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
     from synthesis.design.plant import Plant
 
 
+NOTHING_WRONG = (
+    "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"
+    " more divisions may help"
+)
+
+
 def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
     """Raises `InputError` where a control costs nothing or a measurement is free of disturbances at
     some p, and where the plant has none.
@@ -59,10 +65,7 @@ def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
         at=said,
         gamma=least if math.isfinite(least) else None,
     )
-    lines = why or (
-        "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"
-        " more divisions may help",
-    )
+    lines = why or (NOTHING_WRONG,)
     return SynthesisError(
         "no controller was found:\n  " + "\n  ".join([*lines, *map(str, attempts)]), tuple(lines)
     )
