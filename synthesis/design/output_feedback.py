@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -26,11 +26,15 @@ from synthesis.design.sampled_recovery import joined
 from synthesis.design.search import (
     BACK_OFF,
     CHECKED,
+    CLOSE,
     DEGREES,
+    WORTH,
     Dependence,
+    Design,
     Shape,
     Start,
     best,
+    both_moving,
     least,
     settled,
     shapes,
@@ -65,7 +69,10 @@ def output_feedback(
 
     X(p) belongs to what the measurements tell, Y(p) to what the controls can do. While only one of
     them moves with a parameter the controller needs no rate of it; both pairs are tried. Both may
-    move with a parameter whose rate is another one (`plant.lagged`), or that stands still.
+    move with a parameter whose rate is another one (`plant.lagged`), or that stands still. Where
+    one of them moving does not come near the worst frozen optimum both do, and the controller is
+    not told dp/dt: `gamma` is then what the storage function of X and Y proves of that, and is
+    taken where it is at most 1.05 times what a controller could have that is told.
 
     Parameters
     ----------
@@ -124,9 +131,13 @@ def output_feedback(
     def every(degree: int) -> list[Shape]:
         return shapes(parameters, X, Y, plant.dt is not None, matters, degree)
 
+    def both(degree: int) -> Shape | None:
+        free = X is None and Y is None and plant.dt is None
+        return both_moving(parameters, matters, degree) if free else None
+
     if isinstance(plant.model, UncertainStateSpace):
         return _robust(plant, every(DEGREES[1][0]), factors, fastest, divisions, attempts)
-    return _nominal(plant, every, factors, fastest, divisions, attempts)
+    return _nominal(plant, every, both, factors, fastest, divisions, attempts)
 
 
 def _robust(
@@ -144,7 +155,7 @@ def _robust(
     found = scaled_plant(plant, start, lambda p: _start(p, best, divisions, attempts).gamma)
     if found is None:
         raise failed(plant, attempts)
-    made = _nominal(found, lambda degree: [best], factors, fastest, divisions, attempts)
+    made = _nominal(found, lambda _: [best], lambda _: None, factors, fastest, divisions, attempts)
     return replace(made, plant=plant, method=f"robust {made.method}")
 
 
@@ -155,6 +166,7 @@ def _start(plant: Plant, shape: Shape, divisions: int, attempts: list[Attempt]) 
 def _nominal(
     plant: Plant,
     every: Callable[[int], Sequence[Shape]],
+    both: Callable[[int], Shape | None],
     factors: Sequence[float],
     fastest: float,
     divisions: int,
@@ -167,24 +179,51 @@ def _nominal(
     start = best(
         lambda channel: coordinates_of(plant, channel), every, divisions, USUAL, attempts, floor
     )
-    if not math.isfinite(start.gamma):
-        raise failed(plant, attempts)
-    slowest: Controller | None = None
-    for design in settled(start, factors, _recover, USUAL, attempts):
-        method = f"output feedback, {start.shape}"
+    slowest, notes = None, ()
+    for own, design in _designs(plant, start, both, factors, floor, divisions, attempts):
+        told = "" if own is start else ", their rates neglected"
+        method = f"output feedback, {own.shape}{told}"
         made = in_plant_units(plant, design.coordinates, design.fit, design.gamma, method)
-        made = replace(made, optimum=start.gamma, by_adjoint=start.shape.by_y)
+        made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
         frozen = frozen_stability(made.closed())
         if frozen.stable is False:
             attempts.append(Attempt("frozen loop", 0.0, f"not stable at {frozen.p}", math.inf))
             continue
-        slowest = made if slowest is None or _fastest(made) < _fastest(slowest) else slowest
+        if slowest is None or _fastest(made) < _fastest(slowest):
+            slowest, notes = made, _limited(own, made, min(factors), fastest)
         if _fastest(made) <= fastest:
             break
     if slowest is None:
         raise failed(plant, attempts)
-    notes = _limited(start, slowest, min(factors), fastest)
     return replace(slowest, notes=notes, attempts=tuple(attempts))
+
+
+def _designs(
+    plant: Plant,
+    start: Start,
+    both: Callable[[int], Shape | None],
+    factors: Sequence[float],
+    floor: float,
+    divisions: int,
+    attempts: list[Attempt],
+) -> Iterator[tuple[Start, Design]]:
+    """Where X or Y moving stays above what no controller can beat, first with both moving and a
+    controller that is not told how fast, which serves where parameters move slowly.
+    """
+    if start.gamma > CLOSE * floor and both(DEGREES[1][0]) is not None:
+        other = best(
+            lambda channel: coordinates_of(plant, channel),
+            lambda degree: [shape for shape in (both(degree),) if shape is not None],
+            divisions,
+            USUAL,
+            attempts,
+            floor,
+        )
+        if other.gamma < WORTH * start.gamma:
+            for design in settled(other, factors, _recover, USUAL, attempts, neglecting=True):
+                yield other, design
+    for design in settled(start, factors, _recover, USUAL, attempts):
+        yield start, design
 
 
 def _limited(start: Start, made: Controller, asked: float, fastest: float) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from synthesis.design.coordinates import Coordinates
 from synthesis.design.existence import LARGEST, Existence, Found
 from synthesis.design.fitted import Fitted, fits
 from synthesis.design.motions import used
+from synthesis.design.neglected_rate import level_kept
 from synthesis.program.cone_program import Solver
 from synthesis.worst.frozen import below
 
@@ -34,6 +35,8 @@ BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
 """Multiples of the least gamma at which X and Y are settled, tried in turn."""
 SLACK = 1e-6
 """By which the frozen gain of a controller may exceed what was promised: rounding."""
+FURTHER = 1.05
+"""Of the gamma of a controller that is told dp/dt, where it is not told."""
 ROUGH = 0.3
 """Functions of p farther from the gains than this are not looked at."""
 ACCURACY = 3e-3
@@ -203,6 +206,19 @@ class Design:
 Recover = Callable[[Coordinates, Existence, Found], Gains]
 
 
+def both_moving(
+    parameters: Sequence[Scheduling], matters: Sequence[bool], degree: int
+) -> Shape | None:
+    """X and Y of this degree in every parameter of a limited rate; None where none moves slowly."""
+    rates = [s.rate for s in parameters if not isinstance(s.rate, str)]
+    if len(rates) < len(parameters) or not any(0 < rate < math.inf for rate in rates):
+        return None
+    degrees = tuple(
+        degree if m and rate != math.inf else 0 for rate, m in zip(rates, matters, strict=True)
+    )
+    return Shape(*(functions(degrees, parameters, name) for name in ("X", "Y")))
+
+
 def best(
     coordinates: Callable[[float], Coordinates],
     every: Callable[[int], Sequence[Shape]],
@@ -279,9 +295,10 @@ def settled(
     solver: Solver,
     attempts: list[Attempt],
     loop: Loop | None = None,
+    neglecting: bool = False,
 ) -> Iterator[Design]:
     """Designs at these multiples of the least gamma, whose frozen `loop` keeps it with the gains
-    as functions of p.
+    as functions of p; `neglecting`: at most `FURTHER` above, where the gains are not told dp/dt.
     """
     coordinates, existence, lowest, _ = start
     if not math.isfinite(lowest.gamma):
@@ -291,21 +308,24 @@ def settled(
         gamma = factor * lowest.gamma
         for found in tracked(f"at {factor:g} of the least gamma", existence.widest(gamma, solver)):
             gains = recover(coordinates, existence, found) if np.any(found.coefficients) else None
-            holds, fit = False, None
-            if gains is not None:
-                # X and Y of a solver that stopped short may not be positive
-                with contextlib.suppress(np.linalg.LinAlgError):
-                    level = gamma * (1 + SLACK)
-                    holds = kept(coordinates, gains, loop or closed, points, level)
-                    if holds:
-                        fit = _fit(coordinates, gains, loop or closed, points, gamma)
-            outcome = "frozen loops keep it" if holds else "frozen loops do not keep it"
-            if holds:
-                outcome += (
-                    ", no functions of p do"
-                    if fit is None
-                    else f", functions of p within {fit.misfit:.1e}"
-                )
+            reached, fit, outcome = gamma, None, "frozen loops do not keep it"
+            # X and Y of a solver that stopped short may not be positive
+            with contextlib.suppress(np.linalg.LinAlgError):
+                if gains is not None and neglecting:
+                    looped = closed(coordinates, gains, points)
+                    reached = level_kept(coordinates, existence, found, looped, points)
+                    reached = max(reached, gamma)
+                if reached > FURTHER * gamma:
+                    outcome = f"{reached / gamma:.3g} times as much as dp/dt is not known"
+                elif gains is not None and kept(
+                    coordinates, gains, loop or closed, points, reached * (1 + SLACK)
+                ):
+                    fit = _fit(coordinates, gains, loop or closed, points, reached)
+                    outcome = "frozen loops keep it, " + (
+                        "no functions of p do"
+                        if fit is None
+                        else f"functions of p within {fit.misfit:.1e}"
+                    )
             attempts.append(
                 Attempt(
                     f"back-off {factor:g}",
@@ -315,7 +335,7 @@ def settled(
                 )
             )
             if fit is not None:
-                yield Design(coordinates, existence, found, fit)
+                yield Design(coordinates, existence, found._replace(gamma=reached), fit)
                 break
 
 
