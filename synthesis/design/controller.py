@@ -120,8 +120,9 @@ class Controller:
         """
         from synthesis.design.sampling import held
 
-        sampling = self.dt is not None and self.plant.dt is None
-        return held(self.plant, self.dt) if sampling else self.plant
+        if self.dt is None or self.plant.dt is not None:
+            return self.plant
+        return held(self.plant, self.dt)
 
     def closed(self) -> Any:
         """The plant under this controller, from disturbances to performance; sampled where the

@@ -162,6 +162,30 @@ def test_a_sampled_controller_flies(ideal, roll):
     np.testing.assert_allclose(record["d_lat"], expected, atol=1e-12)
 
 
+def test_a_design_against_a_reference_flies_as_it_is(ideal, roll):
+    """`phi_error` of the plant is reference minus phi; a flight subtracts the other way round."""
+    own = roll.plant.with_reference(["phi"]).with_noise({"p": 0.02, "phi_error": 0.02})
+    made = output_feedback(own).discretize(0.02)
+    assert "phi_error" in made.model.inputs
+    schedule = symheli.AirspeedSchedule.transition(2.0, 3.0, acceleration=1.0, hold=0.3)
+    table = symheli.TableController.of(made, 9)
+    assert "phi" in table.inputs
+    windy = symheli.Wind((0.0, 2.0, 0.0), turbulence=symheli.Dryden(wind=6.0, altitude=20.0))
+    flown = []
+    for controller in (made, table):
+        record = symheli.fly(ideal, schedule, controller=controller, wind=windy, seed=1)
+        flown.append(record["d_lat"] - record["d_lat_reference"])
+    rebuilt = made.model.matrices(2.0).D[0]
+    np.testing.assert_allclose(
+        made.scheduled_controller.model.matrices(2.0).D[0],
+        rebuilt * [-1.0 if u == "phi_error" else 1.0 for u in made.model.inputs],
+    )
+    # nine airspeeds: within the misfit of the table, with a margin for how the flights part
+    assert table.misfit < 1e-2
+    np.testing.assert_allclose(flown[1], flown[0], atol=10 * table.misfit * np.ptp(flown[0]))
+    assert np.ptp(flown[0]) > 1e-5
+
+
 def test_its_states_begin_at_zero_after_a_reset(roll):
     """Step by step, twice: a controller with states, from noisy readings."""
     noisy = roll.plant.with_noise({"p": 0.02, "phi": 0.02})
