@@ -453,6 +453,16 @@ class Plant:
         )
 
 
+def require_plant(given: object) -> None:
+    """Raises `InputError`, with what to write, for anything but a `Plant`."""
+    if not isinstance(given, Plant):
+        raise InputError(
+            f"plant: expected a synthesis.Plant, got {type(given).__name__}; say what is what of a"
+            " model first: synthesis.Plant(model, disturbances=[...], performance=[...],"
+            " controls=[...], measurements=[...])"
+        )
+
+
 def _scheduled(given: Any) -> Model:
     if is_control_system(given):
         given = LinearModel.from_control(given)

@@ -642,3 +642,30 @@ def test_a_scheduled_gain_that_cancels_the_scheduling_leaves_a_constant_loop():
     own = Plant(model, disturbances=["w"], performance=["y"], controls=["u"], measurements=["y"])
     cert = synthesis.l2_gain(own.close(gain), rate=math.inf, search=None)
     assert 0.5 <= cert.gamma <= 0.5005
+
+
+@pytest.mark.parametrize("given", [roll(), roll().at(3.0), None])
+@pytest.mark.parametrize(
+    "design",
+    [
+        synthesis.output_feedback,
+        synthesis.state_feedback,
+        synthesis.estimator,
+        synthesis.lft_feedback,
+        lambda plant: synthesis.multiobjective(plant, [synthesis.L2()]),
+        lambda plant: synthesis.certify_flown({}, plant),
+        lambda plant: synthesis.with_wrong_parameter(plant, {}, 0.1),
+        lambda plant: synthesis.proven_around(plant, {}, 3.0),
+    ],
+)
+def test_a_design_of_a_model_says_that_it_needs_a_plant(design, given):
+    said = (
+        rf"expected a synthesis\.Plant, got {type(given).__name__}; .*Plant\(model, disturbances="
+    )
+    with pytest.raises(InputError, match=said):
+        design(given)
+
+
+def test_a_point_design_of_a_plant_says_where_its_model_is():
+    with pytest.raises(InputError, match=r"got Plant; .* a Plant \.nominal\.at\(p\)"):
+        synthesis.hinf(plant(), ["d_lat"], ["phi"])
