@@ -211,7 +211,7 @@ def _of_data_alone(theta: Array, R: Array, d: Array, fed: Array) -> Array:
     """
     found, last = theta, np.inf
     for _ in range(STEPS):
-        inner = solve_triangular(R, fed[:, None] * found, unit_diagonal=True, trans="T")
+        inner = solve_triangular(R, fed[:, None] * found, unit_diagonal=True, trans=1)
         better = theta + solve_triangular(R, inner / d[:, None], unit_diagonal=True)
         step = float(np.abs(better - found).max(initial=0.0))
         if not step < 0.5 * last:  # nothing but rounding is left, or it would not converge
