@@ -51,23 +51,25 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None) -> LPVStateS
     content = plain_file.read(path, SCHEMA)
     try:
         trim, residuals = content["trim"], content["residuals"]
+        fields: dict[str, Any] = {name: _read(content[name]) for name in "ABCD"}
+        for group in GROUPS:
+            fields[group] = tuple(Signal(name, unit) for name, unit in content[group])
         return LPVStateSpace(
-            basis_of(content["basis"], basis, path),
-            *(_read(content[name]) for name in "ABCD"),
-            tuple(
+            basis=basis_of(content["basis"], basis, path),
+            **fields,
+            parameters=tuple(
                 Scheduling(name, unit, low, high, math.inf if rate == "inf" else rate)
                 for name, unit, low, high, rate in content["parameters"]
             ),
-            *(tuple(Signal(name, unit) for name, unit in content[group]) for group in GROUPS),
-            content["dt"],
-            trim
+            dt=content["dt"],
+            trim=trim
             and TrimSchedule(
                 basis_of(trim["basis"], None, path),
                 _read(trim["x"]),
                 _read(trim["u"]),
                 None if trim["xdot"] is None else _read(trim["xdot"]),
             ),
-            None if residuals is None else Residuals(*map(_read, residuals)),
+            residuals=None if residuals is None else Residuals(*map(_read, residuals)),
         )
     except InputError:
         raise
