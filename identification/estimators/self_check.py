@@ -52,7 +52,7 @@ def check_recursion(state: RLSState, phi: Array, y: Array) -> None:
 
     With any forgetting; to 1e-8 of the spread of each output over phi (m, n), y (m, ny).
     """
-    apart = np.abs(phi @ (state.theta - state.solve())).max(axis=0)
+    apart = np.abs(phi @ (state.theta - state.solve(as_it_stands=True))).max(axis=0)
     if not (apart <= 1e-8 * np.std(y, axis=0) + 1e-12 * np.abs(y).max(axis=0)).all():
         raise AccuracyError(
             f"the recursion lost its accuracy: its coefficients predict {apart.max():.3g} apart"

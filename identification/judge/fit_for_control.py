@@ -134,8 +134,11 @@ def fit_for_control(
       point (`identification.judge.derivatives`: coefficients of all lags together, per second), and
       only of those without which the frozen plant would move by more than a third of the margin;
     - J: the frozen responses, averaged along the record as its spectral estimate is, beside that
-      estimate; the mean over the pairs that say enough;
-    - TIC: of predictions over `horizon`, deviations from the mean, all outputs in their scales.
+      estimate; the mean over the pairs that say enough. Frequencies at which noise of the sensors,
+      fed back to the inputs, has moved the estimate and not the plant are left out;
+    - TIC: of predictions over `horizon`, deviations from the mean, all outputs in their scales;
+      where it exceeds the threshold, without what noise of the sensors makes of the measurements
+      and of the starts of the predictions.
 
     Frozen plants say nothing of how fast the scheduling may move.
 

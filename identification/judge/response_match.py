@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.estimators.filter_error import noise_variance
 from identification.judge.frequency_response import (
     FrequencyResponse,
     independent,
@@ -27,6 +28,9 @@ Remple (2012), ch. 8 and 9.
 
 WINDOWS = 2
 """Independent windows an input: with fewer the inputs explain by chance what they do not cause."""
+
+KNOWN = 1.1
+"""The variance of sensor noise is told from a fifth of a spectrum: to ten percent."""
 
 LEAST, SPAN = 8, 3.0
 """A pair of signals counts where so many frequencies say enough, over such a ratio of them."""
@@ -71,7 +75,7 @@ def response_match(
     """
     records = as_records(records)
     outputs_, inputs_ = units_of(outputs, records), units_of(inputs, records)
-    nu = len(inputs_)
+    nu, ny = len(inputs_), len(outputs_)
     omega, pieces = windows_of(records, (*inputs_, *outputs_), window, band, tuple(scheduling))
     if independent(len(pieces)) < WINDOWS * nu:
         raise ExcitationError(
@@ -81,12 +85,20 @@ def response_match(
         omega, np.mean([S for S, _ in pieces], axis=0), len(pieces), outputs_, inputs_, window
     )
     power = sum(S[:, :nu, :nu] for S, _ in pieces)
-    crossed = np.zeros((len(omega), len(outputs_), nu), complex)
+    crossed = np.zeros((len(omega), ny, nu), complex)
+    left = np.zeros((len(omega), ny))  # power of what the model leaves of an output
     for S, p in pieces:
         model = model_at(p).select(inputs=inputs_, outputs=outputs_)
-        crossed += model.frequency_response(omega) @ S[:, :nu, :nu]
+        response = model.frequency_response(omega)
+        crossed += response @ S[:, :nu, :nu]
+        rest = np.concatenate([-response, np.tile(np.eye(ny), (len(omega), 1, 1))], axis=2)
+        left += np.einsum("kij,kjl,kil->ki", rest, S, np.conj(rest)).real / len(pieces)
     H = np.swapaxes(np.linalg.solve(np.swapaxes(power, 1, 2), np.swapaxes(crossed, 1, 2)), 1, 2)  # type: ignore[arg-type]
+    alone = 1 / np.einsum("kjj->kj", np.linalg.inv(power / len(pieces))).real
     good = (measured.coherence >= COHERENCE) & (measured.random_error <= RANDOM_ERROR)
+    good &= ~_fed_back(
+        measured, H, alone, left, _floor(records, outputs_), independent(len(pieces))
+    )
     columns = [list(map(str, inputs_)).index(name) for name in judged]
     first = np.min(np.where(good, omega[:, None, None], np.inf), axis=0)
     last = np.max(np.where(good, omega[:, None, None], 0.0), axis=0)
@@ -99,3 +111,32 @@ def response_match(
     scatter = 20 * np.sum(np.where(good, weight * noise, 0.0), axis=0)
     scatter = scatter / np.maximum(good.sum(axis=0), 1)
     return ResponseMatch(measured, H[:, :, columns], cost[:, columns], scatter[:, columns])
+
+
+def _floor(records: Sequence[FlightRecord], outputs: Sequence[str]) -> Array:
+    """Spectral density (ny,) of white noise of the sensors, one-sided as that of the windows."""
+    level = [[noise_variance(record[y], record.segments()) for record in records] for y in outputs]
+    return 2 * records[0].dt * np.mean(level, axis=1)
+
+
+def _fed_back(
+    measured: FrequencyResponse,
+    H: Array,
+    alone: Array,
+    left: Array,
+    floor: Array,
+    windows: float,
+) -> Array:
+    """Frequencies (n, ny, nu) at which the estimate is off by noise that a feedback brought to the
+    inputs: what the model leaves of the output is no more than the noise of its sensor, yet G and H
+    are farther apart than random errors, and the noise is large enough for that.
+
+    In feedback G is off by S_eu / S_uu, up to (S_ee / S_uu)^(1/2), and is -1/K where noise alone
+    moves the inputs, with a coherence near 1 (Tischler and Remple, ch. 5 and 8). Such a frequency
+    says nothing of the model.
+    """
+    own = np.abs(measured.G) ** 2 * alone[:, None, :]
+    explained = left <= KNOWN * floor * (1 + 2 / np.sqrt(windows))
+    random = np.sqrt(2) * measured.random_error * np.abs(measured.G)  # both parts of G
+    biased = np.abs(measured.G - H) > 2 * random
+    return explained[:, :, None] & biased & (floor[:, None] > RANDOM_ERROR**2 * own)

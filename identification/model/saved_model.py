@@ -13,6 +13,7 @@ from identification.model import model_file
 from identification.model.lpvarx_model import LPVARXModel
 from identification.structure.lpvarx import LPVARX
 from symheli.lpv import FunctionSpace
+from symheli.lpv.bases.described import basis_of, described_basis, tuples
 from symheli.values import plain_file
 
 SCHEMA = "symheli LPV-ARX model"
@@ -32,7 +33,7 @@ def save(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:
 def described_structure(structure: Any) -> dict[str, Any]:
     """The fields of a structure in plain values."""
     return {f.name: getattr(structure, f.name) for f in fields(structure) if f.name != "basis"} | {
-        "basis": model_file.described_basis(structure.basis)
+        "basis": described_basis(structure.basis)
     }
 
 
@@ -73,8 +74,8 @@ def fields_of_structure(
     given = dict(content["structure"])
     described = given.pop("basis")
     return {
-        **{k: model_file.tuples(v) for k, v in given.items()},
-        "basis": model_file.basis_of(described, basis, path),
+        **{k: tuples(v) for k, v in given.items()},
+        "basis": basis_of(described, basis, path),
     }
 
 

@@ -45,7 +45,8 @@ class RecursiveLeastSquares:
     that they are at every sample those of batch least squares on the weighted samples so far. What
     these leave open is kept small by rows that are pretended: each coefficient is 0, with the
     weight of 32 eps samples with its regressor at its largest (without forgetting; else see
-    `Constant`). `determined` says whether anything is left open, by the rule of
+    `Constant`). Models that are made of it are without these rows: `RLSState.solve` takes them off.
+    `determined` says whether anything is left open, by the rule of
     `identification.design.determined`.
 
     The arithmetic is C where a compiler was there when symheli was installed, else NumPy, with one

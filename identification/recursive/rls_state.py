@@ -8,12 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from identification.recursive.forgetting import Constant
 from identification.recursive.kernel import configuration as at
 from identification.recursive.kernel import twin
 from identification.recursive.kernel.configuration import Configuration, GroupLayout
 from symheli.errors import InputError
 from symheli.values.arrays import Array
 from symheli.values.summary import summarized
+
+NEVER = Constant(1.0)
+"""Nothing is forgotten."""
+STEPS = 12
+"""Of a refinement, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,10 +128,14 @@ class RLSState:
         """
         return max(self._header(at.WEIGHT)) * float(np.finfo(self.configuration.dtype).eps) >= 1
 
-    def solve(self) -> Array:
-        """The least-squares coefficients (n, ny), R theta = Z, in double precision; `theta` agrees
-        with them to rounding.
+    def solve(self, *, as_it_stands: bool = False) -> Array:
+        """The least-squares coefficients (n, ny) in double precision.
+
+        Where nothing is forgotten and everything is determined, those of the data alone: what is
+        pretended of the coefficients is taken off again, and `theta` is as far away as `pretended`
+        says. `as_it_stands`: the solution of R theta = Z, with which `theta` agrees to rounding.
         """
+        alone = not as_it_stands and self.configuration.forgetting == NEVER
         structure = self.configuration.structure
         out = np.zeros((structure.n_regressors, structure.ny))
         for layout in self.configuration.groups:
@@ -134,8 +144,31 @@ class RLSState:
                 layout.triangle.full(self._part(layout, "triangle").astype(float)),
             )
             where = structure.regressors(layout.group)[:, None], layout.group.outputs
-            out[where] = solve_triangular(triangle[:n, :n], triangle[:n, n:], unit_diagonal=True)
+            R, Z = triangle[:n, :n], triangle[:n, n:]
+            found = solve_triangular(R, Z, unit_diagonal=True)
+            if alone and self._part(layout, "header")[at.DETERMINED]:
+                d, fed = (self._part(layout, name)[:n].astype(float) for name in ("d", "fed"))
+                found = _of_data_alone(found, R, d, fed)
+            out[where] = found
         return out
+
+    @property
+    def pretended(self) -> float:
+        """How far `theta` is at most from `solve()`, in standard deviations of the coefficients:
+        what the rows that are pretended move them. Small unless the data hardly tell coefficients
+        apart, as in a flight at one airspeed that then creeps away.
+        """
+        away, solved = 0.0, self.solve()
+        size = np.sqrt(np.diag(self.residual_covariance))
+        for layout, factor in zip(self.configuration.groups, self.factors, strict=True):
+            n, rows = layout.n, self.configuration.structure.regressors(layout.group)
+            inverse = solve_triangular(factor[:n, :n], np.eye(n))
+            deviation = np.outer(np.linalg.norm(inverse, axis=1), size[layout.group.outputs])
+            where = np.ix_(rows, np.array(layout.group.outputs))
+            off = np.abs(self.theta[where] - solved[where])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                away = max(away, float(np.max(np.where(off > 0, off / deviation, 0.0))))
+        return away
 
     @property
     def residual_covariance(self) -> Array:
@@ -169,6 +202,22 @@ class RLSState:
         value.flags.writeable = False
         self._learnt[name] = value
         return value
+
+
+def _of_data_alone(theta: Array, R: Array, d: Array, fed: Array) -> Array:
+    """theta (n, ny) of (R'DR) theta = R'DZ without the rows that say 0 with the weights `fed` (n,)
+    in it, R'DR - diag(fed): by refinement, each step of which leaves of the rest what those rows
+    decide, less than a thousandth.
+    """
+    found, last = theta, np.inf
+    for _ in range(STEPS):
+        inner = solve_triangular(R, fed[:, None] * found, unit_diagonal=True, trans=1)
+        better = theta + solve_triangular(R, inner / d[:, None], unit_diagonal=True)
+        step = float(np.abs(better - found).max(initial=0.0))
+        if not step < 0.5 * last:  # nothing but rounding is left, or it would not converge
+            break
+        found, last = better, step
+    return found
 
 
 class RLSInfo(NamedTuple):

@@ -15,6 +15,7 @@ from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
 from symheli.values.whole_files import write_text
+from synthesis.design.rows import DISTURBANCE
 
 TOP, RATE = 13.0, 3.0
 """Of the airspeed, m/s, and of its change, m/s^2."""
@@ -64,9 +65,6 @@ SERVO_RATE = 3.0
 
 NOISE_SHARE = 1 / 3
 """Of the noise that counts as 1, the standard deviation that is flown."""
-
-AT_INPUT = "_disturbance"
-"""Ends the name of a disturbance that is added to a control."""
 
 WIDTH = 100
 
@@ -217,7 +215,7 @@ class Asked:
 
     def disturbance(self, name: str) -> str:
         """The name in the plant: of one that is added to a control its own."""
-        return f"{name}{AT_INPUT}" if name in self.controls else name
+        return f"{name}{DISTURBANCE}" if name in self.controls else name
 
     def servo(self, control: str) -> Servo | None:
         """As it was given, with the rate limit that is flown; None where there is none."""

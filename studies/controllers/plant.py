@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 import symheli
-from studies.controllers.asked import AT_INPUT, PERIOD, SAMPLED_DEGREE, Asked
+from studies.controllers.asked import PERIOD, SAMPLED_DEGREE, Asked
 from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace
 from symheli.flight import Servo
 from symheli.values.signal import Signal, indices, signals
 from synthesis import Plant
+from synthesis.design import rows
 
 STUDY = Asked()
 
@@ -38,15 +39,8 @@ def disturbed(model: LPVStateSpace, asked: Asked) -> LPVStateSpace:
     both = [name for name in asked.disturbances if name in asked.controls]
     if not both:
         return model
-    at = indices(both, model.inputs, "input")
-    return replace(
-        model,
-        B=np.concatenate([model.B, model.B[:, :, at]], axis=2),
-        D=np.concatenate([model.D, model.D[:, :, at]], axis=2),
-        inputs=(*model.inputs, *(Signal(f"{name}{AT_INPUT}", "rad") for name in both)),
-        trim=None,
-        residuals=None,
-    )
+    own = [model.inputs[i] for i in indices(both, model.inputs, "input")]
+    return replace(rows.disturbed(model, own), residuals=None)
 
 
 def actuator(servo: Servo, name: str, late: float) -> LinearModel:

@@ -134,7 +134,7 @@ def _sampled(family: LinearFamily, exact: ExactLateral) -> LinearFamily:
         .discretize(DT)
         for model, slope in zip(family.models, slopes, strict=True)
     ]
-    return LinearFamily.from_models(family.airspeeds, models)
+    return LinearFamily.from_models(family.airspeeds, models, family.kinks, family.parameter)
 
 
 def _slopes(exact: ExactLateral, at: Array) -> Array:

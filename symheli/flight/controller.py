@@ -16,6 +16,7 @@ from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.linear_model import LinearModel, is_control_system
 from symheli.lpv.lpv_state_space import LPVStateSpace
+from symheli.lpv.mixing import ERROR, turned
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
@@ -72,6 +73,24 @@ class Controller(Protocol):
         ...
 
 
+def deviations(given: object) -> LPVStateSpace:
+    """The model of a controller, of `given` itself or its `model`, with inputs measured minus
+    reference: of a design against `reference - y`, whose inputs are called `<name>_error`, those
+    inputs as `<name>` with the other sign.
+
+    Raises `InputError` where there is no LPV model.
+    """
+    model = given if isinstance(given, LPVStateSpace) else getattr(given, "model", None)
+    if not isinstance(model, LPVStateSpace):
+        raise InputError(
+            "expected an LPVStateSpace, or a controller of synthesis with such a .model, got"
+            f" {type(given).__name__}"
+        )
+    return turned(
+        model, {y: y.removesuffix(ERROR) for y in model.inputs if y.removesuffix(ERROR) in TOLD}
+    )
+
+
 class Pieces(NamedTuple):
     """Matrices as polynomials of p - break: breaks (pieces + 1,), coefficients (pieces, degree + 1,
     rows, columns) from the highest power.
@@ -93,7 +112,8 @@ class ScheduledController:
     model : LPVStateSpace
         Sampled; its inputs are measured states (u v w p q r phi theta; Om om_i), its outputs
         helicopter inputs (d_lon d_lat d_col d_ped), both as deviations, its parameters `airspeed`,
-        `acceleration` or both.
+        `acceleration` or both. An input `<name>_error` is reference minus measured, and becomes
+        `<name>`; of a `synthesis.Controller` its model.
     follow : {"command", "reading"}
         Whether p is what is commanded, or the airspeed as its sensor reads it.
 
@@ -122,10 +142,7 @@ class ScheduledController:
     __repr__ = summarized
 
     def __post_init__(self) -> None:
-        if not isinstance(self.model, LPVStateSpace):
-            raise InputError(
-                f"a scheduled controller is an LPVStateSpace, got {type(self.model).__name__}"
-            )
+        object.__setattr__(self, "model", deviations(self.model))
         if self.model.dt is None:
             raise InputError("the controller is continuous: sample it with .discretize(dt)")
         if self.follow not in get_args(Follow):
@@ -133,7 +150,9 @@ class ScheduledController:
         require_names("measured signal", self.model.inputs, TOLD)
         require_names("helicopter input", self.model.outputs, INPUTS)
         names = tuple(s.name for s in self.model.parameters)
-        indices(names, SCHEDULING, "scheduling parameter of a controller")
+        require_parameters(
+            "a controller flies over airspeed (m/s) and acceleration (m/s^2)", self.model
+        )
         if self.follow == "reading" and (names != ("airspeed",) or self.pieces is None):
             raise InputError(
                 "only a controller over airspeed alone, polynomial or piecewise polynomial in it,"
@@ -218,6 +237,19 @@ class ScheduledController:
     @property
     def _own(self) -> Array:
         return vars(self)["_state"]
+
+
+def require_parameters(
+    what: str, model: LPVStateSpace, known: Sequence[Signal] = SCHEDULING
+) -> None:
+    """Raises `InputError` where a parameter of the model is none of these, or in another unit."""
+    for s in model.parameters:
+        if not any(s.name == k and s.unit == k.unit for k in known):
+            raise InputError(
+                f"{what}; this model is scheduled by {s.name} ({s.unit}): where that is one of"
+                " them under another name, .with_scheduling(Scheduling(name, unit, low, high,"
+                " rate)) renames it"
+            )
 
 
 def require_names(kind: str, given: Sequence[str], known: Sequence[str]) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -146,7 +146,7 @@ class TableController:
     @classmethod
     def of(
         cls,
-        model: LPVStateSpace,
+        model: LPVStateSpace | Any,
         knots: int | Sequence[float] = 33,
         *,
         correction: object | None = None,
@@ -162,9 +162,9 @@ class TableController:
 
         Parameters
         ----------
-        model : LPVStateSpace
-            As a `ScheduledController` takes it; an output may also be the rate of a command, as
-            d_lon_rate (rad/s), which then integrates.
+        model : LPVStateSpace or synthesis.Controller
+            As a `ScheduledController` takes it: `<name>_error` is reference minus measured; an
+            output may also be the rate of a command, as d_lon_rate (rad/s), which then integrates.
         knots : int or sequence of float
             So many at equal distances over the range of the model, or the airspeeds, m/s.
         correction : array_like, optional
@@ -185,13 +185,13 @@ class TableController:
         table = cls(
             at,
             source.matrices(at, correction),
-            model.states,
-            model.inputs,
+            source.model.states,
+            source.model.inputs,
             source.outputs,
             source.dt,
             tuple(str(y) for y, rate in zip(source.outputs, source.rates, strict=True) if rate),
             limits or {},
-            model.scheduling.limit,
+            source.model.scheduling.limit,
             fade,
             airspeed or AirspeedMonitor(),
             follow,

@@ -9,6 +9,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.flight.anti_windup import observer_gains
+from symheli.flight.controller import SCHEDULING, deviations, require_parameters
 from symheli.flight.single_precision import increasing
 from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
@@ -30,17 +31,12 @@ class Tabulated:
     model: LPVStateSpace
 
     def __post_init__(self) -> None:
-        if not isinstance(self.model, LPVStateSpace):
-            raise InputError(
-                f"a table is made of an LPVStateSpace, got {type(self.model).__name__}"
-            )
+        object.__setattr__(self, "model", deviations(self.model))
         if self.model.dt is None:
             raise InputError("the controller is continuous: sample it with .discretize(dt)")
-        names = [s.name for s in self.model.parameters]
-        if names != ["airspeed"]:
-            raise InputError(
-                f"a table is one over airspeed alone; this model is scheduled by {', '.join(names)}"
-            )
+        require_parameters("a table is one over airspeed alone, in m/s", self.model, SCHEDULING[:1])
+        if len(self.model.parameters) > 1:
+            raise InputError("a table is one over airspeed alone, freeze the other parameters")
 
     @property
     def dt(self) -> float:

@@ -13,11 +13,13 @@ A JSON file is one object:
     dt        sample period, s; left out or null in continuous time
     x0, u0    states and inputs at the trims, (values of each axis..., states), where they are known
     xdot0     rates of the states there; left out: zero
+    airspeed0 airspeeds of the trims, m/s, (values of each axis...), where no axis is the airspeed
     kinks     {"stall": [7.5]}: airspeeds at which a family has a corner; may be left out
 
-An NPZ file holds the same as arrays: A, B, C, D, dt, x0, u0, xdot0; `axes`, `states`, `inputs` and
-`outputs` are arrays of names with `axes_units`, `states_units` ... beside them, and the values of
-the axes are `values_0`, `values_1`, ...; `kinks` are names, with the airspeeds `kinks_at`.
+An NPZ file holds the same as arrays: A, B, C, D, dt, x0, u0, xdot0, airspeed0; `axes`, `states`,
+`inputs` and `outputs` are arrays of names with `axes_units`, `states_units` ... beside them, and
+the values of the axes are `values_0`, `values_1`, ...; `kinks` are names, with the airspeeds
+`kinks_at`.
 """
 
 from __future__ import annotations
@@ -44,6 +46,7 @@ from symheli.values.signal import Signal
 from symheli.values.whole_files import write_bytes, write_text
 
 SCHEMA, VERSION = "symheli linear models", 1
+AIRSPEED = Signal("airspeed", "m/s")
 GROUPS = ("axes", "states", "inputs", "outputs")
 
 
@@ -67,6 +70,8 @@ def write(content: Content, path: str | os.PathLike[str]) -> Path:
             "u0": models.points.input(models.inputs),
             "xdot0": models.points.rate(models.states),
         }
+        if AIRSPEED not in content.axes:
+            arrays["airspeed0"] = np.array([point.airspeed for point in models.points])
     arrays = {name: a.reshape(*shape, *a.shape[1:]) for name, a in arrays.items()}
     names = {"axes": content.axes} | {g: getattr(models, g) for g in GROUPS[1:]}
     match path.suffix:
@@ -187,10 +192,21 @@ def _content(given: dict[str, Any]) -> Content:
     )
     if "x0" in given and "u0" in given:
         x, u = stacked("x0", nx), stacked("u0", nu)
+        airspeeds = stacked("airspeed0") if "airspeed0" in given else _airspeeds(axes, values)
         xdot = stacked("xdot0", nx) if "xdot0" in given else np.zeros((count, nx))
         models = LinearModels(
             *(models.A, models.B, models.C, models.D, states, inputs, outputs, models.dt),
-            OperatingPoints.of(_points(axes, values, states, inputs, (x, u, xdot))),
+            OperatingPoints.of(
+                [
+                    OperatingPoint(
+                        NamedVector(states, x0),
+                        NamedVector(inputs, u0),
+                        NamedVector(states, rate),
+                        float(speed),
+                    )
+                    for x0, u0, rate, speed in zip(x, u, xdot, airspeeds, strict=True)
+                ]
+            ),
         )
     kinks = given.get("kinks") or {}
     if not isinstance(kinks, dict):
@@ -198,22 +214,14 @@ def _content(given: dict[str, Any]) -> Content:
     return Content(axes, values, models, {k: tuple(map(float, v)) for k, v in kinks.items()})
 
 
-def _points(
-    axes: tuple[Signal, ...],
-    values: tuple[Array, ...],
-    states: tuple[Signal, ...],
-    inputs: tuple[Signal, ...],
-    trims: tuple[Array, Array, Array],
-) -> list[OperatingPoint]:
-    if "airspeed" not in axes:
-        raise InputError("x0: the trims of models need an axis airspeed; leave out x0 and u0")
-    grid = np.meshgrid(*values, indexing="ij")[axes.index(Signal("airspeed"))].reshape(-1)
-    return [
-        OperatingPoint(
-            NamedVector(states, x), NamedVector(inputs, u), NamedVector(states, xdot), float(speed)
+def _airspeeds(axes: tuple[Signal, ...], values: tuple[Array, ...]) -> Array:
+    """Of every trim, from the axis."""
+    if AIRSPEED not in axes:
+        raise InputError(
+            "x0: where no axis is the airspeed, the trims need airspeed0, one a model (m/s); or"
+            " leave out x0 and u0"
         )
-        for x, u, xdot, speed in zip(*trims, grid, strict=True)
-    ]
+    return np.meshgrid(*values, indexing="ij")[axes.index(AIRSPEED)].reshape(-1)
 
 
 def _signals(group: str, given: Any) -> tuple[Signal, ...]:

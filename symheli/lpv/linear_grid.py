@@ -146,17 +146,20 @@ class LinearGrid:
         return self.at(*index).point
 
     def family(self, **fixed: float) -> LinearFamily:
-        """The models over airspeed at one value of every other axis, as in family(mass=8.2); it
-        must be on the grid.
+        """The models over one axis at one value of every other, as in family(mass=8.2); it must be
+        on the grid.
         """
-        others = [a for a in self.axes if a != AIRSPEED]
-        if set(fixed) != set(map(str, others)):
+        left = [a for a in self.axes if a not in fixed]
+        if len(left) != 1 or len(fixed) != len(self.axes) - 1:
+            usual = AIRSPEED if AIRSPEED in self.axes else self.axes[0]
+            others = [a for a in self.axes if a != usual]
             raise UnknownNameError("axes", ", ".join(fixed) or "(none)", [", ".join(others)])
         index: list[int | slice] = [slice(None)] * len(self.axes)
         for name, value in fixed.items():
             index[self._axis(name)] = self._position(name, value)
         chosen = np.arange(len(self.models)).reshape(self.shape)[tuple(index)]
-        return LinearFamily.from_models(self.airspeeds, self.models.at(chosen))
+        along = self.values[self._axis(left[0])]
+        return LinearFamily.from_models(along, self.models.at(chosen), parameter=left[0])
 
     def select(
         self,

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError
+from symheli.errors import DataWarning, InputError
 from symheli.lpv.equilibration import loop_inverse
 from symheli.lpv.further_parameter import over
 from symheli.lpv.linear_model import LinearModel, is_control_system
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.lpv.matrix_function import Box, MatrixFunction, block, functions_of, in_one_basis
-from symheli.lpv.scheduling import UNSCHEDULED
+from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.lpv.uncertain_state_space import UncertainStateSpace
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices
+from symheli.values.units import to_si
 
 PREFIX = "controller_"
 """Before the name of a controller's state that the plant has too."""
@@ -69,7 +71,9 @@ def lower_feedback(
         Of an uncertain one every model of the set is closed.
     controller : LPVStateSpace, LinearModel or a system of python-control
         Constant, or over parameters of the same names and units as the plant's: fewer, more, or in
-        another order. Its range must hold the plant's; how fast they move is the plant's to say.
+        another order. Its range must hold the plant's; how fast they move is the plant's to say. A
+        parameter of another name is another parameter, with a `DataWarning` where it may be the
+        same quantity.
     inputs, outputs : sequence of str, optional
         Of the closed loop, by default all that are not connected. A u among the inputs is what is
         added to the controller's; a y among the outputs is read by the controller and stays.
@@ -297,6 +301,21 @@ def _is_unscheduled(lpv: LPVStateSpace) -> bool:
     return [s.with_rate(UNSCHEDULED.rate) for s in lpv.parameters] == [UNSCHEDULED]
 
 
+def _same_quantity(s: Scheduling, known: Sequence[Scheduling]) -> Scheduling | None:
+    """One of these that may be the same signal: of the same dimension, with a range in common."""
+    for other in known:
+        try:
+            (size, one), (other_size, two) = to_si(s.unit), to_si(other.unit)
+        except InputError:  # units of one's own: only the very same one is comparable
+            if s.unit != other.unit:
+                continue
+            size, one, other_size, two = 1.0, s.unit, 1.0, s.unit
+        overlap = s.low * size < other.high * other_size and other.low * other_size < s.high * size
+        if one == two != "1" and overlap:
+            return other
+    return None
+
+
 def _over_the_same(
     plant: LPVStateSpace, controller: LPVStateSpace
 ) -> tuple[LPVStateSpace, LPVStateSpace]:
@@ -320,6 +339,20 @@ def _over_the_same(
                 f"the plant holds for {s.name} on [{known.low:g}, {known.high:g}] {s.unit}, what is"
                 f" connected to it on [{low:g}, {high:g}] only; narrow the plant,"
                 " .with_scheduling(...), or make that over the wider range"
+            )
+    for s in controller.parameters:
+        if s.name not in own and (same := _same_quantity(s, plant.parameters)):
+            how = (
+                f"call it so: .with_scheduling(Scheduling({same.name!r}, {same.unit!r}, low, high))"
+                if same.unit == s.unit
+                else f"make it over {same.name} in {same.unit}"
+            )
+            warnings.warn(
+                f"{same.name} ({same.unit}) of the plant and {s.name} ({s.unit}) of what is"
+                " connected to it are taken for two parameters that move independently; if they are"
+                f" one, {how}",
+                DataWarning,
+                stacklevel=4,
             )
     every = (*plant.parameters, *(s for s in controller.parameters if s.name not in own))
     return over(plant, every), over(controller, every)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -486,6 +488,26 @@ class LPVStateSpace:
         return balanced_truncation(
             self, order, nodes=nodes, input_scale=input_scale, output_scale=output_scale
         )
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the model with names, units, trim and residuals as JSON, every number exact; a
+        reader sees the old file or the new one. Raises `InputError` for a basis that is not made of
+        numbers, `SymheliError` where the file cannot be written.
+        """
+        from symheli.lpv.lpv_file import save
+
+        return save(self, path)
+
+    @classmethod
+    def load(
+        cls, path: str | os.PathLike[str], basis: FunctionSpace | None = None
+    ) -> LPVStateSpace:
+        """The model in `path`, equal to the last bit; one with `UserFunctions` needs the `basis` it
+        was made with. Raises `InputError` unless the file is whole and of this kind.
+        """
+        from symheli.lpv.lpv_file import load
+
+        return load(path, basis)
 
     def simulate(
         self,

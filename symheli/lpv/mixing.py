@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from symheli.errors import InputError
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal, indices
 
 Sum = Mapping[Any, float]
 """{signal: gain}."""
+ERROR = "_error"
+"""Ends the name of a signal that is reference minus measured."""
 
 
 def mixed(
@@ -45,6 +48,23 @@ def mixed(
         return model
     exact = between(*origin.matrices)
     return model.with_residuals(origin.nodes, exact._replace(D=exact.D + through))
+
+
+def turned(model: LPVStateSpace, names: Mapping[str, str]) -> LPVStateSpace:
+    """The model with these inputs {name: other name} read with the other sign."""
+    own = {str(y): str(names[y]) for y in model.inputs if y in names and names[y] != y}
+    if not own:
+        return model
+    inputs = {
+        Signal(own[y], y.unit) if y in own else y: {y: -1.0 if y in own else 1.0}
+        for y in model.inputs
+    }
+    if len(inputs) < len(model.inputs):
+        raise InputError(
+            f"the controller reads {', '.join(own.values())} and {', '.join(own)}: give it one of"
+            " the two"
+        )
+    return mixed(model, inputs, itself(model.outputs))
 
 
 def itself(names: Iterable[Signal]) -> dict[Signal, Sum]:

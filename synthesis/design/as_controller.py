@@ -10,6 +10,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.lpv.linear_model import feedback_matrix, is_control_system
+from symheli.lpv.mixing import ERROR, turned
 from symheli.values.arrays import frozen
 from symheli.values.signal import Signal, indices
 
@@ -22,7 +23,9 @@ def as_controller(
     """
     inner = getattr(given, "model", None)
     if isinstance(inner, LPVStateSpace) and not isinstance(given, UncertainStateSpace):
-        given = inner
+        # what flies reads measured minus reference
+        read = {y: f"{y}{ERROR}" for y in inner.inputs if y not in measurements}
+        given = turned(inner, {y: e for y, e in read.items() if e in measurements})
     if is_control_system(given):
         given = LinearModel.from_control(_named(given, controls, measurements))
     elif isinstance(given, Mapping):

@@ -30,6 +30,12 @@ ADJOINT = (
 )
 
 
+SAMPLED = (
+    "proven of the sampled loop: the plant with its inputs, disturbances too, held over each"
+    " {dt:g} s; nothing is said of what happens between the samples"
+)
+
+
 ADJOINT_USUAL = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV}
 
 
@@ -47,7 +53,7 @@ class Controller:
     model : LPVStateSpace
         The controller itself; what flies and what is certified.
     plant : Plant
-        What it was made for.
+        What it was made for; see `loop_plant`.
     gamma : float
         What its synthesis promised, in units of performance per unit of disturbance: a number to
         compare with, no proof. `certify` proves.
@@ -74,6 +80,8 @@ class Controller:
     >>> proof = made.certify(search=None)
     >>> proof.verified, bool(proof.gamma < made.gamma * (1 + 1e-6))
     (True, True)
+    >>> made.discretize(0.02).certify(search=None).verified
+    True
     """
 
     model: LPVStateSpace
@@ -103,9 +111,24 @@ class Controller:
         """Number of states."""
         return len(self.model.states)
 
+    @cached_property
+    def loop_plant(self) -> Plant:
+        """The plant that `closed` closes: that of the design, around a controller that was sampled
+        with its inputs held between the samples, see `synthesis.design.sampling.held`.
+
+        Raises `InputError` for an uncertain plant that is not sampled as the controller is.
+        """
+        from synthesis.design.sampling import held
+
+        if self.dt is None or self.plant.dt is not None:
+            return self.plant
+        return held(self.plant, self.dt)
+
     def closed(self) -> Any:
-        """The plant under this controller, from disturbances to performance."""
-        return self.plant.close(self.model)
+        """The plant under this controller, from disturbances to performance; sampled where the
+        controller is.
+        """
+        return self.loop_plant.close(self.model)
 
     def certify(self, rate: Any = None, **options: Any) -> Certificate:
         """Its proven gain: `synthesis.l2_gain` of the closed loop, or of the adjoint of that, which
@@ -115,19 +138,25 @@ class Controller:
         not P: then the adjoint, which has the same gain, is analysed first. Where one of the two
         proves more than `gamma` the other is tried too, and the lower gain is returned; of a
         parameter whose rate is another one only the loop is, since backwards that is not so.
+
+        Of a controller that was sampled it is the gain of the sampled loop, and the hypotheses say
+        so, with the misfit of the sampled plant. `synthesis.certify_flown` proves that of a plant
+        with servos and delay as they are.
         """
         from synthesis.analysis.l2_gain import l2_gain
 
         loop = self.closed()
+        rests = [SAMPLED.format(dt=self.dt)] if self.loop_plant is not self.plant else []
         moving = limits(loop.parameters, rate)
         tied = any(isinstance(s.rate, str) for s in moving)
         usual = not {"form", "impose", "solver"} & set(options)
 
         def proof(adjoint: bool) -> Certificate:
             if not adjoint:
-                return l2_gain(loop, rate, **options)
+                return l2_gain(loop, rate, **options).resting_on(rests)
             usually = ADJOINT_USUAL if usual and len(moving) == 1 else {}
-            return l2_gain(loop.adjoint(), rate, **usually | options).resting_on([ADJOINT])
+            proven = l2_gain(loop.adjoint(), rate, **usually | options)
+            return proven.resting_on([*rests, ADJOINT])
 
         if tied or isinstance(loop, UncertainStateSpace):
             return proof(False)
@@ -137,7 +166,8 @@ class Controller:
         return found
 
     def discretize(self, dt: float) -> Controller:
-        """Sampled by Tustin's rule at every frozen p, functions of the same degree fitted to that.
+        """Sampled by Tustin's rule at every frozen p, functions of the same degree fitted to that;
+        `closed` and `certify` then hold the inputs of the plant between the samples.
 
         Raises `InputError` for a controller that is sampled, or a period that is not positive.
         """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,15 +20,13 @@ from synthesis.design.existence import Existence, Found
 from synthesis.design.fitted import Fitted
 from synthesis.design.frozen_stability import frozen_stability
 from synthesis.design.output_feedback import USUAL
+from synthesis.design.plant import Plant, require_plant
 from synthesis.design.recovery import control_gain
 from synthesis.design.refusals import failed, least_ranks
 from synthesis.design.sampled_recovery import state_gain
 from synthesis.design.search import BACK_OFF, Dependence, Gains, Shape, best, dependence, settled
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
-
-if TYPE_CHECKING:
-    from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
@@ -122,6 +120,7 @@ def estimator(
     >>> proof.verified, bool(proof.gamma <= made.gamma)
     (True, True)
     """
+    require_plant(plant)
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)
     least_ranks(plant, controls=False)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +19,8 @@ from synthesis.analysis.l2_gain import l2_gain
 from synthesis.certificate import Certificate
 from synthesis.cover import Remainder, covering
 from synthesis.design.controller import Controller
+from synthesis.design.plant import Plant, require_plant
 from synthesis.worst.rates import Rate
-
-if TYPE_CHECKING:
-    from synthesis.design.plant import Plant
 
 ROUNDING = 256 * np.finfo(float).eps
 """A misfit of an entry of the performance below this fraction of the terms that the entry is the
@@ -143,6 +141,7 @@ def certify_flown(
     >>> print(certify_flown({("u", "y"): -1.0}, plant, search=None))
     the loop as it flies is proven for 0.5 (frozen 0.5)
     """
+    require_plant(plant)
     if plant.dt is None:
         raise InputError(
             "what flies is sampled, and the plant is continuous:"

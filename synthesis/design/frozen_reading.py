@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
@@ -11,12 +11,9 @@ from symheli.lpv.linear_model import LinearModel
 from synthesis.analysis.stability import stability
 from synthesis.design.as_controller import as_controller
 from synthesis.design.largest import largest
+from synthesis.design.plant import Plant, require_plant
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
-
-if TYPE_CHECKING:
-    from synthesis.design.plant import Plant
-
 
 FINEST = 1e-6
 """The smallest tolerance: twenty bisections, each of them a proof; solvers decide no closer."""
@@ -74,6 +71,7 @@ def proven_around(
     >>> print(low, round(high, 3))
     0.0 0.719
     """
+    require_plant(plant)
     if not FINEST <= tolerance < 1:
         raise InputError(f"tolerance: expected from {FINEST:g} to below 1, got {tolerance}")
     (s,) = _one(plant, rate)

@@ -10,7 +10,7 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from synthesis.design.generalized import Generalized
 from synthesis.design.in_plant_units import in_plant_units, packed
 from synthesis.design.motions import motions, used
 from synthesis.design.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
+from synthesis.design.plant import Plant, require_plant
 from synthesis.design.recovery import Transformed, controller
 from synthesis.design.refusals import failed, require_channels
 from synthesis.design.search import ACCURACY, Dependence, functions, limited
@@ -34,9 +35,6 @@ from synthesis.program.cone_program import Solver
 from synthesis.program.panic import no_panic
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
-
-if TYPE_CHECKING:
-    from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
@@ -112,6 +110,7 @@ def multiobjective(
     >>> bool(made.closed().at(0.5).poles().real.max() <= -1.2)
     True
     """
+    require_plant(plant)
     require_channels(plant)
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from synthesis.design.existence import LARGEST, Existence, Found
 from synthesis.design.frozen_stability import frozen_stability
 from synthesis.design.in_plant_units import in_plant_units, packed
 from synthesis.design.motions import motions, used
+from synthesis.design.plant import Plant, require_plant
 from synthesis.design.recovery import controller, split
 from synthesis.design.refusals import NOTHING_WRONG, failed, least_ranks
 from synthesis.design.robust import scaled_plant
@@ -43,9 +43,6 @@ from synthesis.design.worst_optimum import worst_optimum
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
-
-if TYPE_CHECKING:
-    from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
@@ -121,6 +118,7 @@ def output_feedback(
     >>> slow.certify(0.1, search=None).verified
     True
     """
+    require_plant(plant)
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)
     least_ranks(plant)

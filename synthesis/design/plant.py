@@ -21,7 +21,7 @@ from symheli.lpv import (
 from symheli.lpv.linear_model import is_control_system
 from symheli.lpv.lower_feedback import Partition, Positions
 from symheli.lpv.matrix_function import functions_of
-from symheli.lpv.mixing import itself, mixed
+from symheli.lpv.mixing import ERROR, itself, mixed
 from symheli.lpv.scheduling import Rates
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import as_table, summarized
@@ -29,7 +29,7 @@ from symheli.values.units import quotient
 from synthesis.design import parts
 from synthesis.design.as_controller import as_controller
 from synthesis.design.generalized import Channels, Generalized
-from synthesis.design.rows import Model, new_name, on, passing, with_row
+from synthesis.design.rows import DISTURBANCE, Model, disturbed, new_name, on, passing, with_row
 
 TRUE, WEIGHTED = "true_", "weighted_"
 """Before the name of a performance signal of which the measurement is another: without its noise
@@ -104,7 +104,10 @@ class Plant:
         w, u = groups["disturbances"], groups["controls"]
         for name in w:
             if name in u:
-                raise InputError(f"{name} is a disturbance and a control: name it in one only")
+                raise InputError(
+                    f"{name} is a disturbance and a control: leave it a control, and"
+                    f" .with_input_disturbance(['{name}']) adds a disturbance to it"
+                )
         known = (*model.outputs, *(s for s in (*w, *u) if s not in model.outputs))
         z = _named(self.performance, known, "performance signal")
         groups["performance"] = z
@@ -227,6 +230,21 @@ class Plant:
             plant = plant._changed(lambda m, at=name, by=part: m.filtered_by({at: by}))
         return plant
 
+    def with_input_disturbance(self, controls: Sequence[str] | None = None) -> Plant:
+        """With a disturbance `<control>_disturbance`, in the unit of the control, added to all or
+        to these controls: called before `with_servo` behind the servo, after it to the command. A
+        control that is performance stays the command alone.
+
+        Raises `InputError` where the control is weighted already.
+        """
+        names = self.controls if controls is None else _tuple(controls)
+        own = [self.controls[i] for i in indices(names, self.controls, "control")]
+        self._bare(own)
+        new = (Signal(f"{u}{DISTURBANCE}", u.unit) for u in own)
+        return self._changed(
+            lambda model: disturbed(model, own), disturbances=(*self.disturbances, *new)
+        )
+
     def with_noise(self, sizes: Mapping[str, float]) -> Plant:
         """With a disturbance `<measurement>_noise` (unit "1") of {measurement: size} in the unit of
         each.
@@ -243,7 +261,8 @@ class Plant:
     def with_reference(self, signals: Sequence[str] | None = None) -> Plant:
         """With a disturbance `<name>_reference` for each of these performance signals and
         measurements (None: those that are both); they become `<name>_error` = reference - signal,
-        and a performance signal `true_<name>` becomes `true_<name>_error`.
+        and a performance signal `true_<name>` becomes `true_<name>_error`. What flies reads
+        `<name>` measured minus reference again: `fly` and `TableController.of` turn the sign.
 
         Raises `InputError` where no signal is both and none is given.
         """
@@ -327,13 +346,17 @@ class Plant:
 
     def _driven(self, by: Mapping[str, parts.Part]) -> Plant:
         indices(by, self.controls, "control")
-        for name in by:
+        self._bare(by)
+        return self._changed(lambda model: model.driven_by(by))
+
+    def _bare(self, controls: Iterable[str]) -> None:
+        """Raises `InputError` where one of them is weighted."""
+        for name in controls:
             if WEIGHTED + name in self.performance:
                 raise InputError(
-                    f"{WEIGHTED}{name} weights {name} as it is: add servos and delays first, then"
-                    " the weights of the commands"
+                    f"{WEIGHTED}{name} weights {name} as it is: add servos, delays and disturbances"
+                    " first, then the weights of the commands"
                 )
-        return self._changed(lambda model: model.driven_by(by))
 
     def _weighted_disturbance(self, name: str, part: parts.Part) -> Plant:
         unit = Signal(name, "1")
@@ -394,7 +417,7 @@ class Plant:
         (i,) = indices([name], known, "performance signal or measurement")
         unit = known[i].unit
         reference = Signal(f"{name}_reference", unit)
-        errors = {y: Signal(f"{y}_error", unit) for y in (name, TRUE + name) if y in known}
+        errors = {y: Signal(f"{y}{ERROR}", unit) for y in (name, TRUE + name) if y in known}
 
         def change(model: LPVStateSpace) -> LPVStateSpace:
             outputs = {errors.get(y, y): {y: -1.0 if y in errors else 1.0} for y in model.outputs}
@@ -427,6 +450,16 @@ class Plant:
             change,
             controls=_with(self.controls, name, rate),
             measurements=(*self.measurements, *commands),
+        )
+
+
+def require_plant(given: object) -> None:
+    """Raises `InputError`, with what to write, for anything but a `Plant`."""
+    if not isinstance(given, Plant):
+        raise InputError(
+            f"plant: expected a synthesis.Plant, got {type(given).__name__}; say what is what of a"
+            " model first: synthesis.Plant(model, disturbances=[...], performance=[...],"
+            " controls=[...], measurements=[...])"
         )
 
 

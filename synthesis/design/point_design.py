@@ -85,7 +85,7 @@ def as_model(system: object) -> LinearModel:
         return LinearModel.from_control(system)
     raise InputError(
         "expected a LinearModel or a system of python-control, got"
-        f" {type(system).__name__}; an LPV model has .at(p)"
+        f" {type(system).__name__}; an LPV model has .at(p), a Plant .nominal.at(p)"
     )
 
 

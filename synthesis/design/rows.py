@@ -13,6 +13,8 @@ from symheli.lpv.mixing import itself, mixed
 from symheli.values.signal import Signal
 
 Model = LPVStateSpace | UncertainStateSpace
+DISTURBANCE = "_disturbance"
+"""Ends the name of what is added to a control."""
 
 
 def on(model: Model, change: Callable[[LPVStateSpace], LPVStateSpace]) -> Model:
@@ -46,6 +48,15 @@ def _passes(model: LPVStateSpace, name: Signal) -> bool:
     row = model.select(outputs=[name]).matrices(model.basis.samples(model.box))
     unit = np.array([float(u == name) for u in model.inputs])
     return not np.any(row.C) and bool(np.allclose(row.D, unit, rtol=0.0, atol=1e-12))
+
+
+def disturbed(model: LPVStateSpace, controls: Sequence[Signal]) -> LPVStateSpace:
+    """The model with one more input for each of these inputs, `<name>_disturbance`, added to it."""
+    inputs = itself(model.inputs)
+    for name in controls:
+        added = Signal(f"{name}{DISTURBANCE}", name.unit)
+        inputs |= new_name(added, model.inputs, "input", {name: 1.0})
+    return mixed(model, inputs, itself(model.outputs))
 
 
 def with_row(

@@ -1,8 +1,10 @@
-"""A controller sampled."""
+"""A controller sampled, and the plant that it then meets."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, Matrices
 from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto
 from symheli.values.numbers import positive
+from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
@@ -29,14 +32,33 @@ def tustin(model: LPVStateSpace, dt: float) -> LPVStateSpace:
         raise InputError(f"the controller is already sampled (dt = {model.dt} s)")
     positive(dt, "dt")
 
+    return resampled(model, _rule(model, dt, "tustin"), dt)
+
+
+def held(plant: Plant, dt: float) -> Plant:
+    """The plant with its inputs held between the samples at every frozen p. Polynomials of p become
+    those of twice the degree, in which the exponential is right to the second power of dt; other
+    functions stay the same ones. The misfit is in `.model.residuals`.
+
+    Raises `InputError` for an uncertain plant.
+    """
+    degrees = plant.basis.degrees
+    if degrees is not None or not isinstance(plant.model, LPVStateSpace):
+        return plant.sampled(dt, None if degrees is None else [2 * n for n in degrees])
+    return replace(plant, model=resampled(plant.model, _rule(plant.model, dt, "hold"), dt))
+
+
+def _rule(
+    model: LPVStateSpace, dt: float, method: Literal["hold", "tustin"]
+) -> Callable[[Array, Array, Array, Array], tuple[Array, ...]]:
     def rule(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, ...]:
         each = [
-            LinearModel(*M, model.states, model.inputs, model.outputs).discretize(dt, "tustin")
+            LinearModel(*M, model.states, model.inputs, model.outputs).discretize(dt, method)
             for M in zip(A, B, C, D, strict=True)
         ]
         return tuple(np.stack([getattr(m, name) for m in each]) for name in "ABCD")
 
-    return resampled(model, rule, dt)
+    return rule
 
 
 def resampled(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,15 +17,13 @@ from synthesis.design.existence import Existence, Found
 from synthesis.design.frozen_stability import frozen_stability
 from synthesis.design.in_plant_units import in_plant_units
 from synthesis.design.output_feedback import USUAL
+from synthesis.design.plant import Plant, require_plant
 from synthesis.design.recovery import control_gain
 from synthesis.design.refusals import failed, least_ranks
 from synthesis.design.sampled_recovery import state_gain
 from synthesis.design.search import BACK_OFF, Dependence, Shape, best, dependence, settled
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
-
-if TYPE_CHECKING:
-    from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
@@ -82,6 +79,7 @@ def state_feedback(
     >>> made.order, bool(made.gamma < synthesis.output_feedback(plant).gamma)
     (0, True)
     """
+    require_plant(plant)
     parameters = limits(plant.parameters, rate)
     plant = plant.with_scheduling(parameters)
     least_ranks(plant, measurements=False)

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -33,11 +33,9 @@ from symheli.values.signal import signals
 from synthesis.design.as_controller import as_controller
 from synthesis.design.balanced_block import balanced
 from synthesis.design.existence import FINEST
+from synthesis.design.plant import Plant, require_plant
 from synthesis.polynomial.bernstein import restriction
 from synthesis.polynomial.pieces import function_pieces
-
-if TYPE_CHECKING:
-    from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
@@ -99,6 +97,7 @@ def with_wrong_parameter(
     >>> print(round(synthesis.l2_gain(wrong, 0.1, search=None).gamma, 3), round(0.1 / 0.17, 3))
     0.588 0.588
     """
+    require_plant(plant)
     if not (np.isfinite(error) and error >= 0):
         raise InputError(f"error: expected a number >= 0 in the unit of p, got {error!r}")
     whole = isinstance(divisions, int) and not isinstance(divisions, bool)

@@ -188,7 +188,7 @@ def test_what_is_no_controller_is_refused(ideal, pilot):
         (model(inputs=("bank",)), "must bear their names: unknown measured signal 'bank'"),
         (model(inputs=("a1",)), "unknown measured signal 'a1'"),
         (model(outputs=("roll",)), "unknown helicopter input 'roll'"),
-        (model(height), "unknown scheduling parameter of a controller 'height'"),
+        (model(height), r"this model is scheduled by height \(m\)"),
         (model(dt=0.013), "was designed for 0.013 s"),
         (control.ss(-1, 1, 1, 0), "must bear their names"),
         (Autopilot([0.0, 5.0], np.zeros((2, 4, 1)), ["a1"], 0.02), "unknown measured signal 'a1'"),

@@ -441,9 +441,14 @@ def test_what_is_no_table_is_refused():
         return replace(good, **change)
 
     for model, knots, said in (
-        (3.0, 5, "made of an LPVStateSpace, got float"),
+        (3.0, 5, "expected an LPVStateSpace, .* got float"),
         (bad(dt=None), 5, "is continuous"),
-        (bad(parameters=(height,)), 5, "over airspeed alone; this model is scheduled by height"),
+        (bad(parameters=(height,)), 5, "over airspeed alone, in m/s; this model is .* height"),
+        (
+            bad(parameters=(replace(good.scheduling, unit="kt"),)),
+            5,
+            r"scheduled by airspeed \(kt\)",
+        ),
         (bad(inputs=("bank", *INPUTS[1:])), 5, "unknown measured signal 'bank'"),
         (bad(outputs=("roll", *OUTPUTS[1:])), 5, "unknown helicopter input 'roll'"),
         (good, 1, "at least 2"),

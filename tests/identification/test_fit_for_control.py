@@ -38,6 +38,29 @@ def flown(gain=GAIN, noise=0.0, size=1.0, n=1500, a=0.0):
     return FlightRecord.from_arrays(DT * np.arange(n), dict.fromkeys("yup", "1"), y=y, u=u, p=p)
 
 
+def governed(noise, n=3000):
+    """The unstable y(k+1) = 1.05 y(k) + 0.1 u(k) held by feedback of what is measured of it, at
+    20 dB where `noise` is 0.1; what is commanded has no power above 5 rad/s.
+    """
+    rng = np.random.default_rng(1)
+    r = sosfilt(butter(6, 5 * DT / np.pi, output="sos"), rng.standard_normal(n))
+    white = rng.standard_normal(n)
+
+    def flight(size):
+        y, u, m = np.zeros(n), np.zeros(n), 0.0
+        for k in range(n):
+            y[k] = 1.05 * y[k - 1] + 0.1 * u[k - 1] if k else 0.0
+            m = y[k] + size * white[k]
+            u[k] = r[k] - 3.0 * m
+        return y, u
+
+    y, u = flight(noise * np.std(flight(0.0)[0]))
+    size = noise * np.std(flight(0.0)[0])
+    p = np.sin(0.05 * np.arange(n))
+    time = DT * np.arange(n)
+    return FlightRecord.from_arrays(time, dict.fromkeys("yup", "1"), y=y + size * white, u=u, p=p)
+
+
 def structure(na=0):
     return idn.LPVARX("y", "u", "p", na=na, nb=1, delay=1, basis=idn.Polynomial(0, -1.0, 1.0))
 
@@ -286,3 +309,37 @@ def test_a_loop_that_asks_for_no_derivative_is_content_with_any():
     found = idn.fit_for_control(model, faint, LOOP, scales=SCALES, covariance=joint, **SHORT)
     assert found["Cramer-Rao bound"].where == "none matters to this loop"
     assert found["Cramer-Rao bound"].verdict == "fit"
+
+
+# --- an unstable plant under feedback of noisy readings ------------------------------------------
+
+HELD = {("u", "y"): -3.0}
+LONG = {"window": 8.0, "horizon": 4.0, "points": [0.0]}
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return idn.fit(structure(na=1), governed(0.0))
+
+
+def test_the_truth_is_fit_at_20_db_under_feedback(truth):
+    """Noise fed back biases the spectral estimate, to -1/K where nothing else moves the input; and
+    4 s ahead the noise of where a prediction starts has grown sevenfold. Neither is the model's.
+    """
+    np.testing.assert_allclose(np.sort(np.ravel(truth.theta)), [-1.05, 0.1], rtol=1e-6)
+    record = governed(0.1)
+    found = idn.fit_for_control(truth, record, HELD, scales=SCALES, **LONG)
+    assert found["J"].verdict == "fit", str(found)
+    assert found["TIC"].value > found["TIC"].threshold
+    assert (found["TIC"].verdict, found["TIC"].where) == ("fit", "noise of the sensors taken off")
+
+
+@pytest.mark.parametrize("factor", [0.4, 2.5])
+def test_what_is_wrong_is_not_fit_at_20_db_under_feedback(truth, factor):
+    """The effect of the input by a factor."""
+    theta = np.array(truth.theta)
+    theta[np.isclose(theta, 0.1)] *= factor
+    wrong = replace(truth, theta=theta)
+    found = idn.fit_for_control(wrong, governed(0.1), HELD, scales=SCALES, **LONG)
+    assert found["J"].verdict == "not fit", str(found)
+    assert found["TIC"].verdict == "not fit", str(found)

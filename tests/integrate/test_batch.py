@@ -136,6 +136,7 @@ def test_a_lost_flight_is_marked_and_harms_no_other(ideal):
     np.testing.assert_array_equal(np.delete(batch.final, 3, axis=0), np.delete(good, 3, axis=0))
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_ends_a_long_batch_at_once(ideal):
     x0, u, _, _ = many(ideal, 64, n=1)
     simulate_batch(ideal, x0, u, dt=0.02)  # compiled before the clock runs

@@ -2,6 +2,7 @@
 basis, and nothing moves that need not.
 """
 
+import warnings
 from dataclasses import replace
 
 import control
@@ -351,3 +352,34 @@ def test_a_static_controller_goes_with_any_sample_period():
     dynamic = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ("k",), ("y1",), ("u1",), dt=0.1)
     loop = lower_feedback(static, dynamic)
     assert (loop.dt, float(loop.at(0.0).A[0, 0])) == (0.1, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("other", "noticed"),
+    [
+        (Scheduling("u", "m/s", 0.0, 13.0), True),
+        (Scheduling("V", "kt", 0.0, 30.0), True),
+        (Scheduling("descent", "m/s", -5.0, -1.0), False),  # nothing in common
+        (Scheduling("mass", "kg", 5.0, 9.0), False),
+    ],
+)
+def test_two_parameters_that_may_be_one_are_noticed(other, noticed):
+    """A plant over airspeed under a controller that calls it otherwise would be closed as if the
+    two moved independently.
+    """
+    airspeed = Scheduling("airspeed", "m/s", 0.0, 13.0)
+    one = np.ones((1, 1))
+    P = LPVStateSpace.polynomial([-one, -0.1 * one], [one], [one], [0 * one], airspeed)
+    none = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0))
+    K = LPVStateSpace.polynomial(
+        *([M] for M in none), [-one, -0.1 * one], other, inputs=P.outputs, outputs=P.inputs
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        loop = lower_feedback(P, K)
+    assert {s.name for s in loop.parameters} == {"airspeed", other.name}
+    said = [str(w.message) for w in caught]
+    assert bool(said) == noticed
+    if noticed:
+        renamed = "with_scheduling(Scheduling('airspeed', 'm/s', low, high))"
+        assert (renamed if other.unit == "m/s" else "make it over airspeed in m/s") in said[0]

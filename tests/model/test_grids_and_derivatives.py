@@ -186,6 +186,21 @@ def test_a_grid_is_the_family_at_each_value(ideal, name, values, variant):
     assert not np.allclose(grid.A[:, 0], grid.A[:, 1])
 
 
+def test_a_grid_is_a_family_over_any_of_its_axes(ideal, tmp_path):
+    """With its name and unit, to the file and back with the trims."""
+    grid = symheli.sweep_grid(ideal, [3.0, 8.0], mass=[8.0, 9.0])
+    family = grid.family(airspeed=8.0)
+    assert (family.parameter, family.parameter.unit) == ("mass", "kg")
+    np.testing.assert_array_equal(family.A, grid.A[1])
+    assert family.interpolate(degree=1).scheduling.name == "mass"
+    for ending in ("json", "npz"):
+        back = symheli.LinearFamily.load(family.save(tmp_path / f"mass.{ending}"))
+        assert (back.parameter, back.parameter.unit) == ("mass", "kg")
+        assert [t.airspeed for t in back.trims] == [8.0, 8.0]
+        x0 = family.trims.state(family.states)
+        np.testing.assert_array_equal(back.trims.state(back.states), x0)
+
+
 def test_a_grid_refuses_what_it_does_not_hold(ideal):
     grid = symheli.sweep_grid(ideal, [3.0], mass=[8.0, 9.0])
     with pytest.raises(symheli.InputError, match=r"mass = 8\.5 kg is not on the grid: 8, 9"):

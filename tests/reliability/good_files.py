@@ -138,6 +138,7 @@ def _saved(folder: Path) -> list[Reader]:
     kinematic.save(folder / "kinematic.json")
     model.save(folder / "model.json")
     recursion.save(recursion.init(), folder / "state.json")
+    lag.save(folder / "lpv.json")
     synthesis.stability(lag).save(folder / "proof.json")
     record = symheli.FlightRecord.from_arrays(
         0.02 * np.arange(40),
@@ -165,6 +166,12 @@ def _saved(folder: Path) -> list[Reader]:
             "LPV-ARX model",
             folder / "model.json",
             identification.LPVARXModel.load,
+            content=pickle.dumps,
+        ),
+        Reader(
+            "LPV state space",
+            folder / "lpv.json",
+            symheli.LPVStateSpace.load,
             content=pickle.dumps,
         ),
         Reader("recursion state", folder / "state.json", recursion.load, content=pickle.dumps),

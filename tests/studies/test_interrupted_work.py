@@ -15,9 +15,12 @@ LIMIT = 2.0
 """Seconds of processor time, which other work on the machine does not make longer."""
 ENDING = 1.0
 """That Python needs to end when so many libraries are loaded: 0.4 s, measured."""
-pytestmark = pytest.mark.skipif(
-    not Path("/proc/self/stat").exists(), reason="reads processor times in /proc"
-)
+pytestmark = [
+    pytest.mark.skipif(
+        not Path("/proc/self/stat").exists(), reason="reads processor times in /proc"
+    ),
+    pytest.mark.usefixtures("interruptible"),
+]
 
 HELI = """
 import numpy as np

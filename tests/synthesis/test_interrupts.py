@@ -43,6 +43,7 @@ print("ended by itself")
         pytest.param("SCS", 60, 600, 1.0, marks=pytest.mark.slow),
     ],
 )
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupted_solve_ends_within_two_seconds(name, n, m, after):
     if name == "SCS":
         pytest.importorskip("scs")

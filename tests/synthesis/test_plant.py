@@ -214,7 +214,9 @@ def test_a_servo_drives_the_control_and_the_command_is_performance(dt):
         bare.with_servo({"gust": SERVO})
     with pytest.raises(InputError, match="the actuator of d_lat: expected a Servo"):
         bare.with_servo({"d_lat": 36.0})
-    with pytest.raises(InputError, match="add servos and delays first, then the weights"):
+    with pytest.raises(
+        InputError, match="add servos, delays and disturbances first, then the weights"
+    ):
         bare.weighted({"d_lat": 2.0}).with_servo({"d_lat": SERVO})
 
 
@@ -282,6 +284,58 @@ def test_noise_enters_the_measurement_and_not_the_performance():
         plant().with_noise({"phi": 0.0})
     with pytest.raises(InputError, match="has an input phi_noise already"):
         own.with_noise({"phi": 0.1})
+
+
+def test_an_input_disturbance_acts_where_the_control_does():
+    """Before `with_servo` behind the servo, after it through it; the command that is performance
+    stays the command alone.
+    """
+    behind = plant().with_input_disturbance().with_servo({"d_lat": SERVO})
+    through = plant().with_servo({"d_lat": SERVO}).with_input_disturbance(["d_lat"])
+    for own in (behind, through):
+        assert own.disturbances == ("gust", "d_lat_disturbance")
+        assert own.disturbances[1].unit == "rad"
+    for p in SPEEDS:
+        bare = transfer(plant(), p, "phi", "d_lat")
+        same(transfer(behind, p, "phi", "d_lat_disturbance"), bare)
+        same(transfer(through, p, "phi", "d_lat_disturbance"), transfer(through, p, "phi", "d_lat"))
+        assert np.abs(transfer(through, p, "phi", "d_lat") / bare - 1).max() > 0.1
+        for own in (behind, through):
+            same(transfer(own, p, "d_lat", "d_lat_disturbance"), 0.0)
+    with pytest.raises(InputError, match=r"add servos, delays and disturbances first"):
+        plant().weighted({"d_lat": 2.0}).with_input_disturbance()
+    with pytest.raises(UnknownNameError, match="unknown control 'gust'"):
+        plant().with_input_disturbance(["gust"])
+    with pytest.raises(InputError, match=r"\.with_input_disturbance\(\['d_lat'\]\) adds"):
+        Plant(roll(), disturbances=["d_lat"], controls=["d_lat"])
+
+
+def test_what_flies_is_closed_with_the_errors_of_a_design():
+    """A table reads measured minus reference, the plant of the design gives reference minus
+    measured: one loop, to the rounding of the table.
+    """
+    own = plant(roll(0.02)).with_reference()
+    K = LPVStateSpace.polynomial(
+        [[[0.5]], [[0.01]]],
+        [[[0.1, 0.3]]],
+        [[[0.2]]],
+        [[[0.02, -0.001]], [[0.001, 0.0]]],
+        SPEED,
+        states=["k"],
+        inputs=["phi_error", "p"],
+        outputs=["d_lat"],
+        dt=0.02,
+    )
+    flies = symheli.ScheduledController(K)
+    assert flies.model.inputs == ("phi", "p")
+    table = symheli.TableController.of(K, 2)
+    for p in SPEEDS:
+        expected = own.close(K).at(p)
+        np.testing.assert_allclose(own.close(flies).at(p).A, expected.A, atol=1e-12)
+        np.testing.assert_allclose(own.close(table).at(p).A, expected.A, atol=1e-6)
+        np.testing.assert_allclose(own.close(table).at(p).B, expected.B, atol=1e-6)
+    with pytest.raises(InputError, match="reads phi and phi_error: give it one of the two"):
+        symheli.ScheduledController(replace(K, inputs=("phi_error", "phi")))
 
 
 def test_a_reference_makes_errors_of_signals():
@@ -588,3 +642,30 @@ def test_a_scheduled_gain_that_cancels_the_scheduling_leaves_a_constant_loop():
     own = Plant(model, disturbances=["w"], performance=["y"], controls=["u"], measurements=["y"])
     cert = synthesis.l2_gain(own.close(gain), rate=math.inf, search=None)
     assert 0.5 <= cert.gamma <= 0.5005
+
+
+@pytest.mark.parametrize("given", [roll(), roll().at(3.0), None])
+@pytest.mark.parametrize(
+    "design",
+    [
+        synthesis.output_feedback,
+        synthesis.state_feedback,
+        synthesis.estimator,
+        synthesis.lft_feedback,
+        lambda plant: synthesis.multiobjective(plant, [synthesis.L2()]),
+        lambda plant: synthesis.certify_flown({}, plant),
+        lambda plant: synthesis.with_wrong_parameter(plant, {}, 0.1),
+        lambda plant: synthesis.proven_around(plant, {}, 3.0),
+    ],
+)
+def test_a_design_of_a_model_says_that_it_needs_a_plant(design, given):
+    said = (
+        rf"expected a synthesis\.Plant, got {type(given).__name__}; .*Plant\(model, disturbances="
+    )
+    with pytest.raises(InputError, match=said):
+        design(given)
+
+
+def test_a_point_design_of_a_plant_says_where_its_model_is():
+    with pytest.raises(InputError, match=r"got Plant; .* a Plant \.nominal\.at\(p\)"):
+        synthesis.hinf(plant(), ["d_lat"], ["phi"])

@@ -1,14 +1,18 @@
 """Controllers sampled, and flown."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scheduled_plants import spring
+from scipy.linalg import expm
 
 import symheli
 from symheli.errors import InputError
 from symheli.flight.controller import SCHEDULING
 from symheli.values.named_vector import NamedVector
 from synthesis import Plant, output_feedback, state_feedback
+from synthesis.design.controller import SAMPLED
 from synthesis.worst.frozen import norm
 
 
@@ -42,6 +46,75 @@ def test_what_cannot_be_sampled(made):
         made.discretize(0.02).discretize(0.02)
     with pytest.raises(InputError, match="dt: expected a number > 0"):
         made.discretize(0.0)
+
+
+# --- the loop of a sampled controller -------------------------------------------------------------
+
+
+def held_by_hand(plant, p, dt):
+    """exp([A B; 0 0] dt) of all inputs at one p: no code of the package but the matrices."""
+    A, B1, B2, *_ = (np.atleast_2d(M) for M in plant.at(p))
+    n, B = len(A), np.hstack([B1, B2])
+    whole = expm(dt * np.block([[A, B], [np.zeros((B.shape[1], n + B.shape[1]))]]))
+    return whole[:n, :n], whole[:n, n:]
+
+
+@pytest.mark.parametrize("table", [False, True])
+def test_the_plant_of_a_sampled_controller_holds_its_inputs_between_the_samples(made, table):
+    """Both as polynomials and as a table; within what the functions of p cannot hold, which the
+    residuals say.
+    """
+    if table:
+        own = made.plant.model
+        basis = symheli.lpv.PiecewiseLinear(tuple(np.linspace(0.0, 1.0, 11)))
+        p = np.linspace(0.0, 1.0, 11)
+        fit = [basis.fit(p, M) for M in own.matrices(p)]
+        as_table = symheli.LPVStateSpace(
+            basis, *fit, own.parameters, own.states, own.inputs, own.outputs
+        )
+        made = replace(made, plant=replace(made.plant, model=as_table))
+    plant = made.discretize(0.05).loop_plant
+    off = plant.model.residuals
+    assert plant.dt == 0.05
+    for p in (0.0, 0.27, 1.0):
+        A, B = held_by_hand(made.plant, p, 0.05)
+        found = plant.at(p)
+        tolerance = 1e-9 + 1.1 * max(np.abs(off.A).max(), np.abs(off.B).max())
+        assert tolerance < 1e-3
+        np.testing.assert_allclose(found.A, A, atol=tolerance)
+        np.testing.assert_allclose(np.hstack([found.B1, found.B2]), B, atol=tolerance)
+
+
+def test_a_sampled_controller_is_certified_and_says_that_the_loop_is_sampled(made):
+    proof = made.discretize(0.02).certify(search=None)
+    assert proof.verified
+    assert SAMPLED.format(dt=0.02) in proof.hypotheses
+    assert not any("sampled" in sentence for sentence in made.certify(search=None).hypotheses)
+    # what no proof can beat: the loop of the plant held by hand at each p
+    for p in (0.0, 0.5, 1.0):
+        A, B = held_by_hand(made.plant, p, 0.02)
+        of = made.plant.at(p)
+        K = made.discretize(0.02).at(p)
+        n = of.B1.shape[1]
+        loop = (
+            np.block([[A + B[:, n:] @ K.D @ of.C2, B[:, n:] @ K.C], [K.B @ of.C2, K.A]]),
+            np.vstack([B[:, :n] + B[:, n:] @ K.D @ of.D21, K.B @ of.D21]),
+            np.hstack([of.C1 + of.D12 @ K.D @ of.C2, of.D12 @ K.C]),
+            of.D11 + of.D12 @ K.D @ of.D21,
+        )
+        assert norm(*loop, 0.02)[0] <= proof.gamma * (1 + 1e-5)
+
+
+def test_a_sampled_controller_may_be_reduced(made):
+    assert made.discretize(0.02).reduce(1).certify(search=None).verified
+
+
+def test_an_uncertain_plant_is_not_sampled_and_says_what_to_do(made):
+    plant = made.plant
+    lossy = symheli.UncertainStateSpace(plant.model, ["u"], ["y"], 0.1, 1.0, "by choice")
+    uncertain = Plant(lossy, ["w"], ["z"], [], [])
+    with pytest.raises(InputError, match="start from an uncertain model that is sampled"):
+        replace(made, plant=uncertain).discretize(0.02).certify()
 
 
 # --- on the helicopter -------------------------------------------------------------------------
@@ -87,6 +160,30 @@ def test_a_sampled_controller_flies(ideal, roll):
     assert np.abs(error).max() > 1e-4
     # the machine adds the same products in another order
     np.testing.assert_allclose(record["d_lat"], expected, atol=1e-12)
+
+
+def test_a_design_against_a_reference_flies_as_it_is(ideal, roll):
+    """`phi_error` of the plant is reference minus phi; a flight subtracts the other way round."""
+    own = roll.plant.with_reference(["phi"]).with_noise({"p": 0.02, "phi_error": 0.02})
+    made = output_feedback(own).discretize(0.02)
+    assert "phi_error" in made.model.inputs
+    schedule = symheli.AirspeedSchedule.transition(2.0, 3.0, acceleration=1.0, hold=0.3)
+    table = symheli.TableController.of(made, 9)
+    assert "phi" in table.inputs
+    windy = symheli.Wind((0.0, 2.0, 0.0), turbulence=symheli.Dryden(wind=6.0, altitude=20.0))
+    flown = []
+    for controller in (made, table):
+        record = symheli.fly(ideal, schedule, controller=controller, wind=windy, seed=1)
+        flown.append(record["d_lat"] - record["d_lat_reference"])
+    rebuilt = made.model.matrices(2.0).D[0]
+    np.testing.assert_allclose(
+        made.scheduled_controller.model.matrices(2.0).D[0],
+        rebuilt * [-1.0 if u == "phi_error" else 1.0 for u in made.model.inputs],
+    )
+    # nine airspeeds: within the misfit of the table, with a margin for how the flights part
+    assert table.misfit < 1e-2
+    np.testing.assert_allclose(flown[1], flown[0], atol=10 * table.misfit * np.ptp(flown[0]))
+    assert np.ptp(flown[0]) > 1e-5
 
 
 def test_its_states_begin_at_zero_after_a_reset(roll):
