@@ -170,7 +170,7 @@ def _mean_cost(plants: Generalized, dt: float | None) -> Array | None:
 
 def _priced(D: Array) -> bool:
     """Whether every control costs."""
-    return np.linalg.matrix_rank(D) == D.shape[1]
+    return D.shape[1] == 0 or np.linalg.matrix_rank(D) == D.shape[1]
 
 
 def coordinates_of(plant: Plant, channel: float) -> Coordinates:
