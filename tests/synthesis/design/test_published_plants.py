@@ -1,4 +1,4 @@
-"""Plants of published designs: their frozen optima, and that polynomials stand for the functions."""
+"""Plants of published designs: frozen optima, and polynomials that stand for functions."""
 
 import math
 from itertools import product
