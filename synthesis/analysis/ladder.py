@@ -73,6 +73,11 @@ class Ladder(ABC):
         """
         self.unit = self.expect(1.0)
 
+    @property
+    def found_by(self) -> str:
+        """How the inequalities were imposed in the search."""
+        return self.asked.impose.found_by
+
     @abstractmethod
     def expect(self, bound: float) -> float:
         """Set the units in which numbers are of order one where the bound is near this one; the
