@@ -239,6 +239,7 @@ def _affine(
 
 
 def coefficients_of(shape: Shape, index: Sequence[int]) -> Array:
+    """Numbers of the coefficients of P on one segment of each parameter, an axis a parameter."""
     return np.arange(prod(shape.counts)).reshape(shape.counts)[segment_slices(shape.degrees, index)]
 
 
