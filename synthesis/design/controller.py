@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.named_vector import NamedVector
 from symheli.values.summary import as_table, summarized
@@ -30,6 +31,10 @@ ADJOINT = (
 )
 
 
+NEAR = 1.05
+"""A gain proven within this factor of what no proof undercuts is not tried to improve upon, where
+none was promised.
+"""
 ADJOINT_USUAL = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV}
 
 
@@ -50,7 +55,7 @@ class Controller:
         What it was made for.
     gamma : float
         What its synthesis promised, in units of performance per unit of disturbance: a number to
-        compare with, no proof. `certify` proves.
+        compare with, no proof. `certify` proves. NaN where nothing is promised, as of fewer states.
     method : str
         By which it was made, in some words.
     optimum : float or None
@@ -132,7 +137,8 @@ class Controller:
         if tied or isinstance(loop, UncertainStateSpace):
             return proof(False)
         found = proof(self.by_adjoint)
-        if usual and moving and not found.gamma <= self.gamma:
+        enough = NEAR * found.lower if math.isnan(self.gamma) else self.gamma
+        if usual and moving and not found.gamma <= enough:
             return min(found, proof(not self.by_adjoint), key=_proven)
         return found
 
@@ -146,13 +152,30 @@ class Controller:
         model = tustin(self.model, dt)
         return replace(self, model=model)
 
-    def reduce(self, order: int) -> Controller:
-        """At most `order` states: one projection that keeps what the closed loop sees of the
-        controller; see `synthesis.design.reduction`.
-        """
-        from synthesis.design.reduction import reduced
+    def reduce(self, order: int | None = None, *, loss: float | None = None) -> Controller:
+        """At most `order` states, or the fewest with which the largest gain of the frozen loops is
+        at most the fraction `loss` above that of all states; give one of the two.
 
-        return reduced(self, order)
+        One projection keeps what the closed loop sees of the controller; see
+        `synthesis.design.reduction`. What was promised of all states is not promised of fewer:
+        `gamma` is NaN then, and the `notes` tell both frozen gains.
+
+        Raises `InputError` for both or none, an order below 0 or a loss that is no number >= 0,
+        `SynthesisError` where the loop is not stable at some frozen p, before or after.
+
+        Examples
+        --------
+        >>> made = synthesis.output_feedback(plant)
+        >>> made.reduce(loss=0.0).order <= made.order
+        True
+        """
+        from synthesis.design.reduction import reduced, within
+
+        if order is not None and loss is None:
+            return reduced(self, order)
+        if loss is not None and order is None:
+            return within(self, loss)
+        raise InputError("reduce: give an order, or a loss such as 0.03, and not both")
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
@@ -194,9 +217,14 @@ class Controller:
         names = ", ".join(s.name for s in self.model.parameters)
         time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
         least = "" if self.optimum is None else f", at best {self.optimum:.6g}"
+        promised = (
+            "  no gamma is promised, .certify() proves one"
+            if math.isnan(self.gamma)
+            else f"  gamma {self.gamma:.6g} in synthesis{least}: no proof, .certify() proves"
+        )
         lines = [
             f"{self.method}: {self.order} states, {time}, {', '.join(self.model.inputs)} ->"
             f" {', '.join(self.model.outputs)} over {names}",
-            f"  gamma {self.gamma:.6g} in synthesis{least}: no proof, .certify() proves",
+            promised,
         ]
         return "\n".join([*lines, *(f"  {reason}" for reason in self.reasons)])
