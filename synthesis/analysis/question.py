@@ -59,10 +59,11 @@ class Question(NamedTuple):
     def points_serve(self) -> bool:
         """Whether that could be."""
         return (
-            not self.one_parameter
+            len(self.model.parameters) > 1
             and self.demand.kind == "l2 gain"
             and self.model.dt is None
             and isinstance(self.impose, Bernstein)
+            and self.impose.elevation == self.impose.subdivision == 0
             and isinstance(self.form, Spline)
             and self.form.total_degree is None
         )
