@@ -17,7 +17,8 @@ from synthesis.certificate import Attempt, Certificate
 from synthesis.design.conditions import conditions
 from synthesis.design.diagnosis import decided
 from synthesis.forms import Spline
-from synthesis.program.cone_program import LYAPUNOV
+from synthesis.impose import Bernstein
+from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import asked as limits
 
 if TYPE_CHECKING:
@@ -36,6 +37,15 @@ NEAR = 1.05
 none was promised.
 """
 ADJOINT_USUAL = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV}
+
+RICHER = {
+    "form": Spline(degree=4, segments=4, grading=1.0),
+    "impose": Bernstein(floor=1e-2),
+    "solver": Solver(LYAPUNOV, tolerance=1e-3),
+}
+"""Where the usual P proves far more than was promised. Solved coarsely and held off zero, such a P
+keeps digits enough for its verification.
+"""
 
 
 def _proven(found: Certificate) -> float:
@@ -118,8 +128,9 @@ class Controller:
 
         Where Y(p) moved in the synthesis the inverse of P(p) is a polynomial as simple as Y, and
         not P: then the adjoint, which has the same gain, is analysed first. Where one of the two
-        proves more than `gamma` the other is tried too, and the lower gain is returned; of a
-        parameter whose rate is another one only the loop is, since backwards that is not so.
+        proves more than `gamma` the other is tried too, then a richer P where that is far more, and
+        the lowest gain is returned; of a parameter whose rate is another one only the loop is,
+        since backwards that is not so.
         """
         from synthesis.analysis.l2_gain import l2_gain
 
@@ -128,10 +139,12 @@ class Controller:
         tied = any(isinstance(s.rate, str) for s in moving)
         usual = not {"form", "impose", "solver"} & set(options)
 
-        def proof(adjoint: bool) -> Certificate:
+        def proof(adjoint: bool, richer: bool = False) -> Certificate:
+            usually: dict[str, Any] = {}
+            if richer or (adjoint and usual and len(moving) == 1):
+                usually = RICHER if richer else ADJOINT_USUAL
             if not adjoint:
-                return l2_gain(loop, rate, **options)
-            usually = ADJOINT_USUAL if usual and len(moving) == 1 else {}
+                return l2_gain(loop, rate, **usually | options)
             return l2_gain(loop.adjoint(), rate, **usually | options).resting_on([ADJOINT])
 
         if tied or isinstance(loop, UncertainStateSpace):
@@ -139,7 +152,9 @@ class Controller:
         found = proof(self.by_adjoint)
         enough = NEAR * found.lower if math.isnan(self.gamma) else self.gamma
         if usual and moving and not found.gamma <= enough:
-            return min(found, proof(not self.by_adjoint), key=_proven)
+            found = min(found, proof(not self.by_adjoint), key=_proven)
+        if usual and len(moving) == 1 and loop.dt is None and not found.gamma <= NEAR * enough:
+            found = min(found, proof(self.by_adjoint, richer=True), key=_proven)
         return found
 
     def discretize(self, dt: float) -> Controller:
