@@ -151,10 +151,14 @@ class Controller:
             return proof(False)
         found = proof(self.by_adjoint)
         enough = NEAR * found.lower if math.isnan(self.gamma) else self.gamma
-        if usual and moving and not found.gamma <= enough:
-            found = min(found, proof(not self.by_adjoint), key=_proven)
-        if usual and len(moving) == 1 and loop.dt is None and not found.gamma <= NEAR * enough:
-            found = min(found, proof(self.by_adjoint, richer=True), key=_proven)
+        others = [lambda: proof(not self.by_adjoint)] if usual and moving else []
+        if usual and len(moving) == 1 and loop.dt is None:
+            # at once where the usual P proves nothing
+            others.insert(found.verified, lambda: proof(self.by_adjoint, richer=True))
+        for k, other in enumerate(others):
+            if found.gamma <= (NEAR if k else 1.0) * enough:
+                break
+            found = min(found, other(), key=_proven)
         return found
 
     def discretize(self, dt: float) -> Controller:
