@@ -132,7 +132,7 @@ def _fed_back(
     are farther apart than random errors, and the noise is large enough for that.
 
     In feedback G is off by S_eu / S_uu, up to (S_ee / S_uu)^(1/2), and is -1/K where noise alone
-    moves the inputs, with a coherence near 1 (Tischler and Remple, ch. 5 and 8). Such a frequency
+    moves the inputs, with a coherence near 1. Such a frequency
     says nothing of the model.
     """
     own = np.abs(measured.G) ** 2 * alone[:, None, :]

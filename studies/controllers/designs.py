@@ -39,6 +39,7 @@ from synthesis.design.controller import Controller
 from synthesis.design.hinf import hinf
 from synthesis.design.lft_feedback import lft_feedback
 from synthesis.design.output_feedback import output_feedback
+from synthesis.design.reduction import fewest
 from synthesis.worst.frozen import norm
 
 LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"
@@ -260,27 +261,14 @@ def simplest(made: Controller | LPVStateSpace, plant: Plant) -> tuple[LPVStateSp
         loop = closed(plant, model)
         return max(norm(*loop.matrices(float(v)), loop.dt)[0] for v in LOOKED_AT)
 
-    def sampled(order: int) -> LPVStateSpace:
-        assert isinstance(made, Controller)  # noqa: S101
-        return made.reduce(order).discretize(PERIOD).model
-
     whole = made.discretize(PERIOD).model if isinstance(made, Controller) else made
     best, limit = whole, NEAR * gain(whole)
-    for order in ORDERS if isinstance(made, Controller) and math.isfinite(limit) else ():
-        fewer = _tried(lambda order=order: sampled(order))
-        if fewer is not None and gain(fewer) <= limit:
-            best = fewer
-            break
+    if isinstance(made, Controller) and math.isfinite(limit):
+        fewer = fewest(made, lambda k: gain(k.discretize(PERIOD).model), limit, ORDERS)
+        best = fewer.discretize(PERIOD).model
     for degree in DEGREES if math.isfinite(limit) else ():
         simpler = of_degree(best, degree)
         if gain(simpler) <= limit:
             best = simpler
             break
     return best, gain(best)
-
-
-def _tried(make: Callable[[], LPVStateSpace]) -> LPVStateSpace | None:
-    try:
-        return make()
-    except SymheliError:
-        return None

@@ -58,11 +58,11 @@ from symheli.progress import task
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from synthesis import Flown, Plant
+from synthesis.design.reduction import fewest
 from synthesis.worst.frozen import norm
 
-ORDERS = (*range(2, 11), 12, 14, 16, 20, 24, 28)
 KNOTS = (2, 3, 5, 9, 17, 33)
-"""States and airspeeds of the table that are tried in turn."""
+"""Airspeeds of the table that are tried in turn."""
 LOOKED_AT = 9
 """Airspeeds at which the frozen gain of the loop is."""
 MANY = 12
@@ -214,11 +214,8 @@ def tabulated(made: synthesis.Controller, plant: Plant, asked: Asked) -> TableCo
     if asked.order:
         sampled = made.reduce(asked.order).discretize(asked.period)
     else:
-        for order in (n for n in ORDERS if n < made.order):
-            fewer = _reduced(made, order, asked.period)
-            if fewer is not None and gain(fewer.model) <= most:
-                sampled = fewer
-                break
+        fewer = fewest(made, lambda k: gain(k.discretize(asked.period).model), most)
+        sampled = fewer.discretize(asked.period)
     for knots in (asked.knots,) if asked.knots else KNOTS:
         table = TableController.of(sampled.model, knots, limits=limits)
         if asked.knots or gain(table) <= most:
@@ -272,13 +269,6 @@ def _limits(asked: Asked) -> dict[str, tuple[float, float]]:
     heli = Helicopter.load(asked.vehicle, governor="ideal")
     travel = dict(zip(map(str, heli.inputs), map(float, heli.travel), strict=True))
     return {u: (-travel[u], travel[u]) for u in asked.controls}
-
-
-def _reduced(made: synthesis.Controller, order: int, period: float) -> synthesis.Controller | None:
-    try:
-        return made.reduce(order).discretize(period)
-    except SynthesisError:
-        return None
 
 
 @contextmanager

@@ -168,9 +168,9 @@ class _Report:
                 asked.model.parameters,
                 asked.demand.rates,
                 asked.uncertain or asked.model.source,
-                (*self._how(best, status), *self._distance(bounds, best, ladder)),
+                (*self._how(best, status, ladder), *self._distance(bounds, best, ladder)),
             ),
-            method=f"{type(asked.form).__name__}, {asked.impose.found_by}",
+            method=f"{type(asked.form).__name__}, {(ladder or asked.impose).found_by}",
             solver=str(asked.solver),
             seconds=Seconds(*(float(s) for s in spent), bounds=beaten.seconds),
             conditioning=best.conditioning,
@@ -181,13 +181,13 @@ class _Report:
             proof=best.proof,
         )
 
-    def _how(self, best: Found, status: Status) -> tuple[str, ...]:
+    def _how(self, best: Found, status: Status, ladder: Ladder | None) -> tuple[str, ...]:
         if status is Status.UNPROVEN and isinstance(self.asked.impose, Grid):
             return (
                 f"the inequalities hold at {self.asked.impose.points} values of each parameter in"
                 " every region: no guarantee",
             )
-        if best.proof is None:
+        if best.proof is None or ladder is None:
             return ()
         if self.asked.one_parameter:
             what, shared = (
@@ -198,7 +198,7 @@ class _Report:
             what = "the whole box, halved where needed, and a grid of p"
             shared = "pieces, regions, products of polynomials and the inequalities themselves"
         return (
-            f"{best.proof.lyapunov.form}; {self.asked.impose.found_by}, for every p in its range"
+            f"{best.proof.lyapunov.form}; {ladder.found_by}, for every p in its range"
             " and every admissible rate",
             VERIFIED.format(what=what, shared=shared),
         )

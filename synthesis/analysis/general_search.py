@@ -4,22 +4,31 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 
-from symheli.lpv import LinearModel
-from synthesis.analysis.ladder import NOTHING, Found, Ladder
+from symheli.lpv import LinearModel, Matrices
+from synthesis.analysis.ladder import CLOSE, NOTHING, Found, Ladder
+from synthesis.analysis.question import Question
 from synthesis.assemble.box import Shape, affine_inequalities, assemble
+from synthesis.assemble.points import at_points, points_of
 from synthesis.certificate import Attempt, Kind, Proof
 from synthesis.forms import Spline
 from synthesis.impose import Grid
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.lyapunov.spline import graded_knots
+from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.pieces import Pieces
+from synthesis.polynomial.regions import regions
 from synthesis.polynomial.symmetric import length, smat
-from synthesis.program.cone_program import Answer, Candidate, solve
-from synthesis.program.scaling import model_scaling
+from synthesis.program import interior_point
+from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, general_solver, solve
+from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
+from synthesis.program.scaling import Scaling, dissipative, model_scaling
 from synthesis.proof.box import Evidence, Units
+from synthesis.worst.frozen import norm
 
 Array = np.ndarray
 
@@ -29,16 +38,90 @@ parameters: 3).
 """
 
 
+LOOKED_AT, FIRST = {1: 81, 2: 25}, {1: 9, 2: 4}
+"""Values of each parameter in a region at which inequalities may join a program (more parameters:
+5), and at which they stand in the first one (more: 2).
+"""
+ROUNDS = 8
+"""Most rounds of adding violated ones."""
+ADDED = 24
+"""Most that join at a time from a region."""
+NEAR = 3e-3
+"""A bound proven within this fraction of the level of its program is as good as that."""
+COARSE = 2e-3
+"""Relative gap at which a program of points is left: its P is proven by other means, and one well
+inside holds between the points too.
+"""
+
+
 class General(Ladder):
     """Splines P(p) over a box, in the scaled units of the `evidence`."""
 
+    def __init__(self, asked: Question):
+        if asked.solver.name == LYAPUNOV and not asked.by_points:  # of stability, for a gain
+            asked = asked._replace(solver=general_solver("CLARABEL"))
+        super().__init__(asked)
+
     def expect(self, bound: float) -> float:
         """Set the units; the unit of gains."""
-        model, demand = self.asked.model, self.asked.demand
-        self.evidence = Evidence(model, _units(model, demand.kind, bound), demand)
-        searched = self.evidence._replace(model=model.rounded)
+        model, kind = self.asked.model, self.asked.demand.kind
+        frozen, scale = _scaling(model, kind, bound)
+        self.choices = [_units(scale, kind)]
+        other = dissipative(scale, frozen, bound) if kind == "l2 gain" else None
+        if other is not None:
+            self.choices.insert(0, _units(other, kind))
+        self.rounding = math.inf
+        return self._in_units(self.choices[-1])
+
+    def settle(self) -> float:
+        """Programs are solved in the first units in which the gain of the model frozen at mid-range
+        is found, or nearly; the unit of gains.
+        """
+        if self.asked.demand.kind != "l2 gain" or len(self.choices) == 1:
+            return self.unit
+        start, found = time.perf_counter(), []
+        gain = norm(*_frozen(self.asked.model), self.asked.model.dt)[0]
+        for units in self.choices:
+            self._in_units(units)
+            found.append(self._frozen_gain() / gain - 1 if gain > 0 else 0.0)
+            if found[-1] <= CLOSE:
+                break
+        best = int(np.argmin(np.nan_to_num(found, nan=math.inf)))
+        self.rounding = found[best]
+        self.spent[1] += time.perf_counter() - start
+        return self._in_units(self.choices[best])
+
+    def _in_units(self, units: Units) -> float:
+        self.evidence = Evidence(self.asked.model, units, self.asked.demand)
+        searched = self.evidence._replace(model=self.asked.model.rounded)
         self.scaled, self.scaled_demand = searched.scaled
         return 1.0 / self.evidence.in_units(1.0)
+
+    def _frozen_gain(self) -> float:
+        """What a program in these units finds of the gain of the model frozen at mid-range."""
+        whole, scaled = self.evidence, self.scaled
+        box = tuple((s.low, s.high) for s in self.asked.model.parameters)
+        still = {
+            (0,) * len(box): tuple(
+                PolynomialMatrix.constant(M, box) for M in _frozen(self.asked.model)
+            )
+        }
+        model = self.asked.model._replace(breaks=box, models=still)
+        self.evidence = whole._replace(model=model)
+        self.scaled = self.evidence.scaled[0]
+        shape, margin = self.constant(), self.asked.impose.tried[0]
+        candidate = self._solve(shape, margin)
+        P = candidate.x is not None and self._lyapunov(candidate.x, shape)
+        bound = self.evidence.sampled(P, 2)[1] if P else math.inf
+        self.evidence, self.scaled = whole, scaled
+        return bound
+
+    @property
+    def found_by(self) -> str:
+        """How the inequalities were imposed in the search."""
+        if self.asked.by_points:
+            return "LMIs at single p, added where they were violated"
+        return super().found_by
 
     def constant(self) -> Shape:
         """One matrix for the whole box."""
@@ -93,22 +176,124 @@ class General(Ladder):
 
     def attempt(self, shape: Shape, margin: float, alpha: float = 0.0) -> Found:
         """One P and one margin, or one decay rate."""
-        start = time.perf_counter()
-        asked, n = self.asked, self.asked.model.sizes[0]
-        demand = self.scaled_demand._replace(shift=self.evidence.in_units(alpha) if alpha else 0.0)
-        inequalities = affine_inequalities(
-            self.scaled, demand, shape, margin, asked.impose.least, self.evidence.units.weight
-        )
-        program = assemble(inequalities, shape, n, asked.impose, maximise=not asked.gains)
-        built = time.perf_counter()
-        candidate = solve(program, asked.solver)
-        solved = time.perf_counter()
-        found = self._judged(candidate, shape)
-        self.spent += (built - start, solved - built, time.perf_counter() - solved)
+        asked = self.asked
+        demand = self.scaled_demand
+        shift = self.evidence.in_units(alpha) if alpha else 0.0
+        self.scaled_demand = demand._replace(shift=shift)
+        if asked.by_points:
+            found, message = self._by_points(shape, margin)
+        else:
+            candidate = self._solve(shape, margin)
+            found, message = self._verified(candidate, shape), candidate.message
+        self.scaled_demand = demand
         words = "no P" if found.proof is None else f"bound {found.bound:.6g}"
         segments = math.prod(len(k) - 1 for k in shape.knots)
         name = f"{segments} segments of degree {max(shape.degrees)}"
-        self.attempts.append(Attempt(name, margin, f"{candidate.message}, {words}", found.bound))
+        self.attempts.append(Attempt(name, margin, f"{message}, {words}", found.bound))
+        return found
+
+    def _solve(self, shape: Shape, margin: float) -> Candidate:
+        """A program of every inequality."""
+        asked, start = self.asked, time.perf_counter()
+        if asked.by_points:
+            every = self._inequalities(shape)
+            return self._of_points(every, [np.ones(len(b.constant), bool) for b in every], margin)
+        inequalities = affine_inequalities(
+            self.scaled,
+            self.scaled_demand,
+            shape,
+            margin,
+            asked.impose.least,
+            self.evidence.units.weight,
+        )
+        n = asked.model.sizes[0]
+        program = assemble(inequalities, shape, n, asked.impose, maximise=not asked.gains)
+        built = time.perf_counter()
+        candidate = solve(program, asked.solver)
+        self.spent += (built - start, time.perf_counter() - built, 0.0)
+        return candidate
+
+    def _by_points(self, shape: Shape, margin: float) -> tuple[Found, str]:
+        """Programs of few inequalities, which those that came out violated join, until the bound
+        proven of the whole box is near their level; in a word what became of them.
+        """
+        best, n, nu = Found(math.inf), *self.asked.model.sizes[:2]
+        every, rounds = self._inequalities(shape), 0
+        active = [self._first(shape, block) for block in every]
+        while True:
+            rounds += 1
+            candidate = self._of_points(every, active, margin)
+            best = best.or_better(self._verified(candidate, shape), 1.0)
+            if candidate.x is None or rounds == ROUNDS:
+                break
+            g = candidate.x[-1]
+            if best.bound * self.evidence.in_units(1.0) <= (1 + NEAR) * math.sqrt(max(g, 0.0)):
+                break
+            P = smat(candidate.x[:-1].reshape(-1, length(n)), n)
+            level, added = np.diag(np.r_[np.zeros(n), np.full(nu, g)]), 0
+            for block, which in zip(every, active, strict=True):
+                excess = np.linalg.eigvalsh(block.linear(P) + block.constant - level)[:, -1]
+                excess[which] = 0.0
+                worst = np.argsort(excess)[-ADDED:]
+                worst = worst[excess[worst] > 0]
+                which[worst] = True
+                added += len(worst)
+            if not added:
+                break
+        return best, f"{candidate.message} ({rounds} round(s))"
+
+    def _inequalities(self, shape: Shape) -> list[LyapunovBlocks]:
+        """Those that may join a program, one object a region."""
+        start, demand = time.perf_counter(), self.scaled_demand
+        count = LOOKED_AT.get(len(shape.knots), 5)
+        moving = demand.moving(shape.degrees)
+        every = [
+            at_points(self.scaled, demand, shape, region, points_of(region, count), self.weight)
+            for region in regions(self.scaled, shape.knots, demand.motion, moving)
+        ]
+        self.spent[0] += time.perf_counter() - start
+        return every
+
+    def _first(self, shape: Shape, block: LyapunovBlocks) -> Array:
+        """Which of a region stand in the first program: some points, with every motion."""
+        m = len(shape.knots)
+        count = LOOKED_AT.get(m, 5)
+        chosen = np.zeros(count, dtype=bool)
+        chosen[np.linspace(0, count - 1, FIRST.get(m, 2)).round().astype(int)] = True
+        grid = reduce(np.logical_and.outer, [chosen] * m)
+        return np.resize(grid.ravel(), len(block.constant))
+
+    def _of_points(
+        self, every: list[LyapunovBlocks], active: list[Array], margin: float
+    ) -> Candidate:
+        n, nu, _ = self.asked.model.sizes
+        chosen = [b.keep(which) for b, which in zip(every, active, strict=True) if which.any()]
+        unknowns = 1 + max(int(b.columns.max()) for b in every)
+        program = LyapunovProgram(
+            tuple(chosen), Sizes(n, nu, unknowns), margin, self.asked.impose.least
+        )
+        given = self.asked.solver
+        coarse = max(COARSE, given.options["tolerance"])
+        candidate = interior_point.minimise(program, replace(given, tolerance=coarse))
+        self.spent[1] += candidate.seconds
+        return candidate
+
+    @property
+    def weight(self) -> Array:
+        """Of the state blocks; see `Scaling`."""
+        return self.evidence.units.weight
+
+    def _lyapunov(self, x: Array, shape: Shape) -> BoxLyapunov:
+        """P at the solver's point x, as it is stored: in physical units."""
+        n, free = self.asked.model.sizes[0], shape.free
+        values = smat(x[: free.shape[1] * length(n)].reshape(free.shape[1], -1), n)
+        tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
+        return BoxLyapunov(shape.knots, shape.degrees, self.evidence.units.to_physical(tensor))
+
+    def _verified(self, candidate: Candidate, shape: Shape) -> Found:
+        start = time.perf_counter()
+        found = self._judged(candidate, shape)
+        self.spent[2] += time.perf_counter() - start
         return found
 
     def _judged(self, candidate: Candidate, shape: Shape) -> Found:
@@ -121,10 +306,7 @@ class General(Ladder):
         margin = 1.0 if gains else candidate.x[free.shape[1] * length(n)]
         none = candidate.answer is Answer.SOLVED and margin <= NOTHING
         nothing = Found(math.inf, None, Answer.INFEASIBLE if none else Answer.FAILED)
-        values = smat(candidate.x[: free.shape[1] * length(n)].reshape(free.shape[1], -1), n)
-        tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
-        # judged as it is stored, in physical units
-        P = BoxLyapunov(shape.knots, shape.degrees, self.evidence.units.to_physical(tensor))
+        P = self._lyapunov(candidate.x, shape)
         if isinstance(self.asked.impose, Grid):
             P, bound = self.evidence.sampled(P, self.asked.impose.points)
             if math.isinf(bound):
@@ -138,17 +320,25 @@ class General(Ladder):
         return Found(bound, proof, candidate.answer, self.evidence.conditioning(P))
 
 
-def _units(model: Pieces, kind: Kind, expected: float) -> Units:
+def _frozen(model: Pieces) -> Matrices:
+    """The model at mid-range."""
     middle = np.array([[s.middle for s in model.parameters]])
-    A, B, C, D = (M[0] for M in model.at(middle))
+    return Matrices(*(M[0] for M in model.at(middle)))
+
+
+def _scaling(model: Pieces, kind: Kind, expected: float) -> tuple[LinearModel, Scaling]:
+    """The model at mid-range, and its units."""
     names = [
         tuple(f"{letter}{i}" for i in range(n))
         for letter, n in zip("xuy", model.sizes, strict=True)
     ]
     low, high = np.array([(s.low, s.high) for s in model.parameters]).T
     every = model.at(low + np.linspace(0.0, 1.0, 9)[:, None] * (high - low))
-    frozen = LinearModel(A, B, C, D, *names, dt=model.dt)  # type: ignore[arg-type]
-    scale = model_scaling(frozen, expected if kind.endswith("gain") else 1.0, every)
+    frozen = LinearModel(*_frozen(model), *names, dt=model.dt)  # type: ignore[arg-type]
+    return frozen, model_scaling(frozen, expected if kind.endswith("gain") else 1.0, every)
+
+
+def _units(scale: Scaling, kind: Kind) -> Units:
     root = math.sqrt(scale.time)
     if kind == "energy-to-peak gain":
         # outputs are peaks, not energies

@@ -73,6 +73,11 @@ class Ladder(ABC):
         """
         self.unit = self.expect(1.0)
 
+    @property
+    def found_by(self) -> str:
+        """How the inequalities were imposed in the search."""
+        return self.asked.impose.found_by
+
     @abstractmethod
     def expect(self, bound: float) -> float:
         """Set the units in which numbers are of order one where the bound is near this one; the
@@ -146,15 +151,21 @@ class Ladder(ABC):
         if best.proof is not None and best.bound <= (1 + CLOSE) * limit:
             return best
         self.unit = self.settle() if gains else self.unit
-        shape, near = None, self.asked.form.near
-        for shape in self.shapes():
+        shapes, near, still = self.shapes(), self.asked.form.near, None
+        if gains and any(map(self.varies, shapes)):
+            # cheapest, and enough where p changes little
+            still = self._margins(self.constant(), Found(math.inf))
+            if still.proof is not None and still.bound <= (1 + CLOSE) * limit:
+                return still
+        for shape in shapes:
             best = self._margins(shape, best)
             if best.proof is not None and not best.bound > near * limit:
                 break
-        short = best.proof is None or best.bound > (1 + CLOSE) * limit
-        if shape is not None and self.varies(shape) and short:
+        if still is None and best.proof is None and any(map(self.varies, shapes)):
+            still = self._margins(self.constant(), Found(math.nan))
+        if still is not None:
             # that there is no P is said of the form that was asked for, of which a constant is one
-            answer, best = best.answer, self._margins(self.constant(), best)
+            answer, best = best.answer, best.or_better(still, 1.0)
             best = best if best.proof is not None else best._replace(answer=answer)
         return best
 

@@ -49,6 +49,26 @@ class Question(NamedTuple):
         )
 
     @property
+    def by_points(self) -> bool:
+        """Whether a gain of several parameters is sought by inequalities at single p, as products
+        with P.
+        """
+        return self.points_serve and self.solver.name == LYAPUNOV
+
+    @property
+    def points_serve(self) -> bool:
+        """Whether that could be."""
+        return (
+            len(self.model.parameters) > 1
+            and self.demand.kind == "l2 gain"
+            and self.model.dt is None
+            and isinstance(self.impose, Bernstein)
+            and self.impose.elevation == self.impose.subdivision == 0
+            and isinstance(self.form, Spline)
+            and self.form.total_degree is None
+        )
+
+    @property
     def gains(self) -> bool:
         """Whether a gain is asked for."""
         return self.demand.kind.endswith("gain")
@@ -96,7 +116,7 @@ def question(
 
 
 def _solver(asked: Question, solver: Solver | str | None) -> Solver:
-    by_products = asked.one_parameter and isinstance(asked.form, Spline)
+    by_products = (asked.one_parameter and isinstance(asked.form, Spline)) or asked.points_serve
     if solver is None:
         return Solver(LYAPUNOV if by_products and asked.model.sizes[0] > GENERAL else "CLARABEL")
     if by_products:

@@ -92,7 +92,7 @@ def affine_inequalities(
     out = []
     # every P on its own segments
     for index in np.ndindex(*(len(k) - 1 for k in shape.knots)):
-        columns, P = _unknown(shape, index, np.unique(_ids(shape, index)), nx)
+        columns, P = _unknown(shape, index, np.unique(coefficients_of(shape, index)), nx)
         out.append(
             _affine(
                 positivity(P), columns, nothing, floor * svec(eye) if gains else nothing, 0 * eye
@@ -122,7 +122,9 @@ def affine_inequalities(
                 )
             )
         if demand.kind == "energy-to-peak gain" and region.next_segment == region.segment:
-            columns, P = _unknown(shape, region.segment, np.unique(_ids(shape, region.segment)), nx)
+            columns, P = _unknown(
+                shape, region.segment, np.unique(coefficients_of(shape, region.segment)), nx
+            )
             F = peak(model, region, P, float)
             size = F.shape[0]
             level_y = -svec(np.diag(np.r_[np.zeros(size - ny), np.ones(ny)]))
@@ -236,13 +238,14 @@ def _affine(
     )
 
 
-def _ids(shape: Shape, index: Sequence[int]) -> Array:
+def coefficients_of(shape: Shape, index: Sequence[int]) -> Array:
+    """Numbers of the coefficients of P on one segment of each parameter, an axis a parameter."""
     return np.arange(prod(shape.counts)).reshape(shape.counts)[segment_slices(shape.degrees, index)]
 
 
 def _pair(shape: Shape, region: Region, states: int) -> tuple[Array, Pair]:
     here, there = region.segment, region.next_segment
-    involved = np.union1d(_ids(shape, here), _ids(shape, there))
+    involved = np.union1d(coefficients_of(shape, here), coefficients_of(shape, there))
     columns, P = _unknown(shape, here, involved, states)
     return columns, Pair(P, _unknown(shape, there, involved, states)[1])
 
@@ -253,7 +256,7 @@ def _unknown(
     """Columns (V,) of the `involved` coefficients, and P on a segment for a unit of each; then for
     none.
     """
-    ids, E = _ids(shape, index), basis(states)
+    ids, E = coefficients_of(shape, index), basis(states)
     nv = len(E)
     unit = (ids[..., None] == involved).astype(float)
     stack = np.multiply.outer(unit, E).reshape(*ids.shape, len(involved) * nv, states, states)

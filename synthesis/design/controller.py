@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
 from symheli.values.named_vector import NamedVector
 from symheli.values.summary import as_table, summarized
@@ -16,7 +17,8 @@ from synthesis.certificate import Attempt, Certificate
 from synthesis.design.conditions import conditions
 from synthesis.design.diagnosis import decided
 from synthesis.forms import Spline
-from synthesis.program.cone_program import LYAPUNOV
+from synthesis.impose import Bernstein
+from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import asked as limits
 
 if TYPE_CHECKING:
@@ -36,7 +38,20 @@ SAMPLED = (
 )
 
 
+NEAR = 1.05
+"""A gain proven within this factor of what no proof undercuts is not tried to improve upon, where
+none was promised.
+"""
 ADJOINT_USUAL = {"form": Spline(degree=2, segments=(1, 4)), "solver": LYAPUNOV}
+
+RICHER = {
+    "form": Spline(degree=4, segments=4, grading=1.0),
+    "impose": Bernstein(floor=1e-2),
+    "solver": Solver(LYAPUNOV, tolerance=1e-3),
+}
+"""Where the usual P proves far more than was promised. Solved coarsely and held off zero, such a P
+keeps digits enough for its verification.
+"""
 
 
 def _proven(found: Certificate) -> float:
@@ -56,7 +71,7 @@ class Controller:
         What it was made for; see `loop_plant`.
     gamma : float
         What its synthesis promised, in units of performance per unit of disturbance: a number to
-        compare with, no proof. `certify` proves.
+        compare with, no proof. `certify` proves. NaN where nothing is promised, as of fewer states.
     method : str
         By which it was made, in some words.
     optimum : float or None
@@ -136,8 +151,9 @@ class Controller:
 
         Where Y(p) moved in the synthesis the inverse of P(p) is a polynomial as simple as Y, and
         not P: then the adjoint, which has the same gain, is analysed first. Where one of the two
-        proves more than `gamma` the other is tried too, and the lower gain is returned; of a
-        parameter whose rate is another one only the loop is, since backwards that is not so.
+        proves more than `gamma` the other is tried too, then a richer P where that is far more, and
+        the lowest gain is returned; of a parameter whose rate is another one only the loop is,
+        since backwards that is not so.
 
         Of a controller that was sampled it is the gain of the sampled loop, and the hypotheses say
         so, with the misfit of the sampled plant. `synthesis.certify_flown` proves that of a plant
@@ -151,18 +167,27 @@ class Controller:
         tied = any(isinstance(s.rate, str) for s in moving)
         usual = not {"form", "impose", "solver"} & set(options)
 
-        def proof(adjoint: bool) -> Certificate:
+        def proof(adjoint: bool, richer: bool = False) -> Certificate:
+            usually: dict[str, Any] = {}
+            if richer or (adjoint and usual and len(moving) == 1):
+                usually = RICHER if richer else ADJOINT_USUAL
             if not adjoint:
-                return l2_gain(loop, rate, **options).resting_on(rests)
-            usually = ADJOINT_USUAL if usual and len(moving) == 1 else {}
+                return l2_gain(loop, rate, **usually | options).resting_on(rests)
             proven = l2_gain(loop.adjoint(), rate, **usually | options)
             return proven.resting_on([*rests, ADJOINT])
 
         if tied or isinstance(loop, UncertainStateSpace):
             return proof(False)
         found = proof(self.by_adjoint)
-        if usual and moving and not found.gamma <= self.gamma:
-            return min(found, proof(not self.by_adjoint), key=_proven)
+        enough = NEAR * found.lower if math.isnan(self.gamma) else self.gamma
+        others = [lambda: proof(not self.by_adjoint)] if usual and moving else []
+        if usual and len(moving) == 1 and loop.dt is None:
+            # at once where the usual P proves nothing
+            others.insert(found.verified, lambda: proof(self.by_adjoint, richer=True))
+        for k, other in enumerate(others):
+            if found.gamma <= (NEAR if k else 1.0) * enough:
+                break
+            found = min(found, other(), key=_proven)
         return found
 
     def discretize(self, dt: float) -> Controller:
@@ -176,13 +201,30 @@ class Controller:
         model = tustin(self.model, dt)
         return replace(self, model=model)
 
-    def reduce(self, order: int) -> Controller:
-        """At most `order` states: one projection that keeps what the closed loop sees of the
-        controller; see `synthesis.design.reduction`.
-        """
-        from synthesis.design.reduction import reduced
+    def reduce(self, order: int | None = None, *, loss: float | None = None) -> Controller:
+        """At most `order` states, or the fewest with which the largest gain of the frozen loops is
+        at most the fraction `loss` above that of all states; give one of the two.
 
-        return reduced(self, order)
+        One projection keeps what the closed loop sees of the controller; see
+        `synthesis.design.reduction`. What was promised of all states is not promised of fewer:
+        `gamma` is NaN then, and the `notes` tell both frozen gains.
+
+        Raises `InputError` for both or none, an order below 0 or a loss that is no number >= 0,
+        `SynthesisError` where the loop is not stable at some frozen p, before or after.
+
+        Examples
+        --------
+        >>> made = synthesis.output_feedback(plant)
+        >>> made.reduce(loss=0.0).order <= made.order
+        True
+        """
+        from synthesis.design.reduction import reduced, within
+
+        if order is not None and loss is None:
+            return reduced(self, order)
+        if loss is not None and order is None:
+            return within(self, loss)
+        raise InputError("reduce: give an order, or a loss such as 0.03, and not both")
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
@@ -224,9 +266,14 @@ class Controller:
         names = ", ".join(s.name for s in self.model.parameters)
         time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
         least = "" if self.optimum is None else f", at best {self.optimum:.6g}"
+        promised = (
+            "  no gamma is promised, .certify() proves one"
+            if math.isnan(self.gamma)
+            else f"  gamma {self.gamma:.6g} in synthesis{least}: no proof, .certify() proves"
+        )
         lines = [
             f"{self.method}: {self.order} states, {time}, {', '.join(self.model.inputs)} ->"
             f" {', '.join(self.model.outputs)} over {names}",
-            f"  gamma {self.gamma:.6g} in synthesis{least}: no proof, .certify() proves",
+            promised,
         ]
         return "\n".join([*lines, *(f"  {reason}" for reason in self.reasons)])

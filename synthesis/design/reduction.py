@@ -9,6 +9,8 @@ Goddard and Glover, CDC 1996). Whether it was too much the analysis of the loop 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -18,22 +20,29 @@ from symheli.errors import InputError, SynthesisError
 from symheli.lpv import LPVStateSpace, Matrices
 from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.design.controller import Controller
+from synthesis.worst.frozen import norm
 
 Array = np.ndarray
+
+NOT_STABLE = (
+    "the closed loop is not stable at every frozen p, so that nothing says which states of the"
+    " controller matter"
+)
 
 NODES = {1: 14, 2: 6}
 """Values of each parameter at which the loop is looked at (more parameters: 4)."""
 
 
 def reduced(controller: Controller, order: int) -> Controller:
-    """The controller with at most `order` states.
+    """The controller with at most `order` states, of which nothing is promised: its `gamma` is NaN,
+    and a note tells the frozen gains of its loop and of that of all states.
 
     Raises `InputError` for an order below 0, `SynthesisError` where the loop is not stable at some
     frozen p, before or after.
     """
-    n = controller.order
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
         raise InputError(f"order: expected an integer >= 0, got {order!r}")
+    n = controller.order
     if order >= n:
         return controller
     left, right = projection(controller, order)
@@ -48,15 +57,66 @@ def reduced(controller: Controller, order: int) -> Controller:
         residuals=None,
     )
     made = replace(
-        controller, model=projected, method=f"{controller.method}, {order} of {n} states kept"
+        controller,
+        model=projected,
+        method=f"{controller.method}, {order} of {n} states kept",
+        gamma=math.nan,
+        optimum=None,
     )
-    loop: LPVStateSpace = made.closed()
-    A = loop.matrices(_conditions(loop)).A
-    if any(_unstable(each, loop.dt) for each in A):
+    gain = frozen_gain(made)
+    if math.isinf(gain):
         raise SynthesisError(
-            f"with {order} of {n} states the closed loop is not stable at every frozen p: keep more"
+            f"with {order} of {n} states the closed loop is not stable at every frozen p: keep"
+            " more, or reduce(loss=0.03) finds the least order"
         )
-    return made
+    note = (
+        f"the largest gain of the loop at frozen p is {gain:.6g}, {frozen_gain(controller):.6g} of"
+        f" all {n} states"
+    )
+    return replace(made, notes=(note,))
+
+
+def within(controller: Controller, loss: float) -> Controller:
+    """The controller of least order whose loop has a frozen gain at most the fraction `loss` above
+    that of all states.
+
+    Raises `InputError` for a loss that is no number >= 0, `SynthesisError` where the loop is not
+    stable at some frozen p.
+    """
+    if isinstance(loss, bool) or not isinstance(loss, int | float) or not 0 <= loss < math.inf:
+        raise InputError(
+            f"loss: expected a number >= 0, such as 0.03 for 3 % more gain, got {loss!r}"
+        )
+    whole = frozen_gain(controller)
+    if math.isinf(whole):
+        raise SynthesisError(NOT_STABLE)
+    return fewest(controller, frozen_gain, (1 + loss) * whole)
+
+
+def fewest(
+    controller: Controller,
+    gain: Callable[[Controller], float],
+    limit: float,
+    orders: Iterable[int] | None = None,
+) -> Controller:
+    """The reduced controller of the first of the `orders` (None: every one, from 0 on) with gain at
+    most `limit`; the controller itself where there is none.
+    """
+    for order in range(controller.order) if orders is None else orders:
+        try:
+            fewer = reduced(controller, order)
+        except SynthesisError:
+            continue
+        if gain(fewer) <= limit:
+            return fewer
+    return controller
+
+
+def frozen_gain(controller: Controller) -> float:
+    """Largest H-infinity norm of the loop at some frozen p, inf where one is not stable."""
+    loop: LPVStateSpace = controller.closed()
+    every = zip(*loop.matrices(_conditions(loop)), strict=True)
+    return max(norm(*each, loop.dt)[0] for each in every)
 
 
 def projection(controller: Controller, order: int) -> tuple[Array, Array]:
@@ -86,10 +146,7 @@ def gramians(controller: Controller) -> tuple[Array, Array]:
 def _gramians(loop: Matrices, dt: float | None) -> tuple[Array, Array]:
     A, B, C, _ = loop
     if _unstable(A, dt):
-        raise SynthesisError(
-            "the closed loop is not stable at every frozen p, so that nothing says which states of"
-            " the controller matter"
-        )
+        raise SynthesisError(NOT_STABLE)
     solve = linalg.solve_continuous_lyapunov if dt is None else linalg.solve_discrete_lyapunov
     sign = -1.0 if dt is None else 1.0
     return solve(A, sign * B @ B.T), solve(A.T, sign * C.T @ C)

@@ -88,6 +88,10 @@ class LyapunovBlocks(NamedTuple):
         half = (self.varying @ Z[:, None, None] @ np.swapaxes(self.fixed, -1, -2)).sum(axis=(0, 2))
         return half + np.swapaxes(half, -1, -2)
 
+    def keep(self, which: Array) -> LyapunovBlocks:
+        """Those blocks alone; without a `supply` or a level of their own."""
+        return self._replace(varying=self.varying[which], constant=self.constant[which])
+
     def congruent(self, W: Array) -> LyapunovBlocks:
         """W' F W for every F, W (N, N) not acting on the part with g."""
         return self._replace(

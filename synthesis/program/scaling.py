@@ -44,7 +44,7 @@ FAR = 30.0
 """A bound this many times larger or smaller than the scale it was found in deserves its own."""
 RESCALED = 3
 """Most changes of scale."""
-LEVELS = (1.01, 2.0, 10.0)
+LEVELS = (1.01, 2.0, 10.0, 100.0, 1e4)
 """Multiples of the expected gain at which a storage function is sought in turn."""
 SWEEPS = 100
 """Most sweeps of balancing."""
@@ -196,7 +196,10 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     )
     root = linalg.inv(linalg.cholesky(X))
     weight = powered(root.T @ symmetrized(Q) @ root * (time if continuous else 1.0), -0.5)
-    channel = _channel(gain, float(np.sqrt(np.trace(Wc) * np.trace(Wo))))
+    # state by state, so that their units play no part
+    alone = _gramian(A, B, continuous), _gramian(A.T, C.T, continuous)
+    heard = np.sqrt(np.maximum(np.diag(alone[0]) * np.diag(alone[1]), 0.0))
+    channel = _channel(gain, float(heard.sum()))
     size_B, size_C = (
         np.linalg.norm(weight @ linalg.solve(root, B)),
         np.linalg.norm(C @ root @ weight) / channel,
@@ -216,17 +219,26 @@ def dissipative(units: Scaling, model: LinearModel, gain: float) -> Scaling | No
     """
     if not (model.inputs and model.outputs and 0 < gain < math.inf):
         return None
-    scaled = units._replace(channel=gain).of_model(model)
-    for level in LEVELS:
-        storage = strict_storage(*scaled, level, discrete=model.dt is not None)
-        if storage is not None:
-            return units._replace(
-                left=linalg.solve(storage.T, units.left),
-                right=units.right @ storage.T,
-                channel=gain,
-                weight=powered(storage.W, -0.5),
-            )
-    return None
+    found, levels = None, LEVELS
+    while levels:
+        scaled = (found or units)._replace(channel=gain).of_model(model)
+        tried = (
+            (k, strict_storage(*scaled, level, discrete=model.dt is not None))
+            for k, level in enumerate(levels)
+        )
+        lowest = next(((k, storage) for k, storage in tried if storage is not None), None)
+        if lowest is None:
+            break
+        # in the coordinates of a higher level a lower one is found where rounding kept it
+        k, storage = lowest
+        levels, own = levels[:k], found or units
+        found = own._replace(
+            left=linalg.solve(storage.T, own.left),
+            right=own.right @ storage.T,
+            channel=gain,
+            weight=powered(storage.W, -0.5),
+        )
+    return found
 
 
 def in_its_own_scale(found: Callable[[float], tuple[T, float, float]], expected: float) -> list[T]:

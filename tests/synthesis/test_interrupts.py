@@ -64,6 +64,32 @@ def test_an_interrupted_solve_ends_within_two_seconds(name, n, m, after):
     assert took < 2.0 + 1.5  # a second and a half for other work on the machine
 
 
+ANALYSE = """
+from benchmarks.loops_over_decades import loop
+from symheli.lpv import LPVStateSpace, Scheduling
+from synthesis import l2_gain
+parameters = [Scheduling(name, "1", 0.0, 1.0, rate=1.0) for name in ("p", "q")]
+lpv = LPVStateSpace.polynomial(*({(0, 0): M} for M in loop(4).model), parameters)
+print("begins", flush=True)
+while True:
+    l2_gain(lpv)
+"""
+
+
+def test_an_interrupted_analysis_of_many_states_ends_within_two_seconds():
+    process = subprocess.Popen(
+        [sys.executable, "-c", ANALYSE], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    process.stdout.readline()
+    time.sleep(1.0)
+    begin = time.perf_counter()
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    took = time.perf_counter() - begin
+    assert err.rstrip().endswith("KeyboardInterrupt")
+    assert took < 2.0 + 1.5  # as above
+
+
 def test_what_fails_in_a_thread_is_raised_where_it_was_asked():
     assert in_thread(lambda stop: stop.is_set()) is False
     with pytest.raises(ZeroDivisionError):

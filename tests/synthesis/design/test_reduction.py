@@ -1,5 +1,6 @@
 """Controllers with fewer states."""
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from scheduled_plants import frozen, spring
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError, SynthesisError
 from synthesis import hinf, output_feedback
+from synthesis.design.reduction import frozen_gain
 from synthesis.worst.frozen import norm
 
 
@@ -71,6 +73,41 @@ def test_a_state_that_matters_little_may_go():
 def test_a_state_without_which_the_loop_is_unstable_stays(made):
     with pytest.raises(SynthesisError, match="with 1 of 2 states the closed loop is not stable"):
         made.reduce(1)
+
+
+def test_what_was_promised_of_all_states_is_not_promised_of_fewer(made):
+    more = extended(made, np.eye(3))
+    less = more.reduce(2)
+    assert np.isnan(less.gamma)
+    assert less.optimum is None
+    (note,) = less.reasons
+    assert f"{frozen_gain(less):.6g}" in note
+    assert f"{frozen_gain(more):.6g} of all 3 states" in note
+    assert "gamma nan" not in str(less)
+    # a gain is proven without a promise
+    assert less.certify(search=None).verified
+
+
+def test_the_least_order_within_a_loss_is_found():
+    gusts = LinearModel([[-20.0]], [[20.0]], [[1.0]], [[0.0]], ("x",), ("in",), ("out",))
+    made = output_feedback(spring().weighted({"w": gusts}))
+    whole = frozen_gain(made)
+    orders = []
+    for loss in (0.0, 0.02, 1.0):
+        less = made.reduce(loss=loss)
+        orders.append(less.order)
+        assert frozen_gain(less) <= (1 + loss) * whole
+        if less.order:
+            with contextlib.suppress(SynthesisError):
+                assert frozen_gain(made.reduce(less.order - 1)) > (1 + loss) * whole
+    assert orders == sorted(orders, reverse=True)
+    assert orders[1] < made.order
+
+
+@pytest.mark.parametrize("given", [{}, {"order": 1, "loss": 0.1}, {"loss": -0.1}, {"loss": "3%"}])
+def test_an_order_or_a_loss_is_asked_for(made, given):
+    with pytest.raises(InputError, match="loss"):
+        made.reduce(**given)
 
 
 def test_as_many_states_as_there_are_is_the_same_controller(made):

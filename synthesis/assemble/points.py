@@ -1,0 +1,87 @@
+"""The bounded real lemma of several parameters and many states at single p, in continuous time:
+fewer blocks than Bernstein coefficients, as products with P. What is found so is a proposal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from symheli.lpv.bases.polynomials import lobatto_points
+from synthesis.assemble.box import Shape, coefficients_of
+from synthesis.assemble.lyapunov_blocks import of_state
+from synthesis.polynomial.bernstein import blossom
+from synthesis.polynomial.pieces import Pieces
+from synthesis.polynomial.regions import Region, model_on
+from synthesis.polynomial.symmetric import extended
+from synthesis.program.lyapunov_program import LyapunovBlocks
+from synthesis.proof.inequalities import Demand
+
+Array = np.ndarray
+
+
+def points_of(region: Region, count: int) -> Array:
+    """So many values of each parameter in a region, (K, m), ends included, dense towards them."""
+    return lobatto_points(count, region.box).reshape(-1, len(region.box))
+
+
+def at_points(
+    model: Pieces, demand: Demand, shape: Shape, region: Region, points: Array, weight: Array
+) -> LyapunovBlocks:
+    """The inequalities of a region at `points` (K, m), one block each and extreme motion of p; of
+    scaled data, the state blocks in coordinates changed by `weight`.
+    """
+    A, B, C, D = (M(points) for M in model_on(model, region, float))
+    flow, state = np.concatenate([A, B], axis=2), of_state(A, B)
+    seen = np.concatenate([C, D], axis=2)
+    value, slopes = _spline(shape, region, points)
+    still = value[:, :, None, None] * flow[:, None]
+    drifts = [
+        sum(
+            (
+                (rate if tie is None else points[:, tie, None]) * demand.time * slope
+                for rate, tie, slope in zip(drift.rates, drift.ties, slopes, strict=True)
+                if rate or tie is not None
+            ),
+            np.zeros_like(value),
+        )
+        for drift in demand.motion.drifts(demand.moving(shape.degrees))
+    ]
+    varying = np.concatenate([still + 0.5 * d[:, :, None, None] * state for d in drifts])
+    constant = np.tile(np.swapaxes(seen, 1, 2) @ seen, (len(drifts), 1, 1))
+    blocks = LyapunovBlocks(
+        coefficients_of(shape, region.segment).ravel(),
+        state[None],
+        varying[:, :, None],
+        constant,
+    )
+    return blocks.congruent(extended(weight, B.shape[2]))
+
+
+def _spline(shape: Shape, region: Region, points: Array) -> tuple[Array, list[Array]]:
+    """Weights (K, k) of the coefficients of a segment in P at the points, and in each of its
+    derivatives.
+    """
+    each, slopes = [], []
+    for i, (knots, d) in enumerate(zip(shape.knots, shape.degrees, strict=True)):
+        low, high = knots[region.segment[i]], knots[region.segment[i] + 1]
+        t = (points[:, i] - low) / (high - low)
+        each.append(np.stack([blossom([s] * d) for s in t]))
+        lower = np.stack([blossom([s] * max(d - 1, 0)) for s in t]) * d / (high - low)
+        nothing = np.zeros((len(t), 1))
+        slopes.append(
+            np.hstack([nothing, lower]) - np.hstack([lower, nothing]) if d else 0.0 * each[-1]
+        )
+    return _product(each), [
+        _product([slopes[j] if j == i else each[j] for j in range(len(each))])
+        for i in range(len(each))
+    ]
+
+
+def _product(factors: Sequence[Array]) -> Array:
+    """Products of the entries of every row, the last factor's fastest."""
+    out = factors[0]
+    for factor in factors[1:]:
+        out = (out[:, :, None] * factor[:, None, :]).reshape(len(out), -1)
+    return out
