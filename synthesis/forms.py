@@ -129,6 +129,9 @@ class Spline(_InP):
         super().__post_init__()
         if self.total_degree is not None and not self.total_degree >= 0:
             raise InputError(f"total_degree must be >= 0 or None, got {self.total_degree!r}")
+        counts = [np.ravel(k) for k in self.segments or (1,)]
+        if self.total_degree is not None and np.any(np.concatenate(counts) != 1):
+            raise InputError("a total degree of P needs one segment in each parameter")
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ def apart(gamma: float, lower: float, rounding: float, answer: Answer) -> tuple[
         return (
             f"{head}, and of the model frozen at mid-range the same program does not find the gain"
             " either: rounding limits the bound; drop states that are far faster or slower than"
-            " what matters, or take solver='LYAPUNOV'",
+            " what matters",
         )
     told = f"{head}; of the model frozen at mid-range the same program finds the gain"
     if answer is not Answer.SOLVED:

@@ -47,8 +47,10 @@ from synthesis.worst.rates import asked as limits
 Array = np.ndarray
 
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
-FAR_ABOVE = 1.01
-"""A gamma this many times the least one, with the back-off that was asked for, is said to be."""
+FAR_ABOVE = 1.05
+"""A gamma this many times the least one is said to be, one of a larger back-off that was asked for
+in proportion.
+"""
 
 
 def output_feedback(
@@ -232,7 +234,7 @@ def _limited(start: Start, made: Controller, asked: float, fastest: float) -> tu
             f"the bound {start.existence.largest:g} on X and Y decides gamma: some measurement is"
             " almost free of noise or some control almost free of cost; give it more"
         )
-    if made.gamma > FAR_ABOVE * asked * start.gamma:
+    if made.gamma > FAR_ABOVE * max(1.0, asked / BACK_OFF[0]) * start.gamma:
         out.append(
             f"gamma is {made.gamma / start.gamma:.2f} times the least one of the inequalities: no"
             " nearer controller had gains that are smooth in the scheduling parameters"

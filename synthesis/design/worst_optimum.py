@@ -20,7 +20,7 @@ def worst_optimum(plant: Plant) -> float:
     """The largest optimum of H-infinity output feedback over models of the range, to a part in a
     thousand; 0 where the Riccati equations of none have a solution.
 
-    Without the part of a plant that is uncertain. Of some p only: never too high but for rounding.
+    Without the part of a plant that is uncertain, and of some p only.
     """
     p = lobatto_points(POINTS.get(len(plant.parameters), 3), plant.nominal.box)
     least = 0.0

@@ -291,9 +291,11 @@ def balance(A: Array, B: Array, C: Array) -> Array:
 
 def _channel(gain: float, response: float) -> float:
     """The gain expected; where that is nothing beside the `response` of the states to inputs and
-    outputs, a gain to begin with.
+    outputs, a gain to begin with, as small as that fraction where there is no response.
     """
-    return gain if math.isfinite(gain) and gain > NOTHING * response else START * response
+    if math.isfinite(gain) and gain > NOTHING * response:
+        return gain
+    return START * response or NOTHING
 
 
 def _size(M: Array) -> float:
