@@ -129,8 +129,8 @@ class Spline(_InP):
         super().__post_init__()
         if self.total_degree is not None and not self.total_degree >= 0:
             raise InputError(f"total_degree must be >= 0 or None, got {self.total_degree!r}")
-        counts = [np.ravel(k) for k in self.segments or (1,)]
-        if self.total_degree is not None and np.any(np.concatenate(counts) != 1):
+        counts: Any = (1,) if self.segments is None else self.segments
+        if self.total_degree is not None and any(np.any(np.ravel(k) != 1) for k in counts):
             raise InputError("a total degree of P needs one segment in each parameter")
 
 

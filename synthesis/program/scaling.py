@@ -199,7 +199,9 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     # state by state, so that their units play no part
     alone = _gramian(A, B, continuous), _gramian(A.T, C.T, continuous)
     heard = np.sqrt(np.maximum(np.diag(alone[0]) * np.diag(alone[1]), 0.0))
-    channel = _channel(gain, float(heard.sum()))
+    # where no state is both reached and seen, what may be neither
+    silent = float(np.sqrt(np.trace(alone[0]) * np.trace(alone[1])))
+    channel = _channel(gain, float(heard.sum()) or silent)
     size_B, size_C = (
         np.linalg.norm(weight @ linalg.solve(root, B)),
         np.linalg.norm(C @ root @ weight) / channel,
