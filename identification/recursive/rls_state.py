@@ -164,8 +164,7 @@ class RLSState:
             n, rows = layout.n, self.configuration.structure.regressors(layout.group)
             inverse = solve_triangular(factor[:n, :n], np.eye(n))
             deviation = np.outer(np.linalg.norm(inverse, axis=1), size[layout.group.outputs])
-            where = np.ix_(np.asarray(rows, dtype=int), np.asarray(layout.group.outputs, dtype=int))
-            off = np.abs(self.theta[where] - solved[where])
+            off = np.abs(self.theta - solved)[rows][:, layout.group.outputs]
             with np.errstate(divide="ignore", invalid="ignore"):
                 away = max(away, float(np.max(np.where(off > 0, off / deviation, 0.0))))
         return away

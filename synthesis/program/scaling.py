@@ -38,6 +38,10 @@ NOTHING = 1e-6
 """A gain below this fraction of the response of the states is what cancellation leaves, and no
 scale of anything.
 """
+ROUNDED = 1e-12
+"""A response below this fraction is rounding: of the product of two Gramians its root, of some
+states.
+"""
 START = 0.1
 """Fraction of that response from which a proof then sets out."""
 FAR = 30.0
@@ -199,9 +203,12 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     # state by state, so that their units play no part
     alone = _gramian(A, B, continuous), _gramian(A.T, C.T, continuous)
     heard = np.sqrt(np.maximum(np.diag(alone[0]) * np.diag(alone[1]), 0.0))
-    # where no state is both reached and seen, what may be neither
-    silent = float(np.sqrt(np.trace(alone[0]) * np.trace(alone[1])))
-    channel = _channel(gain, float(heard.sum()) or silent)
+    # where no state is both reached and seen but for rounding, what hardly is
+    response, silent, hardly = (
+        float(np.sum(heard)),
+        *(np.sqrt(np.trace(c) * np.trace(o)) for c, o in (alone, (Wc, Wo))),
+    )
+    channel = _channel(gain, response if response > ROUNDED * silent else hardly)
     size_B, size_C = (
         np.linalg.norm(weight @ linalg.solve(root, B)),
         np.linalg.norm(C @ root @ weight) / channel,
@@ -293,11 +300,9 @@ def balance(A: Array, B: Array, C: Array) -> Array:
 
 def _channel(gain: float, response: float) -> float:
     """The gain expected; where that is nothing beside the `response` of the states to inputs and
-    outputs, a gain to begin with, as small as that fraction where there is no response.
+    outputs, a gain to begin with.
     """
-    if math.isfinite(gain) and gain > NOTHING * response:
-        return gain
-    return START * response or NOTHING
+    return gain if math.isfinite(gain) and gain > NOTHING * response else START * response
 
 
 def _size(M: Array) -> float:
