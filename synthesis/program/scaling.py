@@ -38,10 +38,8 @@ NOTHING = 1e-6
 """A gain below this fraction of the response of the states is what cancellation leaves, and no
 scale of anything.
 """
-ROUNDED = 1e-12
-"""A response below this fraction is rounding: of the product of two Gramians its root, of some
-states.
-"""
+ROUNDED = 1e-7
+"""A response below this fraction is rounding: the root of that of a Gramian."""
 START = 0.1
 """Fraction of that response from which a proof then sets out."""
 FAR = 30.0
@@ -201,7 +199,7 @@ def model_scaling(model: LinearModel, gain: float, elsewhere: Matrices | None = 
     root = linalg.inv(linalg.cholesky(X))
     weight = powered(root.T @ symmetrized(Q) @ root * (time if continuous else 1.0), -0.5)
     # state by state, so that their units play no part
-    alone = _gramian(A, B, continuous), _gramian(A.T, C.T, continuous)
+    alone = _gramian(A, B, continuous, 0.0), _gramian(A.T, C.T, continuous, 0.0)
     heard = np.sqrt(np.maximum(np.diag(alone[0]) * np.diag(alone[1]), 0.0))
     # where no state is both reached and seen but for rounding, what hardly is
     response, silent, hardly = (
@@ -326,11 +324,12 @@ def _stabilised(A: Array, poles: Any, continuous: bool) -> Array:
     return A / max(1.0, float(np.abs(poles).max()) * (1 + 1e-6))
 
 
-def _gramian(A: Array, B: Array, continuous: bool) -> Array:
+def _gramian(A: Array, B: Array, continuous: bool, least: float = 1e-12) -> Array:
+    """With no eigenvalue below the fraction `least` of the largest."""
     X = (
         linalg.solve_continuous_lyapunov(A, -B @ B.T)
         if continuous
         else linalg.solve_discrete_lyapunov(A, B @ B.T)
     )
     values, vectors = linalg.eigh(symmetrized(X))
-    return (vectors * np.maximum(values, 1e-12 * abs(values[-1]))) @ vectors.T
+    return (vectors * np.maximum(values, least * abs(values[-1]))) @ vectors.T
