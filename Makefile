@@ -54,6 +54,8 @@ bench: $(STAMP)
 	$(BIN)/python benchmarks/analysis.py --write
 	$(BIN)/python benchmarks/closed_loop_certificates.py --write
 	$(BIN)/python benchmarks/synthesis.py --write
+	$(BIN)/python benchmarks/designs_near_optimum.py --write
+	$(BIN)/python benchmarks/gains_of_loops.py --write
 	$(BIN)/python benchmarks/controller_step.py --write
 	$(BIN)/python benchmarks/campaigns.py --write
 

@@ -29,6 +29,8 @@ from symheli.errors import SymheliError  # noqa: E402
 from symheli.progress import tracked  # noqa: E402
 from synthesis import output_feedback  # noqa: E402
 
+PLANTS, PROOFS = 40, 10
+"""Seeds, and those of them whose loops are proven."""
 WITHIN, SETTLED, PROVEN = 1.02, 1.05, 1.05
 """Goals: least gamma by the worst frozen optimum, promise by least gamma, proof by promise."""
 
@@ -66,7 +68,7 @@ def row(found: np.ndarray, goal: float) -> tuple[str, ...]:
 
 def main() -> None:
     options = arguments(__doc__, write=True)
-    count, proofs = (4, 2) if options.quick else (200, 20)
+    count, proofs = (1, 1) if options.quick else (PLANTS, PROOFS)
     rows, ratios = [], []
     for moving in (False, True):
         name = "a thousandth of its range per time constant" if moving else "0"

@@ -24,6 +24,8 @@ UNITS = 3.0
 """States come in units of up to so many decades either way, time too."""
 SEEN = 101
 """Values of p at which the plant must have a frozen optimum."""
+FINER = 41
+"""More of them beside the worst of these."""
 LARGEST = 1e3
 """Of the frozen optima: beyond it a plant is so nearly out of control that digits are not left."""
 
@@ -43,9 +45,12 @@ def random_plant(seed: int) -> Drawn:
     rng = np.random.default_rng(seed)
     while True:
         plant, slow, zero = _drawn(rng, seed)
-        found = frozen_optima(plant, np.sort([*np.linspace(*RANGE, SEEN), zero]))
+        p = np.sort([*np.linspace(*RANGE, SEEN), zero])
+        found = frozen_optima(plant, p)
         if 0 < min(found) and max(found) < LARGEST:
-            return Drawn(plant, max(found), slow)
+            k = int(np.argmax(found))
+            near = np.linspace(p[max(k - 1, 0)], p[min(k + 1, len(p) - 1)], FINER)
+            return Drawn(plant, max(*found, *frozen_optima(plant, near)), slow)
 
 
 def _drawn(rng: np.random.Generator, seed: int) -> tuple[Plant, float, float]:
