@@ -56,7 +56,8 @@ def _lyapunov(A: Array, dt: float | None) -> Array | None:
     """The square root of P > 0, for which all states decay at a part of the rate of the slowest
     mode; None where A is not stable.
     """
-    _, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
+    with np.errstate(invalid="ignore"):  # of the permutation, which is not used
+        _, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
     balanced = A * units / units[:, None]
     poles = np.linalg.eigvals(balanced)
     one = np.eye(len(A))

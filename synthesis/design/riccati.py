@@ -50,7 +50,8 @@ def stabilising(A: Array, R: Array, Q: Array) -> Array | None:
         return None
     size = np.abs(H)
     np.fill_diagonal(size, 0.0)
-    _, (factors, _) = linalg.matrix_balance(size, permute=False, separate=True)
+    with np.errstate(invalid="ignore"):  # of the permutation, which is not used
+        _, (factors, _) = linalg.matrix_balance(size, permute=False, separate=True)
     exponents = np.log2(factors)
     units = 2.0 ** np.round(0.5 * (exponents[:n] - exponents[n:]))
     scale = np.concatenate([units, 1 / units])
