@@ -23,7 +23,7 @@ one_thread()
 import numpy as np  # noqa: E402
 
 from benchmarks.race import Ratio, present, table  # noqa: E402
-from benchmarks.random_plants import random_plant  # noqa: E402
+from benchmarks.random_plants import Drawn, random_plant  # noqa: E402
 from benchmarks.timing import arguments  # noqa: E402
 from symheli.errors import SymheliError  # noqa: E402
 from symheli.progress import tracked  # noqa: E402
@@ -44,9 +44,8 @@ class Measured(NamedTuple):
     seconds: float
 
 
-def measured(seed: int, moving: bool, prove: bool) -> Measured:
-    """Of the plant of this seed."""
-    drawn = random_plant(seed)
+def measured(drawn: Drawn, moving: bool, prove: bool) -> Measured:
+    """Of this plant."""
     rate = drawn.slow if moving else 0.0
     begin = time.perf_counter()
     try:
@@ -70,10 +69,11 @@ def main() -> None:
     options = arguments(__doc__, write=True)
     count, proofs = (1, 1) if options.quick else (PLANTS, PROOFS)
     rows, ratios = [], []
+    drawn = [random_plant(seed) for seed in tracked("drawing plants", range(count))]
     for moving in (False, True):
         name = "a thousandth of its range per time constant" if moving else "0"
-        seeds = tracked(f"plants, rate {name}", range(count))
-        every = [measured(seed, moving, seed < proofs) for seed in seeds]
+        plants = tracked(f"plants, rate {name}", drawn)
+        every = [measured(each, moving, k < proofs) for k, each in enumerate(plants)]
         least, settled, proven, seconds = map(np.array, zip(*every, strict=True))
         for what, found, goal in (
             ("least gamma by worst frozen optimum", least, WITHIN),

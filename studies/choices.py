@@ -7,6 +7,8 @@ from __future__ import annotations
 import difflib
 import json
 import math
+import os
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, field, fields, is_dataclass
 from pathlib import Path
@@ -15,6 +17,11 @@ from typing import Any, get_args, get_origin, get_type_hints
 from symheli.errors import InputError
 
 Table = Mapping[str, Any]
+
+WIDTH = 100
+"""Of the lines of a file that is written, where it can be."""
+FILES = ("vehicle", "model")
+"""Fields that may name a file."""
 
 
 def about(said: str, least: float | None = None, empty: bool = False) -> dict[str, Any]:
@@ -72,9 +79,56 @@ def toml(value: Any) -> str:
     return str(value)
 
 
+def entries(path: Path, verb: str, out: Path | None = None) -> dict[str, Any]:
+    """What a file of choices for this verb of the command line says. A folder `out`, by default
+    this one, and files that are there are beside it.
+
+    Raises `InputError` for a file that is not there, or no TOML.
+    """
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(
+            f"{path} is not there; symheli {verb} --write-config {path} writes one with the"
+            " defaults"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is no TOML file: {error}") from error
+    if out is not None:
+        found.setdefault("out", str(out))
+    for name in ("out", *FILES):
+        said = found.get(name)
+        if isinstance(said, str) and (name == "out" or (path.parent / said).is_file()):
+            found[name] = str(path.parent / said)
+    return found
+
+
+def beside(thing: Any, name: str, folder: Path) -> Any:
+    """The value of a field as a file in this folder has it: paths relative to it where they can
+    be.
+    """
+    value = getattr(thing, name)
+    if name != "out" and not (name in FILES and value and Path(value).is_file()):
+        return value
+    try:
+        return os.path.relpath(value, folder).replace(os.sep, "/")
+    except ValueError:  # another drive
+        return str(Path(value).absolute())
+
+
 def sentence(kind: type, name: str) -> str:
     """What is said about a field."""
     return next((f.metadata.get("said", "") for f in fields(kind) if f.name == name), "")
+
+
+def commented(entry: str, said: str) -> tuple[str, ...]:
+    """Lines of an entry of a file with a sentence about it, if any: beside it where there is room,
+    else before it.
+    """
+    if not said:
+        return (entry,)
+    beside_it = f"{entry}  # {said}"
+    return (beside_it,) if len(beside_it) <= WIDTH else (f"# {said}:", entry)
 
 
 def default(kind: type, name: str) -> Any:

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from studies.output import Output
 from symheli.airframe.printed_forms import PRINTED
 from symheli.errors import InputError
+from symheli.values.whole_files import write_text
 
 if TYPE_CHECKING:
     from symheli import Helicopter
     from symheli.steady.equilibrium import TrimPoint
+
+STANDARD_OUTPUT = "-"
+"""Where choices are written to without a file."""
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -42,6 +48,28 @@ def vehicle(parser: argparse.ArgumentParser, governor: str = "ideal") -> None:
             " docs/model.md has the reasons)"
         ),
     )
+
+
+def write_config(parser: Any, said: str) -> None:
+    """--write-config of a verb that takes a file of choices, or of a group of its options."""
+    parser.add_argument(
+        "--write-config", nargs="?", const=STANDARD_OUTPUT, metavar="FILE", help=said
+    )
+
+
+def choices_written(text: Callable[[Path], str], target: str) -> Output:
+    """The choices, whose `text` is that of a file in a folder, to a new file or to standard output.
+
+    Raises `InputError` for a file that is there.
+    """
+    if target == STANDARD_OUTPUT:
+        told = text(Path())
+        return Output(told.rstrip("\n"), {"configuration": told})
+    path = Path(target)
+    if path.exists():
+        raise InputError(f"{path} is there; give another name, or remove it")
+    write_text(path, text(path.parent))
+    return Output(f"wrote {path}", {"written": path})
 
 
 def condition(parser: argparse.ArgumentParser) -> None:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 HELP = "the main job: model, identification, guarantees, report"
 OVERRIDE = ("vehicle", "seed", "out", "quick")
 """Options that win over the file."""
-STANDARD_OUTPUT = "-"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -67,12 +66,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     which.add_argument(
         "--list-stages", action="store_true", help="name, need and state of every stage; run none"
     )
-    which.add_argument(
-        "--write-config",
-        nargs="?",
-        const=STANDARD_OUTPUT,
-        metavar="FILE",
-        help="write a configuration with the defaults (default: to standard output); run nothing",
+    options.write_config(
+        which,
+        "write a configuration with the defaults (default: to standard output); run nothing",
     )
     parser.set_defaults(kept=_kept)
 
@@ -81,7 +77,7 @@ def run(arguments: argparse.Namespace) -> Output:
     """Run the study; it shows its own progress and writes into the folder."""
     configuration = _asked(arguments)
     if arguments.write_config is not None:
-        return _written(configuration, arguments.write_config)
+        return options.choices_written(configuration.text, arguments.write_config)
     if arguments.list_stages:
         return _listed(configuration)
     from studies.transition.study import run_study
@@ -105,20 +101,6 @@ def _kept(arguments: argparse.Namespace) -> str:
     if arguments.write_config is not None or arguments.list_stages:
         return "nothing was written, files that were there are unchanged"
     return f"what was finished is in {_asked(arguments).out}; --resume goes on from there"
-
-
-def _written(configuration: Configuration, target: str) -> Output:
-    from symheli.errors import InputError
-    from symheli.values.whole_files import write_text
-
-    if target == STANDARD_OUTPUT:
-        text = configuration.text(Path())
-        return Output(text.rstrip("\n"), {"configuration": text})
-    path = Path(target)
-    if path.exists():
-        raise InputError(f"{path} is there; give another name, or remove it")
-    write_text(path, configuration.text(path.parent))
-    return Output(f"wrote {path}", {"written": path})
 
 
 def _listed(configuration: Configuration) -> Output:

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from studies.commands import options
 from studies.output import Output
 from symheli.errors import InputError
 
@@ -18,7 +19,6 @@ HELP = (
 )
 OVERRIDE = ("vehicle", "model", "out")
 """Options that win over the file."""
-STANDARD_OUTPUT = "-"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -47,12 +47,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder of table, certificate, numbers and page (default: controller)",
     )
-    parser.add_argument(
-        "--write-config",
-        nargs="?",
-        const=STANDARD_OUTPUT,
-        metavar="FILE",
-        help="write the choices with their defaults (default: to standard output); run nothing",
+    options.write_config(
+        parser,
+        "write the choices with their defaults (default: to standard output); run nothing",
     )
 
 
@@ -63,7 +60,7 @@ def run(arguments: argparse.Namespace) -> Output:
     given = {name: getattr(arguments, name) for name in OVERRIDE}
     asked = Asked.read(arguments.file, {k: v for k, v in given.items() if v is not None})
     if arguments.write_config is not None:
-        return _configuration(asked, arguments.write_config)
+        return options.choices_written(asked.text, arguments.write_config)
     from studies.controllers import synthesized_report as report
     from studies.controllers.synthesized import synthesized
 
@@ -85,15 +82,3 @@ def _given(asked: Asked):
     if isinstance(given, LinearGrid):
         raise InputError(f"{asked.model}: expected a model over airspeed, got one over more")
     return given
-
-
-def _configuration(asked: Asked, target: str) -> Output:
-    from symheli.values.whole_files import write_text
-
-    if target == STANDARD_OUTPUT:
-        return Output(asked.text().rstrip("\n"), {"configuration": asked.text()})
-    path = Path(target)
-    if path.exists():
-        raise InputError(f"{path} is there; give another name, or remove it")
-    write_text(path, asked.text())
-    return Output(f"wrote {path}", {"written": path})

@@ -4,13 +4,22 @@ of the study.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from studies.choices import about, check, checked, choice, sentence, toml
+from studies.choices import (
+    about,
+    beside,
+    check,
+    checked,
+    choice,
+    commented,
+    entries,
+    sentence,
+    toml,
+)
 from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
@@ -65,8 +74,6 @@ SERVO_RATE = 3.0
 
 NOISE_SHARE = 1 / 3
 """Of the noise that counts as 1, the standard deviation that is flown."""
-
-WIDTH = 100
 
 
 def _numbers(servo: Servo) -> tuple[float, ...]:
@@ -162,9 +169,9 @@ class Asked:
 
         Raises `InputError` for a file that cannot be read, or with everything that is wrong in it.
         """
-        entries = {} if path is None else _entries(path)
+        said = {} if path is None else entries(path, "synthesize")
         complaints: list[str] = []
-        found = checked(cls, {**entries, **options}, complaints)
+        found = checked(cls, {**said, **options}, complaints)
         if complaints:
             raise InputError(f"{path or 'options'}: {'; '.join(complaints)}")
         try:
@@ -174,13 +181,13 @@ class Asked:
 
     def write(self, path: Path) -> Path:
         """Write everything that was asked for, defaults too."""
-        return write_text(path, self.text())
+        return write_text(path, self.text(path.parent))
 
-    def text(self) -> str:
-        """The choices as a TOML file with a sentence on each."""
-        return "\n".join(self._lines()) + "\n"
+    def text(self, folder: Path) -> str:
+        """The choices as a TOML file in this folder, with a sentence on each."""
+        return "\n".join(self._lines(folder)) + "\n"
 
-    def _lines(self) -> Iterator[str]:
+    def _lines(self, folder: Path) -> Iterator[str]:
         yield "# symheli synthesize FILE designs, certifies and flies what this file asks for."
         yield "# Paths are relative to this file; options of the command line win. SI and radians."
         yield ""
@@ -188,14 +195,10 @@ class Asked:
         for f in fields(self):
             if f.name in tables:
                 continue
-            value = getattr(self, f.name)
+            value = beside(self, f.name, folder)
             mark = "# " if f.name == "model" and not value else ""
             entry = f"{mark}{f.name} = {toml(value or 'model.json' if mark else value)}"
-            said = sentence(type(self), f.name)
-            if len(entry) + len(said) + 4 <= WIDTH:
-                yield f"{entry}  # {said}"
-            else:
-                yield from (f"# {said}:", entry)
+            yield from commented(entry, sentence(type(self), f.name))
         for name in tables:
             yield ""
             yield f"[{name}]  # {sentence(type(self), name)}"
@@ -227,20 +230,3 @@ class Asked:
 
 
 _OF_A_SERVO = ("natural_frequency", "damping", "zero", "pole")
-
-
-def _entries(path: Path) -> dict[str, Any]:
-    try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(
-            f"{path} is not there; symheli synthesize --write-config {path} writes one with the"
-            " defaults"
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is no TOML file: {error}") from error
-    for name in ("out", "vehicle", "model"):
-        said = found.get(name)
-        if isinstance(said, str) and (name == "out" or (path.parent / said).is_file()):
-            found[name] = str(path.parent / said)
-    return found

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.output import plain
+from studies.report.pages import FOLDER, environment
 from symheli.values.drawing import BLUE, GREY, ORANGE
 from symheli.values.whole_files import write_text
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from studies.controllers.synthesized import Synthesized
 
-FOLDER = Path(__file__).parents[1] / "report"
 TABLE, CERTIFICATE, CHOICES, PAGE, NUMBERS = (
     *("controller.json", "certificate.json", "synthesize.toml", "report.html", "numbers.json"),
 )
@@ -175,26 +175,19 @@ def data(found: Synthesized) -> dict[str, Any]:
 
 def page(found: Synthesized) -> str:
     """The report as HTML."""
-    import jinja2
     from markupsafe import Markup
 
     from studies.report.drawn import drawn
     from symheli import Helicopter, __version__
 
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(FOLDER),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
+    templates = environment()
     a = found.asked
     pictures = []
     if found.flights:
         caption = FLIGHT.format(n=len(found.flights))
         pictures = drawn([("flights", caption, "", flights(found))], a.out / "figures")
     name = Helicopter.load(a.vehicle).vehicle.title if a.vehicle else a.model
-    text = environment.get_template("controller.html.j2").render(
+    text = templates.get_template("controller.html.j2").render(
         style=Markup((FOLDER / "page.css").read_text(encoding="utf-8")),
         title=f"A controller for {name}",
         date=datetime.date.today().isoformat(),
@@ -205,7 +198,7 @@ def page(found: Synthesized) -> str:
         hypotheses=found.flown.certificate.hypotheses,
         files=FILES,
         pictures=pictures,
-        choices=a.text(),
+        choices=a.text(a.out),
         seconds=found.seconds,
     )
     return text.replace("m/s^2", "m/s²")

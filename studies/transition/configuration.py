@@ -4,21 +4,29 @@ complaint at once, kept beside the results.
 
 from __future__ import annotations
 
-import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from studies.choices import about, check, checked, choice, default, sentence, toml
+from studies.choices import (
+    about,
+    beside,
+    check,
+    checked,
+    choice,
+    commented,
+    default,
+    entries,
+    sentence,
+    toml,
+)
 from studies.transition.effort import Effort
 from symheli.errors import InputError
 from symheli.values.whole_files import write_text
 
 KEPT = "study.toml"
 """In the folder of a run: what it was asked for."""
-WIDTH = 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +65,9 @@ class Configuration:
         Paths of the file are relative to it. Raises `InputError` for a file that cannot be read, or
         with everything that is wrong in it.
         """
-        entries = {} if path is None else _entries(path)
-        return cls.of({**entries, **options}, str(path or "options"))
+        usual = default(cls, "out")
+        said = {} if path is None else entries(path, "study", usual)
+        return cls.of({**said, **options}, str(path or "options"))
 
     def write(self, path: Path) -> Path:
         """Write everything that was asked for, defaults too."""
@@ -72,12 +81,8 @@ class Configuration:
         yield "# symheli study FILE runs what this file asks for; options of the command line win."
         yield "# Paths are relative to this file."
         yield ""
-        vehicle = Path(self.vehicle)
-        paths = {"out": _beside(self.out, folder)}
-        if vehicle.is_file():
-            paths["vehicle"] = _beside(vehicle, folder)
         for name in ("vehicle", "seed", "out", "quick"):
-            value = paths.get(name, getattr(self, name))
+            value = beside(self, name, folder)
             yield f"{name} = {toml(value)}  # {sentence(Configuration, name)}"
         yield ""
         yield "[effort]"
@@ -100,23 +105,6 @@ def _effort(quick: bool, changes: Any, complaints: list[str]) -> Effort:
     return base if complaints else replace(base, **changes)
 
 
-def _entries(path: Path) -> dict[str, Any]:
-    try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(
-            f"{path} is not there; symheli study --write-config {path} writes one with the defaults"
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is no TOML file: {error}") from error
-    if isinstance(out := found.get("out", str(default(Configuration, "out"))), str):
-        found["out"] = str(path.parent / out)
-    vehicle = found.get("vehicle")
-    if isinstance(vehicle, str) and (path.parent / vehicle).is_file():
-        found["vehicle"] = str(path.parent / vehicle)
-    return found
-
-
 def _entries_of(thing: Any, table: str, mark: str) -> Iterator[str]:
     """Lines of a table, those of the tables in it last."""
     inner = []
@@ -126,21 +114,8 @@ def _entries_of(thing: Any, table: str, mark: str) -> Iterator[str]:
             inner.append((f.name, value))
         elif value is not None:
             entry, said = f"{mark}{f.name} = {toml(value)}", sentence(type(thing), f.name)
-            if not said:
-                yield entry
-            elif len(entry) + len(said) + 4 <= WIDTH:
-                yield f"{entry}  # {said}"
-            else:
-                yield from (f"# {said}:", entry)
+            yield from commented(entry, said)
     for name, value in inner:
         said = sentence(type(thing), name)
         yield from ("", f"{mark}[{table}.{name}]  # {said}")
         yield from _entries_of(value, f"{table}.{name}", mark)
-
-
-def _beside(path: Path, folder: Path) -> str:
-    """Relative to the folder where it can be."""
-    try:
-        return os.path.relpath(path, folder).replace(os.sep, "/")
-    except ValueError:  # another drive
-        return str(path.absolute())

@@ -11,6 +11,7 @@ from studies.controllers import tables as controllers
 from studies.report.drawn import Drawn, drawn
 from studies.report.equations import EQUATIONS
 from studies.report.labels import Labels
+from studies.report.pages import FOLDER, environment
 from studies.report.references import REFERENCES
 from studies.report.shortfalls import shortfalls
 from studies.transition import gain_tables, tables
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from studies.transition.identified import Identification
     from studies.transition.outcome import Outcome
 
-FOLDER = Path(__file__).parents[1] / "report"
 TEMPLATE, STYLE, SCRIPTS = "page.html.j2", "page.css", ("hover.js", "explorer.js", "fit.js")
 ORDER = (
     *("question", "definitions", "vehicle", "baseline", "experiment", "identified", "terms"),
@@ -73,18 +73,11 @@ def write_report(study: Outcome, out: Path) -> Path:
 
 def page(study: Outcome, pictures: dict[str, Drawn], results: dict[str, Any]) -> str:
     """The report as HTML; rendered twice, so that what stands below can be referred to above."""
-    import jinja2
     from markupsafe import Markup
 
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(FOLDER),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters["whole"] = whole
-    template = environment.get_template(TEMPLATE)
+    templates = environment()
+    templates.filters["whole"] = whole
+    template = templates.get_template(TEMPLATE)
     said = {
         "study": study,
         "pictures": pictures,

@@ -15,7 +15,7 @@ from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
 from synthesis.design.back_off import levels_above
-from synthesis.design.coordinates import Coordinates, coordinates_of, depends
+from synthesis.design.coordinates import Coordinates, depends
 from synthesis.design.existence import Existence, Found
 from synthesis.design.fitted import Fitted
 from synthesis.design.frozen_stability import frozen_stability
@@ -130,7 +130,7 @@ def estimator(
     def every(degree: int) -> list[Shape]:
         return [Shape(dependence(X, parameters, "X", matters, degree, still=still), None)]
 
-    start = best(lambda channel: coordinates_of(plant, channel), every, divisions, USUAL, attempts)
+    start = best(plant, every, divisions, USUAL, attempts)
     factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts, _error):
         model, error = _observer(plant, design.coordinates, design.fit)

@@ -13,7 +13,7 @@ from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certificate import Attempt
 from synthesis.design.back_off import levels_above
 from synthesis.design.controller import Controller
-from synthesis.design.coordinates import Coordinates, coordinates_of, depends
+from synthesis.design.coordinates import Coordinates, depends
 from synthesis.design.existence import LARGEST, Existence, Found
 from synthesis.design.frozen_stability import frozen_stability
 from synthesis.design.in_plant_units import in_plant_units, packed
@@ -131,9 +131,9 @@ def output_feedback(
     def every(degree: int) -> list[Shape]:
         return shapes(parameters, X, Y, plant.dt is not None, matters, degree)
 
-    def both(degree: int) -> Shape | None:
+    def both(degree: int) -> list[Shape]:
         free = X is None and Y is None and plant.dt is None
-        return both_moving(parameters, matters, degree) if free else None
+        return both_moving(parameters, matters, degree) if free else []
 
     if isinstance(plant.model, UncertainStateSpace):
         return _robust(plant, every(DEGREES[1][0]), factors, fastest, divisions, attempts)
@@ -149,24 +149,23 @@ def _robust(
     attempts: list[Attempt],
 ) -> Controller:
     """For all models of the set, by the one of the shapes that serves the nominal one best."""
-    gammas = [_start(plant, shape, divisions, attempts).gamma for shape in every]
-    start = min(gammas)
-    best = every[gammas.index(start)]
-    found = scaled_plant(plant, start, lambda p: _start(p, best, divisions, attempts).gamma)
+    starts = [least(plant, shape, divisions, USUAL, attempts) for shape in every]
+    start = min(starts, key=lambda each: each.gamma)
+    found = scaled_plant(
+        plant, start.gamma, lambda p: least(p, start.shape, divisions, USUAL, attempts).gamma
+    )
     if found is None:
         raise failed(plant, attempts)
-    made = _nominal(found, lambda _: [best], lambda _: None, factors, fastest, divisions, attempts)
+    made = _nominal(
+        found, lambda _: [start.shape], lambda _: [], factors, fastest, divisions, attempts
+    )
     return replace(made, plant=plant, method=f"robust {made.method}")
-
-
-def _start(plant: Plant, shape: Shape, divisions: int, attempts: list[Attempt]) -> Start:
-    return least(lambda channel: coordinates_of(plant, channel), shape, divisions, USUAL, attempts)
 
 
 def _nominal(
     plant: Plant,
     every: Callable[[int], Sequence[Shape]],
-    both: Callable[[int], Shape | None],
+    both: Callable[[int], Sequence[Shape]],
     factors: Sequence[float],
     fastest: float,
     divisions: int,
@@ -176,9 +175,7 @@ def _nominal(
     floor = worst_optimum(plant)
     if floor == 0 and (refusal := failed(plant, attempts)).reasons != (NOTHING_WRONG,):
         raise refusal  # no frozen model has a controller, and it is known why
-    start = best(
-        lambda channel: coordinates_of(plant, channel), every, divisions, USUAL, attempts, floor
-    )
+    start = best(plant, every, divisions, USUAL, attempts, floor)
     slowest, notes = None, ()
     for own, design in _designs(plant, start, both, factors, floor, divisions, attempts):
         told = "" if own is start else ", their rates neglected"
@@ -201,7 +198,7 @@ def _nominal(
 def _designs(
     plant: Plant,
     start: Start,
-    both: Callable[[int], Shape | None],
+    both: Callable[[int], Sequence[Shape]],
     factors: Sequence[float],
     floor: float,
     divisions: int,
@@ -210,15 +207,8 @@ def _designs(
     """Where X or Y moving stays above what no controller can beat, first with both moving and a
     controller that is not told how fast, which serves where parameters move slowly.
     """
-    if start.gamma > CLOSE * floor and both(DEGREES[1][0]) is not None:
-        other = best(
-            lambda channel: coordinates_of(plant, channel),
-            lambda degree: [shape for shape in (both(degree),) if shape is not None],
-            divisions,
-            USUAL,
-            attempts,
-            floor,
-        )
+    if start.gamma > CLOSE * floor and both(DEGREES[1][0]):
+        other = best(plant, both, divisions, USUAL, attempts, floor)
         if other.gamma < WORTH * start.gamma:
             for design in settled(other, factors, _recover, USUAL, attempts, neglecting=True):
                 yield other, design

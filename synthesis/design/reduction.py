@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg
@@ -20,7 +21,7 @@ from symheli.errors import InputError, SynthesisError
 from symheli.lpv import LPVStateSpace, Matrices
 from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.design.controller import Controller
-from synthesis.worst.frozen import norm
+from synthesis.worst.frozen import norm, stable
 
 Array = np.ndarray
 
@@ -42,38 +43,7 @@ def reduced(controller: Controller, order: int) -> Controller:
     """
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
         raise InputError(f"order: expected an integer >= 0, got {order!r}")
-    n = controller.order
-    if order >= n:
-        return controller
-    left, right = projection(controller, order)
-    model = controller.model
-    projected = replace(
-        model,
-        A=left @ model.A @ right,
-        B=left @ model.B,
-        C=model.C @ right,
-        states=tuple(f"k{i + 1}" for i in range(order)),  # type: ignore[arg-type]
-        trim=None,
-        residuals=None,
-    )
-    made = replace(
-        controller,
-        model=projected,
-        method=f"{controller.method}, {order} of {n} states kept",
-        gamma=math.nan,
-        optimum=None,
-    )
-    gain = frozen_gain(made)
-    if math.isinf(gain):
-        raise SynthesisError(
-            f"with {order} of {n} states the closed loop is not stable at every frozen p: keep"
-            " more, or reduce(loss=0.03) finds the least order"
-        )
-    note = (
-        f"the largest gain of the loop at frozen p is {gain:.6g}, {frozen_gain(controller):.6g} of"
-        f" all {n} states"
-    )
-    return replace(made, notes=(note,))
+    return controller if order >= controller.order else _Whole(controller).kept(order)
 
 
 def within(controller: Controller, loss: float) -> Controller:
@@ -102,9 +72,10 @@ def fewest(
     """The reduced controller of the first of the `orders` (None: every one, from 0 on) with gain at
     most `limit`; the controller itself where there is none.
     """
+    whole = _Whole(controller)
     for order in range(controller.order) if orders is None else orders:
         try:
-            fewer = reduced(controller, order)
+            fewer = whole.kept(order)
         except SynthesisError:
             continue
         if gain(fewer) <= limit:
@@ -112,20 +83,67 @@ def fewest(
     return controller
 
 
+class _Whole:
+    """A controller of all states, whose Gramians and gain serve every order."""
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller = controller
+
+    @cached_property
+    def directions(self) -> tuple[Array, Array]:
+        """(left (n, n), right (n, n)) of the states in falling order of what the loop sees of them;
+        the first rows and columns project on fewer.
+        """
+        P, Q = gramians(self.controller)
+        L, R = _root(P), _root(Q)
+        U, s, Vt = np.linalg.svd(R.T @ L)
+        size = np.sqrt(np.maximum(s, 1e-300))
+        return (U / size).T @ R.T, L @ Vt.T / size
+
+    @cached_property
+    def gain(self) -> float:
+        """Frozen gain of its loop."""
+        return frozen_gain(self.controller)
+
+    def kept(self, order: int) -> Controller:
+        """With `order` states; raises `SynthesisError` where the loop is not stable."""
+        controller, n = self.controller, self.controller.order
+        left, right = self.directions[0][:order], self.directions[1][:, :order]
+        model = controller.model
+        projected = replace(
+            model,
+            A=left @ model.A @ right,
+            B=left @ model.B,
+            C=model.C @ right,
+            states=tuple(f"k{i + 1}" for i in range(order)),  # type: ignore[arg-type]
+            trim=None,
+            residuals=None,
+        )
+        made = replace(
+            controller,
+            model=projected,
+            method=f"{controller.method}, {order} of {n} states kept",
+            gamma=math.nan,
+            optimum=None,
+        )
+        gain = frozen_gain(made)
+        if math.isinf(gain):
+            raise SynthesisError(
+                f"with {order} of {n} states the closed loop is not stable at every frozen p: keep"
+                " more, or reduce(loss=0.03) finds the least order"
+            )
+        note = (
+            f"the largest gain of the loop at frozen p is {gain:.6g}, {self.gain:.6g} of all {n}"
+            " states"
+        )
+        return replace(made, notes=(note,))
+
+
 def frozen_gain(controller: Controller) -> float:
     """Largest H-infinity norm of the loop at some frozen p, inf where one is not stable."""
     loop: LPVStateSpace = controller.closed()
     every = zip(*loop.matrices(_conditions(loop)), strict=True)
     return max(norm(*each, loop.dt)[0] for each in every)
-
-
-def projection(controller: Controller, order: int) -> tuple[Array, Array]:
-    """(left (order, n), right (n, order)), left right = I."""
-    P, Q = gramians(controller)
-    L, R = _root(P), _root(Q)
-    U, s, Vt = np.linalg.svd(R.T @ L)
-    kept = np.sqrt(np.maximum(s[:order], 1e-300))
-    return (U[:, :order] / kept).T @ R.T, L @ Vt[:order].T / kept
 
 
 def gramians(controller: Controller) -> tuple[Array, Array]:
@@ -145,7 +163,7 @@ def gramians(controller: Controller) -> tuple[Array, Array]:
 
 def _gramians(loop: Matrices, dt: float | None) -> tuple[Array, Array]:
     A, B, C, _ = loop
-    if _unstable(A, dt):
+    if not stable(np.linalg.eigvals(A), dt):
         raise SynthesisError(NOT_STABLE)
     solve = linalg.solve_continuous_lyapunov if dt is None else linalg.solve_discrete_lyapunov
     sign = -1.0 if dt is None else 1.0
@@ -154,11 +172,6 @@ def _gramians(loop: Matrices, dt: float | None) -> tuple[Array, Array]:
 
 def _conditions(loop: LPVStateSpace) -> Array:
     return lobatto_points(NODES.get(len(loop.parameters), 4), loop.box)
-
-
-def _unstable(A: Array, dt: float | None) -> bool:
-    poles = np.linalg.eigvals(A)
-    return bool(np.any(poles.real >= 0 if dt is None else np.abs(poles) >= 1))
 
 
 def _root(M: Array) -> Array:

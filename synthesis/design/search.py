@@ -8,7 +8,7 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,13 +18,16 @@ from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import polynomials
 from symheli.progress import tracked
 from synthesis.certificate import Attempt
-from synthesis.design.coordinates import Coordinates
+from synthesis.design.coordinates import Coordinates, coordinates_of
 from synthesis.design.existence import LARGEST, Existence, Found
 from synthesis.design.fitted import Fitted, fits
 from synthesis.design.motions import used
 from synthesis.design.neglected_rate import level_kept
 from synthesis.program.cone_program import Solver
 from synthesis.worst.frozen import below
+
+if TYPE_CHECKING:
+    from synthesis.design.plant import Plant
 
 Array = np.ndarray
 
@@ -35,6 +38,7 @@ BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
 """Multiples of the least gamma at which X and Y are settled, tried in turn."""
 SLACK = 1e-6
 """By which the frozen gain of a controller may exceed what was promised: rounding."""
+UNKEPT = "frozen loops do not keep it"
 FURTHER = 1.05
 """Of the gamma of a controller that is told dp/dt, where it is not told."""
 ROUGH = 0.3
@@ -208,19 +212,21 @@ Recover = Callable[[Coordinates, Existence, Found], Gains]
 
 def both_moving(
     parameters: Sequence[Scheduling], matters: Sequence[bool], degree: int
-) -> Shape | None:
-    """X and Y of this degree in every parameter of a limited rate; None where none moves slowly."""
+) -> list[Shape]:
+    """X and Y of this degree in every parameter of a limited rate; nothing where none moves, or
+    one whose rate is another.
+    """
     rates = [s.rate for s in parameters if not isinstance(s.rate, str)]
     if len(rates) < len(parameters) or not any(0 < rate < math.inf for rate in rates):
-        return None
+        return []
     degrees = tuple(
         degree if m and rate != math.inf else 0 for rate, m in zip(rates, matters, strict=True)
     )
-    return Shape(*(functions(degrees, parameters, name) for name in ("X", "Y")))
+    return [Shape(*(functions(degrees, parameters, name) for name in ("X", "Y")))]
 
 
 def best(
-    coordinates: Callable[[float], Coordinates],
+    plant: Plant,
     every: Callable[[int], Sequence[Shape]],
     divisions: int,
     solver: Solver,
@@ -232,10 +238,10 @@ def best(
     a gamma below `floor`.
     """
     channel = floor if 0 < floor < math.inf else 1.0
-    degrees = DEGREES.get(len(coordinates(1.0).parameters), (2,))
+    degrees = DEGREES.get(len(plant.parameters), (2,))
     starts: list[Start] = []
     for shape in every(degrees[0]):
-        starts.append(least(coordinates, shape, divisions, solver, attempts, channel))
+        starts.append(least(plant, shape, divisions, solver, attempts, channel))
         if starts[-1].gamma <= CLOSE * floor:
             break
     chosen = min(range(len(starts)), key=lambda k: starts[k].gamma)
@@ -248,7 +254,7 @@ def best(
         shape = every(degree)[chosen]
         if start.gamma <= CLOSE * floor or shape.size == start.shape.size:
             break
-        richer = least(coordinates, shape, divisions, solver, attempts, channel)
+        richer = least(plant, shape, divisions, solver, attempts, channel)
         more = worth(richer)
         start = richer if richer.gamma < start.gamma else start
         if not more and math.isfinite(start.gamma):
@@ -256,9 +262,7 @@ def best(
     for largest in LARGEST[1:]:
         if start.gamma <= CLOSE * floor or not start.existence.bounded(start.found):
             break
-        wider = least(
-            coordinates, start.shape, divisions, solver, attempts, start.gamma, largest=largest
-        )
+        wider = least(plant, start.shape, divisions, solver, attempts, start.gamma, largest=largest)
         if not worth(wider):
             break
         start = wider
@@ -266,7 +270,7 @@ def best(
 
 
 def least(
-    coordinates: Callable[[float], Coordinates],
+    plant: Plant,
     shape: Shape,
     divisions: int,
     solver: Solver,
@@ -277,7 +281,7 @@ def least(
 ) -> Start:
     """The least gamma of a shape, in a unit of performance that suits it, at first `channel`."""
     for _ in tracked(f"least gamma, {shape}", range(3)):
-        own = coordinates(channel)
+        own = coordinates_of(plant, channel)
         existence = Existence(own, shape.X, shape.Y, divisions, largest)
         found = existence.least_gamma(solver)
         gamma = channel * found.gamma
@@ -303,29 +307,15 @@ def settled(
     coordinates, existence, lowest, _ = start
     if not math.isfinite(lowest.gamma):
         return
-    points = _judged(existence)
     for factor in tracked("backing off", back_off):
         gamma = factor * lowest.gamma
         for found in tracked(f"at {factor:g} of the least gamma", existence.widest(gamma, solver)):
-            gains = recover(coordinates, existence, found) if np.any(found.coefficients) else None
-            reached, fit, outcome = gamma, None, "frozen loops do not keep it"
-            # X and Y of a solver that stopped short may not be positive
+            design, outcome = None, UNKEPT
+            # X and Y of a solver that stopped short may be nothing, or not positive
             with contextlib.suppress(np.linalg.LinAlgError):
-                if gains is not None and neglecting:
-                    looped = closed(coordinates, gains, points)
-                    reached = level_kept(coordinates, existence, found, looped, points)
-                    reached = max(reached, gamma)
-                if reached > FURTHER * gamma:
-                    outcome = f"{reached / gamma:.3g} times as much as dp/dt is not known"
-                elif gains is not None and kept(
-                    coordinates, gains, loop or closed, points, reached * (1 + SLACK)
-                ):
-                    fit = _fit(coordinates, gains, loop or closed, points, reached)
-                    outcome = "frozen loops keep it, " + (
-                        "no functions of p do"
-                        if fit is None
-                        else f"functions of p within {fit.misfit:.1e}"
-                    )
+                if np.any(found.coefficients):
+                    gains = recover(coordinates, existence, found)
+                    design, outcome = _tried(start, found, gains, loop or closed, neglecting)
             attempts.append(
                 Attempt(
                     f"back-off {factor:g}",
@@ -334,9 +324,29 @@ def settled(
                     gamma * coordinates.channel,
                 )
             )
-            if fit is not None:
-                yield Design(coordinates, existence, found._replace(gamma=reached), fit)
+            if design is not None:
+                yield design
                 break
+
+
+def _tried(
+    start: Start, found: Found, gains: Gains, loop: Loop, neglecting: bool
+) -> tuple[Design | None, str]:
+    """The design of these gains, None where their loop does not keep gamma; and what came of it."""
+    coordinates, existence, *_ = start
+    points, reached = _judged(existence), found.gamma
+    if neglecting:
+        looped = closed(coordinates, gains, points)
+        reached = max(reached, level_kept(coordinates, existence, found, looped, points))
+    if reached > FURTHER * found.gamma:
+        return None, f"{reached / found.gamma:.3g} times as much as dp/dt is not known"
+    if not kept(coordinates, gains, loop, points, reached * (1 + SLACK)):
+        return None, UNKEPT
+    fit = _fit(coordinates, gains, loop, points, reached)
+    if fit is None:
+        return None, "frozen loops keep it, no functions of p do"
+    said = f"frozen loops keep it, functions of p within {fit.misfit:.1e}"
+    return Design(coordinates, existence, found._replace(gamma=reached), fit), said
 
 
 def _fit(

@@ -12,7 +12,7 @@ from synthesis.certificate import Attempt
 from synthesis.design.back_off import levels_above
 from synthesis.design.conditions import conditions
 from synthesis.design.controller import Controller
-from synthesis.design.coordinates import Coordinates, coordinates_of, depends
+from synthesis.design.coordinates import Coordinates, depends
 from synthesis.design.existence import Existence, Found
 from synthesis.design.frozen_stability import frozen_stability
 from synthesis.design.in_plant_units import in_plant_units
@@ -90,7 +90,7 @@ def state_feedback(
     def every(degree: int) -> list[Shape]:
         return [Shape(None, dependence(Y, parameters, "Y", matters, degree))]
 
-    start = best(lambda channel: coordinates_of(plant, channel), every, divisions, USUAL, attempts)
+    start = best(plant, every, divisions, USUAL, attempts)
     factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts):
         method = f"state feedback, {start.shape}"

@@ -18,7 +18,7 @@ from synthesis.polynomial.pieces import Pieces
 from synthesis.program.scaling import balance
 from synthesis.proof.inequalities import Demand
 from synthesis.worst.budget import Budget
-from synthesis.worst.frozen import FrozenGain, norm, to_continuous
+from synthesis.worst.frozen import FrozenGain, norm, stable, to_continuous
 from synthesis.worst.lines import Line, alone, directions, growing_on, shared
 from synthesis.worst.lower_bound import Search, lower_bound
 from synthesis.worst.over_box import grid_of, worst_over
@@ -73,8 +73,7 @@ def energy_to_peak(A: Array, B: Array, C: Array, D: Array, dt: float | None) -> 
 
     inf where the model is not stable. Source: Rotea (1993); discrete time by the same argument.
     """
-    poles = np.linalg.eigvals(A)
-    if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
+    if not stable(np.linalg.eigvals(A), dt):
         return math.inf
     d = balance(np.abs(A), B, C)
     A, B, C = A * d / d[:, None], B / d[:, None], C * d

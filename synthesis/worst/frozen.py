@@ -96,7 +96,7 @@ def norm(
     if len(A) == 0:
         return float(np.linalg.norm(D, 2)), 0.0
     poles = np.linalg.eigvals(A)
-    if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
+    if not stable(poles, dt):
         return math.inf, math.nan
     balanced, (units, _) = linalg.matrix_balance(A, permute=False, separate=True)
     # continuous: time in units in which the fastest pole is about 1
@@ -145,6 +145,13 @@ def norm(
     return math.ldexp(peak.gain, size), omega
 
 
+def stable(poles: Array, dt: float | None) -> Array:
+    """Whether all poles (.., n) are strictly stable: left of the axis, of a sampled model within
+    the unit circle.
+    """
+    return np.all(np.real(poles) < 0 if dt is None else np.abs(poles) < 1, axis=-1)
+
+
 def below(A: Array, B: Array, C: Array, D: Array, level: float, dt: float | None = None) -> bool:
     """Whether every pole is strictly stable and the response below `level` at, and between, the
     frequencies where eigenvalues of the Hamiltonian of that level come near the axis: a quick look
@@ -152,8 +159,7 @@ def below(A: Array, B: Array, C: Array, D: Array, level: float, dt: float | None
     """
     if min(B.shape[1], C.shape[0]) == 0:
         return True
-    poles = np.linalg.eigvals(A)
-    if not np.all(poles.real < 0 if dt is None else np.abs(poles) < 1):
+    if not stable(np.linalg.eigvals(A), dt):
         return False
     if dt is not None:
         A, B, C, D = to_continuous(A, B, C, D)

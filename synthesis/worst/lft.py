@@ -13,7 +13,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv import LFT, Scheduling
 from symheli.lpv.lft import Block
-from synthesis.worst.frozen import FrozenGain, norm
+from synthesis.worst.frozen import FrozenGain, norm, stable
 from synthesis.worst.lines import Line, alone, directions, growing_on, shared
 from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
 from synthesis.worst.over_box import grid_of, worst_over
@@ -78,9 +78,9 @@ def _at_poles(lft: LFT, grid: Array) -> Array:
     M, x = lft.matrix(grid), len(lft.states)
     A, B, C, D = M[:, :x, :x], M[:, :x, x:], M[:, x:, :x], M[:, x:, x:]
     poles = np.linalg.eigvals(A)
-    stable = np.all(poles.real < 0 if lft.dt is None else np.abs(poles) < 1, axis=1)
-    if not stable.all():
-        return np.where(stable, 0.0, math.inf)
+    good = stable(poles, lft.dt)
+    if not good.all():
+        return np.where(good, 0.0, math.inf)
     if min(B.shape[2], C.shape[1]) == 0:
         return np.zeros(len(grid))
     if lft.dt is None:

@@ -74,6 +74,11 @@ def test_what_is_written_with_the_defaults_asks_for_the_defaults(tmp_path):
     assert max(map(len, path.read_text().splitlines())) <= 120
 
 
+def test_the_choices_beside_the_results_name_their_folder_again(tmp_path):
+    asked = Asked(out=tmp_path / "controller")
+    assert Asked.read(asked.write(asked.out / "synthesize.toml"), {}) == asked
+
+
 def test_everything_that_is_wrong_in_the_file_is_said_at_once(tmp_path):
     path = tmp_path / "my.toml"
     path.write_text(
