@@ -34,7 +34,7 @@ Array = np.ndarray
 
 
 LYAPUNOV = "LYAPUNOV"
-"""The method of `interior_point`, which takes programs of Lyapunov inequalities alone."""
+"""What `Solver` takes for the method of `interior_point`, of Lyapunov inequalities alone."""
 
 
 class Answer(Enum):
@@ -53,9 +53,10 @@ class Solver:
     Parameters
     ----------
     name : str
-        As cvxpy spells it; or "LYAPUNOV", this package's own method for a P of many states.
+        As cvxpy spells it; or "LYAPUNOV", this package's own interior-point method for Lyapunov
+        inequalities with a P of many states.
     tolerance : float, optional
-        On residuals and gap, relative: 1e-8; SCS, a first-order method, and LYAPUNOV 1e-5, since
+        On residuals and gap, relative: 1e-8; SCS, a first-order method, and "LYAPUNOV" 1e-5, since
         the gain is recomputed from P afterwards and more digits cost minutes.
     iterations : int, optional
         At most: 200; SCS 20000.
@@ -85,7 +86,7 @@ class Solver:
         if self.name not in (*installed_solvers(), LYAPUNOV):
             raise SolverError(
                 f"solver {self.name!r} is not available; installed here:"
-                f" {', '.join(installed_solvers())}, and {LYAPUNOV}"
+                f" {', '.join(installed_solvers())}, and solver={LYAPUNOV!r}, {_OWN}"
             )
         for setting, usual in _USUAL.items():
             given = getattr(self, setting)
@@ -119,11 +120,15 @@ class Solver:
 
     def __str__(self) -> str:
         limit = "no time limit" if self.time_limit is None else f"{self.time_limit:g} s"
+        called = f"{_OWN}, symheli" if self.name == LYAPUNOV else self.name
         return (
-            f"{self.name} {self.version}, tolerance {self.tolerance:g}, at most {self.iterations}"
+            f"{called} {self.version}, tolerance {self.tolerance:g}, at most {self.iterations}"
             f" iterations, {limit}"
         )
 
+
+_OWN = "interior-point method for Lyapunov inequalities"
+"""What certificates and messages call "LYAPUNOV"."""
 
 _PACKAGES = {
     "CLARABEL": "clarabel",
@@ -184,8 +189,9 @@ def general_solver(solver: Solver | str) -> Solver:
     solver = solver if isinstance(solver, Solver) else Solver(solver)
     if solver.name == LYAPUNOV:
         raise InputError(
-            f"{LYAPUNOV} is for l2_gain and stability of an LPVStateSpace in one parameter with"
-            " form=Spline(...) by plain Bernstein coefficients; take solver='CLARABEL' here"
+            f"the {_OWN} (solver={LYAPUNOV!r}) serves l2_gain and stability of an LPVStateSpace in"
+            " one parameter, with form=Spline(...) by plain Bernstein coefficients; take"
+            " solver='CLARABEL' here"
         )
     return solver
 
