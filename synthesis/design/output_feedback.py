@@ -83,7 +83,8 @@ def output_feedback(
     X, Y : int, tuple or FunctionSpace, optional
         Degree in every parameter, one each, or functions; by default one of the two moves, with a
         degree that rises from 2 while that lowers gamma and gamma is above the worst optimum of the
-        frozen models, which no controller can beat.
+        frozen models, which no controller can beat. Where both are given and move with a parameter
+        of a bounded rate, the controller is not told dp/dt, as above.
     back_off : float or sequence
         Multiples of the least gamma at which X and Y are settled, tried in turn until the gains are
         smooth functions of p: at the least itself a controller has poles without limit.
@@ -178,7 +179,7 @@ def _nominal(
     start = best(plant, every, divisions, USUAL, attempts, floor)
     slowest, notes = None, ()
     for own, design in _designs(plant, start, both, factors, floor, divisions, attempts):
-        told = "" if own is start else ", their rates neglected"
+        told = ", their rates neglected" if own.shape.untold(plant.parameters) else ""
         method = f"output feedback, {own.shape}{told}"
         made = in_plant_units(plant, design.coordinates, design.fit, design.gamma, method)
         made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
@@ -212,7 +213,8 @@ def _designs(
         if other.gamma < WORTH * start.gamma:
             for design in settled(other, factors, _recover, USUAL, attempts, neglecting=True):
                 yield other, design
-    for design in settled(start, factors, _recover, USUAL, attempts):
+    untold = bool(start.shape.untold(plant.parameters))  # asked for by hand
+    for design in settled(start, factors, _recover, USUAL, attempts, neglecting=untold):
         yield start, design
 
 

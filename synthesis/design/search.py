@@ -79,6 +79,15 @@ class Shape:
         moving = [basis is not None and basis.size > 1 for basis in (self.X, self.Y)]
         return moving == [False, True]
 
+    def untold(self, parameters: Sequence[Scheduling]) -> list[str]:
+        """Parameters of a rate that is a number > 0 with which X and Y both move: a controller
+        would have to be told dp/dt.
+        """
+        if self.X is None or self.Y is None:
+            return []
+        both = zip(parameters, used(self.X), used(self.Y), strict=True)
+        return [s.name for s, x, y in both if x and y and not _known(s)]
+
     def __str__(self) -> str:
         said = [
             f"{name} {_said(basis)}"
@@ -135,9 +144,11 @@ def shapes(
     then the other, with the parameters that the plant depends on.
 
     Both may move with a parameter that stands still, and with one whose rate is another parameter:
-    then the controller knows how they move. Raises `InputError` where it would need dp/dt.
+    then the controller knows how they move. Where both were asked for they may move with others too
+    (`Shape.untold`), of which dp/dt is then neglected. Raises `InputError` where that has no proof:
+    in discrete time, and beside a rate that is another parameter.
     """
-    free = [isinstance(s.rate, str) or s.rate == 0 for s in parameters]
+    free = [_known(s) for s in parameters]
     jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
     both = tuple(degree if f and m else 0 for f, m in zip(free, matters, strict=True))
     one = tuple(degree if m and not j else 0 for j, m in zip(jumps, matters, strict=True))
@@ -155,20 +166,28 @@ def shapes(
         bases = [
             limited(functions(d, parameters, n), parameters, n) for d, n in ((x, "X"), (y, "Y"))
         ]
-        for s, in_x, in_y, alone in zip(parameters, *map(used, bases), free, strict=True):
-            if in_x and in_y and not alone:
-                raise InputError(
-                    f"X and Y both depend on {s.name}: the controller would need its rate; let one"
-                    " of them be of degree 0 in it, or give the plant a lagged parameter:"
-                    " plant.lagged(...)"
-                )
+        for s, in_x in zip(parameters, used(bases[0]), strict=True):
             if sampled and in_x and (isinstance(s.rate, str) or s.rate > 0):
                 raise InputError(
                     f"in discrete time X cannot depend on {s.name}: the controller would need its"
                     " next value; let Y depend on it"
                 )
-        out.append(Shape(*bases))
+        shape = Shape(*bases)
+        untold = shape.untold(parameters)
+        if untold and any(isinstance(s.rate, str) for s in parameters):
+            raise InputError(
+                f"X and Y both depend on {', '.join(untold)}: the controller would need its rate,"
+                " which can be neglected only where no rate is another parameter; let one of X and"
+                f" Y be of degree 0 in {', '.join(untold)}, or give numbers as rates,"
+                " .with_rate(...)"
+            )
+        out.append(shape)
     return out
+
+
+def _known(s: Scheduling) -> bool:
+    """Whether a controller knows dp/dt."""
+    return isinstance(s.rate, str) or s.rate == 0
 
 
 Gains = Callable[[Array], Array]
