@@ -11,7 +11,7 @@ from symheli.lpv.bases.polynomial import Polynomial
 from symheli.lpv.bases.polynomials import interpolation_points, polynomials
 from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.scheduling import Scheduling
-from symheli.values.units import quotient
+from symheli.values.units import per_second
 
 LAGGED, LAG_RATE = "_lagged", "_lag_rate"
 """After the name of a parameter p: q with T dq/dt = p - q, and r = dq/dt = (p - q)/T."""
@@ -59,7 +59,7 @@ def lagged(lpv: LPVStateSpace, seconds: float) -> LPVStateSpace:
     wide = Polynomial(degree, s.low - reach, s.high + reach)
     given = (
         Scheduling(s.name + LAGGED, s.unit, s.low, s.high, rate=s.name + LAG_RATE),
-        Scheduling(s.name + LAG_RATE, quotient(s.unit, "s"), -s.rate, s.rate, 2 * s.rate / seconds),
+        Scheduling(s.name + LAG_RATE, per_second(s.unit), -s.rate, s.rate, 2 * s.rate / seconds),
     )
     box = [(q.low, q.high) for q in given]
     nodes = interpolation_points([degree, degree], box)

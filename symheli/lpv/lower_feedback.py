@@ -316,6 +316,11 @@ def _same_quantity(s: Scheduling, known: Sequence[Scheduling]) -> Scheduling | N
     return None
 
 
+def _renamed(s: Scheduling) -> str:
+    """What brings another model to the name and unit of a parameter."""
+    return f".with_scheduling(Scheduling({s.name!r}, {s.unit!r}, low, high))"
+
+
 def _over_the_same(
     plant: LPVStateSpace, controller: LPVStateSpace
 ) -> tuple[LPVStateSpace, LPVStateSpace]:
@@ -331,7 +336,10 @@ def _over_the_same(
         if (known := own.get(s.name)) is None:
             continue
         if known.unit != s.unit:
-            raise InputError(f"{s.name} is in {known.unit} in the plant, in {s.unit} in the other")
+            raise InputError(
+                f"{s.name} is in {known.unit} in the plant, in {s.unit} in the other:"
+                f" {_renamed(known)} brings that to it"
+            )
         low, high = max(low, s.low), min(high, s.high)
         slack = 1e-9 * (known.high - known.low)
         if low > known.low + slack or high < known.high - slack:
@@ -342,15 +350,10 @@ def _over_the_same(
             )
     for s in controller.parameters:
         if s.name not in own and (same := _same_quantity(s, plant.parameters)):
-            how = (
-                f"call it so: .with_scheduling(Scheduling({same.name!r}, {same.unit!r}, low, high))"
-                if same.unit == s.unit
-                else f"make it over {same.name} in {same.unit}"
-            )
             warnings.warn(
                 f"{same.name} ({same.unit}) of the plant and {s.name} ({s.unit}) of what is"
                 " connected to it are taken for two parameters that move independently; if they are"
-                f" one, {how}",
+                f" one, {_renamed(same)} calls it so",
                 DataWarning,
                 stacklevel=4,
             )

@@ -14,11 +14,20 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.bases.function_space import FunctionSpace
 from symheli.lpv.bases.polynomials import coefficients_of, lobatto_points, polynomials
+from symheli.lpv.bases.rescaled import rescaled
 from symheli.lpv.bases.restricted import Restricted
 from symheli.lpv.linear_model import LinearModel, feedback_matrix
 from symheli.lpv.monomials import as_blocks
 from symheli.lpv.recentred import centre, recentred
-from symheli.lpv.scheduling import UNSCHEDULED, Rates, Scheduling, check_all, parameters, with_rates
+from symheli.lpv.scheduling import (
+    UNSCHEDULED,
+    Rates,
+    Scheduling,
+    check_all,
+    parameters,
+    unit_sizes,
+    with_rates,
+)
 from symheli.lpv.trim_schedule import TrimSchedule
 from symheli.values.arrays import Array, frozen
 from symheli.values.signal import Signal, indices, signals
@@ -252,12 +261,31 @@ class LPVStateSpace:
         return LinearModel(*frozen_at, self.states, self.inputs, self.outputs, dt=self.dt)
 
     def with_scheduling(self, scheduling: Scheduling | Sequence[Scheduling]) -> LPVStateSpace:
-        """The same model over narrower ranges, with the residuals there, or with other rate
-        limits.
+        """The same model over narrower ranges, with the residuals there, with other rate limits, or
+        with its parameters, in order, under other names or in other units.
+
+        Another unit of the same quantity is converted to: in "km/h" a model over "m/s" takes p in
+        km/h, and is the same. A parameter without a unit ("1") is given one as it is. Raises
+        `InputError` for a unit of another quantity, and ranges beyond the basis.
         """
         given = parameters(scheduling)
+        model, sizes = self, unit_sizes(self.parameters, given)
+        if any(size != 1.0 for size in sizes):
+            model = self._in_units(given, sizes)
         return replace(
-            self, parameters=given, residuals=self.residuals and self.residuals.within(given)
+            model, parameters=given, residuals=model.residuals and model.residuals.within(given)
+        )
+
+    def _in_units(self, given: Sequence[Scheduling], sizes: Sequence[float]) -> LPVStateSpace:
+        """p in units that are so many times as large, over the ranges given."""
+        scale = np.array(sizes) if len(sizes) > 1 else sizes[0]
+        off = self.residuals
+        return replace(
+            self,
+            parameters=tuple(given),
+            basis=rescaled(self.basis, sizes),
+            trim=self.trim and replace(self.trim, basis=rescaled(self.trim.basis, sizes)),
+            residuals=off and off._replace(nodes=off.nodes / scale),
         )
 
     def with_rate(self, rate: Rates) -> LPVStateSpace:

@@ -10,7 +10,7 @@ import numpy as np
 
 from symheli.errors import InputError, UnknownNameError
 from symheli.values.arrays import Array, frozen
-from symheli.values.units import dimension, quotient
+from symheli.values.units import per_second, ratio
 
 Limit = float | str
 """How fast a parameter may move: a number in its unit per second (math.inf: as fast as it likes),
@@ -138,10 +138,11 @@ def parameters(given: Scheduling | Sequence[Scheduling]) -> tuple[Scheduling, ..
                 f"the rate of {s.name} is {other.name}, whose own rate must then be a number"
                 f" ({other.unit}/s), got {other.rate!r}"
             )
-        if dimension(other.unit) != dimension(quotient(s.unit, "s")):
+        expected = per_second(s.unit)
+        if not math.isclose(ratio(other.unit, expected) or 0.0, 1.0):  # not another size either
             raise InputError(
                 f"{other.name} ({other.unit}) cannot be the rate of {s.name} ({s.unit}): expected"
-                f" {s.unit}/s"
+                f" {expected}"
             )
     return out
 
@@ -166,6 +167,30 @@ def with_rates(given: Sequence[Scheduling], rate: Rates) -> tuple[Scheduling, ..
         limits = [rate] * len(names)
     limits = [limit if isinstance(limit, str) else float(limit) for limit in limits]
     return parameters([s.with_rate(limit) for s, limit in zip(given, limits, strict=True)])
+
+
+def unit_sizes(known: Sequence[Scheduling], given: Sequence[Scheduling]) -> list[float]:
+    """How many units of each of the known parameters one unit of that given in its place is.
+
+    A parameter without a unit ("1") may be given any: it is named, not converted. Raises
+    `InputError` for another number of parameters and for a unit of another quantity.
+    """
+    if len(known) != len(given):
+        raise InputError(
+            f"expected {len(known)} parameter(s), for {', '.join(s.name for s in known)}, got"
+            f" {len(given)}"
+        )
+    sizes = []
+    for old, new in zip(known, given, strict=True):
+        size = ratio(new.unit, old.unit)
+        if size is None and old.unit != "1":
+            raise InputError(
+                f"{old.name} is in {old.unit}, got a range in {new.unit}, which does not convert:"
+                f" give it in {old.unit} or a unit of the same quantity; a model over another"
+                " quantity has to be made over that"
+            )
+        sizes.append(1.0 if size is None else size)
+    return sizes
 
 
 def check_all(given: Sequence[Scheduling], p: object) -> Array:

@@ -10,7 +10,7 @@ from symheli.errors import InputError
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
-from symheli.values.units import quotient
+from symheli.values.units import per_second
 
 PREFIX = "drift_"
 """With the name of a parameter: the input that its motion is."""
@@ -57,7 +57,7 @@ def _columns(lpv: LPVStateSpace, p: Array) -> tuple[list[Signal], Array]:
             columns.append(own - slopes[:, i] * at[tied[s.name]][:, None])
             own = 0.0
         else:
-            names.append(Signal(PREFIX + s.name, quotient(s.unit, "s")))
+            names.append(Signal(PREFIX + s.name, per_second(s.unit)))
             columns.append(-slopes[:, i])
     if not np.isscalar(own):
         names.append(Signal(PREFIX + "trim", "1"))

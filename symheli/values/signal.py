@@ -64,9 +64,9 @@ def signals(names: Iterable[str], units: Mapping[str, str] | None = None) -> tup
 
 def rates(names: Iterable[Signal]) -> tuple[Signal, ...]:
     """Derivatives in time: the same names, with the units per second."""
-    from symheli.values.units import quotient  # which knows no signals
+    from symheli.values.units import per_second  # which knows no signals
 
-    return tuple(Signal(str(n), quotient(n.unit, "s")) for n in names)
+    return tuple(Signal(str(n), per_second(n.unit)) for n in names)
 
 
 def indices(wanted: Iterable[str], known: Sequence[str], kind: str) -> list[int]:

@@ -199,6 +199,30 @@ def quotient(unit: str, by: str) -> str:
     return text(_combined(dimension(unit), dimension(by), -1))
 
 
+def per_second(unit: str) -> str:
+    """The unit of a rate of something in `unit`: "m/s^2" of "m/s"; "km/h/s" of "km/h" and of a unit
+    of one's own, with which nothing can be calculated, that per second.
+    """
+    try:
+        return quotient(unit, "s") if to_si(unit)[0] == 1.0 else f"{unit}/s"
+    except InputError:
+        return f"{unit}/s"
+
+
+def ratio(unit: str, other: str) -> float | None:
+    """How many of `other` one `unit` is: 3.6 for "m/s" and "km/h"; None where they are of another
+    dimension, or not known and not the same.
+    """
+    if unit == other:
+        return 1.0
+    try:
+        if dimension(unit) != dimension(other):
+            return None
+        return to_si(unit)[0] / to_si(other)[0]
+    except InputError:
+        return None
+
+
 def text(powers: Dimension) -> str:
     """A dimension as a unit of kg, m, rad and s: "m/s^2/rad"; "1" without dimension."""
 

@@ -25,7 +25,7 @@ from symheli.lpv.mixing import ERROR, itself, mixed
 from symheli.lpv.scheduling import Rates
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import as_table, summarized
-from symheli.values.units import quotient
+from symheli.values.units import per_second
 from synthesis.design import parts
 from synthesis.design.as_controller import as_controller
 from synthesis.design.generalized import Channels, Generalized
@@ -435,7 +435,7 @@ class Plant:
     def _integrated(self, name: str, measured: bool) -> Plant:
         (i,) = indices([name], self.controls, "control")
         unit = self.controls[i].unit
-        rate, command = Signal(f"{name}_rate", quotient(unit, "s")), Signal(f"{name}_command", unit)
+        rate, command = Signal(f"{name}_rate", per_second(unit)), Signal(f"{name}_command", unit)
         part = parts.integrator(self.controls[i], self.dt)
         commands = (command,) if measured else ()
         rows = (*commands, self.controls[i]) if name in self.performance else commands

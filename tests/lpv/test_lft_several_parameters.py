@@ -131,7 +131,10 @@ def test_another_range_of_one_parameter_keeps_the_model():
     with pytest.raises(UnknownNameError, match="did you mean 'mass'"):
         lft.with_scheduling(Scheduling("mas", "kg", 7.0, 7.5))
     with pytest.raises(InputError, match="in kg"):
-        lft.with_scheduling(Scheduling("mass", "lb", 7.0, 7.5))
+        lft.with_scheduling(Scheduling("mass", "m/s", 7.0, 7.5))
+    grams = lft.with_scheduling(Scheduling("mass", "gram", 7000.0, 7500.0, 1000.0))
+    at = stacked(grams.at(3.3, 7200.0))
+    np.testing.assert_allclose(at, stacked(lft.at(3.3, 7.2)), atol=1e-10)
 
 
 def reciprocal(scheduling):

@@ -336,7 +336,7 @@ def test_what_cannot_be_closed_says_what_to_do():
         lower_feedback(P, narrow)
     assert lower_feedback(P.with_scheduling(replace(SPEED, high=9.0)), narrow).scheduling.high == 9
     knots = K.with_scheduling(replace(SPEED, unit="kt"))
-    with pytest.raises(InputError, match="m/s in the plant, in kt"):
+    with pytest.raises(InputError, match=r"in kt in the other: \.with_scheduling"):
         lower_feedback(P, knots)
     brought = controller(UserFunctions((np.ones_like, np.sqrt), 0.0, 13.0))
     with pytest.raises(InputError, match="no basis in common"):
@@ -381,5 +381,4 @@ def test_two_parameters_that_may_be_one_are_noticed(other, noticed):
     said = [str(w.message) for w in caught]
     assert bool(said) == noticed
     if noticed:
-        renamed = "with_scheduling(Scheduling('airspeed', 'm/s', low, high))"
-        assert (renamed if other.unit == "m/s" else "make it over airspeed in m/s") in said[0]
+        assert "with_scheduling(Scheduling('airspeed', 'm/s', low, high))" in said[0]

@@ -9,13 +9,19 @@ from scipy.integrate import solve_ivp
 
 from symheli.errors import InputError
 from symheli.lpv import (
+    BSpline,
     LPVStateSpace,
     Patches,
     PiecewiseLinear,
+    Polynomial,
     Scheduling,
+    Spline,
+    TrimSchedule,
     UserFunctions,
     simulate,
 )
+from symheli.lpv.lpv_state_space import Matrices
+from symheli.lpv.scheduling import parameters
 
 
 def stable(dt=None):
@@ -212,6 +218,69 @@ def test_a_loop_closes_around_a_fitted_model_on_a_part_of_its_range():
     np.testing.assert_allclose(closed.residuals.A, whole.residuals.A[inside], atol=1e-13)
     between = replace(SPEED, low=nodes[3] + 1e-3, high=nodes[4] - 1e-3)
     assert lpv.with_scheduling(between).residuals is None
+
+
+NODES = np.array([1.0, 6.0])
+BREAKS = (0.0, 3.0, 7.0, 8.5, 13.0)
+
+
+@pytest.mark.parametrize(
+    "basis",
+    [
+        Polynomial(3, 0.0, 13.0),
+        PiecewiseLinear(BREAKS),
+        Spline(BREAKS),
+        BSpline(2, BREAKS),
+        Patches(2, BREAKS),
+        UserFunctions((np.ones_like, np.sqrt), 0.0, 13.0),
+    ],
+    ids=lambda basis: type(basis).__name__,
+)
+def test_another_unit_of_a_parameter_is_converted_to(basis):
+    """The same model at the same airspeed, its trim and residuals too, whatever that is told in."""
+    rng = np.random.default_rng(0)
+    whole = [
+        rng.standard_normal((basis.size, *shape)) for shape in ((2, 2), (2, 1), (1, 2), (1, 1))
+    ]
+    x0 = rng.standard_normal((5, 2))
+    trim = TrimSchedule(Spline(BREAKS), x0, x0[:, :1])
+    known = LPVStateSpace(basis, *whole, SPEED, ("x1", "x2"), ("u1",), ("y1",), trim=trim)
+    known = known.with_residuals(NODES, Matrices(*(np.zeros((2, *M.shape[1:])) for M in whole)))
+    told = known.with_scheduling(Scheduling("V", "km/h", 0.0, 36.0, rate=3.6))
+    assert told.residuals.nodes == pytest.approx(3.6 * NODES)
+    for speed in (0.0, 2.5, 7.2, 10.0):
+        for name in "ABCD":
+            same = getattr(known.at(speed), name)
+            np.testing.assert_allclose(getattr(told.at(3.6 * speed), name), same, atol=1e-9)
+        np.testing.assert_allclose(told.trim.state(3.6 * speed), trim.state(speed), atol=1e-9)
+        # per km/h, at an acceleration of 1 m/s^2
+        drift = told.trim.drift(3.6 * speed, 3.6), trim.drift(speed, 1.0)
+        np.testing.assert_allclose(*drift, atol=1e-8 * np.abs(drift[1]).max())
+    back = told.with_scheduling(replace(SPEED, high=10.0))
+    np.testing.assert_allclose(back.at(5.0).A, known.at(5.0).A, atol=1e-9)
+    assert told.with_trim_drift().inputs[-1].unit == "km/h/s"
+    with pytest.raises(InputError, match=r"\[0\.0, 46\.8.* V ranges over \[0\.0, 50"):
+        known.with_scheduling(Scheduling("V", "km/h", 0.0, 50.0))
+
+
+def test_a_unit_of_another_quantity_is_refused_and_one_where_there_was_none_is_taken():
+    with pytest.raises(InputError, match="is in m/s, got a range in rad, .* give it in m/s"):
+        stable().with_scheduling(Scheduling("airspeed", "rad", 0.0, 1.0))
+    with pytest.raises(InputError, match=r"expected 1 parameter\(s\), for airspeed, got 2"):
+        stable().with_scheduling((SPEED, Scheduling("a", "m/s^2", -1.0, 1.0)))
+    bare = stable().with_scheduling(SPEED)
+    bare = replace(bare, parameters=replace(SPEED, name="p", unit="1"))
+    np.testing.assert_array_equal(bare.with_scheduling(SPEED).at(4.0).A, stable().at(4.0).A)
+
+
+def test_the_rate_of_a_parameter_is_in_its_unit_per_second():
+    """km/h that change by an acceleration in m/s^2 would change 3.6 times too slowly."""
+    speed = Scheduling("V", "km/h", 0.0, 36.0, rate="a")
+    with pytest.raises(InputError, match=r"a \(m/s\^2\) cannot be the rate .* expected km/h/s"):
+        parameters((speed, Scheduling("a", "m/s^2", -3.0, 3.0)))
+    assert len(parameters((speed, Scheduling("a", "km/h/s", -3.0, 3.0)))) == 2
+    own = Scheduling("valve", "turns", 0.0, 1.0, rate="speed")
+    assert len(parameters((own, Scheduling("speed", "turns/s", -3.0, 3.0)))) == 2
 
 
 def test_a_constant_model_is_the_same_everywhere():

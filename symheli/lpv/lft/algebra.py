@@ -14,7 +14,7 @@ from symheli.errors import InputError, UnknownNameError
 from symheli.lpv.equilibration import is_singular
 from symheli.lpv.lft.model import LFT, Block, parts
 from symheli.lpv.lft.systems import System, as_lft
-from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.scheduling import Scheduling, unit_sizes
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal
@@ -285,11 +285,11 @@ def over_range(lft: LFT, scheduling: Scheduling) -> LFT:
     if scheduling.name not in names:
         raise UnknownNameError("scheduling parameter", scheduling.name, names)
     old = lft.parameters[names.index(scheduling.name)]
-    if scheduling.unit != old.unit:
-        raise InputError(f"{old.name} is in {old.unit}, got a range in {scheduling.unit}")
+    (size,) = unit_sizes([old], [scheduling])
     a, b = np.zeros(lft.order), np.ones(lft.order)
     here = _where(lft, scheduling.name)
-    a[here], b[here] = (scheduling.middle - old.middle) / old.radius, scheduling.radius / old.radius
+    a[here] = (size * scheduling.middle - old.middle) / old.radius
+    b[here] = size * scheduling.radius / old.radius
     loop = np.eye(lft.order) - lft.M11 * a
     if is_singular(loop):
         raise InputError(

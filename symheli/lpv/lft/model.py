@@ -277,8 +277,8 @@ class LFT:
     # -- the same model in other clothes
 
     def with_scheduling(self, scheduling: Scheduling) -> LFT:
-        """The same model with the parameter of that name over another range or with another rate;
-        exact.
+        """The same model with the parameter of that name over another range, with another rate or
+        in another unit of the same quantity, to which it is converted; exact.
         """
         from symheli.lpv.lft.algebra import over_range
 
