@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from symheli.lpv.uncertain_state_space import UncertainStateSpace
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
 from symheli.values.signal import Signal, indices
-from symheli.values.units import to_si
+from symheli.values.units import per_second, to_si
 
 PREFIX = "controller_"
 """Before the name of a controller's state that the plant has too."""
@@ -71,9 +71,10 @@ def lower_feedback(
         Of an uncertain one every model of the set is closed.
     controller : LPVStateSpace, LinearModel or a system of python-control
         Constant, or over parameters of the same names and units as the plant's: fewer, more, or in
-        another order. Its range must hold the plant's; how fast they move is the plant's to say. A
-        parameter of another name is another parameter, with a `DataWarning` where it may be the
-        same quantity.
+        another order. Of one that both have, the loop takes the plant's range, which the
+        controller's must hold, and the plant's rate, with a `DataWarning` where the controller was
+        made for a slower one or its rate is another parameter. A parameter of another name is
+        another parameter, with a `DataWarning` where it may be the same quantity.
     inputs, outputs : sequence of str, optional
         Of the closed loop, by default all that are not connected. A u among the inputs is what is
         added to the controller's; a y among the outputs is read by the controller and stays.
@@ -321,6 +322,30 @@ def _renamed(s: Scheduling) -> str:
     return f".with_scheduling(Scheduling({s.name!r}, {s.unit!r}, low, high))"
 
 
+def _made_for_another_rate(
+    s: Scheduling, known: Scheduling, plant: Mapping[str, Scheduling]
+) -> str | None:
+    """What to say where a parameter moves otherwise in the plant, which is taken, than it was made
+    to in what is connected; None where that allows as much, or the plant gives no limit.
+    """
+    if s.rate == known.rate or known.rate == np.inf:
+        return None
+    most = known.rate
+    if isinstance(most, str):
+        most = max(abs(plant[most].low), abs(plant[most].high))
+    unit = per_second(s.unit)
+    if isinstance(s.rate, str):
+        made = f"the rate of {s.name} is the parameter {s.rate}"
+    elif s.rate < most:
+        made = f"{s.name} moves at {s.rate:g} {unit} at most"
+    else:
+        return None
+    return (
+        f"in what is connected {made}, in the plant at up to {most:g} {unit}: the loop is taken"
+        " with the plant's rate; where that is too fast, .with_rate(...) of the plant says so"
+    )
+
+
 def _over_the_same(
     plant: LPVStateSpace, controller: LPVStateSpace
 ) -> tuple[LPVStateSpace, LPVStateSpace]:
@@ -349,7 +374,9 @@ def _over_the_same(
                 " .with_scheduling(...), or make that over the wider range"
             )
     for s in controller.parameters:
-        if s.name not in own and (same := _same_quantity(s, plant.parameters)):
+        if (known := own.get(s.name)) and (slower := _made_for_another_rate(s, known, own)):
+            warnings.warn(slower, DataWarning, stacklevel=4)
+        if known is None and (same := _same_quantity(s, plant.parameters)):
             warnings.warn(
                 f"{same.name} ({same.unit}) of the plant and {s.name} ({s.unit}) of what is"
                 " connected to it are taken for two parameters that move independently; if they are"

@@ -2,6 +2,8 @@
 basis, and nothing moves that need not.
 """
 
+import math
+import re
 import warnings
 from dataclasses import replace
 
@@ -352,6 +354,42 @@ def test_a_static_controller_goes_with_any_sample_period():
     dynamic = LinearModel([[0.5]], [[1.0]], [[1.0]], [[0.0]], ("k",), ("y1",), ("u1",), dt=0.1)
     loop = lower_feedback(static, dynamic)
     assert (loop.dt, float(loop.at(0.0).A[0, 0])) == (0.1, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("plants", "others", "said"),
+    [
+        (
+            5.0,
+            1.0,
+            r"airspeed moves at 1 m/s\^2 at most, in the plant at up to 5 m/s\^2: .*with_rate",
+        ),
+        (5.0, 5.0, None),
+        (5.0, 9.0, None),
+        (math.inf, 1.0, None),  # nothing was said of the plant
+        ("acceleration", 1.0, r"1 m/s\^2 at most, in the plant at up to 3"),
+        ("acceleration", 4.0, None),
+        (5.0, "acceleration", "the rate of airspeed is the parameter acceleration"),
+        ("acceleration", "acceleration", None),
+    ],
+)
+def test_a_controller_made_for_a_slower_parameter_is_noticed(plants, others, said):
+    """The loop takes range and rate of the plant, whatever the controller says of them."""
+
+    def model(rate, inputs, outputs, low, high):
+        box = [Scheduling("airspeed", "m/s", low, high, rate)]
+        if isinstance(rate, str):
+            box.append(Scheduling("acceleration", "m/s^2", -3.0, 2.0))
+        gain = LinearModel.gain([[0.5]], inputs, outputs)
+        return LPVStateSpace.constant(gain, box)
+
+    P, K = model(plants, ["u"], ["y"], 2.0, 8.0), model(others, ["y"], ["u"], 0.0, 9.0)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        loop = lower_feedback(P, K)
+    assert loop.parameters[0] == P.parameters[0]
+    assert len(caught) == (said is not None)
+    assert said is None or re.search(said, str(caught[0].message))
 
 
 @pytest.mark.parametrize(

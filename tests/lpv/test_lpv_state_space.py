@@ -264,7 +264,7 @@ def test_another_unit_of_a_parameter_is_converted_to(basis):
 
 
 def test_a_unit_of_another_quantity_is_refused_and_one_where_there_was_none_is_taken():
-    with pytest.raises(InputError, match="is in m/s, got a range in rad, .* give it in m/s"):
+    with pytest.raises(InputError, match=r"is in m/s, got a range in rad, .* give it in m/s"):
         stable().with_scheduling(Scheduling("airspeed", "rad", 0.0, 1.0))
     with pytest.raises(InputError, match=r"expected 1 parameter\(s\), for airspeed, got 2"):
         stable().with_scheduling((SPEED, Scheduling("a", "m/s^2", -1.0, 1.0)))

@@ -251,7 +251,7 @@ def test_the_rate_of_a_parameter_may_be_another():
         tied.along((0, 0), (1, 1))
     with pytest.raises(UnknownNameError, match="acceleratoin"):
         model().with_rate({"airspeed": "acceleratoin"})
-    with pytest.raises(InputError, match=r"cannot be the rate of airspeed \(m/s\): expected m/s\^2"):
+    with pytest.raises(InputError, match=r"cannot be the rate of airspeed .*: expected m/s\^2"):
         LPVStateSpace.polynomial(
             **GIVEN, scheduling=(Scheduling("airspeed", "m/s", 0, 13, "mass"), MASS)
         )
