@@ -40,7 +40,6 @@ if TYPE_CHECKING:
         ValidityWarning,
     )
     from symheli.flight import (
-        AirspeedMonitor,
         AirspeedSchedule,
         Autopilot,
         Controller,
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
         FlightBatch,
         FlightDataset,
         FlightPlan,
+        ParameterMonitor,
         ScheduledController,
         Sensor,
         Servo,
@@ -109,9 +109,9 @@ _ROOMS = {
         "Batch CashKarp DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
     ),
     "symheli.flight": (
-        "AirspeedMonitor AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightDataset"
-        " FlightPlan ScheduledController Sensor Servo SimulatedFlight TableController fly"
-        " fly_batch fly_campaign gain_scheduled_lqr"
+        "AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightDataset"
+        " FlightPlan ParameterMonitor ScheduledController Sensor Servo SimulatedFlight"
+        " TableController fly fly_batch fly_campaign gain_scheduled_lqr"
     ),
     "symheli.flight.stitched_model": "StitchedModel",
     "symheli.environment": "Air Dryden Gust Wind standard_atmosphere",
@@ -132,7 +132,6 @@ __all__ = [
     "LFT",
     "AccuracyError",
     "Air",
-    "AirspeedMonitor",
     "AirspeedSchedule",
     "Autopilot",
     "Batch",
@@ -163,6 +162,7 @@ __all__ = [
     "LinearGrid",
     "LinearModel",
     "NamedVector",
+    "ParameterMonitor",
     "PrecisionWarning",
     "Progress",
     "Radau",

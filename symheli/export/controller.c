@@ -46,8 +46,8 @@ void controller_enter(controller_state *s, const float *command) { start(s, comm
 
 void controller_set_axes(controller_state *s, uint32_t axes) { s->axes = axes; }
 
-/* Move the airspeed in use towards a reading, or what stands for a bad one. */
-static int follow_airspeed(controller_state *s, float reading, int valid)
+/* Move the parameter in use towards a reading, or what stands for a bad one. */
+static int follow_parameter(controller_state *s, float reading, int valid)
 {
     const int again = s->same >= 0 && reading == s->reading;
     int status = 0;
@@ -57,7 +57,7 @@ static int follow_airspeed(controller_state *s, float reading, int valid)
         s->bad = 0;
         s->target = clipped(reading, knots[0], knots[KNOTS - 1]);
     } else {
-        status |= CONTROLLER_AIRSPEED;
+        status |= CONTROLLER_PARAMETER;
         if (s->bad < NEVER) s->bad++;
         if (!s->started || s->bad > hold) {
             status |= CONTROLLER_FALLBACK;
@@ -107,10 +107,10 @@ static float times(const float *below, const float *above, float weight, int fir
 }
 
 int controller_update(controller_state *s, const float *measured, const float *reference,
-                      const float *trim, const float *others, float airspeed, int airspeed_valid,
+                      const float *trim, const float *others, float parameter, int parameter_valid,
                       float *command)
 {
-    int status = follow_airspeed(s, airspeed, airspeed_valid);
+    int status = follow_parameter(s, parameter, parameter_valid);
     const int i0 = interval(s->used);
     const float weight = (s->used - knots[i0]) / (knots[i0 + 1] - knots[i0]);
     const float *below = matrices + i0 * (NX + NY) * COLUMNS, *above = below + (NX + NY) * COLUMNS;

@@ -1,14 +1,14 @@
-/* Controller in a table over airspeed, for every @dt@ s.
+/* Controller in a table over @parameter@, for every @dt@ s.
 
      x(k+1) = A x + B e + L (u - w)        e = measured - reference
      w = trim + C x + D e, or, where a command integrates, w = u(k-1) + C x + D e
      u = w within its limits
-     A .. L straight between @knots@ airspeeds from @low@ to @high@ m/s
-     the airspeed in use moves at @rate@ m/s^2 at most
+     A .. L straight between @knots@ values of @parameter@ from @low@ to @high@
+     the one in use moves at @rate@ @per_second@ at most
 
-   32-bit numbers, SI units and radians, body axes x forward, y right, z down. No allocation, no
-   library. Compiled with -ffp-contract=off (not with -ffast-math) it gives the bits of what was
-   analysed and flown in simulation.
+   32-bit numbers, SI units and radians, but @parameter@ (@unit@); body axes x forward, y right,
+   z down. No allocation, no library. Compiled with -ffp-contract=off (not with -ffast-math) it
+   gives the bits of what was analysed and flown in simulation.
 
    controller_init once; on the ground controller_reset every sample; in flight controller_enter
    once with the command in force, then controller_update every sample. After a gap enter again.
@@ -22,11 +22,11 @@
 /* @sizes@ */
 
 /* What controller_update met with: bits. HELD: a number that is none came in or out; the commands
-   in force stay, and nothing else changed. AIRSPEED: it was bad and not followed. FALLBACK: it was
+   in force stay, and nothing else changed. PARAMETER: it was bad and not followed. FALLBACK: it was
    so for too long. SATURATED: a command stands at its limit. */
 enum {
     CONTROLLER_SATURATED = 1,
-    CONTROLLER_AIRSPEED = 2,
+    CONTROLLER_PARAMETER = 2,
     CONTROLLER_FALLBACK = 4,
     CONTROLLER_HELD = 8
 };
@@ -35,7 +35,7 @@ enum {
 typedef struct {
     float x[CONTROLLER_NX > 0 ? CONTROLLER_NX : 1];
     float command[CONTROLLER_NY], offset[CONTROLLER_NY];
-    float reading, target, filtered, used; /* airspeeds, m/s; used: where in the table it is */
+    float reading, target, filtered, used; /* of @parameter@; used: where in the table */
     int32_t same, bad, started;
     int32_t entry[CONTROLLER_NY];
     uint32_t axes;
@@ -46,7 +46,7 @@ extern "C" {
 #endif
 /* All axes are flown; then as controller_reset. */
 void controller_init(controller_state *s);
-/* States, filters and integrators as on the ground; the axes stay. The airspeed in use starts at
+/* States, filters and integrators as on the ground; the axes stay. The parameter in use starts at
    the next reading, the commands at their trim. */
 void controller_reset(controller_state *s);
 /* The same, but the next commands are command[CONTROLLER_NY], those in force now, whatever is
@@ -56,10 +56,11 @@ void controller_enter(controller_state *s, const float *command);
    which the states follow; when they are flown again they begin at it. */
 void controller_set_axes(controller_state *s, uint32_t axes);
 /* command[CONTROLLER_NY] from measured, reference[CONTROLLER_NU], trim[CONTROLLER_NY], the commands
-   applied on axes that are not flown, others[CONTROLLER_NY] (NULL: their trim), and the airspeed,
-   @follow@, with whether it is trusted. A number that is not finite marks a missing one. */
+   applied on axes that are not flown, others[CONTROLLER_NY] (NULL: their trim), and the parameter,
+   @parameter@ (@unit@) @follow@, with whether it is trusted. A number that is not finite marks a
+   missing one. */
 int controller_update(controller_state *s, const float *measured, const float *reference,
-                      const float *trim, const float *others, float airspeed, int airspeed_valid,
+                      const float *trim, const float *others, float parameter, int parameter_valid,
                       float *command);
 #ifdef __cplusplus
 }

@@ -14,6 +14,7 @@ from symheli.export.controller_check import cases
 from symheli.flight.table_controller import TableController
 from symheli.values.c_text import (
     define,
+    in_comment,
     index_macros,
     literals,
     require_identifier,
@@ -21,6 +22,7 @@ from symheli.values.c_text import (
     table,
 )
 from symheli.values.template import filled_module
+from symheli.values.units import per_second
 from symheli.values.whole_files import write_text
 
 HERE = Path(__file__).parent
@@ -96,17 +98,23 @@ def _header(controller: TableController, up: str) -> dict[str, object]:
     ]
     blocks = [
         sizes,
-        index_macros(f"{up}U_", controller.inputs),
+        index_macros(
+            f"{up}U_", controller.inputs, [_read(controller, s) for s in controller.inputs]
+        ),
         index_macros(
             f"{up}Y_", controller.outputs, [_said(controller, y) for y in controller.outputs]
         ),
     ]
     (scheduling,) = controller.model.parameters
+    unit = in_comment(scheduling.unit)
     return {
+        "parameter": in_comment(scheduling.name),
+        "unit": unit,
+        "per_second": in_comment(per_second(scheduling.unit)),
         "dt": f"{controller.dt:.9g}",
         "knots": len(controller.knots),
         "low": f"{controller.knots[0]:g}",
-        "high": f"{controller.knots[-1]:g}",
+        "high": f"{controller.knots[-1]:g}{'' if unit == '1' else f' {unit}'}",
         "rate": f"{scheduling.limit:g}",
         "fade": f"{controller.fade:g}",
         "follow": "as its sensor reads it"
@@ -114,6 +122,12 @@ def _header(controller: TableController, up: str) -> dict[str, object]:
         else "as it is commanded",
         "sizes": "\n\n".join("\n".join(b) for b in blocks),
     }
+
+
+def _read(controller: TableController, name: str) -> str:
+    """What is given where a controller reads a command of its own."""
+    own = name in controller.own_commands
+    return "in force, its trim before one is; reference: the trim" if own else ""
 
 
 def _said(controller: TableController, output: str) -> str:

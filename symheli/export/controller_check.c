@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include "controller.h"
 
-/* events: 1 reset, 2 enter with `others`; given: measured, reference, trim, others, airspeed;
+/* events: 1 reset, 2 enter with `others`; given: measured, reference, trim, others, parameter;
    expected: commands; status: what was met with */
 /* @cases@ */
 

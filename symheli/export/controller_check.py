@@ -21,7 +21,7 @@ RESET, ENTER = 1, 2
 
 
 def cases(controller: TableController, up: str) -> str:
-    """A flight from a fixed seed as C tables: any size of error, jumps of the airspeed and bad
+    """A flight from a fixed seed as C tables: any size of error, jumps of the parameter and bad
     ones, resets, entries, axes flown by others.
     """
     own, rng = replace(controller), np.random.default_rng(0)  # its own state
@@ -29,11 +29,11 @@ def cases(controller: TableController, up: str) -> str:
     events, axes, valid, status = (np.zeros(SAMPLES, int) for _ in range(4))
     given = np.zeros((SAMPLES, 2 * nu + 2 * ny + 1), np.float32)
     expected = np.zeros((SAMPLES, ny), np.float32)
-    airspeeds = _airspeeds(rng, float(own.knots[0]), float(own.knots[-1]))
+    parameter = _parameter(rng, float(own.knots[0]), float(own.knots[-1]))
     for k in range(SAMPLES):
         block = k // 20
         draw = SIZES[block % len(SIZES)] * rng.standard_normal(2 * nu)
-        given[k] = *draw, *(0.1 * rng.standard_normal(2 * ny)), airspeeds[k]
+        given[k] = *draw, *(0.1 * rng.standard_normal(2 * ny)), parameter[k]
         events[k] = {0: RESET, 1: ENTER}.get(k % 47, 0)
         axes[k] = (1 << ny) - 1 if block % 4 else rng.integers(1 << ny)
         valid[k] = rng.random() > 0.05
@@ -66,7 +66,7 @@ def cases(controller: TableController, up: str) -> str:
     )
 
 
-def _airspeeds(rng: np.random.Generator, low: float, high: float) -> Array:
+def _parameter(rng: np.random.Generator, low: float, high: float) -> Array:
     """Over the whole range and beyond its ends, slow, stuck and fast, and none."""
     wave = np.sin(0.05 * np.arange(SAMPLES)) + 0.02 * rng.standard_normal(SAMPLES)
     p = 0.5 * (low + high) + 0.6 * (high - low) * wave

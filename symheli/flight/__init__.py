@@ -1,6 +1,5 @@
 """Closed-loop flights of the nonlinear model."""
 
-from symheli.flight.airspeed_monitor import AirspeedMonitor
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
 from symheli.flight.batch import FlightBatch, fly_batch
 from symheli.flight.campaign import fly_campaign
@@ -8,6 +7,7 @@ from symheli.flight.controller import Controller, ScheduledController
 from symheli.flight.excitation import Excitation
 from symheli.flight.flight_dataset import FlightDataset
 from symheli.flight.fly import fly
+from symheli.flight.parameter_monitor import ParameterMonitor
 from symheli.flight.plan import FlightPlan
 from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
@@ -18,7 +18,6 @@ from symheli.flight.table_controller import TableController
 
 __all__ = [
     "XCELL_SERVOS",
-    "AirspeedMonitor",
     "AirspeedSchedule",
     "Autopilot",
     "Controller",
@@ -26,6 +25,7 @@ __all__ = [
     "FlightBatch",
     "FlightDataset",
     "FlightPlan",
+    "ParameterMonitor",
     "ScheduledController",
     "Sensor",
     "Servo",

@@ -32,6 +32,8 @@ SCHEDULING = (Signal("airspeed", "m/s"), Signal("acceleration", "m/s^2"))
 """What a controller can be scheduled by."""
 EVERY_SPEED = Scheduling("airspeed", "m/s", 0.0, 1.0)
 """Of a controller that does not depend on it."""
+RATE, COMMAND = "_rate", "_command"
+"""End the names of an output that is the rate of a command, and of an input that is the command."""
 Follow = Literal["command", "reading"]
 
 
@@ -147,6 +149,11 @@ class ScheduledController:
             raise InputError("the controller is continuous: sample it with .discretize(dt)")
         if self.follow not in get_args(Follow):
             raise UnknownNameError("way to schedule", self.follow, get_args(Follow))
+        if rates := [y for y in self.model.outputs if y in {f"{u}{RATE}" for u in INPUTS}]:
+            raise InputError(
+                f"{', '.join(rates)}: the rate of a command is integrated by a TableController,"
+                " within its limits: TableController.of(model)"
+            )
         require_names("measured signal", self.model.inputs, TOLD)
         require_names("helicopter input", self.model.outputs, INPUTS)
         names = tuple(s.name for s in self.model.parameters)
@@ -247,8 +254,8 @@ def require_parameters(
         if not any(s.name == k and s.unit == k.unit for k in known):
             raise InputError(
                 f"{what}; this model is scheduled by {s.name} ({s.unit}): where that is one of"
-                " them under another name, .with_scheduling(Scheduling(name, unit, low, high,"
-                " rate)) renames it"
+                " them under another name or in another unit, .with_scheduling(Scheduling(name,"
+                " unit, low, high, rate)) brings it to that"
             )
 
 

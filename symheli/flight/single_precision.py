@@ -31,11 +31,11 @@ def rounded(given: object, name: str, shape: Sequence[int | None]) -> Array:
 
 
 def increasing(given: object, name: str) -> Array:
-    """Two airspeeds or more, as `rounded`; raises `InputError` unless they increase."""
+    """Two numbers or more, as `rounded`; raises `InputError` unless they increase."""
     out = rounded(given, name, (None,))
     if len(out) < 2 or (np.diff(out) <= 0).any():
         raise InputError(
-            f"{name}: expected two airspeeds or more that increase, in 32 bits too, got"
+            f"{name}: expected two values or more that increase, in 32 bits too, got"
             f" {np.asarray(given).tolist()!r:.80}"
         )
     return out

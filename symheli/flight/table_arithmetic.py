@@ -21,20 +21,21 @@ NEVER = 2**30
 class Status(IntFlag):
     """What a step of a `TableController` met with.
 
-    `SATURATED`: a command stands at its limit. `AIRSPEED`: the airspeed was bad and not followed.
-    `FALLBACK`: it was so for too long, and the controller moves to that of its fallback. `HELD`: a
-    number that is none came in or out; the commands in force stay, and nothing else changed.
+    `SATURATED`: a command stands at its limit. `PARAMETER`: the scheduling parameter was bad and
+    not followed. `FALLBACK`: it was so for too long, and the controller moves to its fallback.
+    `HELD`: a number that is none came in or out; the commands in force stay, and nothing else
+    changed.
 
     Examples
     --------
     >>> from symheli.flight import Status
-    >>> Status.AIRSPEED in Status.AIRSPEED | Status.FALLBACK
+    >>> Status.PARAMETER in Status.PARAMETER | Status.FALLBACK
     True
     """
 
     FINE = 0
     SATURATED = 1
-    AIRSPEED = 2
+    PARAMETER = 2
     FALLBACK = 4
     HELD = 8
 
@@ -53,7 +54,7 @@ class Numbers:
     [A B L; C D 0] and, one an output, the ends of its command `low`, `high`, whether it
     `integrates`; float32.
 
-    `fade` is the part of an offset that is left after a sample, `step` the most that the airspeed
+    `fade` is the part of an offset that is left after a sample, `step` the most that the parameter
     in use moves in one, `gain` that of the filter before (1: none), `frozen` and `hold` count
     samples.
     """
@@ -74,14 +75,14 @@ class Numbers:
 
     @property
     def searches(self) -> int:
-        """Halvings that find the interval of any airspeed."""
+        """Halvings that find the interval of any parameter."""
         return int(np.ceil(np.log2(len(self.knots) - 1)))
 
 
 @dataclass(eq=False)
 class State:
     """What the arithmetic keeps: which axes are `flown` (ny,), `x` (n,), `command` and `offset`
-    (ny,), `entry` (ny,) of `Entry`, and of the airspeed the last `reading` and its repetitions
+    (ny,), `entry` (ny,) of `Entry`, and of the parameter the last `reading` and its repetitions
     `same`, `bad` ones in a row, `target`, `filtered`, `used`.
     """
 
@@ -111,8 +112,8 @@ class State:
         self.entry = np.full(len(command), Entry.IN_FORCE)
 
 
-def follow_airspeed(n: Numbers, s: State, reading: np.float32, valid: bool) -> Status:
-    """Move the airspeed in use towards a reading, or what stands for a bad one."""
+def follow_parameter(n: Numbers, s: State, reading: np.float32, valid: bool) -> Status:
+    """Move the parameter in use towards a reading, or what stands for a bad one."""
     status = Status.FINE
     s.same = min(s.same + 1, NEVER - 1) if reading == s.reading else 0
     s.reading = reading
@@ -120,7 +121,7 @@ def follow_airspeed(n: Numbers, s: State, reading: np.float32, valid: bool) -> S
         s.bad = 0
         s.target = _clip(reading, n.knots[0], n.knots[-1])
     else:
-        status |= Status.AIRSPEED
+        status |= Status.PARAMETER
         s.bad = min(s.bad + 1, NEVER)
         if not s.started or s.bad > n.hold:
             status |= Status.FALLBACK
@@ -152,7 +153,7 @@ def matrices_at(n: Numbers, p: np.float32) -> Array:
 
 
 def commands(n: Numbers, s: State, error: Array, trim: Array, others: Array) -> Status:
-    """One step at the airspeed in use; the commands are then `s.command`.
+    """One step at the parameter in use; the commands are then `s.command`.
 
     Parameters
     ----------

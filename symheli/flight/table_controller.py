@@ -1,4 +1,4 @@
-"""A controller as it flies: a table over airspeed, in single precision."""
+"""A controller as it flies: a table over its scheduling parameter, in single precision."""
 
 from __future__ import annotations
 
@@ -15,8 +15,15 @@ from numpy.typing import ArrayLike
 
 from symheli.dynamics import INPUTS
 from symheli.errors import InputError, UnknownNameError
-from symheli.flight.airspeed_monitor import AirspeedMonitor
-from symheli.flight.controller import TOLD, Follow, ScheduledController, require_names
+from symheli.flight.controller import (
+    COMMAND,
+    SCHEDULING,
+    TOLD,
+    Follow,
+    ScheduledController,
+    require_names,
+)
+from symheli.flight.parameter_monitor import ParameterMonitor
 from symheli.flight.single_precision import (
     LARGEST,
     NUMBER,
@@ -27,20 +34,22 @@ from symheli.flight.single_precision import (
 )
 from symheli.flight.table_arithmetic import (
     NEVER,
+    Entry,
     Numbers,
     State,
     Status,
     commands,
-    follow_airspeed,
+    follow_parameter,
 )
 from symheli.flight.tabulated import Tabulated
 from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.lpv_state_space import LPVStateSpace
-from symheli.lpv.scheduling import Scheduling
+from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
+from symheli.values.units import per_second, ratio
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,22 +57,24 @@ class TableController:
     """x(k+1) = A(p) x + B(p) e + L(p) (u - w), w = u0 + C(p) x + D(p) e, u = w within its limits,
     e = measured - reference, all in 32-bit arithmetic.
 
-    A .. L stand in a table over airspeed, straight between its knots. `model` holds the same
+    A .. L stand in a table over one parameter p, straight between its knots. `model` holds the same
     numbers: what an analysis certifies is what `fly` flies and what `write_controller` writes in C,
     which gives the same bits. u0 is the trim of the flight at each moment. A command that
     integrates starts there and is then u(k) = u(k-1) + C x + D e within its limits, at which the
-    integration stops. The airspeed in use moves at the certified rate at most, whatever is read:
-    see `AirspeedMonitor`.
+    integration stops. The parameter in use moves at the certified rate at most, whatever is read:
+    see `ParameterMonitor`. `fly` provides the commanded airspeed and acceleration, and by `follow`
+    the readings; a table over anything else, as a Mach number, is told its parameter by `update`.
 
     Parameters
     ----------
     knots : array (K,)
-        Airspeeds, m/s, increasing, K >= 2.
+        Values of `parameter` in its unit, increasing, K >= 2.
     matrices : array (K, n + ny, n + nu + ny)
         [A B L; C D 0] at the knots; rounded to 32 bits. Rows of a command that integrates are what
         it changes by in a sample.
     states, inputs, outputs : sequence of str
-        n names; of nu measured states; of ny inputs of the helicopter.
+        n names; of nu measured states; of ny inputs of the helicopter. An input may also be the
+        command in force of an output that integrates, <name>_command, with the trim as reference.
     dt : float
         Sample period, s.
     integrates : sequence of str
@@ -71,15 +82,17 @@ class TableController:
     limits : mapping of str to (float, float)
         Ends of the commands, rad; none where nothing is given.
     rate : float
-        Certified rate of the airspeed, m/s^2.
+        Certified rate of the parameter, in its unit per second.
     fade : float
         Time constant, s, of the offset that joins the first command to the one in force before.
-    airspeed : AirspeedMonitor
-        What is done with the airspeed.
+    monitor : ParameterMonitor
+        What is done with what is told of the parameter.
     follow : {"command", "reading"}
-        Whether it is scheduled by the airspeed that is commanded, or as its sensor reads it.
+        Whether it is scheduled by what is commanded of the parameter, or as its sensor reads it.
     misfit : float
         Largest departure from the model that the table was made of; see `of`.
+    parameter : Signal
+        What the table is over, with its unit; default the airspeed, m/s.
 
     Raises
     ------
@@ -94,7 +107,7 @@ class TableController:
     >>> table = symheli.TableController.of(lqr.scheduled_controller.model, 17, limits=limits)
     >>> hover = symheli.AirspeedSchedule((2.0,), (1.0,), (0.0,), lead=0.2)
     >>> record = symheli.fly(heli, hover, controller=table)
-    >>> table.misfit < 1e-6, round(table.airspeed_used, 2)
+    >>> table.misfit < 1e-6, round(table.parameter_used, 2)
     (True, 2.0)
     """
 
@@ -108,9 +121,10 @@ class TableController:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rate: float = math.inf
     fade: float = 1.0
-    airspeed: AirspeedMonitor = field(default_factory=AirspeedMonitor)
+    monitor: ParameterMonitor = field(default_factory=ParameterMonitor)
     follow: Follow = "command"
     misfit: float = 0.0
+    parameter: Signal = SCHEDULING[0]
 
     __repr__ = summarized
 
@@ -119,10 +133,14 @@ class TableController:
             object.__setattr__(self, group, signals(getattr(self, group)))
         if not self.inputs or not self.outputs:
             raise InputError("a controller needs at least one input and one output")
-        require_names("measured signal", self.inputs, TOLD)
         require_names("helicopter input", self.outputs, INPUTS)
         indices(self.integrates, self.outputs, "output that integrates")
         object.__setattr__(self, "integrates", tuple(map(str, self.integrates)))
+        own = tuple(f"{y}{COMMAND}" for y in self.integrates)
+        require_names("measured signal", self.inputs, (*TOLD, *own))
+        read = tuple(Signal(s, "rad") if s in own else s for s in self.inputs)
+        object.__setattr__(self, "inputs", read)
+        object.__setattr__(self, "parameter", Signal(self.parameter))
         object.__setattr__(self, "knots", increasing(self.knots, "knots"))
         n, nu, ny = self.order, len(self.inputs), len(self.outputs)
         object.__setattr__(
@@ -135,7 +153,7 @@ class TableController:
         if not self.fade > 0:
             raise InputError(f"fade: expected a time constant in s > 0, got {self.fade}")
         if not self.rate >= 0:
-            raise InputError(f"rate: expected a number of m/s^2 >= 0, got {self.rate}")
+            raise InputError(f"rate: expected a number >= 0 of {self._per_second}, got {self.rate}")
         if not self.misfit >= 0:
             raise InputError(f"misfit: expected a number >= 0, got {self.misfit}")
         if self.follow not in get_args(Follow):
@@ -152,10 +170,10 @@ class TableController:
         correction: object | None = None,
         limits: Mapping[str, tuple[float, float]] | None = None,
         fade: float = 1.0,
-        airspeed: AirspeedMonitor | None = None,
+        monitor: ParameterMonitor | None = None,
         follow: Follow = "command",
     ) -> TableController:
-        """The table of a sampled model over airspeed.
+        """The table of a sampled model over one parameter, of any name and unit.
 
         Its `misfit` is the largest entry of table minus model, at the knots and at four points
         between every two, over the largest of the model: in A, B, C or D, where it is worst.
@@ -164,21 +182,22 @@ class TableController:
         ----------
         model : LPVStateSpace or synthesis.Controller
             As a `ScheduledController` takes it: `<name>_error` is reference minus measured; an
-            output may also be the rate of a command, as d_lon_rate (rad/s), which then integrates.
+            output may also be the rate of a command, as d_lon_rate (rad/s), which then integrates,
+            and d_lon_command an input, as in a design on `plant.velocity_form(measured=True)`.
         knots : int or sequence of float
-            So many at equal distances over the range of the model, or the airspeeds, m/s.
+            So many at equal distances over the range of the model, or the values, in its unit.
         correction : array_like, optional
             L, rad to states, (n, ny) or one at each knot (K, n, ny); 0: none. Default: gains of
             Kalman filters that read the states from the commands applied, none for those that
             integrate (see `symheli.flight.anti_windup`).
-        limits, fade, airspeed, follow
+        limits, fade, monitor, follow
             See above.
 
         Raises
         ------
         InputError
-            A continuous model or one over other parameters, knots beyond its range, numbers beyond
-            those of 32 bits.
+            A continuous model or one over several parameters, knots beyond its range, numbers
+            beyond those of 32 bits.
         """
         source = Tabulated(model)
         at = source.knots(knots)
@@ -193,8 +212,9 @@ class TableController:
             limits or {},
             source.model.scheduling.limit,
             fade,
-            airspeed or AirspeedMonitor(),
+            monitor or ParameterMonitor(),
             follow,
+            parameter=source.parameter,
         )
         return replace(table, misfit=source.misfit(table.knots, table.matrices))
 
@@ -203,12 +223,12 @@ class TableController:
     @cached_property
     def numbers(self) -> Numbers:
         """What the arithmetic reads, here and in C."""
-        a, (low, high) = self.airspeed, self._ends
+        a, (low, high) = self.monitor, self._ends
         fallback = 0.5 * (low + high) if a.fallback is None else a.fallback
         if not low <= fallback <= high:
             raise InputError(
-                f"fallback: expected an airspeed of the table, {low:g} to {high:g} m/s, got"
-                f" {fallback:g}"
+                f"fallback: expected a value of the table, {low:g} to {high:g}"
+                f" {self.parameter.unit}, got {fallback:g}"
             )
         plausible = a.plausible or (2 * low - high, 2 * high - low)
         ends = [self.limits.get(str(y), (-math.inf, math.inf)) for y in self.outputs]
@@ -239,10 +259,12 @@ class TableController:
         coefficients the 32-bit numbers of the table, straight between the knots. Only the rounding
         of sums and products in flight is left out.
 
-        A command that integrates is a state more, <name>_held, its deviation from the trim; that
-        the trim moves under it is left out.
+        A command that integrates is a state more, <name>_held, its deviation from the trim, which
+        is also what an input <name>_command reads; that the trim moves under it is left out.
         """
         n, own = self.order, self.order + len(self.inputs)
+        read = self.own_commands
+        seen = [n + j for j, s in enumerate(self.inputs) if s not in read]
         M = self.matrices[:, :, :own].astype(float)
         held = [i for i, y in enumerate(self.outputs) if y in self.integrates]
         count, m, ny = len(self.knots), len(held), len(self.outputs)
@@ -252,15 +274,21 @@ class TableController:
         A[:, :n, :n] = M[:, :n, :n]
         A[:, n:, :n] = M[:, n:, :n][:, held]
         A[:, n:, n:] = np.eye(m)
+        for j, s in enumerate(self.inputs):
+            if s in read:
+                k = held.index(indices([read[s]], self.outputs, "output")[0])
+                A[:, :n, n + k] += M[:, :n, n + j]
+                A[:, n:, n + k] += M[:, n:, n + j][:, held]
+                keep[:, :, k] += M[:, n:, n + j]
         return LPVStateSpace(
             PiecewiseLinear(tuple(self.knots.astype(float).tolist())),
             A,
-            np.concatenate([M[:, :n, n:], M[:, n:, n:][:, held]], axis=1),
+            np.concatenate([M[:, :n, seen], M[:, n:, seen][:, held]], axis=1),
             np.concatenate([M[:, n:, :n], keep], axis=2),
-            M[:, n:, n:],
-            (Scheduling("airspeed", "m/s", *self._ends, self._rate),),
+            M[:, n:, seen],
+            (Scheduling(str(self.parameter), self.parameter.unit, *self._ends, self._rate),),
             (*self.states, *(Signal(f"{self.outputs[i]}_held", "rad") for i in held)),
-            self.inputs,
+            tuple(s for s in self.inputs if s not in read),
             self.outputs,
             self.dt,
         )
@@ -268,9 +296,10 @@ class TableController:
     @property
     def in_double_precision(self) -> ScheduledController:
         """`model` in 64-bit arithmetic, compiled: for many flights within the limits, with an
-        airspeed that keeps to its rate and is always good.
+        parameter that keeps to its rate and is always good.
 
-        Raises `InputError` where a command integrates.
+        Raises `InputError` where a command integrates, and for a parameter that is neither airspeed
+        nor acceleration.
         """
         if self.integrates:
             raise InputError(
@@ -299,7 +328,7 @@ class TableController:
     # --- how it flies ----------------------------------------------------------------------------
 
     def reset(self, command: ArrayLike | None = None) -> None:
-        """States, filters and integrators to those on the ground; the airspeed in use starts at
+        """States, filters and integrators to those on the ground; the parameter in use starts at
         the next good reading.
 
         With `command` (ny,), rad, the one in force now: the next step answers just that, whatever
@@ -323,7 +352,7 @@ class TableController:
         measured: ArrayLike,
         reference: ArrayLike,
         trim: ArrayLike,
-        airspeed: float,
+        parameter: float,
         *,
         valid: bool = True,
         others: ArrayLike | None = None,
@@ -333,11 +362,12 @@ class TableController:
         Parameters
         ----------
         measured, reference : (nu,)
-            Of the inputs, in their units.
+            Of the inputs, in their units; of an input <name>_command the command in force, which is
+            the trim on the ground, and its trim.
         trim : (ny,)
             Of the outputs, rad.
-        airspeed : float
-            As it is read, or commanded, m/s; anything where it is bad.
+        parameter : float
+            As it is read, or commanded, in its unit; anything where it is bad.
         valid : bool
             Whether who read it trusts it.
         others : (ny,), optional
@@ -348,19 +378,25 @@ class TableController:
             seen, held = as_told("measured", measured, nu), as_told("reference", reference, nu)
             at = as_told("trim", trim, ny)
             elsewhere = at if others is None else as_told("others", others, ny)
-            s.status = follow_airspeed(n, s, NUMBER(airspeed), valid)
+            s.status = follow_parameter(n, s, NUMBER(parameter), valid)
             s.status |= commands(n, s, seen - held, at, elsewhere)
         return s.command.copy()
 
     def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> Array:
-        """Commands (4,), rad; see `Controller`. Inputs it does not name stay at their trim."""
-        told = measured if self.follow == "reading" else p
+        """Commands (4,), rad; see `Controller`. Inputs it does not name stay at their trim.
+
+        Raises `InputError` where a flight does not provide the parameter of the table.
+        """
+        parameter = self._provided(measured if self.follow == "reading" else p)
         u = np.array([reference[s] for s in INPUTS])
+        trim, state, read = u[self._rows], self._state, self.own_commands
+        before = np.where(state.entry == Entry.GROUND, trim, state.command)
+        in_force = dict(zip(map(str, self.outputs), before, strict=True))
         u[self._rows] = self.update(
-            [measured[s] for s in self.inputs],
-            [reference[s] for s in self.inputs],
-            u[self._rows],
-            told["airspeed"],
+            [in_force[read[s]] if s in read else measured[s] for s in self.inputs],
+            [reference[read.get(s, s)] for s in self.inputs],
+            trim,
+            parameter,
         )
         return u
 
@@ -370,8 +406,8 @@ class TableController:
         return self._state.status
 
     @property
-    def airspeed_used(self) -> float:
-        """Where in the table the last step was, m/s."""
+    def parameter_used(self) -> float:
+        """Where in the table the last step was, in the unit of the parameter."""
         return float(self._state.used)
 
     # --- inside ----------------------------------------------------------------------------------
@@ -384,16 +420,42 @@ class TableController:
     def _rows(self) -> list[int]:
         return indices(self.outputs, INPUTS, "helicopter input")
 
+    @cached_property
+    def own_commands(self) -> Mapping[str, str]:
+        """{input <name>_command: the output that it is the command in force of}."""
+        known = {f"{y}{COMMAND}": y for y in self.integrates}
+        return {str(s): known[s] for s in self.inputs if s in known}
+
+    def _provided(self, told: NamedVector) -> float:
+        """The parameter in the unit of the table, of what a flight tells."""
+        if self.parameter == UNSCHEDULED.name:
+            return UNSCHEDULED.middle
+        for signal, value in zip(told.signals, told.array, strict=True):
+            if signal == self.parameter and (size := ratio(signal.unit, self.parameter.unit)):
+                return size * float(value)
+        known = ", ".join(f"{s} ({s.unit})" for s in told.signals)
+        raise InputError(
+            f"the table is over {self.parameter} ({self.parameter.unit}), and a flight provides"
+            f" {known} where it follows the {self.follow}: tell it its parameter by"
+            " .update(measured, reference, trim, parameter) in a controller of your own; or, where"
+            " it is one of them under another name, rename that of the model,"
+            " .with_scheduling(Scheduling(name, unit, low, high, rate))"
+        )
+
+    @property
+    def _per_second(self) -> str:
+        return per_second(self.parameter.unit)
+
     @property
     def _ends(self) -> tuple[float, float]:
         return float(self.knots[0]), float(self.knots[-1])
 
     @property
     def _rate(self) -> float:
-        return self.rate if self.airspeed.rate is None else self.airspeed.rate
+        return self.rate if self.monitor.rate is None else self.monitor.rate
 
     def _largest_step(self) -> np.float32:
-        """What the airspeed in use may move by in a sample: rounding its sum takes it no farther
+        """What the parameter in use may move by in a sample: rounding its sum takes it no farther
         than the rate allows.
         """
         most = self._rate * self.dt
@@ -402,8 +464,8 @@ class TableController:
         rounding = float(np.spacing(np.abs(self.knots).max()))
         if most <= 2 * rounding:
             raise InputError(
-                f"rate: {self._rate:g} m/s^2 moves the airspeed by less in a sample than 32 bits"
-                " resolve; sample more slowly, or give rate=0"
+                f"rate: {self._rate:g} {self._per_second} moves {self.parameter} by less in a"
+                " sample than 32 bits resolve; sample more slowly, or give rate=0"
             )
         return inward(most - rounding, -math.inf)
 

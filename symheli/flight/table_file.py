@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from symheli.flight.airspeed_monitor import AirspeedMonitor
+from symheli.flight.parameter_monitor import ParameterMonitor
 from symheli.flight.table_controller import TableController
 from symheli.values import Signal, plain_file
 
@@ -29,7 +29,8 @@ def save(table: TableController, path: str | os.PathLike[str]) -> Path:
         "limits": table.limits,
         "rate": table.rate,
         "fade": table.fade,
-        "airspeed": asdict(table.airspeed),
+        "monitor": asdict(table.monitor),
+        "parameter": [str(table.parameter), table.parameter.unit],
         "follow": table.follow,
         "misfit": table.misfit,
     }
@@ -46,7 +47,10 @@ def load(path: str | os.PathLike[str]) -> TableController:
         n, ny = len(groups["states"]), len(groups["outputs"])
         shape = (len(content["knots"]), n + ny, n + len(groups["inputs"]) + ny)
         content["matrices"] = np.reshape(content["matrices"], shape)
-        content["airspeed"] = AirspeedMonitor(**content["airspeed"])
+        monitor = content.pop("airspeed" if "airspeed" in content else "monitor")
+        content["monitor"] = ParameterMonitor(**monitor)
+        if "parameter" in content:  # files that say none are over airspeed
+            content["parameter"] = Signal(*content["parameter"])
         return TableController(**content, **groups)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise plain_file.incomplete(path, error) from error

@@ -1,4 +1,4 @@
-"""A sampled model over airspeed as a table for single precision."""
+"""A sampled model over one parameter as a table for single precision."""
 
 from __future__ import annotations
 
@@ -9,22 +9,20 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.flight.anti_windup import observer_gains
-from symheli.flight.controller import SCHEDULING, deviations, require_parameters
+from symheli.flight.controller import RATE, deviations
 from symheli.flight.single_precision import increasing
 from symheli.lpv.bases.interpolating import PiecewiseLinear
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
 from symheli.values.arrays import Array
 from symheli.values.signal import Signal
 
-RATE = "_rate"
-"""Ends the name of an output that is the rate of a command."""
 BETWEEN = 4
 """Points between two knots at which a table is compared with what it is of."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tabulated:
-    """The sampled `model` over airspeed of a `TableController`; raises `InputError` for any
+    """The sampled `model` over one parameter of a `TableController`; raises `InputError` for any
     other.
     """
 
@@ -34,15 +32,23 @@ class Tabulated:
         object.__setattr__(self, "model", deviations(self.model))
         if self.model.dt is None:
             raise InputError("the controller is continuous: sample it with .discretize(dt)")
-        require_parameters("a table is one over airspeed alone, in m/s", self.model, SCHEDULING[:1])
         if len(self.model.parameters) > 1:
-            raise InputError("a table is one over airspeed alone, freeze the other parameters")
+            raise InputError(
+                "a table is over one scheduling parameter, this model over"
+                f" {', '.join(s.name for s in self.model.parameters)}: design the controller over"
+                " one of them"
+            )
 
     @property
     def dt(self) -> float:
         """Sample period, s."""
         assert self.model.dt is not None  # noqa: S101
         return self.model.dt
+
+    @property
+    def parameter(self) -> Signal:
+        """What the table is over, with its unit."""
+        return Signal(self.model.scheduling.name, self.model.scheduling.unit)
 
     @property
     def outputs(self) -> tuple[Signal, ...]:
@@ -65,15 +71,15 @@ class Tabulated:
         slack = 1e-6 * (high - low)
         if at[0] < low - slack or at[-1] > high + slack:
             raise InputError(
-                f"knots: expected airspeeds within {low:g} to {high:g} m/s, the range of the"
-                f" model, got {at[0]:g} to {at[-1]:g}"
+                f"knots: expected values within {low:g} to {high:g} {self.parameter.unit}, the"
+                f" range of {self.parameter} of the model, got {at[0]:g} to {at[-1]:g}"
             )
         return at
 
-    def at(self, airspeeds: Array) -> Matrices:
+    def at(self, p: Array) -> Matrices:
         """A, B, C, D (N, ...), rates as what they change in a sample."""
         s = self.model.scheduling
-        A, B, C, D = self.model.matrices(np.clip(airspeeds, s.low, s.high))
+        A, B, C, D = self.model.matrices(np.clip(p, s.low, s.high))
         each = np.where(self.rates, self.dt, 1.0)[:, None]
         return Matrices(A, B, each * C, each * D)
 

@@ -52,10 +52,15 @@ def define(name: str, value: object, comment: str = "") -> str:
     return f"#define {name} {value}" + (f" /* {comment} */" if comment else "")
 
 
+def in_comment(text: str) -> str:
+    """A text of somebody's own in a C comment: on one line, and not its end."""
+    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")
+
+
 def index_macros(prefix: str, names: Sequence[Signal], notes: Sequence[str] = ()) -> list[str]:
     """The index of every signal, with its unit and what `notes`, one each, say of it."""
     return [
-        define(f"{prefix}{identifier(s)}", i, f"{s.unit}, {note}" if note else s.unit)
+        define(f"{prefix}{identifier(s)}", i, in_comment(f"{s.unit}, {note}" if note else s.unit))
         for i, (s, note) in enumerate(zip(names, notes or [""] * len(names), strict=True))
     ]
 

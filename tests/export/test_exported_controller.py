@@ -11,23 +11,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flight.tables import OUTPUTS, static, table
+from flight.tables import MACH, OUTPUTS, over, static, table, velocity
 
 from studies.cli import main
-from symheli import AirspeedMonitor, InputError, TableController
+from symheli import InputError, ParameterMonitor, Signal, TableController
 from symheli.export import write_controller
 
 CC = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 EXACT = "-ffp-contract=off"
-MONITOR = AirspeedMonitor(lag=0.1, frozen=0.5, hold=0.3, fallback=4.0)
+MONITOR = ParameterMonitor(lag=0.1, frozen=0.5, hold=0.3, fallback=4.0)
 RATES = ("d_lon_rate", "d_lat", "d_col_rate", "d_ped_rate")
 TABLES = {
-    "position": lambda: table(10, 33, airspeed=MONITOR, follow="reading"),
-    "rates": lambda: table(5, 8, outputs=RATES, airspeed=MONITOR, follow="reading"),
-    "gains": lambda: static(0.3, airspeed=MONITOR, limits={"d_lat": (-0.1, 0.05)}),
+    "position": lambda: table(10, 33, monitor=MONITOR, follow="reading"),
+    "rates": lambda: table(5, 8, outputs=RATES, monitor=MONITOR, follow="reading"),
+    "gains": lambda: static(0.3, monitor=MONITOR, limits={"d_lat": (-0.1, 0.05)}),
     "gains of four": lambda: table(0, (0.0, 0.3, 7.0, 13.0), limit=None),
     "no anti-windup": lambda: table(3, 3, correction=0, follow="reading"),
+    "over Mach": lambda: over(MACH, 9),
+    "reads its command": lambda: velocity(follow="reading"),
     "one output": lambda: table(2, 2, outputs=("d_ped",), limit=0.02),
 }
 
@@ -261,13 +263,33 @@ def test_the_header_says_what_it_is(tmp_path):
         "#define OWN_U_phi 6 /* rad */",
         "#define OWN_Y_d_lon 0 /* rad, -0.2 to 0.2, integrates */",
         "#define OWN_Y_d_lat 1 /* rad, -0.2 to 0.2 */",
-        "straight between 8 airspeeds from 0 to 13 m/s",
+        "straight between 8 values of airspeed from 0 to 13 m/s",
         "moves at 3 m/s^2 at most",
         "fades with 0.7 s",
         "as its sensor reads it",
         "int own_update(own_state *s",
     ):
         assert said in header, said
+
+
+def test_the_header_names_the_parameter_that_the_table_is_over(tmp_path):
+    odd = replace(over(MACH, 9), parameter=Signal("Mach */ number", "1"), rate=0.05)
+    header, code, _ = (file.read_text() for file in write_controller(odd, tmp_path, "own"))
+    for said in (
+        "Controller in a table over Mach * / number, for every 0.02 s",
+        "straight between 9 values of Mach * / number from 0.2 to 0.9\n",
+        "moves at 0.05 1/s at most",
+        "Mach * / number (1) as it is commanded",
+        "float parameter, int parameter_valid",
+        "OWN_PARAMETER = 2",
+    ):
+        assert said in header, said
+    assert "airspeed" not in (header + code).lower()
+    header = write_controller(velocity(), tmp_path, "own")[0].read_text()
+    assert (
+        "OWN_U_d_lat_command 2 /* rad, in force, its trim before one is; reference: the trim */"
+        in header
+    )
 
 
 def test_what_cannot_be_written_is_refused(tmp_path):

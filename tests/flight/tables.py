@@ -1,9 +1,11 @@
 """Controllers to make tables of, for several test modules."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import symheli
-from symheli import AirspeedMonitor, TableController
+from symheli import ParameterMonitor, TableController
 
 OUTPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 INPUTS = ("u", "v", "w", "p", "q", "r", "phi", "theta")
@@ -41,10 +43,25 @@ def sampled(order, inputs=INPUTS, outputs=OUTPUTS, *, low=0.0, high=13.0, rate=3
 
 def table(order=6, knots=9, *, outputs=OUTPUTS, limit=0.2, **options):
     """Of `sampled`, with the same limit on all commands."""
-    options.setdefault("airspeed", AirspeedMonitor(lag=0.1, frozen=0.5, hold=0.3, fallback=4.0))
+    options.setdefault("monitor", ParameterMonitor(lag=0.1, frozen=0.5, hold=0.3, fallback=4.0))
     names = [y.removesuffix("_rate") for y in outputs]
     limits = {} if limit is None else {y: (-limit, limit) for y in names}
     return TableController.of(sampled(order, outputs=outputs), knots, limits=limits, **options)
+
+
+MACH = symheli.Scheduling("Mach", "1", 0.2, 0.9, 0.1)
+
+
+def over(scheduling, knots=5, order=2, **options):
+    """Of `sampled`, over another parameter."""
+    model = sampled(order, low=scheduling.low, high=scheduling.high)
+    return TableController.of(replace(model, parameters=scheduling), knots, **options)
+
+
+def velocity(**options):
+    """Of bank and its command, d_lat_command, by the rate of that."""
+    model = sampled(3, ("phi", "p", "d_lat_command"), ("d_lat_rate",))
+    return TableController.of(model, 5, limits={"d_lat": (-0.2, 0.2)}, **options)
 
 
 def static(gain, *, rate=3.0, output="d_lat", **options):

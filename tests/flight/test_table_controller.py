@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flight.flown import SHORT, STORM, differences, dynamic
-from flight.tables import DT, INPUTS, OUTPUTS, sampled, static, table
+from flight.tables import DT, INPUTS, MACH, OUTPUTS, over, sampled, static, table
 
 import symheli
-from symheli import AirspeedMonitor, InputError, TableController, fly
+import synthesis
+from symheli import InputError, LinearModel, LPVStateSpace, ParameterMonitor, TableController, fly
 from symheli.flight import Status
 from symheli.flight.anti_windup import saturated_radius
+from symheli.flight.table_file import SCHEMA
+from symheli.values import plain_file
 
 ROUNDING = float(np.finfo(np.float32).eps)
 
@@ -82,7 +85,7 @@ def test_any_airspeed_is_looked_up_between_its_knots(knots):
         held = np.clip(p, 0.0, 13.0)
         # eight products of numbers of size 1 in 32 bits
         np.testing.assert_allclose(first, t.model.at(held).D @ e, atol=8 * ROUNDING)
-        assert t.airspeed_used == np.float32(held)
+        assert t.parameter_used == np.float32(held)
 
 
 # --- beside 64-bit arithmetic --------------------------------------------------------------------
@@ -92,8 +95,8 @@ def test_within_its_limits_a_table_runs_as_its_model_in_double_precision():
     t = table(order=6, limit=None)
     rng = np.random.default_rng(0)
     errors, p = 0.1 * rng.standard_normal((400, 8)), 6.0 + 5.0 * np.sin(0.008 * np.arange(400))
-    monitor = AirspeedMonitor(rate=math.inf)
-    free = replace(t, airspeed=monitor)
+    monitor = ParameterMonitor(rate=math.inf)
+    free = replace(t, monitor=monitor)
     zeros, trim = np.zeros(8), np.zeros(4)
     mine = np.array([free.update(e, zeros, trim, at) for e, at in zip(errors, p, strict=True)])
     _, exact = free.model.simulate(p, errors)
@@ -302,13 +305,13 @@ def used_along(t, readings, valid=None):
             p,
             valid=True if valid is None else bool(valid[k]),
         )
-        out.append((t.airspeed_used, t.status))
+        out.append((t.parameter_used, t.status))
     used, status = zip(*out, strict=True)
     return np.array(used), list(status)
 
 
 def gain(**monitor):
-    return static(1.0, follow="reading", airspeed=AirspeedMonitor(**monitor))
+    return static(1.0, follow="reading", monitor=ParameterMonitor(**monitor))
 
 
 def test_whatever_is_read_the_airspeed_in_use_keeps_to_the_certified_rate():
@@ -337,13 +340,13 @@ def test_a_bad_airspeed_is_held_and_then_left_for_the_fallback(wrong):
     late = 24 if wrong == "frozen" else 0  # the 25th repetition is half a second's
     held = used[50 + late : 50 + late + 50]
     np.testing.assert_array_equal(held, np.float32(6.0))
-    assert set(status[50 + late : 50 + late + 50]) == {Status.AIRSPEED}
+    assert set(status[50 + late : 50 + late + 50]) == {Status.PARAMETER}
     moving = used[50 + late + 50 :]
     np.testing.assert_allclose(
         moving, np.maximum(6.0 - 3.0 * DT * np.arange(1, len(moving) + 1), 2.0), atol=2e-4
     )
     assert moving[-1] == 2.0
-    assert status[-1] == Status.AIRSPEED | Status.FALLBACK
+    assert status[-1] == Status.PARAMETER | Status.FALLBACK
     back, _ = used_along(t, np.linspace(6.1, 6.2, 100))
     assert back[0] == pytest.approx(2.06, abs=1e-5)
 
@@ -352,7 +355,7 @@ def test_an_entry_with_a_bad_airspeed_begins_at_the_fallback():
     t = gain(fallback=3.0)
     used, status = used_along(t, [math.nan, 8.0, 8.0])
     np.testing.assert_allclose(used, [3.0, 3.06, 3.12], rtol=1e-5)
-    assert status[0] == Status.AIRSPEED | Status.FALLBACK
+    assert status[0] == Status.PARAMETER | Status.FALLBACK
 
 
 def test_the_filter_before_the_limit_lags_by_its_time_constant():
@@ -364,7 +367,7 @@ def test_the_filter_before_the_limit_lags_by_its_time_constant():
 
 
 def test_a_constant_command_is_no_frozen_reading():
-    t = static(1.0, airspeed=AirspeedMonitor(frozen=0.1))
+    t = static(1.0, monitor=ParameterMonitor(frozen=0.1))
     used, status = used_along(t, np.full(100, 7.0))
     assert set(used) == {7.0}
     assert not any(status)
@@ -391,7 +394,7 @@ def test_numbers_that_are_none_hold_the_commands_and_harm_nothing():
 @pytest.mark.parametrize("order", [0, 5])
 def test_a_table_comes_back_from_its_file_to_the_last_bit(tmp_path, order):
     t = table(order=order, limit=None, outputs=("d_lon", "d_lat_rate", "d_col", "d_ped"))
-    t = replace(t, limits={"d_lat": (-math.inf, 0.1)}, airspeed=AirspeedMonitor(hold=math.inf))
+    t = replace(t, limits={"d_lat": (-math.inf, 0.1)}, monitor=ParameterMonitor(hold=math.inf))
     back = TableController.load(t.save(tmp_path / "t.json"))
     for name in ("knots", "matrices"):
         np.testing.assert_array_equal(getattr(back, name), getattr(t, name))
@@ -404,14 +407,26 @@ def test_a_table_comes_back_from_its_file_to_the_last_bit(tmp_path, order):
         "limits",
         "rate",
         "fade",
-        "airspeed",
+        "monitor",
         "follow",
         "misfit",
+        "parameter",
     ):
         assert getattr(back, name) == getattr(t, name), name
     assert back.inputs[0].unit == "m/s"
     errors = np.random.default_rng(0).standard_normal((30, 8))
     np.testing.assert_array_equal(run(back, errors, 5.0), run(t, errors, 5.0))
+
+
+def test_a_file_from_before_tables_named_their_parameter_is_one_over_airspeed(tmp_path):
+    t = table(order=1)
+    content = plain_file.read(t.save(tmp_path / "new.json"), SCHEMA)
+    content["airspeed"] = content.pop("monitor")
+    del content["parameter"]
+    back = TableController.load(plain_file.write(tmp_path / "old.json", SCHEMA, content))
+    assert (back.parameter, back.parameter.unit) == ("airspeed", "m/s")
+    assert back.monitor == t.monitor
+    np.testing.assert_array_equal(back.matrices, t.matrices)
 
 
 def test_a_damaged_file_says_so(tmp_path):
@@ -430,6 +445,126 @@ def test_a_damaged_file_says_so(tmp_path):
         TableController.load(tmp_path / "none.json")
 
 
+# --- any parameter -------------------------------------------------------------------------------
+
+
+def test_a_table_over_any_parameter_is_the_one_over_airspeed_under_its_name(tmp_path):
+    """Name and unit are kept by save and load; the numbers do not depend on them."""
+    own = over(MACH)
+    other = TableController.of(sampled(2, low=0.2, high=0.9, rate=0.1), 5)
+    back = TableController.load(own.save(tmp_path / "mach.json"))
+    s = back.model.scheduling
+    assert (s.name, s.unit, s.low, s.rate) == ("Mach", "1", np.float32(0.2), 0.1)
+    errors = np.random.default_rng(0).standard_normal((30, 8))
+    for at in (0.2, 0.55, 1.1):
+        np.testing.assert_array_equal(run(back, errors, at), run(other, errors, at))
+    with pytest.raises(InputError, match=r"rate: 1e-09 1/s moves Mach by less"):
+        over(MACH, monitor=ParameterMonitor(rate=1e-9))
+    with pytest.raises(InputError, match=r"within 0\.2 to 0\.9 1, the range of Mach"):
+        over(MACH, (0.1, 0.5))
+
+
+@pytest.mark.parametrize("follow", ["command", "reading"])
+def test_a_flight_does_not_feed_its_airspeed_to_a_table_over_something_else(ideal, follow):
+    hover = symheli.AirspeedSchedule((2.0,), (1.0,), (0.0,), lead=0.2)
+    with pytest.raises(InputError, match=r"over Mach \(1\), and a flight provides .*airspeed"):
+        fly(ideal, hover, controller=over(MACH, follow=follow))
+    wrong = symheli.Scheduling("airspeed", "rad", 0.0, 13.0, 3.0)
+    with pytest.raises(InputError, match=r"over airspeed \(rad\)"):
+        fly(ideal, hover, controller=over(wrong, follow=follow))
+
+
+def test_what_a_flight_provides_in_another_unit_is_converted(ideal):
+    lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 8.0, dt=DT, points=5).scheduled_controller.model
+    speed = lqr.with_scheduling(symheli.Scheduling("airspeed", "km/h", 0.0, 28.8, 10.8))
+    climb = symheli.AirspeedSchedule.transition(3.0, 5.0, acceleration=2.0, hold=0.5)
+    own, told = (TableController.of(model, 9) for model in (lqr.with_rate(3.0), speed))
+    flown = [fly(ideal, climb, controller=each).values for each in (told, own)]
+    np.testing.assert_allclose(*flown, atol=1e-4)  # 32 bits round the knots otherwise
+    assert told.parameter_used == pytest.approx(3.6 * own.parameter_used, rel=1e-5)
+
+
+def test_a_table_over_the_acceleration_flies_and_one_over_nothing_too(ideal):
+    """What the flight commands beside the airspeed serves too; a constant controller needs none."""
+    lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 8.0, dt=DT, points=5).scheduled_controller.model
+    hold = symheli.AirspeedSchedule.transition(3.0, 3.5, acceleration=0.5, hold=0.3)
+    box = symheli.Scheduling("acceleration", "m/s^2", -1.0, 1.0, 5.0)
+    records = []
+    for scheduling in ((box,), ()):
+        table = TableController.of(LPVStateSpace.constant(lqr.at(3.0), *scheduling), 3)
+        records.append(fly(ideal, hold, controller=table).values)
+    np.testing.assert_array_equal(*records)
+
+
+# --- a design in velocity form -------------------------------------------------------------------
+
+
+def test_a_table_of_the_velocity_form_is_the_loop_that_was_designed():
+    """Where the command is a measurement too, the table reads its own: the plant with a sample of
+    delay under the table is the plant behind integrators under the design.
+    """
+    roll = symheli.LinearModel(
+        [[-8.0, 0.0], [1.0, 0.0]], [[120.0, 1.0], [0.0, 0.0]], np.eye(2), np.zeros((2, 2)),
+        ("p", "phi"), ("d_lat", "gust"), ("p", "phi"),
+    ).discretize(DT)  # fmt: skip
+    bare = synthesis.Plant(
+        roll, disturbances=["gust"], performance=["phi"], controls=["d_lat"],
+        measurements=["phi", "p"],
+    )  # fmt: skip
+    gains = LinearModel.gain([[-2.0, -0.5, -9.0]], ("phi", "p", "d_lat_command"), ("d_lat_rate",))
+    design = LPVStateSpace.constant(replace(gains, dt=DT), MACH)
+    t = TableController.of(design, 2)
+    assert t.own_commands == {"d_lat_command": "d_lat"}
+    loops = (
+        bare.velocity_form(measured=True).close(design),
+        bare.with_delay(DT).close(t),
+    )
+    own, flown = (loop.at(0.5).frequency_response(np.geomspace(0.1, 100.0, 9)) for loop in loops)
+    np.testing.assert_allclose(flown, own, rtol=1e-5)  # 32 bits
+    # in flight too: the response of the closed integrator to a constant error
+    model, h, u = t.model.at(0.5), 0.0, []
+    for _ in range(20):
+        u.append(model.C[0, 0] * h + model.D[0, 0] * 0.01)
+        h = model.A[0, 0] * h + model.B[0, 0] * 0.01
+    flown, in_force = [], np.zeros(1)
+    for _ in range(20):
+        in_force = t.update([0.01, 0.0, in_force[0] + 0.1], [0.0, 0.0, 0.1], [0.1], 0.5) - 0.1
+        flown.append(float(in_force[0]))
+    np.testing.assert_allclose(flown, u, atol=1e-6)
+
+
+def test_a_controller_that_reads_its_command_flies_on_and_off_the_ground(ideal):
+    """`fly` tells it the command in force: the record is that of a controller that keeps it."""
+    names = ("phi", "p", "d_lat_command")
+    gains = LinearModel.gain([[-2.0, -0.5, -9.0]], names, ("d_lat_rate",))
+    speed = symheli.Scheduling("airspeed", "m/s", 0.0, 13.0, 3.0)
+    design = LPVStateSpace.constant(replace(gains, dt=DT), speed)
+    t = TableController.of(design, 2)
+
+    class ByHand:
+        dt = DT
+
+        def reset(self):
+            self.u = None
+
+        def step(self, measured, reference, p):
+            out = np.array([reference[name] for name in OUTPUTS])
+            before = out[1] if self.u is None else self.u
+            error = [measured[s] - reference[s] for s in names[:2]] + [before - out[1]]
+            self.u = out[1] = before + DT * float(gains.D[0] @ error)
+            return out
+
+    hover = symheli.AirspeedSchedule((2.0,), (1.0,), (0.0,), lead=0.2)
+    own, hand = (fly(ideal, hover, controller=c) for c in (t, ByHand()))
+    np.testing.assert_allclose(own.values, hand.values, atol=1e-4)
+    assert np.ptp(own["d_lat"]) > 1e-6
+    with pytest.raises(InputError, match=r"d_lat_rate: .* integrated by a TableController"):
+        symheli.ScheduledController(design)
+    bad = replace(gains, dt=DT, inputs=("phi", "p", "d_ped_command"))
+    with pytest.raises(InputError, match="unknown measured signal 'd_ped_command'"):
+        TableController.of(LPVStateSpace.constant(bad, speed), 2)
+
+
 # --- bad input -----------------------------------------------------------------------------------
 
 
@@ -443,12 +578,7 @@ def test_what_is_no_table_is_refused():
     for model, knots, said in (
         (3.0, 5, "expected an LPVStateSpace, .* got float"),
         (bad(dt=None), 5, "is continuous"),
-        (bad(parameters=(height,)), 5, "over airspeed alone, in m/s; this model is .* height"),
-        (
-            bad(parameters=(replace(good.scheduling, unit="kt"),)),
-            5,
-            r"scheduled by airspeed \(kt\)",
-        ),
+        (good.with_parameter(height), 5, "one scheduling parameter, .* over airspeed, height"),
         (bad(inputs=("bank", *INPUTS[1:])), 5, "unknown measured signal 'bank'"),
         (bad(outputs=("roll", *OUTPUTS[1:])), 5, "unknown helicopter input 'roll'"),
         (good, 1, "at least 2"),
@@ -468,8 +598,8 @@ def test_what_is_no_table_is_refused():
         ({"follow": "wind"}, "unknown way to schedule 'wind'"),
         ({"correction": np.zeros((3, 3))}, r"correction: expected \(states, outputs\) \(2, 4\)"),
         ({"correction": np.full((2, 4), math.nan)}, "matrices: entry"),
-        ({"airspeed": AirspeedMonitor(fallback=20.0)}, "fallback: expected an airspeed of the"),
-        ({"airspeed": AirspeedMonitor(rate=1e-6)}, "than 32 bits resolve"),
+        ({"monitor": ParameterMonitor(fallback=20.0)}, "fallback: expected a value of the"),
+        ({"monitor": ParameterMonitor(rate=1e-6)}, "than 32 bits resolve"),
     ):
         with pytest.raises(InputError, match=said):
             TableController.of(good, 5, **options)
@@ -501,4 +631,4 @@ def test_what_is_no_table_is_refused():
 )
 def test_a_monitor_of_nonsense_is_refused(options, said):
     with pytest.raises(InputError, match=said):
-        AirspeedMonitor(**options)
+        ParameterMonitor(**options)

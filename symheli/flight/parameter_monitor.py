@@ -1,4 +1,4 @@
-"""What a controller does with the airspeed it is given, a wrong one too."""
+"""What a controller does with the scheduling parameter it is given, a wrong one too."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from symheli.errors import InputError
 
 
 @dataclass(frozen=True)
-class AirspeedMonitor:
-    """How the scheduling parameter of a controller follows a reading of the airspeed.
+class ParameterMonitor:
+    """How the scheduling parameter of a controller follows a reading of it, as an airspeed.
 
     A good reading is held at the ends of the table, filtered (`lag`) and followed at `rate` at
     most, the rate for which the loop is certified. A bad one (no number, said to be invalid,
@@ -22,19 +22,20 @@ class AirspeedMonitor:
     Parameters
     ----------
     rate : float, optional
-        m/s^2; default the rate limit of the model's scheduling.
+        In its unit per second; default the rate limit of the model's scheduling.
     lag : float
         Time constant of a first-order filter before the rate limit, s; 0: none.
     plausible : (float, float), optional
-        Readings outside are bad, m/s; default the range of the table and its width on either side.
+        Readings outside are bad, in its unit; default the range of the table and its width on
+        either side.
     frozen : float
         Longest time that a reading may stay the same to the last bit, s; longer for a sensor that
-        rounds, math.inf where a constant airspeed is right. A commanded airspeed may stay as long
-        as it likes.
+        rounds, math.inf where a constant one is right. What is commanded may stay as long as it
+        likes.
     hold : float
         How long the last good reading stays, s.
     fallback : float, optional
-        m/s; default the middle of the table.
+        In its unit; default the middle of the table.
 
     Raises
     ------
@@ -44,7 +45,7 @@ class AirspeedMonitor:
     Examples
     --------
     >>> import symheli
-    >>> symheli.AirspeedMonitor(lag=0.2, fallback=4.0).hold
+    >>> symheli.ParameterMonitor(lag=0.2, fallback=4.0).hold
     1.0
     """
 
@@ -63,7 +64,12 @@ class AirspeedMonitor:
         if self.lag == math.inf:
             raise InputError("lag: expected a finite time constant in s, got inf")
         if self.fallback is not None:
-            _expect("fallback", self.fallback, "an airspeed in m/s", math.isfinite)
+            _expect(
+                "fallback",
+                self.fallback,
+                "a finite value of the parameter",
+                math.isfinite,
+            )
         if self.plausible is not None:
             try:
                 low, high = map(float, self.plausible)
@@ -71,7 +77,7 @@ class AirspeedMonitor:
                 low = high = math.nan
             if not low < high:
                 raise InputError(
-                    f"plausible: expected two airspeeds low < high, got {self.plausible!r:.80}"
+                    f"plausible: expected two values low < high, got {self.plausible!r:.80}"
                 )
             object.__setattr__(self, "plausible", (low, high))
 
