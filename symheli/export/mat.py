@@ -142,6 +142,7 @@ def content(family: LinearFamily, title: str) -> bytes:
             (f"{group}_units", _cells([s.unit for s in getattr(family, group)])),
         )
     }
+    speeds = family.over_airspeed("a MAT file of trimmed models")
     points = family.known_trims("a MAT file of trimmed models")
     x0 = np.array([[t.x[s] for s in family.states] for t in points])
     u0 = np.array([[t.u[s] for s in family.inputs] for t in points])
@@ -152,7 +153,7 @@ def content(family: LinearFamily, title: str) -> bytes:
     savemat(
         buffer,
         {
-            "airspeeds": family.airspeeds,
+            "airspeeds": speeds,
             "title": title,
             "readme": README,
             "kink_airspeeds": kinks,

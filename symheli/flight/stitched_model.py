@@ -114,6 +114,7 @@ class StitchedModel:
         """From a continuous family with all rigid-body states and its trims; tables straight
         between the anchors, or "spline".
         """
+        speeds = family.over_airspeed("a stitched model")
         if family.dt is not None:
             raise InputError(f"stitch continuous models; these are sampled at {family.dt} s")
         if family.states[:8] != BODY_STATES:
@@ -132,7 +133,7 @@ class StitchedModel:
                 f"leave {', '.join(gusts)} out (family.select(inputs=...)): wind enters a stitched"
                 " model by its kinematics"
             )
-        nodes = tuple(float(p) for p in family.airspeeds)
+        nodes = tuple(float(p) for p in speeds)
         x0 = np.array([[trim.x[s] for s in family.states] for trim in family.trims])
         u0 = np.array([[trim.u[s] for s in family.inputs] for trim in family.trims])
         xdot = np.array([[trim.xdot[s] for s in family.states] for trim in family.trims])

@@ -13,7 +13,8 @@ A JSON file is one object:
     dt        sample period, s; left out or null in continuous time
     x0, u0    states and inputs at the trims, (values of each axis..., states), where they are known
     xdot0     rates of the states there; left out: zero
-    airspeed0 airspeeds of the trims, m/s, (values of each axis...), where no axis is the airspeed
+    airspeed0 airspeeds of the trims, m/s, (values of each axis...), where they have one and no axis
+              is the airspeed in m/s
     kinks     {"stall": [7.5]}: airspeeds at which a family has a corner; may be left out
 
 An NPZ file holds the same as arrays: A, B, C, D, dt, x0, u0, xdot0, airspeed0; `axes`, `states`,
@@ -43,6 +44,7 @@ from symheli.values.named_vector import NamedVector
 from symheli.values.operating_point import OperatingPoint
 from symheli.values.operating_points import OperatingPoints
 from symheli.values.signal import Signal
+from symheli.values.units import ratio
 from symheli.values.whole_files import write_bytes, write_text
 
 SCHEMA, VERSION = "symheli linear models", 1
@@ -70,8 +72,9 @@ def write(content: Content, path: str | os.PathLike[str]) -> Path:
             "u0": models.points.input(models.inputs),
             "xdot0": models.points.rate(models.states),
         }
-        if AIRSPEED not in content.axes:
-            arrays["airspeed0"] = np.array([point.airspeed for point in models.points])
+        speeds = [point.airspeed for point in models.points]
+        if ("airspeed", "m/s") not in [(s, s.unit) for s in content.axes] and None not in speeds:
+            arrays["airspeed0"] = np.array(speeds, float)
     arrays = {name: a.reshape(*shape, *a.shape[1:]) for name, a in arrays.items()}
     names = {"axes": content.axes} | {g: getattr(models, g) for g in GROUPS[1:]}
     match path.suffix:
@@ -192,7 +195,9 @@ def _content(given: dict[str, Any]) -> Content:
     )
     if "x0" in given and "u0" in given:
         x, u = stacked("x0", nx), stacked("u0", nu)
-        airspeeds = stacked("airspeed0") if "airspeed0" in given else _airspeeds(axes, values)
+        airspeeds = (
+            stacked("airspeed0").tolist() if "airspeed0" in given else _airspeeds(axes, values)
+        )
         xdot = stacked("xdot0", nx) if "xdot0" in given else np.zeros((count, nx))
         models = LinearModels(
             *(models.A, models.B, models.C, models.D, states, inputs, outputs, models.dt),
@@ -202,7 +207,7 @@ def _content(given: dict[str, Any]) -> Content:
                         NamedVector(states, x0),
                         NamedVector(inputs, u0),
                         NamedVector(states, rate),
-                        float(speed),
+                        speed,
                     )
                     for x0, u0, rate, speed in zip(x, u, xdot, airspeeds, strict=True)
                 ]
@@ -214,14 +219,12 @@ def _content(given: dict[str, Any]) -> Content:
     return Content(axes, values, models, {k: tuple(map(float, v)) for k, v in kinks.items()})
 
 
-def _airspeeds(axes: tuple[Signal, ...], values: tuple[Array, ...]) -> Array:
-    """Of every trim, from the axis."""
-    if AIRSPEED not in axes:
-        raise InputError(
-            "x0: where no axis is the airspeed, the trims need airspeed0, one a model (m/s); or"
-            " leave out x0 and u0"
-        )
-    return np.meshgrid(*values, indexing="ij")[axes.index(AIRSPEED)].reshape(-1)
+def _airspeeds(axes: tuple[Signal, ...], values: tuple[Array, ...]) -> list[float] | list[None]:
+    """Of every trim, m/s, from the axis; None where there is none."""
+    size = next((ratio(s.unit, AIRSPEED.unit) for s in axes if s == AIRSPEED), None)
+    if size is None:
+        return [None] * math.prod(map(len, values))
+    return (size * np.meshgrid(*values, indexing="ij")[axes.index(AIRSPEED)]).ravel().tolist()
 
 
 def _signals(group: str, given: Any) -> tuple[Signal, ...]:

@@ -1,4 +1,4 @@
-"""Linear models along a range of airspeeds, and their element-wise interpolation."""
+"""Linear models along a range of one parameter, and their element-wise interpolation."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class LinearFamily:
         object.__setattr__(self, "airspeeds", frozen(self.airspeeds, "airspeeds", (None,)))
         object.__setattr__(self, "parameter", Signal(self.parameter))
         if np.any(np.diff(self.airspeeds) <= 0):
-            raise InputError("airspeeds must increase strictly")
+            raise InputError(f"the values of {self.parameter} must increase strictly")
         if self.dt is not None:
             positive(self.dt, "dt")
         models = LinearModels(
@@ -107,8 +107,8 @@ class LinearFamily:
         )
         if len(models) != len(self.airspeeds):
             raise InputError(
-                f"expected one model an airspeed, got {len(models)} models for"
-                f" {len(self.airspeeds)} airspeeds"
+                f"expected one model a value of {self.parameter}, got {len(models)} models for"
+                f" {len(self.airspeeds)} values"
             )
         for name in ("A", "B", "C", "D", "states", "inputs", "outputs"):
             object.__setattr__(self, name, getattr(models, name))
@@ -127,7 +127,7 @@ class LinearFamily:
         of another `parameter`; all with their operating point, or none.
         """
         if not len(models) or len(models) != len(np.atleast_1d(np.asarray(airspeeds))):
-            raise InputError(f"expected one model an airspeed, got {len(models)} models")
+            raise InputError(f"expected one model a value of {parameter}, got {len(models)}")
         models = LinearModels.of(models)
         return cls(
             np.asarray(airspeeds, float),
@@ -152,12 +152,23 @@ class LinearFamily:
         """
         return entry_called(self, k) if isinstance(k, str) else self.models[k]
 
+    def over_airspeed(self, purpose: str) -> Array:
+        """The airspeeds, m/s; raises `InputError` for a family over another parameter or in another
+        unit, which `purpose` has no use for.
+        """
+        if (self.parameter, self.parameter.unit) != (AIRSPEED, AIRSPEED.unit):
+            raise InputError(
+                f"{purpose} is over airspeed in m/s, and this family over {self.parameter}"
+                f" ({self.parameter.unit})"
+            )
+        return self.airspeeds
+
     def known_trims(self, purpose: str) -> OperatingPoints:
         """The trims; raises `InputError` where there are none, which `purpose` needs."""
         if not self.models.points:
             raise InputError(
-                f"{purpose} needs the trim at each airspeed, and this family has none; give its"
-                " models a point, or sweep"
+                f"{purpose} needs the trim at each {self.parameter}, and this family has none;"
+                " give its models a point, or sweep"
             )
         return self.models.points
 

@@ -78,7 +78,8 @@ class LinearModel:
         """The matrices that are not trivial with the names of rows and columns."""
         time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
         rows = "derivative of the state" if self.dt is None else "state at the next sample"
-        around = "" if self.point is None else f", about {self.point.airspeed:g} m/s"
+        speed = None if self.point is None else self.point.airspeed
+        around = "" if speed is None else f", about {speed:g} m/s"
         lines = [
             f"linear model, {time}{around}: {len(self.states)} states, {len(self.inputs)} inputs,"
             f" {len(self.outputs)} outputs; SI and radians",

@@ -60,7 +60,7 @@ class LinearModels(Sequence[LinearModel]):
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
         if len(self.points) not in (0, K):
             raise InputError(
-                f"expected {K} trims, one an airspeed, or none at all, got {len(self.points)}"
+                f"expected {K} trims, one a model, or none at all, got {len(self.points)}"
             )
 
     @classmethod

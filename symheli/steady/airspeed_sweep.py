@@ -76,7 +76,7 @@ def sweep(
     """
     require(heli, "sweep(heli, [0.0, 5.0, 10.0])")
     speeds = increasing(airspeeds)
-    if start and not np.array_equal(start.airspeeds, speeds):
+    if start and not np.array_equal(start.over_airspeed("a sweep from a family"), speeds):
         raise InputError("the family to start from has other airspeeds")
     conditions = FlightConditions(speeds, climb_rate=climb_rate, acceleration=acceleration)
     flights = SteadyFlights.of(heli, conditions)

@@ -179,6 +179,7 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
         raise InputError(
             f"derivatives are those of continuous models; this family has dt = {family.dt} s"
         )
+    speeds = family.over_airspeed("a table of derivatives")
     trims = family.known_trims("a table of derivatives")
     rates = [rate for rate in ("p", "q", "r") if rate in trims[0].x]
     if np.any(np.abs(trims.state(rates)) > 1e-9):  # straight to the accuracy of a trim
@@ -203,4 +204,4 @@ def derivatives(family: LinearFamily) -> DerivativeTable:
                 Signal(f"{symbol}_{control.removeprefix('d_')}", quotient(unit, control.unit))
             )
             values.append(family.B[:, i, j])
-    return DerivativeTable(family.airspeeds, tuple(names), np.column_stack(values) + 0.0)
+    return DerivativeTable(speeds, tuple(names), np.column_stack(values) + 0.0)

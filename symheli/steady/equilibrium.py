@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -53,6 +53,7 @@ class TrimPoint(OperatingPoint):
     (True, True, False)
     """
 
+    airspeed: float = field()  # type: ignore[assignment]  # a flight has one
     condition: FlightCondition
     residual: NamedVector
     wind: NamedVector

@@ -7,7 +7,9 @@ import pytest
 
 import symheli
 from symheli.errors import InputError
-from symheli.lpv import LinearFamily, LinearGrid
+from symheli.export import write_family_mat
+from symheli.lpv import LinearFamily, LinearGrid, LinearModel, LPVStateSpace
+from symheli.values import NamedVector, OperatingPoint, Signal, signals
 
 BY_HAND = {
     "schema": "symheli linear models",
@@ -96,6 +98,79 @@ def test_what_is_wrong_with_a_file_is_said(tmp_path, change, said):
     with pytest.raises(InputError, match=said) as error:
         LinearFamily.load(path).interpolate(degree=1)
     assert str(path) in str(error.value) or "dt" in change
+
+
+MACH = (0.5, 0.6, 0.7, 0.9)
+
+
+def over_mach(speed=lambda mach: None):
+    """Trims x0 = M^2, u0 = -M of something that is no helicopter."""
+    alpha, fin = signals(["alpha"], {"alpha": "rad"}), signals(["fin"], {"fin": "rad"})
+    models = [
+        LinearModel(
+            [[-mach]],
+            [[2.0 * mach]],
+            [[1.0]],
+            [[0.0]],
+            alpha,
+            fin,
+            alpha,
+            point=OperatingPoint(
+                NamedVector(alpha, [mach**2]),
+                NamedVector(fin, [-mach]),
+                NamedVector(alpha, [0.0]),
+                speed(mach),
+            ),
+        )
+        for mach in MACH
+    ]
+    return LinearFamily.from_models(MACH, models, parameter=Signal("Mach", "1"))
+
+
+@pytest.mark.parametrize("ending", ["json", "npz"])
+def test_trims_over_any_parameter_need_no_airspeed(tmp_path, ending):
+    """From the points by files to a model that simulates and predicts about x0(p), u0(p)."""
+    made = over_mach()
+    back = LinearFamily.load(made.save(tmp_path / f"mach.{ending}"))
+    assert [t.airspeed for t in back.trims] == [None] * 4
+    assert "about" not in str(back[0])
+    lpv = back.interpolate("polynomial", degree=1)
+    np.testing.assert_allclose(lpv.trim.state(0.8), [0.64], atol=1e-12)  # by a cubic spline
+    np.testing.assert_allclose(lpv.trim.input(0.8), [-0.8], atol=1e-12)
+    drift = lpv.with_trim_drift()
+    assert (drift.inputs[-1], drift.inputs[-1].unit) == ("drift_Mach", "1/s")
+    # held at the trim it stays there; along a motion of p the trim drifts by -2 M dM/dt
+    p = np.full(50, 0.8)
+    rest = lpv.predict(p, np.full((50, 1), -0.8), np.full((50, 1), 0.64), dt=0.01)
+    np.testing.assert_allclose(rest.free_run()[1:], 0.64, atol=1e-12)
+    moving = np.linspace(0.6, 0.8, 50)
+    u = -moving[:, None]
+    push = lpv.predict(moving, u, moving[:, None] ** 2, dt=0.01).push[:-1, 0]
+    rate = (moving[1] - moving[0]) / 0.01
+    np.testing.assert_allclose(push, -2 * moving[:-1] * rate * 0.01, rtol=0.01)
+    assert LPVStateSpace.load(lpv.save(tmp_path / "lpv.json")).scheduling == lpv.scheduling
+
+
+def test_an_airspeed_that_a_trim_has_is_kept_and_never_taken_from_another_unit(tmp_path):
+    back = LinearFamily.load(over_mach(lambda mach: 340.0 * mach).save(tmp_path / "mach.json"))
+    assert [t.airspeed for t in back.trims] == [340.0 * mach for mach in MACH]
+    knots = {**BY_HAND, "x0": [[0, 0]] * 2, "u0": [[0]] * 2}
+    knots["axes"] = [{"name": "airspeed", "unit": "kt", "values": [0, 10]}]
+    (tmp_path / "kt.json").write_text(json.dumps(knots))
+    slow = LinearFamily.load(tmp_path / "kt.json")
+    assert [t.airspeed for t in slow.trims] == pytest.approx([0.0, 18520 / 3600])
+
+
+def test_what_is_over_airspeed_refuses_a_family_over_something_else(ideal, tmp_path):
+    made = over_mach()
+    for call in (
+        lambda: symheli.StitchedModel.from_family(made),
+        lambda: symheli.derivatives(made),
+        lambda: symheli.sweep(ideal, MACH, start=made),
+        lambda: write_family_mat(made, tmp_path / "mach.mat", "over Mach"),
+    ):
+        with pytest.raises(InputError, match=r"over airspeed in m/s, .* over Mach \(1\)"):
+            call()
 
 
 def test_a_missing_or_damaged_file_is_refused(tmp_path, family):

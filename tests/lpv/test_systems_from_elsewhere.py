@@ -128,7 +128,7 @@ def test_a_family_of_matrices_from_elsewhere_has_no_trims_and_interpolates_all_t
     assert lpv.at(9.0).A[0, 0] == pytest.approx(-10.0, rel=1e-12)
     with pytest.raises(InputError, match="this family has none"):
         family.known_trims("a stitched model")
-    with pytest.raises(InputError, match="expected one model an airspeed, got 3"):
+    with pytest.raises(InputError, match="expected one model a value of airspeed, got 3"):
         LinearFamily.from_models([0.0, 5.0], models)
     with pytest.raises(InputError, match=r"models\[2\]: expected states"):
         LinearFamily.from_models([0.0, 5.0, 13.0], [*models[:2], PLANT])
