@@ -192,8 +192,19 @@ def _nominal(
         if _fastest(made) <= fastest:
             break
     if slowest is None:
-        raise failed(plant, attempts)
+        raise failed(plant, attempts, _both_asked(start.shape.untold(plant.parameters)))
     return replace(slowest, notes=notes, attempts=tuple(attempts))
+
+
+def _both_asked(untold: Sequence[str]) -> tuple[str, ...]:
+    """What to write instead of X and Y that both move with these."""
+    if not untold:
+        return ()
+    return (
+        f"X and Y both depend on {', '.join(untold)}, and a controller that is not told its rate"
+        " keeps no gamma near theirs: let X or Y be of degree 0 in it, as X=0, or give the plant a"
+        " lagged parameter, plant.lagged(...)",
+    )
 
 
 def _designs(

@@ -53,8 +53,10 @@ def require_channels(plant: Plant, *, controls: bool = True, measurements: bool 
     return named
 
 
-def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
-    """The error that says why: modes, directions and weights, and every program that was tried."""
+def failed(plant: Plant, attempts: Sequence[Attempt], asked: Sequence[str] = ()) -> SynthesisError:
+    """The error that says why: what was `asked` for, modes, directions and weights, and every
+    program that was tried.
+    """
     p, said = conditions(plant)
     # what a solve that ran out of digits left is no level of this plant
     least = min((a.bound for a in attempts if a.answer.startswith("solved")), default=math.inf)
@@ -65,7 +67,7 @@ def failed(plant: Plant, attempts: Sequence[Attempt]) -> SynthesisError:
         at=said,
         gamma=least if math.isfinite(least) else None,
     )
-    lines = why or (NOTHING_WRONG,)
+    lines = (*asked, *why) or (NOTHING_WRONG,)
     return SynthesisError(
         "no controller was found:\n  " + "\n  ".join([*lines, *map(str, attempts)]), tuple(lines)
     )

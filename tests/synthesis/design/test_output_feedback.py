@@ -27,7 +27,7 @@ from scheduled_plants import (
 )
 
 from symheli import LinearModel
-from symheli.errors import InputError
+from symheli.errors import InputError, SynthesisError
 from synthesis import hinf, output_feedback
 
 BACK_OFF = 1.02
@@ -218,6 +218,12 @@ def test_both_sides_move_where_that_is_asked_and_the_rate_is_neglected():
     proof = made.certify(0.05, search=None)
     assert proof.verified
     assert proof.gamma <= made.gamma * PROVEN
+
+
+def test_where_neglecting_the_rate_keeps_no_gamma_it_is_said_what_to_write(monkeypatch):
+    monkeypatch.setattr("synthesis.design.search.FURTHER", 0.5)
+    with pytest.raises(SynthesisError, match=r"not told its rate .* X=0, or .*plant\.lagged"):
+        output_feedback(spring(), 0.5, X=2, Y=2, back_off=BACK_OFF)
 
 
 # --- a parameter seen through a lag --------------------------------------------------------------
