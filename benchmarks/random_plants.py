@@ -50,7 +50,9 @@ def random_plant(seed: int) -> Drawn:
         if 0 < min(found) and max(found) < LARGEST:
             k = int(np.argmax(found))
             near = np.linspace(p[max(k - 1, 0)], p[min(k + 1, len(p) - 1)], FINER)
-            return Drawn(plant, max(*found, *frozen_optima(plant, near)), slow)
+            worst = max(*found, *frozen_optima(plant, near))
+            if worst < LARGEST:
+                return Drawn(plant, worst, slow)
 
 
 def _drawn(rng: np.random.Generator, seed: int) -> tuple[Plant, float, float]:

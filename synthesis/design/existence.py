@@ -92,7 +92,9 @@ class Found(NamedTuple):
 
 
 class Existence:
-    """The program of a plant with X and Y of these bases, its ranges cut in so many parts."""
+    """The program of a plant with X and Y of these bases, its ranges cut in so many parts; `p` (m,)
+    is one of the points at which blocks are imposed.
+    """
 
     def __init__(
         self,
@@ -101,6 +103,7 @@ class Existence:
         Y: FunctionSpace | None,
         divisions: int = 1,
         largest: float = LARGEST[0],
+        p: Array | None = None,
     ):
         self.plant, self.largest = plant, largest
         both = [b for b in (X, Y) if b is not None]
@@ -112,7 +115,8 @@ class Existence:
         self.S: Unknown | None = each.pop(0) if each else self.Y
         self.count = sum(b.size for b in both)
         self.states = plant.at(np.array([[s.middle for s in plant.parameters]])).A.shape[-1]
-        self.points = self._first(divisions)
+        first = self._first(divisions)
+        self.points = first if p is None else np.unique(np.vstack([first, p]), axis=0)
 
     def _first(self, divisions: int) -> Array:
         """Points (K, m) at which blocks are imposed at first."""

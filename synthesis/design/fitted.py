@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symheli.lpv import BSpline, FunctionSpace, Scheduling
-from symheli.lpv.bases.polynomials import lobatto_points, polynomials
+from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto, polynomials
 
 Array = np.ndarray
 
@@ -20,6 +20,12 @@ NEGLIGIBLE = 0.01
 """Of the geometric mean of the largest entries of its row and column an entry matters from here."""
 NODES = {1: 129, 2: 17}
 """Values of each parameter at which the gains are computed (more parameters: 7)."""
+MOST = 256
+"""Segments of a spline that are not cut further."""
+IN_EACH, AT_LAST = 9, 33
+"""Values of p in each of them at which it must serve, at every other one the gains are computed;
+and once it serves at these.
+"""
 
 
 class Fitted(NamedTuple):
@@ -45,14 +51,47 @@ def fits(gains: Callable[[Array], Array], parameters: Sequence[Scheduling]) -> I
     box = [(s.low, s.high) for s in parameters]
     p = lobatto_points(NODES.get(m, 7), box)
     values = gains(p.reshape(len(p), -1))
+    for basis in _bases(box):
+        yield _fit(basis, p, values)
+
+
+def cut_to_serve(
+    gains: Callable[[Array], Array],
+    parameter: Scheduling,
+    serves: Callable[[Fitted, Array], Array],
+) -> Fitted | None:
+    """`gains` of one parameter as a cubic spline whose segments are halved where it does not serve
+    ((K,) at p (K, 1)); None where that takes more than `MOST`.
+    """
+    known: dict[float, Array] = {}
+    knots = np.linspace(parameter.low, parameter.high, SEGMENTS[0] + 1)
+    while len(knots) <= MOST:
+        p = np.unique(piecewise_lobatto(knots.tolist(), IN_EACH))
+        nodes = p[::2]
+        new = np.array([q for q in nodes if q not in known])
+        if len(new):
+            known.update(zip(new, gains(new[:, None]), strict=True))
+        fit = _fit(BSpline(3, tuple(knots)), nodes, np.array([known[q] for q in nodes]))
+        bad = p[~serves(fit, p[:, None])]
+        if not len(bad):
+            p = np.unique(piecewise_lobatto(knots.tolist(), AT_LAST))
+            bad = p[~serves(fit, p[:, None])]
+        if not len(bad):
+            return fit
+        cut = np.unique(np.searchsorted(knots[1:-1], bad, side="right"))
+        knots = np.sort(np.concatenate([knots, 0.5 * (knots[cut] + knots[cut + 1])]))
+    return None
+
+
+def _fit(basis: FunctionSpace, p: Array, values: Array) -> Fitted:
+    """To these values (K, r, c)."""
     size = np.abs(values).max(axis=0)
     rows, columns = (size.max(axis=k, keepdims=True, initial=0.0) for k in (1, 0))
     size = np.maximum(size, NEGLIGIBLE * np.sqrt(rows * columns))
     size[size == 0] = 1.0
-    for basis in _bases(box):
-        coefficients = basis.fit(p, values)
-        off = np.abs(np.tensordot(basis(p), coefficients, axes=1) - values)
-        yield Fitted(basis, coefficients, float((off / size).max(initial=0.0)))
+    coefficients = basis.fit(p, values)
+    off = np.abs(np.tensordot(basis(p), coefficients, axes=1) - values)
+    return Fitted(basis, coefficients, float((off / size).max(initial=0.0)))
 
 
 def _bases(box: Sequence[tuple[float, float]]) -> Iterator[FunctionSpace]:

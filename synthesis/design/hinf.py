@@ -177,6 +177,23 @@ def optimum_above(plant: Generalized, level: float, dt: float | None) -> float:
     return level if found is None else max(level, found[0])
 
 
+def slack(plant: Generalized, gamma: float, dt: float | None) -> float:
+    """By how much a level is above the smallest, gamma^2 over the spectral radius of XY less one;
+    not above 0 where it is out of reach, inf where the equations cannot be written.
+    """
+    try:
+        return _Levels.of(plant, dt).normal.trial(gamma).slack
+    except (np.linalg.LinAlgError, InputError):
+        return math.inf
+
+
+def central_gains(plant: Generalized, gamma: float, dt: float | None) -> Matrices | None:
+    """A, B, C, D of the central controller of this level, None where it is out of reach."""
+    levels = _Levels.of(plant, dt)
+    trial = levels.normal.trial(gamma)
+    return None if trial.obstacle is not None else levels.controller(trial)
+
+
 def _at(levels: _Levels, plant: Generalized, names: Channels, gamma: float) -> PointDesign:
     """The central controller of this level, or why it cannot be reached."""
     obstacle = levels.normal.trial(gamma).obstacle

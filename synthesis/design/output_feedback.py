@@ -11,6 +11,7 @@ import numpy as np
 from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certificate import Attempt
+from synthesis.design.at_rest import at_rest
 from synthesis.design.back_off import levels_above
 from synthesis.design.controller import Controller
 from synthesis.design.coordinates import Coordinates, depends
@@ -28,6 +29,7 @@ from synthesis.design.search import (
     CHECKED,
     CLOSE,
     DEGREES,
+    FAR_ABOVE,
     WORTH,
     Dependence,
     Design,
@@ -39,18 +41,20 @@ from synthesis.design.search import (
     settled,
     shapes,
 )
-from synthesis.design.worst_optimum import worst_optimum
+from synthesis.design.worst_optimum import Worst, worst_optimum
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
 Array = np.ndarray
 
+CENTRAL = "output feedback, central controllers of the frozen models"
+BOUND_DECIDES = (
+    "the bound {:g} on X and Y decides gamma: some measurement is almost free of noise or some"
+    " control almost free of cost; give it more"
+)
+
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
-FAR_ABOVE = 1.05
-"""A gamma this many times the least one is said to be, one of a larger back-off that was asked for
-in proportion.
-"""
 
 
 def output_feedback(
@@ -71,7 +75,9 @@ def output_feedback(
     move with a parameter whose rate is another one (`plant.lagged`), or that stands still. Where
     one of them moving does not come near the worst frozen optimum both do, and the controller is
     not told dp/dt: `gamma` is then what the storage function of X and Y proves of that, and is
-    taken where it is at most 1.05 times what a controller could have that is told.
+    taken where it is at most 1.05 times what a controller could have that is told. Where parameters
+    stand still and the inequalities find nothing near that optimum, the gains are those of the
+    central H-infinity controllers of the frozen models.
 
     Parameters
     ----------
@@ -138,7 +144,8 @@ def output_feedback(
 
     if isinstance(plant.model, UncertainStateSpace):
         return _robust(plant, every(DEGREES[1][0]), factors, fastest, divisions, attempts)
-    return _nominal(plant, every, both, factors, fastest, divisions, attempts)
+    free = X is None and Y is None
+    return _nominal(plant, every, both, factors, fastest, divisions, attempts, free=free)
 
 
 def _robust(
@@ -171,29 +178,71 @@ def _nominal(
     fastest: float,
     divisions: int,
     attempts: list[Attempt],
+    *,
+    free: bool = False,
 ) -> Controller:
-    """For one model, by the best of the shapes."""
-    floor = worst_optimum(plant)
-    if floor == 0 and (refusal := failed(plant, attempts)).reasons != (NOTHING_WRONG,):
+    """For one model, by the best of the shapes; those are `free` where none was asked for."""
+    worst = worst_optimum(plant)
+    if worst.level == 0 and (refusal := failed(plant, attempts)).reasons != (NOTHING_WRONG,):
         raise refusal  # no frozen model has a controller, and it is known why
-    start = best(plant, every, divisions, USUAL, attempts, floor)
-    slowest, notes = None, ()
-    for own, design in _designs(plant, start, both, factors, floor, divisions, attempts):
+    start = best(plant, every, divisions, USUAL, attempts, worst)
+    slowest = None
+    for found, notes in _controllers(
+        plant, start, both, factors, worst, divisions, attempts, free=free
+    ):
+        frozen = frozen_stability(found.closed())
+        if frozen.stable is False:
+            attempts.append(Attempt("frozen loop", 0.0, f"not stable at {frozen.p}", math.inf))
+            continue
+        if slowest is None or _fastest(found) < _fastest(slowest):
+            slowest = replace(found, notes=(*notes, *_limited(found, min(factors), fastest)))
+        if _fastest(found) <= fastest:
+            break
+    if slowest is None:
+        raise failed(plant, attempts, _both_asked(start.shape.untold(plant.parameters)))
+    return replace(slowest, attempts=tuple(attempts))
+
+
+def _controllers(
+    plant: Plant,
+    start: Start,
+    both: Callable[[int], Sequence[Shape]],
+    factors: Sequence[float],
+    worst: Worst,
+    divisions: int,
+    attempts: list[Attempt],
+    *,
+    free: bool,
+) -> Iterator[tuple[Controller, tuple[str, ...]]]:
+    """Those of the inequalities with what kept them from a lower gamma; where every parameter
+    stands still and X and Y are `free`, the central ones of the frozen models before those that are
+    far from it.
+    """
+    floor = worst.level
+    still = free and floor > 0 and all(s.rate == 0 for s in plant.parameters)
+
+    def central() -> Iterator[tuple[Controller, tuple[str, ...]]]:
+        for each in at_rest(plant, worst, factors, attempts):
+            made = in_plant_units(plant, each.coordinates, each.fit, each.gamma, CENTRAL)
+            yield replace(made, optimum=floor), ()
+
+    for own, design in _designs(plant, start, both, factors, worst, divisions, attempts):
+        if still and design.gamma > _far(min(factors)) * floor:
+            yield from central()
+            still = False
         told = ", their rates neglected" if own.shape.untold(plant.parameters) else ""
         method = f"output feedback, {own.shape}{told}"
         made = in_plant_units(plant, design.coordinates, design.fit, design.gamma, method)
         made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
-        frozen = frozen_stability(made.closed())
-        if frozen.stable is False:
-            attempts.append(Attempt("frozen loop", 0.0, f"not stable at {frozen.p}", math.inf))
-            continue
-        if slowest is None or _fastest(made) < _fastest(slowest):
-            slowest, notes = made, _limited(own, made, min(factors), fastest)
-        if _fastest(made) <= fastest:
-            break
-    if slowest is None:
-        raise failed(plant, attempts, _both_asked(start.shape.untold(plant.parameters)))
-    return replace(slowest, notes=notes, attempts=tuple(attempts))
+        decides = own.existence.bounded(own.found) and own.existence.largest >= LARGEST[-1]
+        yield made, (BOUND_DECIDES.format(own.existence.largest),) if decides else ()
+    if still:
+        yield from central()
+
+
+def _far(asked: float) -> float:
+    """A gamma so many times the least one is far from it, where the least back-off is `asked`."""
+    return FAR_ABOVE * max(1.0, asked / BACK_OFF[0])
 
 
 def _both_asked(untold: Sequence[str]) -> tuple[str, ...]:
@@ -212,15 +261,15 @@ def _designs(
     start: Start,
     both: Callable[[int], Sequence[Shape]],
     factors: Sequence[float],
-    floor: float,
+    worst: Worst,
     divisions: int,
     attempts: list[Attempt],
 ) -> Iterator[tuple[Start, Design]]:
     """Where X or Y moving stays above what no controller can beat, first with both moving and a
     controller that is not told how fast, which serves where parameters move slowly.
     """
-    if start.gamma > CLOSE * floor and both(DEGREES[1][0]):
-        other = best(plant, both, divisions, USUAL, attempts, floor)
+    if start.gamma > CLOSE * worst.level and both(DEGREES[1][0]):
+        other = best(plant, both, divisions, USUAL, attempts, worst)
         if other.gamma < WORTH * start.gamma:
             for design in settled(other, factors, _recover, USUAL, attempts, neglecting=True):
                 yield other, design
@@ -229,17 +278,12 @@ def _designs(
         yield start, design
 
 
-def _limited(start: Start, made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
+def _limited(made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
     """What may have kept the controller from a lower gamma, or from its limits, a sentence each."""
     out = []
-    if start.existence.bounded(start.found) and start.existence.largest >= LARGEST[-1]:
+    if made.optimum and made.gamma > _far(asked) * made.optimum:
         out.append(
-            f"the bound {start.existence.largest:g} on X and Y decides gamma: some measurement is"
-            " almost free of noise or some control almost free of cost; give it more"
-        )
-    if made.gamma > FAR_ABOVE * max(1.0, asked / BACK_OFF[0]) * start.gamma:
-        out.append(
-            f"gamma is {made.gamma / start.gamma:.2f} times the least one of the inequalities: no"
+            f"gamma is {made.gamma / made.optimum:.2f} times the least one of the inequalities: no"
             " nearer controller had gains that are smooth in the scheduling parameters"
         )
     if _fastest(made) > fastest:

@@ -20,9 +20,10 @@ from symheli.progress import tracked
 from synthesis.certificate import Attempt
 from synthesis.design.coordinates import Coordinates, coordinates_of
 from synthesis.design.existence import LARGEST, Existence, Found
-from synthesis.design.fitted import Fitted, fits
+from synthesis.design.fitted import Fitted, cut_to_serve, fits
 from synthesis.design.motions import used
 from synthesis.design.neglected_rate import level_kept
+from synthesis.design.worst_optimum import Worst
 from synthesis.program.cone_program import Solver
 from synthesis.worst.frozen import below
 
@@ -39,6 +40,11 @@ BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
 SLACK = 1e-6
 """By which the frozen gain of a controller may exceed what was promised: rounding."""
 UNKEPT = "frozen loops do not keep it"
+SHARP = "frozen loops keep it, no functions of p do"
+FAR_ABOVE = 1.05
+"""A gamma this many times the least one is said to be, one of a larger back-off that was asked for
+in proportion; before it gains that turn sharply become splines with as many knots as that takes.
+"""
 FURTHER = 1.05
 """Of the gamma of a controller that is told dp/dt, where it is not told."""
 ROUGH = 0.3
@@ -47,7 +53,7 @@ ACCURACY = 3e-3
 """Of functions of p fitted to the gains, relative, entry by entry."""
 NEAR = 2e-2
 """Polynomials as accurate as this are preferred to splines."""
-CHECKED = {1: 33, 2: 7}
+CHECKED = {1: 97, 2: 7}
 """Values of each parameter at which frozen loops are judged, beside those where the inequalities
 were imposed (more parameters: 3).
 """
@@ -55,6 +61,7 @@ DEGREES = {1: (2, 4, 6, 8), 2: (2, 4)}
 """Of the one that moves, tried in turn while gamma falls (more parameters: 2)."""
 CLOSE = 1.01
 """A gamma within this factor of what no controller can beat is not worth another program."""
+NOTHING_KNOWN = Worst()
 WORTH = 0.995
 """Part of gamma to which a richer program must lower it to be worth another."""
 FAR = 30.0
@@ -250,17 +257,18 @@ def best(
     divisions: int,
     solver: Solver,
     attempts: list[Attempt],
-    floor: float = 0.0,
+    worst: Worst = NOTHING_KNOWN,
 ) -> Start:
     """The shape of the least gamma: of those of the lowest degree the best, then of higher degrees
     while that lowers it, then with a larger bound on X and Y where that decides. No controller has
-    a gamma below `floor`.
+    a gamma below the `worst` frozen optimum.
     """
+    floor = worst.level
     channel = floor if 0 < floor < math.inf else 1.0
     degrees = DEGREES.get(len(plant.parameters), (2,))
     starts: list[Start] = []
     for shape in every(degrees[0]):
-        starts.append(least(plant, shape, divisions, solver, attempts, channel))
+        starts.append(least(plant, shape, divisions, solver, attempts, channel, worst.p))
         if starts[-1].gamma <= CLOSE * floor:
             break
     chosen = min(range(len(starts)), key=lambda k: starts[k].gamma)
@@ -273,7 +281,7 @@ def best(
         shape = every(degree)[chosen]
         if start.gamma <= CLOSE * floor or shape.size == start.shape.size:
             break
-        richer = least(plant, shape, divisions, solver, attempts, channel)
+        richer = least(plant, shape, divisions, solver, attempts, channel, worst.p)
         more = worth(richer)
         start = richer if richer.gamma < start.gamma else start
         if not more and math.isfinite(start.gamma):
@@ -281,7 +289,10 @@ def best(
     for largest in LARGEST[1:]:
         if start.gamma <= CLOSE * floor or not start.existence.bounded(start.found):
             break
-        wider = least(plant, start.shape, divisions, solver, attempts, start.gamma, largest=largest)
+        unit = start.gamma
+        wider = least(
+            plant, start.shape, divisions, solver, attempts, unit, worst.p, largest=largest
+        )
         if not worth(wider):
             break
         start = wider
@@ -295,13 +306,16 @@ def least(
     solver: Solver,
     attempts: list[Attempt],
     channel: float = 1.0,
+    p: Array | None = None,
     *,
     largest: float = LARGEST[0],
 ) -> Start:
-    """The least gamma of a shape, in a unit of performance that suits it, at first `channel`."""
+    """The least gamma of a shape, in a unit of performance that suits it, at first `channel`; with
+    the inequalities at this p (m,), too.
+    """
     for _ in tracked(f"least gamma, {shape}", range(3)):
         own = coordinates_of(plant, channel)
-        existence = Existence(own, shape.X, shape.Y, divisions, largest)
+        existence = Existence(own, shape.X, shape.Y, divisions, largest, p)
         found = existence.least_gamma(solver)
         gamma = channel * found.gamma
         attempts.append(Attempt(f"least gamma, {shape}", 0.0, found.message, gamma))
@@ -326,7 +340,25 @@ def settled(
     coordinates, existence, lowest, _ = start
     if not math.isfinite(lowest.gamma):
         return
+    judged = loop or closed
+    sharp: dict[float, tuple[Found, Gains]] = {}
+
+    def noted(factor: float, message: str, outcome: str) -> None:
+        gamma = factor * lowest.gamma * coordinates.channel
+        attempts.append(Attempt(f"back-off {factor:g}", 0.0, f"{message}, {outcome}", gamma))
+
+    def by_splines() -> Iterator[Design]:
+        while sharp:
+            factor = max(sharp)
+            found, gains = sharp.pop(factor)
+            design, outcome = _tried(start, found, gains, judged, neglecting, with_knots)
+            noted(factor, "knots added", outcome)
+            if design is not None:
+                yield design
+
     for factor in tracked("backing off", back_off):
+        if factor > FAR_ABOVE:
+            yield from by_splines()
         gamma = factor * lowest.gamma
         for found in tracked(f"at {factor:g} of the least gamma", existence.widest(gamma, solver)):
             design, outcome = None, UNKEPT
@@ -334,41 +366,43 @@ def settled(
             with contextlib.suppress(np.linalg.LinAlgError):
                 if np.any(found.coefficients):
                     gains = recover(coordinates, existence, found)
-                    design, outcome = _tried(start, found, gains, loop or closed, neglecting)
-            attempts.append(
-                Attempt(
-                    f"back-off {factor:g}",
-                    0.0,
-                    f"{found.message}, {outcome}",
-                    gamma * coordinates.channel,
-                )
-            )
+                    design, outcome = _tried(start, found, gains, judged, neglecting, simplest)
+                    if outcome == SHARP:
+                        sharp.setdefault(factor, (found, gains))
+            noted(factor, found.message, outcome)
             if design is not None:
                 yield design
                 break
+    yield from by_splines()
 
 
 def _tried(
-    start: Start, found: Found, gains: Gains, loop: Loop, neglecting: bool
+    start: Start,
+    found: Found,
+    gains: Gains,
+    loop: Loop,
+    neglecting: bool,
+    fit_of: Callable[[Coordinates, Gains, Loop, Array, float], Fitted | None],
 ) -> tuple[Design | None, str]:
     """The design of these gains, None where their loop does not keep gamma; and what came of it."""
     coordinates, existence, *_ = start
-    points, reached = _judged(existence), found.gamma
+    reached = found.gamma
+    points = judged(existence.plant.parameters, existence.points)
     if neglecting:
         looped = closed(coordinates, gains, points)
         reached = max(reached, level_kept(coordinates, existence, found, looped, points))
     if reached > FURTHER * found.gamma:
         return None, f"{reached / found.gamma:.3g} times as much as dp/dt is not known"
-    if not kept(coordinates, gains, loop, points, reached * (1 + SLACK)):
+    if not all(kept(coordinates, gains, loop, points, reached * (1 + SLACK))):
         return None, UNKEPT
-    fit = _fit(coordinates, gains, loop, points, reached)
+    fit = fit_of(coordinates, gains, loop, points, reached)
     if fit is None:
-        return None, "frozen loops keep it, no functions of p do"
+        return None, SHARP
     said = f"frozen loops keep it, functions of p within {fit.misfit:.1e}"
     return Design(coordinates, existence, found._replace(gamma=reached), fit), said
 
 
-def _fit(
+def simplest(
     coordinates: Coordinates, gains: Gains, loop: Loop, points: Array, gamma: float
 ) -> Fitted | None:
     """The simplest functions that are accurate and keep gamma, else the most accurate of those that
@@ -380,29 +414,47 @@ def _fit(
     accurate = [fit for fit in every if fit.misfit <= ACCURACY]
     rest = [fit for fit in (polynomials if near else every) if ACCURACY < fit.misfit <= ROUGH]
     for fit in (*accurate, *sorted(rest, key=lambda fit: fit.misfit)):
-        if kept(coordinates, fit, loop, points, gamma * (1 + SLACK)):
+        if all(kept(coordinates, fit, loop, points, gamma * (1 + SLACK))):
             return fit
     return None
 
 
-def _judged(existence: Existence) -> Array:
-    """Points (K, m) at which frozen loops are judged; a parameter that is the rate of another is
-    zero there.
+def with_knots(
+    coordinates: Coordinates, gains: Gains, loop: Loop, points: Array, gamma: float
+) -> Fitted | None:
+    """Splines of one parameter with knots where gamma would not be kept without; None where they
+    do not come to an end.
     """
-    parameters = existence.plant.parameters
+    if len(coordinates.parameters) != 1:
+        return None
+    limit = gamma * (1 + SLACK)
+
+    def serves(fit: Fitted, p: Array) -> Array:
+        return np.fromiter(kept(coordinates, fit, loop, p, limit), bool, len(p))
+
+    fit = cut_to_serve(gains, coordinates.parameters[0], serves)
+    return fit if fit is not None and serves(fit, points).all() else None
+
+
+def judged(parameters: Sequence[Scheduling], more: Array | None = None) -> Array:
+    """Points (K, m) at which frozen loops are judged, with `more`; a parameter that is the rate of
+    another is zero there.
+    """
     count = CHECKED.get(len(parameters), 3)
-    axes = [np.linspace(s.low, s.high, count) for s in parameters]
-    p = np.unique(np.concatenate([tensor_grid(axes), existence.points]), axis=0)
+    p = tensor_grid([np.linspace(s.low, s.high, count) for s in parameters])
+    p = p if more is None else np.vstack([p, more])
     rates = [s.name in {other.rate for other in parameters} for s in parameters]
     low, high = np.array([(s.low, s.high) for s in parameters]).T
     p[:, rates] = np.clip(0.0, low, high)[rates]
     return np.unique(p, axis=0)
 
 
-def kept(coordinates: Coordinates, gains: Gains, loop: Loop, p: Array, gamma: float) -> bool:
+def kept(
+    coordinates: Coordinates, gains: Gains, loop: Loop, p: Array, gamma: float
+) -> Iterator[bool]:
     """Whether the loop frozen at each p (K, m), scaled, is stable and its gain below gamma."""
-    every = zip(*loop(coordinates, gains, p), strict=True)
-    return all(below(A, B, C, D, gamma, coordinates.dt) for A, B, C, D in every)
+    for A, B, C, D in zip(*loop(coordinates, gains, p), strict=True):
+        yield below(A, B, C, D, gamma, coordinates.dt)
 
 
 def closed(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:
