@@ -20,8 +20,8 @@ NEGLIGIBLE = 0.01
 """Of the geometric mean of the largest entries of its row and column an entry matters from here."""
 NODES = {1: 129, 2: 17}
 """Values of each parameter at which the gains are computed (more parameters: 7)."""
-MOST = 256
-"""Segments of a spline that are not cut further."""
+MOST, SHORTEST = 256, 1e-6
+"""Segments of a spline that are not cut further; nor is one of this part of the range."""
 IN_EACH, AT_LAST = 9, 33
 """Values of p in each of them at which it must serve, at every other one the gains are computed;
 and once it serves at these.
@@ -61,11 +61,12 @@ def cut_to_serve(
     serves: Callable[[Fitted, Array], Array],
 ) -> Fitted | None:
     """`gains` of one parameter as a cubic spline whose segments are halved where it does not serve
-    ((K,) at p (K, 1)); None where that takes more than `MOST`.
+    ((K,) at p (K, 1)); None where that takes more than `MOST` or ones too short.
     """
     known: dict[float, Array] = {}
     knots = np.linspace(parameter.low, parameter.high, SEGMENTS[0] + 1)
-    while len(knots) <= MOST:
+    shortest = SHORTEST * (parameter.high - parameter.low)
+    while len(knots) <= MOST and np.diff(knots).min() > shortest:
         p = np.unique(piecewise_lobatto(knots.tolist(), IN_EACH))
         nodes = p[::2]
         new = np.array([q for q in nodes if q not in known])
