@@ -21,6 +21,7 @@ REQUIRED = (
     "control",
     "cvxpy",
     "clarabel",
+    "threadpoolctl",
     "matplotlib",
     "jinja2",
     "markupsafe",

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
+from symheli.threads import with_one_thread
 from symheli.values.labelled import per
 from symheli.values.signal import Signal
 from synthesis.analysis.l2_gain import l2_gain
@@ -29,6 +30,7 @@ REDUCED = (
 )
 
 
+@with_one_thread
 def gain_against_rate(
     model: LPVStateSpace | UncertainStateSpace,
     rates: Sequence[float],

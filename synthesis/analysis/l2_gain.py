@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from symheli.threads import with_one_thread
 from synthesis.analysis.certify import certify
 from synthesis.analysis.question import Model, question
 from synthesis.certificate import Certificate
@@ -12,6 +13,7 @@ from synthesis.worst.lower_bound import THOROUGH, Search
 from synthesis.worst.rates import Rate
 
 
+@with_one_thread
 def l2_gain(
     model: Model,
     rate: Rate = None,

@@ -11,6 +11,7 @@ import numpy as np
 
 from symheli.lpv import LPVStateSpace
 from symheli.lpv.matrix_function import MatrixFunction, block, in_one_basis
+from symheli.threads import with_one_thread
 from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
@@ -71,6 +72,7 @@ class Estimator:
         return l2_gain(self.error, rate, **options)
 
 
+@with_one_thread
 def estimator(
     plant: Plant,
     rate: Rate = None,

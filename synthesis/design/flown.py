@@ -14,6 +14,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
+from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
 from synthesis.analysis.l2_gain import l2_gain
 from synthesis.certificate import Certificate
@@ -92,6 +93,7 @@ class Flown:
         return f"{told}: {abs(100 * self.loss):.3g} % {'more' if self.loss >= 0 else 'less'}"
 
 
+@with_one_thread
 def certify_flown(
     controller: Any,
     plant: Plant,

@@ -8,6 +8,7 @@ from typing import Any
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from symheli.lpv.linear_model import LinearModel
+from symheli.threads import with_one_thread
 from synthesis.analysis.stability import stability
 from synthesis.design.as_controller import as_controller
 from synthesis.design.largest import largest
@@ -19,6 +20,7 @@ FINEST = 1e-6
 """The smallest tolerance: twenty bisections, each of them a proof; solvers decide no closer."""
 
 
+@with_one_thread
 def proven_around(
     plant: Plant,
     controller: Any,

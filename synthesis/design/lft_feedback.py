@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from symheli.threads import with_one_thread
 from synthesis.design.controller import Controller
 from synthesis.design.output_feedback import output_feedback
 from synthesis.design.search import BACK_OFF
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from synthesis.design.plant import Plant
 
 
+@with_one_thread
 def lft_feedback(
     plant: Plant,
     *,

@@ -16,6 +16,7 @@ import numpy as np
 
 from symheli.errors import InputError, SolverError
 from symheli.lpv import FunctionSpace
+from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from synthesis.certificate import Attempt
 from synthesis.design.back_off import levels_above
@@ -49,6 +50,7 @@ LARGEST = 1e5
 WIDE = 1e3
 
 
+@with_one_thread
 def multiobjective(
     plant: Plant,
     objectives: Objective | Sequence[Objective],

@@ -10,6 +10,7 @@ import numpy as np
 
 from symheli.lpv import UncertainStateSpace
 from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.threads import with_one_thread
 from synthesis.certificate import Attempt
 from synthesis.design.at_rest import at_rest
 from synthesis.design.back_off import levels_above
@@ -57,6 +58,7 @@ BOUND_DECIDES = (
 USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
 
 
+@with_one_thread
 def output_feedback(
     plant: Plant,
     rate: Rate = None,

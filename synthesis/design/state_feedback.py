@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.threads import with_one_thread
 from synthesis.certificate import Attempt
 from synthesis.design.back_off import levels_above
 from synthesis.design.conditions import conditions
@@ -31,6 +32,7 @@ WORST = 1e12
 """So many times weaker than what C2 shows best, anywhere, is a state that it does not show."""
 
 
+@with_one_thread
 def state_feedback(
     plant: Plant,
     rate: Rate = None,

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from symheli.errors import SolverError
+from symheli.threads import one_thread
 
 T = TypeVar("T")
 
@@ -95,7 +96,8 @@ def answer() -> None:
     with os.fdopen(os.dup(1), "wb") as reply:
         os.dup2(2, 1)
         try:
-            outcome = function(*arguments), None
+            with one_thread():
+                outcome = function(*arguments), None
         except Exception as error:
             outcome = None, error
         reply.write(pickle.dumps(outcome))
