@@ -299,6 +299,60 @@ def test_the_defaults_give_a_proven_controller_that_flies(tmp_path, capsys):
     assert not any(flight["lost"] for flight in told["flights"])
 
 
+def with_known_kinematics():
+    """A rigid body, damped and driven axis by axis, whose u is its airspeed."""
+    controls = ("d_lon", "d_lat", "d_col", "d_ped")
+    basis = identification.Polynomial(1, 0.0, 10.0)
+    kin = identification.KinematicARX(controls, "airspeed_command", na=1, nb=1, basis=basis)
+    own = np.zeros((12, 6))  # of one second: from u v w p q r, the controls, offset and increment
+    own[range(6), range(6)] = [-0.4, -0.5, -0.8, -6.0, -5.0, -4.0]
+    own[[6, 7, 8, 9], [4, 3, 2, 5]] = [30.0, 40.0, -50.0, 25.0]
+    V = np.array([0.0, 5.0, 10.0])
+    aerodynamics = identification.LPVARXModel(
+        structure=kin.aerodynamics,
+        theta=np.vstack([basis.fit(V, np.tile(0.02 * row, (3, 1))) for row in own]),
+        dt=0.02,
+        outputs=kin.aerodynamics.outputs,
+        inputs=kin.aerodynamics.inputs,
+        scheduling=symheli.Signal("airspeed_command", "m/s"),
+        residual_covariance=np.eye(6),
+        rows_used=100,
+    )
+    trim = basis.fit(V, np.outer(V, np.eye(8)[0]))
+    return identification.KinematicModel(structure=kin, aerodynamics=aerodynamics, trim=trim)
+
+
+def test_to_a_model_with_known_kinematics_a_gust_is_the_opposite_velocity(tmp_path):
+    """In its forces: what a gust adds to velocities is what they lose of the same velocity."""
+    path = with_known_kinematics().save(tmp_path / "model.json")
+    asked = Asked(vehicle="", model=str(path), airspeeds=(0.0, 8.0), delay=0.0, servos={})
+    model = model_of(asked, identification.KinematicModel.load(path))
+    at = model.at(3.0)
+    gust = [list(map(str, model.inputs)).index(name) for name in ("u_w", "v_w", "w_w")]
+    np.testing.assert_allclose(at.B[:, gust], np.eye(8)[:, :3] - at.A[:, :3], atol=1e-12)
+    continuous, sampled = plants(model, asked)
+    assert (continuous.model.dt, sampled.model.dt) == (None, 0.02)
+    # Tustin's rule back: its poles, but for those of the hold
+    z = np.linalg.eigvals(at.A)
+    s = np.linalg.eigvals(continuous.model.at(3.0).A)
+    np.testing.assert_allclose(
+        np.sort_complex(s), np.sort_complex(2 / 0.02 * (z - 1) / (z + 1)), atol=1e-3
+    )
+
+
+@pytest.mark.slow
+def test_a_controller_for_a_model_with_known_kinematics_is_proven(tmp_path, capsys):
+    with_known_kinematics().save(tmp_path / "model.json")
+    (tmp_path / "my.toml").write_text(
+        'vehicle = ""\nmodel = "model.json"\nairspeeds = [0, 8]\nacceleration = 2.0\n'
+        "delay = 0.0\nback_off = [1.6]\norder = 8\nknots = 3\n[servos]\n"
+    )
+    assert cli.main(["synthesize", str(tmp_path / "my.toml"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verified"]
+    assert told["frozen"] <= told["proven"] < 2 * told["promised"]
+
+
 @pytest.mark.slow
 def test_sideways_alone_the_rest_is_flown_by_an_autopilot(tmp_path):
     asked = Asked(
