@@ -306,6 +306,7 @@ def with_known_kinematics():
     kin = identification.KinematicARX(controls, "airspeed_command", na=1, nb=1, basis=basis)
     own = np.zeros((12, 6))  # of one second: from u v w p q r, the controls, offset and increment
     own[range(6), range(6)] = [-0.4, -0.5, -0.8, -6.0, -5.0, -4.0]
+    own[[0, 1, 1], [4, 3, 5]] = [0.3, -0.4, 0.2]  # speed to pitch, roll and yaw
     own[[6, 7, 8, 9], [4, 3, 2, 5]] = [30.0, 40.0, -50.0, 25.0]
     V = np.array([0.0, 5.0, 10.0])
     aerodynamics = identification.LPVARXModel(
