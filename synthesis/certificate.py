@@ -342,7 +342,7 @@ class Certificate:
         return read(path)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Frozen, flown and proven bound, the bracket between the last two shaded; returns the
+        """Frozen, attained and proven bound, the bracket between the last two shaded; returns the
         axes. Raises `InputError` for stability, which has no numbers.
         """
         from synthesis.certificate_plot import plot_certificate

@@ -21,7 +21,7 @@ def plot_certificate(certificate: Certificate, ax: Axes | None) -> Axes:
     ax = axes_of(ax, 5.5, 3.5)
     bounds = {
         "frozen": (certificate.frozen, GREY),
-        "flown": (certificate.limit, ORANGE),
+        "attained": (certificate.limit, ORANGE),
         "proven": (certificate.proven, BLUE),
     }
     for place, (name, (bound, colour)) in enumerate(bounds.items()):

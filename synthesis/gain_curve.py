@@ -153,14 +153,14 @@ class GainCurve:
                 f" {gain:.3g}"
             )
             words += (
-                f" (flown {self.lower[rate]:.3g}, frozen {self.frozen:.3g})"
+                f" (attained {self.lower[rate]:.3g}, frozen {self.frozen:.3g})"
                 if rate in self.lower
                 else f" (frozen {self.frozen:.3g})"
             )
         if math.isfinite(self.growing):
             words += (
-                f"; at {self.growing:g} {self.rate_unit} a flown {self.parameter} makes the state"
-                " grow"
+                f"; at {self.growing:g} {self.rate_unit} a computed history of {self.parameter}"
+                " makes the state grow"
             )
         return words + "."
 

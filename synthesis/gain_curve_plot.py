@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from synthesis.gain_curve import GainCurve
 
 COLOURS = {"P(p)": BLUE, "P(p, lag)": GREEN}
+ATTAINED = "worst trajectory of the linear model"
+"""Label of the gains that no bound can be smaller than."""
 
 
 def plot_gain_curve(
@@ -48,9 +50,9 @@ def plot_gain_curve(
         ax.text(
             math.sqrt(curve.growing * edge), low * 1.08, "grows", color=RED, ha="center", fontsize=8
         )
-    flown = sorted((place[r], g) for r, g in curve.lower.items() if math.isfinite(g))
+    attained = sorted((place[r], g) for r, g in curve.lower.items() if math.isfinite(g))
     upper = {place[r]: g for r, g in curve.best.items()}
-    both = [(x, g, upper[x]) for x, g in flown if x in upper]
+    both = [(x, g, upper[x]) for x, g in attained if x in upper]
     if both:
         x, low_side, high_side = zip(*both, strict=True)
         ax.fill_between(x, low_side, high_side, color=ORANGE, alpha=0.15, linewidth=0)
@@ -64,13 +66,13 @@ def plot_gain_curve(
                 markersize=4,
                 label=f"proven, {form}",
             )
-    if flown:
+    if attained:
         ax.plot(
-            *zip(*flown, strict=True),
+            *zip(*attained, strict=True),
             "^--",
             color=ORANGE,
             markersize=4,
-            label="flown: no bound can be smaller",
+            label=ATTAINED,
         )
     if math.isfinite(curve.frozen):
         ax.axhline(curve.frozen, color=GREY, linestyle=":", label=f"frozen, {curve.frozen:.3g}")

@@ -78,7 +78,17 @@ def _given(asked: Asked):
 
     if not asked.model:
         return None
-    given = read(Path(asked.model))
+    path = Path(asked.model)
+    if not path.is_file():
+        raise InputError(
+            f"model: there is no file {path}, neither beside the file of choices nor here; symheli"
+            " identify --save FILE writes one"
+        )
+    given = read(path)
     if isinstance(given, LinearGrid):
-        raise InputError(f"{asked.model}: expected a model over airspeed, got one over more")
+        over = ", ".join(f"{axis} ({axis.unit})" for axis in given.axes)
+        raise InputError(
+            f"{path}: expected a family over airspeed in m/s alone, got one over {over}; of a grid,"
+            " LinearGrid.family at one value of every other axis makes one"
+        )
     return given

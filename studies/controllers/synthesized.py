@@ -57,6 +57,7 @@ from symheli.flight.flight_data import FlightData
 from symheli.progress import task
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
+from symheli.values.units import ratio
 from synthesis import Flown, Plant
 from synthesis.design.reduction import fewest
 from synthesis.worst.frozen import norm
@@ -161,24 +162,50 @@ def synthesized(asked: Asked, given: Given | None = None) -> Synthesized:
 def model_of(asked: Asked, given: Given | None = None) -> LPVStateSpace:
     """What is designed for, over airspeed, with its disturbances; sampled where it was identified.
 
-    Raises `InputError` for a model sampled otherwise than the controller.
+    Raises `InputError` for a model sampled otherwise than the controller, one that is not over
+    airspeed or not over all that are asked for, and for what it does not have.
     """
     if given is None:
         return baseline(Helicopter.load(asked.vehicle, governor="ideal"), asked)
-    low, high = asked.airspeeds
-    airspeed = Scheduling("airspeed", "m/s", low, high, rate=asked.acceleration)
     if isinstance(given, LinearFamily):
         model = of_family(given, asked)
+    elif asked.states:
+        raise InputError("states: an identified model keeps its own; leave them out")
     elif isinstance(given, KinematicModel):
         model = with_gusts(given.to_state_space(held=moving_with_commands(given)))
     else:
         model = given.to_state_space()
+    airspeed = _airspeed(model, asked)
+    gusts = [name for name in asked.disturbances if name not in model.inputs]
+    if gusts and isinstance(given, LPVARXModel):
+        raise InputError(
+            f"disturbances: the model has no {', '.join(gusts)}; give names of"
+            f" {', '.join(model.inputs)} (added to that control), or a model with known kinematics"
+        )
     if model.dt is not None and abs(model.dt - asked.period) > 1e-9:
         raise InputError(
             f"period: the model is sampled every {model.dt:g} s, the controller every"
             f" {asked.period:g} s; give the same"
         )
     return disturbed(model.with_scheduling(airspeed), asked)
+
+
+def _airspeed(model: LPVStateSpace, asked: Asked) -> Scheduling:
+    """The airspeeds that are asked for; raises `InputError` where the model is not over them."""
+    low, high = asked.airspeeds
+    over = ", ".join(f"{p.name} ({p.unit})" for p in model.parameters)
+    size = ratio("m/s", model.parameters[0].unit)
+    if len(model.parameters) != 1 or size is None:
+        raise InputError(
+            f"model: expected one over airspeed in m/s alone, got one over {over}; make it over"
+            " airspeed"
+        )
+    least, most = (edge / size for edge in model.box[0])
+    if low < least - 1e-9 or high > most + 1e-9:
+        raise InputError(
+            f"airspeeds: the model is known from {least:.6g} to {most:.6g} m/s; ask for no more"
+        )
+    return Scheduling("airspeed", "m/s", low, high, rate=asked.acceleration)
 
 
 def plants(model: LPVStateSpace, asked: Asked) -> tuple[Plant, Plant]:

@@ -123,10 +123,10 @@ def _proofs(study: Outcome) -> Iterator[Row]:
 def _why(b: Bound, bounds: Sequence[Bound]) -> str:
     """By what any search among the same airspeeds has found."""
     c, same = b.certificate, (b.channel, b.model, b.rate)
-    flown = max(o.certificate.lower for o in bounds if (o.channel, o.model, o.rate) == same)
+    attained = max(o.certificate.lower for o in bounds if (o.channel, o.model, o.rate) == same)
     if c.status is Status.UNSTABLE or math.isinf(c.frozen):
         return "The loop is unstable at an airspeed held."
-    if math.isinf(flown):
+    if math.isinf(attained):
         return "A computed airspeed history makes the state grow: there is nothing to prove."
     if math.isinf(b.rate):
         return "Conservative: an airspeed that jumps is allowed."

@@ -59,8 +59,9 @@ CAPTION = {
     ),
     "gain": (
         "What the rate is worth: L2 gain of the gust loops against permitted acceleration, from"
-        " frozen to an airspeed that jumps, as the LFT tests let it. Triangles: an airspeed history"
-        " attains it. Grey: neither a gain is proven nor growth found."
+        " frozen to an airspeed that jumps, as the LFT tests let it. Triangles: the"
+        " worst airspeed history found, on the linear model and not in flight, attains it. Grey:"
+        " neither a gain is proven nor growth found."
     ),
 }
 

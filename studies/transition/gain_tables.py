@@ -46,7 +46,7 @@ def guarantee(found: Sequence[Bound], channel: str) -> Table:
         for rate in sorted({b.rate for b in gains if b.model == model}):
             here = {**jumping, **{b.form: b for b in gains if (b.model, b.rate) == (model, rate)}}
             now = [b for b in own if (b.model, b.rate) == (model, rate)]
-            flown = max(b.certificate.lower for b in now if b.certificate.kind == "l2 gain")
+            attained = max(b.certificate.lower for b in now if b.certificate.kind == "l2 gain")
             frozen = next(iter(here.values())).certificate.frozen
             cells = [gain(proven(here[form])) if form in here else "" for form in forms]
             table.rows.append(
@@ -55,7 +55,7 @@ def guarantee(found: Sequence[Bound], channel: str) -> Table:
                     rate_text(rate),
                     _stable(now, jumping),
                     "unstable" if math.isinf(frozen) else gain(frozen),
-                    "grows" if math.isinf(flown) else gain(flown),
+                    "grows" if math.isinf(attained) else gain(attained),
                     *cells,
                 ]
             )
@@ -67,8 +67,8 @@ def guarantee(found: Sequence[Bound], channel: str) -> Table:
 
 
 def not_about_the_helicopter(found: Sequence[Bound]) -> list[str]:
-    """Gains proven of an interpolated or identified model that a flown airspeed of the exact models
-    exceeds, a sentence each.
+    """Gains proven of an interpolated or identified model that a computed airspeed history of the
+    exact models exceeds, a sentence each.
     """
     gains = [b for b in found if b.certificate.kind == "l2 gain"]
     out = []
@@ -78,21 +78,23 @@ def not_about_the_helicopter(found: Sequence[Bound]) -> list[str]:
             for b in gains
             if b.model != "exact" and (b.channel, b.rate) == (exact.channel, exact.rate)
         ]
-        flown = exact.certificate.lower
+        attained = exact.certificate.lower
         for model in dict.fromkeys(b.model for b in others):
             least = min(proven(b) for b in others if b.model == model)
-            if least < flown and gain(least) != gain(
-                flown
+            if least < attained and gain(least) != gain(
+                attained
             ):  # what no digit shown tells apart says nothing either way
                 who = (
                     "the exact models, frozen,"
                     if exact.rate == 0
-                    else "flown airspeeds of the exact models"
+                    else "computed airspeed histories of the exact models"
                 )
-                flight = "make their state grow" if math.isinf(flown) else f"reach {gain(flown)}"
+                reached = (
+                    "make their state grow" if math.isinf(attained) else f"reach {gain(attained)}"
+                )
                 out.append(
                     f"{exact.channel.capitalize()} channel, {rate_text(exact.rate)}: {gain(least)}"
-                    f" is proven of the {model} model, and {who} {flight}: that proof says nothing"
+                    f" is proven of the {model} model, and {who} {reached}: that proof says nothing"
                     " of the helicopter."
                 )
     return out

@@ -80,5 +80,6 @@ def _nodes(model: LPVStateSpace) -> Array:
     if len(model.parameters) > 1:
         return lobatto_points(NODES.get(len(model.parameters), 7), model.box)
     pieces = model.basis.pieces()
-    knots = [pieces[0].low, *(piece.high for piece in pieces)]
-    return piecewise_lobatto(knots, max(EACH, -(-NODES[1] // len(pieces))))
+    ((low, high),) = model.box  # may be narrower than the range of the functions
+    knots = [low, *(piece.high for piece in pieces if low < piece.high < high), high]
+    return piecewise_lobatto(knots, max(EACH, -(-NODES[1] // (len(knots) - 1))))

@@ -36,7 +36,7 @@ def test_a_proof_for_a_larger_acceleration_counts_for_a_smaller_one():
 def test_the_words_say_what_is_proven_and_what_grows():
     assert STEEP.growing == 7.0
     assert "none can" in STEEP.verdict()
-    assert "at 7 m/s^2 a flown airspeed makes the state grow" in STEEP.verdict()
+    assert "at 7 m/s^2 a computed history of airspeed makes the state grow" in STEEP.verdict()
     assert FLAT.verdict().startswith("LFT D/G proves 1 for an airspeed that jumps")
 
 
@@ -90,8 +90,8 @@ def test_a_proof_of_a_model_that_the_exact_one_exceeds_is_said_not_to_hold_for_t
         [*bounds("baseline", 1.0), *bounds("exact", 2.0)]
     )
     assert sentence.startswith(
-        "Gust channel, 1 m/s^2: 1 is proven of the baseline model, and flown airspeeds of the exact"
-        " models reach 2"
+        "Gust channel, 1 m/s^2: 1 is proven of the baseline model, and computed airspeed"
+        " histories of the exact models reach 2"
     )
     assert not gain_tables.not_about_the_helicopter(
         [*bounds("baseline", 2.1), *bounds("exact", 2.0)]

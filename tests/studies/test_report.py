@@ -14,6 +14,7 @@ import pytest
 from json_schema import faults
 from matplotlib.figure import Figure
 
+from studies.report import pages
 from studies.transition import figures, gain_tables, guarantees, report
 from studies.transition.outcome import Outcome
 from symheli import LPVStateSpace, Scheduling
@@ -135,6 +136,24 @@ def test_numbers_are_on_the_disk_before_a_picture_fails(full, tmp_path, monkeypa
     with pytest.raises(RuntimeError, match="a picture failed"):
         report.write_report(replace(full, complete=True), tmp_path)
     assert json.loads((tmp_path / "results.json").read_text())["complete"]
+
+
+REPORT = Path(pages.__file__).parent
+
+
+def test_every_table_scrolls_in_a_box_of_its_own_and_keeps_its_rows_on_paper():
+    """What the tests in a browser see, where there is none."""
+    for template in REPORT.glob("*.html.j2"):
+        source = template.read_text(encoding="utf-8")
+        assert source.count("<table") == source.count('<div class="scroll"><table') > 0
+        assert source.count("<table") == source.count("<thead>")
+    screen, paper = (REPORT / "page.css").read_text(encoding="utf-8").split("@media print")
+    assert re.search(r"\.scroll \{[^}]*overflow-x: auto[^}]*max-width: 100%", screen)
+    assert re.search(r"\btd \{[^}]*white-space: nowrap", screen)
+    assert re.search(r"\btr\b[^{}]*\{[^}]*break-inside: avoid", paper)
+    assert "thead { display: table-header-group; }" in paper
+    assert report.whole("0.85, 1.36") == "0.85,\N{NO-BREAK SPACE}1.36"
+    assert report.whole("v, p") == "v, p"
 
 
 @pytest.mark.slow

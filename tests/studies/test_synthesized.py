@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import identification
 import symheli
 import synthesis
 from studies import cli
@@ -23,6 +24,7 @@ from studies.controllers.synthesized import (
 )
 from studies.controllers.synthesized_report import TABLE, gains, text
 from symheli.errors import InputError, SynthesisError
+from synthesis.worst.frozen import norm
 
 SMALL = """
 vehicle = ""
@@ -162,6 +164,98 @@ def test_a_model_sampled_otherwise_than_the_controller_is_refused(small, family)
         model_of(asked, Sampled())  # type: ignore[arg-type]
 
 
+# --- a model that symheli identify has saved ------------------------------------------------------
+
+
+def identified(path, dt=0.02, high=10.0, parameter="airspeed", unit="m/s"):
+    """Saved by a fit to v(k) = (1.004 - 0.002 V(k-1)) v(k-1) + 0.1 d_lat(k-1)."""
+    k, rng = np.arange(600), np.random.default_rng(0)
+    V, u, v = 0.5 * high * (1 + np.sin(0.05 * k)), rng.uniform(-0.05, 0.05, 600), np.zeros(600)
+    for i in range(1, 600):
+        v[i] = (1.004 - 0.002 * V[i - 1]) * v[i - 1] + 0.1 * u[i - 1]
+    units = {"v": "m/s", "d_lat": "rad", parameter: unit}
+    record = symheli.FlightRecord.from_arrays(dt * k, units, v=v, d_lat=u, **{parameter: V})
+    basis = identification.Polynomial(1, 0.0, high)
+    arx = identification.LPVARX("v", "d_lat", parameter, na=1, nb=1, delay=1, basis=basis)
+    return identification.fit(arx, record).save(path)
+
+
+OF_IDENTIFIED = SMALL.replace('["v_w", "d_lat"]', '["d_lat"]').replace("family", "model")
+
+
+def said_of(tmp_path, capsys, choices=OF_IDENTIFIED):
+    """What `symheli synthesize` refuses these choices with."""
+    (tmp_path / "my.toml").write_text(choices)
+    assert cli.main(["synthesize", str(tmp_path / "my.toml")]) == 1
+    assert not (tmp_path / "made").exists()
+    return capsys.readouterr().err
+
+
+def test_a_controller_for_a_saved_identified_model_is_proven_around_that_model(tmp_path, capsys):
+    """Known to higher airspeeds than are asked for; the loop of the proof is by hand that of the
+    coefficients that made the record.
+    """
+    identified(tmp_path / "model.json")
+    (tmp_path / "my.toml").write_text(OF_IDENTIFIED)
+    assert cli.main(["synthesize", str(tmp_path / "my.toml"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verified"]
+    assert told["frozen"] <= told["proven"] < math.inf
+    assert "keeps a gain of" in (tmp_path / "made" / "report.html").read_text()
+    table = symheli.TableController.load(tmp_path / "made" / TABLE)
+    assert table.dt == 0.02
+    proof = synthesis.Certificate.load(tmp_path / "made" / "certificate.json")
+    assert proof.verify()
+    asked = Asked.read(tmp_path / "my.toml", {})
+    given = identification.LPVARXModel.load(tmp_path / "model.json")
+    _, plant = plants(model_of(asked, given), asked)
+    worst = 0.0
+    for V in (0.0, 3.0, 8.0):
+        K = table.model.at(V)
+        A = np.block([[np.atleast_2d(1.004 - 0.002 * V) + 0.1 * K.D, 0.1 * K.C], [K.B, K.A]])
+        loop = plant.close(table).at(V)
+        own, of_loop = (np.sort_complex(np.linalg.eigvals(M)) for M in (A, loop.A))
+        np.testing.assert_allclose(of_loop, own, atol=1e-6)
+        worst = max(worst, norm(loop.A, loop.B, loop.C, loop.D, 0.02)[0])
+    assert worst <= told["proven"]
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ({"dt": 0.05}, "sampled every 0.05 s, the controller every 0.02 s; give the same"),
+        ({"high": 5.0}, "airspeeds: the model is known from 0 to 5 m/s; ask for no more"),
+        ({"parameter": "rpm", "unit": "rad/s"}, "one over rpm (rad/s); make it over airspeed"),
+        ({"parameter": "mixture", "unit": "1"}, "one over mixture (1); make it over airspeed"),
+    ],
+)
+def test_an_identified_model_over_something_else_is_refused(tmp_path, capsys, other, said):
+    identified(tmp_path / "model.json", **other)
+    assert said in said_of(tmp_path, capsys)
+
+
+def test_what_an_identified_model_does_not_have_is_not_asked_of_it(tmp_path, capsys):
+    identified(tmp_path / "model.json")
+    gusts = OF_IDENTIFIED.replace('["d_lat"]\ndelay', '["v_w", "d_lat"]\ndelay')
+    assert "the model has no v_w; give names of d_lat" in said_of(tmp_path, capsys, gusts)
+    states = OF_IDENTIFIED.replace("degree = 1", 'degree = 1\nstates = ["v"]')
+    assert "an identified model keeps its own; leave them out" in said_of(tmp_path, capsys, states)
+
+
+def test_a_file_that_holds_no_model_over_airspeed_is_refused(tmp_path, capsys, family):
+    path = tmp_path / "model.json"
+    assert "symheli identify --save FILE writes one" in said_of(tmp_path, capsys)
+    for content in ("u v w", '{"schema": "symheli table controller"}', "[1, 2]"):
+        path.write_text(content)
+        assert "model.json: expected a model of symheli identify" in said_of(tmp_path, capsys)
+    axes, speeds = (symheli.Signal("airspeed", "m/s"), symheli.Signal("altitude", "m")), (0.0, 8.0)
+    models = [family.models[0]] * 4
+    symheli.LinearGrid(axes, (speeds, (0.0, 100.0)), models).save(path)
+    said = said_of(tmp_path, capsys)
+    assert "got one over airspeed (m/s), altitude (m)" in said
+    assert "LinearGrid.family" in said
+
+
 def test_a_controller_whose_loop_does_not_stand_the_delay_is_refused_with_what_to_change(
     family, found
 ):
@@ -203,6 +297,61 @@ def test_the_defaults_give_a_proven_controller_that_flies(tmp_path, capsys):
     assert told["flown"]["largest"] < told["proven"] < 1.3 * told["frozen"]
     assert told["states"]["flown"] < told["states"]["designed"]
     assert not any(flight["lost"] for flight in told["flights"])
+
+
+def with_known_kinematics():
+    """A rigid body, damped and driven axis by axis, whose u is its airspeed."""
+    controls = ("d_lon", "d_lat", "d_col", "d_ped")
+    basis = identification.Polynomial(1, 0.0, 10.0)
+    kin = identification.KinematicARX(controls, "airspeed_command", na=1, nb=1, basis=basis)
+    own = np.zeros((12, 6))  # of one second: from u v w p q r, the controls, offset and increment
+    own[range(6), range(6)] = [-0.4, -0.5, -0.8, -6.0, -5.0, -4.0]
+    own[[0, 1, 1], [4, 3, 5]] = [0.3, -0.4, 0.2]  # speed to pitch, roll and yaw
+    own[[6, 7, 8, 9], [4, 3, 2, 5]] = [30.0, 40.0, -50.0, 25.0]
+    V = np.array([0.0, 5.0, 10.0])
+    aerodynamics = identification.LPVARXModel(
+        structure=kin.aerodynamics,
+        theta=np.vstack([basis.fit(V, np.tile(0.02 * row, (3, 1))) for row in own]),
+        dt=0.02,
+        outputs=kin.aerodynamics.outputs,
+        inputs=kin.aerodynamics.inputs,
+        scheduling=symheli.Signal("airspeed_command", "m/s"),
+        residual_covariance=np.eye(6),
+        rows_used=100,
+    )
+    trim = basis.fit(V, np.outer(V, np.eye(8)[0]))
+    return identification.KinematicModel(structure=kin, aerodynamics=aerodynamics, trim=trim)
+
+
+def test_to_a_model_with_known_kinematics_a_gust_is_the_opposite_velocity(tmp_path):
+    """In its forces: what a gust adds to velocities is what they lose of the same velocity."""
+    path = with_known_kinematics().save(tmp_path / "model.json")
+    asked = Asked(vehicle="", model=str(path), airspeeds=(0.0, 8.0), delay=0.0, servos={})
+    model = model_of(asked, identification.KinematicModel.load(path))
+    at = model.at(3.0)
+    gust = [list(map(str, model.inputs)).index(name) for name in ("u_w", "v_w", "w_w")]
+    np.testing.assert_allclose(at.B[:, gust], np.eye(8)[:, :3] - at.A[:, :3], atol=1e-12)
+    continuous, sampled = plants(model, asked)
+    assert (continuous.model.dt, sampled.model.dt) == (None, 0.02)
+    # Tustin's rule back: its poles, but for those of the hold
+    z = np.linalg.eigvals(at.A)
+    s = np.linalg.eigvals(continuous.model.at(3.0).A)
+    np.testing.assert_allclose(
+        np.sort_complex(s), np.sort_complex(2 / 0.02 * (z - 1) / (z + 1)), atol=1e-3
+    )
+
+
+@pytest.mark.slow
+def test_a_controller_for_a_model_with_known_kinematics_is_proven(tmp_path, capsys):
+    with_known_kinematics().save(tmp_path / "model.json")
+    (tmp_path / "my.toml").write_text(
+        'vehicle = ""\nmodel = "model.json"\nairspeeds = [0, 8]\nacceleration = 2.0\n'
+        "delay = 0.0\nback_off = [1.6]\norder = 8\nknots = 3\n[servos]\n"
+    )
+    assert cli.main(["synthesize", str(tmp_path / "my.toml"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verified"]
+    assert told["frozen"] <= told["proven"] < 2 * told["promised"]
 
 
 @pytest.mark.slow

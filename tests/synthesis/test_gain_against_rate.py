@@ -58,7 +58,7 @@ def test_a_rate_at_which_the_state_grows_has_no_proof(curve):
     assert curve.growing == 1.0
     assert math.isinf(curve.proven["P(p)"][1.0])
     assert curve.fastest[0] == 0.2
-    assert "at 1 1/s a flown stiffness makes the state grow" in curve.verdict()
+    assert "at 1 1/s a computed history of stiffness makes the state grow" in curve.verdict()
 
 
 def test_the_frame_holds_every_form(curve, pd):
@@ -112,6 +112,7 @@ def test_the_curve_is_drawn_on_the_axes_given(curve, ax):
     np.testing.assert_array_equal(
         lines["proven, P(p)"], [curve.proven["P(p)"][r] for r in (0.0, 0.2)]
     )
+    assert "worst trajectory of the linear model" in lines  # no flight
     assert "stiffness" in ax.get_xlabel()
     assert {"open", "grows"} & {text.get_text() for text in ax.texts} == {"open", "grows"}
     assert ax.get_title() == "a spring"
@@ -122,7 +123,7 @@ def test_a_certificate_draws_its_bracket(curve, ax):
     assert cert.plot(ax) is ax
     points = [float(line.get_ydata()[0]) for line in ax.lines if len(line.get_ydata()) == 1]
     assert points == [cert.frozen, cert.lower, cert.gamma]
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["frozen", "flown", "proven"]
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["frozen", "attained", "proven"]
 
 
 def test_a_certificate_without_a_proof_says_so(curve, ax):

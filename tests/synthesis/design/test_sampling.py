@@ -13,6 +13,7 @@ from symheli.flight.controller import SCHEDULING
 from symheli.values.named_vector import NamedVector
 from synthesis import Plant, output_feedback, state_feedback
 from synthesis.design.controller import SAMPLED
+from synthesis.design.sampling import tustin
 from synthesis.worst.frozen import norm
 
 
@@ -46,6 +47,21 @@ def test_what_cannot_be_sampled(made):
         made.discretize(0.02).discretize(0.02)
     with pytest.raises(InputError, match="dt: expected a number > 0"):
         made.discretize(0.0)
+
+
+@pytest.mark.parametrize("table", [False, True])
+def test_what_is_sampled_may_hold_on_less_than_its_functions_of_p_do(made, table):
+    """Between 0.1 and 0.75 alone, of functions over 0 to 1: as the whole is there."""
+    model = made.model
+    if table:
+        basis, p = symheli.lpv.PiecewiseLinear((0.0, 0.3, 0.6, 1.0)), np.linspace(0.0, 1.0, 31)
+        A, B, C, D = (basis.fit(p, M) for M in model.matrices(p))
+        model = replace(model, basis=basis, A=A, B=B, C=C, D=D, trim=None, residuals=None)
+    (whole,) = model.parameters
+    part = tustin(model.with_scheduling(replace(whole, low=0.1, high=0.75)), 0.02)
+    for p in (0.1, 0.3, 0.5, 0.75):
+        exact = model.at(p).discretize(0.02, "tustin")
+        np.testing.assert_allclose(part.at(p).A, exact.A, atol=1e-3)
 
 
 # --- the loop of a sampled controller -------------------------------------------------------------
