@@ -36,6 +36,7 @@ SHARED = (
     "symheli.extras",
     "symheli.lazy",
     "symheli.progress",
+    "symheli.threads",
 )
 """What identification and synthesis may see of the model's room."""
 
