@@ -15,6 +15,25 @@ ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("symheli", "identification", "synthesis", "studies")
 
 
+TOP = {
+    *ROOMS,
+    *("tests", "benchmarks", "examples", "docs", ".ci", ".gitignore", "Makefile", "setup.py"),
+    *("pyproject.toml", "constraints.txt"),
+    *("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md"),
+}
+
+
+def test_nothing_that_a_command_wrote_is_kept_at_the_top():
+    """As the folders are into which commands write by default."""
+    git = shutil.which("git")
+    if git is None or not (ROOT / ".git").exists():
+        pytest.skip("no git checkout")
+    listed = subprocess.run(
+        [git, "ls-files"], check=True, capture_output=True, text=True, cwd=ROOT
+    ).stdout.splitlines()
+    assert {name.split("/")[0] for name in listed} <= TOP
+
+
 @pytest.mark.parametrize("room", ROOMS)
 def test_every_file_beside_the_code_is_in_the_wheel(room):
     setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]

@@ -218,7 +218,7 @@ def _controllers(
 ) -> Iterator[tuple[Controller, tuple[str, ...]]]:
     """Those of the inequalities with what kept them from a lower gamma; where every parameter
     stands still and X and Y are `free`, the central ones of the frozen models before those that are
-    far from it.
+    far from it. Where X or Y moving stays above what no controller can beat, both move first.
     """
     floor = worst.level
     still = free and floor > 0 and all(s.rate == 0 for s in plant.parameters)
@@ -228,7 +228,13 @@ def _controllers(
             made = in_plant_units(plant, each.coordinates, each.fit, each.gamma, CENTRAL)
             yield replace(made, optimum=floor), ()
 
-    for own, design in _designs(plant, start, both, factors, worst, divisions, attempts):
+    def other() -> Start | None:
+        if start.gamma <= CLOSE * floor or not both(DEGREES[1][0]):
+            return None
+        found = best(plant, both, divisions, USUAL, attempts, worst)
+        return found if found.gamma < WORTH * start.gamma else None
+
+    for own, design in _designs(plant, start, other(), factors, attempts):
         if still and design.gamma > _far(min(factors)) * floor:
             yield from central()
             still = False
@@ -261,20 +267,16 @@ def _both_asked(untold: Sequence[str]) -> tuple[str, ...]:
 def _designs(
     plant: Plant,
     start: Start,
-    both: Callable[[int], Sequence[Shape]],
+    other: Start | None,
     factors: Sequence[float],
-    worst: Worst,
-    divisions: int,
     attempts: list[Attempt],
 ) -> Iterator[tuple[Start, Design]]:
-    """Where X or Y moving stays above what no controller can beat, first with both moving and a
-    controller that is not told how fast, which serves where parameters move slowly.
+    """First of the `other`, where X and Y both move and the controller is not told how fast, which
+    serves where parameters move slowly.
     """
-    if start.gamma > CLOSE * worst.level and both(DEGREES[1][0]):
-        other = best(plant, both, divisions, USUAL, attempts, worst)
-        if other.gamma < WORTH * start.gamma:
-            for design in settled(other, factors, _recover, USUAL, attempts, neglecting=True):
-                yield other, design
+    if other is not None:
+        for design in settled(other, factors, _recover, USUAL, attempts, neglecting=True):
+            yield other, design
     untold = bool(start.shape.untold(plant.parameters))  # asked for by hand
     for design in settled(start, factors, _recover, USUAL, attempts, neglecting=untold):
         yield start, design
