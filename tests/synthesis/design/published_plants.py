@@ -110,3 +110,69 @@ def wu_1996(rate, half=math.pi):
     return plant.weighted(
         {"r1": follow, "r2": follow, "n1": noise, "n2": noise, "u1": 1 / 280, "u2": 1 / 280}
     )
+
+
+def first_order_lag(pole, gain, output, parameters):
+    """x' = -pole x + gain (Wu + u), y = output x, which follows a command r and is disturbed by d.
+
+    `pole`, `gain` and `output` map exponents of the parameters to coefficients. The error r - y is
+    weighted by We = (s + 25)/(5 s + 5), the disturbed control u + d/10 by Wu = (10 s + 10)/(s + 100).
+    Source: the pages on LFT models and on conversions between grids and LFTs of LPVTools'
+    documentation.
+    """
+    A, B, C = {}, {}, {}
+
+    def entry(matrices, shape, place, polynomial, sign=1.0):
+        for exponents, coefficient in polynomial.items():
+            matrices.setdefault(exponents, np.zeros(shape))[place] += sign * coefficient
+
+    one = {(0,) * len(parameters): 1.0}
+    # states x, of We, of Wu; inputs r, d, u; outputs We, Wu, r - y
+    wu = {"state": -990.0, "direct": 10.0}
+    entry(A, (3, 3), (0, 0), pole, -1.0)
+    entry(A, (3, 3), (0, 2), gain, wu["state"])
+    entry(A, (3, 3), (1, 0), output, -1.0)
+    entry(A, (3, 3), (1, 1), one, -1.0)
+    entry(A, (3, 3), (2, 2), one, -100.0)
+    entry(B, (3, 3), (0, 1), gain, 0.1 * wu["direct"])
+    entry(B, (3, 3), (0, 2), gain, wu["direct"] + 1.0)
+    entry(B, (3, 3), (1, 0), one)
+    entry(B, (3, 3), (2, 1), one, 0.1)
+    entry(B, (3, 3), (2, 2), one)
+    entry(C, (3, 3), (0, 0), output, -0.2)
+    entry(C, (3, 3), (0, 1), one, 4.8)
+    entry(C, (3, 3), (1, 2), one, wu["state"])
+    entry(C, (3, 3), (2, 0), output, -1.0)
+    D = {(0,) * len(parameters): np.array([[0.2, 0, 0], [0, 1.0, 10.0], [1.0, 0, 0]])}
+    model = LPVStateSpace.polynomial(
+        A,
+        B,
+        C,
+        D,
+        list(parameters),
+        states=["x", "we", "wu"],
+        inputs=["r", "d", "u"],
+        outputs=["error", "effort", "measured"],
+    )
+    return Plant(
+        model,
+        disturbances=["r", "d"],
+        performance=["error", "effort"],
+        controls=["u"],
+        measurements=["measured"],
+    )
+
+
+def lft_tutorial(rate):
+    """x' = rho (u - x), y = x, for rho in [1, 10] 1/s moving by `rate` a second."""
+    rho = Scheduling("rho", "1/s", 1.0, 10.0, rate=rate)
+    return first_order_lag({(1,): 1.0}, {(1,): 1.0}, {(0,): 1.0}, [rho])
+
+
+def grid_to_lft(rate):
+    """x' = -rho1 x + rho2 u, y = rho1 rho2 x, for rho1 in [1, 10], rho2 in [1, 3]."""
+    rho = [
+        Scheduling("rho1", "1/s", 1.0, 10.0, rate=rate),
+        Scheduling("rho2", "1/s", 1.0, 3.0, rate=rate),
+    ]
+    return first_order_lag({(1, 0): 1.0}, {(0, 1): 1.0}, {(1, 1): 1.0}, rho)
