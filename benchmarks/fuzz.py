@@ -21,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[0] = str(ROOT)  # not benchmarks/, whose files are named after the rooms they measure
 
-from studies.stamped_tables import DOCS, keep, processor  # noqa: E402
+from evidence.tables import DOCS, keep  # noqa: E402
 from studies.threads import one_thread  # noqa: E402
 
 one_thread()
@@ -99,7 +99,7 @@ def main() -> None:
         for package in options.only or (*PACKAGES, "readers"):
             one = rows(package, options.quick, options.seed)
             if options.write:
-                keep(DOCS / "reliability.md", f"fuzzing {package}", table(one), processor())
+                keep(DOCS / "reliability.md", f"fuzzing {package}", table(one))
             found |= one
         os.chdir(home)
     faults = [str(fault) for tally in found.values() for fault in tally.faults]

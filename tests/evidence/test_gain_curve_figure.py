@@ -1,0 +1,22 @@
+"""The figure of gain against permitted acceleration of several loops."""
+
+import math
+
+from evidence.gain_curve import save
+from synthesis import GainCurve
+
+CURVE = GainCurve(
+    "loop",
+    "1",
+    1.0,
+    {0.0: 1.0, 1.0: 2.0, math.inf: math.inf},
+    {"P(p)": {0.0: 1.0, 1.0: 2.5}},
+    {"constant P": math.inf},
+)
+
+
+def test_the_figure_has_a_panel_a_loop(tmp_path):
+    for count in (1, 2):
+        save([CURVE] * count, tmp_path / f"{count}.png")
+    one, two = ((tmp_path / f"{count}.png").stat().st_size for count in (1, 2))
+    assert 10_000 < one < two
