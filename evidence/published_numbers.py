@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import root
 
 import symheli
+from evidence.tables import markdown
 from symheli import Helicopter
 from symheli.errors import SymheliError, ValidityWarning
 from symheli.values.kinematics import GRAVITY
@@ -23,6 +24,11 @@ from symheli.values.kinematics import GRAVITY
 SPEEDS = (0.0, 3.0, 5.0, 10.0, 15.0, 20.0, 25.0)
 Y_V = (-0.038, -0.047, -0.0485, -0.060, -0.072, -0.0805, -0.086)
 Y_DPED = (-5.15, -4.87, -4.80, -4.80, -5.25, -5.80, -6.35)
+
+HEAD = (
+    *("quantity", "unit", "printed", "reading error", "computed", "miss"),
+    *("determined by the equations", "met"),
+)
 
 
 class PublishedNumber(NamedTuple):
@@ -252,19 +258,20 @@ def _side_slope(heli: Helicopter, point: symheli.TrimPoint, what: str, step: flo
 
 def table() -> str:
     """The numbers as a Markdown table."""
-    lines = [
-        (
-            "| quantity | unit | printed | reading error | computed | miss | determined by the"
-            " equations | met |"
-        ),
-        "|---|---|---|---|---|---|---|---|",
+    rows = [
+        [
+            row.quantity,
+            row.unit,
+            f"{row.printed:g}",
+            f"{row.reading_error:g}",
+            f"{row.computed:.4g}",
+            f"{row.miss:+.2g}",
+            _yes(row.determined),
+            _yes(row.met),
+        ]
+        for row in published_numbers()
     ]
-    for row in published_numbers():
-        values = f"{row.printed:g} | {row.reading_error:g} | {row.computed:.4g} | {row.miss:+.2g}"
-        lines.append(
-            f"| {row.quantity} | {row.unit} | {values} | {_yes(row.determined)} | {_yes(row.met)} |"
-        )
-    return "\n".join(lines)
+    return markdown(HEAD, rows)
 
 
 def _yes(answer: bool) -> str:

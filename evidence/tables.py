@@ -8,6 +8,7 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Iterable, Sequence
 from datetime import date
 from pathlib import Path
 
@@ -17,6 +18,17 @@ from symheli.errors import InputError
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 QUIET = 0.2
 """Processors that other programs may keep busy while a table is measured for keeping."""
+
+
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [f"| {' | '.join(line)} |" for line in (head, *rows)]
+    return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]])
+
+
+def four_digits(value: float) -> str:
+    """A number to four significant digits, zeros kept."""
+    return f"{value:#.4g}".rstrip(".")
 
 
 def keep(page: Path, section: str, text: str, machine: str = "", command: str = "") -> None:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import synthesis
 from evidence.bracket.servo import curves_of, found_of, measure_servo, text_of
 from evidence.bracket.table import bracket_table
-from evidence.gain_curve import save
+from evidence.figures import save
 from evidence.tables import DOCS, keep, parsed
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
@@ -199,7 +199,7 @@ def main() -> None:
     if options.write:
         keep(DOCS / "bracket.md", options.model, table)
     if options.figure:
-        save(curves, options.figure)
+        save([one.plot for one in curves], options.figure)
 
 
 def _measured(heli: Helicopter, *, exact: bool, quick: bool) -> dict[str, Any]:

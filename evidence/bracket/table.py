@@ -7,6 +7,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from evidence.tables import four_digits, markdown
+
 COLUMNS = {
     "lower": "flown",
     "memory": "proven, P(p, lag)",
@@ -40,13 +42,11 @@ def bracket_table(found: Mapping[str, Any]) -> str:
             )
             if key and float(match[1]) not in gains:
                 rows.setdefault(float(match[1]), {})[key] = "stable" if result else "nothing"
-    lines = [["acceleration, m/s²", *(COLUMNS[key] for key in shown)]]
-    lines += [[f"{rate:g}", *(rows[rate].get(key, "") for key in shown)] for rate in sorted(rows)]
-    body = ["| " + " | ".join(line) + " |" for line in lines]
-    return "\n".join([body[0], "|" + "---|" * len(lines[0]), *body[1:]])
+    return markdown(
+        ["acceleration, m/s²", *(COLUMNS[key] for key in shown)],
+        ([f"{rate:g}", *(rows[rate].get(key, "") for key in shown)] for rate in sorted(rows)),
+    )
 
 
 def _gain(value: float) -> str:
-    return (
-        "" if math.isnan(value) else "nothing" if math.isinf(value) else f"{value:#.4g}".rstrip(".")
-    )
+    return "" if math.isnan(value) else "nothing" if math.isinf(value) else four_digits(value)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from evidence.jerk.flown import Fastest
@@ -17,17 +16,13 @@ if TYPE_CHECKING:
 COLOURS = (BLUE, GREEN, ORANGE, RED)
 
 
-def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes | None = None) -> Axes:
+def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes) -> None:
     """Proven gains as lines, flown ones as triangles of the same colour; nothing proven: no point.
 
     The flights stand at their largest acceleration, with their largest jerk.
     """
     from matplotlib.ticker import LogLocator, NullLocator
 
-    if ax is None:
-        import matplotlib.pyplot as plt
-
-        ax = plt.subplots(figsize=(7.0, 4.5), layout="constrained")[1]
     for k, jerk in enumerate(sorted({c.jerk for c in loop.cells})):
         cells = sorted(c for c in loop.cells if c.jerk == jerk)
         colour = COLOURS[k % len(COLOURS)]
@@ -66,23 +61,6 @@ def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes | None
     ax.set_xlabel("permitted |dV/dt| (m/s²)")
     ax.set_ylabel("L2 gain: lines proven, triangles flown")
     ax.legend(fontsize=8, frameon=False, loc="upper left")
-    return ax
-
-
-def save(loops: Mapping[str, Loop], flights: Mapping[str, Fastest], path: Path) -> None:
-    """One panel a loop, to `path`; its ending says the format."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(
-        1, len(loops), figsize=(2 + 6 * len(loops), 4.5), squeeze=False, layout="constrained"
-    )
-    for (name, loop), ax in zip(loops.items(), axes[0], strict=True):
-        plot(f"{name.capitalize()} loop", loop, flights, ax)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
 
 
 def _shown(gain: float) -> float:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import argparse
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from evidence.jerk.figure import save
+from evidence.figures import save
+from evidence.jerk.figure import plot
 from evidence.jerk.flown import WINDOW, Fastest, fastest
 from evidence.jerk.gains import Knots, Loop, carried_over, measure
-from evidence.jerk.table import jerk_table
+from evidence.jerk.table import jerk_table, table_of_flights
 from evidence.tables import DOCS, keep, parsed
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
@@ -70,18 +72,25 @@ def main() -> None:
         "longitudinal": _found("longitudinal", longitudinal_loop(heli), options.quick),
     }
     texts = {name: jerk_table(found) for name, found in loops.items()}
+    fastest_of_each = table_of_flights(flown)
     if options.json:
         print(as_json(_data(loops, flown)))
     else:
-        print("\n\n".join([*(f"{name}\n{text}" for name, text in texts.items()), _said(flown)]))
+        print("\n\n".join([*(f"{name}\n{text}" for name, text in texts.items()), fastest_of_each]))
     if options.write:
         for name, text in texts.items():
             keep(DOCS / "jerk.md", name, text)
-        keep(DOCS / "jerk.md", "flights", _said(flown))
+        keep(DOCS / "jerk.md", "flights", fastest_of_each)
     for path in {options.figure, DOCS / "gain-against-jerk.png" if options.write else None} - {
         None
     }:
-        save(loops, flown, path)
+        save(
+            [
+                partial(plot, f"{name.capitalize()} loop", loop, flown)
+                for name, loop in loops.items()
+            ],
+            path,
+        )
 
 
 def _found(name: str, loop: LPVStateSpace, quick: bool) -> Loop:
@@ -97,12 +106,6 @@ def _found(name: str, loop: LPVStateSpace, quick: bool) -> Loop:
         found[what] = result
     summary = {key: found.pop(key) for key in ("frozen", "same_knots", "chosen_knots")}
     return Loop(**summary, cells=carried_over(list(found.values())))
-
-
-def _said(flown: dict[str, Fastest]) -> str:
-    rows = ["| flight | largest \\|dV/dt\\|, m/s² | largest \\|d²V/dt²\\|, m/s³ |", "|---|---|---|"]
-    rows += [f"| {name} | {f.acceleration:.2f} | {f.jerk:.2f} |" for name, f in flown.items()]
-    return "\n".join(rows)
 
 
 def _data(loops: dict[str, Loop], flown: dict[str, Fastest]) -> dict[str, Any]:

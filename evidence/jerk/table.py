@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
+from evidence.jerk.flown import Fastest
 from evidence.jerk.gains import Cell, Loop
+from evidence.tables import four_digits, markdown
 
 
 def jerk_table(loop: Loop) -> str:
@@ -17,17 +20,24 @@ def jerk_table(loop: Loop) -> str:
         "P(V), same knots",
         "P(V), knots chosen",
     ]
-    lines = [heads, ["---"] * len(heads)]
-    for a in sorted({a for a, _ in cells}):
-        lines.append(
-            [
-                f"{a:g}",
-                *(_cell(cells[a, jerk]) if (a, jerk) in cells else "" for jerk in jerks),
-                _gain(loop.same_knots[a], "nothing"),
-                _gain(loop.chosen_knots[a], "nothing"),
-            ]
-        )
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    rows = [
+        [
+            f"{a:g}",
+            *(_cell(cells[a, jerk]) if (a, jerk) in cells else "" for jerk in jerks),
+            _gain(loop.same_knots[a], "nothing"),
+            _gain(loop.chosen_knots[a], "nothing"),
+        ]
+        for a in sorted({a for a, _ in cells})
+    ]
+    return markdown(heads, rows)
+
+
+def table_of_flights(flown: Mapping[str, Fastest]) -> str:
+    """How fast the airspeed of each flight changes."""
+    return markdown(
+        ["flight", "largest \\|dV/dt\\|, m/s²", "largest \\|d²V/dt²\\|, m/s³"],
+        ([name, f"{f.acceleration:.2f}", f"{f.jerk:.2f}"] for name, f in flown.items()),
+    )
 
 
 def _cell(cell: Cell) -> str:
@@ -35,4 +45,4 @@ def _cell(cell: Cell) -> str:
 
 
 def _gain(value: float, infinite: str) -> str:
-    return infinite if math.isinf(value) else f"{value:#.4g}".rstrip(".")
+    return infinite if math.isinf(value) else four_digits(value)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import synthesis
-from evidence.tables import DOCS, keep, parsed
+from evidence.tables import DOCS, keep, markdown, parsed
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
 from studies.output import as_json, columns, progress
@@ -208,9 +208,10 @@ def tables(loop: str, results: dict[str, Any]) -> str:
 
 def _table(title: str, rows: dict[str, dict[str, Any]]) -> str:
     names = list(dict.fromkeys(name for row in rows.values() for name in row))
-    lines = [[title, *names], ["---"] * (len(names) + 1)]
-    lines += [[what, *(_word(row.get(name, "")) for name in names)] for what, row in rows.items()]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown(
+        [title, *names],
+        ([what, *(_word(row.get(name, "")) for name in names)] for what, row in rows.items()),
+    )
 
 
 def _range(found: dict[str, Any]) -> str:

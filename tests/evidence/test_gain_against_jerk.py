@@ -1,12 +1,14 @@
 """Gain against acceleration and jerk: what the page shows, and how it is put together."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 import synthesis
-from evidence.jerk.figure import save
+from evidence.figures import save
+from evidence.jerk.figure import plot
 from evidence.jerk.flown import Fastest, fastest
 from evidence.jerk.gains import Cell, Knots, Loop, carried_over, cell, with_jerk
 from evidence.jerk.table import jerk_table
@@ -60,7 +62,7 @@ def test_the_table_says_where_nothing_is_proven():
     loop = Loop(0.98, {1.0: 2.6, 4.5: math.inf}, {1.0: 2.55, 4.5: 104.8}, cells)
     assert jerk_table(loop).splitlines() == [
         "| acceleration, m/s² | jerk 3 m/s³ | P(V), same knots | P(V), knots chosen |",
-        "| --- | --- | --- | --- |",
+        "|---|---|---|---|",
         "| 1 | 2.500 (2.000) | 2.600 | 2.550 |",
         "| 4.5 | nothing (grows) | nothing | 104.8 |",
     ]
@@ -81,5 +83,5 @@ def test_the_fastest_change_of_a_sine_is_found_and_a_shake_is_smoothed_away():
 def test_the_figure_has_a_panel_a_loop(tmp_path):
     cells = [Cell(a, j, 2 + a, 1 + a) for a in (1.0, 3.0) for j in (1.0, math.inf)]
     loop = Loop(0.98, {1.0: 3.0, 3.0: 5.0}, {1.0: 3.0, 3.0: 5.0}, cells)
-    save({"lateral": loop}, {"test": Fastest(3.2, 2.0)}, tmp_path / "gain.png")
+    save([partial(plot, "lateral", loop, {"test": Fastest(3.2, 2.0)})], tmp_path / "gain.png")
     assert (tmp_path / "gain.png").read_bytes().startswith(b"\x89PNG")

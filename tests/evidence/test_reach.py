@@ -76,12 +76,12 @@ def test_the_tables_of_the_page_hold_every_range_and_say_what_failed():
     }
     assert tables("lateral", found).splitlines() == [
         "| lateral: gain on | DG | small gain | frozen |",
-        "| --- | --- | --- | --- |",
+        "|---|---|---|---|",
         "| [0, 1] m/s | 4.581 | INFEASIBLE | 0.957 |",
         "| [0, 13] m/s | INFEASIBLE |  | 0.984 |",
         "",
         "| lateral: stable | DG | growth |",
-        "| --- | --- | --- |",
+        "|---|---|---|",
         "| from the low end | 0 - 1.56 m/s | from 4 m/s |",
         "| about 2 m/s | 0.57 - 3.43 m/s |  |",
     ]

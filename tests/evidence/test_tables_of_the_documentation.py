@@ -142,7 +142,7 @@ def outcomes_of_one_reader():
         " import fuzz; folder = pathlib.Path(tempfile.mkdtemp());"
         " reader = next(r for r in fuzz.good_files.readers(folder) if r.entry == 'CSV');"
         " tally = fuzz.damaged_files.tally(reader, fuzz.damaged_files.USUAL, first=0);"
-        " print(fuzz._row('`CSV`', tally.outcomes, len(tally.faults)))"
+        " print(*fuzz._row('`CSV`', tally.outcomes, len(tally.faults)), sep=' | ')"
     )
     assert _ran("-c", code).strip() in KEPT["reliability.md", "fuzzing readers"].text
 

@@ -1,8 +1,8 @@
-"""The figure of gain against permitted acceleration of several loops."""
+"""Panels side by side."""
 
 import math
 
-from evidence.gain_curve import save
+from evidence.figures import save
 from synthesis import GainCurve
 
 CURVE = GainCurve(
@@ -15,8 +15,8 @@ CURVE = GainCurve(
 )
 
 
-def test_the_figure_has_a_panel_a_loop(tmp_path):
+def test_the_figure_is_wider_by_a_panel(tmp_path):
     for count in (1, 2):
-        save([CURVE] * count, tmp_path / f"{count}.png")
+        save([CURVE.plot] * count, tmp_path / f"{count}.png")
     one, two = ((tmp_path / f"{count}.png").stat().st_size for count in (1, 2))
     assert 10_000 < one < two
