@@ -21,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[0] = str(ROOT)  # not benchmarks/, whose files are named after the rooms they measure
 
-from studies.stamped_tables import DOCS, keep, processor  # noqa: E402
+from evidence.tables import DOCS, keep, markdown  # noqa: E402
 from studies.threads import one_thread  # noqa: E402
 
 one_thread()
@@ -61,19 +61,19 @@ def rows(package: str, quick: bool, seed: int | None) -> dict[str, fuzzed.Tally]
 def table(found: dict[str, fuzzed.Tally]) -> str:
     """Markdown: an entry a row, and all together."""
     head = ("entry", "inputs", *OUTCOMES, "faults")
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    rows: list[list[str]] = []
     total: Counter[str] = Counter()
     faults = 0
     for entry, tally in found.items():
         total += tally.outcomes
         faults += len(tally.faults)
-        lines.append(_row(f"`{entry}`", tally.outcomes, len(tally.faults)))
-    return "\n".join([*lines, _row("**together**", total, faults)])
+        rows.append(_row(f"`{entry}`", tally.outcomes, len(tally.faults)))
+    return markdown(head, [*rows, _row("**together**", total, faults)])
 
 
-def _row(name: str, outcomes: Counter[str], faults: int) -> str:
+def _row(name: str, outcomes: Counter[str], faults: int) -> list[str]:
     counts = [outcomes.total(), *(outcomes[word] for word in OUTCOMES), faults]
-    return f"| {name} | " + " | ".join(str(n) if n else "" for n in counts) + " |"
+    return [name, *(str(n) if n else "" for n in counts)]
 
 
 def main() -> None:
@@ -99,7 +99,7 @@ def main() -> None:
         for package in options.only or (*PACKAGES, "readers"):
             one = rows(package, options.quick, options.seed)
             if options.write:
-                keep(DOCS / "reliability.md", f"fuzzing {package}", table(one), processor())
+                keep(DOCS / "reliability.md", f"fuzzing {package}", table(one))
             found |= one
         os.chdir(home)
     faults = [str(fault) for tally in found.values() for fault in tally.faults]

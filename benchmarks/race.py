@@ -9,9 +9,10 @@ import subprocess
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
-from studies import stamped_tables
+import evidence.tables
+from studies.report.provenance import processor
 
-DOCUMENT = stamped_tables.DOCS / "benchmarks.md"
+DOCUMENT = evidence.tables.DOCS / "benchmarks.md"
 
 
 @dataclass(frozen=True)
@@ -102,11 +103,11 @@ def machine() -> str:
         except PackageNotFoundError:
             libraries.append(f"no {name}")
     return (
-        f"{stamped_tables.processor()}, {platform.system()}; {compiler}; Python"
+        f"{processor()}, {platform.system()}; {compiler}; Python"
         f" {platform.python_version()}, {', '.join(libraries)}"
     )
 
 
 def keep(section: str, text: str) -> None:
     """Put `text` between the marks of `section` in docs/benchmarks.md, stamped."""
-    stamped_tables.keep(DOCUMENT, section, text, machine())
+    evidence.tables.keep(DOCUMENT, section, text, machine())

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from studies.stamped_tables import parsed
+from evidence.tables import parsed
 
 
 def medians(

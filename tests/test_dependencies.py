@@ -65,15 +65,17 @@ def imports(tree):
             yield node, node.args[0].value
 
 
-def complaint(source):
-    """What is wrong with the imports of a source text: "" where nothing is."""
+def complaint(source, own=ROOMS):
+    """What is wrong with the imports of a source text that may import the packages `own`: "" where
+    nothing is.
+    """
     core, extras = declared()
     tree = ast.parse(source)
     above = parents(tree)
     for node, module in imports(tree):
         top = module.split(".")[0]
         package = PACKAGE.get(top, top).lower()
-        if top in sys.stdlib_module_names or top in ROOMS or package in core:
+        if top in sys.stdlib_module_names or top in own or package in core:
             continue
         around = list(guards(node, above))
         if "TYPE_CHECKING" in around or "ImportError" in around or top in ASKED_FOR_BY_NAME:
@@ -96,6 +98,21 @@ def complaint(source):
 )
 def test_every_import_is_declared(path):
     assert not complaint(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted((ROOT / "evidence").rglob("*.py")),
+    ids=lambda p: str(p.relative_to(ROOT)),
+)
+def test_every_import_of_the_evidence_is_declared(path):
+    assert not complaint(path.read_text(encoding="utf-8"), (*ROOMS, "evidence"))
+
+
+def test_the_evidence_is_not_installed_and_no_package_imports_it():
+    found = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    assert found["find"]["include"] == [f"{room}*" for room in ROOMS]
+    assert complaint("from evidence.tables import keep")
 
 
 def test_doctor_asks_for_what_is_declared():

@@ -17,8 +17,18 @@ ROOMS = ("symheli", "identification", "synthesis", "studies")
 
 TOP = {
     *ROOMS,
-    *("tests", "benchmarks", "examples", "docs", ".ci", ".gitignore", "Makefile", "setup.py"),
-    *("pyproject.toml", "constraints.txt"),
+    *(
+        "tests",
+        "benchmarks",
+        "evidence",
+        "examples",
+        "docs",
+        ".ci",
+        ".gitignore",
+        "Makefile",
+        "setup.py",
+    ),
+    *("pyproject.toml", "setup.py", "constraints.txt", "Makefile", ".gitignore"),
     *("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md"),
 }
 

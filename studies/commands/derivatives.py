@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
-    from studies.figures.written import write
+    from studies.commands.table_and_figure import write
 
     low, high, n = arguments.airspeeds
     progress(f"trimming and linearizing {arguments.vehicle} from {low:g} to {high:g} m/s")

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> Output:
     import numpy as np
 
     import symheli
-    from studies.figures.written import write
+    from studies.commands.table_and_figure import write
 
     speeds, rates = (
         np.linspace(low, high, int(n))

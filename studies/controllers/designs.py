@@ -26,7 +26,7 @@ from studies.controllers.asked import (
 from studies.controllers.identified_plant import identified_model
 from studies.controllers.in_airspeed import of_degree
 from studies.controllers.plant import baseline, closed, design_plant, flown_plant
-from studies.marks import flights
+from studies.known_kinematics import flights
 from studies.transition.effort import Effort
 from studies.transition.flights import autopilot_for
 from studies.transition.proofs import Questions

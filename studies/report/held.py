@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.judge.frozen_models import continuous_poles
-from studies.marks.truth import AXES, frozen, sampled
+from studies.known_kinematics.truth import AXES, frozen, sampled
 from studies.transition.axes import LATERAL, LONGITUDINAL
 from studies.transition.baseline import derivative_name
 from studies.transition.comparison import CHANNELS

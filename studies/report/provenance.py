@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import datetime
+import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-
-from studies.stamped_tables import processor
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -55,3 +55,13 @@ def source(root: Path) -> str:
 def command() -> str:
     """What started this process, as one would type it."""
     return " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])
+
+
+def processor() -> str:
+    """Its name and the number of its cores."""
+    try:
+        found = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
+        name = found[1] if found else ""
+    except OSError:
+        name = ""
+    return f"{name or platform.processor() or platform.machine()}, {os.cpu_count()} cores"

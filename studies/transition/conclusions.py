@@ -11,8 +11,8 @@ from studies.controllers.asked import RATE
 from studies.controllers.designs import BASELINE, LFT
 from studies.controllers.flown import WINDS
 from studies.controllers.tables import hypotheses
-from studies.marks import models
-from studies.marks.guarantee import PROBABILITY, verdict
+from studies.known_kinematics import models
+from studies.known_kinematics.robust_loop import PROBABILITY, verdict
 from studies.transition.guarantees import (
     ALLOWED,
     CONSTANT,

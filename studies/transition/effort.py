@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 from studies.choices import about, check, choice
-from studies.marks.flights import LONGEST as AGGRESSIVE
-from studies.marks.guarantee import FORM
+from studies.known_kinematics.flights import LONGEST as AGGRESSIVE
+from studies.known_kinematics.robust_loop import FORM
 from synthesis import Search, Spline
 
 GLANCE = Search(levels=6, dwells=5, starts=1, nodes=60, evaluations=8, samples=20_000)

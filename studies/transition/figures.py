@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.controllers.figure import RATIOS, SEEDS, energy_ratios, seeds
-from studies.marks import models
-from studies.marks.truth import SPEEDS
+from studies.known_kinematics import models
+from studies.known_kinematics.truth import SPEEDS
 from studies.transition.flights import NOISES
 from studies.transition.guarantees import curves
 from studies.transition.known_kinematics import CUBIC, KNOWN, TWO_INPUTS

@@ -52,7 +52,7 @@ MEMORIES = {
     for rate, lag, across in ((3.0, 0.6, 3), (4.5, 0.6, 3), (6.0, 0.5, 4))
 }
 """Accelerations (m/s^2) at which a P with a memory is tried, on a coarser mesh than
-`studies.bracket.measured`, which takes minutes.
+`evidence.bracket.measured`, which takes minutes.
 """
 
 

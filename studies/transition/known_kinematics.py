@@ -12,11 +12,11 @@ import numpy as np
 
 import symheli
 from identification import BaselineModel, KinematicModel, LPVARXModel, fit
+from studies.known_kinematics import flights, models
+from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
+from studies.known_kinematics.truth import AXES, SPEEDS, FrozenAxes, Truth, frozen_axes, sampled
 from studies.loops.lateral import ATTITUDE_HOLD
 from studies.loops.robust_lateral import FEEDBACK, margin
-from studies.marks import flights, models
-from studies.marks.measured import HORIZON, OUTPUTS, PAIRS, fits_of, states_of
-from studies.marks.truth import AXES, SPEEDS, FrozenAxes, Truth, frozen_axes, sampled
 from studies.transition import accelerating_baseline
 from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, update_time
 from studies.transition.baseline import Baseline
@@ -87,7 +87,7 @@ def identify_with_known_kinematics(
     if effort.gentle_flight:
         training.append(symheli.fly(heli, flights.gentle(seed, autopilot)))
     test = symheli.fly(heli, flights.transition(seed, autopilot))
-    chosen = PAIRS.get(vehicle, "xcell60")
+    chosen = models.PAIRS.get(vehicle, "xcell60")
     simulator = Helicopter.load(chosen, governor="ideal")
     truth, clean = Truth.of(heli), states_of(heli, test)
 

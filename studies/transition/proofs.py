@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from studies.known_kinematics.robust_loop import FORM, robust_loop
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.longitudinal import longitudinal_loop
 from studies.loops.robust_lateral import FEEDBACK
-from studies.marks.guarantee import FORM, robust_loop
 from studies.processes import Processes
 from studies.transition import guarantees
 from studies.transition.axes import LATERAL

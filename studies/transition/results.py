@@ -12,7 +12,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from studies.controllers.written import controllers_to_dict
-from studies.marks.truth import SPEEDS
+from studies.known_kinematics.truth import SPEEDS
 from studies.output import plain
 from studies.report.held import held_to_dict
 from studies.report.provenance import provenance

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from studies.marks import models
-from studies.marks.truth import SPEEDS
+from studies.known_kinematics import models
+from studies.known_kinematics.truth import SPEEDS
 from studies.transition.axes import (
     ALL,
     AXES,

@@ -10,7 +10,7 @@ import pytest
 
 from studies import cli
 from studies.controllers import designs
-from studies.marks.guarantee import FORM
+from studies.known_kinematics.robust_loop import FORM
 from studies.transition import known_kinematics
 from studies.transition import study as stages
 from studies.transition.effort import Effort

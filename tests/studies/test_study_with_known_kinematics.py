@@ -10,9 +10,9 @@ import pytest
 
 import symheli
 import synthesis
+from studies.known_kinematics.truth import AXES, Truth, frozen_axes
 from studies.loops.lateral import ATTITUDE_HOLD
 from studies.loops.robust_lateral import margin
-from studies.marks.truth import AXES, Truth, frozen_axes
 from studies.transition import conclusions, guarantees, tables
 from studies.transition.baseline import build_baseline
 from studies.transition.effort import Effort

@@ -15,9 +15,8 @@ from studies.controllers.certified import CertifiedControllers, proofs
 from studies.controllers.designs import Design
 from studies.controllers.flown import WINDS, measures, plan
 from studies.controllers.plant import baseline, closed, flown_plant
-from studies.marks import flights as training
-from studies.marks import models
-from studies.marks.measured import PAIRS
+from studies.known_kinematics import flights as training
+from studies.known_kinematics import models
 from symheli import LPVStateSpace
 from symheli.errors import SynthesisError, UnknownNameError
 from synthesis import Plant
@@ -108,7 +107,7 @@ def identified(vehicle: str, seed: int) -> KinematicModel:
     records = [
         symheli.fly(heli, make(seed, pilot)) for make in (training.aggressive, training.gentle)
     ]
-    return models.identified(records, helicopter(PAIRS.get(vehicle, "xcell60")))
+    return models.identified(records, helicopter(models.PAIRS.get(vehicle, "xcell60")))
 
 
 TRIAL = Trial(

@@ -127,7 +127,7 @@ def test_a_plant_in_continuous_time_is_refused():
 @pytest.mark.slow
 def test_a_designed_controller_is_proven_on_exact_linearizations_that_it_never_saw(ideal):
     """From 8 to 10 m/s: exact loops at other airspeeds, closed by another route, stay within."""
-    from studies.loops.designed_lateral import (
+    from evidence.designed_lateral import (
         ACCELERATION,
         CONTROLS,
         GUST,

@@ -350,7 +350,7 @@ def test_bisection_refuses_what_is_not_positive():
 @pytest.mark.slow
 def test_the_lateral_loop_is_stable_however_its_airspeed_is_misread(ideal):
     """2.5 m/s: a bias of 1 m/s and a lag of .5 s at 3 m/s^2 together, from 8 to 11 m/s."""
-    from studies.loops.designed_lateral import DT, designed, flying_plant
+    from evidence.designed_lateral import DT, designed, flying_plant
     from synthesis import stability
 
     controller = designed(ideal, 8.0, 11.0)

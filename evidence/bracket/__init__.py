@@ -1,0 +1,1 @@
+"""The lateral loop bracketed from both sides: `python -m evidence.bracket`."""

@@ -1,0 +1,1 @@
+"""Gain against acceleration and jerk: `python -m evidence.jerk`."""

@@ -1,0 +1,231 @@
+"""How far identified models are from the exact ones, and how well they predict: flights of many
+seeds, each identified with a simulator that is another vehicle.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import symheli
+from evidence.tables import DOCS, keep, parsed
+from identification import BaselineModel
+from studies.campaigns.runners import results, runner
+from studies.known_kinematics.flights import aggressive, transition
+from studies.known_kinematics.models import PAIRS, identified
+from studies.known_kinematics.predictions import HORIZON, OUTPUTS, fits_of, states_of
+from studies.known_kinematics.truth import SPEEDS, Truth, frozen_axes
+from studies.output import as_json, progress
+from studies.transition.flights import (
+    ABOVE_GROUND,
+    BREEZE,
+    BREEZE_AT_20FT,
+    TOP,
+    autopilot_for,
+)
+from symheli import Dryden, FlightRecord, Helicopter, Wind
+from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
+from symheli.values.arrays import Array
+
+STATIC_SPEEDS = (0.0, 1.0, 2.0, 4.0, 7.0, 10.0, 13.0)
+"""Airspeeds at which static gains are compared, m/s."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Marks:
+    """Of one seed. `gaps`: worst nu-gap by axis and where; `stability`: airspeeds on which model
+    and truth disagree; `static`: ratio of static gains by airspeed; fits in percent by output:
+    `ahead` and `baseline` 1 s ahead against the noise-free states, `measured` against the measured
+    ones, `closed_loop`.
+    """
+
+    seed: int
+    gaps: dict[str, tuple[float, float]]
+    stability: int
+    static: dict[float, float]
+    ahead: dict[str, float]
+    baseline: dict[str, float]
+    measured: dict[str, float]
+    closed_loop: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is identified, from what, and with which simulator."""
+
+    truth: str = "xcell60"
+    simulator: str = PAIRS["xcell60"]
+    servos: bool = False
+    turbulent: bool = False
+
+    def air(self, seed: int) -> Wind | None:
+        """The breeze and light turbulence of the study, where the air is to move."""
+        if not self.turbulent:
+            return None
+        return Wind(BREEZE, turbulence=Dryden(BREEZE_AT_20FT, ABOVE_GROUND), seed=seed)
+
+    @property
+    def governor(self) -> str:
+        """With servos the rotor speed is not held for free either."""
+        return "pi" if self.servos else "ideal"
+
+    def helicopters(self) -> tuple[Helicopter, Helicopter]:
+        """Truth and simulator."""
+        return (
+            Helicopter.load(self.truth, governor=self.governor),  # type: ignore[arg-type]
+            Helicopter.load(self.simulator, governor=self.governor),  # type: ignore[arg-type]
+        )
+
+
+def of_seed(setting: Setting, seed: int) -> Marks:
+    """Fly, identify, judge."""
+    heli, simulator = setting.helicopters()
+    autopilot = (
+        gain_scheduled_lqr(heli, 0.0, TOP, 0.02, servos=XCELL_SERVOS)
+        if setting.servos
+        else autopilot_for(heli)
+    )
+    plan = aggressive(seed, autopilot, servos=setting.servos, wind=setting.air(seed))
+    training = symheli.fly(heli, plan)
+    model = identified(training, simulator, setting.servos, setting.turbulent)
+    test = symheli.fly(heli, transition(seed, autopilot, servos=setting.servos))
+    truth = Truth.of(heli, setting.servos)
+    models = frozen_axes(model, truth)
+    gaps = {
+        name: (float(gap.max()), float(SPEEDS[gap.argmax()]))
+        for name, gap in truth.gaps(models).items()
+    }
+    clean = states_of(heli, test)
+    return Marks(
+        seed=seed,
+        gaps=gaps,
+        stability=truth.falsely_stable(models)["all axes"],
+        static=(
+            {} if setting.servos else {v: truth.static_ratio(models, v) for v in STATIC_SPEEDS}
+        ),
+        ahead=fits_of(clean, model.predict(test, HORIZON)),
+        baseline=fits_of(clean, baseline_of(heli, test)),
+        measured=fits_of(test.columns(OUTPUTS), model.predict(test, HORIZON)),
+        closed_loop=fits_of(clean, model.closed_loop(test)),
+    )
+
+
+def baseline_of(heli: Helicopter, record: FlightRecord) -> Array:
+    """What the interpolated exact models over airspeed predict of a record, 1 s ahead from its
+    measured states.
+    """
+    family = symheli.sweep(heli, np.linspace(0.0, TOP, 27))  # type: ignore[arg-type]
+    lpv = family.interpolate("polynomial", 3)
+    baseline = BaselineModel(
+        model=lpv, scheduling="airspeed_command", inputs=tuple(map(str, heli.inputs))
+    )
+    return baseline.on(record).predict(OUTPUTS, HORIZON)
+
+
+def table(setting: Setting, marks: Sequence[Marks], simulator_gaps: dict[str, float]) -> str:
+    """Median and worst of every mark, with the mark."""
+    lines = [
+        f"Truth {setting.truth}, simulator {setting.simulator} (its own worst nu-gap:"
+        f" {', '.join(f'{k} {v:.2f}' for k, v in simulator_gaps.items())}),"
+        f" {len(marks)} seeds from {marks[0].seed} to {marks[-1].seed}.",
+        "",
+        "| | mark | median | worst (seed) | |",
+        "|---|---|---|---|---|",
+    ]
+    limits = (
+        dict.fromkeys(marks[0].gaps, 0.15)
+        if setting.servos or setting.turbulent
+        else {"lateral": 0.05, "longitudinal": 0.05, "all axes": 0.10}
+    )
+    for axis in marks[0].gaps:
+        values = np.array([m.gaps[axis][0] for m in marks])
+        lines.append(_row(f"worst nu-gap, {axis}", limits[axis], values, marks, 2 * limits[axis]))
+    stable = np.array([m.stability for m in marks], float)
+    lines.append(_row("airspeeds (of 27) where stability differs", 0.0, stable, marks, 0.0))
+    for airspeed in marks[0].static:
+        values = np.array([m.static[airspeed] for m in marks])
+        off = np.abs(np.log(values))
+        lines.append(
+            f"| static gain at {airspeed:g} m/s, of the exact | "
+            f"{'.6 to 1.6' if airspeed == 0 else 'printed' if airspeed < 2 else '.9 to 1.1'}"
+            f" | {np.median(values):.3f} | {values[off.argmax()]:.3f}"
+            f" ({marks[int(off.argmax())].seed}) | |"
+        )
+    goals = {"u": 94, "v": 65, "w": 94, "p": 95, "r": 75, "phi": 85, "theta": 94}
+    for y in OUTPUTS:
+        ahead, base, seen, loop = (
+            np.array([getattr(m, kind)[y] for m in marks])
+            for kind in ("ahead", "baseline", "measured", "closed_loop")
+        )
+        lines.append(
+            f"| {y} 1 s ahead, % | {goals.get(y, 'printed')} | {np.median(ahead):.1f} |"
+            f" {ahead.min():.1f} ({marks[int(ahead.argmin())].seed}) | baseline"
+            f" {np.median(base):.1f}, behind it by {np.max(base - ahead):.1f} at most; of the"
+            f" measured {np.median(seen):.1f}; recorded loop {np.median(loop):.1f},"
+            f" {loop.min():.1f} |"
+        )
+    return "\n".join(lines)
+
+
+def _row(name: str, mark: float, values: Array, marks: Sequence[Marks], worst: float) -> str:
+    k = int(values.argmax())
+    verdict = "met" if np.median(values) <= mark and values.max() <= worst else "MISSED"
+    return (
+        f"| {name} | {mark:g} | {np.median(values):.3f} | {values.max():.3f} ({marks[k].seed}) |"
+        f" {verdict} |"
+    )
+
+
+def seeds_of(text: str) -> list[int]:
+    """ "0-20" or "3,5,7"."""
+    if "-" in text:
+        first, last = text.split("-")
+        return list(range(int(first), int(last) + 1))
+    return [int(s) for s in text.split(",")]
+
+
+def measure(setting: Setting, seeds: Sequence[int]) -> tuple[list[Marks], dict[str, float]]:
+    """Every seed, on the runner that is there; and the simulator's own gaps."""
+    heli, simulator = setting.helicopters()
+    own = Truth.of(heli, setting.servos).gaps(Truth.of(simulator, setting.servos).models)
+    with runner() as on:
+        found = list(results(on, [partial(of_seed, setting, s) for s in seeds]))
+    return found, {name: float(gap.max()) for name, gap in own.items()}
+
+
+def main() -> None:
+    """Print the marks of a vehicle, and keep them in docs/marks.md."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
+    parser.add_argument("--simulator", help="default: the other vehicle")
+    parser.add_argument("--servos", action="store_true", help="servos, 20 ms delay, governor pi")
+    parser.add_argument("--seeds", default="0-20")
+    parser.add_argument("--quick", action="store_true", help="the first two seeds")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--turbulent", action="store_true", help="breeze and light turbulence")
+    options = parsed(parser, "marks.md", timed=False)
+    setting = Setting(
+        options.truth,
+        options.simulator or PAIRS[options.truth],
+        options.servos,
+        options.turbulent,
+    )
+    seeds = seeds_of(options.seeds)[: 2 if options.quick else None]
+    progress(f"{len(seeds)} flights of {setting.truth}")
+    marks, own = measure(setting, seeds)
+    text = table(setting, marks, own)
+    print(as_json(_plain(marks)) if options.json else text)
+    if options.write:
+        section = setting.truth + (
+            " with servos" if setting.servos else " in turbulence" if setting.turbulent else ""
+        )
+        keep(DOCS / "marks.md", section, text)
+
+
+def _plain(marks: Sequence[Marks]) -> list[dict[str, Any]]:
+    return [vars(m) | {"static": {f"{v:g}": g for v, g in m.static.items()}} for m in marks]

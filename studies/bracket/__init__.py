@@ -1,1 +1,0 @@
-"""The lateral loop bracketed from both sides: `python -m studies.bracket`."""

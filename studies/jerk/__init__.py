@@ -1,1 +1,0 @@
-"""Gain against acceleration and jerk: `python -m studies.jerk`."""

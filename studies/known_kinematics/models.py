@@ -1,0 +1,61 @@
+"""What is identified, and how: fixed on the seeds 1000 to 1004, before any mark was read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identification import FilterError, KinematicARX, KinematicModel, Polynomial, Product, fit
+from studies.transition.flights import TOP
+from symheli import FlightRecord, Helicopter, SimulatedFlight
+
+INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
+SCHEDULING = ("airspeed_command", "acceleration_command")
+FASTEST = 4.0
+"""Largest commanded acceleration, m/s^2."""
+
+
+GUST = 2.0
+"""Standard deviation given for what the air may do in light turbulence, m/s."""
+
+PAIRS = {"xcell60": "xcell_kahn_hudson", "xcell_kahn_hudson": "xcell60"}
+"""Vehicle whose simulator flies the instruments, by the vehicle that is identified."""
+
+CONSTANT, ALONE, BOTH = "constant coefficients", "over airspeed", "over airspeed and acceleration"
+
+
+def structure(servos: bool = False, turbulent: bool = False) -> KinematicARX:
+    """Cubic in airspeed, quadratic in acceleration, of total degree 3; where servos fly, from the
+    commands, with as many lags as delay and servo need; in turbulence, which leaves less to be
+    told, quadratic in airspeed alone.
+    """
+    if turbulent:
+        return KinematicARX(INPUTS, SCHEDULING[0], basis=Polynomial(2, 0.0, TOP))
+    basis = Product(
+        (Polynomial(3, 0.0, TOP), Polynomial(2, -FASTEST, FASTEST)),
+        total_degree=3,
+    )
+    inputs = tuple(f"{u}_command" for u in INPUTS) if servos else INPUTS
+    return KinematicARX(inputs, SCHEDULING, basis=basis, nb=4 if servos else 2, offset_rate=False)
+
+
+def structures() -> dict[str, KinematicARX]:
+    """The same beside those that are not scheduled on the acceleration, whose trims move with the
+    rate of the airspeed instead, and on nothing.
+    """
+    both = structure()
+    alone = replace(both, scheduling=SCHEDULING[0], basis=Polynomial(3, 0.0, TOP), offset_rate=True)
+    return {CONSTANT: replace(alone, basis=Polynomial(0, 0.0, TOP)), ALONE: alone, BOTH: both}
+
+
+def identified(
+    records: FlightRecord | list[FlightRecord],
+    simulator: Helicopter,
+    servos: bool = False,
+    turbulent: bool = False,
+    kin: KinematicARX | None = None,
+) -> KinematicModel:
+    """By the filter error method, its instruments flown in `simulator`; the gust a hidden state
+    where the air is `turbulent`. `kin`: another structure than that of `structure`.
+    """
+    method = FilterError(SimulatedFlight(simulator), gust=GUST if turbulent else 0.0)
+    return fit(kin or structure(servos, turbulent), records, method=method)

@@ -1,0 +1,156 @@
+"""Exact models with the airspeed held, and how far identified ones are from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import symheli
+from identification import KinematicModel
+from studies.known_kinematics.models import INPUTS
+from studies.loops.lateral import HOLD
+from studies.transition.comparison import SCALES
+from studies.transition.flights import TOP
+from studies.transition.guarantees import PERIOD, SIZES
+from symheli import Helicopter, LinearModel
+from symheli.flight import XCELL_SERVOS
+from symheli.lpv import nu_gap
+from symheli.values import Signal
+from symheli.values.arrays import Array
+
+SPEEDS = np.linspace(0.0, TOP, 27)
+"""m/s."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Outputs, inputs, and the states of the truth that belong to them (None: all)."""
+
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    states: tuple[str, ...] | None
+
+
+AXES: Mapping[str, Axis] = {
+    "lateral": Axis(("v", "p", "r", "phi"), ("d_lat", "d_ped"), ("v", "p", "r", "phi", "b1")),
+    "longitudinal": Axis(
+        ("u", "w", "q", "theta"), ("d_lon", "d_col"), ("u", "w", "q", "theta", "a1")
+    ),
+    "all axes": Axis(("u", "v", "w", "p", "q", "r", "phi", "theta"), INPUTS, None),
+}
+
+
+FrozenAxes = Mapping[str, Sequence[LinearModel]]
+"""Models at `SPEEDS` by axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Linear models at `SPEEDS`, 50 Hz, by axis; from the commands where servos fly."""
+
+    models: Mapping[str, tuple[LinearModel, ...]]
+    servos: bool
+
+    @classmethod
+    def of(cls, heli: Helicopter, servos: bool = False) -> Truth:
+        """By exact linearization; with the servos and one sample of delay before them."""
+        exact = [symheli.linearize(heli, symheli.trim(heli, float(v))) for v in SPEEDS]
+        models = {}
+        for name, axis in AXES.items():
+            if servos and axis.states is not None:
+                continue
+            models[name] = tuple(sampled(model, axis, servos) for model in exact)
+        return cls(models, servos)
+
+    def gaps(self, models: FrozenAxes, points: int = 2000) -> dict[str, Array]:
+        """nu-gap at each airspeed, by axis, of the axes that `models` have; `points` as of
+        `nu_gap`.
+        """
+        return {
+            name: np.array(
+                [
+                    nu_gap(
+                        exact,
+                        other,
+                        input_scale=[SCALES[u] for u in AXES[name].inputs],
+                        output_scale=[SCALES[y] for y in AXES[name].outputs],
+                        points=points,
+                    )
+                    for exact, other in zip(self.models[name], models[name], strict=True)
+                ]
+            )
+            for name in self.models
+            if name in models
+        }
+
+    def falsely_stable(self, models: FrozenAxes) -> dict[str, int]:
+        """By axis: airspeeds at which the model is unstable and the truth is stable, counted
+        together with the reverse.
+        """
+        return {
+            name: sum(
+                exact.is_stable() != other.is_stable()
+                for exact, other in zip(self.models[name], models[name], strict=True)
+            )
+            for name in self.models
+            if name in models
+        }
+
+    def static_ratio(self, models: FrozenAxes, airspeed: float) -> float:
+        """Static gain of the study's lateral loop around the model over that around the truth, at
+        the nearest of `SPEEDS`.
+        """
+        k = int(np.argmin(np.abs(SPEEDS - airspeed)))
+        return static_gain(models["lateral"][k]) / static_gain(self.models["lateral"][k])
+
+
+def sampled(model: LinearModel, axis: Axis, servos: bool = False) -> LinearModel:
+    """The part of a continuous model that is an axis, at 50 Hz."""
+    kept = model if axis.states is None else model.select(states=axis.states)
+    kept = kept.select(inputs=axis.inputs, outputs=axis.outputs)
+    if not servos:
+        return kept.discretize(PERIOD)
+    actuators = {u: XCELL_SERVOS[u].linear(u) for u in axis.inputs}
+    return delayed(kept.driven_by(actuators).discretize(PERIOD))
+
+
+def delayed(model: LinearModel) -> LinearModel:
+    """The same with every input one sample later."""
+    nx, nu = model.B.shape
+    A = np.block([[model.A, model.B], [np.zeros((nu, nx + nu))]])
+    B = np.vstack([np.zeros((nx, nu)), np.eye(nu)])
+    C = np.hstack([model.C, model.D])
+    states = (*model.states, *(Signal(f"{u}_late", u.unit) for u in model.inputs))
+    return LinearModel(
+        A, B, C, np.zeros_like(model.D), states, model.inputs, model.outputs, dt=model.dt
+    )
+
+
+def frozen_axes(model: KinematicModel, truth: Truth) -> FrozenAxes:
+    """An identified model at `SPEEDS`, in the axes of the truth."""
+    return {
+        name: tuple(frozen(model, AXES[name], float(v)) for v in SPEEDS) for name in truth.models
+    }
+
+
+def frozen(model: KinematicModel, axis: Axis, airspeed: float) -> LinearModel:
+    """An identified model of an axis in level flight, named as the truth is."""
+    p = (airspeed, 0.0) if len(model.parameters) == 2 else airspeed
+    commands = {u.removesuffix("_command"): u for u in map(str, model.inputs)}
+    part = model.at(p, axis.outputs, [commands[u] for u in axis.inputs])
+    inputs = tuple(Signal(u.removesuffix("_command"), u.unit) for u in part.inputs)
+    return replace(part, inputs=inputs)
+
+
+def static_gain(model: LinearModel, hold: float = HOLD) -> float:
+    """Largest gain from d_lat, d_ped to r, phi at frequency 0 in the study's lateral loop, in its
+    sizes.
+    """
+    K = np.zeros((2, 4))
+    K[0, 3] = hold
+    A = model.A + model.B @ K @ model.C
+    G = (model.C @ np.linalg.solve(np.eye(len(A)) - A, model.B))[2:]
+    sizes = [[SIZES[u] / SIZES[y] for u in model.inputs] for y in ("r", "phi")]
+    return float(np.linalg.norm(G * np.array(sizes), 2))

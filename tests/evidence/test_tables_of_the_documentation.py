@@ -1,0 +1,229 @@
+"""Tables that a command wrote into the documentation are what it would write today: one row of
+each is computed again.
+"""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import synthesis
+from evidence.bracket.measured import GAINS, bracket
+from evidence.jerk.measured import FlightPlan, fastest
+from evidence.marks import guarantee, measured
+from evidence.reach.measured import gains
+from evidence.tables import DOCS
+from studies.loops.exact_lateral import ExactLateral
+from studies.loops.lateral import lateral_loop
+from studies.loops.longitudinal import longitudinal_loop
+from studies.transition.flights import TOP, autopilot_for
+from studies.transition.guarantees import PERIOD, scaled
+from symheli import Helicopter
+
+ROOT = DOCS.parent
+MARKED = re.compile(
+    r"<!-- (?P<name>[^\n]+): written by its command -->\n\n`python (?P<command>[^`]*)`, .*?\n\n"
+    r"(?P<text>.*?)\n\n<!-- (?P=name): end -->",
+    re.DOTALL,
+)
+
+
+class Kept(NamedTuple):
+    """What stands between the marks of a page: the command that wrote it and the text."""
+
+    command: str
+    text: str
+
+    def cells(self, label):
+        """Of the first row that begins with `label`, without it."""
+        for line in self.text.splitlines():
+            first, *rest = (cell.strip() for cell in line.strip("|").split("|"))
+            if first == label:
+                return rest
+        raise AssertionError(f"no row begins with {label!r}")
+
+
+def kept():
+    """{(page, section): what is kept there} of the whole documentation."""
+    return {
+        (page.name, found["name"]): Kept(found["command"], found["text"])
+        for page in sorted(DOCS.glob("*.md"))
+        for found in MARKED.finditer(page.read_text(encoding="utf-8"))
+    }
+
+
+KEPT = kept()
+
+
+def same(shown, value, rel=0.0):
+    """Whether a printed number is this one, to its last digit or a relative `rel`."""
+    digits = len(shown.partition(".")[2])
+    return abs(float(shown) - value) <= max(0.51 * 10.0**-digits, rel * abs(value))
+
+
+def worst(cell):
+    """(number, seed) of "0.039 (6)"."""
+    found = re.fullmatch(r"(-?[\d.]+) \((\d+)\)", cell)
+    assert found, cell
+    return found[1], int(found[2])
+
+
+def marks_of_the_worst_seed(section, truth="xcell60", turbulent=False):
+    shown, seed = worst(KEPT["marks.md", section].cells("worst nu-gap, lateral")[2])
+    setting = measured.Setting(truth, measured.PAIRS[truth], False, turbulent)
+    assert same(shown, measured.of_seed(setting, seed).gaps["lateral"][0])
+
+
+def guarantee_of_the_worst_seed():
+    section = KEPT["marks.md", "guarantee xcell60"]
+    shown, seed = worst(section.cells("worst (seed)")[0])
+    proof = guarantee.exact_gain(Helicopter.load("xcell60", governor="ideal"))
+    exact = proof.gamma, proof.lower
+    found = guarantee.of_seed("xcell60", guarantee.PAIRS["xcell60"], seed, exact)
+    assert same(shown, found.ratio)
+    assert found.verdict == "holds"
+
+
+def proven_by_p_alone(section, loop):
+    found = bracket(loop, 1.0, GAINS[1.0], search=synthesis.Search(seconds=1.0))
+    shown = KEPT["bracket.md", section].cells("1")
+    assert same(shown[1], found.memory)
+    assert same(shown[2], found.plain)
+    assert found.exact
+
+
+def frozen_gain_of_the_exact_servo_loop():
+    loop = scaled(ExactLateral.of(_xcell(), 0.0, TOP).loop("inputs", PERIOD))
+    text = KEPT["bracket.md", "identified"].text
+    row = next(line for line in text.splitlines() if line.split()[:2] == ["exact", "frozen"])
+    assert same(row.split()[3], synthesis.frozen_gain(loop).gamma)
+
+
+def gain_with_any_jerk(section, loop):
+    shown = KEPT["jerk.md", section].cells("1")
+    assert same(shown[-1], synthesis.l2_gain(loop, 1.0, search=None).gamma)
+
+
+def fastest_of_the_test_flight():
+    heli = _xcell()
+    found = fastest(FlightPlan().test(heli, autopilot_for(heli)))
+    shown = KEPT["jerk.md", "flights"].cells("test")
+    assert same(shown[0], found.acceleration)
+    assert same(shown[1], found.jerk)
+
+
+def gains_on_a_narrow_range():
+    found = list(gains(lateral_loop(_xcell()), 5.5, 7.5).values())
+    for shown, value in zip(KEPT["lft.md", "reach"].cells("[5.5, 7.5] m/s"), found, strict=True):
+        assert same(shown, value, rel=2e-4)
+
+
+def faults_of_one_entry(package, entry):
+    """As many inputs, no more faults: how many of them are refused is the draw's."""
+    code = (
+        "import sys; sys.path[:0] = ['benchmarks', 'tests/reliability']; import fuzz;"
+        f" calls = fuzz.caught(lambda name: name == {entry!r});"
+        f" tally = fuzz.fuzzed.tally(calls, fuzz.entries.inputs({entry!r}), None);"
+        " print(tally.outcomes.total(), len(tally.faults))"
+    )
+    inputs, faults = _ran("-c", code).split()
+    shown = KEPT["reliability.md", f"fuzzing {package}"].cells(f"`{entry}`")
+    assert [inputs, faults] == [shown[0], shown[-1] or "0"]
+
+
+def outcomes_of_one_reader():
+    code = (
+        "import sys, tempfile, pathlib; sys.path[:0] = ['benchmarks', 'tests/reliability'];"
+        " import fuzz; folder = pathlib.Path(tempfile.mkdtemp());"
+        " reader = next(r for r in fuzz.good_files.readers(folder) if r.entry == 'CSV');"
+        " tally = fuzz.damaged_files.tally(reader, fuzz.damaged_files.USUAL, first=0);"
+        " print(*fuzz._row('`CSV`', tally.outcomes, len(tally.faults)), sep=' | ')"
+    )
+    assert _ran("-c", code).strip() in KEPT["reliability.md", "fuzzing readers"].text
+
+
+def _xcell():
+    return Helicopter.load("xcell60", governor="ideal")
+
+
+def _ran(*arguments):
+    """What Python prints of this, in the root of the repository."""
+    found = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert found.returncode == 0, found.stderr[-2000:]
+    return found.stdout
+
+
+ROWS = {
+    ("bracket.md", "interpolated"): lambda: proven_by_p_alone(
+        "interpolated", lateral_loop(_xcell())
+    ),
+    ("bracket.md", "exact"): lambda: proven_by_p_alone("exact", ExactLateral.of(_xcell()).loop()),
+    ("bracket.md", "identified"): frozen_gain_of_the_exact_servo_loop,
+    ("jerk.md", "lateral"): lambda: gain_with_any_jerk("lateral", lateral_loop(_xcell())),
+    ("jerk.md", "longitudinal"): lambda: gain_with_any_jerk(
+        "longitudinal", longitudinal_loop(_xcell())
+    ),
+    ("jerk.md", "flights"): fastest_of_the_test_flight,
+    ("lft.md", "reach"): gains_on_a_narrow_range,
+    ("marks.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
+    ("marks.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(
+        "xcell_kahn_hudson", "xcell_kahn_hudson"
+    ),
+    ("marks.md", "xcell60 in turbulence"): lambda: marks_of_the_worst_seed(
+        "xcell60 in turbulence", turbulent=True
+    ),
+    ("marks.md", "guarantee xcell60"): guarantee_of_the_worst_seed,
+    ("reliability.md", "fuzzing symheli"): lambda: faults_of_one_entry(
+        "symheli", "symheli.Scheduling"
+    ),
+    ("reliability.md", "fuzzing identification"): lambda: faults_of_one_entry(
+        "identification", "identification.theil"
+    ),
+    ("reliability.md", "fuzzing synthesis"): lambda: faults_of_one_entry(
+        "synthesis", "synthesis.PoleRegion"
+    ),
+    ("reliability.md", "fuzzing readers"): outcomes_of_one_reader,
+}
+"""How a row of each is computed again."""
+
+TIMED = {key for key in KEPT if key[0] == "benchmarks.md"}
+"""What these hold is of the machine and the day: of them the command must still run."""
+
+
+def test_every_table_that_a_command_wrote_is_checked():
+    marked = {
+        (page.name, name)
+        for page in DOCS.glob("*.md")
+        for name in re.findall(
+            r"^<!-- (.+): written by its command -->$", page.read_text(encoding="utf-8"), re.M
+        )
+    }
+    assert marked == KEPT.keys() == ROWS.keys() | TIMED
+    for found in KEPT.values():
+        what = shlex.split(found.command)[: 2 if found.command.startswith("-m") else 1]
+        file = Path(*what[-1].split(".")) if what[0] == "-m" else Path(what[0])
+        assert any((ROOT / f).is_file() for f in (file, file / "__main__.py", f"{file}.py"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", sorted(ROWS), ids=" ".join)
+def test_a_row_is_what_the_command_finds_today(key):
+    ROWS[key]()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", sorted(TIMED), ids=" ".join)
+def test_the_command_of_a_timed_table_still_runs(key):
+    command = shlex.split(KEPT[key].command)
+    assert _ran(*(part for part in command if part != "--write"), "--quick").strip()
