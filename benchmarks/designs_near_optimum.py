@@ -55,7 +55,7 @@ def measured(drawn: Drawn, moving: bool, prove: bool) -> Measured:
     seconds = time.perf_counter() - begin
     least = math.inf if made.optimum is None else made.optimum
     proof = made.certify(rate, search=None).gamma if prove else math.nan
-    return Measured(least / drawn.worst, made.gamma / least, proof / made.gamma, seconds)
+    return Measured(least / drawn.worst, made.promised / least, proof / made.promised, seconds)
 
 
 def row(found: np.ndarray, goal: float) -> tuple[str, ...]:

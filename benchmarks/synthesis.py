@@ -36,7 +36,7 @@ from benchmarks.memory import alone, with_children  # noqa: E402
 from benchmarks.race import Ratio, present, readable, table  # noqa: E402
 from benchmarks.timing import arguments, medians  # noqa: E402
 from symheli.errors import SymheliError  # noqa: E402
-from synthesis import Spline, certify_flown, hinf, output_feedback  # noqa: E402
+from synthesis import Spline, certify_sampled, hinf, output_feedback  # noqa: E402
 
 BACK_OFF = 1.3
 LARGE = 18
@@ -89,7 +89,7 @@ def made(states: int, degree: int, moving: int, divisions: int) -> Made:
     spent = time.perf_counter() - begin
     A = found.model.matrices(np.linspace(LOW, HIGH, 27)).A
     fastest = float(np.abs(np.linalg.eigvals(A)).max())
-    return Made(found.gamma, spent, with_children(), fastest, found.misfit)
+    return Made(found.promised, spent, with_children(), fastest, found.misfit)
 
 
 def flown(states: int, kept: int, prove: bool) -> Flight:
@@ -97,20 +97,20 @@ def flown(states: int, kept: int, prove: bool) -> Flight:
     from synthesis import frozen_gain
 
     controller = output_feedback(design_plant(states), Y=2, back_off=BACK_OFF)
-    full = frozen_gain(controller.closed(), points=14).gamma
+    full = frozen_gain(controller.closed(), points=14).gain
     small = controller.reduce(kept)
-    less = frozen_gain(small.closed(), points=14).gamma
+    less = frozen_gain(small.closed(), points=14).gain
     flies = symheli.TableController.of(small.discretize(DT).model, KNOTS)
     plant = flying_plant(DESIGNS[states][0])
     begin = time.perf_counter()
     if not prove:
         loop = plant.close(flies)
-        frozen = frozen_gain(loop, points=14).gamma
+        frozen = frozen_gain(loop, points=14).gain
         spent = time.perf_counter() - begin
         return Flight(
             small.order,
             len(loop.states),
-            controller.gamma,
+            controller.promised,
             full,
             less,
             frozen,
@@ -119,13 +119,13 @@ def flown(states: int, kept: int, prove: bool) -> Flight:
             spent,
             with_children(),
         )
-    found = certify_flown(
-        flies, plant, RATE, synthesized=controller.gamma, cover=False, form=SAMPLED, search=None
+    found = certify_sampled(
+        flies, plant, RATE, promised=controller.promised, cover=False, form=SAMPLED, search=None
     )
     return Flight(
         small.order,
         len(found.loop.states),
-        controller.gamma,
+        controller.promised,
         full,
         less,
         found.certificate.frozen,
@@ -177,7 +177,7 @@ def points(states: int, seconds: float) -> list[tuple[str, float, float, float]]
             },
             seconds,
         )
-        rows.append((f"{p:g} m/s", own.gamma / theirs(), times["own"], times["slicot"]))
+        rows.append((f"{p:g} m/s", own.hinf_norm / theirs(), times["own"], times["slicot"]))
     return rows
 
 

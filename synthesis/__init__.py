@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
     from synthesis.design.controller import Controller
     from synthesis.design.estimator import Estimator, estimator
-    from synthesis.design.flown import Flown, certify_flown
     from synthesis.design.frozen_reading import proven_around
     from synthesis.design.generalized import Generalized
     from synthesis.design.h2 import h2
@@ -55,6 +54,7 @@ if TYPE_CHECKING:
     from synthesis.design.output_feedback import output_feedback
     from synthesis.design.plant import Plant
     from synthesis.design.point_design import DesignStatus, PointDesign
+    from synthesis.design.sampled_loop import SampledLoop, certify_sampled
     from synthesis.design.state_feedback import state_feedback
     from synthesis.design.wrong_parameter import with_wrong_parameter
     from synthesis.forms import HigherOrder, Memory, Spline
@@ -87,7 +87,7 @@ _ROOMS = {
     "synthesis.design.objectives": "H2 L2 EnergyToPeak PoleRegion",
     "synthesis.design.output_feedback": "output_feedback",
     "synthesis.design.state_feedback": "state_feedback",
-    "synthesis.design.flown": "Flown certify_flown",
+    "synthesis.design.sampled_loop": "SampledLoop certify_sampled",
     "synthesis.design.frozen_reading": "proven_around",
     "synthesis.design.generalized": "Generalized",
     "synthesis.design.plant": "Plant",
@@ -128,7 +128,6 @@ __all__ = [
     "DesignStatus",
     "EnergyToPeak",
     "Estimator",
-    "Flown",
     "FrozenGain",
     "GainCurve",
     "Generalized",
@@ -144,6 +143,7 @@ __all__ = [
     "PoleRegion",
     "PolynomialMatrix",
     "Proof",
+    "SampledLoop",
     "Search",
     "Seconds",
     "Solver",
@@ -154,7 +154,7 @@ __all__ = [
     "Trajectory",
     "Vertices",
     "bandwidth",
-    "certify_flown",
+    "certify_sampled",
     "decay_rate",
     "disk_margin",
     "estimator",

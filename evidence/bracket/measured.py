@@ -1,5 +1,5 @@
 """The lateral loop closed from both sides: gain and stability against permitted acceleration,
-proven above and flown below.
+proven above, and the gain of computed trajectories below.
 
 P(p) is the ordinary proof; P(p, lag) remembers where the airspeed came from; the lower bound is an
 explicit airspeed and gust. Of the interpolated model, of the exact one, or, on the servo channel,
@@ -74,8 +74,8 @@ PATIENT = Solver(time_limit=3600.0)
 
 
 class Bracket(NamedTuple):
-    """Gains at one acceleration (m/s^2): flown, proven with a memory, proven with P(p); inf:
-    nothing proven, or growth.
+    """Gains at one acceleration (m/s^2): of a computed trajectory (no bound is smaller), proven
+    with a memory, proven with P(p); inf: nothing proven, or growth.
 
     `covered`: proven with P(p) for every model within the remainder; NaN: there is none.
     """
@@ -89,7 +89,7 @@ class Bracket(NamedTuple):
 
     @property
     def gap(self) -> float:
-        """Best proven gain over the flown one."""
+        """Best proven gain over the one of a computed trajectory."""
         return min(self.memory, self.plain) / self.lower
 
 
@@ -132,7 +132,7 @@ def measure(
     rest: Remainder | None = None,
 ) -> Iterator[tuple[str, Any]]:
     """(what, result) of everything the page shows, as it is found."""
-    yield "gain, frozen", synthesis.frozen_gain(loop).gamma
+    yield "gain, frozen", synthesis.frozen_gain(loop).gain
     jump = synthesis.l2_gain(loop, math.inf)
     tests = {"constant P": jump.gamma}
     if isinstance(loop.basis, Polynomial):
@@ -144,7 +144,7 @@ def measure(
     yield "airspeed jumps", {"lower": jump.lower, **tests}
     for rate in GROWING:
         found = synthesis.lower_bound(loop, rate)
-        yield f"growth at {rate:g} m/s^2", found.growth if math.isinf(found.gamma) else "none found"
+        yield f"growth at {rate:g} m/s^2", found.growth if math.isinf(found.gain) else "none found"
     for rate, form in gains.items():
         found = bracket(loop, rate, form, rest=rest)
         yield f"gain at {rate:g} m/s^2", {**found._asdict(), "gap": found.gap}
@@ -156,17 +156,17 @@ def measure(
 def curve(found: dict[str, Any], title: str) -> GainCurve:
     """What was found as a curve."""
     rows = [row for what, row in found.items() if what.startswith("gain at")]
-    flown = {row["rate"]: row["lower"] for row in rows}
+    lower = {row["rate"]: row["lower"] for row in rows}
     for rate in GROWING:
         if isinstance(found.get(f"growth at {rate:g} m/s^2"), float):
-            flown[rate] = math.inf
+            lower[rate] = math.inf
     tests = dict(found["airspeed jumps"])
-    flown |= {0.0: found["gain, frozen"], math.inf: tests.pop("lower")}
+    lower |= {0.0: found["gain, frozen"], math.inf: tests.pop("lower")}
     proven = {
         form: {row["rate"]: row[key] for row in rows}
         for form, key in (("P(p, lag)", "memory"), ("P(p)", "plain"))
     }
-    return GainCurve(title, "(rad/s, rad)/(m/s)", found["gain, frozen"], flown, proven, tests)
+    return GainCurve(title, "(rad/s, rad)/(m/s)", found["gain, frozen"], lower, proven, tests)
 
 
 def main() -> None:

@@ -27,8 +27,8 @@ FORM = Spline(segments=(8,))
 
 
 def measure_servo(heli: Helicopter, quick: bool = False) -> list[Bound]:
-    """Bounds of every model: flown, P(p), constant P and, for polynomial models, the LFT tests;
-    identified as in the study, seed 0.
+    """Bounds of every model: of a computed trajectory, P(p), constant P and, for polynomial
+    models, the LFT tests; identified as in the study, seed 0.
     """
     plan, autopilot = FlightPlan(0, ramps=Effort().ramps), autopilot_for(heli)
     gentle = axes.identify(

@@ -10,7 +10,7 @@ from typing import Any
 from evidence.tables import four_digits, markdown
 
 COLUMNS = {
-    "lower": "flown",
+    "lower": "lower bound",
     "memory": "proven, P(p, lag)",
     "plain": "proven, P(p)",
     "covered": "covered, P(p)",

@@ -17,7 +17,7 @@ COLOURS = (BLUE, GREEN, ORANGE, RED)
 
 
 def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes) -> None:
-    """Proven gains as lines, flown ones as triangles of the same colour; nothing proven: no point.
+    """Draw proven gains as lines, lower bounds as triangles; nothing proven: no point.
 
     The flights stand at their largest acceleration, with their largest jerk.
     """
@@ -29,7 +29,7 @@ def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes) -> No
         label = f"jerk up to {jerk:g} m/s³" if math.isfinite(jerk) else "any jerk"
         rates = [c.acceleration for c in cells]
         ax.plot(rates, [_shown(c.proven) for c in cells], "o-", color=colour, ms=4, label=label)
-        ax.plot(rates, [_shown(c.flown) for c in cells], "^:", color=colour, ms=4)
+        ax.plot(rates, [_shown(c.lower) for c in cells], "^:", color=colour, ms=4)
     present = sorted(loop.chosen_knots.items())
     ax.plot(
         [a for a, _ in present],
@@ -39,7 +39,7 @@ def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes) -> No
         label="P(V), acceleration may jump",
     )
     ax.axhline(loop.frozen, color=GREY, linestyle=":", label=f"frozen, {loop.frozen:.3g}")
-    shown = [g for c in loop.cells for g in (c.proven, c.flown)] + list(loop.chosen_knots.values())
+    shown = [g for c in loop.cells for g in (c.proven, c.lower)] + list(loop.chosen_knots.values())
     largest = max(g for g in (loop.frozen, *shown) if math.isfinite(g))
     fastest = max(a for a in (*loop.chosen_knots, *(f.acceleration for f in flights.values())))
     ax.set(yscale="log", title=title, ylim=(0.2 * loop.frozen, 2.0 * largest))
@@ -59,7 +59,7 @@ def plot(title: str, loop: Loop, flights: Mapping[str, Fastest], ax: Axes) -> No
             fontsize=8,
         )
     ax.set_xlabel("permitted |dV/dt| (m/s²)")
-    ax.set_ylabel("L2 gain: lines proven, triangles flown")
+    ax.set_ylabel("L2 gain: lines proven, triangles lower bounds")
     ax.legend(fontsize=8, frameon=False, loc="upper left")
 
 

@@ -1,4 +1,6 @@
-"""Gain of a loop for a bounded acceleration and a bounded jerk: proven above, flown below."""
+"""Bounds of the gain of a loop for a bounded acceleration and a bounded jerk: the upper one is
+proven, the lower one is the gain of a computed trajectory.
+"""
 
 from __future__ import annotations
 
@@ -31,13 +33,13 @@ class Knots(NamedTuple):
 class Cell(NamedTuple):
     """Gains for one acceleration (m/s^2) and jerk (m/s^3); inf: nothing proven, or growth.
 
-    `flown` is at least the gain at an airspeed held, and that without a search.
+    `lower` is at least the gain at an airspeed held, and that without a search.
     """
 
     acceleration: float
     jerk: float
     proven: float
-    flown: float
+    lower: float
 
 
 class Loop(NamedTuple):
@@ -53,14 +55,14 @@ class Loop(NamedTuple):
 
 def carried_over(cells: Sequence[Cell]) -> list[Cell]:
     """The same cells, each with the best of all: what is proven for more acceleration and jerk
-    holds for less, and a flight that keeps to less keeps to more.
+    holds for less, and a trajectory that keeps to less keeps to more.
     """
     out = []
     for c in cells:
         above = [o for o in cells if o.acceleration >= c.acceleration and o.jerk >= c.jerk]
         below = [o for o in cells if o.acceleration <= c.acceleration and o.jerk <= c.jerk]
-        proven, flown = min(o.proven for o in above), max(o.flown for o in below)
-        out.append(c._replace(proven=proven, flown=flown))
+        proven, lower = min(o.proven for o in above), max(o.lower for o in below)
+        out.append(c._replace(proven=proven, lower=lower))
     return out
 
 
@@ -75,7 +77,7 @@ def with_jerk(loop: LPVStateSpace, acceleration: float, jerk: float) -> LPVState
 def cell(
     loop: LPVStateSpace, acceleration: float, jerk: float, knots: Knots, search: Search | None
 ) -> Cell:
-    """Proven and flown gain of one acceleration and jerk."""
+    """Proven gain and lower bound of one acceleration and jerk."""
     found = synthesis.l2_gain(
         with_jerk(loop, acceleration, jerk), form=knots.both(jerk), search=search
     )
@@ -90,7 +92,7 @@ def measure(
     search: Search | None,
 ) -> Iterator[tuple[str, Any]]:
     """(what, result) of everything the page shows for one loop, as it is found."""
-    yield "frozen", synthesis.frozen_gain(loop).gamma
+    yield "frozen", synthesis.frozen_gain(loop).gain
     for what, form in (("same_knots", knots.alone), ("chosen_knots", Spline())):
         yield (
             what,

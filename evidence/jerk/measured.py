@@ -1,4 +1,5 @@
-"""Gain of the study's loops against permitted acceleration and jerk: proven above, flown below.
+"""Gain of the study's loops against permitted acceleration and jerk: a proven upper bound, and the
+gain of a computed trajectory as the lower one.
 
 The loops do not depend on the acceleration a; with a as a second parameter, dV/dt = a, P(V, a) can
 use that |da/dt| is bounded. P(V) at |dV/dt| <= a_max lets the acceleration jump.

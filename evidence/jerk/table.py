@@ -11,7 +11,7 @@ from evidence.tables import four_digits, markdown
 
 
 def jerk_table(loop: Loop) -> str:
-    """Proven gain of every acceleration and jerk, the flown one in brackets, beside P(V)."""
+    """Proven gain of every acceleration and jerk, the lower bound in brackets, beside P(V)."""
     cells = {(c.acceleration, c.jerk): c for c in loop.cells}
     jerks = sorted({jerk for _, jerk in cells})
     heads = [
@@ -41,7 +41,7 @@ def table_of_flights(flown: Mapping[str, Fastest]) -> str:
 
 
 def _cell(cell: Cell) -> str:
-    return f"{_gain(cell.proven, 'nothing')} ({_gain(cell.flown, 'grows')})"
+    return f"{_gain(cell.proven, 'nothing')} ({_gain(cell.lower, 'grows')})"
 
 
 def _gain(value: float, infinite: str) -> str:

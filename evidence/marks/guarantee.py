@@ -58,7 +58,7 @@ class Guarantee:
 
 
 def exact_gain(heli: Helicopter) -> Certificate:
-    """The same loop around the exact models: proven, with a gain that was flown below."""
+    """The same loop around the exact models: proven, with a lower bound."""
     loop = scaled(ExactLateral.of(heli, 0.0, TOP).loop("inputs", PERIOD, FEEDBACK))
     return synthesis.l2_gain(loop, rate=RATE)
 
@@ -66,8 +66,8 @@ def exact_gain(heli: Helicopter) -> Certificate:
 def of_seed(
     truth: str, simulator: str, seed: int, exact: tuple[float, float], with_gentle: bool = True
 ) -> Guarantee:
-    """Fly, identify, hold against a flight not seen, prove; `exact`: proven and flown gain of the
-    exact loop.
+    """Fly, identify, hold against a flight not seen, prove; `exact`: both bounds of the gain of
+    the exact loop.
     """
     heli = Helicopter.load(truth, governor="ideal")
     other = Helicopter.load(simulator, governor="ideal")
@@ -78,7 +78,7 @@ def of_seed(
     unseen.require()
     loop = robust_loop(model)
     proof = synthesis.l2_gain(loop, rate=RATE, form=FORM, search=None)
-    nominal = synthesis.frozen_gain(loop.nominal).gamma
+    nominal = synthesis.frozen_gain(loop.nominal).gain
     return Guarantee(
         seed=seed,
         proven=proof.gamma,
@@ -100,7 +100,7 @@ def table(truth: str, exact: tuple[float, float], found: Sequence[Guarantee]) ->
     return "\n".join(
         [
             f"Truth {truth}, {len(found)} seeds from {found[0].seed} to {found[-1].seed}; exact"
-            f" loop: proven {exact[0]:.3f}, flown {exact[1]:.3f}.",
+            f" loop: proven {exact[0]:.3f}, lower bound {exact[1]:.3f}.",
             "",
             "| | |",
             "|---|---|",
@@ -129,7 +129,7 @@ def main() -> None:
     seeds = seeds_of(options.seeds)
     proof = exact_gain(Helicopter.load(options.truth, governor="ideal"))
     exact = proof.gamma, proof.lower
-    progress(f"exact loop: proven {exact[0]:.3f}, flown {exact[1]:.3f}")
+    progress(f"exact loop: proven {exact[0]:.3f}, lower bound {exact[1]:.3f}")
     found = []
     with runner(options.processes) as on:
         calls = [

@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> Output:
 
     found = synthesized(asked, _given(asked))
     written = report.write(found)
-    failed = not found.flown.certificate.verified or found.lost > 0
+    failed = not found.sampled.certificate.verified or found.lost > 0
     data = {**report.data(found), "written": written}
     return Output(report.text(found, written), data, status=int(failed))
 

@@ -162,7 +162,7 @@ def design(name: str, make: Callable[[], Controller | LPVStateSpace], plant: Pla
     except SymheliError as error:
         seconds = time.perf_counter() - begin
         return [Design(name=name, controller=None, seconds=seconds, reason=str(error))]
-    promised = made.gamma if isinstance(made, Controller) else math.nan
+    promised = made.promised if isinstance(made, Controller) else math.nan
     return [
         Design(
             name=name,
@@ -247,7 +247,7 @@ def hinf_schedule(plant: Plant, points: int = AIRSPEEDS) -> Controller:
     return Controller(
         model=model,
         plant=plant,
-        gamma=max(one.gamma for one in found),
+        promised=max(one.hinf_norm for one in found),
         method=f"H-infinity at {points} airspeeds",
     )
 

@@ -58,7 +58,7 @@ from symheli.progress import task
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.units import ratio
-from synthesis import Flown, Plant
+from synthesis import Plant, SampledLoop
 from synthesis.design.reduction import fewest
 from synthesis.worst.frozen import norm
 
@@ -78,14 +78,14 @@ Given = LinearFamily | LPVARXModel | KinematicModel
 class Synthesized:
     """What came of it.
 
-    `made`: the controller of the synthesis; `table`: what flies; `flown`: the proof of its loop;
+    `made`: the controller of the synthesis; `table`: what flies; `sampled`: the proof of its loop;
     `flights`, `measures`: each transition; none without a vehicle; `seconds` of each step.
     """
 
     asked: Asked
     made: synthesis.Controller
     table: TableController
-    flown: Flown
+    sampled: SampledLoop
     flights: tuple[FlightData, ...] = ()
     measures: tuple[Measures, ...] = ()
     seconds: Mapping[str, float]
@@ -143,7 +143,7 @@ def synthesized(asked: Asked, given: Given | None = None) -> Synthesized:
     with _timed("reducing, sampling, tabulating", seconds):
         table = tabulated(made, flying, asked)
     with _timed("certifying", seconds):
-        flown = certified(table, flying, made.gamma)
+        sampled = certified(table, flying, made.promised)
     flights: tuple[FlightData, ...] = ()
     if asked.vehicle:
         with _timed("flying", seconds):
@@ -152,7 +152,7 @@ def synthesized(asked: Asked, given: Given | None = None) -> Synthesized:
         asked=asked,
         made=made,
         table=table,
-        flown=flown,
+        sampled=sampled,
         flights=flights,
         measures=tuple(measured(flights, asked)),
         seconds=seconds,
@@ -250,12 +250,12 @@ def tabulated(made: synthesis.Controller, plant: Plant, asked: Asked) -> TableCo
     return table
 
 
-def certified(table: TableController, plant: Plant, promised: float) -> Flown:
+def certified(table: TableController, plant: Plant, promised: float) -> SampledLoop:
     """The proven gain of the loop that flies, on the fit of its plant."""
     states = len(closed(plant, table).states)
     options: dict[str, Any] = {"form": FORM, "solver": SOLVER} if states > MANY else {}
-    return synthesis.certify_flown(
-        table, plant, synthesized=promised, cover=False, search=None, **options
+    return synthesis.certify_sampled(
+        table, plant, promised=promised, cover=False, search=None, **options
     )
 
 

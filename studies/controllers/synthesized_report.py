@@ -42,7 +42,7 @@ def write(found: Synthesized) -> list[Path]:
     out = found.asked.out
     out.mkdir(parents=True, exist_ok=True)
     written = [found.table.save(out / TABLE)]
-    found.flown.certificate.save(out / CERTIFICATE)
+    found.sampled.certificate.save(out / CERTIFICATE)
     written += [
         out / CERTIFICATE,
         found.asked.write(out / CHOICES),
@@ -58,22 +58,22 @@ def answer(found: Synthesized) -> str:
     low, high = a.airspeeds
     flies = f"A table of {len(table.knots)} airspeeds and {table.order} states"
     held = f"from {low:g} to {high:g} m/s and up to {a.acceleration:g} m/s^2"
-    if not found.flown.certificate.verified:
+    if not found.sampled.certificate.verified:
         return f"{flies} was designed; of its loop nothing is proven {held}."
-    return f"{flies} keeps a gain of {found.flown.gamma:.3g}, proven as it flies, {held}."
+    return f"{flies} keeps a gain of {found.sampled.gamma:.3g}, proven as it flies, {held}."
 
 
 def sentences(found: Synthesized) -> list[str]:
     """What else there is to say."""
     a = found.asked
-    worst = found.flown.certificate.frozen
+    worst = found.sampled.certificate.frozen
     out = [
         f"{', '.join(a.controls)} from {', '.join(a.measurements)}, every {1000 * a.period:g} ms,"
         f" commands {1000 * a.delay:g} ms late.",
         f"At an airspeed held the gain is {worst:.3g} at worst; what the airspeed's motion costs"
-        f" and what this form of proof gives away are {100 * (found.flown.gamma / worst - 1):.2g} %"
-        " more."
-        if found.flown.certificate.verified and math.isfinite(worst)
+        " and what this form of proof gives away are"
+        f" {100 * (found.sampled.gamma / worst - 1):.2g} % more."
+        if found.sampled.certificate.verified and math.isfinite(worst)
         else f"The worst gain at an airspeed held is {worst:.3g}.",
     ]
     out.append(
@@ -107,11 +107,11 @@ def sentences(found: Synthesized) -> list[str]:
 
 def gains(found: Synthesized) -> list[tuple[str, str, str]]:
     """Promised, frozen, proven, flown: each with what it is of."""
-    certificate, (median, most) = found.flown.certificate, found.ratios
+    certificate, (median, most) = found.sampled.certificate, found.ratios
     a = found.asked
     low, high = a.airspeeds
     rows = [
-        ("promised", found.made.gamma, f"the synthesis, of {found.made.order} states"),
+        ("promised", found.made.promised, f"the synthesis, of {found.made.order} states"),
         ("frozen", certificate.frozen, "the loop that flies, worst at an airspeed held"),
         (
             "proven",
@@ -138,19 +138,19 @@ def text(found: Synthesized, written: list[Path]) -> str:
 
 def data(found: Synthesized) -> dict[str, Any]:
     """What a program would read."""
-    a, certificate, (median, most) = found.asked, found.flown.certificate, found.ratios
+    a, certificate, (median, most) = found.asked, found.sampled.certificate, found.ratios
     return {
         "vehicle": a.vehicle,
         "airspeeds": a.airspeeds,
         "acceleration": a.acceleration,
-        "promised": found.made.gamma,
+        "promised": found.made.promised,
         "frozen": certificate.frozen,
         "proven": certificate.gamma if certificate.verified else math.inf,
         "verified": certificate.verified,
         "flown": None if math.isnan(most) else {"median": median, "largest": most},
         "states": {"designed": found.made.order, "flown": found.table.order},
         "knots": found.table.knots,
-        "misfit_of_the_plant": found.flown.misfit,
+        "misfit_of_the_plant": found.sampled.misfit,
         "flights": [
             {
                 "lost": one.lost,
@@ -195,7 +195,7 @@ def page(found: Synthesized) -> str:
         answer=answer(found),
         sentences=sentences(found),
         gains=gains(found),
-        hypotheses=found.flown.certificate.hypotheses,
+        hypotheses=found.sampled.certificate.hypotheses,
         files=FILES,
         pictures=pictures,
         choices=a.text(a.out),

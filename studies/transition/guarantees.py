@@ -112,7 +112,7 @@ def servo_loops(
 
 def has_lft(loop: LPVStateSpace) -> bool:
     """Whether the LFT tests have anything to say: polynomial entries, stable when frozen."""
-    return isinstance(loop.basis, Polynomial) and math.isfinite(synthesis.frozen_gain(loop).gamma)
+    return isinstance(loop.basis, Polynomial) and math.isfinite(synthesis.frozen_gain(loop).gain)
 
 
 def sampled_baseline(family: LinearFamily, degree: int = 3) -> LPVStateSpace:

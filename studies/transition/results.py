@@ -318,7 +318,7 @@ def _guarantees(study: Outcome) -> dict[str, Any]:
         "servo_frozen_peaks": [
             {
                 "model": name,
-                "gain": value(peak.gamma, "1"),
+                "gain": value(peak.gain, "1"),
                 "airspeed": value(peak.p, "m/s"),
                 "frequency": value(peak.omega, "rad/s"),
             }

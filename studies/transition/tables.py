@@ -300,7 +300,7 @@ def findings(study: Outcome) -> list[str]:
     found = study.identification
     out = [] if found is None else [_other_inputs(found), _real_time(found)]
     for name, peak in study.servo.frozen_peaks.items() if study.servo else ():
-        if math.isfinite(peak.gamma):
+        if math.isfinite(peak.gain):
             out.append(
                 f"Servo channel, {name}: the largest frozen gain is at {peak.p:.1f} m/s and"
                 f" {peak.omega:.2g} rad/s."

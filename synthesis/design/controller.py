@@ -69,7 +69,7 @@ class Controller:
         The controller itself; what flies and what is certified.
     plant : Plant
         What it was made for; see `loop_plant`.
-    gamma : float
+    promised : float
         What its synthesis promised, in units of performance per unit of disturbance: a number to
         compare with, no proof. `certify` proves. NaN where nothing is promised, as of fewer states.
     method : str
@@ -93,7 +93,7 @@ class Controller:
     >>> print(made.at(0.5).inputs, made.at(0.5).outputs)
     ('y',) ('u',)
     >>> proof = made.certify(search=None)
-    >>> proof.verified, bool(proof.gamma < made.gamma * (1 + 1e-6))
+    >>> proof.verified, bool(proof.gamma < made.promised * (1 + 1e-6))
     (True, True)
     >>> made.discretize(0.02).certify(search=None).verified
     True
@@ -101,7 +101,7 @@ class Controller:
 
     model: LPVStateSpace
     plant: Plant
-    gamma: float
+    promised: float
     method: str
     optimum: float | None = None
     misfit: float = 0.0
@@ -156,7 +156,7 @@ class Controller:
         since backwards that is not so.
 
         Of a controller that was sampled it is the gain of the sampled loop, and the hypotheses say
-        so, with the misfit of the sampled plant. `synthesis.certify_flown` proves that of a plant
+        so, with the misfit of the sampled plant. `synthesis.certify_sampled` proves that of a plant
         with servos and delay as they are.
         """
         from synthesis.analysis.l2_gain import l2_gain
@@ -179,7 +179,7 @@ class Controller:
         if tied or isinstance(loop, UncertainStateSpace):
             return proof(False)
         found = proof(self.by_adjoint)
-        enough = NEAR * found.lower if math.isnan(self.gamma) else self.gamma
+        enough = NEAR * found.lower if math.isnan(self.promised) else self.promised
         others = [lambda: proof(not self.by_adjoint)] if usual and moving else []
         if usual and len(moving) == 1 and loop.dt is None:
             # at once where the usual P proves nothing
@@ -237,7 +237,7 @@ class Controller:
         about = decided(
             self.plant.matrices(p),
             self.plant.channels,
-            self.gamma,
+            self.promised,
             self.optimum,
             said,
             self.plant.dt,
@@ -268,8 +268,8 @@ class Controller:
         least = "" if self.optimum is None else f", at best {self.optimum:.6g}"
         promised = (
             "  no gamma is promised, .certify() proves one"
-            if math.isnan(self.gamma)
-            else f"  gamma {self.gamma:.6g} in synthesis{least}: no proof, .certify() proves"
+            if math.isnan(self.promised)
+            else f"  gamma {self.promised:.6g} in synthesis{least}: no proof, .certify() proves"
         )
         lines = [
             f"{self.method}: {self.order} states, {time}, {', '.join(self.model.inputs)} ->"

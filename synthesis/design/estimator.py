@@ -42,7 +42,7 @@ class Estimator:
         From measurements and controls to `<performance>_estimate`.
     error : LPVStateSpace
         From the disturbances to the performance minus its estimate.
-    gamma : float
+    promised : float
         What its synthesis promised; `certify` proves.
     misfit : float
         Of the functions of p to the gains that were computed, relative.
@@ -58,7 +58,7 @@ class Estimator:
 
     model: LPVStateSpace
     error: LPVStateSpace
-    gamma: float
+    promised: float
     misfit: float
     attempts: tuple[Attempt, ...] = ()
 
@@ -119,7 +119,7 @@ def estimator(
     --------
     >>> made = synthesis.estimator(plant)
     >>> proof = made.certify(search=None)
-    >>> proof.verified, bool(proof.gamma <= made.gamma)
+    >>> proof.verified, bool(proof.gamma <= made.promised)
     (True, True)
     """
     require_plant(plant)
@@ -140,7 +140,7 @@ def estimator(
             return Estimator(
                 model=model,
                 error=error,
-                gamma=design.gamma,
+                promised=design.gamma,
                 misfit=design.fit.misfit,
                 attempts=tuple(attempts),
             )

@@ -93,8 +93,9 @@ def hinf(
     Returns
     -------
     PointDesign
-        `optimum`, the controller u = K y, and the norm of its loop `gamma`, recomputed. Where there
-        is no controller, `reasons` with the modes, controls or measurements that stand against it.
+        `optimum`, the controller u = K y, and the recomputed norm `hinf_norm` of its loop. Where
+        there is no controller, `reasons` with the modes, controls or measurements that stand
+        against it.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def hinf(
     ...     ["x"], ["w1", "w2", "u"], ["z1", "z2", "y"],
     ... )
     >>> design = hinf(plant, ["u"], ["y"])
-    >>> print(f"{design.optimum:.7f} {design.gamma:.3f}", design.controller.is_stable())
+    >>> print(f"{design.optimum:.7f} {design.hinf_norm:.3f}", design.controller.is_stable())
     0.6009252 0.607 True
     """
     model = as_model(model)
@@ -211,9 +212,9 @@ def _optimal(levels: _Levels, plant: Generalized, names: Channels, back_off: flo
     """The central controller a little above the smallest level."""
     K = lqg(plant, levels.dt)
     simple = None if K is None else checked(plant, K, names, levels.dt)
-    if simple is not None and simple.gamma <= NOTHING * _untouched(plant, simple):
+    if simple is not None and simple.hinf_norm <= NOTHING * _untouched(plant, simple):
         return replace(simple, optimum=0.0, reasons=(NO_LEAST,))
-    found = _smallest(levels.normal, 1.0 if simple is None else simple.gamma)
+    found = _smallest(levels.normal, 1.0 if simple is None else simple.hinf_norm)
     if found is None:
         return PointDesign.without(DesignStatus.FAILED, [NO_LEVEL])
     optimum, obstacle = found
@@ -223,8 +224,8 @@ def _optimal(levels: _Levels, plant: Generalized, names: Channels, back_off: flo
     for more in BACK_OFFS:
         design = _kept(levels, plant, names, optimum * back_off * more)
         if design is not None:
-            about = decided_by(plant, names, optimum, levels.dt, reached=design.gamma)
-            optimum = min(optimum, design.gamma)  # within rounding, where the norm cannot move
+            about = decided_by(plant, names, optimum, levels.dt, reached=design.hinf_norm)
+            optimum = min(optimum, design.hinf_norm)  # within rounding, where the norm cannot move
             return replace(design, optimum=optimum, limit=limit, reasons=tuple(about))
     level = optimum * back_off * BACK_OFFS[-1]
     return PointDesign.without(DesignStatus.FAILED, [NOT_KEPT.format(level), limit], optimum)
@@ -247,7 +248,7 @@ def _kept(levels: _Levels, plant: Generalized, names: Channels, gamma: float) ->
     if K is None:
         return None
     design = checked(plant, K, names, levels.dt)
-    return design if design is not None and design.gamma <= gamma * (1 + KEPT) else None
+    return design if design is not None and design.hinf_norm <= gamma * (1 + KEPT) else None
 
 
 def _smallest(

@@ -49,4 +49,4 @@ def in_plant_units(
         plant.controls,
         plant.dt,
     )
-    return Controller(model=model, plant=plant, gamma=gamma, method=method, misfit=misfit)
+    return Controller(model=model, plant=plant, promised=gamma, method=method, misfit=misfit)

@@ -55,7 +55,7 @@ def lft_feedback(
     --------
     >>> made = synthesis.lft_feedback(plant)
     >>> proof = made.certify(math.inf, search=None)
-    >>> proof.verified, bool(proof.gamma <= made.gamma)
+    >>> proof.verified, bool(proof.gamma <= made.promised)
     (True, True)
     """
     return output_feedback(plant, math.inf, back_off=back_off, fastest=fastest, divisions=divisions)

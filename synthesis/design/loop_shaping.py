@@ -69,7 +69,7 @@ def ncf(
     >>> from symheli.lpv import LinearModel
     >>> integrator = LinearModel([[0.0]], [[1.0]], [[1.0]], [[0.0]], ["x"], ["u"], ["y"])
     >>> design = ncf(integrator)
-    >>> print(f"{design.optimum:.6f} {design.gamma:.3f} {design.controller.D[0, 0]:.1f}")
+    >>> print(f"{design.optimum:.6f} {design.hinf_norm:.3f} {design.controller.D[0, 0]:.1f}")
     1.414214 1.428 0.0
     """
     G = as_model(G)
@@ -90,7 +90,7 @@ def ncf(
             DesignStatus.FAILED, ["a Riccati equation was not solved to a stable loop"]
         )
     whole = series(series(behind, design.controller), before)
-    return replace(design, optimum=min(found[0], design.gamma), controller=whole)
+    return replace(design, optimum=min(found[0], design.hinf_norm), controller=whole)
 
 
 def _four_block(G: LinearModel) -> tuple[Generalized, Channels]:

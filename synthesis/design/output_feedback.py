@@ -124,7 +124,7 @@ def output_feedback(
     Examples
     --------
     >>> slow, fast = (synthesis.output_feedback(plant, rate) for rate in (0.1, 10.0))
-    >>> bool(slow.gamma < fast.gamma)
+    >>> bool(slow.promised < fast.promised)
     True
     >>> slow.certify(0.1, search=None).verified
     True
@@ -285,10 +285,11 @@ def _designs(
 def _limited(made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
     """What may have kept the controller from a lower gamma, or from its limits, a sentence each."""
     out = []
-    if made.optimum and made.gamma > _far(asked) * made.optimum:
+    if made.optimum and made.promised > _far(asked) * made.optimum:
         out.append(
-            f"gamma is {made.gamma / made.optimum:.2f} times the least one of the inequalities: no"
-            " nearer controller had gains that are smooth in the scheduling parameters"
+            f"gamma is {made.promised / made.optimum:.2f} times the least one of the"
+            " inequalities: no nearer controller had gains that are smooth in the scheduling"
+            " parameters"
         )
     if _fastest(made) > fastest:
         out.append(

@@ -43,7 +43,7 @@ class PointDesign:
         model, in the same coordinates: controllers of neighbouring models may be interpolated.
     loop : LinearModel or None
         From disturbances to performance.
-    gamma : float
+    hinf_norm : float
         Norm of that loop, recomputed from its matrices; inf where there is none.
     optimum : float
         What no controller undercuts, to the accuracy asked for; NaN where it was not sought.
@@ -56,7 +56,7 @@ class PointDesign:
     status: DesignStatus
     controller: LinearModel | None
     loop: LinearModel | None
-    gamma: float
+    hinf_norm: float
     optimum: float
     reasons: tuple[str, ...] = ()
     limit: str = ""
@@ -73,7 +73,7 @@ class PointDesign:
     def __str__(self) -> str:
         head = self.status.value
         if self.controller is not None:
-            head += f"; gamma = {self.gamma:.6g}"
+            head += f"; gamma = {self.hinf_norm:.6g}"
         return "\n".join([head, *([self.limit] if self.limit else []), *self.reasons])
 
 

@@ -123,7 +123,7 @@ class _Whole:
             controller,
             model=projected,
             method=f"{controller.method}, {order} of {n} states kept",
-            gamma=math.nan,
+            promised=math.nan,
             optimum=None,
         )
         gain = frozen_gain(made)

@@ -78,7 +78,7 @@ def state_feedback(
     ...     plant.model, disturbances=["w"], performance=["z_x", "z_u"],
     ...     controls=["u"], measurements=["z_x"])
     >>> made = synthesis.state_feedback(shown)
-    >>> made.order, bool(made.gamma < synthesis.output_feedback(plant).gamma)
+    >>> made.order, bool(made.promised < synthesis.output_feedback(plant).promised)
     (0, True)
     """
     require_plant(plant)

@@ -102,7 +102,7 @@ def lft_gain(
         )
     start = time.perf_counter()
     frozen = frozen_box_gain(lft)
-    if math.isinf(frozen.gamma):
+    if math.isinf(frozen.gain):
         if surely_unstable(lft.at(*frozen.p).A, lft.dt):
             return _certificate(
                 lft,
@@ -122,12 +122,12 @@ def lft_gain(
         attempt = _Attempt(lft, scaling, solver, expected).run()
         return attempt, attempt.gamma, attempt.evidence.coordinates.units.channel
 
-    tries = in_its_own_scale(found, frozen.gamma)
+    tries = in_its_own_scale(found, frozen.gain)
     best = min(tries, key=lambda attempt: attempt.gamma)
     for other in tries:
         if other is not best:
             best.add(other)
-    return _certificate(lft, scaling, solver, best, below, frozen.gamma, bounds).resting_on(
+    return _certificate(lft, scaling, solver, best, below, frozen.gain, bounds).resting_on(
         said(search and search.seconds, bounds)
     )
 
@@ -182,7 +182,7 @@ def lft_stability(
     """
     solver = _checked(lft, scaling, solver)
     frozen = frozen_box_gain(lft.select(inputs=(), outputs=()))
-    if math.isinf(frozen.gamma) and surely_unstable(lft.at(*frozen.p).A, lft.dt):
+    if math.isinf(frozen.gain) and surely_unstable(lft.at(*frozen.p).A, lft.dt):
         return _certificate(
             lft, scaling, solver, None, LowerBound(math.nan, _at_rest(frozen)), math.nan, 0.0
         )
@@ -325,9 +325,9 @@ def _certificate(
     """The certificate of what was `found`; None: a frozen model is unstable and nothing was
     tried.
     """
-    kind: Kind = "stability" if math.isnan(below.gamma) else "l2 gain"
+    kind: Kind = "stability" if math.isnan(below.gain) else "l2 gain"
     proof = found.proof if found else None
-    growing = math.isinf(below.gamma) if kind == "l2 gain" else below.trajectory is not None
+    growing = math.isinf(below.gain) if kind == "l2 gain" else below.trajectory is not None
     if proof is not None:
         status = Status.PROVEN
     elif found is None:
@@ -345,7 +345,7 @@ def _certificate(
     return Certificate(
         kind=kind,
         gamma=math.nan if kind == "stability" else found.gamma if found else math.inf,
-        lower=below.gamma,
+        lower=below.gain,
         frozen=frozen,
         status=status,
         verified=proof is not None,

@@ -147,7 +147,7 @@ def worst_moving(
         if demand.kind == "l2 gain":
             known = FrozenGain(frozen.value, near, math.nan)
             found = lower_bound(line.model, line.rate, frozen=known, search=share)
-            value, trajectory = found.gamma, found.trajectory
+            value, trajectory = found.gain, found.trajectory
         elif demand.kind == "energy-to-peak gain":
             value, trajectory = _peaks(line.model, line.rate, share)
         else:
@@ -171,11 +171,11 @@ def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Sear
     if search is None or demand.kind not in ("l2 gain", "stability"):
         return frozen
     found = tied_lower_bound(model, demand.motion, search)
-    if found is None or not found.gamma > frozen.value:
+    if found is None or not found.gain > frozen.value:
         return frozen
-    if demand.kind == "stability" and not math.isinf(found.gamma):
+    if demand.kind == "stability" and not math.isinf(found.gain):
         return frozen
-    return Worst(found.gamma, None, found.trajectory)
+    return Worst(found.gain, None, found.trajectory)
 
 
 def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:

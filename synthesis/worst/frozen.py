@@ -20,11 +20,11 @@ Array = np.ndarray
 
 
 class FrozenGain(NamedTuple):
-    """The largest frozen gain `gamma`, the `p` and frequency `omega` (rad/s) where it occurs; inf
+    """The largest frozen `gain`, the `p` and frequency `omega` (rad/s) where it occurs; inf
     and NaN where unstable.
     """
 
-    gamma: float
+    gain: float
     p: float
     omega: float
 
@@ -45,7 +45,7 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     Returns
     -------
     FrozenGain
-        `gamma` (inf where a frozen model is unstable), `p` and `omega` (rad/s; then NaN) where it
+        `gain` (inf where a frozen model is unstable), `p` and `omega` (rad/s; then NaN) where it
         occurs.
 
     References
@@ -59,7 +59,7 @@ def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) ->
     >>> p = Scheduling("p", "1", 0.0, 1.0)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
     >>> frozen_gain(lag)  # 1/(1 + p), at p = 0
-    FrozenGain(gamma=1.0, p=0.0, omega=0.0)
+    FrozenGain(gain=1.0, p=0.0, omega=0.0)
     """
     low, high = lpv.scheduling.low, lpv.scheduling.high
     if not 0 < tolerance < 1:

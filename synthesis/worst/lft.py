@@ -23,11 +23,11 @@ Array = np.ndarray
 
 
 class BoxGain(NamedTuple):
-    """The largest frozen gain `gamma`, the `p` (m,) and frequency `omega` (rad/s) where it occurs;
+    """The largest frozen `gain`, the `p` (m,) and frequency `omega` (rad/s) where it occurs;
     inf and NaN where unstable.
     """
 
-    gamma: float
+    gain: float
     p: tuple[float, ...]
     omega: float
 
@@ -45,7 +45,7 @@ def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
     Returns
     -------
     BoxGain
-        `gamma` (inf where a frozen model is unstable), `p` (m,) and `omega` (rad/s).
+        `gain` (inf where a frozen model is unstable), `p` (m,) and `omega` (rad/s).
 
     Examples
     --------
@@ -116,15 +116,15 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
     the limits of the parameters, where they have some, give a second try. `search` None: the frozen
     gain.
     """
-    best = LowerBound(frozen.gamma, None)
+    best = LowerBound(frozen.gain, None)
     limits = [s.limit / s.radius for s in lft.parameters if 0 < s.limit < math.inf]
     tries = [line for rate in (math.inf, *limits[:1]) for line in _lines(lft, rate)]
     for line, share in shared(tries, search):
-        known = FrozenGain(frozen.gamma, 0.0, frozen.omega)
+        known = FrozenGain(frozen.gain, 0.0, frozen.omega)
         found = lower_bound(line.model, line.rate, frozen=known, search=share)
-        if found.gamma > best.gamma:
+        if found.gain > best.gain:
             best = found._replace(trajectory=found.trajectory and line.in_box(found.trajectory))
-        if math.isinf(best.gamma):
+        if math.isinf(best.gain):
             break
     return best
 

@@ -103,16 +103,16 @@ THOROUGH = Search()
 
 
 class LowerBound(NamedTuple):
-    """`gamma`: no smaller L2 gain can be certified (inf: the state grows along `trajectory`,
+    """`gain`: no smaller L2 gain can be certified (inf: the state grows along `trajectory`,
     repeated).
 
     `trajectory` None: p constant, the frozen gain is the best found; in discrete time it has one p
-    a sample. `input` (n, nu): the input with |y| = gamma |u|, held from each time of the trajectory
+    a sample. `input` (n, nu): the input with |y| = gain |u|, held from each time of the trajectory
     to the next; None where none was computed. `growth`: factor of the state in one cycle; None
     without a trajectory.
     """
 
-    gamma: float
+    gain: float
     trajectory: Trajectory | None
     input: Array | None = None
     growth: float | None = None
@@ -146,7 +146,7 @@ def lower_bound(
     Returns
     -------
     LowerBound
-        `gamma`, no smaller gain can be certified; the trajectory and the input that show it.
+        `gain`, no smaller gain can be certified; the trajectory and the input that show it.
 
     Raises
     ------
@@ -163,13 +163,13 @@ def lower_bound(
     >>> from symheli.lpv import LPVStateSpace, Scheduling
     >>> p = Scheduling("p", "1", 0.0, 1.0, rate=0.5)
     >>> lag = LPVStateSpace.polynomial([[[-1.0]], [[-1.0]]], [[[1.0]]], [[[1.0]]], [[[0.0]]], p)
-    >>> lower_bound(lag, search=None).gamma
+    >>> lower_bound(lag, search=None).gain
     1.0
     """
     (limit,) = rates((lpv.scheduling,), rate)
     frozen = frozen or frozen_gain(lpv)
-    best = LowerBound(frozen.gamma, None)
-    if search is None or limit == 0 or not math.isfinite(frozen.gamma):
+    best = LowerBound(frozen.gain, None)
+    if search is None or limit == 0 or not math.isfinite(frozen.gain):
         return best
     hunt = _Hunt(lpv, limit, search)
     cycles, growing = hunt.fastest()
@@ -191,7 +191,7 @@ def lower_bound(
     if not found:
         return best
     explicit = hunt.explicit(max(found, key=_first)[1])
-    return explicit if explicit.gamma > best.gamma else best
+    return explicit if explicit.gain > best.gain else best
 
 
 def growing_trajectory(

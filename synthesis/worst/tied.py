@@ -110,15 +110,13 @@ def tied_lower_bound(lpv: LPVStateSpace, motion: Motion, search: Search) -> Lowe
         if budget.over:
             break
         found = _flown(lpv, (i, j), Smooth(candidate, window), search)
-        if found.gamma > best.gamma:
+        if found.gain > best.gain:
             best, wave = found, candidate
-        if math.isinf(best.gamma):
+        if math.isinf(best.gain):
             return best
     if wave is None:
         return None
-    return max(
-        (best, _moved(lpv, (i, j), wave, top, window, search, budget)), key=lambda b: b.gamma
-    )
+    return max((best, _moved(lpv, (i, j), wave, top, window, search, budget)), key=lambda b: b.gain)
 
 
 def _candidates(
@@ -146,7 +144,7 @@ def _flown(lpv: LPVStateSpace, tie: tuple[int, int], path: Smooth, search: Searc
     if found.trajectory is None:
         return found
     time, phase = found.trajectory.time, np.mod(found.trajectory.p, period)
-    if math.isinf(found.gamma):  # one cycle, known by its ends alone
+    if math.isinf(found.gain):  # one cycle, known by its ends alone
         time = phase = np.linspace(0.0, period, search.steps + 1)
     shown = Trajectory(time, along.points(phase))
     return found._replace(trajectory=shown)
@@ -176,11 +174,11 @@ def _moved(
 
     def cost(x: Array) -> float:
         nonlocal best
-        if budget.over or math.isinf(best.gamma):
+        if budget.over or math.isinf(best.gain):
             return 0.0
         found = _flown(lpv, tie, Smooth(at(x), window), search)
-        best = max((best, found), key=lambda b: b.gamma)
-        return -min(found.gamma, 1e300)
+        best = max((best, found), key=lambda b: b.gain)
+        return -min(found.gain, 1e300)
 
     start = np.array(
         [

@@ -37,7 +37,7 @@ def test_a_bounded_jerk_proves_less_gain_and_an_unbounded_one_no_more(lateral):
     knots = Knots((2, 1), 2)
     alone = synthesis.l2_gain(lateral, 2.0, form=knots.alone, search=None).gamma
     bounded, jumping = (cell(lateral, 2.0, jerk, knots, None) for jerk in (1.0, math.inf))
-    assert bounded.flown <= bounded.proven < 0.7 * jumping.proven
+    assert bounded.lower <= bounded.proven < 0.7 * jumping.proven
     # the bounds are loosened by 1e-6 of gamma^2 until they are verified
     assert jumping.proven <= alone * (1 + 2e-6)
 

@@ -85,7 +85,7 @@ def test_the_bracket_as_a_table():
         "stable at 6 m/s^2 by V of degree four": True,
     }
     assert bracket_table(found).splitlines() == [
-        "| acceleration, m/s² | flown | proven, P(p, lag) | proven, P(p) |",
+        "| acceleration, m/s² | lower bound | proven, P(p, lag) | proven, P(p) |",
         "|---|---|---|---|",
         "| 3 | 4.945 | 5.275 | nothing |",
         "| 7.1 |  | stable |  |",

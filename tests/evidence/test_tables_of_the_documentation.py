@@ -101,7 +101,7 @@ def frozen_gain_of_the_exact_servo_loop():
     loop = scaled(ExactLateral.of(_xcell(), 0.0, TOP).loop("inputs", PERIOD))
     text = KEPT["bracket.md", "identified"].text
     row = next(line for line in text.splitlines() if line.split()[:2] == ["exact", "frozen"])
-    assert same(row.split()[3], synthesis.frozen_gain(loop).gamma)
+    assert same(row.split()[3], synthesis.frozen_gain(loop).gain)
 
 
 def gain_with_any_jerk(section, loop):

@@ -61,7 +61,7 @@ EXEMPT: dict[str, str] = {
             *("Attempt", "Bandwidth", "BoxGain", "BoxLyapunov", "Certificate", "Controller"),
             *(
                 "Estimator",
-                "Flown",
+                "SampledLoop",
                 "FrozenGain",
                 "GainCurve",
                 "Generalized",
@@ -86,7 +86,7 @@ SLOW = {
     *("identification.unseen_flight", "identification.KinematicModel.observer"),
     *("synthesis.l2_gain", "synthesis.output_feedback", "synthesis.Controller.certify"),
     *("synthesis.Controller.discretize", "synthesis.estimator", "synthesis.Estimator.certify"),
-    *("synthesis.certify_flown", "synthesis.lft_feedback", "synthesis.multiobjective"),
+    *("synthesis.certify_sampled", "synthesis.lft_feedback", "synthesis.multiobjective"),
     *("synthesis.proven_around", "synthesis.state_feedback", "synthesis.with_wrong_parameter"),
     *("synthesis.frozen_box_gain", "synthesis.generalized_h2", "synthesis.decay_rate"),
     *("synthesis.stability", "synthesis.lower_bound", "synthesis.lft_gain"),

@@ -206,7 +206,7 @@ BY_FIELD: dict[str, Rule] = {
     "Certificate.frozen": _stability,
     "Certificate.indicative": _no_grid,
     "Attempt.bound": _stability,
-    "Flown.synthesized": _no_promise,
+    "SampledLoop.promised": _no_promise,
     "PointDesign.optimum": _not_sought,
     "BoxGain.omega": _unstable,
     "FrozenGain.omega": _unstable,

@@ -28,7 +28,7 @@ def test_a_family_from_a_file_is_certified_as_the_vehicle_it_came_from(answer, f
     )
     loop = lateral_loop(ideal, 4.0, 9.0, "inputs", points=6)
     assert got["verified"]
-    assert got["frozen"] == pytest.approx(synthesis.frozen_gain(loop).gamma, rel=1e-6)
+    assert got["frozen"] == pytest.approx(synthesis.frozen_gain(loop).gain, rel=1e-6)
     assert "d_lat = -0.02 phi" in got["loop"]
 
 

@@ -184,7 +184,7 @@ def test_the_schedule_of_point_designs_keeps_their_gain_at_each_point(base):
     made = hinf_schedule(plant, points=3)
     for speed in (0.0, TOP / 2, TOP):
         loop = closed(plant, made.model)
-        assert norm(*loop.matrices(speed), None)[0] <= made.gamma * (1 + 1e-6)
+        assert norm(*loop.matrices(speed), None)[0] <= made.promised * (1 + 1e-6)
 
 
 @pytest.mark.slow

@@ -132,14 +132,14 @@ def test_the_table_the_proof_and_the_page_are_of_what_was_asked_for(
     assert "d_lat_disturbance" in plant.disturbances
     loop = plant.close(found.table)
     for p in (0.0, 3.0, 8.0):
-        np.testing.assert_allclose(found.flown.loop.at(p).A, loop.at(p).A, atol=1e-12)
+        np.testing.assert_allclose(found.sampled.loop.at(p).A, loop.at(p).A, atol=1e-12)
 
 
 def test_what_is_shown_fits_a_terminal_and_names_what_is_known(found):
     assert [name for name, *_ in gains(found)] == ["promised", "frozen", "proven"]
     said = text(found, [])
     assert max(map(len, said.splitlines())) <= 100
-    assert f"{found.flown.gamma:.3g}" in said.splitlines()[0]
+    assert f"{found.sampled.gamma:.3g}" in said.splitlines()[0]
     lost = replace(found, measures=(SimpleNamespace(**dict.fromkeys(MEASURED, 0.5), lost=True),))
     assert "1 of 1 were lost" in text(lost, [])
 
@@ -364,5 +364,5 @@ def test_sideways_alone_the_rest_is_flown_by_an_autopilot(tmp_path):
         disturbances=("v_w",),
     )
     found = synthesized(asked)
-    assert found.flown.certificate.verified
+    assert found.sampled.certificate.verified
     assert found.lost == 0

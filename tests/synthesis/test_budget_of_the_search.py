@@ -56,7 +56,7 @@ def test_a_search_that_was_not_made_is_not_claimed():
 
 def test_more_time_is_never_worse_and_no_time_still_a_bound():
     bounds = [
-        lower_bound(lateral(), 0.3, search=Search(seconds=s, evaluations=10, starts=1)).gamma
+        lower_bound(lateral(), 0.3, search=Search(seconds=s, evaluations=10, starts=1)).gain
         for s in (1e-9, math.inf)
     ]
     assert l2_gain(lateral(), 0.0, search=None).frozen <= bounds[0] * (1 + 1e-9)

@@ -64,7 +64,7 @@ def test_the_input_along_the_worst_trajectory_shows_the_gain(lpv, rate):
     if found.trajectory is None:
         return
     within(lpv, rate, found.trajectory)
-    if math.isinf(found.gamma):
+    if math.isinf(found.gain):
         A = lpv.matrices(found.trajectory.p).A
         assert np.abs(
             np.linalg.eigvals(np.linalg.multi_dot([*A[::-1], np.eye(len(A[0]))]))
@@ -72,7 +72,7 @@ def test_the_input_along_the_worst_trajectory_shows_the_gain(lpv, rate):
         assert found.growth > 1
         return
     y = simulate(lpv, found.trajectory.p, found.input)[1]
-    assert np.linalg.norm(y) / np.linalg.norm(found.input) == pytest.approx(found.gamma, rel=1e-6)
+    assert np.linalg.norm(y) / np.linalg.norm(found.input) == pytest.approx(found.gain, rel=1e-6)
 
 
 @common

@@ -126,8 +126,8 @@ def test_a_sampled_model_has_the_norm_of_its_bilinear_twin(seed):
 @pytest.mark.parametrize("dt", [1e-3, 1e-5, 1e-7])
 def test_the_frozen_gain_of_a_finely_sampled_model_is_that_of_the_continuous_one(dt):
     lpv = random_stable(3)
-    assert frozen_gain(lpv.discretize(dt)).gamma == pytest.approx(
-        frozen_gain(lpv).gamma, rel=2 * dt + 1e-7
+    assert frozen_gain(lpv.discretize(dt)).gain == pytest.approx(
+        frozen_gain(lpv).gain, rel=2 * dt + 1e-7
     )
 
 

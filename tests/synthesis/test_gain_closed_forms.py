@@ -34,7 +34,7 @@ def test_a_constant_model_has_its_h_infinity_norm(seed, dt):
     m = random_stable(seed, states=4, degree=0, dt=dt).at(0.5)
     expected = control.system_norm(control.ss(m.A, m.B, m.C, m.D, dt or 0), p="inf", tol=1e-8)
     lpv = constant(m.A, m.B, m.C, m.D, dt)
-    assert frozen_gain(lpv).gamma == pytest.approx(expected, rel=1e-6)
+    assert frozen_gain(lpv).gain == pytest.approx(expected, rel=1e-6)
     # the bounded real lemma is exact here: what is left is the solver's gap and the margin
     assert l2_gain(lpv, form=COARSE, search=None).gamma == pytest.approx(expected, rel=1e-4)
 
@@ -48,7 +48,7 @@ def test_frozen_gain_finds_a_peak_between_grid_points_and_its_frequency():
         A, [[[0.0], [1]]], [[[1.0, 0]]], [[[0.0]]], Scheduling("p", "1", 0.0, 1.0)
     )
     found = frozen_gain(lpv, points=7)
-    assert found.gamma == pytest.approx(1 / (0.02 * math.sqrt(1 - 1e-4)), rel=1e-6)
+    assert found.gain == pytest.approx(1 / (0.02 * math.sqrt(1 - 1e-4)), rel=1e-6)
     # the norm is flat at its peak: p is found to the square root of the precision of the norm
     assert found.p == pytest.approx(k, abs=1e-3)
     assert found.omega == pytest.approx(1.0, abs=1e-3)

@@ -279,8 +279,8 @@ def test_an_lft_and_its_polynomial_model_have_the_same_lower_bound():
     # the same search on the same matrices, computed by another route: rounding, amplified a little
     # by the ascents
     found, expected = (lower_bound(model, 1.0, search=quick) for model in (reduced(lpv), lpv))
-    assert found.gamma == pytest.approx(expected.gamma, rel=1e-6)
-    assert expected.gamma > 1.001 * frozen_gain(lpv).gamma
+    assert found.gain == pytest.approx(expected.gain, rel=1e-6)
+    assert expected.gain > 1.001 * frozen_gain(lpv).gain
 
 
 @pytest.mark.parametrize(
@@ -323,7 +323,7 @@ def test_the_frozen_gain_over_a_box_is_found_between_grid_points():
     box = [Scheduling("a", "1", -1.0, 1.0), Scheduling("b", "1", -1.0, 1.0)]
     lft = LFT.polynomial(A, {(0, 0): [[0.0], [1]]}, {(0, 0): [[1.0, 0]]}, {(0, 0): [[0.0]]}, box)
     found = frozen_box_gain(lft.reduce())
-    assert found.gamma == pytest.approx(1 / (0.2 * math.sqrt(1 - 0.01)), rel=1e-5)
+    assert found.gain == pytest.approx(1 / (0.2 * math.sqrt(1 - 0.01)), rel=1e-5)
     # the peak is flat: its place is known to the square root of that
     np.testing.assert_allclose(found.p, (0.3137, -0.77), atol=5e-3)
 

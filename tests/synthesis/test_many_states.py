@@ -186,7 +186,7 @@ def test_of_a_model_that_does_not_move_it_finds_the_frozen_norm(dt):
     cert = l2_gain(lpv, form=form, search=None)
     assert cert.solver.startswith("interior-point method for Lyapunov inequalities, symheli ")
     # the tolerance is 1e-5 of gamma^2, the margin of the LMI 1e-6
-    assert cert.gamma == pytest.approx(frozen_gain(lpv).gamma, rel=1e-4)
+    assert cert.gamma == pytest.approx(frozen_gain(lpv).gain, rel=1e-4)
     assert cert.verify(rigorous=True)
 
 

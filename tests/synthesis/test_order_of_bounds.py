@@ -95,7 +95,7 @@ def test_parametric_resonance_is_proven_when_slow_and_found_when_fast():
 
 def test_a_growing_trajectory_does_grow_when_it_is_flown():
     found = lower_bound(spring(), 4.0, search=QUICK)
-    assert math.isinf(found.gamma)
+    assert math.isinf(found.gain)
     assert found.trajectory is not None
     time, p = found.trajectory
     assert np.abs(np.diff(p)).max() <= 4.0 * np.diff(time)[np.abs(np.diff(p)).argmax()] * (1 + 1e-9)
@@ -130,19 +130,19 @@ def test_the_lower_bound_is_the_ratio_of_an_input_that_can_be_flown(dt):
             / float(np.sum(found.input[:-1, 0] ** 2 * np.diff(time)))
         )
     # continuous: the last input sample is left out
-    assert ratio == pytest.approx(found.gamma, rel=1e-3 if dt is None else 1e-6)
-    assert found.gamma > l2_gain(lpv, 0.0, form=COARSE, search=None).frozen
+    assert ratio == pytest.approx(found.gain, rel=1e-3 if dt is None else 1e-6)
+    assert found.gain > l2_gain(lpv, 0.0, form=COARSE, search=None).frozen
 
 
 def test_the_search_for_bad_trajectories_is_deterministic():
     a, b = (lower_bound(spring(), 0.2, search=QUICK) for _ in range(2))
-    assert a.gamma == b.gamma
+    assert a.gain == b.gain
 
 
 def test_a_rate_of_zero_leaves_the_frozen_gain():
     found = lower_bound(spring(), 0.0)
     assert found.trajectory is None
-    assert found.gamma == pytest.approx(
+    assert found.gain == pytest.approx(
         l2_gain(spring(), 0.0, form=Spline(segments=8), search=None).gamma, rel=1e-3
     )
 

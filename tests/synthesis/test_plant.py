@@ -653,7 +653,7 @@ def test_a_scheduled_gain_that_cancels_the_scheduling_leaves_a_constant_loop():
         synthesis.estimator,
         synthesis.lft_feedback,
         lambda plant: synthesis.multiobjective(plant, [synthesis.L2()]),
-        lambda plant: synthesis.certify_flown({}, plant),
+        lambda plant: synthesis.certify_sampled({}, plant),
         lambda plant: synthesis.with_wrong_parameter(plant, {}, 0.1),
         lambda plant: synthesis.proven_around(plant, {}, 3.0),
     ],

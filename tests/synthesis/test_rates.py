@@ -38,4 +38,4 @@ def test_the_rate_of_the_one_parameter_may_be_given_by_name():
             UnknownNameError, match="unknown scheduling parameter 'airspeed'; known: p"
         ):
             question(lag(), {"airspeed": 0.3})
-    assert lower_bound(lag(), {"p": 0.0}).gamma == lower_bound(lag(), 0.0).gamma
+    assert lower_bound(lag(), {"p": 0.0}).gain == lower_bound(lag(), 0.0).gain

@@ -103,7 +103,7 @@ def gridded(points, count):
 def test_the_frozen_gain_is_the_one_that_was_computed_before():
     found = frozen_gain(Loop())
     # 1.2252 at p = 7, four decimals
-    assert found.gamma == pytest.approx(1.2252, abs=5e-5)
+    assert found.gain == pytest.approx(1.2252, abs=5e-5)
     assert found.p == pytest.approx(7.0)
 
 
@@ -129,8 +129,8 @@ def test_a_trajectory_replayed_on_the_exact_model_exceeds_what_was_printed():
     # flown once more by Runge and Kutta's rule, with Simpson's for the energy of e = C x + d
     energy = output_energy(model, time, p, found.input)
     ratio = np.sqrt(energy / np.sum(found.input[:-1, 0] ** 2 * np.diff(time)))
-    print(f"replayed {ratio:.4f}, claimed {found.gamma:.4f}")
-    assert ratio == pytest.approx(found.gamma, rel=1e-3)
+    print(f"replayed {ratio:.4f}, claimed {found.gain:.4f}")
+    assert ratio == pytest.approx(found.gain, rel=1e-3)
     assert ratio > 1.34
     assert ratio < 1.3806
 

@@ -145,8 +145,8 @@ def test_no_model_of_the_set_exceeds_the_bound_and_the_worst_one_found_is_one(se
     cert = l2_gain(unc, form=COARSE, search=None)
     assert cert.verified
     every = [*unc.draws(8, seed), *unc.draws(8, seed, "boundary")]
-    gains = [frozen_gain(lpv, points=9).gamma for lpv in every]
-    worst = frozen_gain(unc.perturbed(cert.perturbation)).gamma
+    gains = [frozen_gain(lpv, points=9).gain for lpv in every]
+    worst = frozen_gain(unc.perturbed(cert.perturbation)).gain
     assert max(gains) <= worst == pytest.approx(cert.frozen, rel=1e-6)
     assert worst <= cert.lower <= cert.gamma
 

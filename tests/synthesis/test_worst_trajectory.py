@@ -128,7 +128,7 @@ def test_the_search_finds_more_than_the_waves_it_starts_from():
         for wave in hunt.family.coarse()
         if math.isfinite(gain := hunt.gain(Trajectory(*wave.vertices())))
     )
-    assert lower_bound(lpv, search=search).gamma > 1.02 * waves
+    assert lower_bound(lpv, search=search).gain > 1.02 * waves
 
 
 @pytest.mark.parametrize("rate", [2.9, math.inf])
@@ -187,9 +187,9 @@ def test_a_bound_by_jumps_is_flown_as_it_is_reported():
     energy = response(lpv, time, p, found.input, np.zeros((2, 1)), 0.02)[1]
     # as in test_order_of_bounds: the last input sample is left out
     assert math.sqrt(energy / np.sum(found.input[:-1, 0] ** 2 * np.diff(time))) == pytest.approx(
-        found.gamma, rel=1e-3
+        found.gain, rel=1e-3
     )
-    assert found.gamma > 1.1 * lower_bound(lpv, 0.0).gamma
+    assert found.gain > 1.1 * lower_bound(lpv, 0.0).gain
 
 
 def test_a_slow_p_is_given_the_time_to_cross_its_range():
@@ -203,7 +203,7 @@ def test_a_slow_p_is_given_the_time_to_cross_its_range():
     quick = Search(levels=4, dwells=4, starts=1, nodes=40, evaluations=6, steps=120, samples=20_000)
     found = lower_bound(scalar(0.01), search=quick)
     # three times the slowest mode, 19 s, leave 2.2507; what was reached here, rounded down
-    assert 2.2525 < found.gamma < 2.25441
+    assert 2.2525 < found.gain < 2.25441
     assert np.ptp(found.trajectory.p) > 0.01 * 19
 
 
@@ -213,6 +213,6 @@ def test_a_p_that_may_jump_is_never_better_than_one_with_a_limit():
 
     quick = Search(levels=4, dwells=7, starts=1, nodes=40, evaluations=12, steps=80, samples=4000)
     gains = [
-        lower_bound(spring(damping=0.4), rate, search=quick).gamma for rate in (1.0, 3.0, math.inf)
+        lower_bound(spring(damping=0.4), rate, search=quick).gain for rate in (1.0, 3.0, math.inf)
     ]
     assert gains == sorted(gains)

@@ -35,7 +35,7 @@ def gain(
     loop = close(family.interpolate("polynomial", degree), "gust", gains)
     form = synthesis.Spline(segments=segments)
     found = synthesis.l2_gain(loop, rate=rate, form=form, search=None)
-    return {"proven gain": found.gamma, "frozen gain": synthesis.frozen_gain(loop).gamma}
+    return {"proven gain": found.gamma, "frozen gain": synthesis.frozen_gain(loop).gain}
 
 
 TRIAL = Trial(gain, {"proven gain": "1", "frozen gain": "1"})

@@ -73,7 +73,7 @@ def test_it_is_state_feedback_of_the_transposed_plant(plant, rate):
     """-dY/dt and dX/dt differ in sign, and rates are limited both ways: the same least gain."""
     made = estimator(plant(), rate, back_off=BACK_OFF)
     dual = state_feedback(transposed(plant()), rate, back_off=BACK_OFF)
-    assert made.gamma == pytest.approx(dual.gamma, rel=1e-5)
+    assert made.promised == pytest.approx(dual.promised, rel=1e-5)
 
 
 @pytest.mark.parametrize("pole", [-1.0, 0.5])
@@ -81,7 +81,7 @@ def test_the_error_is_proven_whether_the_plant_is_stable_or_not(pole):
     made = estimator(heave(pole), back_off=BACK_OFF)
     proof = made.certify(search=None)
     assert proof.verified
-    assert proof.gamma <= made.gamma * (1 + 1e-4)  # of functions fitted to the gains
+    assert proof.gamma <= made.promised * (1 + 1e-4)  # of functions fitted to the gains
     for p in (0.0, 0.4, 1.0):
         assert made.error.at(p).is_stable()
 
@@ -108,7 +108,7 @@ def test_of_a_constant_plant_the_gain_is_known():
         [[-1.0]], [[1, 0]], [[1], [1]], [[0, 0], [0, 1]], ["x"], ["w1", "w2"], ["z", "y"]
     )
     plant = Plant(model, disturbances=["w1", "w2"], performance=["z"], measurements=["y"])
-    assert estimator(plant, back_off=BACK_OFF).gamma / BACK_OFF == pytest.approx(
+    assert estimator(plant, back_off=BACK_OFF).promised / BACK_OFF == pytest.approx(
         1 / np.sqrt(2), rel=1e-5
     )
 
@@ -117,7 +117,7 @@ def test_a_sampled_estimator_is_proven():
     made = estimator(heave(-1.0).sampled(0.1))
     proof = made.certify(search=None)
     assert proof.verified
-    assert proof.gamma <= made.gamma * (1 + 1e-4)
+    assert proof.gamma <= made.promised * (1 + 1e-4)
 
 
 def test_in_discrete_time_x_stands_still():

@@ -34,7 +34,7 @@ def test_no_controller_nearby_has_a_smaller_norm(seed, dt):
     model, u, y = random_plant(seed, dt, direct=dt is not None)
     design, P = h2(model, u, y), Generalized.of(model, u, y)
     K = matrices(design.controller)
-    assert size(P, K, dt) == pytest.approx(design.gamma, rel=1e-7)
+    assert size(P, K, dt) == pytest.approx(design.hinf_norm, rel=1e-7)
     rng = np.random.default_rng(seed)
     for spread in np.repeat([1e-5, 1e-3, 1e-1], 20):
         near = [M + spread * np.abs(M).max(initial=0.1) * rng.standard_normal(M.shape) for M in K]
@@ -42,7 +42,7 @@ def test_no_controller_nearby_has_a_smaller_norm(seed, dt):
             near[3] = K[3]  # another one makes the norm infinite
         poles = np.linalg.eigvals(P.closed(*near)[0])
         if np.all(poles.real < 0) if dt is None else np.all(np.abs(poles) < 1):
-            assert size(P, near, dt) >= design.gamma * (1 - 1e-7)
+            assert size(P, near, dt) >= design.hinf_norm * (1 - 1e-7)
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])
@@ -50,7 +50,7 @@ def test_no_controller_nearby_has_a_smaller_norm(seed, dt):
 def test_the_transposed_plant_has_the_same_norm(seed, dt):
     model, u, y = random_plant(seed, dt, direct=dt is not None)
     dual = named(*Generalized.of(model, u, y).dual.joined, len(y), len(u), dt)
-    assert h2(*dual).gamma == pytest.approx(h2(model, u, y).gamma, rel=1e-7)
+    assert h2(*dual).hinf_norm == pytest.approx(h2(model, u, y).hinf_norm, rel=1e-7)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -83,7 +83,7 @@ def test_sampled_fast_the_norm_is_that_of_the_continuous_plant():
         into = np.linalg.solve(eye - A * dt / 2, np.array([[0, 0, 0], [1.0, 0, 1.0]]) * dt)
         noise = np.array([dt**-0.5, dt**-0.5, 1.0])
         sampled = named(step, into * noise, C, D * noise, 1, 1, dt)
-        errors.append(abs(h2(*sampled).gamma / continuous.gamma - 1))
+        errors.append(abs(h2(*sampled).hinf_norm / continuous.hinf_norm - 1))
     assert errors[2] < 0.1 * errors[0]
 
 
@@ -91,7 +91,7 @@ def test_a_static_gain_takes_away_the_direct_way():
     """z = u + w, y = x + w: u = -y leaves z = -x + ..., any other gain leaves white noise."""
     design = h2(*named([[-1]], [[1, 1]], [[0], [1]], [[1, 1], [1, 0]], 1, 1))
     assert design.controller.D[0, 0] == pytest.approx(-1)
-    assert np.isfinite(design.gamma)
+    assert np.isfinite(design.hinf_norm)
 
 
 def test_white_noise_that_comes_through_is_said():
@@ -136,8 +136,8 @@ def test_the_norm_is_that_of_the_loop_in_any_units_of_the_states(seed, dt, sprea
     plain, far = h2(model, u, y), h2(other, u, y)
     A, B, C, D = Generalized.of(model, u, y).closed(*matrices(plain.controller))
     truth = np.sqrt(mean_square(A, B, C, D if dt else 0.0 * D, dt))
-    assert plain.gamma == pytest.approx(truth, rel=1e-8)
-    assert far.gamma == pytest.approx(truth, rel=1e-8)
+    assert plain.hinf_norm == pytest.approx(truth, rel=1e-8)
+    assert far.hinf_norm == pytest.approx(truth, rel=1e-8)
 
 
 @pytest.mark.parametrize("apart", [1e-15, 1e-12, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-2])

@@ -16,9 +16,9 @@ def test_the_lft_of_the_loop_proves_what_the_inequalities_promise():
     """
     made = lft_feedback(spring())
     slack = 1 + 1e-3  # of functions fitted to the gains
-    assert made.certify(math.inf, search=None).gamma <= made.gamma * slack
+    assert made.certify(math.inf, search=None).gamma <= made.promised * slack
     loop = made.closed().to_lft().reduce()
-    assert lft_gain(loop).gamma <= made.gamma * 1.02
+    assert lft_gain(loop).gamma <= made.promised * 1.02
 
 
 def test_jumps_cost_more_than_rates_and_no_less_than_standing_still():

@@ -27,8 +27,8 @@ def test_gamma_is_the_inverse_of_the_margin_of_the_loop(seed):
     """Against `stability_margin`, which takes it from the model and the controller on a grid."""
     G = plant(seed, 0.1)
     design = ncf(G)
-    assert 1 / design.gamma == pytest.approx(stability_margin(G, design.controller), rel=1e-6)
-    assert design.optimum <= design.gamma <= 1.01 * design.optimum * (1 + 1e-6)
+    assert 1 / design.hinf_norm == pytest.approx(stability_margin(G, design.controller), rel=1e-6)
+    assert design.optimum <= design.hinf_norm <= 1.01 * design.optimum * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("dt", [None, 0.1])
@@ -87,9 +87,9 @@ def test_mixed_sensitivity_is_the_gain_of_its_three_functions():
     S = np.linalg.inv(np.eye(len(G.outputs)) - P @ K)
     weighted = np.concatenate([W * S, 0.3 * K @ S, 0.1 * P @ K @ S], axis=1)
     np.testing.assert_allclose(
-        weighted, design.loop.frequency_response(omega), atol=1e-7 * design.gamma
+        weighted, design.loop.frequency_response(omega), atol=1e-7 * design.hinf_norm
     )
-    assert np.linalg.norm(weighted, 2, axis=(1, 2)).max() <= design.gamma * (1 + 1e-7)
+    assert np.linalg.norm(weighted, 2, axis=(1, 2)).max() <= design.hinf_norm * (1 + 1e-7)
     assert design.loop.outputs[0] == f"S_{G.outputs[0]}"
 
 

@@ -50,7 +50,7 @@ def test_printed_optima():
     quiet = multiobjective(of(*scherer_gahinet_chilali([1, 2])), H2(), back_off=1.001)
     assert quiet.optimum == pytest.approx(7.748350599, rel=1e-4)
     found = two_norm(quiet.closed().at(0.5))
-    assert 7.748350599 * (1 - 1e-9) <= found <= quiet.gamma * PROVEN
+    assert 7.748350599 * (1 - 1e-9) <= found <= quiet.promised * PROVEN
     fast = multiobjective(of(*scherer_gahinet_chilali([0])), L2())
     # the measurement tells the disturbance: X tends to infinity, and is bounded
     assert 9.508085 <= fast.optimum <= 9.508085 * (1 + 2e-4)
@@ -60,20 +60,20 @@ def test_h2_is_that_of_two_riccati_equations():
     plant = spring()
     model = plant.model.at(0.3)
     frozen = of(model, ["u"], ["y"])
-    best = h2(model, ["u"], ["y"]).gamma
+    best = h2(model, ["u"], ["y"]).hinf_norm
     assert multiobjective(frozen, H2()).optimum == pytest.approx(best, rel=1e-4)
 
 
 def test_a_hard_bound_is_kept_and_costs_something():
     """The printed example: an H-infinity norm below 23.6, the H2 norm as small as that allows."""
-    free = h2(*scherer_gahinet_chilali([1, 2])).gamma
+    free = h2(*scherer_gahinet_chilali([1, 2])).hinf_norm
     made = multiobjective(both(), [L2(performance=FAST, bound=23.6), H2(performance=QUIET)])
     fast, _ = gains(made, FAST)
     _, quiet = gains(made, QUIET)
     assert fast <= 1.02 * 23.6 * PROVEN
-    assert free * (1 - 1e-6) <= quiet <= made.gamma * PROVEN
+    assert free * (1 - 1e-6) <= quiet <= made.promised * PROVEN
     loose = multiobjective(both(), [L2(performance=FAST, bound=40.0), H2(performance=QUIET)])
-    assert loose.gamma < made.gamma
+    assert loose.promised < made.promised
 
 
 def test_a_bound_below_the_optimum_cannot_be_kept():
@@ -89,7 +89,7 @@ def test_energy_to_peak_is_kept():
     loop = made.closed().at(0.5)
     P = solve_continuous_lyapunov(loop.A, -loop.B @ loop.B.T)
     found = np.sqrt(np.linalg.eigvalsh(loop.C @ P @ loop.C.T).max())
-    assert found <= made.gamma * PROVEN
+    assert found <= made.promised * PROVEN
     assert made.optimum <= 7.748350599  # the root of a largest eigenvalue, not of a trace
 
 
@@ -143,8 +143,8 @@ def test_what_is_promised_is_what_the_frozen_loops_keep(plant, back_off):
     made = multiobjective(plant, L2(), back_off=back_off)
     loop = made.closed()
     worst = max(norm(*loop.matrices(p))[0] for p in np.linspace(0.0, 1.0, 11))
-    assert worst <= made.gamma * PROVEN
-    assert made.gamma == pytest.approx(back_off * made.optimum, rel=1e-12)
+    assert worst <= made.promised * PROVEN
+    assert made.promised == pytest.approx(back_off * made.optimum, rel=1e-12)
 
 
 def test_what_cannot_be_asked():

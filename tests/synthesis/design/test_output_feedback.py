@@ -37,7 +37,7 @@ PROVEN = 1 + 1e-6
 
 def least(plant, rate=0.0, **options):
     """The least gain of the inequalities."""
-    return output_feedback(plant, rate, back_off=BACK_OFF, **options).gamma / BACK_OFF
+    return output_feedback(plant, rate, back_off=BACK_OFF, **options).promised / BACK_OFF
 
 
 @pytest.mark.parametrize(
@@ -62,8 +62,8 @@ def test_a_first_order_plant_has_its_optimum_in_closed_form(a, b, c):
 def test_optima_of_the_literature(plant, optimum):
     """Scherer, Gahinet and Chilali (1997), example 7; the example of SLICOT's SB10FD."""
     made = output_feedback(of(*plant), back_off=BACK_OFF)
-    assert made.gamma / BACK_OFF == pytest.approx(optimum, rel=1e-4)
-    assert optimum <= made.certify(0.0, search=None).gamma <= made.gamma * PROVEN
+    assert made.promised / BACK_OFF == pytest.approx(optimum, rel=1e-4)
+    assert optimum <= made.certify(0.0, search=None).gamma <= made.promised * PROVEN
 
 
 def mixed_sensitivity(bandwidths):
@@ -140,7 +140,7 @@ def test_what_was_promised_is_proven(rate):
     made = output_feedback(spring(), rate)
     proof = made.certify(rate, search=None)
     assert proof.verified
-    assert proof.gamma <= made.gamma * PROVEN
+    assert proof.gamma <= made.promised * PROVEN
 
 
 def test_standing_still_the_least_gain_is_the_worst_frozen_optimum():
@@ -199,8 +199,8 @@ def test_a_sampled_design_is_proven_and_tends_to_the_continuous_one(rate):
         assert made.dt == dt
         proof = made.certify(rate, search=None)
         assert proof.verified
-        assert proof.gamma <= made.gamma * (1 + 1e-4)  # of functions fitted to the gains
-        gaps.append(made.gamma / BACK_OFF / continuous - 1)
+        assert proof.gamma <= made.promised * (1 + 1e-4)  # of functions fitted to the gains
+        gaps.append(made.promised / BACK_OFF / continuous - 1)
     assert abs(gaps[1]) < 0.6 * abs(gaps[0]) < 0.1
 
 
@@ -214,10 +214,10 @@ def test_both_sides_move_where_that_is_asked_and_the_rate_is_neglected():
     one_sided = [output_feedback(spring(), 0.05, X=x, Y=2 - x).optimum for x in (0, 2)]
     assert made.optimum <= min(one_sided)
     # what storage function and neglected rate promise, not what X and Y would with dp/dt known
-    assert made.optimum < made.gamma <= 1.05 * BACK_OFF * made.optimum
+    assert made.optimum < made.promised <= 1.05 * BACK_OFF * made.optimum
     proof = made.certify(0.05, search=None)
     assert proof.verified
-    assert proof.gamma <= made.gamma * PROVEN
+    assert proof.gamma <= made.promised * PROVEN
 
 
 def test_where_neglecting_the_rate_keeps_no_gamma_it_is_said_what_to_write(monkeypatch):
@@ -241,7 +241,7 @@ def test_the_loop_of_a_lagged_parameter_is_proven_by_tied_rates():
     made = output_feedback(spring(1.0).lagged(0.2), X=(2, 0), Y=(2, 0), back_off=BACK_OFF)
     proof = made.certify(search=None)
     assert proof.verified
-    assert proof.gamma <= made.gamma * (1 + 1e-3)  # of functions fitted to the gains
+    assert proof.gamma <= made.promised * (1 + 1e-3)  # of functions fitted to the gains
 
 
 # --- what cannot be asked ------------------------------------------------------------------------

@@ -113,4 +113,4 @@ def test_state_feedback_is_judged_by_the_same_floor():
     (reason,) = made.reasons
     assert "whatever the controller does, the gain from w" in reason
     assert made.optimum == pytest.approx(1 / 3, rel=5e-3)  # two parts, degree 6
-    assert made.gamma == pytest.approx(1.02 * made.optimum, rel=1e-9)
+    assert made.promised == pytest.approx(1.02 * made.optimum, rel=1e-9)

@@ -67,7 +67,7 @@ def test_a_state_that_matters_little_may_go():
     assert (made.order, less.order) == (3, 2)
     for p in np.linspace(0, 1, 7):
         gain = norm(*less.closed().matrices(p))[0]  # inf where the loop is not stable
-        assert hinf(*frozen(made.plant, p)).optimum * (1 - 1e-6) <= gain < 1.02 * made.gamma
+        assert hinf(*frozen(made.plant, p)).optimum * (1 - 1e-6) <= gain < 1.02 * made.promised
 
 
 def test_a_state_without_which_the_loop_is_unstable_stays(made):
@@ -78,7 +78,7 @@ def test_a_state_without_which_the_loop_is_unstable_stays(made):
 def test_what_was_promised_of_all_states_is_not_promised_of_fewer(made):
     more = extended(made, np.eye(3))
     less = more.reduce(2)
-    assert np.isnan(less.gamma)
+    assert np.isnan(less.promised)
     assert less.optimum is None
     (note,) = less.reasons
     assert f"{frozen_gain(less):.6g}" in note

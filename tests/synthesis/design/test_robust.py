@@ -33,8 +33,8 @@ def uncertain(bound):
 
 
 def test_a_set_of_one_model_is_that_model():
-    alone = output_feedback(spring(), X=0, Y=2, back_off=BACK_OFF).gamma
-    assert output_feedback(uncertain(0.0), X=0, Y=2, back_off=BACK_OFF).gamma == pytest.approx(
+    alone = output_feedback(spring(), X=0, Y=2, back_off=BACK_OFF).promised
+    assert output_feedback(uncertain(0.0), X=0, Y=2, back_off=BACK_OFF).promised == pytest.approx(
         alone, rel=1e-4
     )
 
@@ -46,7 +46,7 @@ def test_every_model_of_the_set_keeps_the_gain():
     assert isinstance(loop, UncertainStateSpace)
     proof = l2_gain(loop, search=None)
     assert proof.verified
-    assert proof.gamma <= made.gamma * (1 + 1e-3)  # of functions fitted to the gains
+    assert proof.gamma <= made.promised * (1 + 1e-3)  # of functions fitted to the gains
     for delta in loop.perturbations(20, seed=0):
         one = loop.perturbed(delta)
         for p in (0.0, 0.5, 1.0):
@@ -56,7 +56,8 @@ def test_every_model_of_the_set_keeps_the_gain():
 @pytest.mark.slow
 def test_the_larger_the_set_the_larger_the_gain():
     gains = [
-        output_feedback(uncertain(b), X=0, Y=2, back_off=BACK_OFF).gamma for b in (0.0, 0.05, 0.15)
+        output_feedback(uncertain(b), X=0, Y=2, back_off=BACK_OFF).promised
+        for b in (0.0, 0.05, 0.15)
     ]
     assert gains == sorted(gains)
     assert np.all(np.diff(gains) > 0)

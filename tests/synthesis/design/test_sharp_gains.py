@@ -74,4 +74,4 @@ def test_plants_whose_gains_turn_sharply_are_settled_near_their_optimum(seed):
     drawn = random_plant(seed)
     made = output_feedback(drawn.plant, 0.0)
     assert drawn.worst * (1 - 2e-3) <= made.optimum <= 1.02 * drawn.worst
-    assert made.gamma <= 1.05 * made.optimum
+    assert made.promised <= 1.05 * made.optimum

@@ -39,11 +39,11 @@ def test_the_exact_least_gain_is_met_and_never_undercut(rate):
     plant, exact = turning(rate), EXACT[rate]
     degree = 0 if math.isinf(rate) else 9
     made = state_feedback(plant, Y=degree, divisions=4, back_off=BACK_OFF)
-    least = made.gamma / BACK_OFF
+    least = made.promised / BACK_OFF
     assert exact * (1 - DIGITS) <= least <= exact * (1 + 1e-3)
     proof = made.certify(search=None)
     assert proof.verified
-    assert exact * (1 - DIGITS) <= proof.gamma <= made.gamma * (1 + 1e-6)
+    assert exact * (1 - DIGITS) <= proof.gamma <= made.promised * (1 + 1e-6)
 
 
 def test_a_richer_storage_function_is_never_worse():
@@ -52,7 +52,7 @@ def test_a_richer_storage_function_is_never_worse():
     """
     for degree, on_grids in ((1, 0.368550), (3, 0.359633)):
         made = state_feedback(turning(1.0), Y=degree, divisions=4, back_off=BACK_OFF)
-        least = made.gamma / BACK_OFF
+        least = made.promised / BACK_OFF
         assert least == pytest.approx(on_grids, rel=1e-4)
 
 
@@ -61,7 +61,7 @@ def test_standing_still_it_is_the_worst_of_the_frozen_optima():
     plant = spring(0.0, states=True)
     made = state_feedback(plant, Y=4, back_off=BACK_OFF)
     worst = max(_full_information(plant, p) for p in np.linspace(0, 1, 11))
-    assert worst * (1 - 1e-6) <= made.gamma / BACK_OFF <= worst * (1 + 1e-3)
+    assert worst * (1 - 1e-6) <= made.promised / BACK_OFF <= worst * (1 + 1e-3)
 
 
 def _full_information(plant, p):
@@ -81,8 +81,8 @@ def _full_information(plant, p):
 def test_state_feedback_is_no_worse_than_output_feedback():
     from synthesis import output_feedback
 
-    with_state = state_feedback(spring(states=True), Y=2, back_off=BACK_OFF).gamma
-    with_noise = output_feedback(spring(), X=0, Y=2, back_off=BACK_OFF).gamma
+    with_state = state_feedback(spring(states=True), Y=2, back_off=BACK_OFF).promised
+    with_noise = output_feedback(spring(), X=0, Y=2, back_off=BACK_OFF).promised
     assert with_state <= with_noise * (1 + 1e-6)
 
 
@@ -115,4 +115,4 @@ def test_a_sampled_gain_keeps_its_level():
     assert made.order == 0
     proof = made.certify(search=None)
     assert proof.verified
-    assert proof.gamma <= made.gamma * (1 + 1e-4)
+    assert proof.gamma <= made.promised * (1 + 1e-4)

@@ -138,9 +138,9 @@ def test_frozen_loops_of_wrong_readings_are_within_the_bound(basis, error):
         near = frozen.with_scheduling(
             Scheduling("p", "1", max(0.0, q - error), min(1.0, q + error), 0.1)
         )
-        worst = max(worst, frozen_gain(near, points=9).gamma)
+        worst = max(worst, frozen_gain(near, points=9).gain)
     assert worst <= certificate.gamma
-    right = frozen_gain(plant.close(K)).gamma
+    right = frozen_gain(plant.close(K)).gain
     assert right <= worst * (1 + 1e-9)
 
 

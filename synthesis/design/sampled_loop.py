@@ -1,4 +1,4 @@
-"""The proof of a loop as it flies: the controller's own numbers, sampled, around the sampled plant.
+"""The certificate of a sampled loop: the controller's own numbers around the sampled plant.
 
 How a controller was made plays no part in it: synthesis may be as rough as it likes, and what
 sampling, tabulating, rounding and delay take is the distance between two gains.
@@ -30,8 +30,8 @@ sum of, at the same p, is one of their rounding: of its own terms, whatever the 
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Flown:
-    """What is left of a design once it flies.
+class SampledLoop:
+    """A controller as implemented around its sampled plant, with the certificate of that loop.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Flown:
         with every model that it was fitted to.
     certificate : Certificate
         Of its gain from the disturbances to the performance.
-    synthesized : float
+    promised : float
         The gain that the synthesis promised, for its own plant; NaN where none is known.
     misfit : float
         Largest entry of [A B] by which the loop misses what its plant was fitted to; 0 of a plant
@@ -55,14 +55,14 @@ class Flown:
     ...     inputs=("w", "u"), outputs=("y",))
     >>> plant = synthesis.Plant(lag, disturbances=["w"], performance=["y"], controls=["u"],
     ...                         measurements=["y"])
-    >>> flown = synthesis.certify_flown({("u", "y"): -0.5}, plant, synthesized=0.9, search=None)
-    >>> print(flown)
-    synthesis promised 0.9; the loop as it flies is proven for 1 (frozen 1): 11.1 % more
+    >>> sampled = synthesis.certify_sampled({("u", "y"): -0.5}, plant, promised=0.9, search=None)
+    >>> print(sampled)
+    synthesis promised 0.9; the sampled loop is proven for 1 (frozen 1): 11.1 % more
     """
 
     loop: LPVStateSpace | UncertainStateSpace
     certificate: Certificate
-    synthesized: float = math.nan
+    promised: float = math.nan
     misfit: float = 0.0
 
     __repr__ = summarized
@@ -77,33 +77,33 @@ class Flown:
         """Proven gain over the promised one, minus 1: from all that stands between design and
         flight; inf where nothing is proven, NaN where nothing was promised.
         """
-        return self.gamma / self.synthesized - 1.0
+        return self.gamma / self.promised - 1.0
 
     def __str__(self) -> str:
-        promised = "" if math.isnan(self.synthesized) else f"promised {self.synthesized:.4g}"
+        promised = "" if math.isnan(self.promised) else f"promised {self.promised:.4g}"
         begin = f"synthesis {promised}; " if promised else ""
         frozen = f"frozen {self.certificate.frozen:.4g}"
         if not self.certificate.verified:
-            return f"{begin}of the loop as it flies nothing is proven ({frozen}):" + (
+            return f"{begin}nothing is proven of the sampled loop ({frozen}):" + (
                 f" {self.certificate.status}"
             )
-        told = f"{begin}the loop as it flies is proven for {self.gamma:.4g} ({frozen})"
+        told = f"{begin}the sampled loop is proven for {self.gamma:.4g} ({frozen})"
         if not promised:
             return told
         return f"{told}: {abs(100 * self.loss):.3g} % {'more' if self.loss >= 0 else 'less'}"
 
 
 @with_one_thread
-def certify_flown(
+def certify_sampled(
     controller: Any,
     plant: Plant,
     rate: Rate = None,
     *,
-    synthesized: float | None = None,
+    promised: float | None = None,
     cover: bool = True,
     **options: Any,
-) -> Flown:
-    """The proven gain of a sampled plant under the controller that flies.
+) -> SampledLoop:
+    """The proven gain of a sampled plant under a controller as implemented.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def certify_flown(
         Sampled, its delay exact: `plant.with_servo(...).sampled(dt).with_delay(dt)`.
     rate : float, sequence or mapping, optional
         Largest |dp/dt|, as for `l2_gain`; by default the plant's own.
-    synthesized : float, optional
+    promised : float, optional
         The promised gain to compare with; by default that of a `Controller`.
     cover : bool
         Whether the proof holds for every model within twice the distance that the plant misses
@@ -124,7 +124,7 @@ def certify_flown(
 
     Returns
     -------
-    Flown
+    SampledLoop
         With the certificate and the loss from the promised to the proven gain.
 
     Raises
@@ -140,8 +140,8 @@ def certify_flown(
     ...                   dt=0.1)
     >>> plant = synthesis.Plant(lag, disturbances=["w"], performance=["y"], controls=["u"],
     ...                         measurements=["y"])
-    >>> print(certify_flown({("u", "y"): -1.0}, plant, search=None))
-    the loop as it flies is proven for 0.5 (frozen 0.5)
+    >>> print(certify_sampled({("u", "y"): -1.0}, plant, search=None))
+    the sampled loop is proven for 0.5 (frozen 0.5)
     """
     require_plant(plant)
     if plant.dt is None:
@@ -150,17 +150,17 @@ def certify_flown(
             " plant.with_servo(...).sampled(dt).with_delay(dt) is what the controller meets"
         )
     if isinstance(controller, Controller):
-        synthesized = controller.gamma if synthesized is None else synthesized
+        promised = controller.promised if promised is None else promised
         controller = controller if controller.dt else controller.discretize(plant.dt)
     loop = plant.close(controller)
     misfit = 0.0
     if cover and isinstance(loop, LPVStateSpace) and loop.residuals is not None:
         loop, misfit = _covered(loop)
     certificate = l2_gain(loop, rate, **options)
-    return Flown(
+    return SampledLoop(
         loop=loop,
         certificate=certificate,
-        synthesized=math.nan if synthesized is None else float(synthesized),
+        promised=math.nan if promised is None else float(promised),
         misfit=misfit,
     )
 

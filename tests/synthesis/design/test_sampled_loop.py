@@ -8,7 +8,7 @@ import pytest
 import symheli
 from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, Matrices, Scheduling
-from synthesis import Plant, Spline, certify_flown
+from synthesis import Plant, Spline, certify_sampled
 from synthesis.cover import SAFETY
 
 P = Scheduling("airspeed", "m/s", 0.0, 10.0, rate=1.0)
@@ -45,14 +45,14 @@ def table(gain=lambda p: -1.0 - p / 10, knots=(0.0, 10.0)):
 
 def test_the_loop_is_that_of_the_numbers_of_32_bits():
     gain = -1.0 / 3.0
-    flown = certify_flown(table(lambda p: gain), roll(), form=PLAIN, search=None)
+    flown = certify_sampled(table(lambda p: gain), roll(), form=PLAIN, search=None)
     rounded = float(np.float32(gain))
     assert flown.loop.at(10.0).A[0, 0] == pytest.approx(1.0 + 0.1 * rounded, abs=1e-15)
     assert abs(flown.loop.at(10.0).A[0, 0] - (1.0 + 0.1 * gain)) > 1e-10
 
 
 def test_the_gain_is_the_known_one_and_the_loss_is_told():
-    flown = certify_flown(table(), roll(), synthesized=0.4, search=None)
+    flown = certify_sampled(table(), roll(), promised=0.4, search=None)
     # the pole stays at 0.8: the gain is 0.1 / 0.2, to the solver's tolerance on its square
     assert flown.gamma == pytest.approx(0.5, rel=1e-4)
     assert flown.loss == pytest.approx(0.25, rel=1e-3)
@@ -61,7 +61,7 @@ def test_the_gain_is_the_known_one_and_the_loss_is_told():
 
 
 def test_an_unstable_loop_is_said_to_have_no_proof():
-    flown = certify_flown(table(lambda p: 1.0), roll(), synthesized=0.4, search=None)
+    flown = certify_sampled(table(lambda p: 1.0), roll(), promised=0.4, search=None)
     assert flown.gamma == math.inf
     assert flown.loss == math.inf
     assert "nothing is proven" in str(flown)
@@ -69,8 +69,8 @@ def test_an_unstable_loop_is_said_to_have_no_proof():
 
 def test_what_the_plant_misses_is_carried_through_the_proof():
     missed = 0.01
-    plain = certify_flown(table(), roll(residual=missed), cover=False, form=PLAIN, search=None)
-    covered = certify_flown(table(), roll(residual=missed), form=PLAIN, search=None)
+    plain = certify_sampled(table(), roll(residual=missed), cover=False, form=PLAIN, search=None)
+    covered = certify_sampled(table(), roll(residual=missed), form=PLAIN, search=None)
     assert plain.misfit == 0.0
     assert covered.misfit == pytest.approx(missed)
     truth = 0.1 / (0.2 - SAFETY * missed)
@@ -86,7 +86,7 @@ def test_a_performance_that_is_missed_too_is_refused():
     off = plant.model.with_residuals(at, Matrices(A, B, C + 0.1, D))
     plant = Plant(off, plant.disturbances, plant.performance, plant.controls, plant.measurements)
     with pytest.raises(InputError, match="put what varies behind a state"):
-        certify_flown(table(), plant, search=None)
+        certify_sampled(table(), plant, search=None)
 
 
 @pytest.mark.parametrize("unit", [1e-200, 1e-12, 1e-3, 1.0, 1e6, 1e12])
@@ -116,12 +116,12 @@ def test_a_missed_performance_is_refused_in_any_unit_and_beside_any_other(unit, 
         measurements=["phi"],
     )
     with pytest.raises(InputError, match="is a fit too"):
-        certify_flown(table(), plant, search=None)
+        certify_sampled(table(), plant, search=None)
 
 
 def test_a_plant_in_continuous_time_is_refused():
     with pytest.raises(InputError, match="sampled\\(dt\\)"):
-        certify_flown({("d_lat", "phi"): -1.0}, roll(dt=None))
+        certify_sampled({("d_lat", "phi"): -1.0}, roll(dt=None))
 
 
 @pytest.mark.slow
@@ -144,8 +144,8 @@ def test_a_designed_controller_is_proven_on_exact_linearizations_that_it_never_s
     controller = designed(ideal, low, high)
     flies = symheli.TableController.of(controller.discretize(DT).model, 5)
     plant = flying_plant(ideal, low, high)
-    flown = certify_flown(
-        flies, plant, synthesized=controller.gamma, form=Spline(degree=0), search=None
+    flown = certify_sampled(
+        flies, plant, promised=controller.promised, form=Spline(degree=0), search=None
     )
     assert flown.certificate.verified
     assert flown.certificate.rates == (ACCELERATION,)
