@@ -19,7 +19,7 @@ from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
 from studies.output import as_json, progress
 from studies.stamped_tables import DOCS, keep, parsed, processor
-from studies.transition.flights import FlightPlan, autopilot_for
+from studies.transition.flights import TransitionPlan, autopilot_for
 from symheli import Helicopter, LPVStateSpace
 from synthesis import Search
 
@@ -43,7 +43,7 @@ proven gain is the frozen one nothing is left to find.
 
 def flights(heli: Helicopter) -> dict[str, Fastest]:
     """The study's flights, without noise: how fast their airspeed changes."""
-    autopilot, plan = autopilot_for(heli), FlightPlan()
+    autopilot, plan = autopilot_for(heli), TransitionPlan()
     return {
         "training": fastest(plan.training(heli, autopilot)),
         "test": fastest(plan.test(heli, autopilot)),

@@ -14,7 +14,7 @@ import pytest
 
 import synthesis
 from studies.bracket.measured import GAINS, bracket
-from studies.jerk.measured import FlightPlan, fastest
+from studies.jerk.measured import TransitionPlan, fastest
 from studies.loops.exact_lateral import ExactLateral
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
@@ -111,7 +111,7 @@ def gain_with_any_jerk(section, loop):
 
 def fastest_of_the_test_flight():
     heli = _xcell()
-    found = fastest(FlightPlan().test(heli, autopilot_for(heli)))
+    found = fastest(TransitionPlan().test(heli, autopilot_for(heli)))
     shown = KEPT["jerk.md", "flights"].cells("test")
     assert same(shown[0], found.acceleration)
     assert same(shown[1], found.jerk)
