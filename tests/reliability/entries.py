@@ -70,7 +70,7 @@ EXEMPT: dict[str, str] = {
                 "Margins",
             ),
             *("MemoryLyapunov", "Multiplier", "PointDesign", "Proof", "Seconds"),
-            *("SplineLyapunov", "Trajectory"),
+            *("SplineLyapunov", "SchedulingTrajectory"),
         )
     },
     "synthesis.PolynomialMatrix": ARITHMETIC,
