@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -93,6 +94,30 @@ class ByHand:
         return np.clip(answer[self._n :], -0.2, 0.2)
 
 
+def updated(
+    own: symheli.TableController, errors: np.ndarray, airspeeds: np.ndarray
+) -> list[np.ndarray]:
+    """Commands along errors, from the ground."""
+    zeros, trim = np.zeros(len(MEASURED)), np.zeros(len(INPUTS))
+    state, out = own.init(), []
+    for e, V in zip(errors, airspeeds, strict=True):
+        u, state = own.update(state, e, zeros, trim, V)
+        out.append(u)
+    return out
+
+
+def stepped(
+    own: symheli.flight.PureController,
+    told: Sequence[NamedVector],
+    reference: NamedVector,
+    p: Sequence[NamedVector],
+) -> None:
+    """Every sample in turn, as in a flight."""
+    state = own.init()
+    for measured, at in zip(told, p, strict=True):
+        _, state = own.step(state, measured, reference, at)
+
+
 def in_c(own: symheli.TableController) -> ctypes.CDLL | None:
     """The exported code with a loop around it; None without a C compiler."""
     with TemporaryDirectory() as folder:
@@ -107,7 +132,6 @@ def main() -> None:
     own, rng = controller(), np.random.default_rng(1)
     errors = rng.standard_normal((SAMPLES, len(MEASURED))).astype(np.float32)
     airspeeds = (6.5 + 6.0 * np.sin(0.008 * np.arange(SAMPLES))).astype(np.float32)
-    zeros, trim = np.zeros(len(MEASURED)), np.zeros(len(INPUTS))
     double, by_hand = own.in_double_precision, ByHand(own)
     told = [NamedVector((*MEASURED, Signal("airspeed")), np.append(e, 5.0)) for e in errors[:50]]
     reference = NamedVector((*MEASURED, *INPUTS), np.zeros(12))
@@ -117,15 +141,15 @@ def main() -> None:
     short = range(50)
     calls = {
         "the table in Python, 32 bits": (
-            lambda: [own.update(errors[k], zeros, trim, airspeeds[k]) for k in short],
+            lambda: updated(own, errors[:50], airspeeds[:50]),
             50,
         ),
         "the table in Python, step of a flight": (
-            lambda: [own.step(told[k], reference, p[k]) for k in short],
+            lambda: stepped(own, told, reference, p),
             50,
         ),
         "ScheduledController.step": (
-            lambda: [double.step(told[k], reference, p[k]) for k in short],
+            lambda: stepped(double, told, reference, p),
             50,
         ),
         "by hand in NumPy, 64 bits": (
@@ -144,10 +168,7 @@ def main() -> None:
     ratios, notes = [], []
     if code is not None:
         c = times["exported C"]
-        own.reset()
-        same = np.array(
-            [own.update(e, zeros, trim, V) for e, V in zip(errors, airspeeds, strict=True)]
-        )
+        same = np.array(updated(own, errors, airspeeds))
         code.run(SAMPLES, *at)
         saturated = float((np.abs(out) == np.abs(out).max()).mean())
         notes.append(

@@ -42,16 +42,17 @@ if TYPE_CHECKING:
     from symheli.flight import (
         AirspeedSchedule,
         Autopilot,
-        Controller,
         Excitation,
         FlightBatch,
         FlightDataset,
         FlightPlan,
         ParameterMonitor,
+        PureController,
         ScheduledController,
         Sensor,
         Servo,
         SimulatedFlight,
+        StatefulController,
         TableController,
         fly,
         fly_batch,
@@ -109,9 +110,10 @@ _ROOMS = {
         "Batch CashKarp DormandPrince Feedback Radau RungeKutta4 Trajectory simulate simulate_batch"
     ),
     "symheli.flight": (
-        "AirspeedSchedule Autopilot Controller Excitation FlightBatch FlightDataset"
-        " FlightPlan ParameterMonitor ScheduledController Sensor Servo SimulatedFlight"
-        " TableController fly fly_batch fly_campaign gain_scheduled_lqr"
+        "AirspeedSchedule Autopilot Excitation FlightBatch FlightDataset"
+        " FlightPlan ParameterMonitor PureController ScheduledController Sensor Servo"
+        " SimulatedFlight StatefulController TableController fly fly_batch fly_campaign"
+        " gain_scheduled_lqr"
     ),
     "symheli.flight.stitched_model": "StitchedModel",
     "symheli.environment": "Air Dryden Gust Wind standard_atmosphere",
@@ -138,7 +140,6 @@ __all__ = [
     "CashKarp",
     "CertificateError",
     "CompilerWarning",
-    "Controller",
     "ConvergenceWarning",
     "DataWarning",
     "DerivativeTable",
@@ -165,6 +166,7 @@ __all__ = [
     "ParameterMonitor",
     "PrecisionWarning",
     "Progress",
+    "PureController",
     "Radau",
     "RungeKutta4",
     "ScheduledController",
@@ -174,6 +176,7 @@ __all__ = [
     "Signal",
     "SimulatedFlight",
     "SolverError",
+    "StatefulController",
     "StepResponse",
     "StitchedModel",
     "SymheliError",

@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from synthesis.worst.frozen import FrozenGain, frozen_gain
     from synthesis.worst.lft import BoxGain, frozen_box_gain
     from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
-    from synthesis.worst.trajectory import Trajectory
+    from synthesis.worst.trajectory import SchedulingTrajectory
 
 _ROOMS = {
     "synthesis.analysis.decay_rate": "decay_rate",
@@ -111,7 +111,7 @@ _ROOMS = {
     "synthesis.worst.frozen": "FrozenGain frozen_gain",
     "synthesis.worst.lft": "BoxGain frozen_box_gain",
     "synthesis.worst.lower_bound": "LowerBound Search lower_bound",
-    "synthesis.worst.trajectory": "Trajectory",
+    "synthesis.worst.trajectory": "SchedulingTrajectory",
 }
 
 __all__ = [
@@ -144,6 +144,7 @@ __all__ = [
     "PolynomialMatrix",
     "Proof",
     "SampledLoop",
+    "SchedulingTrajectory",
     "Search",
     "Seconds",
     "Solver",
@@ -151,7 +152,6 @@ __all__ = [
     "SplineLyapunov",
     "Status",
     "SumOfSquares",
-    "Trajectory",
     "Vertices",
     "bandwidth",
     "certify_sampled",

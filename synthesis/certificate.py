@@ -18,7 +18,7 @@ from symheli.errors import CertificateError, InputError
 from symheli.lpv import Scheduling
 from symheli.values.summary import as_table, summarized
 from synthesis.program.cone_program import Answer
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -173,7 +173,7 @@ class Certificate:
         Largest condition number of P in scaled coordinates, inf where there is none.
     attempts : tuple of Attempt
         Every cone program that was tried; printed as a line each.
-    worst : Trajectory or None
+    worst : SchedulingTrajectory or None
         Scheduling trajectory behind `lower` or `upper`, None where p is constant there.
     perturbation : array (nd, nv) or None
         Delta of the model of an uncertain one behind `lower`, None where the model is one.
@@ -216,7 +216,7 @@ class Certificate:
     seconds: Seconds
     conditioning: float = math.inf
     attempts: tuple[Attempt, ...] = ()
-    worst: Trajectory | None = None
+    worst: SchedulingTrajectory | None = None
     perturbation: Array | None = None
     indicative: float = math.nan
     proof: Proof | None = field(default=None, repr=False)

@@ -39,7 +39,7 @@ from synthesis.polynomial.pieces import model_pieces, pieces
 from synthesis.program.scaling import Scaling
 from synthesis.proof import box, one_parameter
 from synthesis.proof.inequalities import Demand
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 
 SCHEMA = "symheli certificate"
 VERSION = 1
@@ -47,7 +47,7 @@ VERSION = 1
 TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
-        *(Attempt, Seconds, Trajectory, Scheduling, Block, LFT, LPVStateSpace),
+        *(Attempt, Seconds, Scheduling, Block, LFT, LPVStateSpace),
         *(PolynomialMatrix, Motion, Scaling, box.Units, Demand, Coordinates, NormBounded),
         *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
         *(Multiplier, lft_proof.Quadratic),
@@ -60,8 +60,9 @@ TYPES: dict[str, Any] = {
             bases.Patches,
         ),
     )
-}
-"""What a file may contain, by name."""
+} | {"Trajectory": SchedulingTrajectory}
+"""What a file may contain, by its word there, which outlives the name of a class."""
+WORDS = {kind: word for word, kind in TYPES.items()}
 
 LEFT_OUT = {LPVStateSpace: ("trim", "residuals")}
 """What the model of a proof does without."""
@@ -144,7 +145,7 @@ def _certificate(content: Mapping[str, Any]) -> Certificate:
         raise InputError(f"verified must be true or false, got {claim['verified']!r:.60}")
     for name, kind in (
         ("seconds", Seconds),
-        ("worst", Trajectory | None),
+        ("worst", SchedulingTrajectory | None),
         ("perturbation", np.ndarray | None),
     ):
         if not isinstance(claim[name], kind):
@@ -228,7 +229,7 @@ def _encoded(value: Any) -> Any:
         return {"shape": list(value.shape), "array": numbers}
     if isinstance(value, dict):
         return {name: _encoded(v) for name, v in value.items()}
-    if type(value) in TYPES.values():
+    if type(value) in WORDS:
         left_out = LEFT_OUT.get(type(value), ())
         names = (
             [f.name for f in fields(value) if f.init]
@@ -236,7 +237,7 @@ def _encoded(value: Any) -> Any:
             else list(value._fields)
         )
         own = {name: _encoded(getattr(value, name)) for name in names if name not in left_out}
-        return {"type": type(value).__name__, **own}
+        return {"type": WORDS[type(value)], **own}
     if isinstance(value, tuple | list):
         return [_encoded(v) for v in value]
     raise InputError(

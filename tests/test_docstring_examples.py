@@ -89,7 +89,7 @@ WITHOUT = {
     "synthesis": {
         # values that the functions return, and exceptions: shown in the examples of what makes them
         *("Attempt", "Bandwidth", "BoxGain", "FrozenGain", "LowerBound", "Margins", "Proof"),
-        *("Seconds", "Trajectory", "Status", "Multiplier", "Generalized"),
+        *("Seconds", "SchedulingTrajectory", "Status", "Multiplier", "Generalized"),
         *("BoxLyapunov", "MemoryLyapunov", "SplineLyapunov"),
         *("DesignStatus", "PointDesign"),
     },

@@ -15,7 +15,7 @@ from studies.transition import axes, gain_tables, guarantees
 from studies.transition.axes import LATERAL
 from studies.transition.certificates import bound_to_dict
 from studies.transition.effort import Effort
-from studies.transition.flights import TOP, FlightPlan, autopilot_for
+from studies.transition.flights import TOP, TransitionPlan, autopilot_for
 from studies.transition.guarantees import Bound
 from symheli import Helicopter
 from synthesis import GainCurve, Spline
@@ -30,7 +30,7 @@ def measure_servo(heli: Helicopter, quick: bool = False) -> list[Bound]:
     """Bounds of every model: of a computed trajectory, P(p), constant P and, for polynomial
     models, the LFT tests; identified as in the study, seed 0.
     """
-    plan, autopilot = FlightPlan(0, ramps=Effort().ramps), autopilot_for(heli)
+    plan, autopilot = TransitionPlan(0, ramps=Effort().ramps), autopilot_for(heli)
     gentle = axes.identify(
         LATERAL, plan.gentle(heli, autopilot, Effort().gentle_ramps), "rls", order=2
     )

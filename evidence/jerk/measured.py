@@ -22,7 +22,7 @@ from evidence.tables import DOCS, keep, parsed
 from studies.loops.lateral import lateral_loop
 from studies.loops.longitudinal import longitudinal_loop
 from studies.output import as_json, progress
-from studies.transition.flights import FlightPlan, autopilot_for
+from studies.transition.flights import TransitionPlan, autopilot_for
 from symheli import Helicopter, LPVStateSpace
 from synthesis import Search
 
@@ -46,7 +46,7 @@ proven gain is the frozen one nothing is left to find.
 
 def flights(heli: Helicopter) -> dict[str, Fastest]:
     """The study's flights, without noise: how fast their airspeed changes."""
-    autopilot, plan = autopilot_for(heli), FlightPlan()
+    autopilot, plan = autopilot_for(heli), TransitionPlan()
     return {
         "training": fastest(plan.training(heli, autopilot)),
         "test": fastest(plan.test(heli, autopilot)),

@@ -148,9 +148,9 @@ class KinematicModel:
         """The model flown in the loop of the record, (n, 8): same controller, reference and
         excitation.
 
-        `controller` has reset() and step(measured, reference, p) as `symheli.Controller`; default
-        that of the record's plan. From the first samples of each segment on nothing measured is
-        used. Raises `InputError` for a record without references, or without a controller.
+        `controller` is a `symheli.PureController` or `symheli.StatefulController`; default that of
+        the record's plan. From the first samples of each segment on nothing measured is used.
+        Raises `InputError` for a record without references, or without a controller.
         """
         return kinematic_run.closed_loop(
             self._along(record), self.structure.inputs, record, controller

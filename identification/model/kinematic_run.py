@@ -17,6 +17,7 @@ from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values import NamedVector, Signal
 from symheli.values.arrays import Array
+from symheli.values.controllers import begun
 from symheli.values.kinematics import RIGID_BODY, kinematic_rates
 
 CORRECTIONS = 2
@@ -129,11 +130,12 @@ def closed_loop(run: Run, inputs: Sequence[str], record: FlightRecord, controlle
     given = (
         getattr(record.meta.get("plan"), "controller", None) if controller is None else controller
     )
-    controller = getattr(given, "scheduled_controller", given)
-    if not hasattr(controller, "step"):
+    flown = getattr(given, "scheduled_controller", given)
+    if not (hasattr(flown, "step") and (hasattr(flown, "reset") or hasattr(flown, "init"))):
         raise InputError(
             "closed_loop: name the controller of the flight, with reset() and step(measured,"
-            f" reference, p); the record's plan has {given!r:.80}"
+            " reference, p), or with init() and step(state, measured, reference, p); the record's"
+            f" plan has {given!r:.80}"
         )
     names = [str(s) for s in record.signals]
     held = [s for s in record.signals if s.endswith("_reference")]
@@ -152,14 +154,15 @@ def closed_loop(run: Run, inputs: Sequence[str], record: FlightRecord, controlle
     airspeed = record["airspeed_command"]
     p = np.column_stack([airspeed, record.slope(airspeed)])
 
-    def answer(k: int, y: Array) -> Array:
+    answer = begun(flown)
+
+    def inputs_at(k: int, y: Array) -> Array:
         measured = NamedVector(MEASURED, np.append(y, np.linalg.norm(y[:3])))
         told = NamedVector(trim, reference[k])
-        command = controller.step(measured, told, NamedVector(COMMANDED, p[k]))
+        command = answer(measured, told, NamedVector(COMMANDED, p[k]))
         return (np.asarray(command, float) + added[k])[order]
 
-    controller.reset()
-    return _alone(run, answer)
+    return _alone(run, inputs_at)
 
 
 def _alone(run: Run, inputs_at: Callable[[int, Array], Array]) -> Array:

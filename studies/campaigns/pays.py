@@ -20,12 +20,12 @@ from studies.campaigns.runners import Runner
 from studies.campaigns.trials.pays import AXES, MODELS, TRIAL, fit_of, paying
 from studies.output import progress
 from studies.transition.axes import Axis
-from studies.transition.flights import NOISE_DB, FlightPlan
+from studies.transition.flights import NOISE_DB, TransitionPlan
 
 CONDITIONS = {
-    "still air, no noise": FlightPlan(),
-    "still air, 30 dB of sensor noise": FlightPlan(noise_db=NOISE_DB),
-    "breeze and turbulence, 30 dB of sensor noise": FlightPlan(noise_db=NOISE_DB, windy=True),
+    "still air, no noise": TransitionPlan(),
+    "still air, 30 dB of sensor noise": TransitionPlan(noise_db=NOISE_DB),
+    "breeze and turbulence, 30 dB of sensor noise": TransitionPlan(noise_db=NOISE_DB, windy=True),
 }
 
 
@@ -51,7 +51,7 @@ class Line:
 def where_scheduling_pays(
     seeds: int,
     vehicle: str,
-    conditions: Mapping[str, FlightPlan] = CONDITIONS,
+    conditions: Mapping[str, TransitionPlan] = CONDITIONS,
     *,
     on: Runner,
     path: Path | None = None,

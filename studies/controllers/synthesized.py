@@ -53,10 +53,12 @@ from symheli import (
 )
 from symheli.dynamics import INPUTS
 from symheli.errors import CompilerWarning, InputError, SynthesisError, ValidityWarning
+from symheli.flight import TableState
 from symheli.flight.flight_data import FlightData
 from symheli.progress import task
 from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
+from symheli.values.signal import indices
 from symheli.values.units import ratio
 from synthesis import Plant, SampledLoop
 from synthesis.design.reduction import fewest
@@ -107,25 +109,37 @@ class Synthesized:
         return float(np.median(each)), max(each)
 
 
+@dataclass(frozen=True, eq=False)
 class BesideAutopilot:
-    """A controller of some controls, the others flown by the LQR schedule."""
+    """A controller of some controls, the others flown by the LQR schedule, which commands all four,
+    as often.
+    """
 
-    def __init__(self, own: TableController, autopilot: ScheduledController):
-        """`autopilot` commands all four, as often."""
-        self._own, self._autopilot, self.dt = own, autopilot, own.dt
-        names = list(map(str, INPUTS))
-        self._rows = [names.index(str(u)) for u in own.outputs]
+    own: TableController
+    autopilot: ScheduledController
 
-    def reset(self) -> None:
-        """Both."""
-        self._own.reset()
-        self._autopilot.reset()
+    @property
+    def dt(self) -> float:
+        """Sample period, s."""
+        return self.own.dt
 
-    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> Array:
-        """Commands (4,), rad."""
-        u = np.array(self._autopilot.step(measured, reference, p), dtype=float)
-        u[self._rows] = self._own.step(measured, reference, p)[self._rows]
-        return u
+    def init(self) -> tuple[TableState, Array]:
+        """The states of both."""
+        return self.own.init(), self.autopilot.init()
+
+    def step(
+        self,
+        state: tuple[TableState, Array],
+        measured: NamedVector,
+        reference: NamedVector,
+        p: NamedVector,
+    ) -> tuple[Array, tuple[TableState, Array]]:
+        """Commands (4,), rad, and the states of both."""
+        u, autopilot = self.autopilot.step(state[1], measured, reference, p)
+        command, own = self.own.step(state[0], measured, reference, p)
+        rows = indices(self.own.outputs, INPUTS, "helicopter input")
+        u[rows] = command[rows]
+        return u, (own, autopilot)
 
 
 def synthesized(asked: Asked, given: Given | None = None) -> Synthesized:

@@ -19,7 +19,7 @@ ACCELERATIONS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5, 3.0, 1.5, 4.0, 3.0, 2.0, 3.5)
 
 NOISE_DB = 30.0
 NOISES = ("noise-free", f"{NOISE_DB:g} dB")
-"""What is said of the flights of a plan and of `FlightPlan.noisy`."""
+"""What is said of the flights of a plan and of `TransitionPlan.noisy`."""
 
 BREEZE, BREEZE_AT_20FT, ABOVE_GROUND = (-2.0, 1.0, 0.0), 7.7, 20.0
 """A steady wind (north, east, down, m/s) and the turbulence of a mean wind of 15 kt ("light"),
@@ -28,8 +28,8 @@ flown 20 m above ground.
 
 
 @dataclass(frozen=True)
-class FlightPlan:
-    """Seeds and lengths that make the flights of one run; `noise_db` None flies without sensor
+class TransitionPlan:
+    """Seed and lengths of the flights of the transition study; `noise_db` None flies without sensor
     noise, `windy` in the breeze above.
     """
 
@@ -39,7 +39,7 @@ class FlightPlan:
     noise_db: float | None = None
     windy: bool = False
 
-    def noisy(self, db: float = NOISE_DB) -> FlightPlan:
+    def noisy(self, db: float = NOISE_DB) -> TransitionPlan:
         """The same flights with sensor noise."""
         return replace(self, noise_db=db)
 
@@ -117,7 +117,7 @@ class Flights:
 def fly_transitions(heli: Helicopter, seed: int, ramps: int, gentle_ramps: int) -> Flights:
     """Training and test without and with noise, and the gentle flight."""
     autopilot = autopilot_for(heli)
-    clean = FlightPlan(seed, ramps=ramps)
+    clean = TransitionPlan(seed, ramps=ramps)
     plans = dict(zip(NOISES, (clean, clean.noisy()), strict=True))
     training, test = {}, {}
     for noise, plan in plans.items():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from symheli.flight.table_controller import TableController
@@ -24,7 +22,7 @@ def cases(controller: TableController, up: str) -> str:
     """A flight from a fixed seed as C tables: any size of error, jumps of the parameter and bad
     ones, resets, entries, axes flown by others.
     """
-    own, rng = replace(controller), np.random.default_rng(0)  # its own state
+    own, state, rng = controller, controller.init(), np.random.default_rng(0)
     nu, ny = len(own.inputs), len(own.outputs)
     events, axes, valid, status = (np.zeros(SAMPLES, int) for _ in range(4))
     given = np.zeros((SAMPLES, 2 * nu + 2 * ny + 1), np.float32)
@@ -41,12 +39,12 @@ def cases(controller: TableController, up: str) -> str:
             given[k, 0] = np.nan
         measured, reference, trim, others = np.split(given[k, :-1], np.cumsum([nu, nu, ny]))
         if events[k]:
-            own.reset(others if events[k] == ENTER else None)
-        own.fly_axes([y for i, y in enumerate(own.outputs) if axes[k] >> i & 1])
-        expected[k] = own.update(
-            measured, reference, trim, given[k, -1], valid=bool(valid[k]), others=others
+            state = own.init(others if events[k] == ENTER else None)
+        state = own.fly_axes(state, [y for i, y in enumerate(own.outputs) if axes[k] >> i & 1])
+        expected[k], state = own.update(
+            state, measured, reference, trim, given[k, -1], valid=bool(valid[k]), others=others
         )
-        status[k] = own.status
+        status[k] = state.status
     return "\n".join(
         [
             define("SAMPLES", SAMPLES),

@@ -3,7 +3,7 @@
 from symheli.flight.autopilot import Autopilot, gain_scheduled_lqr
 from symheli.flight.batch import FlightBatch, fly_batch
 from symheli.flight.campaign import fly_campaign
-from symheli.flight.controller import Controller, ScheduledController
+from symheli.flight.controller import ScheduledController
 from symheli.flight.excitation import Excitation
 from symheli.flight.flight_dataset import FlightDataset
 from symheli.flight.fly import fly
@@ -13,26 +13,29 @@ from symheli.flight.schedule import AirspeedSchedule
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import XCELL_SERVOS, Servo, ServoBank
 from symheli.flight.simulated_flight import SimulatedFlight
-from symheli.flight.table_arithmetic import Status
+from symheli.flight.table_arithmetic import Status, TableState
 from symheli.flight.table_controller import TableController
+from symheli.values.controllers import PureController, StatefulController
 
 __all__ = [
     "XCELL_SERVOS",
     "AirspeedSchedule",
     "Autopilot",
-    "Controller",
     "Excitation",
     "FlightBatch",
     "FlightDataset",
     "FlightPlan",
     "ParameterMonitor",
+    "PureController",
     "ScheduledController",
     "Sensor",
     "Servo",
     "ServoBank",
     "SimulatedFlight",
+    "StatefulController",
     "Status",
     "TableController",
+    "TableState",
     "fly",
     "fly_batch",
     "fly_campaign",

@@ -199,7 +199,7 @@ def fly_in_chunks(
     for plan in plans:  # what they share is made before the threads start
         flights.equipment(plan)
     if any(not isinstance(flights.controller(p), ScheduledController) for p in plans):
-        threads = 1  # one object, asked by one flight at a time
+        threads = 1  # Python answers one flight at a time, and an object may keep its state
         warnings.warn(
             f"a controller written in Python is asked at every sample of {len(plans)} flights, one"
             " flight after the other: a hundred times slower than an Autopilot, a LinearModel or an"

@@ -1,6 +1,4 @@
-"""What flies the helicopter: anything that answers a measurement with a command, and linear
-controllers scheduled by airspeed and acceleration.
-"""
+"""Linear controllers scheduled by airspeed and acceleration, and what else becomes a controller."""
 
 from __future__ import annotations
 
@@ -8,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import Literal, NamedTuple, Protocol, get_args, runtime_checkable
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -19,6 +17,7 @@ from symheli.lpv.lpv_state_space import LPVStateSpace
 from symheli.lpv.mixing import ERROR, turned
 from symheli.lpv.scheduling import Scheduling
 from symheli.values.arrays import Array
+from symheli.values.controllers import PureController, StatefulController
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
@@ -35,44 +34,6 @@ EVERY_SPEED = Scheduling("airspeed", "m/s", 0.0, 1.0)
 RATE, COMMAND = "_rate", "_command"
 """End the names of an output that is the rate of a command, and of an input that is the command."""
 Follow = Literal["command", "reading"]
-
-
-@runtime_checkable
-class Controller(Protocol):
-    """What `fly` asks of a controller: a sample period, a start, and an answer at every sample.
-
-    Examples
-    --------
-    >>> class Hold:
-    ...     "Keeps the wings level, and leaves the rest at its trim."
-    ...     dt = 0.02
-    ...
-    ...     def reset(self):
-    ...         pass
-    ...
-    ...     def step(self, measured, reference, p):
-    ...         u = np.array([reference[name] for name in ("d_lon", "d_lat", "d_col", "d_ped")])
-    ...         u[1] -= 0.03 * (measured["phi"] - reference["phi"])
-    ...         return u
-    >>> hover = symheli.AirspeedSchedule((0.0,), (1.0,), (0.0,), lead=0.2)
-    >>> bool(np.abs(symheli.fly(heli, hover, controller=Hold())["phi"]).max() < 0.2)
-    True
-    """
-
-    dt: float
-    """Sample period, s."""
-
-    def reset(self) -> None:
-        """Called once, before the first sample of a flight."""
-
-    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> object:
-        """Blade pitch commands (4,), rad, d_lon d_lat d_col d_ped in all, at one sample.
-
-        `measured`: u v w p q r phi theta and airspeed as the sensors read them, and with governor
-        "pi" Om om_i. `reference`: states and inputs of the trim that the flight is held to. `p`:
-        commanded airspeed and acceleration. SI and radians.
-        """
-        ...
 
 
 def deviations(given: object) -> LPVStateSpace:
@@ -165,7 +126,6 @@ class ScheduledController:
                 "only a controller over airspeed alone, polynomial or piecewise polynomial in it,"
                 f" can follow its reading; this one is scheduled by {', '.join(names)}"
             )
-        object.__setattr__(self, "_state", np.zeros(self.order))
 
     @property
     def dt(self) -> float:
@@ -228,22 +188,30 @@ class ScheduledController:
         """Position of each parameter among airspeed and acceleration."""
         return indices([s.name for s in self.model.parameters], SCHEDULING, "scheduling parameter")
 
-    def reset(self) -> None:
-        """States to zero."""
-        self._own[:] = 0.0
+    def init(self) -> Array:
+        """The states x (n,) before a flight: zero."""
+        return _held(np.zeros(self.order))
 
-    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> Array:
-        """Commands (4,), rad; see `Controller`."""
+    def step(
+        self, state: Array, measured: NamedVector, reference: NamedVector, p: NamedVector
+    ) -> tuple[Array, Array]:
+        """Commands (4,), rad, and the states x (n,) of the next sample; see `PureController`."""
+        if np.shape(state) != (self.order,):
+            raise InputError(
+                f"state: expected the {self.order} numbers of init() or of the step before, got"
+                f" {state!r:.80}"
+            )
         error = np.array([measured[s] - reference[s] if s in measured else 0.0 for s in TOLD])
         at = [measured["airspeed"], 0.0] if self.follow == "reading" else list(p.array)
         M, n = self.matrices(np.array([at]))[0], self.order
-        answer = M @ np.concatenate([self._own, error])
-        self._own[:] = answer[:n]
-        return np.array([reference[s] for s in INPUTS]) + answer[n:]
+        answer = M @ np.concatenate([state, error])
+        return np.array([reference[s] for s in INPUTS]) + answer[n:], _held(answer[:n].copy())
 
-    @property
-    def _own(self) -> Array:
-        return vars(self)["_state"]
+
+def _held(state: Array) -> Array:
+    """The same, not to be written to."""
+    state.flags.writeable = False
+    return state
 
 
 def require_parameters(
@@ -284,7 +252,7 @@ def _powers(bernstein: Array, width: float) -> Array:
     return np.stack(powers[::-1])
 
 
-def controller_of(given: object, dt: float) -> ScheduledController | Controller:
+def controller_of(given: object, dt: float) -> PureController | StatefulController:
     """A controller from what a user gives: LTI models, python-control systems and LPV models (where
     continuous, sampled every `dt` seconds) become scheduled ones, the rest must answer by itself.
     """
@@ -301,10 +269,10 @@ def controller_of(given: object, dt: float) -> ScheduledController | Controller:
             if isinstance(sampled, LinearModel)
             else sampled
         )
-    if isinstance(given, Controller) and not isinstance(given, type):
+    if isinstance(given, PureController | StatefulController) and not isinstance(given, type):
         return given
     raise InputError(
         f"controller: expected gains over airspeed (Autopilot), a LinearModel, an LPVStateSpace, a"
-        " system of python-control, or an object with dt, reset() and step(measured, reference, p);"
-        f" got {type(given).__name__}"
+        " system of python-control, or an object with dt, reset() and step(measured, reference, p)"
+        f" or dt, init() and step(state, measured, reference, p); got {type(given).__name__}"
     )

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from symheli.dynamics import INPUTS
-from symheli.flight.controller import Controller, ScheduledController
 from symheli.flight.course import Clock
 from symheli.flight.plan import READ
 from symheli.flight.sensor import Sensor
 from symheli.flight.servo import Servo, ServoBank
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
+from symheli.values.controllers import PureController, StatefulController
 
 FOREVER = 2**40
 """Steps that no flight has."""
@@ -53,7 +53,7 @@ class Readings:
 class Equipment:
     """All that flights of one campaign have in common; `late` counts integration steps."""
 
-    controller: ScheduledController | Controller
+    controller: PureController | StatefulController
     readings: Readings
     servos: ServoBank | None
     late: int
@@ -64,7 +64,7 @@ class Equipment:
         cls,
         heli: Helicopter,
         clock: Clock,
-        controller: ScheduledController | Controller,
+        controller: PureController | StatefulController,
         sensors: Mapping[str, Sensor] | None,
         servos: Mapping[str, Servo] | None,
         delay: float,

@@ -11,7 +11,7 @@ import numpy as np
 
 from symheli.codegen import Layout
 from symheli.flight.autopilot import gain_scheduled_lqr
-from symheli.flight.controller import MEASURED, Controller, ScheduledController, controller_of
+from symheli.flight.controller import MEASURED, controller_of
 from symheli.flight.course import Clock, Course
 from symheli.flight.disturbance import Disturbances
 from symheli.flight.equipment import Equipment
@@ -20,6 +20,7 @@ from symheli.flight.loops import Flown, Loops
 from symheli.flight.plan import READ, FlightPlan
 from symheli.helicopter import Helicopter
 from symheli.values.arrays import Array
+from symheli.values.controllers import PureController, StatefulController
 
 KEPT = 256
 """Courses that are kept for the next plan that has the same."""
@@ -30,14 +31,14 @@ class Flights:
     """Flights of one helicopter; keeps controllers, courses and equipment that plans share."""
 
     heli: Helicopter
-    _controllers: dict[Hashable, ScheduledController | Controller] = field(default_factory=dict)
+    _controllers: dict[Hashable, PureController | StatefulController] = field(default_factory=dict)
     _courses: dict[Hashable, Course] = field(default_factory=dict)
     _equipment: dict[Hashable, Equipment] = field(default_factory=dict)
     _under_way: set[Loops] = field(default_factory=set)
     _stopped: bool = False
     _lock: Any = field(default_factory=Lock)
 
-    def controller(self, plan: FlightPlan) -> ScheduledController | Controller:
+    def controller(self, plan: FlightPlan) -> PureController | StatefulController:
         """That of a plan, sampled; an LQR over the commanded airspeeds where it names none."""
         dt = getattr(plan.controller, "dt", None)
         clock = Clock.of(plan, dt if isinstance(dt, float | int) and dt > 0 else None)

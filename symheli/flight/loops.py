@@ -21,6 +21,7 @@ from symheli.integrate.equations import equations
 from symheli.integrate.kernel import structure
 from symheli.physics.attitude import flight_state
 from symheli.values.arrays import Array
+from symheli.values.controllers import begun
 from symheli.values.named_vector import NamedVector
 from symheli.values.signal import signals
 
@@ -169,10 +170,9 @@ class Loops:
 
     def _answered(self, plant: _InSteps | InNumpy, course: Course) -> None:
         """Read, ask the controller, advance, to the end of a course or until the flight is lost."""
-        controller = self.equipment.controller
+        answer = begun(self.equipment.controller)
         names = signals((*self.heli.states, *self.heli.inputs))
         told = READINGS if governed(self.heli) else READINGS[: len(READ)]
-        controller.reset()
         try:
             for k in range(len(course.time)):
                 reading = plant.read(k)
@@ -180,7 +180,7 @@ class Loops:
                     break
                 if self._stop[0]:
                     raise KeyboardInterrupt
-                command = controller.step(
+                command = answer(
                     NamedVector(told, reading[: len(told)]),
                     NamedVector(names, course.reference[k]),
                     NamedVector(SCHEDULING, course.p[k]),

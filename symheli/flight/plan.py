@@ -60,9 +60,10 @@ class FlightPlan:
         Sample period of the record, s; a whole multiple of the controller's.
     controller : object, optional
         An `Autopilot` (gains over airspeed), a LinearModel, an LPVStateSpace or a python-control
-        system (see `ScheduledController` for what their signals mean), or anything with dt, reset()
-        and step(measured, reference, p) (see `Controller`). Default: an LQR designed at several
-        airspeeds.
+        system (see `ScheduledController` for what their signals mean), or an object that is asked
+        at every sample, with its state outside (`PureController`) or within, that is dt, reset()
+        and step(measured, reference, p) (`StatefulController`). Default: an LQR designed at
+        several airspeeds.
     excitation : Excitation, optional
         Added to the commands.
     noise_db : float, optional

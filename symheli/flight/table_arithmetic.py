@@ -6,13 +6,14 @@ along a row from the first column, and nothing is left to a library of linear al
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum, IntFlag
 from typing import Any
 
 import numpy as np
 
 from symheli.values.arrays import Array
+from symheli.values.summary import summarized
 
 NEVER = 2**30
 """A count of samples that is not reached."""
@@ -79,11 +80,37 @@ class Numbers:
         return int(np.ceil(np.log2(len(self.knots) - 1)))
 
 
-@dataclass(eq=False)
-class State:
-    """What the arithmetic keeps: which axes are `flown` (ny,), `x` (n,), `command` and `offset`
-    (ny,), `entry` (ny,) of `Entry`, and of the parameter the last `reading` and its repetitions
-    `same`, `bad` ones in a row, `target`, `filtered`, `used`.
+@dataclass(frozen=True, eq=False)
+class TableState:
+    """What a `TableController` keeps from sample to sample; every step returns a new one.
+
+    Parameters
+    ----------
+    flown : array (ny,)
+        Which axes are flown.
+    x : array (n,)
+        The states.
+    command, offset : array (ny,)
+        The commands in force, rad, and what is left of what they began with beside their own.
+    entry : array (ny,)
+        Of `Entry`: how each command begins.
+    started : bool
+        Whether the parameter was followed before.
+    reading, target, filtered, parameter_used : float32
+        Of the parameter, in its unit: the last reading, where it leads, filtered, and where in the
+        table the last step was.
+    same, bad : int
+        How often the reading stayed the same, and how many bad ones came in a row.
+    status : Status
+        What the last step met with.
+
+    Examples
+    --------
+    >>> lqr = symheli.gain_scheduled_lqr(heli, 0.0, 8.0, dt=0.02, points=5)
+    >>> table = symheli.TableController.of(lqr.scheduled_controller.model)
+    >>> u, state = table.update(table.init(), np.zeros(8), np.zeros(8), np.zeros(4), 2.0)
+    >>> round(float(state.parameter_used), 2), state.status
+    (2.0, <Status.FINE: 0>)
     """
 
     flown: Array
@@ -95,48 +122,60 @@ class State:
     reading: np.float32 = field(default=np.float32(np.nan))
     target: np.float32 = field(default=np.float32(0))
     filtered: np.float32 = field(default=np.float32(0))
-    used: np.float32 = field(default=np.float32(0))
+    parameter_used: np.float32 = field(default=np.float32(0))
     same: int = 0
     bad: int = 0
     status: Status = Status.FINE
 
+    __repr__ = summarized
+
+    def __post_init__(self) -> None:
+        for array in (self.flown, self.x, self.command, self.offset, self.entry):
+            array.flags.writeable = False
+
     @classmethod
-    def ground(cls, n: Numbers, flown: Array) -> State:
+    def ground(cls, n: Numbers, flown: Array) -> TableState:
         """Filters and integrators at zero; commands begin at their trim."""
         zeros = np.zeros(len(n.low), np.float32)
         return cls(flown, np.zeros(n.order, np.float32), zeros, zeros, zeros.astype(int))
 
-    def enter(self, command: Array) -> None:
-        """Begin at the command in force (ny,)."""
-        self.command = command
-        self.entry = np.full(len(command), Entry.IN_FORCE)
+    def entering(self, command: Array) -> TableState:
+        """The same, to begin at the command in force (ny,)."""
+        return replace(self, command=command, entry=np.full(len(command), Entry.IN_FORCE))
 
 
-def follow_parameter(n: Numbers, s: State, reading: np.float32, valid: bool) -> Status:
-    """Move the parameter in use towards a reading, or what stands for a bad one."""
-    status = Status.FINE
-    s.same = min(s.same + 1, NEVER - 1) if reading == s.reading else 0
-    s.reading = reading
-    if valid and n.plausible[0] <= reading <= n.plausible[1] and s.same < n.frozen:
-        s.bad = 0
-        s.target = _clip(reading, n.knots[0], n.knots[-1])
+def follow_parameter(n: Numbers, s: TableState, reading: np.float32, valid: bool) -> TableState:
+    """The state whose parameter in use has moved towards a reading, or what stands for a bad one;
+    its `status` is of that alone.
+    """
+    status, target = Status.FINE, s.target
+    same = min(s.same + 1, NEVER - 1) if reading == s.reading else 0
+    if valid and n.plausible[0] <= reading <= n.plausible[1] and same < n.frozen:
+        bad = 0
+        target = _clip(reading, n.knots[0], n.knots[-1])
     else:
         status |= Status.PARAMETER
-        s.bad = min(s.bad + 1, NEVER)
-        if not s.started or s.bad > n.hold:
+        bad = min(s.bad + 1, NEVER)
+        if not s.started or bad > n.hold:
             status |= Status.FALLBACK
-            s.target = n.fallback
+            target = n.fallback
     if not s.started:
-        s.started = True
-        s.filtered = s.used = s.target
-        return status
-    if n.gain < 1:
-        s.filtered = s.filtered + n.gain * (s.target - s.filtered)
+        filtered = used = target
     else:
-        s.filtered = s.target
-    change = _clip(s.filtered - s.used, -n.step, n.step)
-    s.used = _clip(s.used + change, n.knots[0], n.knots[-1])
-    return status
+        filtered = s.filtered + n.gain * (target - s.filtered) if n.gain < 1 else target
+        change = _clip(filtered - s.parameter_used, -n.step, n.step)
+        used = _clip(s.parameter_used + change, n.knots[0], n.knots[-1])
+    return replace(
+        s,
+        started=True,
+        reading=reading,
+        target=target,
+        filtered=filtered,
+        parameter_used=used,
+        same=same,
+        bad=bad,
+        status=status,
+    )
 
 
 def matrices_at(n: Numbers, p: np.float32) -> Array:
@@ -152,12 +191,13 @@ def matrices_at(n: Numbers, p: np.float32) -> Array:
     return n.matrices[below] + weight * (n.matrices[below + 1] - n.matrices[below])
 
 
-def commands(n: Numbers, s: State, error: Array, trim: Array, others: Array) -> Status:
-    """One step at the parameter in use; the commands are then `s.command`.
+def commands(n: Numbers, s: TableState, error: Array, trim: Array, others: Array) -> TableState:
+    """The state after one step at the parameter in use: its `command` is the answer, its `status`
+    adds to that of `follow_parameter`.
 
     Parameters
     ----------
-    n, s : Numbers, State
+    n, s : Numbers, TableState
         The controller.
     error : array (nu,)
         Measured minus reference.
@@ -165,7 +205,7 @@ def commands(n: Numbers, s: State, error: Array, trim: Array, others: Array) -> 
         Commands of the trim, and those in force on the axes it does not fly.
     """
     flown = s.flown
-    M, order, own = matrices_at(n, s.used), n.order, n.order + len(error)
+    M, order, own = matrices_at(n, s.parameter_used), n.order, n.order + len(error)
     answer = _times(M[:, :own], np.concatenate([s.x, error]))
     before = np.where((s.entry == Entry.GROUND) & np.isfinite(trim), trim, s.command)
     plain = np.where(n.integrates, before, trim) + answer[order:]
@@ -179,15 +219,22 @@ def commands(n: Numbers, s: State, error: Array, trim: Array, others: Array) -> 
     x = answer[:order]
     if order and (excess != 0).any():
         x = x + _times(M[:order, own:], excess)
-    s.entry = np.where(flown, s.entry, Entry.IN_FORCE)
     if not (np.isfinite(wanted).all() and np.isfinite(x).all()):
-        s.command = np.where(flown, before, applied)
-        return Status.HELD
+        return replace(
+            s,
+            command=np.where(flown, before, applied),
+            entry=np.where(flown, s.entry, Entry.IN_FORCE),
+            status=s.status | Status.HELD,
+        )
     kept = np.where(entering, applied - plain, s.offset)
-    s.x, s.command = x, applied
-    s.offset = n.fade * np.where(flown & ~n.integrates, kept, np.float32(0))
-    s.entry = np.where(flown, Entry.UNDER_WAY, Entry.IN_FORCE)
-    return Status.SATURATED if (flown & (excess != 0)).any() else Status.FINE
+    return replace(
+        s,
+        x=x,
+        command=applied,
+        offset=n.fade * np.where(flown & ~n.integrates, kept, np.float32(0)),
+        entry=np.where(flown, Entry.UNDER_WAY, Entry.IN_FORCE),
+        status=s.status | (Status.SATURATED if (flown & (excess != 0)).any() else Status.FINE),
+    )
 
 
 def _times(M: Array, v: Array) -> Array:

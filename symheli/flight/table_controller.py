@@ -36,8 +36,7 @@ from symheli.flight.table_arithmetic import (
     NEVER,
     Entry,
     Numbers,
-    State,
-    Status,
+    TableState,
     commands,
     follow_parameter,
 )
@@ -64,6 +63,8 @@ class TableController:
     integration stops. The parameter in use moves at the certified rate at most, whatever is read:
     see `ParameterMonitor`. `fly` provides the commanded airspeed and acceleration, and by `follow`
     the readings; a table over anything else, as a Mach number, is told its parameter by `update`.
+    What it keeps in flight is a `TableState`: `init` is the first, `update` and `step` return the
+    next.
 
     Parameters
     ----------
@@ -107,7 +108,8 @@ class TableController:
     >>> table = symheli.TableController.of(lqr.scheduled_controller.model, 17, limits=limits)
     >>> hover = symheli.AirspeedSchedule((2.0,), (1.0,), (0.0,), lead=0.2)
     >>> record = symheli.fly(heli, hover, controller=table)
-    >>> table.misfit < 1e-6, round(table.parameter_used, 2)
+    >>> u, state = table.update(table.init(), np.full(8, 0.1), np.zeros(8), np.zeros(4), 2.0)
+    >>> table.misfit < 1e-6, round(float(state.parameter_used), 2)
     (True, 2.0)
     """
 
@@ -159,7 +161,7 @@ class TableController:
         if self.follow not in get_args(Follow):
             raise UnknownNameError("way to schedule", self.follow, get_args(Follow))
         object.__setattr__(self, "limits", _limits(self.limits, self.outputs))
-        vars(self)["_flight"] = State.ground(self.numbers, np.ones(len(self.outputs), bool))
+        self.init()  # what its numbers do not allow is refused here
 
     @classmethod
     def of(
@@ -327,28 +329,32 @@ class TableController:
 
     # --- how it flies ----------------------------------------------------------------------------
 
-    def reset(self, command: ArrayLike | None = None) -> None:
-        """States, filters and integrators to those on the ground; the parameter in use starts at
-        the next good reading.
+    def init(
+        self, command: ArrayLike | None = None, axes: Collection[str] | None = None
+    ) -> TableState:
+        """States, filters and integrators on the ground; the parameter in use starts at the next
+        good reading.
 
-        With `command` (ny,), rad, the one in force now: the next step answers just that, whatever
+        With `command` (ny,), rad, the one in force now: the first step answers just that, whatever
         is measured then, and what it differs by from the controller's own fades away (or stays,
-        where a command integrates). Which axes are flown is left alone.
+        where a command integrates). `axes` are the outputs that are flown, default all; see
+        `fly_axes`.
         """
-        state = State.ground(self.numbers, self._state.flown)
-        if command is not None:
-            state.enter(rounded(command, "command", (len(self.outputs),)))
-        vars(self)["_flight"] = state
+        every = np.ones(len(self.outputs), bool)
+        state = TableState.ground(self.numbers, every if axes is None else self._flown(axes))
+        if command is None:
+            return state
+        return state.entering(rounded(command, "command", (len(self.outputs),)))
 
-    def fly_axes(self, axes: Collection[str]) -> None:
-        """Fly these outputs alone. The others stay at what is applied there, to which the states
-        follow; when they are flown again they begin at it.
+    def fly_axes(self, state: TableState, axes: Collection[str]) -> TableState:
+        """The state from which these outputs alone are flown. The others stay at what is applied
+        there, to which the states follow; when they are flown again they begin at it.
         """
-        indices(axes, self.outputs, "output")
-        self._state.flown = np.array([y in axes for y in self.outputs])
+        return replace(self._own(state), flown=self._flown(axes))
 
     def update(
         self,
+        state: TableState,
         measured: ArrayLike,
         reference: ArrayLike,
         trim: ArrayLike,
@@ -356,8 +362,9 @@ class TableController:
         *,
         valid: bool = True,
         others: ArrayLike | None = None,
-    ) -> Array:
-        """Commands (ny,), float32, in rad, at one sample; `status` says what was met with.
+    ) -> tuple[Array, TableState]:
+        """Commands (ny,), float32, in rad, at one sample, and the state of the next, whose `status`
+        says what was met with.
 
         Parameters
         ----------
@@ -373,48 +380,54 @@ class TableController:
         others : (ny,), optional
             Commands applied on the axes that are not flown, rad; default the trim.
         """
-        n, s, nu, ny = self.numbers, self._state, len(self.inputs), len(self.outputs)
+        n, s, nu, ny = self.numbers, self._own(state), len(self.inputs), len(self.outputs)
         with np.errstate(all="ignore"):  # numbers that are none are met below
             seen, held = as_told("measured", measured, nu), as_told("reference", reference, nu)
             at = as_told("trim", trim, ny)
             elsewhere = at if others is None else as_told("others", others, ny)
-            s.status = follow_parameter(n, s, NUMBER(parameter), valid)
-            s.status |= commands(n, s, seen - held, at, elsewhere)
-        return s.command.copy()
+            s = follow_parameter(n, s, NUMBER(parameter), valid)
+            s = commands(n, s, seen - held, at, elsewhere)
+        return s.command.copy(), s
 
-    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> Array:
-        """Commands (4,), rad; see `Controller`. Inputs it does not name stay at their trim.
+    def step(
+        self, state: TableState, measured: NamedVector, reference: NamedVector, p: NamedVector
+    ) -> tuple[Array, TableState]:
+        """Commands (4,), rad, and the state of the next sample; see `PureController`. Inputs it
+        does not name stay at their trim.
 
         Raises `InputError` where a flight does not provide the parameter of the table.
         """
         parameter = self._provided(measured if self.follow == "reading" else p)
         u = np.array([reference[s] for s in INPUTS])
-        trim, state, read = u[self._rows], self._state, self.own_commands
+        trim, state, read = u[self._rows], self._own(state), self.own_commands
         before = np.where(state.entry == Entry.GROUND, trim, state.command)
         in_force = dict(zip(map(str, self.outputs), before, strict=True))
-        u[self._rows] = self.update(
+        u[self._rows], state = self.update(
+            state,
             [in_force[read[s]] if s in read else measured[s] for s in self.inputs],
             [reference[read.get(s, s)] for s in self.inputs],
             trim,
             parameter,
         )
-        return u
-
-    @property
-    def status(self) -> Status:
-        """What the last step met with."""
-        return self._state.status
-
-    @property
-    def parameter_used(self) -> float:
-        """Where in the table the last step was, in the unit of the parameter."""
-        return float(self._state.used)
+        return u, state
 
     # --- inside ----------------------------------------------------------------------------------
 
-    @property
-    def _state(self) -> State:
-        return vars(self)["_flight"]
+    def _own(self, state: object) -> TableState:
+        """Raises `InputError` for what is no state of a table of this size."""
+        own = self.order, len(self.outputs), bool
+        if not isinstance(state, TableState) or (
+            (len(state.x), len(state.command), state.flown.dtype) != own
+        ):
+            raise InputError(
+                f"state: expected that of init() or of the step before, got {state!r:.80}"
+            )
+        return state
+
+    def _flown(self, axes: Collection[str]) -> Array:
+        """(ny,) of bool."""
+        indices(axes, self.outputs, "output")
+        return np.array([y in axes for y in self.outputs])
 
     @cached_property
     def _rows(self) -> list[int]:
@@ -437,8 +450,8 @@ class TableController:
         raise InputError(
             f"the table is over {self.parameter} ({self.parameter.unit}), and a flight provides"
             f" {known} where it follows the {self.follow}: tell it its parameter by"
-            " .update(measured, reference, trim, parameter) in a controller of your own; or, where"
-            " it is one of them under another name, rename that of the model,"
+            " .update(state, measured, reference, trim, parameter) in a controller of your own; or,"
+            " where it is one of them under another name, rename that of the model,"
             " .with_scheduling(Scheduling(name, unit, low, high, rate))"
         )
 

@@ -33,7 +33,7 @@ from synthesis.worst.box import (
 )
 from synthesis.worst.budget import said
 from synthesis.worst.perturbation import worst_perturbation
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 
 Array = np.ndarray
 
@@ -46,7 +46,7 @@ class Beaten(NamedTuple):
 
     frozen: float
     limit: float
-    worst: Trajectory | None
+    worst: SchedulingTrajectory | None
     seconds: float
     perturbation: Array | None = None
 
@@ -65,7 +65,7 @@ def certify(asked: Question) -> Certificate:
             beaten = Beaten(
                 sign * frozen.value,
                 sign * frozen.value,
-                Trajectory(np.zeros(1), p),
+                SchedulingTrajectory(np.zeros(1), p),
                 time.perf_counter() - start,
                 delta,
             )

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from symheli.errors import InputError
 from symheli.lpv import LinearModel, LPVStateSpace, UncertainStateSpace
+from symheli.values.arrays import Array
 from symheli.values.named_vector import NamedVector
 from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
@@ -254,13 +253,17 @@ class Controller:
 
         return ScheduledController(self.model)
 
-    def reset(self) -> None:
-        """States to zero, before a flight."""
-        self.scheduled_controller.reset()
+    def init(self) -> Array:
+        """The states (n,) before a flight: zero."""
+        return self.scheduled_controller.init()
 
-    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> np.ndarray:
-        """Commands (4,), rad, at one sample; see `symheli.Controller`."""
-        return self.scheduled_controller.step(measured, reference, p)
+    def step(
+        self, state: Array, measured: NamedVector, reference: NamedVector, p: NamedVector
+    ) -> tuple[Array, Array]:
+        """Commands (4,), rad, at one sample and the states (n,) of the next; see
+        `symheli.PureController`.
+        """
+        return self.scheduled_controller.step(state, measured, reference, p)
 
     def __str__(self) -> str:
         names = ", ".join(s.name for s in self.model.parameters)

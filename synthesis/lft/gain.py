@@ -35,7 +35,7 @@ from synthesis.worst.budget import said
 from synthesis.worst.lft import BoxGain, box_growing_trajectory, box_lower_bound, frozen_box_gain
 from synthesis.worst.lower_bound import THOROUGH, LowerBound, Search
 from synthesis.worst.spectrum import surely_unstable
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 
 Array = np.ndarray
 
@@ -308,9 +308,9 @@ def _checked(lft: LFT, scaling: str, solver: Solver | str) -> Solver:
     return general_solver(solver)
 
 
-def _at_rest(frozen: BoxGain) -> Trajectory:
+def _at_rest(frozen: BoxGain) -> SchedulingTrajectory:
     p = np.array([frozen.p])
-    return Trajectory(np.zeros(1), p[:, 0] if p.shape[1] == 1 else p)
+    return SchedulingTrajectory(np.zeros(1), p[:, 0] if p.shape[1] == 1 else p)
 
 
 def _certificate(

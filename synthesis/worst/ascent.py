@@ -21,7 +21,7 @@ from scipy.optimize import linprog
 from synthesis.worst.budget import UNLIMITED, Budget
 from synthesis.worst.periodic import Sensitivity, gain, growth
 from synthesis.worst.scheduled import Scheduled
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 from synthesis.worst.waves import Steps, steps
 
 Array = np.ndarray
@@ -55,7 +55,9 @@ GAIN = Objective(gain, False)
 """Logarithm of the L2 gain of the repeated cycle."""
 
 
-def on_nodes(trajectory: Trajectory, nodes: int, dt: float | None) -> Trajectory:
+def on_nodes(
+    trajectory: SchedulingTrajectory, nodes: int, dt: float | None
+) -> SchedulingTrajectory:
     """The cycle on an even number of equal intervals, about `nodes`; in discrete time each a whole
     number of samples.
     """
@@ -67,18 +69,20 @@ def on_nodes(trajectory: Trajectory, nodes: int, dt: float | None) -> Trajectory
         nodes = 2 * math.ceil(period / (2 * spacing) - 1e-9)
     # at most stretched in time, never steeper
     at = np.linspace(0.0, 1.0, nodes + 1)
-    return Trajectory(spacing * np.arange(nodes + 1), np.interp(at, (time - time[0]) / period, p))
+    return SchedulingTrajectory(
+        spacing * np.arange(nodes + 1), np.interp(at, (time - time[0]) / period, p)
+    )
 
 
 def ascend(
     lpv: Scheduled,
     rate: float,
-    start: Trajectory,
+    start: SchedulingTrajectory,
     objective: Objective,
     longest: float,
     evaluations: int,
     budget: Budget = UNLIMITED,
-) -> tuple[Trajectory, float]:
+) -> tuple[SchedulingTrajectory, float]:
     """(cycle, measure of it) from `start` on equal intervals: no cycle longer than `longest` s, so
     many gradients, within the `budget`.
     """
@@ -105,7 +109,9 @@ def ascend(
     return best, here.value
 
 
-def _gradient(lpv: Scheduled, cycle: Trajectory, objective: Objective) -> tuple[Sensitivity, Array]:
+def _gradient(
+    lpv: Scheduled, cycle: SchedulingTrajectory, objective: Objective
+) -> tuple[Sensitivity, Array]:
     """The measure, and the gradient (N + 1,) of the score: by p at each node, and by the logarithm
     of the period.
 
@@ -124,25 +130,28 @@ def _gradient(lpv: Scheduled, cycle: Trajectory, objective: Objective) -> tuple[
     for parity in (0, 1):
         moved = np.arange(count + 1) % 2 == parity
         change = found.along(
-            _along(lpv, Trajectory(time, p + np.where(moved, shift, 0.0))).step - system.step
+            _along(lpv, SchedulingTrajectory(time, p + np.where(moved, shift, 0.0))).step
+            - system.step
         )
         node = interval + (interval % 2 != parity)
         np.add.at(out, node % count, change / shift[node])
     if lpv.dt is None:
         stretched = (
-            found.along(_along(lpv, Trajectory(time * (1 + 1e-6), p)).step - system.step).sum()
+            found.along(
+                _along(lpv, SchedulingTrajectory(time * (1 + 1e-6), p)).step - system.step
+            ).sum()
             / 1e-6
         )
         out[-1] = stretched - (found.value if objective.a_second else 0.0)
     return found, out / (period if objective.a_second else 1.0)
 
 
-def _along(lpv: Scheduled, cycle: Trajectory) -> Steps:
+def _along(lpv: Scheduled, cycle: SchedulingTrajectory) -> Steps:
     return steps(lpv, cycle.time, cycle.p, float(cycle.time[-1]))
 
 
 def _step(
-    cycle: Trajectory,
+    cycle: SchedulingTrajectory,
     gradient: Array,
     rate: float,
     limits: tuple[float, float],
@@ -150,7 +159,7 @@ def _step(
     longest: float,
     *,
     fixed: bool,
-) -> Trajectory | None:
+) -> SchedulingTrajectory | None:
     """The best vertex within `reach`; the period may change by reach/range of 0.4 unless `fixed`.
     None where the program fails.
     """
@@ -185,5 +194,5 @@ def _step(
     # the solver keeps the rate to its tolerance; what is missing is made good exactly
     excess = max(1.0, float(np.abs(np.diff(nodes)).max()) / (rate * float(time[1])))
     if fixed:
-        return Trajectory(time, nodes.mean() + (nodes - nodes.mean()) / excess)
-    return Trajectory(time * excess, nodes)
+        return SchedulingTrajectory(time, nodes.mean() + (nodes - nodes.mean()) / excess)
+    return SchedulingTrajectory(time * excess, nodes)

@@ -25,7 +25,7 @@ from synthesis.worst.over_box import grid_of, worst_over
 from synthesis.worst.periodic import multiplier
 from synthesis.worst.spectrum import surely_unstable
 from synthesis.worst.tied import tied_lower_bound
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 from synthesis.worst.wave_family import WaveFamily
 from synthesis.worst.waves import samples, steps
 
@@ -43,7 +43,7 @@ class Worst(NamedTuple):
 
     value: float
     p: tuple[float, ...] | None = None
-    trajectory: Trajectory | None = None
+    trajectory: SchedulingTrajectory | None = None
 
 
 def measure(demand: Demand, dt: float | None) -> Measure:
@@ -159,7 +159,9 @@ def worst_moving(
     return best
 
 
-def growing(model: LPVStateSpace, demand: Demand, search: Search | None) -> Trajectory | None:
+def growing(
+    model: LPVStateSpace, demand: Demand, search: Search | None
+) -> SchedulingTrajectory | None:
     """A p(t) on such a line along which the state grows, None where none was found."""
     if demand.motion.tied:
         return worst_tied(model, demand, Worst(0.0), search).trajectory
@@ -178,18 +180,20 @@ def worst_tied(model: LPVStateSpace, demand: Demand, frozen: Worst, search: Sear
     return Worst(found.gain, None, found.trajectory)
 
 
-def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:
+def _peaks(
+    line: LPVStateSpace, rate: float, search: Search
+) -> tuple[float, SchedulingTrajectory | None]:
     """Energy to peak along waves: the Gramian of inputs held over each step, from rest over some
     cycles.
     """
     family = WaveFamily(line, rate, search)
-    best: tuple[float, Trajectory | None] = (0.0, None)
+    best: tuple[float, SchedulingTrajectory | None] = (0.0, None)
     # where A does not depend on p, growth ranks nothing
     budget = Budget(search.seconds)
     for wave in tracked("looking for peaks", (*family.coarse()[:WAVES], *family.spread())):
         if budget.over:
             break
-        cycle = Trajectory(*wave.vertices())
+        cycle = SchedulingTrajectory(*wave.vertices())
         system = steps(line, cycle.time, cycle.p, max(family.longest, wave.period / search.steps))
         shown = cycle if line.dt is None else samples(cycle, line.dt)
         after = np.interp(system.time[1:], *cycle) if line.dt is None else np.roll(shown.p, -1)
@@ -209,17 +213,19 @@ def _peaks(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Tra
     return best
 
 
-def _slowest(line: LPVStateSpace, rate: float, search: Search) -> tuple[float, Trajectory | None]:
+def _slowest(
+    line: LPVStateSpace, rate: float, search: Search
+) -> tuple[float, SchedulingTrajectory | None]:
     """Minus the slowest decay, 1/s, over whole cycles of waves, by Floquet multipliers; the error
     of the time steps taken off.
     """
     family = WaveFamily(line, rate, search)
-    best: tuple[float, Trajectory | None] = (-math.inf, None)
+    best: tuple[float, SchedulingTrajectory | None] = (-math.inf, None)
     budget = Budget(search.seconds)
     for wave in tracked("looking for slow decay", family.coarse()[:WAVES]):
         if budget.over:
             break
-        cycle = Trajectory(*wave.vertices())
+        cycle = SchedulingTrajectory(*wave.vertices())
         longest = max(family.longest, wave.period / search.steps)
         rates = [
             math.log(max(multiplier(steps(line, cycle.time, cycle.p, longest / finer)), 1e-300))

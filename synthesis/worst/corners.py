@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 from synthesis.worst.ascent import Objective
 from synthesis.worst.budget import UNLIMITED, Budget
 from synthesis.worst.scheduled import Scheduled
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 from synthesis.worst.waves import Steps, steps
 
 Array = np.ndarray
@@ -35,7 +35,7 @@ class Corners(NamedTuple):
     rests: Array
 
     @classmethod
-    def of(cls, wave: Trajectory) -> Corners:
+    def of(cls, wave: SchedulingTrajectory) -> Corners:
         """The levels and rests of a `Wave`'s cycle; its ramps become as steep as may be."""
         return cls(wave.p[:4:2], np.diff(wave.time)[::2])
 
@@ -56,11 +56,11 @@ class Corners(NamedTuple):
         uneven = np.repeat([1.2, 0.8], len(self.rests))
         return Corners(np.tile(self.levels, 2), np.tile(self.rests, 2) * uneven)
 
-    def cycle(self, rate: float) -> Trajectory:
+    def cycle(self, rate: float) -> SchedulingTrajectory:
         """One cycle; where p jumps a time stands twice."""
         duration = np.column_stack([self.rests, self.ramps(rate)]).ravel()
         time = np.append(0.0, np.cumsum(duration))
-        return Trajectory(time, np.append(np.repeat(self.levels, 2), self.levels[0]))
+        return SchedulingTrajectory(time, np.append(np.repeat(self.levels, 2), self.levels[0]))
 
 
 class _Path(NamedTuple):

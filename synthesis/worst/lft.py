@@ -17,7 +17,7 @@ from synthesis.worst.frozen import FrozenGain, norm, stable
 from synthesis.worst.lines import Line, alone, directions, growing_on, shared
 from synthesis.worst.lower_bound import LowerBound, Search, lower_bound
 from synthesis.worst.over_box import grid_of, worst_over
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 
 Array = np.ndarray
 
@@ -129,7 +129,7 @@ def box_lower_bound(lft: LFT, frozen: BoxGain, search: Search | None) -> LowerBo
     return best
 
 
-def box_growing_trajectory(lft: LFT, search: Search | None) -> Trajectory | None:
+def box_growing_trajectory(lft: LFT, search: Search | None) -> SchedulingTrajectory | None:
     """A p(t) along such a line on which the free state grows, None where none was found."""
     return growing_on(_lines(lft, math.inf), search)
 

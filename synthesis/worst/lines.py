@@ -14,7 +14,7 @@ import numpy as np
 from symheli.progress import tracked
 from synthesis.worst.budget import Budget
 from synthesis.worst.lower_bound import Search, growing_trajectory
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 
 Array = np.ndarray
 
@@ -28,9 +28,9 @@ class Line(NamedTuple):
     rate: float
     back: Callable[[Array], Array]
 
-    def in_box(self, found: Trajectory) -> Trajectory:
+    def in_box(self, found: SchedulingTrajectory) -> SchedulingTrajectory:
         """A trajectory on the line as one of the box."""
-        return Trajectory(found.time, self.back(found.p))
+        return SchedulingTrajectory(found.time, self.back(found.p))
 
 
 def directions(m: int) -> list[Array]:
@@ -59,7 +59,7 @@ def shared(lines: Iterable[Line], search: Search | None) -> Iterator[tuple[Line,
         yield line, replace(search, seconds=budget.left / (len(lines) - k))
 
 
-def growing_on(lines: Iterable[Line], search: Search | None) -> Trajectory | None:
+def growing_on(lines: Iterable[Line], search: Search | None) -> SchedulingTrajectory | None:
     """A p(t) on one of the lines along which the free state grows, None where none was found."""
     for line, share in shared(lines, search):
         found = growing_trajectory(line.model, line.rate, share)

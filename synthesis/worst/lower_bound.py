@@ -29,7 +29,7 @@ from synthesis.worst.frozen import FrozenGain, frozen_gain
 from synthesis.worst.periodic import Lifted, multiplier, ratio_from_rest, worst_input
 from synthesis.worst.rates import Rate, rates
 from synthesis.worst.scheduled import Scheduled
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 from synthesis.worst.wave_family import WaveFamily
 from synthesis.worst.waves import Steps, samples, steps
 
@@ -113,7 +113,7 @@ class LowerBound(NamedTuple):
     """
 
     gain: float
-    trajectory: Trajectory | None
+    trajectory: SchedulingTrajectory | None
     input: Array | None = None
     growth: float | None = None
 
@@ -196,7 +196,7 @@ def lower_bound(
 
 def growing_trajectory(
     lpv: Scheduled, rate: float, search: Search | None = THOROUGH
-) -> Trajectory | None:
+) -> SchedulingTrajectory | None:
     """One cycle of a p(t) within the limits along which the free state grows, repeated; None where
     none was found.
     """
@@ -206,7 +206,7 @@ def growing_trajectory(
     return growing.trajectory if growing else None
 
 
-def along_cycle(lpv: Scheduled, cycle: Trajectory, search: Search) -> LowerBound:
+def along_cycle(lpv: Scheduled, cycle: SchedulingTrajectory, search: Search) -> LowerBound:
     """What one cycle shows, repeated: growth, or the gain of an explicit input from rest."""
     hunt = _Hunt(lpv, lpv.scheduling.limit, search)
     return hunt.growing(cycle) if hunt.grows(cycle) else hunt.explicit(cycle)
@@ -220,11 +220,11 @@ class _Hunt:
         self.budget = Budget(search.seconds)
         self.family = WaveFamily(lpv, rate, search)
 
-    def fastest(self) -> tuple[list[Trajectory], LowerBound | None]:
+    def fastest(self) -> tuple[list[SchedulingTrajectory], LowerBound | None]:
         """Cycles made to grow as fast as they can, the fastest last; and the verdict where one of
         them grows.
         """
-        reached: list[tuple[float, Trajectory]] = []
+        reached: list[tuple[float, SchedulingTrajectory]] = []
         for cycle in tracked("looking for growth", self._steepening()):
             if self.budget.over and reached:
                 break
@@ -236,8 +236,10 @@ class _Hunt:
         return [cycle for _, cycle in sorted(reached, key=_first)[-self.search.starts :]], None
 
     def improved(
-        self, tops: list[tuple[float, Trajectory]], waves: list[tuple[float, Trajectory]]
-    ) -> Iterator[Trajectory]:
+        self,
+        tops: list[tuple[float, SchedulingTrajectory]],
+        waves: list[tuple[float, SchedulingTrajectory]],
+    ) -> Iterator[SchedulingTrajectory]:
         """What ascents of the gain lead to: on the nodes of the `tops`, on the corners of the
         `waves`; as far as there is time.
         """
@@ -248,7 +250,7 @@ class _Hunt:
             if not self.budget.over:
                 yield from self.climb(cycle, GAIN)
 
-    def _steepening(self) -> Iterator[Trajectory]:
+    def _steepening(self) -> Iterator[SchedulingTrajectory]:
         waves = [wave.cycle() for wave in self.family.coarse()[: self.search.starts]]
         yield from waves
         for wave in waves[:1]:
@@ -256,7 +258,7 @@ class _Hunt:
         for wave in waves:
             yield self.ascend(wave, GROWTH)
 
-    def near(self) -> list[Trajectory]:
+    def near(self) -> list[SchedulingTrajectory]:
         """Waves of fast growth, and slower ones, which now and then are worse."""
         slower = (
             self.rate / 2
@@ -269,7 +271,9 @@ class _Hunt:
         ]
         return mixed[: max(self.search.starts, self.search.evaluations)]
 
-    def ranked(self, cycles: Iterable[Trajectory]) -> list[tuple[float, Trajectory]]:
+    def ranked(
+        self, cycles: Iterable[SchedulingTrajectory]
+    ) -> list[tuple[float, SchedulingTrajectory]]:
         """Gains of the repeated cycles, the largest last, without those along which the state
         grows.
         """
@@ -281,7 +285,9 @@ class _Hunt:
         )
         return sorted(((gain, cycle) for gain, cycle in gains if math.isfinite(gain)), key=_first)
 
-    def climb(self, wave: Trajectory, objective: Objective) -> Iterator[Trajectory]:
+    def climb(
+        self, wave: SchedulingTrajectory, objective: Objective
+    ) -> Iterator[SchedulingTrajectory]:
         """The cycles that ascents on the corners of a wave lead to: two corners, and where growth
         is asked four; none in discrete time.
         """
@@ -304,7 +310,7 @@ class _Hunt:
             )
             yield corners.cycle(self.rate)
 
-    def ascend(self, cycle: Trajectory, objective: Objective) -> Trajectory:
+    def ascend(self, cycle: SchedulingTrajectory, objective: Objective) -> SchedulingTrajectory:
         """The cycle a whole ascent leads to."""
         limit = self.limit(cycle)
         # nodes as close in a slow cycle, as far as the time steps allow
@@ -316,7 +322,7 @@ class _Hunt:
             self.lpv, self.rate, start, objective, limit, self.search.evaluations, self.budget
         )[0]
 
-    def limit(self, cycle: Trajectory) -> float:
+    def limit(self, cycle: SchedulingTrajectory) -> float:
         """How long an ascent may make this cycle, s: a slow one as long as p needs to cross its
         range and come back.
         """
@@ -326,30 +332,30 @@ class _Hunt:
             else self.family.slowest_period
         )
 
-    def along(self, cycle: Trajectory, finer: int = 1, split: int = 1) -> Steps:
+    def along(self, cycle: SchedulingTrajectory, finer: int = 1, split: int = 1) -> Steps:
         """The model along one cycle."""
         longest = max(self.family.longest, float(cycle.time[-1]) / self.search.steps) / finer
         return steps(self.lpv, *cycle, longest, split)
 
-    def multiplier(self, cycle: Trajectory, finer: int = 1) -> float:
+    def multiplier(self, cycle: SchedulingTrajectory, finer: int = 1) -> float:
         """Largest Floquet multiplier (modulus) of one cycle."""
         return multiplier(self.along(cycle, finer))
 
-    def grows(self, cycle: Trajectory) -> bool:
+    def grows(self, cycle: SchedulingTrajectory) -> bool:
         """Whether a multiplier exceeds one by more than the time steps can be wrong."""
         coarse, fine = self.multiplier(cycle, 2), self.multiplier(cycle, 4)
         return fine - abs(fine - coarse) > 1 + 1e-7
 
-    def growing(self, cycle: Trajectory) -> LowerBound:
+    def growing(self, cycle: SchedulingTrajectory) -> LowerBound:
         """The verdict on a cycle along which the state grows."""
         shown = cycle if self.lpv.dt is None else samples(cycle, self.lpv.dt)
         return LowerBound(math.inf, shown, None, self.multiplier(cycle, 4))
 
-    def gain(self, cycle: Trajectory) -> float:
+    def gain(self, cycle: SchedulingTrajectory) -> float:
         """L2 gain of the periodic system, inf where it grows."""
         return worst_input(self.along(cycle))[0]
 
-    def explicit(self, cycle: Trajectory) -> LowerBound:
+    def explicit(self, cycle: SchedulingTrajectory) -> LowerBound:
         """|y|/|u| of an explicit input over many cycles from rest."""
         system = self.along(cycle, finer=2)
         lifted = Lifted.of(system)
@@ -379,18 +385,22 @@ class _Hunt:
             ratio = min(ratio, half) - abs(ratio - half)
         if self.lpv.dt is not None:
             p = np.tile(samples(cycle, self.lpv.dt).p, count)
-            return LowerBound(ratio, Trajectory(self.lpv.dt * np.arange(len(p)), p), inputs, growth)
+            return LowerBound(
+                ratio, SchedulingTrajectory(self.lpv.dt * np.arange(len(p)), p), inputs, growth
+            )
         width = np.tile(np.diff(system.time), count)
         return LowerBound(
             ratio, *_flown(cycle, system.time, count, inputs / np.sqrt(width)[:, None]), growth
         )
 
 
-def _first(pair: tuple[float, Trajectory]) -> float:
+def _first(pair: tuple[float, SchedulingTrajectory]) -> float:
     return pair[0]
 
 
-def _flown(cycle: Trajectory, at: Array, count: int, held: Array) -> tuple[Trajectory, Array]:
+def _flown(
+    cycle: SchedulingTrajectory, at: Array, count: int, held: Array
+) -> tuple[SchedulingTrajectory, Array]:
     """The cycle so many times over, and the input held from each time to the next; where p jumps,
     one time with both values.
     """
@@ -403,6 +413,6 @@ def _flown(cycle: Trajectory, at: Array, count: int, held: Array) -> tuple[Traje
     time, p = np.insert(at[:-1], jumps + 1, at[jumps + 1]), np.insert(start, jumps + 1, end[jumps])
     each = held.reshape(count, len(start), -1)
     time = np.concatenate([time + k * at[-1] for k in range(count)])
-    return Trajectory(time, np.tile(p, count)), np.insert(
+    return SchedulingTrajectory(time, np.tile(p, count)), np.insert(
         each, jumps + 1, each[:, jumps], axis=1
     ).reshape(len(time), -1)

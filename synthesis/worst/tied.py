@@ -19,7 +19,7 @@ from symheli.lpv import LPVStateSpace, Matrices, Scheduling
 from synthesis.polynomial.motion import Motion
 from synthesis.worst.budget import Budget
 from synthesis.worst.lower_bound import LowerBound, Search, along_cycle
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 from synthesis.worst.wave_family import WaveFamily
 from synthesis.worst.waves import Wave
 
@@ -140,13 +140,15 @@ def _flown(lpv: LPVStateSpace, tie: tuple[int, int], path: Smooth, search: Searc
     """The gain along the path over and over, by an explicit input from rest."""
     along = AlongPath(lpv, tie, path)
     period = path.wave.period
-    found = along_cycle(along, Trajectory(np.array([0.0, period]), np.array([0.0, period])), search)
+    found = along_cycle(
+        along, SchedulingTrajectory(np.array([0.0, period]), np.array([0.0, period])), search
+    )
     if found.trajectory is None:
         return found
     time, phase = found.trajectory.time, np.mod(found.trajectory.p, period)
     if math.isinf(found.gain):  # one cycle, known by its ends alone
         time = phase = np.linspace(0.0, period, search.steps + 1)
-    shown = Trajectory(time, along.points(phase))
+    shown = SchedulingTrajectory(time, along.points(phase))
     return found._replace(trajectory=shown)
 
 

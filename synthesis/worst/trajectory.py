@@ -11,9 +11,9 @@ from symheli.values.summary import as_table, summarized
 Array = np.ndarray
 
 
-class Trajectory(NamedTuple):
-    """The worst scheduling trajectory found: `time` (n,) in s, `p` (n,), straight lines between
-    them; a jump has one time twice.
+class SchedulingTrajectory(NamedTuple):
+    """How the scheduling parameters move: `time` (n,) in s, `p` (n,), straight lines between them;
+    a jump has one time twice.
 
     Discrete time: one p for every sample. A cycle is to be repeated. Several parameters: `p` (n,
     m).

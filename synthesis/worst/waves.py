@@ -11,7 +11,7 @@ import numpy as np
 
 from symheli.lpv.exponential import expm
 from synthesis.worst.scheduled import Scheduled
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 
 Array = np.ndarray
 
@@ -43,9 +43,9 @@ class Wave(NamedTuple):
         ramp = math.ceil(self.ramp / dt - 1e-9) * dt
         return self._replace(dwell_bottom=bottom, dwell_top=top, ramp=ramp)
 
-    def cycle(self) -> Trajectory:
+    def cycle(self) -> SchedulingTrajectory:
         """One cycle; where p jumps a time stands twice."""
-        return Trajectory(*self.vertices())
+        return SchedulingTrajectory(*self.vertices())
 
     def vertices(self, cycles: int = 1) -> tuple[Array, Array]:
         """Corner times (s) and values of p over whole cycles."""
@@ -75,13 +75,13 @@ class Steps(NamedTuple):
         return out
 
 
-def samples(trajectory: Trajectory, dt: float) -> Trajectory:
+def samples(trajectory: SchedulingTrajectory, dt: float) -> SchedulingTrajectory:
     """One value of p a sample, from the start to one sample before the end: a cycle can be repeated
     as it is.
     """
     time, p = trajectory
     at = time[0] + dt * np.arange(max(1, round((time[-1] - time[0]) / dt)))
-    return Trajectory(at, np.interp(at, time, p))
+    return SchedulingTrajectory(at, np.interp(at, time, p))
 
 
 def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1) -> Steps:
@@ -93,7 +93,7 @@ def steps(lpv: Scheduled, time: Array, p: Array, longest: float, split: int = 1)
     """
     n = len(lpv.states)
     if lpv.dt is not None:
-        sampled = samples(Trajectory(time, p), lpv.dt)
+        sampled = samples(SchedulingTrajectory(time, p), lpv.dt)
         A, B, C, D = lpv.matrices(_clip(lpv, sampled.p))
         at = np.append(sampled.time, sampled.time[-1] + lpv.dt)
         return Steps(

@@ -14,7 +14,7 @@ import pytest
 
 import synthesis
 from evidence.bracket.measured import GAINS, bracket
-from evidence.jerk.measured import FlightPlan, fastest
+from evidence.jerk.measured import TransitionPlan, fastest
 from evidence.marks import guarantee, measured
 from evidence.reach.measured import gains
 from evidence.tables import DOCS
@@ -111,7 +111,7 @@ def gain_with_any_jerk(section, loop):
 
 def fastest_of_the_test_flight():
     heli = _xcell()
-    found = fastest(FlightPlan().test(heli, autopilot_for(heli)))
+    found = fastest(TransitionPlan().test(heli, autopilot_for(heli)))
     shown = KEPT["jerk.md", "flights"].cells("test")
     assert same(shown[0], found.acceleration)
     assert same(shown[1], found.jerk)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flight.tables import MACH, OUTPUTS, over, static, table, velocity
+from flight.tables import MACH, InFlight, over, static, table, velocity
 
 from studies.cli import main
 from symheli import InputError, ParameterMonitor, Signal, TableController
@@ -49,7 +49,7 @@ def built(folder, name, flags=(EXACT,)):
 
 
 class InC:
-    """The compiled controller with the methods of a `TableController`."""
+    """The compiled controller with the methods of `InFlight`."""
 
     ROOM = 1024
     """Numbers of 32 bits that hold a state."""
@@ -150,7 +150,7 @@ def test_the_check_beside_it_finds_no_other_bit(tmp_path, controller):
 @pytest.mark.skipif(CC is None, reason="no C compiler")
 def test_c_gives_the_bits_of_python_over_any_flight(tmp_path, controller):
     compiled = InC(controller, tmp_path, (EXACT,))
-    (python, c), (said, in_c) = flights([controller, compiled], 6000)
+    (python, c), (said, in_c) = flights([InFlight(controller), compiled], 6000)
     np.testing.assert_array_equal(c.view(np.uint32), python.view(np.uint32))
     assert in_c == said
     met = set(said)
@@ -168,7 +168,9 @@ def test_a_compiler_that_contracts_products_and_sums_changes_the_last_digits_onl
     fast = ("-ffp-contract=fast", "-march=native")
     done = built(tmp_path, "own", fast)
     assert done.returncode == 0, done.stdout  # to 1e-5, as the check says
-    (python, c), (said, in_c) = flights([controller, InC(controller, tmp_path, fast)], 2000)
+    (python, c), (said, in_c) = flights(
+        [InFlight(controller), InC(controller, tmp_path, fast)], 2000
+    )
     assert in_c == said
     assert np.abs(c - python).max() <= 1e-5 * np.abs(python).max()
 
@@ -239,19 +241,6 @@ def test_the_backend_of_the_page_compiles_around_it(tmp_path):
     command = ["g++", "-std=c++11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "backend.cpp"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-
-
-def test_writing_leaves_the_controller_as_it_flies(tmp_path):
-    flown, still = TABLES["position"](), TABLES["position"]()
-    e, zeros, trim = np.full(8, 0.1), np.zeros(8), np.zeros(4)
-    for controller in (flown, still):
-        controller.fly_axes(OUTPUTS[:2])
-        controller.update(e, zeros, trim, 5.0)
-    write_controller(flown, tmp_path)
-    for _ in range(3):
-        np.testing.assert_array_equal(
-            flown.update(e, zeros, trim, 5.1), still.update(e, zeros, trim, 5.1)
-        )
 
 
 def test_the_header_says_what_it_is(tmp_path):

@@ -72,10 +72,11 @@ class InPython:
         self.dt, self.controller = controller.dt, controller
 
     def reset(self):
-        self.controller.reset()
+        self.state = self.controller.init()
 
     def step(self, measured, reference, p):
-        return self.controller.step(measured, reference, p)
+        u, self.state = self.controller.step(self.state, measured, reference, p)
+        return u
 
 
 def differences(first, second):

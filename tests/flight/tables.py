@@ -58,6 +58,35 @@ def over(scheduling, knots=5, order=2, **options):
     return TableController.of(replace(model, parameters=scheduling), knots, **options)
 
 
+class InFlight:
+    """A table with the state that it has come to, as its C code keeps it."""
+
+    def __init__(self, controller):
+        self.controller, self.axes = controller, None
+        self.inputs, self.outputs = controller.inputs, controller.outputs
+        self.reset()
+
+    def reset(self, command=None):
+        self.state = self.controller.init(command, self.axes)
+
+    def fly_axes(self, axes):
+        self.axes = axes
+        self.state = self.controller.fly_axes(self.state, axes)
+
+    def update(self, *told, **more):
+        u, self.state = self.controller.update(self.state, *told, **more)
+        return u
+
+    def run(self, errors, airspeed, trim=0.0):
+        """Commands (N, ny) along errors (N, nu) at an airspeed."""
+        zeros, at = np.zeros(errors.shape[1]), np.full(len(self.outputs), trim)
+        return np.array([self.update(e, zeros, at, airspeed) for e in errors])
+
+    @property
+    def status(self):
+        return self.state.status
+
+
 def velocity(**options):
     """Of bank and its command, d_lat_command, by the rate of that."""
     model = sampled(3, ("phi", "p", "d_lat_command"), ("d_lat_rate",))

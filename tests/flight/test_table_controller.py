@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from flight.flown import SHORT, STORM, differences, dynamic
-from flight.tables import DT, INPUTS, MACH, OUTPUTS, over, sampled, static, table
+from flight.flown import SHORT, STORM, InPython, differences, dynamic
+from flight.tables import DT, INPUTS, MACH, OUTPUTS, InFlight, over, sampled, static, table
 
 import symheli
 import synthesis
@@ -21,10 +21,8 @@ ROUNDING = float(np.finfo(np.float32).eps)
 
 
 def run(controller, errors, airspeed, trim=0.0):
-    """Commands (N, ny) along errors (N, nu) at an airspeed."""
-    ny = len(controller.outputs)
-    zeros, at = np.zeros(errors.shape[1]), np.full(ny, trim)
-    return np.array([controller.update(e, zeros, at, airspeed) for e in errors])
+    """Commands (N, ny) from the ground along errors (N, nu) at an airspeed."""
+    return InFlight(controller).run(errors, airspeed, trim)
 
 
 # --- the numbers ---------------------------------------------------------------------------------
@@ -80,12 +78,11 @@ def test_any_airspeed_is_looked_up_between_its_knots(knots):
     static_gain = [0.0, *np.random.default_rng(3).uniform(-1, 14, 50), *t.knots, 13.0]
     e = np.random.default_rng(1).standard_normal(8)
     for p in static_gain:
-        t.reset()
-        first = t.update(e, np.zeros(8), np.zeros(4), p)
+        first, state = t.update(t.init(), e, np.zeros(8), np.zeros(4), p)
         held = np.clip(p, 0.0, 13.0)
         # eight products of numbers of size 1 in 32 bits
         np.testing.assert_allclose(first, t.model.at(held).D @ e, atol=8 * ROUNDING)
-        assert t.parameter_used == np.float32(held)
+        assert state.parameter_used == np.float32(held)
 
 
 # --- beside 64-bit arithmetic --------------------------------------------------------------------
@@ -96,10 +93,10 @@ def test_within_its_limits_a_table_runs_as_its_model_in_double_precision():
     rng = np.random.default_rng(0)
     errors, p = 0.1 * rng.standard_normal((400, 8)), 6.0 + 5.0 * np.sin(0.008 * np.arange(400))
     monitor = ParameterMonitor(rate=math.inf)
-    free = replace(t, monitor=monitor)
+    free = InFlight(replace(t, monitor=monitor))
     zeros, trim = np.zeros(8), np.zeros(4)
     mine = np.array([free.update(e, zeros, trim, at) for e, at in zip(errors, p, strict=True)])
-    _, exact = free.model.simulate(p, errors)
+    _, exact = t.model.simulate(p, errors)
     # eigenvalues up to .9 add up ten samples of rounding, of sums of 14 products each
     assert np.abs(mine - exact).max() < 140 * ROUNDING * np.abs(exact).max()
     assert np.abs(mine - exact).max() > 0.0  # it is another arithmetic
@@ -137,11 +134,11 @@ def test_rates_are_integrated_from_the_trim(outputs):
 
 
 def test_at_its_limit_a_command_that_integrates_waits_there():
-    t = static(1.0, output="d_lat_rate", limits={"d_lat": (-0.1, 0.1)})
-    up = run(t, np.full((500, 1), 1.0), 5.0)  # 10 s, five times what reaches the limit
+    t = InFlight(static(1.0, output="d_lat_rate", limits={"d_lat": (-0.1, 0.1)}))
+    up = t.run(np.full((500, 1), 1.0), 5.0)  # 10 s, five times what reaches the limit
     assert up.max() == np.float32(0.1) or up.max() == np.nextafter(np.float32(0.1), np.float32(0))
     assert t.status == Status.SATURATED
-    down = run(t, np.full((1, 1), -1.0), 5.0)
+    down = t.run(np.full((1, 1), -1.0), 5.0)
     assert down[0, 0] == pytest.approx(0.1 - DT, abs=1e-7)
 
 
@@ -171,9 +168,9 @@ def test_a_saturated_integral_turns_at_once_with_anti_windup_and_late_without():
     up, back = np.full((250, 1), 1.0), np.full((600, 1), -0.3)
     flown = {}
     for name, correction in (("with", None), ("without", 0)):
-        t = integral(correction)
-        run(t, up, 5.0)
-        flown[name] = run(t, back, 5.0)[:, 0]
+        t = InFlight(integral(correction))
+        t.run(up, 5.0)
+        flown[name] = t.run(back, 5.0)[:, 0]
     assert flown["with"][1] < 0.0
     assert flown["without"].min() == flown["without"].max()  # at the limit: 5 up, 3.6 back, - 0.06
 
@@ -195,12 +192,12 @@ def test_the_states_follow_saturated_commands_stably_whichever_saturate(heli):
 
 @pytest.mark.parametrize("p", [0.0, 3.3, 13.0, 40.0])
 def test_the_first_command_is_the_one_in_force_and_the_difference_fades(p):
-    t = replace(table(limit=None), fade=0.5)
+    t = InFlight(replace(table(limit=None), fade=0.5))
     rng = np.random.default_rng(0)
     errors, now = rng.standard_normal((60, 8)), np.array([0.15, -0.1, 0.05, 0.19])
-    own = run(t, errors, p, trim=0.02)
+    own = t.run(errors, p, trim=0.02)
     t.reset(now)
-    entered = run(t, errors, p, trim=0.02)
+    entered = t.run(errors, p, trim=0.02)
     np.testing.assert_array_equal(entered[0], now.astype(np.float32))
     faded = np.exp(-DT / 0.5 * np.arange(60))[:, None] * (now - own[0])
     # sums of numbers up to 1, in 32 bits, sixty times
@@ -208,15 +205,15 @@ def test_the_first_command_is_the_one_in_force_and_the_difference_fades(p):
 
 
 def test_an_entered_command_that_integrates_goes_on_from_there():
-    t = table(order=3, outputs=RATES, limit=None)
+    t = InFlight(table(order=3, outputs=RATES, limit=None))
     now = np.array([0.1, 0.2, -0.1, 0.0])
     t.reset(now)
     errors = 0.1 * np.ones((3, 8))
-    entered = run(t, errors, 5.0)
+    entered = t.run(errors, 5.0)
     np.testing.assert_array_equal(entered[0], now.astype(np.float32))
     t.reset()
     np.testing.assert_allclose(
-        np.diff(entered, axis=0), np.diff(run(t, errors, 5.0), axis=0), atol=4 * ROUNDING
+        np.diff(entered, axis=0), np.diff(t.run(errors, 5.0), axis=0), atol=4 * ROUNDING
     )
 
 
@@ -228,16 +225,15 @@ def test_a_flight_is_handed_over_without_a_bump(ideal):
         dt, switch = DT, 120
 
         def reset(self):
-            pilot.reset()
-            self.k, self.commands = 0, []
+            self.k, self.commands, self.state = 0, [], pilot.init()
 
         def step(self, measured, reference, p):
-            if self.k < self.switch:
-                u = 0.97 * pilot.step(measured, reference, p)
-            else:
-                if self.k == self.switch:
-                    t.reset(self.commands[-1])
-                u = t.step(measured, reference, p)
+            if self.k == self.switch:
+                self.state = t.init(self.commands[-1])
+            early = self.k < self.switch
+            u, self.state = (pilot if early else t).step(self.state, measured, reference, p)
+            if early:
+                u = 0.97 * u
             self.k += 1
             self.commands.append(u)
             return u
@@ -250,20 +246,12 @@ def test_a_flight_is_handed_over_without_a_bump(ideal):
     assert (np.abs(after - at) < 3 * usual + 1e-3).all()
 
 
-def test_on_the_ground_it_is_as_new():
-    t, errors = table(), np.random.default_rng(0).standard_normal((40, 8))
-    first = run(t, errors, 5.0)
-    t.update(errors[0], np.zeros(8), np.zeros(4), math.nan)
-    t.reset()
-    np.testing.assert_array_equal(run(t, errors, 5.0), first)
-
-
 # --- axes ----------------------------------------------------------------------------------------
 
 
 def test_an_axis_flown_by_another_stays_and_begins_where_it_was():
     for outputs in (OUTPUTS, RATES):
-        t = table(order=3, outputs=outputs, limit=0.5)
+        t = InFlight(table(order=3, outputs=outputs, limit=0.5))
         errors, trim = 0.1 * np.ones((300, 8)), np.full(4, 0.05)
         t.fly_axes(("d_lon", "d_ped"))
         for e in errors:
@@ -281,11 +269,11 @@ def test_an_axis_flown_by_another_stays_and_begins_where_it_was():
 
 
 def test_an_integral_does_not_wind_up_while_another_flies():
-    t = integral()
+    t = InFlight(integral())
     t.fly_axes(())
-    run(t, np.full((500, 1), 1.0), 5.0)
+    t.run(np.full((500, 1), 1.0), 5.0)
     t.fly_axes(("d_lat",))
-    after = run(t, np.full((400, 1), -0.1), 5.0)[:, 0]
+    after = t.run(np.full((400, 1), -0.1), 5.0)[:, 0]
     assert after[0] == 0.0
     # its own integral alone moves it, -0.1 DT a sample; what it was off by fades in seconds
     assert after[-1] < 0.0
@@ -305,13 +293,13 @@ def used_along(t, readings, valid=None):
             p,
             valid=True if valid is None else bool(valid[k]),
         )
-        out.append((t.parameter_used, t.status))
+        out.append((t.state.parameter_used, t.status))
     used, status = zip(*out, strict=True)
     return np.array(used), list(status)
 
 
 def gain(**monitor):
-    return static(1.0, follow="reading", monitor=ParameterMonitor(**monitor))
+    return InFlight(static(1.0, follow="reading", monitor=ParameterMonitor(**monitor)))
 
 
 def test_whatever_is_read_the_airspeed_in_use_keeps_to_the_certified_rate():
@@ -367,25 +355,25 @@ def test_the_filter_before_the_limit_lags_by_its_time_constant():
 
 
 def test_a_constant_command_is_no_frozen_reading():
-    t = static(1.0, monitor=ParameterMonitor(frozen=0.1))
+    t = InFlight(static(1.0, monitor=ParameterMonitor(frozen=0.1)))
     used, status = used_along(t, np.full(100, 7.0))
     assert set(used) == {7.0}
     assert not any(status)
 
 
 def test_numbers_that_are_none_hold_the_commands_and_harm_nothing():
-    clean, t = table(), table()
+    clean, t = InFlight(table()), InFlight(table())
     errors = 0.1 * np.random.default_rng(0).standard_normal((50, 8))
-    run(clean, errors, 5.0), run(t, errors, 5.0)
-    before = run(t, errors[:1], 5.0)[0]
-    run(clean, errors[:1], 5.0)
+    clean.run(errors, 5.0), t.run(errors, 5.0)
+    before = t.run(errors[:1], 5.0)[0]
+    clean.run(errors[:1], 5.0)
     hurt = errors[1].copy()
     hurt[3] = math.nan
     np.testing.assert_array_equal(t.update(hurt, np.zeros(8), np.zeros(4), 5.0), before)
     assert t.status & Status.HELD
     huge = np.full(8, 3e38)
     np.testing.assert_array_equal(t.update(huge, np.zeros(8), np.zeros(4), 5.0), before)
-    np.testing.assert_array_equal(run(t, errors, 6.0), run(clean, errors, 6.0))
+    np.testing.assert_array_equal(t.run(errors, 6.0), clean.run(errors, 6.0))
 
 
 # --- files ---------------------------------------------------------------------------------------
@@ -478,10 +466,12 @@ def test_what_a_flight_provides_in_another_unit_is_converted(ideal):
     lqr = symheli.gain_scheduled_lqr(ideal, 0.0, 8.0, dt=DT, points=5).scheduled_controller.model
     speed = lqr.with_scheduling(symheli.Scheduling("airspeed", "km/h", 0.0, 28.8, 10.8))
     climb = symheli.AirspeedSchedule.transition(3.0, 5.0, acceleration=2.0, hold=0.5)
-    own, told = (TableController.of(model, 9) for model in (lqr.with_rate(3.0), speed))
+    models = lqr.with_rate(3.0), speed
+    own, told = (InPython(TableController.of(model, 9)) for model in models)
     flown = [fly(ideal, climb, controller=each).values for each in (told, own)]
     np.testing.assert_allclose(*flown, atol=1e-4)  # 32 bits round the knots otherwise
-    assert told.parameter_used == pytest.approx(3.6 * own.parameter_used, rel=1e-5)
+    used = told.state.parameter_used
+    assert used == pytest.approx(3.6 * own.state.parameter_used, rel=1e-5)
 
 
 def test_a_table_over_the_acceleration_flies_and_one_over_nothing_too(ideal):
@@ -526,7 +516,7 @@ def test_a_table_of_the_velocity_form_is_the_loop_that_was_designed():
     for _ in range(20):
         u.append(model.C[0, 0] * h + model.D[0, 0] * 0.01)
         h = model.A[0, 0] * h + model.B[0, 0] * 0.01
-    flown, in_force = [], np.zeros(1)
+    flown, in_force, t = [], np.zeros(1), InFlight(t)
     for _ in range(20):
         in_force = t.update([0.01, 0.0, in_force[0] + 0.1], [0.0, 0.0, 0.1], [0.1], 0.5) - 0.1
         flown.append(float(in_force[0]))
@@ -608,11 +598,16 @@ def test_what_is_no_table_is_refused():
         TableController.of(undecaying, 5)
     t = TableController.of(good, 5)
     with pytest.raises(InputError, match="measured: expected 8 numbers"):
-        t.update([0.0], np.zeros(8), np.zeros(4), 5.0)
+        t.update(t.init(), [0.0], np.zeros(8), np.zeros(4), 5.0)
     with pytest.raises(InputError, match="unknown output 'roll'"):
-        t.fly_axes(("roll",))
+        t.fly_axes(t.init(), ("roll",))
+    with pytest.raises(InputError, match="unknown output 'roll'"):
+        t.init(axes=("roll",))
     with pytest.raises(InputError, match="command: expected shape"):
-        t.reset([0.0])
+        t.init([0.0])
+    for state in (None, np.zeros(4), table(order=3).init()):
+        with pytest.raises(InputError, match=r"state: expected that of init\(\)"):
+            t.update(state, np.zeros(8), np.zeros(8), np.zeros(4), 5.0)
     with pytest.raises(InputError, match="integrate from a command on"):
         _ = table(outputs=RATES).in_double_precision
 

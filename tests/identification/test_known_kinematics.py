@@ -157,6 +157,33 @@ def test_in_the_loop_nothing_measured_is_used(vehicle, flight):
     )
 
 
+def test_a_replay_flies_a_controller_with_its_state_inside_or_outside(vehicle, flight):
+    """The attitude answered is filtered: half of it is new at every sample."""
+
+    class Outside:
+        def init(self):
+            return np.zeros(4)
+
+        def step(self, state, *asked):
+            u = 0.5 * (state + Pilot().step(*asked))
+            return u, u
+
+    class Inside:
+        def reset(self):
+            self.state = np.zeros(4)
+
+        def step(self, *asked):
+            u, self.state = Outside().step(self.state, *asked)
+            return u
+
+    model = vehicle.model(flight)
+    outside, inside = Outside(), Inside()
+    runs = [model.closed_loop(flight, c) for c in (outside, inside, inside, outside)]
+    for run in runs[1:]:
+        np.testing.assert_array_equal(run, runs[0])
+    assert np.isfinite(runs[0][vehicle.kin.memory :]).all()
+
+
 def test_a_closed_loop_needs_its_controller_and_its_reference(vehicle, flight):
     model = vehicle.model(flight)
     with pytest.raises(InputError, match="name the controller of the flight"):

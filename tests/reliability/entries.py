@@ -19,8 +19,9 @@ EXEMPT: dict[str, str] = {
     },
     **dict.fromkeys(
         (
-            *("symheli.Controller", "identification.FlightSource"),
-            *("identification.InstrumentSource", "identification.Method"),
+            *("symheli.PureController", "symheli.StatefulController"),
+            *("identification.FlightSource", "identification.InstrumentSource"),
+            "identification.Method",
         ),
         PROTOCOL,
     ),
@@ -69,7 +70,7 @@ EXEMPT: dict[str, str] = {
                 "Margins",
             ),
             *("MemoryLyapunov", "Multiplier", "PointDesign", "Proof", "Seconds"),
-            *("SplineLyapunov", "Trajectory"),
+            *("SplineLyapunov", "SchedulingTrajectory"),
         )
     },
     "synthesis.PolynomialMatrix": ARITHMETIC,

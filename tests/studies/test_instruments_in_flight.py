@@ -5,7 +5,7 @@ import pytest
 import symheli
 from identification import InstrumentalVariables, fit
 from studies.transition.axes import LONGITUDINAL
-from studies.transition.flights import FlightPlan, autopilot_for
+from studies.transition.flights import TransitionPlan, autopilot_for
 from symheli.errors import DataWarning
 
 ADDED = ("e_d_lon", "e_d_col")
@@ -14,7 +14,7 @@ ADDED = ("e_d_lon", "e_d_col")
 @pytest.mark.slow
 def test_instruments_beat_least_squares_in_flight_once_the_command_is_among_them():
     heli = symheli.Helicopter.load("xcell60", governor="ideal")
-    autopilot, plan = autopilot_for(heli), FlightPlan(noise_db=30.0)
+    autopilot, plan = autopilot_for(heli), TransitionPlan(noise_db=30.0)
     training, test = plan.training(heli, autopilot), plan.test(heli, autopilot)
     arx = LONGITUDINAL.structure(order=2)
     biased = fit(arx, training)

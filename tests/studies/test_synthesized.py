@@ -268,22 +268,23 @@ def test_a_controller_whose_loop_does_not_stand_the_delay_is_refused_with_what_t
 
 def test_what_is_not_commanded_is_flown_by_the_autopilot():
     class Four:
-        dt = 0.02
+        dt, outputs = 0.02, ("d_lat", "d_ped")
 
         def __init__(self, *u):
-            self.u, self.outputs = np.array(u), ("d_lat", "d_ped")
+            self.u = u
 
-        def reset(self):
-            self.u = 0 * self.u
+        def init(self):
+            return 1.0
 
-        def step(self, *_):
-            return self.u
+        def step(self, state, *_):
+            return state * np.array(self.u), 2.0 * state
 
     own, rest = Four(0.0, 2.0, 0.0, 4.0), Four(10.0, 20.0, 30.0, 40.0)
     both = BesideAutopilot(own, rest)  # type: ignore[arg-type]
-    np.testing.assert_array_equal(both.step(None, None, None), [10.0, 2.0, 30.0, 4.0])  # type: ignore[arg-type]
-    both.reset()
-    assert not both.step(None, None, None).any()  # type: ignore[arg-type]
+    first, state = both.step(both.init(), None, None, None)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(first, [10.0, 2.0, 30.0, 4.0])
+    second, _ = both.step(state, None, None, None)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(second, [20.0, 4.0, 60.0, 8.0])
 
 
 @pytest.mark.slow

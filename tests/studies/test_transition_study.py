@@ -18,7 +18,7 @@ from studies.transition.axes import LATERAL, LONGITUDINAL
 from studies.transition.baseline import build_baseline
 from studies.transition.campaign import MarksOverSeeds, Row, run_campaign
 from studies.transition.comparison import along_the_command
-from studies.transition.flights import FlightPlan, autopilot_for
+from studies.transition.flights import TransitionPlan, autopilot_for
 from studies.transition.paper_experiment import OUTPUTS, PaperExperiments, run_experiment
 from studies.transition.recovery import recover
 
@@ -32,7 +32,7 @@ def baseline(ideal):
 def flown(ideal):
     """{noise: (training, test)}"""
     autopilot = autopilot_for(ideal)
-    plans = {"noise-free": FlightPlan(0), "30 dB": FlightPlan(0).noisy()}
+    plans = {"noise-free": TransitionPlan(0), "30 dB": TransitionPlan(0).noisy()}
     return {
         name: (plan.training(ideal, autopilot), plan.test(ideal, autopilot))
         for name, plan in plans.items()

@@ -9,11 +9,11 @@ from identification.judge.against_constant import HORIZONS
 from studies.campaigns import pays
 from studies.campaigns.runners import Here
 from studies.transition.axes import LATERAL
-from studies.transition.flights import FlightPlan, autopilot_for
+from studies.transition.flights import TransitionPlan, autopilot_for
 
 
 def test_every_output_of_every_axis_is_judged_and_counted():
-    short = {"short": FlightPlan(ramps=3)}
+    short = {"short": TransitionPlan(ramps=3)}
     with Here() as here:
         lines = list(pays.where_scheduling_pays(0, "xcell60", short, on=here))
     assert [line.output for line in lines] == [
@@ -32,7 +32,7 @@ def test_every_output_of_every_axis_is_judged_and_counted():
 
 
 def test_the_models_are_those_of_the_study_with_a_moving_trim(ideal):
-    plan = FlightPlan(ramps=3)
+    plan = TransitionPlan(ramps=3)
     autopilot = autopilot_for(ideal)
     training, test = plan.training(ideal, autopilot), plan.test(ideal, autopilot)
     own = scores(fit(LATERAL.structure(), training), test).by_horizon
@@ -53,7 +53,7 @@ def test_the_table_gives_the_median_and_the_worst_of_the_seeds():
 
 
 def test_the_breeze_blows_in_the_record(ideal):
-    plan = FlightPlan(ramps=2, windy=True)
+    plan = TransitionPlan(ramps=2, windy=True)
     record = plan.training(ideal, autopilot_for(ideal))
     assert record["wind_n"].mean() < 0 < record["wind_n"].std()
     assert "wind_n" not in replace(plan, windy=False).training(ideal, autopilot_for(ideal)).signals

@@ -17,7 +17,15 @@ from test_forged_certificates import FORMS, genuine, same
 
 from symheli.errors import CertificateError, InputError, SymheliError
 from symheli.lpv import LPVStateSpace, PiecewiseLinear, Scheduling, UserFunctions
-from synthesis import Certificate, Grid, Spline, Status, l2_gain, stability
+from synthesis import (
+    Certificate,
+    Grid,
+    SchedulingTrajectory,
+    Spline,
+    Status,
+    l2_gain,
+    stability,
+)
 
 QUICK = settings(
     max_examples=30, derandomize=True, deadline=None, suppress_health_check=list(HealthCheck)
@@ -42,6 +50,15 @@ def test_a_file_gives_back_the_certificate_and_its_exact_proof(saved):
     assert again.details == cert.details
     # every double comes back: what is written again is the same file
     assert again.save(path.with_name("again.json")).read_bytes() == path.read_bytes()
+
+
+def test_a_trajectory_has_the_word_that_it_always_had_in_files(tmp_path):
+    worst = SchedulingTrajectory(np.array([0.0, 0.5]), np.array([1.0, 2.0]))
+    path = replace(genuine("spline"), worst=worst).save(tmp_path / "proof.json")
+    assert '"type": "Trajectory"' in json.dumps(json.loads(path.read_text()))
+    again = Certificate.load(path).worst
+    assert isinstance(again, SchedulingTrajectory)
+    np.testing.assert_array_equal(again, worst)
 
 
 def test_a_process_that_never_saw_the_model_proves_it_again(tmp_path):

@@ -11,7 +11,7 @@ from models import fastest_growth, lateral, random_stable, spring
 from synthesis.worst.ascent import GAIN, GROWTH, _gradient, ascend, on_nodes
 from synthesis.worst.corners import Corners, climb, gradient
 from synthesis.worst.periodic import Lifted, gain, growth, ratio_from_rest, worst_input
-from synthesis.worst.trajectory import Trajectory
+from synthesis.worst.trajectory import SchedulingTrajectory
 from synthesis.worst.waves import Wave, steps
 
 
@@ -19,7 +19,7 @@ def bumpy(lpv, period=4.0, nodes=24):
     s = lpv.scheduling
     phase = 2 * np.pi * np.arange(nodes + 1) / nodes
     spacing = period / nodes if lpv.dt is None else lpv.dt * math.ceil(period / (nodes * lpv.dt))
-    return Trajectory(
+    return SchedulingTrajectory(
         spacing * np.arange(nodes + 1),
         s.middle + s.radius * (0.5 * np.sin(phase) + 0.2 * np.cos(3 * phase)),
     )
@@ -88,7 +88,7 @@ def test_the_ascent_reaches_the_fastest_pumping_of_a_spring():
     wave = Wave(-1.0, 1.0, 3.1, 1.1, 0.0)
     lpv = spring(damping=0.05, change=0.6)
     cycle, value = ascend(
-        lpv, math.inf, on_nodes(Trajectory(*wave.vertices()), 60, None), GROWTH, 20.0, 40
+        lpv, math.inf, on_nodes(SchedulingTrajectory(*wave.vertices()), 60, None), GROWTH, 20.0, 40
     )
     # a jump of p takes one of sixty nodes
     assert 0.97 * best < value / cycle.time[-1] < best * (1 + 1e-3)
@@ -99,7 +99,7 @@ def test_the_ascent_keeps_range_and_rate_and_never_loses(dt):
     lpv = spring() if dt is None else spring().discretize(dt)
     for rate in (0.1, 1.0):
         wave = Wave(-0.6, 0.7, 1.0, 0.55, 1.3 / rate)
-        start = on_nodes(Trajectory(*wave.vertices()), 40, dt)
+        start = on_nodes(SchedulingTrajectory(*wave.vertices()), 40, dt)
         for objective in (GROWTH, GAIN):
             before = _gradient(lpv, start, objective)[0].value
             cycle, after = ascend(lpv, rate, start, objective, 60.0, 10)
@@ -126,7 +126,7 @@ def test_the_search_finds_more_than_the_waves_it_starts_from():
     waves = max(
         gain
         for wave in hunt.family.coarse()
-        if math.isfinite(gain := hunt.gain(Trajectory(*wave.vertices())))
+        if math.isfinite(gain := hunt.gain(SchedulingTrajectory(*wave.vertices())))
     )
     assert lower_bound(lpv, search=search).gain > 1.02 * waves
 

@@ -9,7 +9,7 @@ from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
 from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, SCHEDULING, Axis, mode_misses
-from studies.transition.flights import ACCELERATIONS, TOP, FlightPlan
+from studies.transition.flights import ACCELERATIONS, TOP, TransitionPlan
 from symheli.errors import UnknownNameError
 
 AXES: dict[str, Axis] = {"longitudinal": LONGITUDINAL, "lateral": LATERAL, "all": ALL}
@@ -45,7 +45,7 @@ def identification(
     """
     heli, pilot = helicopter(vehicle), autopilot(vehicle, period)
     noise = None if np.isinf(noise_db) else noise_db
-    plan = FlightPlan(seed, period, ramps, noise, windy)
+    plan = TransitionPlan(seed, period, ramps, noise, windy)
     training = plan.training(heli, pilot)
     test = plan.test(heli, pilot, acceleration)
     model = fit(structure(axis, order, basis, degree), training, method)

@@ -10,7 +10,7 @@ from studies.campaigns.trials.vehicle import autopilot, helicopter
 from studies.transition import accelerating_baseline, axes
 from studies.transition.accelerating_baseline import ALONE, BOTH, MARKS
 from studies.transition.axes import AXES, FROZEN_SPEEDS, Axis
-from studies.transition.flights import NOISE_DB, NOISES, FlightPlan
+from studies.transition.flights import NOISE_DB, NOISES, TransitionPlan
 
 DECIBELS = dict(zip(NOISES, (None, NOISE_DB), strict=True))
 
@@ -21,7 +21,7 @@ def marks(*, vehicle: str = "xcell60", seed: int = 0) -> dict[str, float]:
     """
     heli, row = helicopter(vehicle), {}
     for noise, decibels in DECIBELS.items():
-        plan = FlightPlan(seed, noise_db=decibels)
+        plan = TransitionPlan(seed, noise_db=decibels)
         training, test = (fly(heli, autopilot(vehicle)) for fly in (plan.training, plan.test))
         if decibels is None:
             fits = accelerating_baseline.fits(_baselines(vehicle), test)

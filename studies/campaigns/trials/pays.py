@@ -9,7 +9,7 @@ from identification.judge.against_constant import HORIZONS
 from studies.campaigns.trial import Trial
 from studies.campaigns.trials.vehicle import autopilot, helicopter
 from studies.transition.axes import ALL, LATERAL, LONGITUDINAL, Axis
-from studies.transition.flights import ACCELERATIONS, FlightPlan
+from studies.transition.flights import ACCELERATIONS, TransitionPlan
 
 AXES = (LONGITUDINAL, LATERAL, ALL)
 MODELS = ("LPV", "LTI")
@@ -28,7 +28,7 @@ def pays(
     """
     heli, pilot, row = helicopter(vehicle), autopilot(vehicle), {}
     noise = None if math.isinf(noise_db) else noise_db
-    plan = FlightPlan(seed, ramps=ramps, noise_db=noise, windy=windy)
+    plan = TransitionPlan(seed, ramps=ramps, noise_db=noise, windy=windy)
     training, test = plan.training(heli, pilot), plan.test(heli, pilot)
     for axis in AXES:
         found = against_constant(axis.structure(), training, test, trim="moving")

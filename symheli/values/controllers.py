@@ -1,0 +1,114 @@
+"""What is asked of a controller in flight, and one flight of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, runtime_checkable
+
+from symheli.values.named_vector import NamedVector
+
+Answer = Callable[[NamedVector, NamedVector, NamedVector], Any]
+"""Commands from (measured, reference, p), asked sample after sample of one flight."""
+
+
+@runtime_checkable
+class StatefulController(Protocol):
+    """A controller that keeps its state to itself: a sample period, a start, and an answer at every
+    sample.
+
+    `fly` asks one flight after the other of such an object; to be flown from several threads at
+    once, each needs its own. A `PureController` needs no such care.
+
+    Examples
+    --------
+    >>> class Hold:
+    ...     "Keeps the wings level, and leaves the rest at its trim."
+    ...     dt = 0.02
+    ...
+    ...     def reset(self):
+    ...         pass
+    ...
+    ...     def step(self, measured, reference, p):
+    ...         u = np.array([reference[name] for name in ("d_lon", "d_lat", "d_col", "d_ped")])
+    ...         u[1] -= 0.03 * (measured["phi"] - reference["phi"])
+    ...         return u
+    >>> hover = symheli.AirspeedSchedule((0.0,), (1.0,), (0.0,), lead=0.2)
+    >>> bool(np.abs(symheli.fly(heli, hover, controller=Hold())["phi"]).max() < 0.2)
+    True
+    """
+
+    dt: float
+    """Sample period, s."""
+
+    def reset(self) -> None:
+        """Called once, before the first sample of a flight."""
+
+    def step(self, measured: NamedVector, reference: NamedVector, p: NamedVector) -> object:
+        """Blade pitch commands (4,), rad, d_lon d_lat d_col d_ped in all, at one sample.
+
+        `measured`: u v w p q r phi theta and airspeed as the sensors read them, and with governor
+        "pi" Om om_i. `reference`: states and inputs of the trim that the flight is held to. `p`:
+        commanded airspeed and acceleration. SI and radians.
+        """
+        ...
+
+
+@runtime_checkable
+class PureController(Protocol):
+    """A controller that changes nowhere: its state in flight is a value that goes into a step and
+    comes out of it.
+
+    Whoever flies it keeps the state, so that one object flies in any number of flights at once.
+    Every controller of this package is one.
+
+    Examples
+    --------
+    >>> class Slow:
+    ...     "Levels the wings by a bank that is filtered first, half of it new at every sample."
+    ...     dt = 0.02
+    ...
+    ...     def init(self):
+    ...         return 0.0
+    ...
+    ...     def step(self, state, measured, reference, p):
+    ...         bank = 0.5 * (state + measured["phi"] - reference["phi"])
+    ...         u = np.array([reference[name] for name in ("d_lon", "d_lat", "d_col", "d_ped")])
+    ...         u[1] -= 0.03 * bank
+    ...         return u, bank
+    >>> hover = symheli.AirspeedSchedule((0.0,), (1.0,), (0.0,), lead=0.2)
+    >>> bool(np.abs(symheli.fly(heli, hover, controller=Slow())["phi"]).max() < 0.2)
+    True
+    """
+
+    @property
+    def dt(self) -> float:
+        """Sample period, s."""
+        ...
+
+    def init(self) -> Any:
+        """The state before the first sample of a flight."""
+
+    def step(
+        self, state: Any, measured: NamedVector, reference: NamedVector, p: NamedVector
+    ) -> tuple[Any, Any]:
+        """Blade pitch commands (4,), rad, at one sample, and the state for the next; what it is
+        told is as a `StatefulController` is.
+        """
+        ...
+
+
+def begun(controller: Any) -> Answer:
+    """What answers along one flight from its start: the state of a pure controller is kept here,
+    one that keeps it itself is reset.
+    """
+    if hasattr(controller, "reset"):
+        controller.reset()
+        return controller.step
+    state = controller.init()
+
+    def answer(measured: NamedVector, reference: NamedVector, p: NamedVector) -> Any:
+        nonlocal state
+        u, state = controller.step(state, measured, reference, p)
+        return u
+
+    return answer
