@@ -35,13 +35,13 @@ def test_series_parallel_and_feedback_are_those_of_the_frozen_models():
     np.testing.assert_allclose(responses(series(a, b), **TWO), K @ G, rtol=1e-9)
     np.testing.assert_allclose(responses(parallel(a, b), **TWO), G + K, rtol=1e-9)
     np.testing.assert_allclose(
-        responses(feedback(a, b), **TWO), np.linalg.solve(np.eye(2) + G @ K, G), rtol=1e-8
+        responses(feedback(a, b), **TWO), np.linalg.solve(np.eye(2) - G @ K, G), rtol=1e-8
     )
 
 
 def test_feedback_agrees_with_python_control():
     a, b = lft(0), lft(1)
-    loop = control.feedback(a.at(4.2).to_control(), b.at(4.2).to_control())
+    loop = control.feedback(a.at(4.2).to_control(), b.at(4.2).to_control(), sign=1)
     expected = np.moveaxis(loop(1j * OMEGA), -1, 0)
     np.testing.assert_allclose(responses(feedback(a, b), **ONE), expected, rtol=1e-8)
 
@@ -72,7 +72,7 @@ def test_gains_by_name_are_those_of_the_polynomial_model():
     )
     by_gain, by_system = (
         lpv.to_lft().feedback({("u1", "y1"): 0.3}),
-        feedback(lpv.to_lft(), constant, sign=1.0),
+        feedback(lpv.to_lft(), constant),
     )
     np.testing.assert_allclose(responses(by_gain, **ONE), responses(by_system, **ONE), rtol=1e-10)
 

@@ -202,15 +202,16 @@ def parallel(first: System, second: System) -> LFT:
     return close(both, np.zeros((2 * nu, 2 * ny)), E, F, first.inputs, first.outputs)
 
 
-def feedback(plant: System, controller: System, sign: float = -1.0) -> LFT:
-    """y = plant(u + sign controller(y)), all outputs into all inputs, in their order.
+def feedback(plant: System, controller: System) -> LFT:
+    """Close y = plant(u + controller(y)), all outputs into all inputs, in their order.
+
+    The sign is positive, as in every `.feedback(...)` of this package; MATLAB's and
+    python-control's `feedback(P, K)` is `feedback(P, -K)`.
 
     Parameters
     ----------
     plant, controller : LFT, LPVStateSpace, LinearModel or a system of python-control
         The outputs of each as many as the inputs of the other.
-    sign : float
-        -1: negative feedback.
 
     Returns
     -------
@@ -224,11 +225,11 @@ def feedback(plant: System, controller: System, sign: float = -1.0) -> LFT:
 
     Examples
     --------
-    A gain of 2 stiffens the spring:
+    A gain of -2 stiffens the spring:
 
     >>> gain = lpv.LFT.constant(
     ...     lpv.LinearModel(
-    ...         np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[2.0]], (), ("e",), ("v",)
+    ...         np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[-2.0]], (), ("e",), ("v",)
     ...     )
     ... )
     >>> lpv.feedback(spring, gain).at(0.0).A.round(6) + 0.0
@@ -244,7 +245,7 @@ def feedback(plant: System, controller: System, sign: float = -1.0) -> LFT:
         )
     both = append(plant, controller)
     K = np.zeros((nu + ny, ny + nu))
-    K[:nu, ny:], K[nu:, :ny] = sign * np.eye(nu), np.eye(ny)
+    K[:nu, ny:], K[nu:, :ny] = np.eye(nu), np.eye(ny)
     return close(
         both, K, np.eye(nu + ny)[:, :nu], np.eye(ny + nu)[:ny], plant.inputs, plant.outputs
     )
