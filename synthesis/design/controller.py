@@ -268,11 +268,11 @@ class Controller:
     def __str__(self) -> str:
         names = ", ".join(s.name for s in self.model.parameters)
         time = "continuous" if self.dt is None else f"sampled every {self.dt:g} s"
-        least = "" if self.optimum is None else f", at best {self.optimum:.6g}"
+        least = "" if self.optimum is None else f", least {self.optimum:.6g}"
         promised = (
-            "  no gamma is promised, .certify() proves one"
+            "  no gain is promised; .certify() proves one"
             if math.isnan(self.promised)
-            else f"  gamma {self.promised:.6g} in synthesis{least}: no proof, .certify() proves"
+            else f"  promised gain {self.promised:.6g}{least}; not proven, see .certify()"
         )
         lines = [
             f"{self.method}: {self.order} states, {time}, {', '.join(self.model.inputs)} ->"
