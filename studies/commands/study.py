@@ -45,7 +45,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help=(
             "take the stages that an earlier run has finished from DIR/stages, where version,"
             " vehicle, seed and what they read of the effort are the same; others, and damaged"
-            " ones, are computed again. They are Python pickles: resume only folders of your own"
+            " ones, are computed again"
         ),
     )
     which = parser.add_mutually_exclusive_group()

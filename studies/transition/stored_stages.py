@@ -1,17 +1,16 @@
 """Finished stages of a study on disk, each whole or not at all, for a run that goes on where
 another stopped.
 
-A stage is stored as a Python pickle below a line with the key of what it was computed from and the
-digest of its bytes. The key covers what the stage reads of the effort and the keys of the stages it
-needs: where one entry changes, the stages that it reaches are computed again, and no others.
-Pickles run code when they are read: only folders of one's own are resumed.
+A stage is stored as JSON and arrays, see `stage_file`, below a line with the key of what it was
+computed from and the digest of its bytes. The key covers what the stage reads of the effort and the
+keys of the stages it needs: where one entry changes, the stages that it reaches are computed again,
+and no others.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import pickle
 import platform
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from studies.transition import stage_file
 from studies.transition.configuration import Configuration
 from studies.transition.effort import Effort
 from studies.transition.stages import Stage
@@ -27,7 +27,7 @@ from symheli import Helicopter
 from symheli.errors import SymheliError
 from symheli.values.whole_files import write_bytes
 
-FORMAT = "symheli stage 1"
+FORMAT = "symheli stage 2"
 STAGES = "stages"
 """Folder of the stored stages, in that of the run."""
 PACKAGES = ("symheli", "identification", "synthesis", "studies")
@@ -116,7 +116,7 @@ class StoredAnswers:
 
 
 def _write(path: Path, key: str, stored: Stored) -> Path:
-    content = pickle.dumps(stored)
+    content = stage_file.written(stored)
     head = f"{FORMAT} {key} {hashlib.sha256(content).hexdigest()}\n"
     return write_bytes(path, head.encode() + content)
 
@@ -132,7 +132,10 @@ def _read(path: Path, key: str, kind: type) -> Stored | None:
         raise NotUsable(f"{path} is of another version, vehicle, effort or seed")
     if words[2] != hashlib.sha256(content).hexdigest():
         raise NotUsable(f"{path} is damaged: its content is not what was written")
-    stored = pickle.loads(content)
+    try:
+        stored = stage_file.read(content)
+    except stage_file.UnreadableError as error:
+        raise NotUsable(f"{path} is damaged: {error}") from error
     if not (isinstance(stored, Stored) and isinstance(stored.result, kind)):
         raise NotUsable(f"{path} is damaged: it holds another stage")
     return stored
