@@ -25,7 +25,7 @@ def coverage(model: KinematicModel, truth: Truth, draws: int = 120, seed: int = 
     """Share of the responses of the lateral model (each input to each output, airspeed, frequency)
     whose nominal 95 % region, from draws of the coefficients, holds the exact one.
     """
-    covariance = model.coefficient_covariance
+    covariance = model.covariance
     assert covariance is not None
     size = covariance.shape[0] * covariance.shape[1]
     values, vectors = np.linalg.eigh(covariance.reshape(size, size))
@@ -50,7 +50,8 @@ def coverage(model: KinematicModel, truth: Truth, draws: int = 120, seed: int = 
 
 
 def _with_theta(model: KinematicModel, theta: Array) -> KinematicModel:
-    return replace(model, aerodynamics=replace(model.aerodynamics, theta=theta))
+    aerodynamics = replace(model.aerodynamics, theta=theta, covariance=None)
+    return replace(model, aerodynamics=aerodynamics)
 
 
 def _at(model: KinematicModel, k: int) -> Array:

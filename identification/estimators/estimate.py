@@ -26,7 +26,6 @@ from identification.structure.kinematic_arx import KinematicARX
 from identification.structure.lpvarx import LPVARX, require_structure
 from identification.structure.regressors import as_records, stacked, units_of
 from symheli.records import FlightRecord
-from symheli.values.arrays import Array
 
 
 @overload
@@ -78,7 +77,17 @@ def fit(
     -------
     LPVARXModel, or KinematicModel of a KinematicARX
         Its `method` is the shorthand, its `excitation` the report on the data, its `details` what
-        the method chose (weights, iterations, strength of the instruments).
+        the method chose (weights, iterations, strength of the instruments), its `covariance`
+        (ny, n, ny, n) that of all coefficients together as far as the method knows it:
+
+        - "ls", and "rls" that forgets nothing: the covariance of the residuals (x) (phi' phi)^-1.
+          It holds for residuals that are white and regressors without noise; modelling errors
+          colour residuals, see `uncertainty`, and noise on the outputs biases the coefficients, of
+          which it says nothing;
+        - "iv" flown in a simulator, all equations with the same regressors, and `FilterError`:
+          summed over residuals correlated in time, up to 25 samples, and between equations; for
+          records that are long against that;
+        - of all others None: prices on coefficients move them by more than they scatter.
 
     Raises
     ------
@@ -116,24 +125,20 @@ def fit(
     """
     if isinstance(structure, KinematicARX):
         records = as_records(records)
-        aerodynamics, covariance = _fitted(structure.aerodynamics, records, method)
         return KinematicModel(
             structure=structure,
-            aerodynamics=aerodynamics,
+            aerodynamics=_fitted(structure.aerodynamics, records, method),
             trim=mean_trim(structure, records),
-            coefficient_covariance=covariance,
         )
-    return _fitted(structure, records, method)[0]
+    return _fitted(structure, records, method)
 
 
 def _fitted(
     structure: LPVARX,
     records: FlightRecord | Iterable[FlightRecord],
     method: Method | str,
-) -> tuple[LPVARXModel, Array | None]:
-    """The model of a regression, and the covariance of its coefficients where the method says
-    it.
-    """
+) -> LPVARXModel:
+    """The model of a regression."""
     require_structure(structure)
     method = method_of(method)
     records = tuple(structure.prepared(record) for record in as_records(records))
@@ -147,21 +152,21 @@ def _fitted(
     found = method.estimate(structure, records, data)
     for remark in found.remarks:
         warnings.warn(remark, stacklevel=3)
-    covariance = found.residual_covariance
-    if covariance is None:
-        covariance = residual_covariance(structure, data.phi, data.y, found.theta)
-    model = LPVARXModel(
+    residual = found.residual_covariance
+    if residual is None:
+        residual = residual_covariance(structure, data.y - data.phi @ found.theta)
+    return LPVARXModel(
         structure=structure,
         theta=found.theta,
         dt=records[0].dt,
         outputs=outputs,
         inputs=inputs,
         scheduling=scheduling,
-        residual_covariance=covariance,
+        residual_covariance=residual,
         rows_used=len(data.phi),
         rows_dropped=data.dropped,
         method=method.shorthand,
         excitation=report,
         details=found.details,
+        covariance=found.covariance,
     )
-    return model, found.covariance

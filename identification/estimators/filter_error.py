@@ -100,7 +100,7 @@ class FilterError(Method):
     ...     basis=idn.Polynomial(1, 2.0, 6.0))
     >>> wrong = symheli.Helicopter.load("xcell_kahn_hudson", governor="ideal")
     >>> found = idn.fit(kin, flight, method=idn.FilterError(symheli.SimulatedFlight(wrong)))
-    >>> found.method, found.coefficient_covariance.shape
+    >>> found.method, found.covariance.shape
     ('filter error', (6, 28, 6, 28))
     """
 
@@ -141,7 +141,7 @@ class FilterError(Method):
         )
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """With the noise found, and the covariance of all coefficients together in the details."""
+        """With the noise found in the details, and the covariance of all coefficients together."""
         if not isinstance(arx, Aerodynamics):
             raise InputError(
                 "the filter error method knows kinematics: fit a KinematicARX, or take another"

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from identification.design.excitation import column_scale
-from identification.design.tall_factors import orthonormal
+from identification.design.tall_factors import orthonormal, triangular
 from identification.estimators.method import Estimate, Method
 from identification.estimators.self_check import check_least_squares
 from identification.structure.lpvarx import LPVARX
@@ -36,7 +36,7 @@ class LeastSquares(Method):
         """By an orthogonal factor for each group of equations with the same regressors."""
         theta = least_squares_by_group(arx, data.phi, data.y)
         check_least_squares(arx, data.phi, data.y, theta, self.shorthand)
-        return Estimate(theta=theta)
+        return Estimate(theta=theta, covariance=least_squares_covariance(arx, data, theta))
 
 
 def least_squares(phi: Array, y: Array) -> Array:
@@ -61,10 +61,49 @@ def least_squares_by_group(arx: LPVARX, phi: Array, y: Array) -> Array:
     return theta
 
 
-def residual_covariance(arx: LPVARX, phi: Array, y: Array, theta: Array) -> Array:
-    """Covariance (ny, ny) of y - phi theta, per degree of freedom left (geometric mean of those of
-    two outputs).
+def residual_covariance(arx: LPVARX, error: Array) -> Array:
+    """Covariance (ny, ny) of residuals (m, ny), per degree of freedom left (geometric mean of those
+    of two outputs).
     """
-    error = y - phi @ theta
-    left = np.sqrt(np.maximum(len(phi) - np.sum(arx.free, axis=0), 1))
+    left = np.sqrt(np.maximum(len(error) - np.sum(arx.free, axis=0), 1))
     return error.T @ error / np.outer(left, left)
+
+
+def least_squares_covariance(arx: LPVARX, data: Regression, theta: Array) -> Array | None:
+    """`white_covariance` of the least-squares coefficients theta with the covariance of their
+    residuals; None where no sample is left to tell that by.
+    """
+    if len(data.phi) <= np.max(np.sum(arx.free, axis=0)):
+        return None
+    error = data.y - data.phi @ theta
+    return white_covariance(arx, data.phi, residual_covariance(arx, error))
+
+
+def white_covariance(arx: LPVARX, phi: Array, residual: Array) -> Array:
+    """Covariance (ny, n, ny, n) of least-squares coefficients whose residuals are white with the
+    covariance `residual` (ny, ny), and independent of regressors phi (m, n) of full rank.
+
+    residual (x) (phi' phi)^-1 where all equations have the same regressors; else D_i phi_i' phi_j
+    D_j residual_ij with D = (phi' phi)^-1 of the regressors of an equation. Zero for coefficients
+    an equation does not have.
+    """
+    n, out = arx.n_regressors, np.zeros((arx.ny, arx.n_regressors) * 2)
+    roots = []
+    for group in arx.groups:
+        root = np.zeros((n, n))
+        own = arx.regressors(group)
+        root[np.ix_(own, own)] = inverse_root(phi[:, own])
+        roots.append((np.array(group.outputs), root, phi @ root))
+    for i, (rows, left, one) in enumerate(roots):
+        for j, (columns, right, other) in enumerate(roots):
+            between = left @ right.T if i == j else left @ (one.T @ other) @ right.T
+            block = np.einsum("yz,ab->yazb", residual[np.ix_(rows, columns)], between)
+            out[rows[:, None], :, columns] = block.transpose(0, 2, 1, 3)
+    return out
+
+
+def inverse_root(phi: Array) -> Array:
+    """W (n, n) with W W' = (phi' phi)^-1, phi (m, n) of full rank."""
+    scale = column_scale(phi)
+    R = triangular(phi / scale)
+    return solve_triangular(R, np.eye(len(scale))) / scale[:, None]

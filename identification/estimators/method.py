@@ -32,7 +32,8 @@ class Estimate:
     residual_covariance : array (ny, ny), optional
         Of the one-step residuals; None: that of the batch of regressors.
     covariance : array (ny, n_regressors, ny, n_regressors), optional
-        Of all coefficients together, where the method knows it.
+        Of all coefficients together, equation by equation, where the method knows it; `fit` keeps
+        it.
 
     Examples
     --------

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from identification.estimators.least_squares import least_squares_covariance
 from identification.estimators.method import Estimate, Method
 from identification.estimators.self_check import check_least_squares, check_recursion
 from identification.recursive.forgetting import Constant, Forgetting, forgetting_of
@@ -46,7 +47,9 @@ class Recursion(Method):
         forgetting_of(self.forgetting)
 
     def estimate(self, arx: LPVARX, records: Sequence[FlightRecord], data: Regression) -> Estimate:
-        """The coefficients after the last sample."""
+        """The coefficients after the last sample; their covariance where nothing is forgotten: by
+        how much they have moved none could tell.
+        """
         forgetting = forgetting_of(self.forgetting)
         online = RecursiveLeastSquares(arx, forgetting).online()
         samples = zip(data.phi, data.y, strict=True)
@@ -54,7 +57,10 @@ class Recursion(Method):
             online.absorb(phi, y)
         state = online.state
         check_recursion(state, data.phi, data.y)
-        theta = state.solve()
+        theta, covariance = state.solve(), None
         if forgetting == Constant(1.0):
             check_least_squares(arx, data.phi, data.y, theta, self.shorthand)
-        return Estimate(theta=theta, residual_covariance=state.residual_covariance)
+            covariance = least_squares_covariance(arx, data, theta)
+        return Estimate(
+            theta=theta, residual_covariance=state.residual_covariance, covariance=covariance
+        )

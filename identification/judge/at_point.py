@@ -27,7 +27,7 @@ class AtPoint:
     feedback: Feedback
     scales: Mapping[str, float]
     thetas: Array | None
-    joint: Array | None
+    covariance: Array | None
     second: tuple[FrozenPlant, ...]
 
     @cached_property

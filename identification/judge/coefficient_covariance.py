@@ -11,10 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.fft import irfft, rfft
 from scipy.fft import next_fast_len
-from scipy.linalg import solve_triangular
 
-from identification.design.excitation import column_scale
-from identification.design.tall_factors import triangular
+from identification.estimators.least_squares import (
+    inverse_root,
+    residual_covariance,
+    white_covariance,
+)
 from identification.structure.lpvarx import LPVARX
 from symheli.values.arrays import Array
 
@@ -27,8 +29,8 @@ LEAST_FREEDOM = 2.0
 def covariances(
     arx: LPVARX, phi: Array, error: Array, runs: Sequence[slice], lags: int
 ) -> tuple[Array, Array, Array]:
-    """Of all coefficients together (ny, n, ny, n), of each equation as if its residuals were white
-    (ny, n, n), and freedom (ny,).
+    """Of all coefficients together (ny, n, ny, n), the same as if residuals were white, and freedom
+    (ny,).
 
     From regressors phi (m, n) and residuals (m, ny) in unbroken `runs`. With D_i = (Phi_i'
     Phi_i)^-1 of equation i and R_ij the correlation of residuals i and j over `lags` samples,
@@ -51,11 +53,7 @@ def covariances(
         / m
         * (1 - np.abs(np.arange(-lags, lags + 1)) / (lags + 1))
     )
-    joint, white, taken = (
-        np.zeros((arx.ny * n, arx.ny * n)),
-        np.zeros((arx.ny, n, n)),
-        np.zeros(arx.ny),
-    )
+    joint, taken = np.zeros((arx.ny * n, arx.ny * n)), np.zeros(arx.ny)
 
     def between(i: int, j: int) -> Array:
         return sum(
@@ -75,30 +73,22 @@ def covariances(
         rows, columns = i * n + a.regressors, j * n + b.regressors
         joint[rows[:, None], columns] = block = 0.5 * (block + block.T) if i == j else block
         joint[columns[:, None], rows] = block.T
-    for y, own in equations.items():
-        white[y, own.regressors[:, None], own.regressors] = own.inverse * (
-            error[:, y] @ error[:, y] / own.left
-        )
+    white = white_covariance(arx, phi, residual_covariance(arx, error))
     independent = m / np.sum((np.einsum("iil->il", R) / power[:, None]) ** 2, axis=1) * (1 - taken)
     freedom = 1 / (1 / np.maximum(independent, LEAST_FREEDOM) + lags / (1.5 * m))
     return joint.reshape(arx.ny, n, arx.ny, n), white, freedom
 
 
 class _Equation(NamedTuple):
-    """Regressors (n,) of an equation, (Phi' Phi)^-1 (n, n), and the degrees of freedom that white
-    residuals have left.
-    """
+    """Regressors (n,) of an equation and (Phi' Phi)^-1 (n, n)."""
 
     regressors: Array
     inverse: Array
-    left: int
 
     @classmethod
     def of(cls, regressors: Array, phi: Array) -> _Equation:
-        scale = column_scale(phi[:, regressors])
-        R = triangular(phi[:, regressors] / scale)
-        inverse = solve_triangular(R, np.eye(len(scale))) / scale[:, None]
-        return cls(regressors, inverse @ inverse.T, max(len(phi) - len(scale), 1))
+        root = inverse_root(phi[:, regressors])
+        return cls(regressors, root @ root.T)
 
 
 class _Spectra(NamedTuple):

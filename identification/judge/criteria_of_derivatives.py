@@ -17,15 +17,15 @@ BOUND, INSENSITIVITY, CORRELATION = 0.2, 0.1, 0.9
 
 def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
     """Three rows over the derivatives that matter to the loop."""
-    none = NO_COVARIANCE if at[0].joint is None else "none matters to this loop"
-    value = float("nan") if at[0].joint is None else 0.0
+    none = NO_COVARIANCE if at[0].covariance is None else "none matters to this loop"
+    value = float("nan") if at[0].covariance is None else 0.0
     worst = {
         "Cramer-Rao bound": (value, BOUND, none),
         "insensitivity": (value, INSENSITIVITY, none),
         "correlation": (value, CORRELATION, none),
     }
     for a in at:
-        if a.joint is None:
+        if a.covariance is None:
             continue
         all_ = Derivatives.of(a.plant, a.plant.model.theta, a.p)
         moved = nu_gaps(
@@ -37,7 +37,7 @@ def certainty(at: Sequence[AtPoint]) -> tuple[Criterion, ...]:
         if not len(matter):
             continue
         names = [all_.names[i] for i in matter]
-        sure = Certainty.of(all_.value[matter], all_.covariance(a.joint)[matter][:, matter])
+        sure = Certainty.of(all_.value[matter], all_.covariance(a.covariance)[matter][:, matter])
         pair = np.unravel_index(np.argmax(np.abs(sure.correlation)), sure.correlation.shape)
         for name, values, which in (
             ("Cramer-Rao bound", sure.bound, names[int(np.argmax(sure.bound))]),

@@ -15,7 +15,7 @@ from identification.judge.criteria_of_the_record import predictions, responses
 from identification.judge.criterion import SET, Criterion, Verdict, together
 from identification.judge.draws import drawn
 from identification.judge.frozen_plant import FrozenPlant, Model
-from identification.model.kinematic_model import KinematicModel
+from identification.model.lpvarx_model import LEAST_SQUARES
 from identification.structure.regressors import as_records
 from symheli.errors import InputError
 from symheli.lpv import LinearModel
@@ -53,7 +53,7 @@ class FitForControl:
     Examples
     --------
     >>> found = idn.fit_for_control(model, record, {("u", "y"): -0.1}, scales={"y": 1.0, "u": 1.0},
-    ...     covariance=idn.uncertainty(model, record).joint, window=8.0, horizon=1.0)
+    ...     covariance=idn.uncertainty(model, record).covariance, window=8.0, horizon=1.0)
     >>> found["nu-gap over margin"].verdict, found.gap.shape
     ('fit', (9,))
     """
@@ -157,8 +157,9 @@ def fit_for_control(
     points : sequence, optional
         Values of the scheduling; default nine over the range of one parameter, or those of `truth`.
     covariance : array (ny, n, ny, n), optional
-        Of all coefficients; default that of the model. Without it nothing is said to be fit: give
-        `uncertainty(...).joint` only where noise in the regressors cannot have biased the fit.
+        Of all coefficients together; default that of the model, but not that of least squares,
+        which says nothing of the bias by noise in the regressors. Without it nothing is said to be
+        fit: give `uncertainty(...).covariance` only where there is no such noise.
     second : LPVARXModel, KinematicModel or sequence of them, optional
         Other estimates that ought to agree: fitted to a second flight, or with a richer basis. The
         covariance knows nothing of what the basis cannot hold; a fit with one degree more does.
@@ -198,7 +199,7 @@ def fit_for_control(
     --------
     >>> known = idn.uncertainty(model, record)
     >>> found = idn.fit_for_control(model, record, {("u", "y"): -0.1}, scales={"y": 1.0, "u": 1.0},
-    ...     points=[-0.5, 0.0, 0.5], covariance=known.joint, window=8.0, horizon=1.0, draws=50)
+    ...     points=[-0.5, 0.0, 0.5], covariance=known.covariance, window=8.0, horizon=1.0, draws=50)
     >>> found["TIC"].verdict, bool(found["nu-gap over margin"].value < 0.1)
     ('fit', True)
     """
@@ -223,21 +224,20 @@ def fit_for_control(
             f" ({', '.join(model.outputs)}; {', '.join(model.inputs)}), got {', '.join(scales)}"
         )
     chosen = _points(model, points, truth)
-    joint = covariance
-    if joint is None and isinstance(model, KinematicModel):
-        joint = model.coefficient_covariance
-    if joint is not None:
-        joint = frozen(joint, "covariance", 2 * model.theta.shape[::-1])
+    if covariance is None and model.method not in LEAST_SQUARES:
+        covariance = model.covariance
+    if covariance is not None:
+        covariance = frozen(covariance, "covariance", 2 * model.theta.shape[::-1])
     plant = FrozenPlant(model, outputs, inputs)
     thetas = None
-    if joint is not None:
-        thetas = drawn(model.theta, joint, plant.regression.free, draws, seed, boundary=SET)
+    if covariance is not None:
+        thetas = drawn(model.theta, covariance, plant.regression.free, draws, seed, boundary=SET)
     others = tuple(
         FrozenPlant(each, outputs, inputs)
         for each in (second if isinstance(second, Sequence) else (second,))
     )
     at = [
-        AtPoint(plant, p, loop(p) if callable(loop) else loop, scales, thetas, joint, others)
+        AtPoint(plant, p, loop(p) if callable(loop) else loop, scales, thetas, covariance, others)
         for p in chosen
     ]
     true = [None if truth is None else _discrete(truth[p], model, outputs, inputs) for p in chosen]

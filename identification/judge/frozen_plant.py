@@ -50,8 +50,9 @@ class FrozenPlant:
         """The model with other coefficients (n, ny)."""
         model = self.model
         if isinstance(model, KinematicModel):
-            return replace(model, aerodynamics=replace(model.aerodynamics, theta=theta))
-        return replace(model, theta=theta)
+            aerodynamics = replace(model.aerodynamics, theta=theta, covariance=None)
+            return replace(model, aerodynamics=aerodynamics)
+        return replace(model, theta=theta, covariance=None)
 
     @property
     def regression(self) -> LPVARX:

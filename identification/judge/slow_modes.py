@@ -164,7 +164,7 @@ def slow_modes(
     slow modes: none
     """
     records = as_records(records)
-    joint, data = uncertainty(model, records).joint, stacked(model.structure, records)
+    joint, data = uncertainty(model, records).covariance, stacked(model.structure, records)
     others = [replace(model, theta=theta, covariance=None) for theta in _compensated(model, data)]
     p, points = data.p.reshape(len(data.p), -1), whole(points, "points", 1)
     found = []

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
@@ -16,16 +16,13 @@ from identification.design.excitation import excitation_of
 from identification.judge.coefficient_covariance import covariances
 from identification.judge.draws import drawn
 from identification.judge.response_band import ResponseBand, response_band
-from identification.model.lpvarx_model import LPVARXModel
+from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
 from identification.structure.regressors import Regression, as_records, stacked
 from symheli.errors import InputError
 from symheli.records import FlightRecord
 from symheli.values.arrays import Array
 from symheli.values.numbers import whole
 from symheli.values.summary import as_table, summarized
-
-if TYPE_CHECKING:
-    pass
 
 
 class Band(NamedTuple):
@@ -81,10 +78,11 @@ class Uncertainty:
     ----------
     model : LPVARXModel
         With n regressors and ny outputs.
-    joint : array (ny, n, ny, n)
-        Of theta[i, y] with theta[j, z], zero for coefficients an equation does not have.
-    white : array (ny, n, n)
-        Of each equation by the formula for white residuals.
+    covariance : array (ny, n, ny, n)
+        Of theta[i, y] with theta[j, z], as that of the model, and honest about the colour of the
+        residuals; zero for coefficients an equation does not have.
+    white : array (ny, n, ny, n)
+        The same by the formula for white residuals.
     freedom : array (ny,)
         Degrees of freedom of the standard errors; for `stretch` of intervals see
         `identification.judge.coefficient_covariance`.
@@ -101,7 +99,7 @@ class Uncertainty:
     """
 
     model: LPVARXModel
-    joint: Array
+    covariance: Array
     white: Array
     freedom: Array
     lags: int
@@ -119,21 +117,16 @@ class Uncertainty:
         return float(1 / np.sqrt(1 - b + b**2 / 3))
 
     @property
-    def covariance(self) -> Array:
-        """(ny, n, n): of the coefficients of each equation, theta[:, y]."""
-        return np.einsum("yiyj->yij", self.joint)
-
-    @property
     def standard_errors(self) -> Array:
         """(n, ny), the Cramer-Rao bounds of normal residuals, corrected for their colour; like
         `model.theta`.
         """
-        return np.sqrt(np.maximum(np.einsum("yiyi->iy", self.joint), 0.0))
+        return np.sqrt(np.maximum(np.einsum("yiyi->iy", self.covariance), 0.0))
 
     @property
     def colour(self) -> Array:
         """Mean ratio (ny,) of corrected to white standard errors."""
-        own = np.sqrt(np.einsum("yii->iy", self.white))
+        own = np.sqrt(np.einsum("yiyi->iy", self.white))
         return np.array(
             [
                 np.mean(self.standard_errors[free, y] / own[free, y])
@@ -155,7 +148,9 @@ class Uncertainty:
                 if not arx.free[block, y].any():
                     continue
                 error = np.sqrt(
-                    np.maximum(np.einsum("ki,ij,kj->k", f, self.joint[y, block, y, block], f), 0.0)
+                    np.maximum(
+                        np.einsum("ki,ij,kj->k", f, self.covariance[y, block, y, block], f), 0.0
+                    )
                 )
                 name = arx.regressor_names[block.start].rsplit(" f0(", 1)[0]
                 out.append(
@@ -178,8 +173,8 @@ class Uncertainty:
         each of them to see how far it is certain.
         """
         free = self.model.structure.free
-        thetas = drawn(self.model.theta, self.joint, free, whole(count, "count", 1), seed)
-        return tuple(replace(self.model, theta=theta) for theta in thetas)
+        thetas = drawn(self.model.theta, self.covariance, free, whole(count, "count", 1), seed)
+        return tuple(replace(self.model, theta=theta, covariance=None) for theta in thetas)
 
     def frequency_response(self, p: object, omega: object) -> ResponseBand:
         """The response at `omega` (k,) in rad/s with the scheduling held at p, and its standard
@@ -188,7 +183,7 @@ class Uncertainty:
         It is that of `at(p)` and of both exact state-space forms at p. Raises `InputError` for p
         outside the basis.
         """
-        return response_band(self.model, self.joint, p, omega)
+        return response_band(self.model, self.covariance, p, omega)
 
     def plot(self, level: float = 0.95) -> Array:
         """Axes (coefficients,) with every coefficient function and its confidence band over p; see
@@ -244,7 +239,7 @@ def uncertainty(
     """
     records = as_records(records)
     arx = model.structure
-    if model.method not in ("ls", "rls"):
+    if model.method not in LEAST_SQUARES:
         raise InputError(
             f'uncertainty is that of least squares; the model was fitted by "{model.method}"'
         )
@@ -263,9 +258,14 @@ def uncertainty(
     if not (isinstance(reach, int | np.integer) and 0 <= reach < longest):
         raise InputError(f"lags: expected 0 .. {longest - 1} samples, got {lags}")
     error, reach = data.residuals(model.theta), int(reach)
-    joint, white, freedom = covariances(arx, data.phi, error, runs, reach)
+    covariance, white, freedom = covariances(arx, data.phi, error, runs, reach)
     return Uncertainty(
-        model=model, joint=joint, white=white, freedom=freedom, lags=reach, samples=len(error)
+        model=model,
+        covariance=covariance,
+        white=white,
+        freedom=freedom,
+        lags=reach,
+        samples=len(error),
     )
 
 

@@ -111,7 +111,7 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
     left = np.array(details["equation_variances"])[:6]
     air = details["gust"] ** 2, details["gust_remains"]
     noise = Noise.of(R, left, *air)
-    covariance = model.coefficient_covariance
+    covariance = model.covariance
     assert covariance is not None  # noqa: S101  what says its noise says this too
     C = covariance.reshape(model.theta.size, -1)
     power, unknown, spread, count, samples = 0.0, 0.0, 0.0, 0, 0

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from identification.model import kinematic_run
 from identification.model.kinematic_realization import Realization
 from identification.model.kinematic_run import Run
-from identification.model.lpvarx_model import LPVARXModel
+from identification.model.lpvarx_model import LEAST_SQUARES, LPVARXModel
 from identification.model.prediction import fit_percent, require_horizon
 from identification.structure.kinematic_arx import MOVING, STATES, KinematicARX
 from symheli.errors import InputError
@@ -39,12 +39,11 @@ class KinematicModel:
     structure : KinematicARX
         Signals, lags, basis.
     aerodynamics : LPVARXModel
-        The regression: coefficients, residual covariance, what the method said.
+        The regression: coefficients, their covariance, that of the residuals, what the method
+        said.
     trim : array (basis size, 8)
         u v w p q r phi theta at steady p, as functions of p: the mean of the records there. What
         the kinematics are linearized about in `at` and `to_state_space`, and nothing else.
-    coefficient_covariance : array (6, n, 6, n), optional
-        Of all coefficients together, (equation, regressor, equation, regressor).
 
     Raises
     ------
@@ -68,19 +67,15 @@ class KinematicModel:
     structure: KinematicARX
     aerodynamics: LPVARXModel
     trim: Array
-    coefficient_covariance: Array | None = None
 
     __repr__ = summarized
     _repr_html_ = as_table
 
     def __post_init__(self) -> None:
-        n, size = self.structure.n_regressors, self.structure.basis.size
+        size = self.structure.basis.size
         object.__setattr__(self, "trim", frozen(self.trim, "trim", (size, len(STATES))))
         if self.aerodynamics.structure != self.structure.aerodynamics:
             raise InputError("aerodynamics: another regression than that of the structure")
-        if self.coefficient_covariance is not None:
-            covariance = frozen(self.coefficient_covariance, "coefficient covariance", (6, n, 6, n))
-            object.__setattr__(self, "coefficient_covariance", covariance)
 
     # --- what it is ------------------------------------------------------------------------------
 
@@ -112,6 +107,13 @@ class KinematicModel:
     def theta(self) -> Array:
         """Coefficients (n_regressors, 6)."""
         return self.aerodynamics.theta
+
+    @property
+    def covariance(self) -> Array | None:
+        """Of all coefficients together (6, n, 6, n), (equation, regressor, equation, regressor), as
+        of `LPVARXModel`; None where the method gives none.
+        """
+        return self.aerodynamics.covariance
 
     @property
     def method(self) -> str:
@@ -302,7 +304,8 @@ class KinematicModel:
         Raises
         ------
         InputError
-            The method gave no covariance of all coefficients together: fit by `FilterError`.
+            The method gave no covariance, or is least squares, whose covariance says nothing of
+            the bias by noise in the regressors: fit by `FilterError`.
 
         References
         ----------
@@ -310,17 +313,17 @@ class KinematicModel:
         state feedback with ellipsoidal parametric uncertainty via LMIs, Automatica 44, for
         ellipsoids of coefficients in LMIs.
         """
-        if self.coefficient_covariance is None:
+        if self.covariance is None or self.method in LEAST_SQUARES:
             raise InputError(
-                f"method {self.method!r} gives no covariance of all coefficients together: fit by"
-                " FilterError(SimulatedFlight(...))"
+                f"method {self.method!r} gives no covariance that holds for noise in the"
+                " regressors: fit by FilterError(SimulatedFlight(...))"
             )
         block, ellipsoid = self.realization.uncertain_part(
             self.parameters,
             outputs,
             inputs,
             held or {},
-            self.coefficient_covariance,
+            self.covariance,
             probability,
             draws,
         )

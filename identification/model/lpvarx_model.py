@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+LEAST_SQUARES = ("ls", "rls")
+"""Methods whose coefficients noise in the regressors biases, of which their covariance says
+nothing.
+"""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LPVARXModel:
@@ -55,9 +60,10 @@ class LPVARXModel:
         On the data.
     details : mapping
         What the method chose (weights, iterations, ...): plain numbers and lists by name.
-    covariance : array (ny, n_regressors, n_regressors), optional
-        Of the coefficients, an equation at a time as `Uncertainty.covariance`, where somebody put
-        it there; it is carried along, saved and loaded.
+    covariance : array (ny, n_regressors, ny, n_regressors), optional
+        Of all coefficients together, theta[i, y] with theta[j, z] at [y, i, z, j], under the
+        hypothesis of the method that `fit` names; None where the method gives none. Zero for
+        coefficients an equation does not have.
 
     Raises
     ------
@@ -109,7 +115,7 @@ class LPVARXModel:
         if self.covariance is not None:
             n = arx.n_regressors
             object.__setattr__(
-                self, "covariance", frozen(self.covariance, "covariance", (arx.ny, n, n))
+                self, "covariance", frozen(self.covariance, "covariance", (arx.ny, n) * 2)
             )
         own, given = (
             (arx.outputs, arx.inputs, arx.parameters),

@@ -24,7 +24,6 @@ def save(model: KinematicModel, path: str | os.PathLike[str]) -> Path:
     Raises `InputError` where `details` hold more than plain values, `SymheliError` where the file
     cannot be written.
     """
-    covariance = model.coefficient_covariance
     return plain_file.write(
         path,
         SCHEMA,
@@ -32,7 +31,6 @@ def save(model: KinematicModel, path: str | os.PathLike[str]) -> Path:
             "structure": saved_model.described_structure(model.structure),
             **saved_model.described(model.aerodynamics),
             "trim": model.trim.tolist(),
-            "coefficient_covariance": None if covariance is None else covariance.tolist(),
         },
     )
 
@@ -50,7 +48,6 @@ def load(path: str | os.PathLike[str], basis: FunctionSpace | None = None) -> Ki
             structure=kin,
             aerodynamics=saved_model.model_of(kin.aerodynamics, content),
             trim=content["trim"],
-            coefficient_covariance=content["coefficient_covariance"],
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise plain_file.incomplete(path, error) from error

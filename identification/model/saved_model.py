@@ -15,6 +15,7 @@ from identification.structure.lpvarx import LPVARX
 from symheli.lpv import FunctionSpace
 from symheli.lpv.bases.described import basis_of, described_basis, tuples
 from symheli.values import plain_file
+from symheli.values.arrays import Array
 
 SCHEMA = "symheli LPV-ARX model"
 
@@ -95,8 +96,26 @@ def model_of(structure: LPVARX, content: dict[str, Any]) -> LPVARXModel:
         method=content["method"],
         excitation=None,
         details=content["details"],
-        covariance=content["covariance"],
+        covariance=_covariance_of(structure, content),
     )
+
+
+def _covariance_of(structure: LPVARX, content: dict[str, Any]) -> Array | None:
+    """Of all coefficients together, also from files of an earlier layout.
+
+    Those of an `LPVARXModel` held it an equation at a time, (ny, n, n): with one output that is all
+    of it, with several the model has none, since what was not kept between equations is unknown and
+    not zero. Those of a `KinematicModel` held it all under another name.
+    """
+    found = content.get("coefficient_covariance")
+    if found is None:
+        found = content["covariance"]
+    if found is None:
+        return None
+    covariance = np.asarray(found, float)
+    if covariance.ndim == 3:
+        return covariance[:, :, None] if structure.ny == 1 else None
+    return covariance
 
 
 def save_mat(model: LPVARXModel, path: str | os.PathLike[str]) -> Path:

@@ -477,8 +477,8 @@ def _prepared(
 def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
     """Pictures and the model, where asked for; the paths written."""
     from identification import uncertainty
+    from identification.model.lpvarx_model import LEAST_SQUARES
     from studies.log import figure
-    from studies.log.report import CERTAIN
 
     if arguments.plot:
         yield figure.save(figure.figure(result), arguments.plot)
@@ -487,7 +487,7 @@ def _write(arguments: argparse.Namespace, result: Any) -> Iterator[Path]:
         yield figure.save(bands[0].figure, arguments.bands)
     if arguments.save:
         model = result.scheduled
-        if model.method in CERTAIN:
+        if model.method in LEAST_SQUARES:
             model = replace(model, covariance=uncertainty(model, result.training).covariance)
         yield (
             model.save(arguments.save)

@@ -11,11 +11,9 @@ import numpy as np
 from identification import AgainstConstant, LPVARXModel, residual_analysis, slow_modes, uncertainty
 from identification.judge.against_constant import HORIZONS, PAYS
 from identification.judge.scores import Scores, percent
+from identification.model.lpvarx_model import LEAST_SQUARES
 from studies.output import columns
 from symheli.records import FlightRecord, KinematicCheck, SensorCheck
-
-CERTAIN = ("ls", "rls")
-"""Methods whose coefficients have a covariance here."""
 
 FIT = (
     "fit in percent: 100 perfect, 0 no better than the output's mean, below 0 worse than that; the",
@@ -110,7 +108,7 @@ def data(
     judged = len(result.judged) > 1 and result.test is not None
     pays = {str(y): result.pays(str(y)) for y in result.scheduled.outputs} if judged else None
     worth = {str(y): result.verdict_on(str(y)) for y in pays} if pays is not None else None
-    certain = result.scheduled.method in CERTAIN
+    certain = result.scheduled.method in LEAST_SQUARES
     return {
         "read": found,
         "kinematics": None if check is None else [_sensor(row) for row in check.rows],
@@ -280,7 +278,7 @@ def _certainty(result: AgainstConstant) -> list[str]:
     model = result.scheduled
     lags = min(25, len(result.training) // 20)
     analysis = f"in sample, {residual_analysis(model, result.training, lags)}"
-    if model.method not in CERTAIN:
+    if model.method not in LEAST_SQUARES:
         return [analysis]
     known = uncertainty(model, result.training)
     colour = ", ".join(

@@ -136,7 +136,7 @@ def test_the_order_of_records_does_not_matter_and_more_of_them_say_more(vehicle)
         fitted(vehicle, records, Source(), steps=5)
         for records in ([first, second], [second, first])
     )
-    spread = np.sqrt(np.einsum("onon->no", one.coefficient_covariance))
+    spread = np.sqrt(np.einsum("onon->no", one.covariance))
     assert np.abs((one.theta - other.theta) / spread).max() < 1e-5  # sums in another order
     error, alone = (
         np.linalg.norm(m.theta - vehicle.theta)
@@ -152,7 +152,7 @@ def test_a_missing_sample_cuts_a_record_in_two(vehicle):
     parts = [whole.rows(np.arange(320) < 150), whole.rows(np.arange(320) > 150)]
     gap = whole.rows(np.arange(320) != 150)
     found = [fitted(vehicle, cut, Cut(clean), steps=5) for cut in (holed, parts, gap)]
-    spread = np.sqrt(np.einsum("onon->no", found[0].coefficient_covariance))
+    spread = np.sqrt(np.einsum("onon->no", found[0].covariance))
     for other in found[1:]:
         assert np.abs((found[0].theta - other.theta) / spread).max() < 1e-5
 
@@ -161,7 +161,7 @@ def test_it_is_closer_than_instruments_and_these_than_least_squares(vehicle):
     """Noise on the sensors biases least squares; instruments only scatter; weights scatter less."""
     record, source = vehicle.record(600, sensors=SENSORS), vehicle.without_noise(seed=1)
     found = fitted(vehicle, record, source)
-    spread = np.sqrt(np.einsum("onon->no", found.coefficient_covariance))
+    spread = np.sqrt(np.einsum("onon->no", found.covariance))
     weighed, instruments, least = (
         np.sqrt(np.mean(((m.theta - vehicle.theta) / spread) ** 2))
         for m in (
@@ -185,7 +185,7 @@ def test_the_truth_lies_within_the_region_it_states(vehicle):
     for seed in range(6):
         record = vehicle.record(2400, seed=seed, sensors=SENSORS)
         found = fitted(vehicle, record, vehicle.without_noise(seed=seed))
-        spread = np.sqrt(np.einsum("onon->no", found.coefficient_covariance))
+        spread = np.sqrt(np.einsum("onon->no", found.covariance))
         shares.append(np.mean(np.abs(found.theta - vehicle.theta) < 1.96 * spread))
     # entries of one flight are correlated: shares scatter by 0.03 from flight to flight
     assert 0.90 < np.mean(shares) < 0.98

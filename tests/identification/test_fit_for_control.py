@@ -67,7 +67,7 @@ def structure(na=0):
 
 def fitted(record, na=0):
     model = idn.fit(structure(na), record)
-    return model, idn.uncertainty(model, record).joint
+    return model, idn.uncertainty(model, record).covariance
 
 
 def with_gain(model, factor):

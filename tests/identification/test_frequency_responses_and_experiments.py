@@ -171,7 +171,7 @@ def test_bounds_are_the_standard_errors_a_fit_reports():
         record.signals,
     )
     model = fit(structure(), noisy)
-    white = np.sqrt(np.diagonal(uncertainty(model, noisy).white[0]))
+    white = np.sqrt(np.diagonal(uncertainty(model, noisy).white[0, :, 0]))
     scale = np.sqrt(model.residual_covariance[0, 0])
     np.testing.assert_allclose(
         one.bounds * scale, white, rtol=0.15

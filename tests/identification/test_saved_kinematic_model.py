@@ -11,7 +11,9 @@ from known_vehicles import CONTROLS, STATES, Vehicle
 from scipy.io import loadmat
 
 import identification as idn
+from identification.model import saved_kinematic_model
 from symheli.errors import InputError
+from symheli.values import plain_file
 
 OWN = idn.UserFunctions((np.ones_like, np.cos), 0.0, 10.0, ("1", "cos p"))
 
@@ -34,10 +36,10 @@ def model(vehicle, flight):
 def test_it_comes_back_to_the_last_bit(model, flight, tmp_path):
     n = model.structure.n_regressors
     covariance = np.arange(36.0 * n * n).reshape(6, n, 6, n) / 7
-    model = replace(model, coefficient_covariance=covariance)
+    model = replace(model, aerodynamics=replace(model.aerodynamics, covariance=covariance))
     back = idn.KinematicModel.load(model.save(tmp_path / "folder" / "m.json"))
     assert back.structure == model.structure
-    for name in ("theta", "trim", "coefficient_covariance"):
+    for name in ("theta", "trim", "covariance"):
         np.testing.assert_array_equal(getattr(back, name), getattr(model, name))
     assert (back.inputs, back.parameters, back.dt, back.method) == (
         model.inputs,
@@ -46,6 +48,17 @@ def test_it_comes_back_to_the_last_bit(model, flight, tmp_path):
         model.method,
     )
     np.testing.assert_array_equal(back.simulate(flight), model.simulate(flight))
+
+
+def test_a_covariance_under_its_name_of_before_is_read(model, tmp_path):
+    path = model.save(tmp_path / "m.json")
+    content = plain_file.read(path, saved_kinematic_model.SCHEMA)
+    content["coefficient_covariance"], content["covariance"] = content["covariance"], None
+    plain_file.write(path, saved_kinematic_model.SCHEMA, content)
+    np.testing.assert_array_equal(idn.KinematicModel.load(path).covariance, model.covariance)
+    content["coefficient_covariance"] = None
+    plain_file.write(path, saved_kinematic_model.SCHEMA, content)
+    assert idn.KinematicModel.load(path).covariance is None
 
 
 def test_functions_brought_along_must_be_brought_again(flight, tmp_path):

@@ -9,7 +9,9 @@ from known_systems import Truth, moving, moving_box, structure
 from scipy.io import loadmat
 
 import identification as idn
+from identification.model import saved_model
 from symheli.errors import InputError, SymheliError
+from symheli.values import plain_file
 
 OWN = idn.UserFunctions((np.ones_like, np.cos), 0.0, 13.0, ("1", "cos p"))
 CASES = {
@@ -53,7 +55,7 @@ def test_a_model_comes_back_to_the_last_bit(case, tmp_path):
         model.inputs,
         model.parameters,
     )
-    for name in ("theta", "residual_covariance"):
+    for name in ("theta", "residual_covariance", "covariance"):
         np.testing.assert_array_equal(getattr(back, name), getattr(model, name))
     assert (back.dt, back.method, back.rows_used, back.rows_dropped) == (
         model.dt,
@@ -67,7 +69,7 @@ def test_a_model_comes_back_to_the_last_bit(case, tmp_path):
 def test_units_details_and_covariance_travel_along(tmp_path):
     model, record = fitted("one output", "ridge")
     n = model.structure.n_regressors
-    carried = replace(model, covariance=np.arange(n * n, dtype=float).reshape(1, n, n) / 7)
+    carried = replace(model, covariance=np.arange(n * n, dtype=float).reshape(1, n, 1, n) / 7)
     back = idn.LPVARXModel.load(carried.save(tmp_path / "b.json"))
     np.testing.assert_array_equal(back.covariance, carried.covariance)
     assert back.details == model.details
@@ -77,6 +79,22 @@ def test_units_details_and_covariance_travel_along(tmp_path):
     with_units = idn.fit(structure(basis=idn.Polynomial(1, 0.0, 7.0)), in_knots)
     back = idn.LPVARXModel.load(with_units.save(tmp_path / "c.json"))
     assert (back.outputs[0].unit, back.parameters[0].unit) == ("rad", "m/s")
+
+
+def test_an_earlier_covariance_an_equation_at_a_time_is_read_where_it_is_all(tmp_path):
+    """With several outputs what was not kept between equations is unknown, and not zero."""
+    for case in ("one output", "orders by signal"):
+        model, record = fitted(case)
+        path = model.save(tmp_path / "m.json")
+        content = plain_file.read(path, saved_model.SCHEMA)
+        content["covariance"] = np.einsum("yiyj->yij", model.covariance).tolist()
+        plain_file.write(path, saved_model.SCHEMA, content)
+        back = idn.LPVARXModel.load(path)
+        if model.structure.ny == 1:
+            np.testing.assert_array_equal(back.covariance, model.covariance)
+        else:
+            assert back.covariance is None
+        np.testing.assert_array_equal(back.simulate(record), model.simulate(record))
 
 
 def test_damaged_foreign_and_newer_files_are_refused_in_words(tmp_path):

@@ -115,7 +115,7 @@ def test_draws_scatter_as_the_covariance_says_and_reach_the_state_space_form():
     known = idn.uncertainty(model, record, lags=5)
     drawn = known.draws(1500, seed=3)
     flat = np.array([m.theta.T.reshape(-1) for m in drawn])
-    square = known.joint.reshape((flat.shape[1],) * 2)
+    square = known.covariance.reshape((flat.shape[1],) * 2)
     sigma = np.sqrt(np.maximum(np.diagonal(square), np.finfo(float).tiny))
     # correlations of 1500 draws are known to 0.026; four of those
     np.testing.assert_allclose(
@@ -144,7 +144,7 @@ def test_correlated_noise_correlates_the_coefficients_of_two_equations():
         outputs=("a", "b"), inputs=("u",), na=1, nb=1, basis=idn.Polynomial(0, 0.0, 13.0)
     )
     model, record = noisy(Truth(shared), 2, mixing=((1.0, 0.0), (1.0, 0.0)))
-    joint = idn.uncertainty(model, record, lags=1).joint
+    joint = idn.uncertainty(model, record, lags=1).covariance
     assert joint[0, 2, 1, 2] == pytest.approx(
         np.sqrt(joint[0, 2, 0, 2] * joint[1, 2, 1, 2]), rel=1e-6
     )

@@ -56,7 +56,7 @@ def test_standard_errors_are_the_scatter_of_repeated_experiments(colour):
         u = uncertainty(model, record, lags=60)  # the noise forgets within 30 samples
         fits.append(model.theta[:, 0])
         errors.append(u.standard_errors[:, 0])
-        white.append(np.sqrt(np.diagonal(u.white[0])))
+        white.append(np.sqrt(np.diagonal(u.white[0, :, 0])))
     scatter = np.std(fits, axis=0, ddof=1)
     # the scatter of 150 fits is known to 6 %; the taper takes a few percent off
     np.testing.assert_allclose(np.mean(errors, axis=0), scatter, rtol=0.25)

@@ -246,7 +246,7 @@ def test_identify_writes_the_model_and_the_bands_of_its_coefficients(answer, run
         model.coefficients.monomial().A, got["models"]["LPV, degree 1"]["coefficients"]["A"]
     )
     np.testing.assert_allclose(
-        np.sqrt(np.einsum("yii->iy", model.covariance)), got["standard_errors"], rtol=1e-12
+        np.sqrt(np.einsum("yiyi->iy", model.covariance)), got["standard_errors"], rtol=1e-12
     )
     answer("identify", log, *STRUCTURE, *UNITS, "--save", tmp_path / "model.mat")
     assert list(np.atleast_1d(loadmat(tmp_path / "model.mat", simplify_cells=True)["outputs"])) == [
