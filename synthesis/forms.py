@@ -136,7 +136,7 @@ class Spline(_InP):
 
 @dataclass(frozen=True)
 class Memory(_InP):
-    """V = x' P(p, p - q) x with q a first-order lag of p: P knows where p came from.
+    """V = x' P(p, p - q) x with q a first-order lag of p: P depends on the recent history of p.
 
     For `l2_gain` and `stability` of one parameter in continuous time. A finite memory of the
     parameter makes a quadratic V exact in the limit.

@@ -156,7 +156,8 @@ class Vertices(_Strictly):
 
 @dataclass(frozen=True)
 class Grid(_Strictly):
-    """On a grid: proves nothing; the certificate is `UNPROVEN` and gives an `indicative` bound.
+    """Inequalities on a grid only: this proves nothing; the certificate is `UNPROVEN` and gives an
+    `indicative` bound.
 
     Parameters
     ----------

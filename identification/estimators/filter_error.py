@@ -52,8 +52,8 @@ CHUNK = 256
 
 @dataclass(frozen=True)
 class FilterError(Method):
-    """Every state measured with white noise, and aerodynamics that a `KinematicARX` describes up to
-    a small white error: the coefficients of largest likelihood.
+    """Filter-error method: maximum likelihood with white measurement noise on every state and a
+    small white error of the aerodynamics that a `KinematicARX` describes.
 
     y = x + v with variances R, and the structure's equations hold for x up to w with variances Q.
     For given coefficients the best x is a smoother's; the equations linearized there are linear in

@@ -48,8 +48,8 @@ ADVICE = (
 
 @dataclass(frozen=True)
 class RefinedInstruments(Method):
-    """Instrumental variables refined with the simulated response: the model found so far
-    instruments and filters, until nothing moves.
+    """Refined instrumental variables: the response simulated by the current model serves as
+    instruments and sets the filters, repeated until convergence.
 
     Parameters
     ----------

@@ -64,8 +64,8 @@ class Scored:
 
 @dataclass(frozen=True, kw_only=True)
 class AgainstConstant:
-    """The models fitted to one record: the one that is judged, the LTI one it is judged against
-    (where there are two), then rivals.
+    """The models fitted to one record: the scheduled one, the LTI one it is compared with (if both
+    exist), then alternative models.
 
     `hold_p`: one step and 1 s hold p from the start of each prediction, because it is measured.
     `leak`: share of what is new in p that the outputs of the same instant explain; beyond a half
@@ -216,7 +216,8 @@ def against_constant(
     hold_p: bool = False,
     method: Method | str = "ls",
 ) -> AgainstConstant:
-    """Fit a scheduled model and the constant one of the same order, and say where scheduling pays.
+    """Fit a scheduled model and the constant one of the same order, and show where scheduling
+    improves the prediction.
 
     Scheduling pays for an output where the scheduled model is more than one point better in free
     run on held-out data and no worse 1 s ahead; it pays for prediction only where it is better 1 s

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrequencyResponse:
-    """Response of outputs to inputs at n frequencies, the other inputs taken off.
+    """Response of outputs to inputs at n frequencies, with the effect of the other inputs removed.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def frequency_response(
     window: float,
     band: tuple[float, float] | None = None,
 ) -> FrequencyResponse:
-    """Spectral estimate G = Gyu Guu^-1 from one record or several: Hann windows, half overlapping,
-    averaged.
+    """Return the spectral estimate G = Gyu Guu^-1 from one record or several: Hann windows, half
+    overlapping, averaged.
 
     A long window resolves low frequencies, a short one averages more: about five windows a record
     are the least. Windows that a gap or a missing sample touches are left out. Feedback biases G

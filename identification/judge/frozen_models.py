@@ -74,7 +74,8 @@ class FrozenModels:
 
 
 def pole_miss(model: LinearModel, pole: complex) -> float:
-    """Distance of the nearest pole of a linear model to `pole` (rad/s), percent of its magnitude.
+    """Return the distance of the nearest pole of a linear model to `pole` (rad/s), in percent of
+    its magnitude.
 
     The poles of a sampled model count as those of the continuous one it samples.
 
@@ -132,7 +133,7 @@ def frozen_models(
     responses_at: float | None = None,
     fast: float = FAST,
 ) -> FrozenModels:
-    """Compare a baseline and an identified model with exact linear models, scheduling held.
+    """Compare a baseline and an identified model with exact linear models at frozen scheduling.
 
     Everything is compared at the sample period of the identified model, inputs held from sample to
     sample, on its inputs and outputs.

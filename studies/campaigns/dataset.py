@@ -66,11 +66,11 @@ class CampaignDataset:
     def open(
         cls, path: str | os.PathLike[str], campaign: Campaign, about: Mapping[str, Any]
     ) -> CampaignDataset:
-        """The dataset for `campaign`: a new one, or one that is there, with the cases it lacks
-        added behind its own. `about` is said of a new one.
+        """Open the dataset for `campaign`: a new one with the attributes `about`, or an existing
+        one, to which the missing cases are appended.
 
-        Raises `InputError` where the folder holds something else or rows of other trials, and
-        `SymheliError` where it cannot be written.
+        Raises `InputError` if the folder holds something else or rows of other trials, and
+        `SymheliError` if it cannot be written.
         """
         folder, units = Path(path), campaign.trial.units
         if (folder / CASES).is_file():

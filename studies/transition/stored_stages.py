@@ -4,7 +4,7 @@ another stopped.
 A stage is stored as a Python pickle below a line with the key of what it was computed from and the
 digest of its bytes. The key covers what the stage reads of the effort and the keys of the stages it
 needs: where one entry changes, the stages that it reaches are computed again, and no others.
-Pickles run code when they are read: only folders of one's own are resumed.
+Pickles run code when they are read: resume only your own folders.
 """
 
 from __future__ import annotations

@@ -126,7 +126,7 @@ def gain_scheduled_lqr(
     points: int = 14,
     servos: Mapping[str, Servo] | None = None,
 ) -> Autopilot:
-    """LQR at several airspeeds on the model with quasi-steady flapping.
+    """Design an LQR at several airspeeds on the model with quasi-steady flapping.
 
     Each gain is checked on the full model (flapping states, servos where given, one sample of
     delay) and softened until stable there.

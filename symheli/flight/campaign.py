@@ -41,7 +41,8 @@ def fly_campaign(
     progress: Progress | None = None,
     **options: Unpack[Options],
 ) -> FlightDataset:
-    """`fly_batch` into one dataset on disk; called again after a stop it flies what is missing.
+    """Run `fly_batch` into one dataset on disk; a repeated call after an interruption flies only
+    what is missing.
 
     Flights are written as they are done, in chunks that are whole or not there; a flight has the
     same bits whether it was flown before the stop or after. Memory: a few chunks.

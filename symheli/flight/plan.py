@@ -50,7 +50,8 @@ class Options(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """A flight before it is flown; `record.meta["plan"]` of every flight, to be flown again.
+    """All settings of a flight; `record.meta["plan"]` of every flight holds them, so that it can be
+    repeated.
 
     Parameters
     ----------

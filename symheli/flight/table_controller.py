@@ -381,7 +381,7 @@ class TableController:
             Commands applied on the axes that are not flown, rad; default the trim.
         """
         n, s, nu, ny = self.numbers, self._own(state), len(self.inputs), len(self.outputs)
-        with np.errstate(all="ignore"):  # numbers that are none are met below
+        with np.errstate(all="ignore"):  # NaN and infinity are handled below
             seen, held = as_told("measured", measured, nu), as_told("reference", reference, nu)
             at = as_told("trim", trim, ny)
             elsewhere = at if others is None else as_told("others", others, ny)

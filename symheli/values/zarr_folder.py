@@ -120,7 +120,7 @@ class ZarrFolder:
         return found
 
     def array(self, name: str) -> ZarrArray:
-        """What is said of an array; `InputError` where that is damaged."""
+        """Metadata of an array; raises `InputError` if they are damaged."""
         try:
             about = json.loads((self.path / name / ".zarray").read_text(encoding="utf-8"))
             along = json.loads((self.path / name / ".zattrs").read_text(encoding="utf-8"))

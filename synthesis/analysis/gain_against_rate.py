@@ -42,8 +42,8 @@ def gain_against_rate(
     solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> GainCurve:
-    """Certified L2 gains of a model over the permitted rates of its parameter, with what no proof
-    can undercut.
+    """Certify the L2 gain of a model over a list of rate bounds of its parameter, each with a lower
+    bound.
 
     Parameters
     ----------

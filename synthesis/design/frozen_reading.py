@@ -30,8 +30,8 @@ def proven_around(
     tolerance: float = 0.05,
     **options: Any,
 ) -> tuple[float, float]:
-    """The interval of the parameter around `at` on which the loop of the constant controller K(at)
-    is proven stable while the parameter moves there.
+    """Find the interval of the parameter around `at` on which the loop of the constant controller
+    K(at) is proven stable while the parameter moves there.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ def certify_sampled(
     cover: bool = True,
     **options: Any,
 ) -> SampledLoop:
-    """The proven gain of a sampled plant under a controller as implemented.
+    """Certify the gain of a sampled plant under a controller as implemented.
 
     Parameters
     ----------

@@ -50,7 +50,8 @@ LOST = 0.1
 def with_wrong_parameter(
     plant: Plant, controller: Any, error: float, *, divisions: int = 8
 ) -> UncertainStateSpace:
-    """The loop of a controller that reads p + b instead of p, for every b(t) with |b| <= `error`.
+    """Return the loop of a controller that reads p + b instead of p, for every b(t) with |b| <=
+    `error`.
 
     A reading beyond the range of the parameter counts as its end. A bias of b0 and a lag of T s at
     rates |dp/dt| <= r together are within `error` = b0 + T r, whatever their motion.
