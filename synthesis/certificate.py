@@ -243,12 +243,13 @@ class Certificate:
                 )
         if sign * (self.frozen - self.limit) > 1e-9 * abs(self.frozen):
             raise CertificateError(
-                f"the {moving} {self.limit:.9g} forgets the frozen {what} {self.frozen:.9g}"
+                f"the {moving} {self.limit:.9g} is inconsistent with the frozen {what}"
+                f" {self.frozen:.9g}"
             )
         if self.verified and self.status is not Status.PROVEN:
             raise CertificateError(f"a verified certificate cannot have the status {self.status}")
         if self.verified and self.proof is None:
-            raise CertificateError("a verified certificate needs its proof, and has none")
+            raise CertificateError("a verified certificate needs its proof, which is missing")
         if self.verified and self.kind == "decay rate" and not self.alpha >= 0:
             raise CertificateError(
                 f"a decay rate of {self.alpha:.6g} is growth, and proves nothing"
@@ -371,7 +372,7 @@ class Certificate:
         try:
             return self.proof.fault(self.kind, self.rates)
         except (TypeError, ValueError, AttributeError, LookupError, OverflowError) as error:
-            return f"the evidence is none that an analysis made: {error}"
+            return f"the proof was not made by an analysis: {error}"
 
     def __str__(self) -> str:
         """What is proven, in three lines; `details` says the rest."""

@@ -42,9 +42,9 @@ class _InP:
         ):
             raise InputError(
                 f"segments must be an integer from 1 to {MOST}, or a tuple of them to try in turn,"
-                f" got {self.segments!r:.80}; each segment has inequalities of its own, and a"
-                " program of more is not solved in any time: grade the knots (grading=2) towards"
-                " where P changes most, or narrow the range"
+                f" got {self.segments!r:.80}; each segment adds inequalities, and a larger program"
+                " is not solved in reasonable time: grade the knots (grading=2) towards where P"
+                " changes most, or narrow the range"
             )
         object.__setattr__(self, "segments", None if segments is None else tuple(segments))
         if self.grading is not None and not self.grading >= 1:

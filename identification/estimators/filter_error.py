@@ -144,8 +144,8 @@ class FilterError(Method):
         """With the noise found, and the covariance of all coefficients together in the details."""
         if not isinstance(arx, Aerodynamics):
             raise InputError(
-                "the filter error method knows kinematics: fit a KinematicARX, or take another"
-                " method for LPVARX"
+                "the filter error method needs known kinematics: fit a KinematicARX, or choose"
+                " another method for an LPVARX"
             )
         theta, _ = instrumental_variables(arx, records, data, self.simulator)
         left = self.misfit * self._unexplained(arx, records)

@@ -274,8 +274,8 @@ def explained(
     known = np.logical_and(np.isfinite(W).all(axis=1), np.isfinite(measured).all(axis=1))
     if known.sum() <= W.shape[1]:
         raise ExcitationError(
-            f"{W.shape[1]} instruments on {known.sum()} samples explain anything; record longer, or"
-            " use fewer lags"
+            f"{W.shape[1]} instruments on {known.sum()} samples fit any data exactly; record"
+            " longer, or use fewer lags"
         )
     Q = column_space(W[known])
     found = np.full_like(measured, np.nan)

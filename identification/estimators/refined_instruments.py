@@ -243,7 +243,7 @@ def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
         )
         missing = direction_in_words(directions[-1], names)
         raise ExcitationError(
-            f"the simulated response leaves undetermined: {missing}; excite the inputs more richly,"
+            f"the simulated response does not determine: {missing}; excite the inputs more richly,"
             " or lower the orders"
         )
     return np.linalg.solve(square, Q.T @ y) / scale

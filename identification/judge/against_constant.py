@@ -165,7 +165,7 @@ class AgainstConstant:
             raise UnknownNameError("output", output, map(str, self.scheduled.outputs))
         if len(self.judged) < 2:
             raise InputError(
-                "the structure is a constant one itself: give one with a basis of degree 1 or more"
+                "the structure is itself constant; give one with a basis of degree 1 or more"
             )
         lpv, lti = self._fits(output)
         out = {h: difference(lpv[h], lti[h]) for h in HORIZONS[1:]}
@@ -185,7 +185,10 @@ class AgainstConstant:
         """{horizon: held-out fit} of the model that is judged and of the LTI one."""
         for one in self.judged:
             if one.held_out is None:
-                raise InputError("nothing was held out: fits in sample cannot tell what pays")
+                raise InputError(
+                    "nothing was held out: fits in sample cannot show whether scheduling improves"
+                    " the model; hold out a part of the record"
+                )
             yield {h: fits[output] for h, fits in one.held_out.by_horizon.items()}
 
 

@@ -183,8 +183,8 @@ def _scheduled(
         inside = np.clip(values, s.low, s.high)
         if not np.any(inside == values):
             raise InputError(
-                f"{name} is nowhere within the baseline's {s.low:g} to {s.high:g}; name the signal"
-                " that schedules it: scheduling=..."
+                f"{name} never lies within the baseline's range {s.low:g} to {s.high:g}; name the"
+                " signal that schedules it: scheduling=..."
             )
         columns.append(inside)
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)

@@ -182,8 +182,8 @@ def response_of(
     nu = len(inputs)
     if count < nu + 1:
         raise ExcitationError(
-            f"{count} unbroken windows of {window} s say nothing about {nu} inputs; record longer"
-            " or shorten the window"
+            f"{count} unbroken windows of {window} s are too few for {nu} inputs; record longer or"
+            " shorten the window"
         )
     Suu, Syu, Syy = S[:, :nu, :nu], S[:, nu:, :nu], S[:, nu:, nu:]
     size = np.sqrt(np.einsum("kii->ki", Suu).real)

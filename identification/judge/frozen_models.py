@@ -107,12 +107,14 @@ def pole_miss(model: LinearModel, pole: complex) -> float:
     """
     if pole == 0 or not np.isfinite(pole):
         raise InputError(
-            f"pole: expected a finite one that is not 0, got {pole}; a miss is told in percent"
-            " of it"
+            f"pole: expected a finite pole other than 0, got {pole}; the distance is given in"
+            " percent of its magnitude"
         )
     poles = continuous_poles(model)
     if not len(poles):
-        raise InputError("the model has no pole but delays; there is none to compare")
+        raise InputError(
+            "the model has no poles other than those of delays; there is none to compare"
+        )
     return float(100 * np.abs(poles - pole).min() / abs(pole))
 
 

@@ -216,7 +216,7 @@ def _drawn_radius(
     if rank > draws:
         least = math.ceil(math.log(CHANCE) / math.log(probability))
         raise InputError(
-            f"draws: expected at least {least} to tell a probability of {probability:g}, got"
+            f"draws: expected at least {least} to estimate a probability of {probability:g}, got"
             f" {draws}"
         )
     m, n = P.shape[:2]

@@ -42,9 +42,9 @@ class UnseenFlight:
         """Raise `InputError` if the model does not explain the flight."""
         if not self.explained:
             raise InputError(
-                f"the model leaves {self.power:.2f} of what its noise explains on this flight, more"
-                f" than {self.largest:.2f}: no certificate about it holds for this vehicle;"
-                " identify from this flight too, or look for what has changed"
+                f"the residual power on this flight is {self.power:.2f} of what the noise model"
+                f" explains, more than {self.largest:.2f}: no certificate about it holds for this"
+                " vehicle; identify from this flight too, or find out what has changed"
             )
 
 

@@ -43,8 +43,8 @@ class RecursiveLeastSquares:
     sample they move along the gain g = R^-1 (R^-T phi), theta += g (y - theta' phi)', and are
     solved anew as soon as a running bound of the rounding errors along it is no longer small, so
     that they are at every sample those of batch least squares on the weighted samples so far.
-    Undetermined directions are regularized by pseudo-observations: each coefficient is 0, with the weight of
-    32 eps samples with its regressor at its largest (without forgetting; otherwise see
+    Undetermined directions are regularized by pseudo-observations: each coefficient is 0, with the
+    weight of 32 eps samples with its regressor at its largest (without forgetting; otherwise see
     `Constant`). Models made from the state exclude them: `RLSState.solve` removes these rows.
     `determined` says whether the data determine every coefficient, by the rule of
     `identification.design.determined`.
@@ -141,8 +141,8 @@ class RecursiveLeastSquares:
         """
         if isinstance(self.structure, KinematicARX):
             raise InputError(
-                "with known kinematics a sample says nothing without the one before, which a state"
-                " does not hold: take online().update(y, u, p), or run(record)"
+                "with known kinematics an update needs the sample before, which a state does not"
+                " hold: use online().update(y, u, p), or run(record)"
             )
         online = self._online(state)
         return _outcome(online, online.update(y, u, p))

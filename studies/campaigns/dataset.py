@@ -55,7 +55,7 @@ class CampaignDataset:
             object.__setattr__(self, "attributes", content["attributes"])
             object.__setattr__(self, "cases", tuple(map(Case, content["cases"])))
         except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
-            raise InputError(f"{self.path}: no dataset of a campaign ({error})") from error
+            raise InputError(f"{self.path}: not a dataset of a campaign ({error})") from error
         if digest != _digest(content):
             raise InputError(
                 f"{self.path / CASES} does not match its digest: it was damaged or edited, or an"
@@ -80,7 +80,7 @@ class CampaignDataset:
             new = [case for case in campaign.cases if case.key not in known]
             cases, about = (*there.cases, *new), there.attributes
         elif folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-            raise InputError(f"{folder} is there and holds no campaign; give another folder")
+            raise InputError(f"{folder} exists and does not hold a campaign; give another folder")
         else:
             cases = campaign.cases
             about = {**about, "trial": campaign.trial.name, "units": units}

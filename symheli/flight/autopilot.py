@@ -194,8 +194,8 @@ def _lqr(model: LinearModel, input_scale: float) -> np.ndarray:
             P = solve_discrete_are(model.A, model.B, Q, R)
     except np.linalg.LinAlgError as error:
         raise InputError(
-            f"no LQR at dt = {model.dt} s ({error}): the plant hardly moves from sample to sample,"
-            " or beyond measure; choose dt near its own pace"
+            f"no LQR at dt = {model.dt} s ({error}): the plant changes too little or too much"
+            " between samples; choose dt near its time constants"
         ) from error
     return np.linalg.solve(R + model.B.T @ P @ model.B, model.B.T @ P @ model.A)
 

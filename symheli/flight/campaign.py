@@ -193,7 +193,7 @@ def _dataset(
         and not (path / ".zgroup").is_file()
         and (path.is_file() or any(path.iterdir()))
     ):
-        raise InputError(f"{path} is there and holds no flights; give another folder")
+        raise InputError(f"{path} exists and does not hold flights; give another folder")
     longest = max(int(np.floor(p.schedule.duration / p.dt + 1e-9)) for p in plans)
     return FlightDataset.create(
         path,

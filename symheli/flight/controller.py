@@ -233,8 +233,8 @@ def require_names(kind: str, given: Sequence[str], known: Sequence[str]) -> None
         indices(given, known, kind)
     except UnknownNameError as error:
         raise InputError(
-            f"the controller's signals must bear their names: {error}; name them, and say what is"
-            " deviation from what: inputs measured minus reference, outputs added to the trim"
+            f"unknown name of a signal of the controller: {error}; use the names of the flight:"
+            " inputs are measured minus reference, outputs are added to the trim"
         ) from error
 
 

@@ -193,7 +193,7 @@ class FlightDataset:
         block = self._folder.chunk("values", i // self._chunk_size) if 0 <= i < len(self) else None
         flown = float(self.duration[i]) if block is not None else np.nan
         if block is None or not np.isfinite(flown):
-            raise InputError(f"{self.path}: flight {i} of {len(self)} is not there")
+            raise InputError(f"{self.path}: flight {i} of {len(self)} does not exist")
         time = self.time
         count = int(np.sum(time <= flown + 1e-9))
         values = block[i % self._chunk_size, :count]

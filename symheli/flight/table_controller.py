@@ -305,8 +305,8 @@ class TableController:
         """
         if self.integrates:
             raise InputError(
-                f"{', '.join(self.integrates)} integrate from a command on, not about the trim:"
-                " fly the table itself"
+                f"{', '.join(self.integrates)} integrate from a command on, not about the trim; fly"
+                " the TableController itself instead of this model"
             )
         return ScheduledController(self.model, self.follow)
 
@@ -449,9 +449,9 @@ class TableController:
         known = ", ".join(f"{s} ({s.unit})" for s in told.signals)
         raise InputError(
             f"the table is over {self.parameter} ({self.parameter.unit}), and a flight provides"
-            f" {known} where it follows the {self.follow}: tell it its parameter by"
-            " .update(state, measured, reference, trim, parameter) in a controller of your own; or,"
-            " where it is one of them under another name, rename that of the model,"
+            f" {known} where it follows the {self.follow}: pass its parameter by .update(state,"
+            " measured, reference, trim, parameter) in a controller of your own; or, where it is"
+            " one of them under another name, rename that of the model,"
             " .with_scheduling(Scheduling(name, unit, low, high, rate))"
         )
 

@@ -99,7 +99,7 @@ def simulate(
     if not np.isfinite(states[-1]).all():  # what is lost stays lost
         lost = ~np.isfinite(states).all(axis=1)
         raise SymheliError(
-            f"the flight left the range of numbers at {dt * int(lost.argmax()):.6g} s: use milder"
+            f"the states became NaN or infinite at {dt * int(lost.argmax()):.6g} s: use milder"
             " inputs or a shorter step"
         )
     warn_of_flights(heli, problem, states[None])

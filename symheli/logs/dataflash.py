@@ -163,8 +163,8 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
         ) from error
     if not present:
         raise InputError(
-            f"{file}: no message that could be read; an ArduPilot log begins with the formats of"
-            " its messages, was this one cut at its beginning?"
+            f"{file}: no readable message; an ArduPilot log begins with the formats of its"
+            " messages, and this one may lack its beginning"
         )
     if said.getvalue():
         warn_of_damage(file)

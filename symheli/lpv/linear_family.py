@@ -158,7 +158,7 @@ class LinearFamily:
         """
         if (self.parameter, self.parameter.unit) != (AIRSPEED, AIRSPEED.unit):
             raise InputError(
-                f"{purpose} is over airspeed in m/s, and this family over {self.parameter}"
+                f"{purpose} needs a family over airspeed in m/s, got one over {self.parameter}"
                 f" ({self.parameter.unit})"
             )
         return self.airspeeds

@@ -371,8 +371,8 @@ def _over_the_same(
         if low > known.low + slack or high < known.high - slack:
             raise InputError(
                 f"the plant holds for {s.name} on [{known.low:g}, {known.high:g}] {s.unit}, what is"
-                f" connected to it on [{low:g}, {high:g}] only; narrow the plant,"
-                " .with_scheduling(...), or make that over the wider range"
+                f" connected to it on [{low:g}, {high:g}] only; narrow the range of the plant,"
+                " .with_scheduling(...), or design over the wider range"
             )
     for s in controller.parameters:
         if (known := own.get(s.name)) and (slower := _made_for_another_rate(s, known, own)):

@@ -126,7 +126,7 @@ def parameters(given: Scheduling | Sequence[Scheduling]) -> tuple[Scheduling, ..
         raise InputError(f"expected a Scheduling or several, got {given!r:.120}")
     names = [s.name for s in out]
     if len(set(names)) < len(names):
-        raise InputError(f"scheduling parameters need names of their own, got {', '.join(names)}")
+        raise InputError(f"scheduling parameters must have different names, got {', '.join(names)}")
     for s in out:
         if not isinstance(s.rate, str):
             continue
@@ -186,8 +186,8 @@ def unit_sizes(known: Sequence[Scheduling], given: Sequence[Scheduling]) -> list
         if size is None and old.unit != "1":
             raise InputError(
                 f"{old.name} is in {old.unit}, got a range in {new.unit}, which does not convert:"
-                f" give it in {old.unit} or a unit of the same quantity; a model over another"
-                " quantity has to be made over that"
+                f" give it in {old.unit} or a unit of the same quantity; for another quantity build"
+                " the model over that quantity"
             )
         sizes.append(1.0 if size is None else size)
     return sizes

@@ -179,13 +179,13 @@ class ZarrFolder:
                 f"{path}: {len(content)} bytes, expected {wanted}; remove it and resume"
             )
         if dtype.kind == "U" and np.any(np.frombuffer(content, "<u4") > LAST_CHARACTER):
-            raise InputError(f"{path}: no text; remove it and resume")
+            raise InputError(f"{path}: not a text file; remove it and resume")
         return np.frombuffer(content, dtype).reshape(array.chunks)
 
     def _damaged(self, name: str, why: str) -> InputError:
         return InputError(
-            f"{self.path / name}: what is said of the array is damaged ({why}); resume, which says"
-            " it anew, or take an older copy"
+            f"{self.path / name}: the metadata of the array are damaged ({why}); resume, which"
+            " writes them again, or take an older copy"
         )
 
     def _file(self, name: str, chunk: int, array: ZarrArray) -> Path:

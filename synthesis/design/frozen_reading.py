@@ -97,7 +97,7 @@ def _one(plant: Plant, rate: Rate) -> tuple[Any, ...]:
     parameters = limits(plant.parameters, rate)
     if len(parameters) != 1:
         raise InputError(
-            "a frozen reading is that of one parameter; the plant has"
+            "a frozen reading needs a plant of one parameter, this one has"
             f" {', '.join(s.name for s in parameters)}"
         )
     return tuple(parameters)

@@ -106,7 +106,7 @@ def with_wrong_parameter(
         raise InputError(f"divisions: expected an integer from 1 to {FINEST}, got {divisions!r}")
     if len(plant.parameters) != 1:
         raise InputError(
-            "a wrong reading is that of one parameter; the plant has"
+            "a wrong reading needs a plant of one parameter, this one has"
             f" {', '.join(s.name for s in plant.parameters)}"
         )
     K = _scheduled(as_controller(controller, plant.controls, plant.measurements), plant)

@@ -202,9 +202,8 @@ class _Response(NamedTuple):
             found = self.C @ X + self.D
         if not np.isfinite(found).all():
             raise AccuracyError(
-                "a frozen response exceeds the range of numbers: a pole so near the limit of"
-                " stability, or channels of such units, leave nothing to compute with; choose other"
-                " units"
+                "a frozen response overflows: a pole is too near the stability limit, or the units"
+                " of the channels are too different; choose other units"
             )
         return np.linalg.svd(found, compute_uv=False)[:, 0]
 

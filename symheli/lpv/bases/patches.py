@@ -26,7 +26,7 @@ class Patches(PiecewisePolynomial):
         if self.degree < 0:
             raise InputError(f"degree: expected 0 or more, got {self.degree}")
         if len(self.breaks) < 2 or any(b <= a for a, b in pairwise(self.breaks)):
-            raise InputError(f"breaks: expected two or more that increase, got {self.breaks}")
+            raise InputError(f"breaks: expected at least two increasing values, got {self.breaks}")
         object.__setattr__(self, "breaks", tuple(float(b) for b in self.breaks))
 
     @property
