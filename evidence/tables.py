@@ -41,7 +41,7 @@ def keep(page: Path, section: str, text: str, machine: str = "", command: str = 
     document = page.read_text(encoding="utf-8") if page.is_file() else ""
     if begin not in document or end not in document:
         raise InputError(
-            f"{page} is not there, or lacks the marks {begin} ... {end}: tables are kept in a"
+            f"{page} does not exist, or lacks the marks {begin} ... {end}: tables are kept in a"
             " clone, where its docs are"
         )
     before, rest = document.split(begin, 1)

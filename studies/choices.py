@@ -89,11 +89,11 @@ def entries(path: Path, verb: str, out: Path | None = None) -> dict[str, Any]:
         found = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(
-            f"{path} is not there; symheli {verb} --write-config {path} writes one with the"
+            f"{path} does not exist; symheli {verb} --write-config {path} writes one with the"
             " defaults"
         ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is no TOML file: {error}") from error
+        raise InputError(f"{path} is not a TOML file: {error}") from error
     if out is not None:
         found.setdefault("out", str(out))
     for name in ("out", *FILES):

@@ -89,7 +89,7 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
     verb = next((word for word in words if not word.startswith("-")), None)
     if verb is None and not {"-h", "--help", "--version"} & set(words):
         whole.print_help(sys.stderr)
-        raise UsageError("name a verb; `symheli VERB --help` tells its options")
+        raise UsageError("give a command; `symheli COMMAND --help` lists its options")
     if verb is not None and verb not in VERBS:
         raise UsageError(str(UnknownNameError("verb", verb, VERBS)))
     arguments, left = whole.parse_known_args(words)

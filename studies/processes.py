@@ -95,7 +95,7 @@ class Processes:
                 future.set_exception(
                     SymheliError(
                         f"a process that computed {name} has ended ({error!r}): memory may have run"
-                        " out; what is finished is kept"
+                        " out; finished results are kept"
                         if gone
                         else f"what {name} answered cannot be read here: {error!r}"
                     )

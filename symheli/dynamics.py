@@ -97,7 +97,7 @@ class Dynamics:
             if not ready:
                 lacking = sorted({n for part in waiting.values() for n in part.needs} - made)
                 raise InputError(
-                    f"{', '.join(waiting)} need flow that no part makes before them:"
+                    f"{', '.join(waiting)} need flow quantities that no earlier part computes:"
                     f" {', '.join(lacking)}; known: {', '.join(sorted(made))}"
                 )
             for name in ready:

@@ -15,11 +15,11 @@ class SymheliError(Exception):
 
 
 class InputError(SymheliError, ValueError):
-    """A value, shape, unit or file that cannot be used as given."""
+    """A value, shape, unit or file is invalid as given."""
 
 
 class UnknownNameError(InputError):
-    """A name that is not among the known ones; the message lists the nearest."""
+    """A name is not among the known ones; the message lists the nearest."""
 
     def __init__(self, kind: str, name: object, known: Iterable[str]):
         known = [str(k) for k in known]
@@ -37,7 +37,7 @@ class UnknownNameError(InputError):
 
 class TrimError(SymheliError):
     """No equilibrium was found; `result` holds the best point and the residual of every equation,
-    `reason` is the message without the advice to a program.
+    `reason` the message without its advice.
     """
 
     def __init__(self, message: str, result: Any = None, advice: str = ""):
@@ -47,8 +47,8 @@ class TrimError(SymheliError):
 
 
 class FlightLostError(SymheliError):
-    """A flight ended upside down or out of the range of numbers; `record` is what was recorded
-    until then (None where that is less than two samples).
+    """A flight ended upside down, or in NaN or infinity; `record` holds the flight up to that time
+    (None if shorter than two samples).
     """
 
     def __init__(self, message: str, record: Any = None):
@@ -77,8 +77,8 @@ class NotFitError(SymheliError):
 
 
 class ExcitationError(SymheliError):
-    """The data cannot determine what was asked of them; `report` says which direction is
-    missing.
+    """The data do not determine the quantities to be identified; `report` names the undetermined
+    directions.
     """
 
     def __init__(self, message: str, report: Any = None):
@@ -87,7 +87,7 @@ class ExcitationError(SymheliError):
 
 
 class CertificateError(SymheliError):
-    """A certificate contradicts another result it must agree with."""
+    """A certificate contradicts another result with which it must agree."""
 
 
 class SolverError(SymheliError):
@@ -95,34 +95,32 @@ class SolverError(SymheliError):
 
 
 class AccuracyError(SymheliError):
-    """A result does not pass the check of its own computation: it is not what it claims to be and
+    """A result fails the check of its own computation: it is not as accurate as it has to be, and
     is not returned.
     """
 
 
 class ConvergenceWarning(UserWarning):
-    """An iteration stopped before it settled; the result is its last value, and may be worse than
-    where it started.
+    """An iteration stopped before it converged; the result is its last iterate, and may be worse
+    than its initial value.
     """
 
 
 class PrecisionWarning(UserWarning):
-    """The numbers asked for cannot hold what they are to say: rounding takes most of their
-    digits.
-    """
+    """The result has few significant digits: rounding errors take most of them."""
 
 
 class CompilerWarning(UserWarning):
-    """Compiled code is not available; the same numbers, to rounding, come out more slowly."""
+    """Compiled code is not available; the same numbers, to rounding, are computed more slowly."""
 
 
 class DataWarning(UserWarning):
-    """Data, or a model made of them, may not mean what they seem to; the message says what was seen
-    and what to do.
+    """Data, or a model made from them, may be misleading; the message says what was found and what
+    to do.
     """
 
 
 class ValidityWarning(DataWarning):
-    """The helicopter is beyond what its equations are known to hold for; the message says by how
-    much, and whose limit it is.
+    """The helicopter is outside the range in which its equations are known to hold; the message
+    says by how much, and gives the source of the limit.
     """

@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a task is.
+    """Progress of a task.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ _depth: ContextVar[int] = ContextVar("depth", default=0)
 
 @contextmanager
 def watched(listener: Listener | None) -> Iterator[None]:
-    """Tell this listener where the work within is; None: nobody.
+    """Report the progress of the work within this context to a listener; None: to nobody.
 
     It is called in the thread that works, when a task begins, with each step and when it ends; an
     exception it raises ends the work.

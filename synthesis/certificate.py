@@ -28,7 +28,7 @@ Kind = Literal["l2 gain", "stability", "energy-to-peak gain", "decay rate"]
 
 
 class Status(Enum):
-    """How a certificate came out; the value is the sentence to print."""
+    """Outcome of a certificate; the value is the sentence to print."""
 
     PROVEN = "proven on the whole interval"
     UNSTABLE = "no certificate exists: a model frozen at some p is not stable"
@@ -69,7 +69,7 @@ class Seconds(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """One cone program: what it asked for, its margin, the solver's word, and the bound verified
+    """One cone program: its description, its margin, the solver's answer, and the bound verified
     from it (inf: none; NaN: stability has none).
     """
 
@@ -108,7 +108,7 @@ class Evidence(Protocol):
 
 
 class Proof(NamedTuple):
-    """A Lyapunov function with the evidence that it proves: the model and its units.
+    """A Lyapunov function with the data needed to verify it: the model and its units.
 
     `lyapunov` is a `SplineLyapunov`, `MemoryLyapunov` or `BoxLyapunov`, or for an LFT a `Quadratic`
     with its multiplier.
@@ -185,9 +185,9 @@ class Certificate:
     Raises
     ------
     InputError
-        For what is no claim.
+        For an invalid field.
     CertificateError
-        Where two of its numbers contradict each other, or a claim to be verified has no proof.
+        If two of its numbers contradict each other, or a verified certificate has no proof.
 
     Examples
     --------
@@ -243,12 +243,13 @@ class Certificate:
                 )
         if sign * (self.frozen - self.limit) > 1e-9 * abs(self.frozen):
             raise CertificateError(
-                f"the {moving} {self.limit:.9g} forgets the frozen {what} {self.frozen:.9g}"
+                f"the {moving} {self.limit:.9g} is inconsistent with the frozen {what}"
+                f" {self.frozen:.9g}"
             )
         if self.verified and self.status is not Status.PROVEN:
             raise CertificateError(f"a verified certificate cannot have the status {self.status}")
         if self.verified and self.proof is None:
-            raise CertificateError("a verified certificate needs its proof, and has none")
+            raise CertificateError("a verified certificate needs its proof, which is missing")
         if self.verified and self.kind == "decay rate" and not self.alpha >= 0:
             raise CertificateError(
                 f"a decay rate of {self.alpha:.6g} is growth, and proves nothing"
@@ -281,7 +282,9 @@ class Certificate:
 
     @property
     def limit(self) -> float:
-        """What no proof can beat: `lower` of a gain, `upper` of a decay rate, NaN for stability."""
+        """The bound no proof can improve on: `lower` of a gain, `upper` of a decay rate, NaN for
+        stability.
+        """
         return self.upper if self.kind == "decay rate" else self.lower
 
     @property
@@ -322,7 +325,7 @@ class Certificate:
         """Write everything `load` and `verify` need into a JSON file, every double exactly.
 
         Raises `SymheliError` where the file cannot be written, `InputError` for a model that no
-        file can hold (a basis of functions of one's own). The trim schedule and the misfit of the
+        file can hold (a basis of user-defined functions). The trim schedule and the misfit of the
         model stay behind: what they mean is among the hypotheses.
         """
         from synthesis.certificate_file import written
@@ -331,11 +334,11 @@ class Certificate:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Certificate:
-        """The certificate in a file, its claim checked against its proof in floating point.
+        """Load a certificate from a file and check its bound against its proof in floating point.
 
-        Raises `InputError` for a file that is none, `CertificateError` where it contradicts itself
-        or its proof does not hold; `verify(rigorous=True)` then decides in exact arithmetic.
-        Bounds from below, trajectories and hypotheses on the model are as they were written.
+        Raises `InputError` for a file that is not a certificate, `CertificateError` if it is
+        inconsistent or its proof does not hold; `verify(rigorous=True)` then decides in exact
+        arithmetic. Lower bounds, trajectories and hypotheses on the model are as they were written.
         """
         from synthesis.certificate_file import read
 
@@ -369,7 +372,7 @@ class Certificate:
         try:
             return self.proof.fault(self.kind, self.rates)
         except (TypeError, ValueError, AttributeError, LookupError, OverflowError) as error:
-            return f"the evidence is none that an analysis made: {error}"
+            return f"the proof was not made by an analysis: {error}"
 
     def __str__(self) -> str:
         """What is proven, in three lines; `details` says the rest."""

@@ -98,7 +98,7 @@ def read(path: str | os.PathLike[str]) -> Certificate:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (ValueError, RecursionError) as error:
         raise InputError(
-            f"{path}: expected a certificate as JSON, got a file that is damaged or none ({error});"
+            f"{path}: expected a certificate as JSON, got another or a damaged file ({error});"
             " write it again with Certificate.save"
         ) from None
     if not isinstance(content, dict) or content.get("schema") != SCHEMA:
@@ -121,10 +121,10 @@ def read(path: str | os.PathLike[str]) -> Certificate:
         *(TypeError, ValueError, AttributeError, LookupError),
         *(ArithmeticError, RecursionError, np.linalg.LinAlgError),
     ) as error:
-        raise InputError(f"{path}: damaged, a value is not what it should be ({error})") from None
+        raise InputError(f"{path}: damaged, a value is invalid ({error})") from None
     if cert.verified and not cert.verify():
         why = cert.fault or "the inequalities do not hold with this bound"
-        raise CertificateError(f"{path}: the proof does not prove the claim: {why}")
+        raise CertificateError(f"{path}: the proof does not establish the certified bound: {why}")
     return cert
 
 
@@ -149,11 +149,11 @@ def _certificate(content: Mapping[str, Any]) -> Certificate:
         ("perturbation", np.ndarray | None),
     ):
         if not isinstance(claim[name], kind):
-            raise InputError(f"{name} is not what it should be: {claim[name]!r:.60}")
+            raise InputError(f"{name} is invalid: {claim[name]!r:.60}")
     for name, kind in (("hypotheses", str), ("attempts", Attempt)):
         values = claim[name]
         if not isinstance(values, tuple) or not all(isinstance(v, kind) for v in values):
-            raise InputError(f"{name} are not what they should be: {values!r:.60}")
+            raise InputError(f"{name} are invalid: {values!r:.60}")
     if not isinstance(claim["method"], str) or not isinstance(claim["solver"], str):
         raise InputError("method and solver must be texts")
     proof = content["proof"]

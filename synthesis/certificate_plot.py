@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def plot_certificate(certificate: Certificate, ax: Axes | None) -> Axes:
     """See `Certificate.plot`."""
     if certificate.kind == "stability":
-        raise InputError("stability has no numbers to draw: print the certificate")
+        raise InputError("a stability certificate has no bounds to draw: print it")
     ax = axes_of(ax, 5.5, 3.5)
     bounds = {
         "frozen": (certificate.frozen, GREY),

@@ -42,9 +42,9 @@ class _InP:
         ):
             raise InputError(
                 f"segments must be an integer from 1 to {MOST}, or a tuple of them to try in turn,"
-                f" got {self.segments!r:.80}; each segment has inequalities of its own, and a"
-                " program of more is not solved in any time: grade the knots (grading=2) towards"
-                " where P changes most, or narrow the range"
+                f" got {self.segments!r:.80}; each segment adds inequalities, and a larger program"
+                " is not solved in reasonable time: grade the knots (grading=2) towards where P"
+                " changes most, or narrow the range"
             )
         object.__setattr__(self, "segments", None if segments is None else tuple(segments))
         if self.grading is not None and not self.grading >= 1:
@@ -136,7 +136,7 @@ class Spline(_InP):
 
 @dataclass(frozen=True)
 class Memory(_InP):
-    """V = x' P(p, p - q) x with q a first-order lag of p: P knows where p came from.
+    """V = x' P(p, p - q) x with q a first-order lag of p: P depends on the recent history of p.
 
     For `l2_gain` and `stability` of one parameter in continuous time. A finite memory of the
     parameter makes a quadratic V exact in the limit.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class GainCurve:
-    """Gains of one loop by the permitted rate of its scheduling parameter (0: frozen, inf: it may
+    """Gains of one loop over the rate bound of its scheduling parameter (0: frozen, inf: it may
     jump), as `gain_against_rate` finds them.
 
     Parameters

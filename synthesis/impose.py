@@ -51,8 +51,8 @@ def _counted(**counts: tuple[int, int, int]) -> None:
     for name, (value, least, most) in counts.items():
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
             raise InputError(
-                f"{name} must be an integer from {least} to {most} (a program of more is not"
-                f" solved in any time), got {value!r}"
+                f"{name} must be an integer from {least} to {most} (a larger program is not solved"
+                f" in reasonable time), got {value!r}"
             )
 
 
@@ -156,7 +156,8 @@ class Vertices(_Strictly):
 
 @dataclass(frozen=True)
 class Grid(_Strictly):
-    """On a grid: proves nothing; the certificate is `UNPROVEN` and gives an `indicative` bound.
+    """Inequalities on a grid only: this proves nothing; the certificate is `UNPROVEN` and gives an
+    `indicative` bound.
 
     Parameters
     ----------

@@ -184,7 +184,7 @@ def _flown(
         if not np.abs(state[6:]).max() < LOST:
             raise FlightLostError(
                 f"the AH-1S was lost at {DT * k:.2f} s: roll {np.degrees(state[6]):.0f} deg, pitch"
-                f" {np.degrees(state[7]):.0f} deg; less excitation or acceleration, please"
+                f" {np.degrees(state[7]):.0f} deg; reduce excitation or acceleration"
             )
         state = simulator.step(sticks[k])
     return states, states + noise, sticks, reached

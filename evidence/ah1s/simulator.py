@@ -1,4 +1,4 @@
-"""JSBSim's AH-1S behind a small door: set a state, hold it while rotor and lags settle, let go."""
+"""Minimal wrapper of JSBSim's AH-1S: set a state, hold it until the rotor settles, release it."""
 
 from __future__ import annotations
 

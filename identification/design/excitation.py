@@ -133,7 +133,7 @@ class ExcitationReport:
 def excitation_report(
     arx: LPVARX, records: FlightRecord | Iterable[FlightRecord]
 ) -> ExcitationReport:
-    """Can these records determine this structure? A value with the answer; nothing is raised for
+    """Report whether these records determine the coefficients of a structure; nothing is raised for
     poor data.
 
     Parameters

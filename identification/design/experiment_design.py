@@ -108,8 +108,8 @@ class Plan:
 def compare_experiments(
     structure: LPVARX, candidates: Mapping[str, FlightRecord], limits: Mapping[str, float]
 ) -> tuple[Experiment, ...]:
-    """The information in each candidate's record (simulated, or flown), for a structure whose
-    equations share their regressors.
+    """Compute the information in each candidate's record (simulated, or flown), for a structure
+    whose equations share their regressors.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def compare_experiments(
 
 
 def choose_experiments(experiments: tuple[Experiment, ...], count: int) -> Plan:
-    """The allowed experiments that teach most, one after the other: each the one that most
+    """Choose the most informative of the allowed experiments one by one: each is the one that most
     increases log det of the information per second.
 
     A sequential D-optimal design: independent of the units of the coefficients.

@@ -47,8 +47,8 @@ class Whitening:
                 raise ValueError("a pivot is rounding")
         except ValueError as error:  # LinAlgError among them
             raise AccuracyError(
-                f"the covariance of the errors is not positive definite in rounding ({error}):"
-                " noise or gusts of such different sizes cannot be weighed; check their units"
+                f"the covariance of the errors is not numerically positive definite ({error}): the"
+                " sizes of noise and gusts differ too much; check their units"
             ) from error
         G = [np.zeros((m, size, size)) for _ in range(reach + 1)]
         for d in range(reach + 1):

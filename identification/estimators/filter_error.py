@@ -52,8 +52,8 @@ CHUNK = 256
 
 @dataclass(frozen=True)
 class FilterError(Method):
-    """Every state measured with white noise, and aerodynamics that a `KinematicARX` describes up to
-    a small white error: the coefficients of largest likelihood.
+    """Filter-error method: maximum likelihood with white measurement noise on every state and a
+    small white error of the aerodynamics that a `KinematicARX` describes.
 
     y = x + v with variances R, and the structure's equations hold for x up to w with variances Q.
     For given coefficients the best x is a smoother's; the equations linearized there are linear in
@@ -144,8 +144,8 @@ class FilterError(Method):
         """With the noise found in the details, and the covariance of all coefficients together."""
         if not isinstance(arx, Aerodynamics):
             raise InputError(
-                "the filter error method knows kinematics: fit a KinematicARX, or take another"
-                " method for LPVARX"
+                "the filter error method needs known kinematics: fit a KinematicARX, or choose"
+                " another method for an LPVARX"
             )
         theta, _ = instrumental_variables(arx, records, data, self.simulator)
         left = self.misfit * self._unexplained(arx, records)

@@ -208,7 +208,7 @@ def _two_stages(
     if values[-1] <= RANK_TOLERANCE * values[0]:
         missing = direction_in_words(directions[-1], names)
         raise ExcitationError(
-            f"the instruments {source} leave undetermined: {missing}; "
-            "excite more inputs, name more instruments or widen their window"
+            f"the instruments {source} do not determine: {missing}; excite more inputs, name more"
+            " instruments or widen their window"
         )
     return least_squares(first_stage, Q.T @ y) / scale[:, None]

@@ -69,8 +69,8 @@ class InstrumentSource(Protocol):
 
 @runtime_checkable
 class FlightSource(Protocol):
-    """The flight of a record once more, without what disturbed and blurred it: its regressors are
-    the instruments, as many as there are coefficients.
+    """Instruments from a simulated repetition of the recorded flight without noise and
+    disturbances: its regressors, one for each coefficient.
 
     `symheli.SimulatedFlight` flies the plan of the record in a simulator. That may be wrong: the
     regressors of its flight depend on nothing but what was commanded.
@@ -110,7 +110,7 @@ USUAL_WINDOW, FEWEST = 1.0, 10
 
 @dataclass(frozen=True)
 class LaggedSignals:
-    """Signals of the record as instruments, at lags evenly over a window.
+    """Instruments made of lagged signals of the record, with lags spaced evenly over a window.
 
     In closed loop what is added to the stabilised inputs, in open loop the inputs; the command is
     an excitation too.
@@ -274,8 +274,8 @@ def explained(
     known = np.logical_and(np.isfinite(W).all(axis=1), np.isfinite(measured).all(axis=1))
     if known.sum() <= W.shape[1]:
         raise ExcitationError(
-            f"{W.shape[1]} instruments on {known.sum()} samples explain anything; record longer, or"
-            " use fewer lags"
+            f"{W.shape[1]} instruments on {known.sum()} samples fit any data exactly; record"
+            " longer, or use fewer lags"
         )
     Q = column_space(W[known])
     found = np.full_like(measured, np.nan)

@@ -24,8 +24,7 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class Lasso(Method):
-    """Least squares with a price on the absolute value of every coefficient, so that some become
-    exactly zero.
+    """Least squares with an L1 penalty on the coefficients, so that some become exactly zero.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from symheli.values.summary import summarized
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Estimate:
-    """What a method found: coefficients and what there is to say about them.
+    """The result of a method: coefficients and diagnostics.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ class Estimate:
 
 
 class Method(ABC):
-    """An estimator with its options: a subclass in a file of its own, exported, is all `fit` needs.
+    """An estimator with its options; a subclass in a file of its own, exported, is all that `fit`
+    needs.
 
     Attributes
     ----------

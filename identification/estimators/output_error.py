@@ -27,8 +27,8 @@ ADVICE = "allow more evaluations, or fit a smaller structure"
 
 @dataclass(frozen=True)
 class OutputError(Method):
-    """The closest free run: the maximum-likelihood estimate for white Gaussian noise on the
-    outputs.
+    """Output-error method: the free run closest to the record, the maximum-likelihood estimate for
+    white Gaussian noise on the outputs.
 
     The search starts from least squares or (with `instruments`) instrumental variables, and from
     their refinement; in closed loop coloured noise biases it.

@@ -19,8 +19,7 @@ from symheli.records import FlightRecord
 
 @dataclass(frozen=True)
 class Recursion(Method):
-    """Least squares sample by sample, older ones weighing less: `RecursiveLeastSquares` over whole
-    records.
+    """Least squares with exponential forgetting: `RecursiveLeastSquares` over whole records.
 
     Parameters
     ----------

@@ -48,8 +48,8 @@ ADVICE = (
 
 @dataclass(frozen=True)
 class RefinedInstruments(Method):
-    """Instrumental variables refined with the simulated response: the model found so far
-    instruments and filters, until nothing moves.
+    """Refined instrumental variables: the response simulated by the current model serves as
+    instruments and sets the filters, repeated until convergence.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def _instrumented(arx: LPVARX, Z: Array, X: Array, y: Array) -> Array:
         )
         missing = direction_in_words(directions[-1], names)
         raise ExcitationError(
-            f"the simulated response leaves undetermined: {missing}; excite the inputs more richly,"
+            f"the simulated response does not determine: {missing}; excite the inputs more richly,"
             " or lower the orders"
         )
     return np.linalg.solve(square, Q.T @ y) / scale

@@ -29,8 +29,8 @@ GRID = np.linspace(-14.0, 4.0, 37)
 
 @dataclass(frozen=True)
 class Ridge(Method):
-    """Least squares with a price on coefficients: those the data hardly determine are held small,
-    or held constant in p.
+    """Least squares with a quadratic penalty on the coefficients: those that the data hardly
+    determine are kept small, or constant in p.
 
     The penalty of one lagged signal with the coefficient a(p) is its mean square times the mean of
     a(p)^2 over the range of the basis, or of the variation of a(p) about its mean there. It is

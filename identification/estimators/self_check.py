@@ -13,7 +13,7 @@ from symheli.errors import AccuracyError
 from symheli.values.arrays import Array
 
 ALLOWED = 1e3
-"""Roundings of a sum that are put up with: a backward stable method needs some tens."""
+"""Permitted error in roundings of a sum: a backward stable method needs some tens."""
 
 
 def check_least_squares(arx: LPVARX, phi: Array, y: Array, theta: Array, method: str) -> None:

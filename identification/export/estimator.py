@@ -95,7 +95,7 @@ def write_estimator(
         raise InputError(f"units: none given for {', '.join(missing)}")
     if not rls.configuration.factors:
         raise InputError(
-            "functions brought along cannot be written in C; identify with a polynomial or spline"
+            "user-supplied functions cannot be written in C; identify with a polynomial or spline"
             " basis"
         )
     up = f"{name.upper()}_"

@@ -91,7 +91,7 @@ def write_model(
     c = Configuration(model.structure, Constant(1.0), dtype)
     if not c.factors:
         raise InputError(
-            "functions brought along cannot be written in C; identify with a polynomial or spline"
+            "user-supplied functions cannot be written in C; identify with a polynomial or spline"
             " basis"
         )
     files = filled_module(

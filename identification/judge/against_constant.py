@@ -64,8 +64,8 @@ class Scored:
 
 @dataclass(frozen=True, kw_only=True)
 class AgainstConstant:
-    """The models fitted to one record: the one that is judged, the LTI one it is judged against
-    (where there are two), then rivals.
+    """The models fitted to one record: the scheduled one, the LTI one it is compared with (if both
+    exist), then alternative models.
 
     `hold_p`: one step and 1 s hold p from the start of each prediction, because it is measured.
     `leak`: share of what is new in p that the outputs of the same instant explain; beyond a half
@@ -165,7 +165,7 @@ class AgainstConstant:
             raise UnknownNameError("output", output, map(str, self.scheduled.outputs))
         if len(self.judged) < 2:
             raise InputError(
-                "the structure is a constant one itself: give one with a basis of degree 1 or more"
+                "the structure is itself constant; give one with a basis of degree 1 or more"
             )
         lpv, lti = self._fits(output)
         out = {h: difference(lpv[h], lti[h]) for h in HORIZONS[1:]}
@@ -185,7 +185,10 @@ class AgainstConstant:
         """{horizon: held-out fit} of the model that is judged and of the LTI one."""
         for one in self.judged:
             if one.held_out is None:
-                raise InputError("nothing was held out: fits in sample cannot tell what pays")
+                raise InputError(
+                    "nothing was held out: fits in sample cannot show whether scheduling improves"
+                    " the model; hold out a part of the record"
+                )
             yield {h: fits[output] for h, fits in one.held_out.by_horizon.items()}
 
 
@@ -216,7 +219,8 @@ def against_constant(
     hold_p: bool = False,
     method: Method | str = "ls",
 ) -> AgainstConstant:
-    """Fit a scheduled model and the constant one of the same order, and say where scheduling pays.
+    """Fit a scheduled model and the constant one of the same order, and show where scheduling
+    improves the prediction.
 
     Scheduling pays for an output where the scheduled model is more than one point better in free
     run on held-out data and no worse 1 s ahead; it pays for prediction only where it is better 1 s

@@ -27,8 +27,8 @@ def plot_bands(known: Uncertainty, level: float = 0.95) -> Array:
     model = known.model
     if len(model.parameters) != 1:
         raise InputError(
-            "coefficients of several scheduling parameters are no curves; take bands(p) along a"
-            " line"
+            "coefficients of several scheduling parameters cannot be drawn as curves; evaluate"
+            " bands(p) along a line"
         )
     low, high = model.structure.basis.ranges[0]
     p = np.linspace(low, high, 101)

@@ -21,7 +21,8 @@ from symheli.values.summary import summarized
 
 @dataclass(frozen=True, kw_only=True)
 class BaselineModel:
-    """An LPV model that predicts from the full state of a record, and what of the record drives it.
+    """An LPV model that predicts from the full state of a record, and the signals of the record
+    that drive it.
 
     Parameters
     ----------
@@ -182,8 +183,8 @@ def _scheduled(
         inside = np.clip(values, s.low, s.high)
         if not np.any(inside == values):
             raise InputError(
-                f"{name} is nowhere within the baseline's {s.low:g} to {s.high:g}; name the signal"
-                " that schedules it: scheduling=..."
+                f"{name} never lies within the baseline's range {s.low:g} to {s.high:g}; name the"
+                " signal that schedules it: scheduling=..."
             )
         columns.append(inside)
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
@@ -203,7 +204,7 @@ class Prediction:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BesideBaseline:
-    """All models on the same unseen flight: what `beside_baseline` returns.
+    """Predictions of the same unseen flight by all models: the result of `beside_baseline`.
 
     Examples
     --------
@@ -244,7 +245,7 @@ def beside_baseline(
     *,
     horizon: float = HORIZON,
 ) -> BesideBaseline:
-    """Predict one flight by identified models and by baselines, on equal terms.
+    """Predict one flight by identified models and by baselines from the same information.
 
     Identified models start from their last samples of outputs and inputs, baselines from the full
     state of the record; free runs of the baselines start where those of the identified models do.

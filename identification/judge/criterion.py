@@ -22,7 +22,7 @@ NO_COVARIANCE = "no covariance"
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
-    """One row of `FitForControl`.
+    """One criterion of `FitForControl`, a row of its table.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DependenceReport:
-    """What p at the other instants explains of the one-step residuals, an entry an output.
+    """How much of the one-step residuals p at other instants explains, one entry per output.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class DependenceReport:
 def dependence_report(
     model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord]
 ) -> DependenceReport:
-    """Whether p at other instants explains what a model leaves: its one-step residuals regressed on
+    """Test whether p at other instants explains the one-step residuals of a model: regress them on
     the same signals with the basis at p(k) for "lag", at p(k - lag) for "now".
 
     What a static dependence cannot express stays in the residual; where p moves slowly from sample

@@ -21,7 +21,7 @@ def design_model(
     held: Mapping[str, float] | None = None,
     degree: int | None = None,
 ) -> LPVStateSpace | UncertainStateSpace:
-    """The state space of a model that was found fit for control.
+    """Return the state space of a model that was judged fit for control.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ POINTS = 9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FitForControl:
-    """What `fit_for_control` found; `str()` is a table, a row a criterion.
+    """The result of `fit_for_control`; `str()` is a table with one row per criterion.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def fit_for_control(
     seed: int = 0,
 ) -> FitForControl:
     """Judge whether a loop may be designed on an identified model: by its frozen plants, by the
-    record and by the certainty of its coefficients.
+    record and by the uncertainty of its coefficients.
 
     "fit" where every criterion is met; "not fit" where one is violated by more than noise explains;
     "not known" where the data cannot say: too little coherence, or an uncertainty too large for

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrequencyResponse:
-    """Response of outputs to inputs at n frequencies, the other inputs taken off.
+    """Response of outputs to inputs at n frequencies, with the effect of the other inputs removed.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def frequency_response(
     window: float,
     band: tuple[float, float] | None = None,
 ) -> FrequencyResponse:
-    """Spectral estimate G = Gyu Guu^-1 from one record or several: Hann windows, half overlapping,
-    averaged.
+    """Return the spectral estimate G = Gyu Guu^-1 from one record or several: Hann windows, half
+    overlapping, averaged.
 
     A long window resolves low frequencies, a short one averages more: about five windows a record
     are the least. Windows that a gap or a missing sample touches are left out. Feedback biases G
@@ -182,8 +182,8 @@ def response_of(
     nu = len(inputs)
     if count < nu + 1:
         raise ExcitationError(
-            f"{count} unbroken windows of {window} s say nothing about {nu} inputs; record longer"
-            " or shorten the window"
+            f"{count} unbroken windows of {window} s are too few for {nu} inputs; record longer or"
+            " shorten the window"
         )
     Suu, Syu, Syy = S[:, :nu, :nu], S[:, nu:, :nu], S[:, nu:, nu:]
     size = np.sqrt(np.einsum("kii->ki", Suu).real)

@@ -74,7 +74,8 @@ class FrozenModels:
 
 
 def pole_miss(model: LinearModel, pole: complex) -> float:
-    """Distance of the nearest pole of a linear model to `pole` (rad/s), percent of its magnitude.
+    """Return the distance of the nearest pole of a linear model to `pole` (rad/s), in percent of
+    its magnitude.
 
     The poles of a sampled model count as those of the continuous one it samples.
 
@@ -106,12 +107,14 @@ def pole_miss(model: LinearModel, pole: complex) -> float:
     """
     if pole == 0 or not np.isfinite(pole):
         raise InputError(
-            f"pole: expected a finite one that is not 0, got {pole}; a miss is told in percent"
-            " of it"
+            f"pole: expected a finite pole other than 0, got {pole}; the distance is given in"
+            " percent of its magnitude"
         )
     poles = continuous_poles(model)
     if not len(poles):
-        raise InputError("the model has no pole but delays; there is none to compare")
+        raise InputError(
+            "the model has no poles other than those of delays; there is none to compare"
+        )
     return float(100 * np.abs(poles - pole).min() / abs(pole))
 
 
@@ -132,7 +135,7 @@ def frozen_models(
     responses_at: float | None = None,
     fast: float = FAST,
 ) -> FrozenModels:
-    """Compare a baseline and an identified model with exact linear models, scheduling held.
+    """Compare a baseline and an identified model with exact linear models at frozen scheduling.
 
     Everything is compared at the sample period of the identified model, inputs held from sample to
     sample, on its inputs and outputs.

@@ -80,7 +80,8 @@ class MatrixEllipsoid(NamedTuple):
 def matrix_ellipsoid(
     covariance: object, probability: float, draws: int = 0, seed: int = 0
 ) -> MatrixEllipsoid:
-    """The ellipsoid of matrices that holds a Gaussian matrix with at least this probability.
+    """Return the ellipsoid of matrices that contains a Gaussian matrix with at least this
+    probability.
 
     The covariance P need not have the form Sigma (x) V^-1 of a matrix Gaussian: the nearest of that
     form is fitted (flip-flop iteration) and scaled until P <= s Sigma (x) V^-1, which is verified
@@ -215,7 +216,7 @@ def _drawn_radius(
     if rank > draws:
         least = math.ceil(math.log(CHANCE) / math.log(probability))
         raise InputError(
-            f"draws: expected at least {least} to tell a probability of {probability:g}, got"
+            f"draws: expected at least {least} to estimate a probability of {probability:g}, got"
             f" {draws}"
         )
     m, n = P.shape[:2]

@@ -65,7 +65,7 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class OrderScan:
-    """Every trial of a scan; `str()` is a table.
+    """All structures tried in a scan; `str()` is a table.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class Theil(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ResidualAnalysis:
-    """One-step residuals of a model on a record, an entry an output.
+    """One-step residuals of a model on a record, one entry per output.
 
     Parameters
     ----------
@@ -118,8 +118,8 @@ class ResidualAnalysis:
 
 
 def residual_analysis(model: LPVARXModel, record: FlightRecord, lags: int = 25) -> ResidualAnalysis:
-    """Whiteness, cross-correlation with the inputs, and Theil's coefficients of the one-step
-    residuals.
+    """Compute whiteness, cross-correlation with the inputs, and Theil's coefficients of the
+    one-step residuals.
 
     Rows with a missing neighbour are left out. Cross-correlation with inputs in closed loop may be
     feedback, at positive lags only it is unmodelled dynamics.
@@ -184,7 +184,7 @@ def residual_analysis(model: LPVARXModel, record: FlightRecord, lags: int = 25) 
 
 
 def theil(measured: Array, predicted: Array) -> Theil:
-    """Theil's coefficients of a prediction of a measured signal.
+    """Return Theil's coefficients of a prediction of a measured signal.
 
     Parameters
     ----------

@@ -158,7 +158,9 @@ def steps(dt: float, horizon: float = HORIZON) -> dict[str, int | None]:
     if not 0 < horizon < np.inf:
         raise InputError(f"horizon: expected seconds greater than 0, got {horizon:g}")
     if not horizon / dt < np.inf:
-        raise InputError(f"horizon: {horizon:g} s at dt = {dt:g} s is no number of samples")
+        raise InputError(
+            f"horizon: {horizon:g} s at dt = {dt:g} s is not a whole number of samples"
+        )
     return dict(zip(horizons(horizon), (1, max(round(horizon / dt), 1), None), strict=True))
 
 

@@ -33,7 +33,7 @@ chance.
 
 @dataclass(frozen=True)
 class SlowMode:
-    """A slow pole of a model, and what noise leaves of it.
+    """A slow pole of a model and its uncertainty due to noise.
 
     Parameters
     ----------
@@ -123,8 +123,8 @@ class SlowModes:
 def slow_modes(
     model: LPVARXModel, records: FlightRecord | Iterable[FlightRecord], points: int = 5
 ) -> SlowModes:
-    """The poles with |log z| < 0.1 of a least-squares model at quantiles of p, and what noise
-    leaves of them.
+    """Return the poles with |log z| < 0.1 of a least-squares model at quantiles of p, with their
+    uncertainty due to noise.
 
     Noise of variance s_j^2 on output j adds N, blocks s_j^2 sum f f' at its lags, to the
     information Phi' Phi, and draws slow poles away from 1 or the unit circle; s_j^2 is what leaves

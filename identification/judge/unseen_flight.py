@@ -1,6 +1,4 @@
-"""Can an identified model, with the noise it was identified with, explain a flight it has not
-seen?
-"""
+"""Validation of an identified model, with its noise model, on a flight not used to identify it."""
 
 from __future__ import annotations
 
@@ -15,13 +13,14 @@ from symheli.errors import InputError
 from symheli.records import FlightRecord
 
 SURE = 3.0
-"""Standard deviations of chance that a flight may exceed what noise leaves."""
+"""Acceptance threshold, in standard deviations of the noise power."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class UnseenFlight:
-    """What a model leaves of a flight, as a share of what its noise would: `power` of all
-    whitened equations together, `largest` that is put up with, `samples` it rests on.
+    """Residual power of a model on a flight, relative to the power that its noise explains: `power`
+    over all whitened equations together, `largest`: acceptance threshold, `samples`: number of
+    samples used.
 
     Examples
     --------
@@ -36,26 +35,27 @@ class UnseenFlight:
 
     @property
     def explained(self) -> bool:
-        """Whether the flight is one the model may have made."""
+        """Whether the residual power is within the acceptance threshold."""
         return self.power <= self.largest
 
     def require(self) -> None:
-        """Raises `InputError` for a flight that the model cannot explain."""
+        """Raise `InputError` if the model does not explain the flight."""
         if not self.explained:
             raise InputError(
-                f"the model leaves {self.power:.2f} of what its noise explains on this flight, more"
-                f" than {self.largest:.2f}: no certificate about it holds for this vehicle;"
-                " identify from this flight too, or look for what has changed"
+                f"the residual power on this flight is {self.power:.2f} of what the noise model"
+                f" explains, more than {self.largest:.2f}: no certificate about it holds for this"
+                " vehicle; identify from this flight too, or find out what has changed"
             )
 
 
 def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
-    """Hold a model against a flight it has not seen: chi-squared of the equations, whitened by the
-    covariance of sensor noise and of what the structure leaves out, with what errors of the
-    coefficients add on this flight.
+    """Validate a model on a flight it was not identified from, by the chi-squared statistic of its
+    equations, whitened by the covariance of sensor noise, of what the structure leaves out and of
+    the errors of the coefficients.
 
-    How loud the sensors are is read off this flight's own spectrum, as it was off each flight
-    identified from, unless `FilterError` was told; what its error may add is allowed for.
+    The noise level of the sensors is estimated from the spectrum of this flight, as it was for the
+    flights used to identify, unless `FilterError` was given it; the threshold allows for the error
+    of that estimate.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def unseen_flight(model: KinematicModel, record: FlightRecord) -> UnseenFlight:
             louder[i] += np.sum(white**2) - np.sum(s.whitened(model.theta, other) ** 2)
         count, samples = count + white.size, samples + len(white)
     if samples * model.dt < 1.0:
-        raise InputError("the record has no complete second to judge by")
+        raise InputError("the record is shorter than 1 s; record longer")
     chance = SURE * float(np.sqrt(2 * (count + spread) + np.sum(louder**2)))
     largest = (count + float(unknown) + chance) / count
     return UnseenFlight(power=power / count, largest=largest, samples=samples)

@@ -17,7 +17,7 @@ FLOOR = 1e-3
 
 @dataclass(frozen=True)
 class Constant:
-    """A sample k steps old has the weight factor^k.
+    """Exponential forgetting: a sample k steps old has the weight factor^k.
 
     Parameters
     ----------
@@ -58,7 +58,8 @@ class Constant:
 
 @dataclass(frozen=True)
 class Variable:
-    """Memory between two lengths, shorter when the innovations outgrow what they usually are.
+    """Variable forgetting: the memory length lies between two limits, and shortens when the
+    innovations exceed their usual size.
 
     The factor is 1 - q / longest, q the power of the innovations over the last `recent` samples
     against that over the last `usual` (mean over the outputs of a group), held between the two
@@ -117,8 +118,8 @@ class Variable:
 
 @dataclass(frozen=True)
 class Directional:
-    """The information along each new regressor is multiplied by a factor before it is taken in; all
-    other directions keep theirs.
+    """Directional forgetting: the information along each new regressor is multiplied by a factor
+    before it is added; all other directions keep theirs.
 
     What is not excited is not forgotten, so that nothing winds up. With n regressors about n / (1 -
     factor) samples are remembered in directions that are excited alike, more in weaker ones: a jump

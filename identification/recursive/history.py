@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class History:
-    """What a recursive estimate did over a record, as `RecursiveLeastSquares.run` returns it.
+    """The course of a recursive estimate over a record, as `RecursiveLeastSquares.run` returns it.
 
     Parameters
     ----------

@@ -25,7 +25,8 @@ WIDE, FAST = len(STATES), len(MOVING)
 
 
 class KinematicObserver:
-    """The states at every sample, from what the model expects and what is measured.
+    """Observer of the states, which combines the predictions of the model with the measurements at
+    every sample.
 
     Made by `KinematicModel.observer`. The mean goes through the nonlinear kinematics, the
     covariance through their Jacobian at the estimate. The first samples after `reset`, as many as

@@ -16,8 +16,8 @@ from symheli.values.arrays import Array
 
 
 class Online:
-    """An estimator at work: `update` changes it in place and copies nothing; `state` is a value to
-    keep, save or go on from.
+    """A recursive estimator for real time: `update` changes it in place without copying; `state` is
+    a value to keep, save or continue from.
 
     Made by `RecursiveLeastSquares.online`. The first update with float64 arrays of the right shape
     costs microseconds where the kernel is compiled; anything else that is a number works, more
@@ -65,9 +65,8 @@ class Online:
         """Take in one regressor phi (n,) with the outputs y (ny,) it must explain; the lags are
         left alone.
 
-        Raises `InputError` for wrong shapes. In real time every check counts: that the numbers are
-        finite is left to who builds phi, a NaN stays for good. `RecursiveLeastSquares.absorb`
-        checks.
+        Raises `InputError` for wrong shapes. To save time, phi is not checked for NaN; a NaN makes
+        the state unusable. `RecursiveLeastSquares.absorb` checks.
         """
         try:
             self._status = self._kernel.absorb(self._state, self._work, phi, y)

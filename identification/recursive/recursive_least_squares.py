@@ -34,19 +34,19 @@ AT_ONCE = 10_000
 
 @dataclass(frozen=True)
 class RecursiveLeastSquares:
-    """Forgetting least squares, sample by sample: `init`, `update`, or `run` over a record;
-    `online` for real time.
+    """Recursive least squares with forgetting: `init`, `update`, or `run` over a record; `online`
+    for real time.
 
     Each sample rotates the row [phi', y'] into [sqrt(l) R, sqrt(l) Z] by square-root-free Givens
     rotations; the covariance is never formed, so nothing can lose its definiteness. Outputs share
     the factor, which nothing but data enters. The coefficients solve R theta = Z: from sample to
     sample they move along the gain g = R^-1 (R^-T phi), theta += g (y - theta' phi)', and are
     solved anew as soon as a running bound of the rounding errors along it is no longer small, so
-    that they are at every sample those of batch least squares on the weighted samples so far. What
-    these leave open is kept small by rows that are pretended: each coefficient is 0, with the
-    weight of 32 eps samples with its regressor at its largest (without forgetting; else see
-    `Constant`). Models that are made of it are without these rows: `RLSState.solve` takes them off.
-    `determined` says whether anything is left open, by the rule of
+    that they are at every sample those of batch least squares on the weighted samples so far.
+    Undetermined directions are regularized by pseudo-observations: each coefficient is 0, with the
+    weight of 32 eps samples with its regressor at its largest (without forgetting; otherwise see
+    `Constant`). Models made from the state exclude them: `RLSState.solve` removes these rows.
+    `determined` says whether the data determine every coefficient, by the rule of
     `identification.design.determined`.
 
     The arithmetic is C where a compiler was there when symheli was installed, else NumPy, with one
@@ -141,8 +141,8 @@ class RecursiveLeastSquares:
         """
         if isinstance(self.structure, KinematicARX):
             raise InputError(
-                "with known kinematics a sample says nothing without the one before, which a state"
-                " does not hold: take online().update(y, u, p), or run(record)"
+                "with known kinematics an update needs the sample before, which a state does not"
+                " hold: use online().update(y, u, p), or run(record)"
             )
         online = self._online(state)
         return _outcome(online, online.update(y, u, p))

@@ -19,8 +19,8 @@ WIDE, FAST = len(STATES), len(MOVING)
 
 
 class RigidBodyOnline(Online):
-    """An `Online` whose samples are u v w p q r phi theta, the controls and p: it hands on what the
-    velocities gained beyond the kinematics.
+    """An `Online` whose samples are u v w p q r phi theta, the controls and p: it passes on the
+    increments of the velocities beyond the kinematics.
 
     Made by `RecursiveLeastSquares.online` of a `KinematicARX`. After a missing sample or a gap the
     next sample is a start: nothing is learnt until the lags are full again.

@@ -24,7 +24,7 @@ STEPS = 12
 
 @dataclass(frozen=True, eq=False)
 class RLSState:
-    """All the estimator remembers; every update returns a new one.
+    """The state of the recursive estimator; every update returns a new one.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class RLSState:
     @property
     def pretended(self) -> float:
         """How far `theta` is at most from `solve()`, in standard deviations of the coefficients:
-        what the rows that are pretended move them. Small unless the data hardly tell coefficients
+        what the pseudo-observations move them. Small unless the data hardly tell coefficients
         apart, as in a flight at one airspeed that then creeps away.
         """
         away, solved = 0.0, self.solve()
@@ -220,7 +220,7 @@ def _of_data_alone(theta: Array, R: Array, d: Array, fed: Array) -> Array:
 
 
 class RLSInfo(NamedTuple):
-    """What one sample did.
+    """Diagnostics of one recursive update.
 
     Parameters
     ----------

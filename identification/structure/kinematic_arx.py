@@ -144,7 +144,7 @@ class KinematicARX:
         object.__setattr__(self, "inputs", given)
         clash = sorted({*map(str, given)} & set(STATES))
         if clash:
-            raise InputError(f"{', '.join(clash)}: a state of the body is no input")
+            raise InputError(f"{', '.join(clash)}: a state of the body cannot be an input")
         aero = self.aerodynamics  # raises for anything else that does not fit
         object.__setattr__(self, "scheduling", aero.scheduling)
         lags = aero.input_lag_ranges[0]

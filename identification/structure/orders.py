@@ -70,7 +70,8 @@ def _complete(
     missing = [n for n in names if n not in value]
     if missing:
         raise InputError(
-            f"{name}: say a number for {', '.join(missing)} too (an order of 0 leaves a signal out)"
+            f"{name}: give a number for {', '.join(missing)} too (an order of 0 leaves a signal"
+            " out)"
         )
 
 

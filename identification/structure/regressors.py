@@ -81,8 +81,8 @@ class Regression:
         size = float(np.max(np.abs(error), initial=0.0))
         if not size <= SIZES[1]:
             raise InputError(
-                f"the model leaves residuals of {size:.3g} on these records, beyond what squares"
-                " can express; check its coefficients and the units of the records"
+                f"the model leaves residuals of {size:.3g} on these records, whose squares"
+                " overflow; check its coefficients and the units of the records"
             )
         return error
 

@@ -156,7 +156,9 @@ class Campaign:
     def _refuse(self) -> None:
         for one, other in itertools.combinations((self.grid, self.random, self.fixed), 2):
             if twice := sorted(set(one) & set(other)):
-                raise InputError(f"{', '.join(twice)}: said twice; give each parameter one place")
+                raise InputError(
+                    f"{', '.join(twice)}: given twice; give each parameter in one place only"
+                )
         for name, values in self.grid.items():
             if isinstance(values, str) or not len(values):
                 raise InputError(f"the axis {name} needs a list of values, got {values!r}")
@@ -168,8 +170,8 @@ class Campaign:
         given = SEED in self.grid or SEED in self.fixed or SEED not in self.trial.defaults
         if self.draws > 1 and given and not self.random:
             raise InputError(
-                f"nothing is random in {self.trial.name} as it is asked: leave the seed to the"
-                " campaign, draw a parameter, or ask for one draw"
+                f"nothing is random in {self.trial.name} with these parameters: leave the seed to"
+                " the campaign, draw a parameter, or set draws to 1"
             )
 
 

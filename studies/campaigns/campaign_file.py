@@ -56,7 +56,7 @@ def campaign_of(entries: Mapping[str, Any]) -> Campaign:
         if name not in KEYS:
             raise UnknownNameError("entry of a campaign", name, KEYS)
     if not isinstance(entries.get("trial"), str):
-        raise InputError('it lacks the trial, such as trial = "identification"')
+        raise InputError('the trial is missing; add one, such as trial = "identification"')
     given: dict[str, Any] = {name: value for name, value in entries.items() if name != "trial"}
     for name in TABLES:
         if not isinstance(given.get(name, {}), Mapping):

@@ -55,7 +55,7 @@ class CampaignDataset:
             object.__setattr__(self, "attributes", content["attributes"])
             object.__setattr__(self, "cases", tuple(map(Case, content["cases"])))
         except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
-            raise InputError(f"{self.path}: no dataset of a campaign ({error})") from error
+            raise InputError(f"{self.path}: not a dataset of a campaign ({error})") from error
         if digest != _digest(content):
             raise InputError(
                 f"{self.path / CASES} does not match its digest: it was damaged or edited, or an"
@@ -66,11 +66,11 @@ class CampaignDataset:
     def open(
         cls, path: str | os.PathLike[str], campaign: Campaign, about: Mapping[str, Any]
     ) -> CampaignDataset:
-        """The dataset for `campaign`: a new one, or one that is there, with the cases it lacks
-        added behind its own. `about` is said of a new one.
+        """Open the dataset for `campaign`: a new one with the attributes `about`, or an existing
+        one, to which the missing cases are appended.
 
-        Raises `InputError` where the folder holds something else or rows of other trials, and
-        `SymheliError` where it cannot be written.
+        Raises `InputError` if the folder holds something else or rows of other trials, and
+        `SymheliError` if it cannot be written.
         """
         folder, units = Path(path), campaign.trial.units
         if (folder / CASES).is_file():
@@ -80,7 +80,7 @@ class CampaignDataset:
             new = [case for case in campaign.cases if case.key not in known]
             cases, about = (*there.cases, *new), there.attributes
         elif folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-            raise InputError(f"{folder} is there and holds no campaign; give another folder")
+            raise InputError(f"{folder} exists and does not hold a campaign; give another folder")
         else:
             cases = campaign.cases
             about = {**about, "trial": campaign.trial.name, "units": units}

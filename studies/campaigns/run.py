@@ -163,7 +163,7 @@ def _error(future: Future[Outcome]) -> BaseException | None:
 def _unable(trial: Trial, error: BaseException) -> SymheliError:
     if isinstance(error, CancelledError):
         return SymheliError(
-            "the scheduler is gone, or has dropped a case; what is finished is kept: run the"
+            "the scheduler has stopped, or has dropped a case; finished cases are kept: run the"
             " campaign again"
         )
     return SymheliError(

@@ -69,8 +69,8 @@ class InProcesses(Runner):
             return self._processes.submit([partial(fn, *args, **kwargs)])[0]
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             raise InputError(
-                f"this cannot be handed to another process ({error}): define it in a module, or ask"
-                " for one worker"
+                f"the trial cannot be sent to another process ({error}): define it in a module, or"
+                " use one worker"
             ) from error
 
     def lost(self, error: BaseException) -> bool:

@@ -50,12 +50,12 @@ class Trial:
             taken = name in self.quantities and name in self.defaults
             if taken or name in RESERVED or not name:
                 raise InputError(
-                    f"{self.name}: {name!r} names something else in the dataset; choose another"
+                    f"{self.name}: {name!r} is already a name in the dataset; choose another"
                 )
         lacking = [p.name for p in self._signature if p.default is inspect.Parameter.empty]
         if lacking:
             raise InputError(
-                f"{self.name}: give {', '.join(lacking)} a default, which says of which kind it is"
+                f"{self.name}: give {', '.join(lacking)} a default value, which sets its type"
             )
         object.__setattr__(self, "quantities", dict(self.quantities))
 

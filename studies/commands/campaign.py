@@ -24,22 +24,22 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vehicle",
         metavar="NAME",
-        help="without FILE: packaged airframe or TOML file (default: xcell60)",
+        help="(without FILE) packaged airframe or TOML file (default: xcell60)",
     )
     parser.add_argument(
         "--seeds",
         type=at_least_one,
         metavar="N",
-        help="without FILE: number of seeds (default: 20)",
+        help="(without FILE) number of seeds (default: 20)",
     )
     parser.add_argument(
         "--show",
         action="append",
         metavar="QUANTITY",
-        help="with FILE: what the table shows, as often as needed (default: the first ones)",
+        help="(with FILE) quantity to show in the table; may be repeated (default: the first ones)",
     )
     parser.add_argument(
-        "--again", action="store_true", help="with FILE: compute failed cases once more"
+        "--again", action="store_true", help="(with FILE) compute failed cases again"
     )
     on_a_runner(parser)
 
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> Output:
     if arguments.file is not None:
         return _declared(arguments)
     if arguments.show or arguments.again:
-        raise InputError("--show and --again belong to a campaign from a file: name the file")
+        raise InputError("--show and --again need a campaign from a file: give the file")
     from studies.transition.campaign import run_campaign
 
     with runner(arguments.workers, arguments.scheduler) as on:
@@ -72,7 +72,7 @@ def _declared(arguments: argparse.Namespace) -> Output:
 
     if arguments.vehicle or arguments.seeds:
         raise InputError(
-            "--vehicle and --seeds are for the campaign of the study; a file says both itself"
+            "--vehicle and --seeds apply to the built-in campaign; a campaign file sets both itself"
         )
     campaign = read_campaign(arguments.file)
     arguments.out = arguments.out or Path(f"{arguments.file.stem}.zarr")

@@ -47,27 +47,27 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lft",
         metavar="TEST",
-        help="a classical LFT test instead: small gain, D, DG or full block; --rate plays no part",
+        help="use a classical LFT test instead: small gain, D, DG or full block; --rate is ignored",
     )
     parser.add_argument(
         "--memory",
         type=options.positive,
         metavar="S",
-        help="P depends on a lag of the airspeed of S seconds, too",
+        help="let P depend also on the airspeed filtered by a first-order lag of S seconds",
     )
     parser.add_argument(
         "--across",
         type=options.at_least_one,
         nargs=2,
         metavar=("L", "D"),
-        help="segments and degree of the memory (3 2)",
+        help="segments and degree of P in the lag error (default: 3 2)",
     )
     parser.add_argument(
         "--order",
         type=options.at_least_one,
         default=1,
         metavar="M",
-        help="V of degree 2M in the states, for --stability",
+        help="use a V of degree 2M in the states, for --stability",
     )
     parser.add_argument(
         "--segments",
@@ -82,9 +82,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="G",
         help="knots at (k/K)^G of the range (2; with a memory 1.5)",
     )
-    parser.add_argument("--stability", action="store_true", help="stability only, no gain")
+    parser.add_argument("--stability", action="store_true", help="prove stability only, no gain")
     parser.add_argument(
-        "--save", metavar="FILE", help="keep the certificate; symheli verify FILE proves it again"
+        "--save",
+        metavar="FILE",
+        help="save the certificate to FILE; symheli verify FILE verifies it again",
     )
     parser.add_argument(
         "--rigorous", action="store_true", help="verify once more in exact rational arithmetic"
@@ -157,8 +159,8 @@ def _given(arguments: argparse.Namespace) -> tuple[LPVStateSpace, str]:
     """The loop of --model, and what it is."""
     if arguments.channel:
         raise InputError(
-            "--channel is one of the lateral loop of a vehicle: name --inputs and --outputs of the"
-            " model"
+            "--channel selects a channel of a vehicle's lateral loop; for a model give --inputs and"
+            " --outputs"
         )
     loop = given_model.closed_loop(arguments, given_model.lpv_model(arguments))
     if arguments.airspeeds:
@@ -186,9 +188,9 @@ def _form(arguments: argparse.Namespace) -> LyapunovForm:
     from synthesis import HigherOrder, Memory, Spline
 
     if arguments.memory and arguments.order > 1:
-        raise InputError("expected --memory or --order, not both: each is a form of V of its own")
+        raise InputError("give --memory or --order, not both: they are different forms of V")
     if arguments.across and not arguments.memory:
-        raise InputError("--across says how P depends on the memory; give --memory S with it")
+        raise InputError("--across sets how P depends on the lag error; give --memory S with it")
     segments = tuple(arguments.segments) if arguments.segments else None
     if arguments.memory:
         across, degree = arguments.across or (3, 2)

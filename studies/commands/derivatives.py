@@ -19,7 +19,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="write derivatives.csv and, with matplotlib, derivatives.svg there",
+        help="folder for derivatives.csv and, with matplotlib, derivatives.svg",
     )
 
 

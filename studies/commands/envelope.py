@@ -28,7 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="write trim_map.csv and, with matplotlib, trim_map.svg there",
+        help="folder for trim_map.csv and, with matplotlib, trim_map.svg",
     )
 
 

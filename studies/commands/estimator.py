@@ -60,7 +60,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="polynomial degree in airspeed (default: %(default)s)",
     )
-    add("--offset", action="store_true", help="with a moving trim c(p), for whole outputs")
+    add(
+        "--offset",
+        action="store_true",
+        help="include a trim c(p) that varies with p, for outputs that are not deviations",
+    )
     add(
         "--forgetting",
         type=options.number,
@@ -68,8 +72,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="L",
         help="factor a sample, in (0, 1] (default: 1)",
     )
-    add("--directional", action="store_true", help="forget along the new regressor only")
-    add("--single", action="store_true", help="float instead of double")
+    add(
+        "--directional",
+        action="store_true",
+        help="forget in the direction of the new regressor only",
+    )
+    add("--single", action="store_true", help="use single instead of double precision")
 
 
 def write(arguments: argparse.Namespace, heli: Helicopter) -> tuple[Path, ...]:

@@ -79,7 +79,8 @@ def run(arguments: argparse.Namespace) -> Output:
         return _said(_mat(arguments))
     if arguments.model:
         raise InputError(
-            f"--model is for model, controller and mat; {arguments.format} is of a vehicle"
+            f"--model applies to the formats model, controller and mat; {arguments.format} is"
+            " written for a vehicle"
         )
     heli = options.helicopter(arguments)
     name = Path(arguments.vehicle).stem
@@ -125,7 +126,7 @@ def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
     if isinstance(given, LPVARXModel):
         return write_model(given, folder, precision=precision)
     raise InputError(
-        f"{arguments.model}: a family of linear models predicts nothing by itself; export mat"
+        f"{arguments.model}: a family of linear models cannot be exported as C; symheli export mat"
         " writes it for MATLAB"
     )
 
@@ -139,7 +140,9 @@ def _mat(arguments: argparse.Namespace) -> tuple[Path, ...]:
     path = path or Path(f"{arguments.model.stem}.mat")
     if isinstance(given, LinearGrid):
         axes = ", ".join(given.axes)
-        raise InputError(f"{arguments.model}: models over {axes}; MATLAB gets those over airspeed")
+        raise InputError(
+            f"{arguments.model}: expected models over airspeed, got models over {axes}"
+        )
     if isinstance(given, LinearFamily):
         return write_family_mat(given, path, arguments.model.name)
     return (given.save_mat(path),)

@@ -32,7 +32,10 @@ def configure(parser: argparse.ArgumentParser, channels: bool = True) -> None:
     group = parser.add_argument_group("model from a file, instead of a vehicle")
     group.add_argument("--model", type=Path, metavar="FILE", help=KINDS)
     group.add_argument(
-        "--states", type=options.names, metavar="A,B", help="of a family: keep these, in this order"
+        "--states",
+        type=options.names,
+        metavar="A,B",
+        help="states of a family to keep, in this order",
     )
     if channels:
         for name, way in (("inputs", "from"), ("outputs", "to")):
@@ -43,7 +46,7 @@ def configure(parser: argparse.ArgumentParser, channels: bool = True) -> None:
         type=options.at_least_one,
         default=3,
         metavar="D",
-        help="of the interpolation (default: %(default)s)",
+        help="degree of the interpolation (default: %(default)s)",
     )
     parser.add_argument(
         "--feedback",
@@ -51,7 +54,7 @@ def configure(parser: argparse.ArgumentParser, channels: bool = True) -> None:
         action="append",
         default=[],
         metavar="IN=OUT:GAIN",
-        help="close this loop, such as d_lat=phi:-0.02; as often as there are gains",
+        help="feedback gain to close, such as d_lat=phi:-0.02; may be repeated",
     )
 
 
@@ -84,7 +87,7 @@ def lpv_model(arguments: argparse.Namespace) -> LPVStateSpace:
     if isinstance(given, LinearFamily | LinearGrid):
         return given.select(arguments.states).interpolate("polynomial", arguments.degree)
     if arguments.states:
-        raise InputError("--states are those of a family; an identified model keeps its own")
+        raise InputError("--states selects states of a family; an identified model keeps its own")
     return given.to_state_space()
 
 
@@ -99,7 +102,7 @@ def only_with_a_model(arguments: argparse.Namespace) -> None:
     """Raises `InputError` for options that say something of --model where none is given."""
     names = [n for n in ("states", "inputs", "outputs") if getattr(arguments, n, None)]
     if names and arguments.model is None:
-        raise InputError(f"--{', --'.join(names)} are about a model from a file: give --model FILE")
+        raise InputError(f"--{', --'.join(names)} need a model from a file: give --model FILE")
 
 
 def words(gains: Mapping[tuple[str, str], float]) -> str:

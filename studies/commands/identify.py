@@ -151,7 +151,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="polynomial degree in p; 0: LTI only (default: %(default)s)",
     )
     add("--orders", action="store_true", help="compare orders 1 to 4 and degrees 0 to 3 instead")
-    add("--no-offset", action="store_true", help="no c(p): outputs are deviations already")
+    add("--no-offset", action="store_true", help="no trim c(p): outputs are already deviations")
     add(
         "--offset-rate",
         choices=("auto", "yes", "no"),
@@ -173,15 +173,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--start",
         type=options.number,
         metavar="S",
-        help="leave out what is before, s on the log's clock",
+        help="drop samples before this time, s on the log's clock",
     )
-    add("--stop", type=options.number, metavar="S", help="leave out what is after")
-    add("--decimate", type=options.at_least_one, default=1, metavar="N", help="means of N samples")
+    add("--stop", type=options.number, metavar="S", help="drop samples after this time, s")
+    add(
+        "--decimate",
+        type=options.at_least_one,
+        default=1,
+        metavar="N",
+        help="average over N samples",
+    )
     add(
         "--train",
         type=options.fraction,
         metavar="SHARE",
-        help="first part of the time to fit, the rest is held out (default: 0.7)",
+        help="fraction of the time to fit, from the start; the rest is held out (default: 0.7)",
     )
     add(
         "--test",
@@ -212,7 +218,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="INPUT=OUTPUT:GAIN",
-        help="say whether the model is fit for this feedback, such as d_lat=phi:-0.03",
+        help="judge whether the model is fit for this feedback, such as d_lat=phi:-0.03",
     )
     add(
         "--save",
@@ -501,7 +507,9 @@ def _orders(structure: Any, training: Any, test: Any, hold_p: bool) -> Output:
     from identification import order_scan
 
     if test is None:
-        raise InputError("--orders judges on held-out samples: let --train leave some")
+        raise InputError(
+            "--orders judges on held-out samples: reduce --train so that some are left"
+        )
     scan = order_scan(
         structure, training, test, horizon=max(round(1.0 / training.dt), 1), hold_p=hold_p
     )
@@ -527,7 +535,8 @@ def _signals(arguments: argparse.Namespace, kind: str) -> _Signals:
     scheduling = arguments.scheduling or default.get("scheduling")
     if not outputs or not inputs:
         raise InputError(
-            "name what is to be predicted and what drives it: --outputs q,theta --inputs d_lon"
+            "give the signals to predict and the inputs that drive them: --outputs q,theta --inputs"
+            " d_lon"
         )
     if arguments.scheduling and arguments.scheduling_from:
         raise InputError("give --scheduling or --scheduling-from, not both")

@@ -63,7 +63,7 @@ def _of_model(arguments: argparse.Namespace) -> Output:
 
     gains = dict(arguments.feedback)
     if not gains:
-        raise InputError("name the loop whose margins are asked for: --feedback d_lat=phi:-0.02")
+        raise InputError("give the loop to analyse: --feedback d_lat=phi:-0.02")
     lpv = given_model.lpv_model(arguments)
     s = lpv.scheduling
     low, high = arguments.airspeeds or (s.low, s.high)

@@ -67,7 +67,7 @@ def choices_written(text: Callable[[Path], str], target: str) -> Output:
         return Output(told.rstrip("\n"), {"configuration": told})
     path = Path(target)
     if path.exists():
-        raise InputError(f"{path} is there; give another name, or remove it")
+        raise InputError(f"{path} already exists; give another name, or remove it")
     write_text(path, text(path.parent))
     return Output(f"wrote {path}", {"written": path})
 
@@ -161,9 +161,9 @@ def trimmed(arguments: argparse.Namespace) -> tuple[Helicopter, TrimPoint]:
         )
     if abs(climb) > speed:
         raise InputError(
-            f"--climb-rate {climb:g} exceeds the --airspeed of {speed:g} m/s, which is that of the"
-            f" whole motion; straight {'up' if climb > 0 else 'down'} is --airspeed"
-            f" {abs(climb):g} --climb-rate {climb:g}"
+            f"--climb-rate {climb:g} exceeds the --airspeed of {speed:g} m/s of the total velocity;"
+            f" straight {'up' if climb > 0 else 'down'} is --airspeed {abs(climb):g} --climb-rate"
+            f" {climb:g}"
         )
     heli = helicopter(arguments)
     point = trim(
@@ -258,18 +258,19 @@ def on_a_runner(parser: argparse.ArgumentParser) -> None:
         "--workers",
         type=at_least_one,
         metavar="N",
-        help="of this machine, one thread each (default: one a core; 1: in this process)",
+        help="number of processes on this machine, one thread each (default: one per core; 1: in"
+        " this process)",
     )
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="run on the scheduler of dask.distributed there, such as tcp://10.0.0.5:8786",
+        help="address of a dask.distributed scheduler to run on, such as tcp://10.0.0.5:8786",
     )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="DIR.zarr",
-        help="dataset of the cases: run again, what is there is not computed again",
+        help="folder of the dataset of cases; cases already there are not computed again",
     )
     parser.set_defaults(
         kept=lambda arguments: (

@@ -25,7 +25,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         type=Path,
         metavar="FILE",
-        help="TOML file with what is asked for; see --write-config",
+        help="TOML file with the options; see --write-config",
     )
     parser.add_argument(
         "--vehicle", metavar="NAME", help="packaged airframe or TOML file (default: xcell60)"
@@ -36,7 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick",
         action=argparse.BooleanOptionalAction,
-        help="shorter flights and fewer of them: a look, not the result",
+        help="fly shorter and fewer flights: a quick look, not the full result",
     )
     parser.add_argument("--seed", type=count, metavar="N", help="excitation and noise (default: 0)")
     parser.add_argument(
@@ -54,17 +54,19 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=options.names,
         default=(),
         metavar="STAGE,...",
-        help="compute these stages; what they need is taken from DIR/stages, computed if absent",
+        help="compute these stages; their inputs are read from DIR/stages, or computed if absent",
     )
     which.add_argument(
         "--from",
         dest="since",
         default="",
         metavar="STAGE",
-        help="compute this stage and all that need it; the others are taken from DIR/stages",
+        help="compute this stage and all that depend on it; the others are read from DIR/stages",
     )
     which.add_argument(
-        "--list-stages", action="store_true", help="name, need and state of every stage; run none"
+        "--list-stages",
+        action="store_true",
+        help="list name, dependencies and state of every stage; run none",
     )
     options.write_config(
         which,

@@ -37,8 +37,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--model",
         metavar="FILE",
         help=(
-            "design for this model instead: of symheli identify --save, or a family of linear"
-            " models; it is flown in the vehicle"
+            "design for this model instead, written by symheli identify --save, or a family of"
+            " linear models; the controller is flown in the vehicle"
         ),
     )
     parser.add_argument(

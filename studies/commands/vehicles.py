@@ -15,7 +15,7 @@ HELP = (
 def configure(parser: argparse.ArgumentParser) -> None:
     """Which airframe, and in which form."""
     parser.add_argument(
-        "vehicle", nargs="?", help="one of them, or a vehicle file: checked, and summarised"
+        "vehicle", nargs="?", help="packaged airframe or vehicle file to check and summarise"
     )
     form = parser.add_mutually_exclusive_group()
     form.add_argument(

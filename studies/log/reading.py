@@ -98,13 +98,13 @@ def scheduling_range(values: np.ndarray, degree: int) -> tuple[float, float]:
     """
     known = values[np.isfinite(values)]
     if not len(known):
-        raise InputError("the scheduling signal has no sample that is a number")
+        raise InputError("the scheduling signal contains only NaN")
     low, high = float(known.min()), float(known.max())
     if high - low > STILL * max(abs(low), abs(high)):
         return low, high
     if degree > 0:
         raise InputError(
-            f"the scheduling signal stays at {low:g}: a model scheduled by it cannot be told;"
+            f"the scheduling signal stays at {low:g}: a model scheduled by it cannot be identified;"
             " --degree 0 fits an LTI model"
         )
     return low - 0.5, high + 0.5

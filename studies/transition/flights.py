@@ -19,7 +19,7 @@ ACCELERATIONS = (1.5, 3.0, 4.0, 2.0, 3.5, 2.5, 3.0, 1.5, 4.0, 3.0, 2.0, 3.5)
 
 NOISE_DB = 30.0
 NOISES = ("noise-free", f"{NOISE_DB:g} dB")
-"""What is said of the flights of a plan and of `TransitionPlan.noisy`."""
+"""Labels of the flights of a plan and of `TransitionPlan.noisy`."""
 
 BREEZE, BREEZE_AT_20FT, ABOVE_GROUND = (-2.0, 1.0, 0.0), 7.7, 20.0
 """A steady wind (north, east, down, m/s) and the turbulence of a mean wind of 15 kt ("light"),

@@ -57,7 +57,7 @@ class IdentifiedModel(LinearModel):
 
 
 def identified_models() -> list[str]:
-    """Names of the identified linear models that come with the package.
+    """Return the names of the identified linear models that come with the package.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def identified_models() -> list[str]:
 
 
 def identified_model(name_or_path: str | os.PathLike[str]) -> IdentifiedModel:
-    """A linear model from the literature.
+    """Return a linear model from the literature.
 
     The file gives for each state its unit and the equation of its derivative, for each parameter
     value, unit and source. That the units fit is checked: the equations must say the same in the

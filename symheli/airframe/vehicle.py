@@ -140,7 +140,7 @@ class Vehicle:
 
 
 def vehicles() -> list[str]:
-    """Names of the airframes that come with the package.
+    """Return the names of the airframes that come with the package.
 
     Returns
     -------

@@ -229,7 +229,7 @@ class VehicleFile:
             if target is not None and _refers(target) and self._target(target) is None:
                 raise _AlreadySaidError
             raise InputError(
-                "{ ref = 'section.entry' } must name an entry with a value and say nothing else,"
+                "{ ref = 'section.entry' } must name an entry with a value and have no other key,"
                 f" got {table}"
             )
         ref = str(table["ref"])

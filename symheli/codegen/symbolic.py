@@ -1,5 +1,5 @@
-"""The one door to CasADi: functions that take floats, NumPy arrays, CasADi and SymPy expressions
-alike.
+"""All CasADi calls go through this module: functions of floats, NumPy arrays, CasADi and SymPy
+expressions alike.
 
 The physics is written once with these. Branches are arithmetic (`where`, `minimum`), roots and
 quotients are guarded at their source, so that values and derivatives stay finite in hover and at

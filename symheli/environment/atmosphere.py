@@ -16,7 +16,7 @@ LAPSE_RATE, TROPOPAUSE, CEILING = -0.0065, 11_000.0, 20_000.0  # K/m, geopotenti
 
 
 class Air(NamedTuple):
-    """Air at rest.
+    """Properties of still air: density, pressure, temperature and speed of sound in SI units.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Air(NamedTuple):
 
 
 def standard_atmosphere(altitude: float, warmer: float = 0.0) -> Air:
-    """The air at an altitude of the standard atmosphere, or warmer at the same pressure.
+    """Return the air at an altitude of the standard atmosphere, or warmer at the same pressure.
 
     Hydrostatic equation with -6.5 K/km up to 11 km, constant temperature above.
 

@@ -126,7 +126,7 @@ def gain_scheduled_lqr(
     points: int = 14,
     servos: Mapping[str, Servo] | None = None,
 ) -> Autopilot:
-    """LQR at several airspeeds on the model with quasi-steady flapping.
+    """Design an LQR at several airspeeds on the model with quasi-steady flapping.
 
     Each gain is checked on the full model (flapping states, servos where given, one sample of
     delay) and softened until stable there.
@@ -194,8 +194,8 @@ def _lqr(model: LinearModel, input_scale: float) -> np.ndarray:
             P = solve_discrete_are(model.A, model.B, Q, R)
     except np.linalg.LinAlgError as error:
         raise InputError(
-            f"no LQR at dt = {model.dt} s ({error}): the plant hardly moves from sample to sample,"
-            " or beyond measure; choose dt near its own pace"
+            f"no LQR at dt = {model.dt} s ({error}): the plant changes too little or too much"
+            " between samples; choose dt near its time constants"
         ) from error
     return np.linalg.solve(R + model.B.T @ P @ model.B, model.B.T @ P @ model.A)
 

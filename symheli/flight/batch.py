@@ -35,7 +35,8 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class FlightBatch(Sequence[FlightRecord]):
-    """N flights; flights[i] is the record of one, flights.column("phi") a signal of all.
+    """Records of N flights; flights[i] is one record, flights.column("phi") a signal of all
+    flights.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ def fly_batch(
     progress: Progress | None = None,
     **options: Unpack[Options],
 ) -> FlightBatch:
-    """Fly every schedule with every seed, side by side in vector registers and over the cores.
+    """Fly every schedule with every seed, vectorised and in parallel over the cores.
 
     A flight comes out the same to the bit as `fly` alone makes it, whatever its neighbours, the
     number of workers and, where there are fused multiply-adds, the processor. Controllers written

@@ -41,7 +41,8 @@ def fly_campaign(
     progress: Progress | None = None,
     **options: Unpack[Options],
 ) -> FlightDataset:
-    """`fly_batch` into one dataset on disk; called again after a stop it flies what is missing.
+    """Run `fly_batch` into one dataset on disk; a repeated call after an interruption flies only
+    what is missing.
 
     Flights are written as they are done, in chunks that are whole or not there; a flight has the
     same bits whether it was flown before the stop or after. Memory: a few chunks.
@@ -192,7 +193,7 @@ def _dataset(
         and not (path / ".zgroup").is_file()
         and (path.is_file() or any(path.iterdir()))
     ):
-        raise InputError(f"{path} is there and holds no flights; give another folder")
+        raise InputError(f"{path} exists and does not hold flights; give another folder")
     longest = max(int(np.floor(p.schedule.duration / p.dt + 1e-9)) for p in plans)
     return FlightDataset.create(
         path,

@@ -23,16 +23,16 @@ from symheli.values.signal import Signal, indices, signals
 from symheli.values.summary import summarized
 
 MEASURED = signals(("u", "v", "w", "p", "q", "r", "phi", "theta"))
-"""States with a sensor, which a controller sees as that reads them."""
+"""Measured states: a controller receives the readings of their sensors."""
 ROTOR = signals(("Om", "om_i"))
-"""What else it sees, as it is, where a governor holds the rotor speed."""
+"""Rotor states, passed on without sensor errors; present with the PI governor."""
 TOLD = (*MEASURED, *ROTOR)
 SCHEDULING = (Signal("airspeed", "m/s"), Signal("acceleration", "m/s^2"))
-"""What a controller can be scheduled by."""
+"""Signals by which a controller can be scheduled."""
 EVERY_SPEED = Scheduling("airspeed", "m/s", 0.0, 1.0)
-"""Of a controller that does not depend on it."""
+"""Scheduling of an unscheduled controller."""
 RATE, COMMAND = "_rate", "_command"
-"""End the names of an output that is the rate of a command, and of an input that is the command."""
+"""Suffixes of an output that is the rate of a command, and of an input that is the command."""
 Follow = Literal["command", "reading"]
 
 
@@ -228,13 +228,13 @@ def require_parameters(
 
 
 def require_names(kind: str, given: Sequence[str], known: Sequence[str]) -> None:
-    """Raises `InputError` for a signal of a controller that is none of these."""
+    """Raise `InputError` if a signal of a controller is not among the known ones."""
     try:
         indices(given, known, kind)
     except UnknownNameError as error:
         raise InputError(
-            f"the controller's signals must bear their names: {error}; name them, and say what is"
-            " deviation from what: inputs measured minus reference, outputs added to the trim"
+            f"unknown name of a signal of the controller: {error}; use the names of the flight:"
+            " inputs are measured minus reference, outputs are added to the trim"
         ) from error
 
 

@@ -1,4 +1,4 @@
-"""What a flight is held to over time: commanded airspeed, trims, and how fine time is cut."""
+"""Reference trajectory and sampling of a flight: commanded airspeed, trims, time steps."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from symheli.values.arrays import Array
 from symheli.values.controllers import PureController, StatefulController
 
 FOREVER = 2**40
-"""Steps that no flight has."""
+"""Larger than the number of steps of any flight."""
 
 
 @dataclass(frozen=True, eq=False)

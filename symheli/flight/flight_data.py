@@ -118,7 +118,7 @@ class FlightData:
         return text + (f" ({', '.join(signs)})" if signs else "")
 
 
-ADVICE = "less excitation, noise, gusts, delay or acceleration, or another controller, please"
+ADVICE = "reduce excitation, noise, gusts, delay or acceleration, or use another controller"
 
 
 def signals_of(heli: Helicopter, plan: FlightPlan) -> tuple[Signal, ...]:

@@ -19,8 +19,9 @@ from symheli.values.zarr_folder import ZarrArray, ZarrFolder
 
 @dataclass(frozen=True, eq=False)
 class FlightDataset:
-    """Flights in a folder: `values` (flight, time, signal) in SI, `time` (s), `signal`, `unit`,
-    `duration` (flight; s flown, NaN where not yet flown), `lost` (flight) and `seed` (flight).
+    """A dataset of flights in a folder: `values` (flight, time, signal) in SI, `time` (s),
+    `signal`, `unit`, `duration` (flight; s flown, NaN if not yet flown), `lost` (flight) and `seed`
+    (flight).
 
     Every chunk of flights is written whole or not at all, so that a reader may come at any time.
     Also read by zarr and xarray: `xarray.open_zarr(path)["values"].sel(signal="phi")`.
@@ -48,7 +49,7 @@ class FlightDataset:
 
     path: Path
     attributes: Mapping[str, Any] = field(init=False, repr=False)
-    """What is said of all flights: vehicle, plans, fingerprint."""
+    """Attributes of all flights: vehicle, plans, fingerprint."""
     _folder: ZarrFolder = field(init=False, repr=False)
     _values: ZarrArray = field(init=False, repr=False)
 
@@ -129,7 +130,7 @@ class FlightDataset:
         wrong = [n for n, a in found.items() if (a.shape, a.chunks, a.dtype) != expected[n]]
         if wrong or values.dtype != "<f8":
             raise InputError(
-                f"{self.path}: what is said of {', '.join(wrong or ['values'])} does not fit the"
+                f"{self.path}: the metadata of {', '.join(wrong or ['values'])} do not fit the"
                 " rest, a file of the dataset is damaged; take an older copy"
             )
 
@@ -192,7 +193,7 @@ class FlightDataset:
         block = self._folder.chunk("values", i // self._chunk_size) if 0 <= i < len(self) else None
         flown = float(self.duration[i]) if block is not None else np.nan
         if block is None or not np.isfinite(flown):
-            raise InputError(f"{self.path}: flight {i} of {len(self)} is not there")
+            raise InputError(f"{self.path}: flight {i} of {len(self)} does not exist")
         time = self.time
         count = int(np.sum(time <= flown + 1e-9))
         values = block[i % self._chunk_size, :count]

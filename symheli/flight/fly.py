@@ -18,7 +18,7 @@ from symheli.records.flight_record import FlightRecord
 def fly(
     heli: Helicopter, schedule: AirspeedSchedule | FlightPlan, **options: Unpack[Options]
 ) -> FlightRecord:
-    """Fly a schedule in the nonlinear model under any controller, and record it.
+    """Fly a schedule in the nonlinear model under any controller and return its record.
 
     The reference at each moment is the quasi-steady trim of the commanded airspeed and acceleration
     in the steady wind. The controller sees what is recorded of u v w p q r phi theta. The whole
@@ -47,8 +47,8 @@ def fly(
     Raises
     ------
     FlightLostError
-        Bank or pitch beyond 80 deg, or numbers that are none: with the cause and what was recorded
-        until then.
+        Bank or pitch beyond 80 deg, or NaN or infinity in the state; it carries the cause and the
+        record up to that time.
     InputError
         Something does not fit.
     TrimError

@@ -82,7 +82,7 @@ class InNumpy:
 
     def _stepped(self, u: Array, wind: Array) -> Array:
         rates = self._made.rates
-        with np.errstate(all="ignore"):  # a lost flight ends in numbers that are none
+        with np.errstate(all="ignore"):  # a lost flight ends in NaN or infinity
             return runge_kutta_step(
                 lambda x: rates(x, u, wind, self._p)[0], self._x, self._loops.clock.step
             )

@@ -11,7 +11,8 @@ from symheli.errors import InputError
 
 @dataclass(frozen=True)
 class ParameterMonitor:
-    """How the scheduling parameter of a controller follows a reading of it, as an airspeed.
+    """How a controller follows a measured scheduling parameter, such as an airspeed: filter, range
+    and fallback.
 
     A good reading is held at the ends of the table, filtered (`lag`) and followed at `rate` at
     most, the rate for which the loop is certified. A bad one (no number, said to be invalid,

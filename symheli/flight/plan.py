@@ -50,7 +50,8 @@ class Options(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """A flight before it is flown; `record.meta["plan"]` of every flight, to be flown again.
+    """All settings of a flight; `record.meta["plan"]` of every flight holds them, so that it can be
+    repeated.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ class FlightPlan:
                 if name not in INPUTS:
                     raise UnknownNameError("input of the excitation", name, INPUTS)
         if self.noise_db is not None and self.sensors is not None:
-            raise InputError("give either noise_db or sensors: each says what the measurements are")
+            raise InputError("give either noise_db or sensors: both define the measurement errors")
         if self.noise_db is not None:
             level = _number("noise_db", self.noise_db, "a number of decibels, as 30")
             if abs(level) > LOUDEST:
@@ -143,8 +144,8 @@ class FlightPlan:
             raise InputError(f"delay: expected a number of seconds >= 0, got {self.delay}")
         if self.delay > LONGEST_DELAY:
             raise InputError(
-                f"delay: {self.delay:g} s is more than any computer and link take; it is in"
-                f" seconds: {self.delay:g} ms are delay={self.delay / 1000:g}"
+                f"delay: {self.delay:g} s is implausibly long; delay is in seconds: {self.delay:g}"
+                f" ms are delay={self.delay / 1000:g}"
             )
         if self.trims not in get_args(Trims):
             raise UnknownNameError("kind of trims", self.trims, get_args(Trims))

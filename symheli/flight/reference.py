@@ -39,8 +39,8 @@ def references(
         worst = int(misses.argmax())
         raise TrimError(
             f"no quasi-steady reference at {speed[knots[order[worst]]]:.1f} m/s,"
-            f" {rate[knots[order[worst]]]:.1f} m/s^2 (misses by {misses[worst]:.2g} SI): fly"
-            " gentler",
+            f" {rate[knots[order[worst]]]:.1f} m/s^2 (misses by {misses[worst]:.2g} SI): reduce the"
+            " accelerations",
             points[worst],
         )
     at = np.searchsorted(order, asked)[which.ravel()]

@@ -20,12 +20,12 @@ NEVER = 2**30
 
 
 class Status(IntFlag):
-    """What a step of a `TableController` met with.
+    """What happened in a step of a `TableController`, as flags.
 
-    `SATURATED`: a command stands at its limit. `PARAMETER`: the scheduling parameter was bad and
-    not followed. `FALLBACK`: it was so for too long, and the controller moves to its fallback.
-    `HELD`: a number that is none came in or out; the commands in force stay, and nothing else
-    changed.
+    `SATURATED`: a command is at its limit. `PARAMETER`: the reading of the scheduling parameter was
+    implausible and was ignored. `FALLBACK`: it was implausible for too long, and the controller
+    moves to its fallback value. `HELD`: an input or a result was NaN or infinite; the previous
+    commands are kept, and the state is unchanged.
 
     Examples
     --------

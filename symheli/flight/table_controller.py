@@ -305,8 +305,8 @@ class TableController:
         """
         if self.integrates:
             raise InputError(
-                f"{', '.join(self.integrates)} integrate from a command on, not about the trim:"
-                " fly the table itself"
+                f"{', '.join(self.integrates)} integrate from a command on, not about the trim; fly"
+                " the TableController itself instead of this model"
             )
         return ScheduledController(self.model, self.follow)
 
@@ -381,7 +381,7 @@ class TableController:
             Commands applied on the axes that are not flown, rad; default the trim.
         """
         n, s, nu, ny = self.numbers, self._own(state), len(self.inputs), len(self.outputs)
-        with np.errstate(all="ignore"):  # numbers that are none are met below
+        with np.errstate(all="ignore"):  # NaN and infinity are handled below
             seen, held = as_told("measured", measured, nu), as_told("reference", reference, nu)
             at = as_told("trim", trim, ny)
             elsewhere = at if others is None else as_told("others", others, ny)
@@ -449,9 +449,9 @@ class TableController:
         known = ", ".join(f"{s} ({s.unit})" for s in told.signals)
         raise InputError(
             f"the table is over {self.parameter} ({self.parameter.unit}), and a flight provides"
-            f" {known} where it follows the {self.follow}: tell it its parameter by"
-            " .update(state, measured, reference, trim, parameter) in a controller of your own; or,"
-            " where it is one of them under another name, rename that of the model,"
+            f" {known} where it follows the {self.follow}: pass its parameter by .update(state,"
+            " measured, reference, trim, parameter) in a controller of your own; or, where it is"
+            " one of them under another name, rename that of the model,"
             " .with_scheduling(Scheduling(name, unit, low, high, rate))"
         )
 

@@ -47,7 +47,7 @@ class Adaptive:
 
 
 class DormandPrince(Adaptive):
-    """Steps of order 5 whose estimated error stays below a tolerance, seven evaluations a step.
+    """Adaptive Runge-Kutta method of order 5 with an error tolerance, seven evaluations a step.
 
     A step ends where a sample does, for inputs and wind jump there, and where a switching function
     of a part is zero (a fin begins to stall, the wake reaches the tail), for the derivative of the
@@ -89,8 +89,9 @@ class DormandPrince(Adaptive):
 
 
 class CashKarp(Adaptive):
-    """As `DormandPrince`, with six evaluations a step: the seventh there is free only where the
-    next step has the same inputs. The method to choose for inputs that are held for some 20 ms.
+    """Adaptive Runge-Kutta method of order 5 like `DormandPrince`, with six evaluations a step;
+    preferable for inputs that are held for about 20 ms, where the last evaluation of
+    `DormandPrince` cannot be reused.
 
     Parameters
     ----------

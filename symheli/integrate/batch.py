@@ -29,7 +29,7 @@ cache.
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """N flights; found["q"] is one state of all (N, kept).
+    """Trajectories of N flights; found["q"] is one state of all flights (N, kept).
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def simulate_batch(
     keep: Literal["final"] | int = "final",
     workers: int | None = None,
 ) -> Batch:
-    """N flights by the classical Runge-Kutta method, side by side in vector registers and over the
+    """Simulate N flights by the classical Runge-Kutta method, vectorised and in parallel over the
     cores.
 
     A flight comes out the same to the bit whatever its neighbours, the number of workers and, where

@@ -12,7 +12,7 @@ from symheli.values.summary import summarized
 
 @dataclass(frozen=True, eq=False)
 class Feedback:
-    """u(k) - K(k) (x - reference(k)), limited to the travel.
+    """State feedback u(k) - K(k) (x - reference(k)) about the given inputs, limited to the travel.
 
     u is what the flight is given: nominal inputs and excitation together. Every flight of a batch
     shares K and the reference.

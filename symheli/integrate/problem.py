@@ -81,8 +81,8 @@ def many_flights(
     lengths |= {len(v) for v in values.values() if v.ndim == 1}
     if len(lengths) != 1 or 0 in lengths:
         raise InputError(
-            "x0 (N, nx), u (N, n, 4), wind (N, n, 3) and parameters (N,) must say one number of"
-            f" flights N >= 1, got {sorted(lengths) or 'none'}"
+            "x0 (N, nx), u (N, n, 4), wind (N, n, 3) and parameters (N,) must agree on the number"
+            f" of flights N >= 1, got {sorted(lengths) or 'none'}"
         )
     count = lengths.pop()
     u = u if u.ndim == 3 else frozen(u, "u", (None, 4))[None]
@@ -100,7 +100,7 @@ def _varied(heli: Helicopter, values: Mapping[str, Array], count: int) -> Array:
         frozen(value, name, (count,) if value.ndim else ())
         if name.startswith("controls."):
             raise InputError(
-                f"{name} is no part of the equations: limit the inputs, or the travel of the"
+                f"{name} is not part of the equations: limit the inputs, or the travel of the"
                 " feedback"
             )
         for extreme in (value.min(), value.max()):

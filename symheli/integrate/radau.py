@@ -16,7 +16,7 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class Radau:
-    """Equal implicit steps with collocation points, stable however stiff.
+    """Implicit Radau collocation method with equal steps, stable for stiff equations.
 
     The quaternion is brought back to unit length after each sample.
 

@@ -21,8 +21,8 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class RungeKutta4:
-    """Equal steps of the classical method of order 4, dt divided evenly; the quaternion is brought
-    back to unit length after each.
+    """Classical Runge-Kutta method of order 4 with equal steps that divide dt; the quaternion is
+    normalised after each step.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class Flights:
                 if keep:
                     self.inputs[part, slot] = u.T
             rates = self._rates(u, wind, parameters.T, x.shape[1])
-            with np.errstate(all="ignore"):  # a lost flight ends in numbers that are none
+            with np.errstate(all="ignore"):  # a lost flight ends in NaN or infinity
                 for _ in range(self.substeps):
                     x = runge_kutta_step(rates, x, self.step)
 

@@ -34,8 +34,8 @@ class Gradient:
 def tangent(
     heli: Helicopter, flown: Trajectory, dx0: object = None, du: object = None, dwind: object = None
 ) -> Array:
-    """First-order change of the states (n+1, nx, m) for m directions: dx0 (nx, m), du (n, 4, m),
-    dwind (n, 3, m), what is left out is 0.
+    """Return the first-order change of the states (n+1, nx, m) for m directions: dx0 (nx, m), du
+    (n, 4, m), dwind (n, 3, m); a direction left out is 0.
 
     Without the last axis one direction, (n+1, nx). `dx0=np.eye(nx)` gives the transition matrices.
     A quaternion stays of unit length, so a change along it vanishes. Inputs made by feedback count
@@ -67,8 +67,8 @@ def tangent(
 
 
 def gradient(heli: Helicopter, flown: Trajectory, weights: object) -> Gradient:
-    """Gradient of a functional of the trajectory, given its derivative `weights` (n+1, nx) with
-    respect to the states at the samples.
+    """Return the gradient of a functional of the trajectory, given its derivative `weights` (n+1,
+    nx) with respect to the states at the samples.
 
     For the final state only the last row is not zero. `weights` (n+1, nx, m): m functionals at
     once. By reverse differentiation: the cost does not grow with the number of inputs.

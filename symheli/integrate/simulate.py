@@ -38,8 +38,8 @@ def simulate(
     method: str | Method = "rk4",
     feedback: Feedback | None = None,
 ) -> Trajectory:
-    """Fly with given inputs, each held for a sample; the whole flight is one call into machine
-    code.
+    """Simulate the helicopter with given inputs, each held for a sample; the whole flight is one
+    call of compiled code.
 
     For other numbers of the vehicle see `Helicopter.with_parameters`: nothing is compiled anew.
 
@@ -99,8 +99,8 @@ def simulate(
     if not np.isfinite(states[-1]).all():  # what is lost stays lost
         lost = ~np.isfinite(states).all(axis=1)
         raise SymheliError(
-            f"the flight left the range of numbers at {dt * int(lost.argmax()):.6g} s: milder"
-            " inputs, or a shorter step, please"
+            f"the states became NaN or infinite at {dt * int(lost.argmax()):.6g} s: use milder"
+            " inputs or a shorter step"
         )
     warn_of_flights(heli, problem, states[None])
     wind_flown = np.broadcast_to(problem.wind[0], (problem.samples, 3))

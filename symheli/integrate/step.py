@@ -10,8 +10,8 @@ from symheli.helicopter import Helicopter
 
 
 def runge_kutta(heli: Helicopter, dt: float, steps: int) -> casadi.Function:
-    """(x, u, wind) -> x after `dt` seconds with u and wind held, by `steps` classical Runge-Kutta
-    steps (order 4).
+    """Return the function (x, u, wind) -> x after `dt` seconds with u and wind held, by `steps`
+    classical Runge-Kutta steps (order 4).
 
     x is the quaternion form (`heli.flight_states`); wind in earth axes. The quaternion is brought
     back to unit length after each step; its drift there is of the order of the integration error.

@@ -21,7 +21,7 @@ INPUTS = ("d_lon", "d_lat", "d_col", "d_ped")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trajectory:
-    """What `simulate` returns; flown["q"] is one state, `to_record()` a `FlightRecord`.
+    """The result of `simulate`; flown["q"] is one state, `to_record()` returns a `FlightRecord`.
 
     Parameters
     ----------

@@ -163,8 +163,8 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
         ) from error
     if not present:
         raise InputError(
-            f"{file}: no message that could be read; an ArduPilot log begins with the formats of"
-            " its messages, was this one cut at its beginning?"
+            f"{file}: no readable message; an ArduPilot log begins with the formats of its"
+            " messages, and this one may lack its beginning"
         )
     if said.getvalue():
         warn_of_damage(file)
@@ -176,9 +176,9 @@ def _read(path: str | os.PathLike[str], wanted: Iterable[str] | None) -> _Found:
 
 @contextlib.contextmanager
 def _closing(reader: Any) -> Iterator[Any]:
-    """A reader that is closed also where it fails to open (its constructor leaves the file open),
-    tells damage in Python (its compiled index prints past `quiet`), and looks for no calendar
-    (which fails for old logs).
+    """A reader that is closed even if it fails to open (its constructor leaves the file open),
+    reports damage by Python's logging (its compiled index ignores `quiet`), and skips the search
+    for GPS time (which fails for old logs).
     """
     log = object.__new__(reader)
     log.init_arrays_fast, log.init_clock = log.init_arrays, lambda: None

@@ -28,8 +28,8 @@ def read_mat(
 ) -> Table:
     """The variables named in `units`, and `time` (there in `time_unit`), in s.
 
-    "log.theta" reaches into a struct. Raises `InputError` for a file that is none of MATLAB's or
-    was cut, one of -v7.3 without h5py, and variables that are no vectors of one length.
+    "log.theta" reaches into a struct. Raises `InputError` for a file that is not a MATLAB file
+    or is truncated, for -v7.3 without h5py, and for variables that are not vectors of equal length.
     """
     file, factor = existing(path), seconds_in(time_unit)
     content = _content(file)

@@ -154,8 +154,8 @@ class SignalMap:
             return found
         if to_si(source.unit)[1] != to_si(found)[1]:
             raise InputError(
-                f"signals.{name}: {source.column} comes in {to_si(found)[1]}, which is no"
-                f" {source.unit}; correct or leave out the unit"
+                f"signals.{name}: {source.column} comes in {to_si(found)[1]}, which does not"
+                f" convert to {source.unit}; correct or leave out the unit"
             )
         return source.unit
 

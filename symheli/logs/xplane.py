@@ -77,7 +77,7 @@ def read_xplane(path: str | os.PathLike[str], dt: float | None = None) -> Table:
     """
     segments = [s for s in _segments(path) if len(s)]
     if not segments:
-        raise InputError(f"{path}: headers but no whole row of numbers")
+        raise InputError(f"{path}: headers but no complete row of numbers")
     signals = [_signals(s.columns) for s in segments]
     if not any(signals):
         raise InputError(

@@ -29,7 +29,7 @@ Riccati solutions lose to rounding.
 
 @dataclass(frozen=True, eq=False)
 class BalancedTruncation(Generic[Model]):
-    """The truncated `model`, and what it costs with p held at each of `p` (K,), between the points
+    """The truncated `model`, and its error with p frozen at each of `p` (K,), between the points
     that were balanced.
 
     `singular_values` (nx,): importance of each balanced state, those beyond the order were left
@@ -56,8 +56,8 @@ def balanced_truncation(
     input_scale: object = 1.0,
     output_scale: object = 1.0,
 ) -> BalancedTruncation[Model]:
-    """Fewer states by one constant projection, balanced for the means over p of the frozen
-    Gramians.
+    """Reduce the number of states by one constant projection that balances the means over p of the
+    frozen Gramians.
 
     The Gramians are those of the normalised coprime factors, solutions of the Riccati equations of
     u'u + y'y: they exist for unstable models and belong to the nu-gap. One projection for all p

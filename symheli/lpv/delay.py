@@ -13,7 +13,8 @@ from symheli.values.signal import Signal
 
 
 def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:
-    """exp(-s T) from `<name>_command` to `name`: Pade's all-pass, in observer form.
+    """Return the Pade all-pass approximation of exp(-s T) from `<name>_command` to `name`, in
+    observer form.
 
     The phase is right to 1e-3 rad up to omega T of about `order` (4: up to 200 rad/s for 20 ms).
 
@@ -71,7 +72,7 @@ def pade_delay(name: str, seconds: float, order: int = 4) -> LinearModel:
 
 
 def sample_delay(name: str, samples: int, dt: float) -> LinearModel:
-    """z^-samples from `<name>_command` to `name`: a shift register, exact.
+    """Return the exact delay z^-samples from `<name>_command` to `name`, a shift register.
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ SINGULAR = 1e12
 
 
 NOISE = 1e-12
-"""An entry this far below the largest of its row or column, in the units that suit all entries
-best, has no say in those units.
+"""An entry smaller than this fraction of the largest of its row or column, after equilibration, is
+treated as zero when the units are chosen.
 """
 
 

@@ -113,7 +113,7 @@ def _labels(content: Content, names: Mapping[str, Sequence[Signal]]) -> dict[str
 
 
 def read(path: str | os.PathLike[str]) -> Content:
-    """Read a file; raises `InputError` for one that is none, or lacks a part."""
+    """Read a file; raise `InputError` if it is not a file of models or lacks a part."""
     path = Path(path)
     try:
         given = _from_npz(path) if path.suffix == ".npz" else _from_json(path)

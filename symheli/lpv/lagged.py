@@ -18,7 +18,7 @@ LAGGED, LAG_RATE = "_lagged", "_lag_rate"
 
 
 def lagged(lpv: LPVStateSpace, seconds: float) -> LPVStateSpace:
-    """The model over q and r with T dq/dt = p - q, r = dq/dt: its parameter is p = q + T r.
+    """Return the model over q and r with T dq/dt = p - q, r = dq/dt: its parameter is p = q + T r.
 
     The rate of q is the parameter r, |r| <= rate of p, and |dr/dt| <= 2 rate/T. Polynomials of one
     parameter p are polynomials of q and r, exactly; beyond the range of p, at corners that q and r

@@ -158,7 +158,7 @@ class LinearFamily:
         """
         if (self.parameter, self.parameter.unit) != (AIRSPEED, AIRSPEED.unit):
             raise InputError(
-                f"{purpose} is over airspeed in m/s, and this family over {self.parameter}"
+                f"{purpose} needs a family over airspeed in m/s, got one over {self.parameter}"
                 f" ({self.parameter.unit})"
             )
         return self.airspeeds
@@ -201,7 +201,7 @@ class LinearFamily:
         "polynomial": least-squares fit of `degree`; "spline": cubic through the nodes; "linear":
         straight lines. `.residuals` of the result are fit minus node values. The trim schedule is
         always the cubic spline (linear below four nodes), none without trims: its slope is the
-        drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2 (None: as fast as it likes).
+        drift -x0'(p) dp/dt. `rate` bounds |dp/dt| in m/s^2 (None: arbitrarily fast).
         """
         return interpolated(self.models, (self.parameter,), (self.airspeeds,), kind, degree, rate)
 
@@ -242,8 +242,8 @@ class LinearFamily:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> LinearFamily:
-        """The models in a file that `save`, another program or somebody wrote. Raises `InputError`
-        for a file that is none, or whose models are over several parameters.
+        """Load the models from a file written by `save` or another program. Raises `InputError` for
+        any other file, and for models over several parameters.
         """
         from symheli.lpv.family_file import read
 

@@ -232,8 +232,8 @@ class LinearGrid:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> LinearGrid:
-        """The models in a file that `save`, another program or somebody wrote. Raises `InputError`
-        for a file that is none.
+        """Load the models from a file written by `save` or another program. Raises `InputError` for
+        any other file.
         """
         from symheli.lpv.family_file import read
 

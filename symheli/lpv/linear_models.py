@@ -18,8 +18,7 @@ from symheli.values.summary import summarized
 
 @dataclass(frozen=True, eq=False)
 class LinearModels(Sequence[LinearModel]):
-    """K linear models with equal names and sample period; models[k] is one, made when it is asked
-    for.
+    """K linear models with equal names and sample period; models[k] is one of them.
 
     Parameters
     ----------

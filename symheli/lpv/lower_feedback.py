@@ -58,7 +58,8 @@ def lower_feedback(
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
 ) -> LPVStateSpace | UncertainStateSpace:
-    """The plant with u = K y closed, from its other inputs to its other outputs.
+    """Close the loop u = K y of a plant, and return the model from its other inputs to its other
+    outputs.
 
     The feedback is positive, and by names: the controller's inputs are outputs y of the plant, its
     outputs inputs u. Exact: what is multiplied by constants keeps its basis, products of
@@ -307,7 +308,7 @@ def _same_quantity(s: Scheduling, known: Sequence[Scheduling]) -> Scheduling | N
     for other in known:
         try:
             (size, one), (other_size, two) = to_si(s.unit), to_si(other.unit)
-        except InputError:  # units of one's own: only the very same one is comparable
+        except InputError:  # user-defined units: comparable only if identical
             if s.unit != other.unit:
                 continue
             size, one, other_size, two = 1.0, s.unit, 1.0, s.unit
@@ -370,8 +371,8 @@ def _over_the_same(
         if low > known.low + slack or high < known.high - slack:
             raise InputError(
                 f"the plant holds for {s.name} on [{known.low:g}, {known.high:g}] {s.unit}, what is"
-                f" connected to it on [{low:g}, {high:g}] only; narrow the plant,"
-                " .with_scheduling(...), or make that over the wider range"
+                f" connected to it on [{low:g}, {high:g}] only; narrow the range of the plant,"
+                " .with_scheduling(...), or design over the wider range"
             )
     for s in controller.parameters:
         if (known := own.get(s.name)) and (slower := _made_for_another_rate(s, known, own)):

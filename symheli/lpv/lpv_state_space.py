@@ -431,7 +431,7 @@ class LPVStateSpace:
         for s in self.parameters:
             if isinstance(s.rate, str):
                 raise InputError(
-                    f"backwards the rate of {s.name} is not {s.rate}: give a number,"
+                    f"backwards the rate of {s.name} is not {s.rate}: give it as a number,"
                     " .with_rate(...)"
                 )
 

@@ -21,7 +21,7 @@ it.
 """
 
 SIZES = 1e-60, 1e60
-"""Scales of channels: the squares of what is left are numbers."""
+"""Permitted channel scales; their squares neither overflow nor underflow."""
 
 
 def nu_gap(
@@ -32,7 +32,7 @@ def nu_gap(
     output_scale: object = 1.0,
     points: int = 2000,
 ) -> float:
-    """The nu-gap metric of two discrete models with equal sample period, inputs and outputs.
+    """Return the nu-gap of two discrete models with equal sample period, inputs and outputs.
 
     1 where the winding-number condition fails: no controller is known to suit both. Evaluated on
     frequencies up to Nyquist, logarithmic, from a thousandth of the slowest pole, at the poles and
@@ -129,7 +129,7 @@ def chordal_distance(
     input_scale: object = 1.0,
     output_scale: object = 1.0,
 ) -> np.ndarray:
-    """Pointwise chordal distance of two models with the same signals.
+    """Return the pointwise chordal distance of two models with the same signals.
 
     Its largest value over all frequencies is the nu-gap where the winding-number condition holds;
     over a band it says how far apart the models are there, whatever their slow modes.

@@ -26,7 +26,7 @@ def nu_gaps(
     output_scale: object = 1.0,
     points: int = 100,
 ) -> Array:
-    """The nu-gap from one discrete model to each of many, as `nu_gap` finds it.
+    """Return the nu-gap from one discrete model to each of many, as `nu_gap` does for two.
 
     All on the frequencies of the one model's poles, then closer around the largest distance of
     each. A model in which the winding number cannot be told on these goes through `nu_gap` itself.

@@ -13,8 +13,8 @@ from symheli.values.arrays import Array, frozen
 from symheli.values.units import per_second, ratio
 
 Limit = float | str
-"""How fast a parameter may move: a number in its unit per second (math.inf: as fast as it likes),
-or the name of the parameter that is its rate.
+"""Rate bound of a parameter: a number in its unit per second (math.inf: arbitrarily fast), or the
+name of the parameter that is its rate.
 """
 Rates = Limit | Sequence[Limit] | Mapping[str, Limit]
 """One limit for all parameters, one for each in order, or {name: limit}."""
@@ -27,13 +27,13 @@ class Scheduling:
     Parameters
     ----------
     name, unit : str
-        What it is called and measured in.
+        Its name and unit.
     low, high : float
         Its range, in `unit`.
     rate : float or str
-        In `unit` per second (math.inf: as fast as it likes), or the name of another parameter of
-        the same model, which then is dp/dt: an airspeed with rate="acceleration" changes as the
-        acceleration says, no faster and no slower.
+        Bound on |dp/dt| in `unit` per second (math.inf: arbitrarily fast), or the name of another
+        parameter of the same model, which is then dp/dt: with rate="acceleration" the rate of an
+        airspeed equals the acceleration.
 
     Raises
     ------
@@ -118,15 +118,15 @@ UNSCHEDULED = Scheduling("constant", "1", 0.0, 1.0)
 
 
 def parameters(given: Scheduling | Sequence[Scheduling]) -> tuple[Scheduling, ...]:
-    """One or several parameters as a tuple; raises `InputError` for names that repeat or a rate
-    that is none of them, or of another unit.
+    """Return one or several parameters as a tuple; raise `InputError` for repeated names, and for a
+    rate that is not one of them or has the wrong unit.
     """
     out = (given,) if isinstance(given, Scheduling) else tuple(given)
     if not out or not all(isinstance(s, Scheduling) for s in out):
         raise InputError(f"expected a Scheduling or several, got {given!r:.120}")
     names = [s.name for s in out]
     if len(set(names)) < len(names):
-        raise InputError(f"scheduling parameters need names of their own, got {', '.join(names)}")
+        raise InputError(f"scheduling parameters must have different names, got {', '.join(names)}")
     for s in out:
         if not isinstance(s.rate, str):
             continue
@@ -148,8 +148,8 @@ def parameters(given: Scheduling | Sequence[Scheduling]) -> tuple[Scheduling, ..
 
 
 def with_rates(given: Sequence[Scheduling], rate: Rates) -> tuple[Scheduling, ...]:
-    """The same parameters with these limits; raises `InputError` for a wrong number of them,
-    `UnknownNameError` for a name that is none of theirs.
+    """Return the same parameters with these rate limits; raise `InputError` for a wrong number of
+    limits, `UnknownNameError` for an unknown parameter name.
     """
     names = [s.name for s in given]
     if isinstance(rate, Mapping):
@@ -186,8 +186,8 @@ def unit_sizes(known: Sequence[Scheduling], given: Sequence[Scheduling]) -> list
         if size is None and old.unit != "1":
             raise InputError(
                 f"{old.name} is in {old.unit}, got a range in {new.unit}, which does not convert:"
-                f" give it in {old.unit} or a unit of the same quantity; a model over another"
-                " quantity has to be made over that"
+                f" give it in {old.unit} or a unit of the same quantity; for another quantity build"
+                " the model over that quantity"
             )
         sizes.append(1.0 if size is None else size)
     return sizes

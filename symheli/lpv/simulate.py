@@ -31,7 +31,7 @@ def simulate(
     dt: float | None = None,
     drift: object | None = None,
 ) -> tuple[Array, Array]:
-    """Response of an LPV model along a scheduling history, deviations in, deviations out.
+    """Simulate an LPV model along a scheduling history, in deviations from the trim.
 
     Continuous models are advanced by the exact exponential of each sample's A(p(k)), B(p(k)), p
     held; discrete ones by their own matrices.

@@ -30,7 +30,7 @@ def stability_margin(
     input_scale: object = 1.0,
     output_scale: object = 1.0,
 ) -> float:
-    """The normalized coprime stability margin b(P, C) of the loop u = C y.
+    """Return the normalized coprime stability margin b(P, C) of the loop u = C y.
 
         1/b = sup over frequency of |[P; I] (I - C P)^-1 [-C, I]|
 

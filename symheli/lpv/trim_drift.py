@@ -20,8 +20,8 @@ def with_trim_drift(lpv: LPVStateSpace) -> LPVStateSpace:
     """See `LPVStateSpace.with_trim_drift`."""
     if lpv.trim is None:
         raise InputError(
-            "the model has no trim, so nothing drifts; interpolate a family or a grid with trims,"
-            " and declare the drift before closing loops"
+            "the model has no trim schedule, hence no drift; interpolate a family or a grid with"
+            " trims, and declare the drift before closing loops"
         )
     names, columns = _columns(lpv, points := lpv.trim.basis.samples(lpv.box))
     own = lpv.basis.fit(points, columns)

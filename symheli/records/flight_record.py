@@ -362,7 +362,7 @@ class FlightRecord:
         keep = (self.time >= low) & (self.time < high)
         if keep.sum() < 2:
             raise InputError(
-                f"nothing is left between start and stop; the record goes from {self.time[0]:g} to"
+                f"no samples lie between start and stop; the record goes from {self.time[0]:g} to"
                 f" {self.time[-1]:g} s"
             )
         return self.rows(keep)

@@ -77,9 +77,9 @@ class KinematicCheck:
     rows : tuple of SensorCheck
         Rates, angles, and velocities and specific forces as far as recorded.
     windows : int
-        How many stretches of flight, each with a free start, were compared.
+        Number of stretches of flight compared, each with a free initial state.
     limit : float
-        Standard errors beyond which a difference is none of chance.
+        Number of standard errors above which a difference counts as significant.
 
     Examples
     --------

@@ -33,7 +33,7 @@ def sweep(
     inputs: Sequence[str] | None = None,
     start: LinearFamily | None = None,
 ) -> LinearFamily:
-    """Trim and linearize at each of several airspeeds, each trim started from the one before.
+    """Trim and linearize at each of several airspeeds, each trim started from the previous one.
 
     Parameters
     ----------

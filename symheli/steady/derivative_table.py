@@ -151,8 +151,8 @@ class DerivativeTable:
 
 
 def derivatives(family: LinearFamily) -> DerivativeTable:
-    """The derivatives of a sweep in straight flight: entries of A and B without gravity and the
-    kinematic terms w0, v0, u0.
+    """Return stability and control derivatives over a sweep in straight flight: entries of A and B
+    without gravity and the kinematic terms w0, v0, u0.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ from symheli.values.summary import as_table, summarized
 
 @dataclass(frozen=True, kw_only=True)
 class TrimPoint(OperatingPoint):
-    """An operating point with the flight condition it answers and how well.
+    """An operating point with its flight condition and the residuals of the trim.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def trim(
     throw: bool = True,
     continuation: bool = True,
 ) -> TrimPoint:
-    """Steady flight at an airspeed.
+    """Find the steady flight at an airspeed.
 
     Newton's method with the exact Jacobian (MINPACK's hybrid method where that stalls); where that
     fails, by continuation from hover and from other guesses. Success is judged on the recomputed
@@ -143,7 +143,7 @@ def trim(
     TrimError
         No equilibrium was found; its `result` is the best point.
     InputError
-        A flight condition that is none.
+        The flight condition is invalid.
 
     Warns
     -----

@@ -23,7 +23,7 @@ axes of the heading.
 
 @dataclass(frozen=True)
 class FlightCondition:
-    """What is asked of a trim.
+    """The flight condition that a trim has to meet.
 
     Parameters
     ----------

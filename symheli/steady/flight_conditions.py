@@ -31,7 +31,7 @@ class FlightConditions(Sequence[FlightCondition]):
     Raises
     ------
     InputError
-        Lengths that differ, or a condition that is none.
+        Lengths that differ, or an invalid flight condition.
     """
 
     airspeed: Array

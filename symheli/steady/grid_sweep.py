@@ -47,7 +47,7 @@ def sweep_grid(
     rotor_speed: Sequence[float] | None = None,
     inputs: Sequence[str] | None = None,
 ) -> LinearGrid:
-    """`sweep` at every combination of the values of one more axis or several.
+    """Run `sweep` at every combination of the values of one or more further axes.
 
     Parameters
     ----------

@@ -26,8 +26,8 @@ def linearize(
     inputs: Sequence[str] | None = None,
     allow_accelerating: bool = False,
 ) -> LinearModel:
-    """A, B of the Euler form about a trim by algorithmic differentiation through the implicit
-    inflow; C = I, D = 0.
+    """Return A, B of the Euler form about a trim by algorithmic differentiation through the
+    implicit inflow; C = I, D = 0.
 
     The air is that of the point.
 

@@ -33,7 +33,7 @@ from symheli.values.summary import as_table, summarized
 
 @dataclass(frozen=True, eq=False)
 class TrimBatch(OperatingPoints):
-    """N trims as arrays; found[k] is one as a `TrimPoint`, made when it is asked for.
+    """N trims as arrays; found[k] is one of them as a `TrimPoint`.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def trim_batch(
     throw: bool = True,
     continuation: bool = True,
 ) -> TrimBatch:
-    """`trim` at N flight conditions, side by side in vector registers.
+    """Trim at N flight conditions, vectorised and in parallel over the cores.
 
     What follows one another should be near: where no start is given each trim is started from one
     of the eight before it. Those that Newton's method does not find are searched as `trim` does,
@@ -210,7 +210,7 @@ def trim_batch(
     TrimError
         No equilibrium was found; its `result` is the best point of the first that failed.
     InputError
-        A flight condition that is none, lengths that differ.
+        An invalid flight condition, or lengths that differ.
 
     Warns
     -----

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class TrimMap:
-    """Trims at n airspeeds and m climb rates; map["theta"] is any state, input or "power" over the
+    """Trims at n airspeeds and m climb rates; map["theta"] is any state, input or "power" on the
     grid (n, m).
 
     Parameters
@@ -179,7 +179,7 @@ class TrimMap:
 def trim_map(
     heli: Helicopter, airspeeds: Sequence[float] | Array, climb_rates: Sequence[float] | Array
 ) -> TrimMap:
-    """Trim at every pair of airspeed and climb rate, each from the neighbours already found.
+    """Trim at every pair of airspeed and climb rate, each started from neighbours already found.
 
     Failures are kept, not raised: see `success`, `attainable` and `vortex_ring` of the result.
 

@@ -13,7 +13,7 @@ Answer = Callable[[NamedVector, NamedVector, NamedVector], Any]
 
 @runtime_checkable
 class StatefulController(Protocol):
-    """A controller that keeps its state to itself: a sample period, a start, and an answer at every
+    """A controller that keeps its own state: a sample period, a reset, and a command at every
     sample.
 
     `fly` asks one flight after the other of such an object; to be flown from several threads at
@@ -55,8 +55,8 @@ class StatefulController(Protocol):
 
 @runtime_checkable
 class PureController(Protocol):
-    """A controller that changes nowhere: its state in flight is a value that goes into a step and
-    comes out of it.
+    """A controller without internal state: its `step` takes the state as an argument and returns
+    the next one.
 
     Whoever flies it keeps the state, so that one object flies in any number of flights at once.
     Every controller of this package is one.

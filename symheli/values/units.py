@@ -1,4 +1,4 @@
-"""Units at the door: what comes in is declared, what is inside is SI and radians."""
+"""Unit conversion of inputs: units are declared at the interface; internally SI and radians."""
 
 from __future__ import annotations
 
@@ -200,8 +200,8 @@ def quotient(unit: str, by: str) -> str:
 
 
 def per_second(unit: str) -> str:
-    """The unit of a rate of something in `unit`: "m/s^2" of "m/s"; "km/h/s" of "km/h" and of a unit
-    of one's own, with which nothing can be calculated, that per second.
+    """The unit of a rate of something in `unit`: "m/s^2" of "m/s"; "km/h/s" of "km/h"; a
+    user-defined unit, which cannot be converted, with "/s" appended.
     """
     try:
         return quotient(unit, "s") if to_si(unit)[0] == 1.0 else f"{unit}/s"

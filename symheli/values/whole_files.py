@@ -50,7 +50,7 @@ def write_bytes(path: str | os.PathLike[str], content: bytes, *, forced: bool = 
         _remove(temporary)
         raise SymheliError(_reason(target, error, len(content))) from error
     except ValueError as error:  # a null byte, or half a character
-        raise InputError(f"{str(path)!r} is no path: {error}") from error
+        raise InputError(f"{str(path)!r} is not a path: {error}") from error
     except BaseException:
         _remove(temporary)
         raise

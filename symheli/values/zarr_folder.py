@@ -120,7 +120,7 @@ class ZarrFolder:
         return found
 
     def array(self, name: str) -> ZarrArray:
-        """What is said of an array; `InputError` where that is damaged."""
+        """Metadata of an array; raises `InputError` if they are damaged."""
         try:
             about = json.loads((self.path / name / ".zarray").read_text(encoding="utf-8"))
             along = json.loads((self.path / name / ".zattrs").read_text(encoding="utf-8"))
@@ -179,13 +179,13 @@ class ZarrFolder:
                 f"{path}: {len(content)} bytes, expected {wanted}; remove it and resume"
             )
         if dtype.kind == "U" and np.any(np.frombuffer(content, "<u4") > LAST_CHARACTER):
-            raise InputError(f"{path}: no text; remove it and resume")
+            raise InputError(f"{path}: not a text file; remove it and resume")
         return np.frombuffer(content, dtype).reshape(array.chunks)
 
     def _damaged(self, name: str, why: str) -> InputError:
         return InputError(
-            f"{self.path / name}: what is said of the array is damaged ({why}); resume, which says"
-            " it anew, or take an older copy"
+            f"{self.path / name}: the metadata of the array are damaged ({why}); resume, which"
+            " writes them again, or take an older copy"
         )
 
     def _file(self, name: str, chunk: int, array: ZarrArray) -> Path:

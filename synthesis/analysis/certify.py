@@ -1,5 +1,5 @@
-"""From a question to a certificate: what no proof can beat, the search for a proof, what it rests
-on.
+"""From an analysis problem to a certificate: a lower bound on the gain, the search for a proof, and
+its hypotheses.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ ROUNDED = 1e-12
 
 
 class Beaten(NamedTuple):
-    """What no proof can beat, in the sign of the bound, and the seconds it took to find it."""
+    """Lower bound on the gain, in the sign of the bound, and the seconds it took to find it."""
 
     frozen: float
     limit: float
@@ -96,7 +96,7 @@ def certify(asked: Question) -> Certificate:
 
 
 class _Member(NamedTuple):
-    """The `model` along whose motions no proof can go lower, and the worst `frozen` one.
+    """The `model` whose trajectories give the lower bound, and the worst `frozen` one.
 
     Of a set the one with `perturbation`; where no basis holds it the nominal one, beside the frozen
     one with the perturbation, which is `unstable` at some p or nowhere (None).

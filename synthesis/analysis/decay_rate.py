@@ -23,7 +23,8 @@ def decay_rate(
     solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> Certificate:
-    """Largest alpha found such that |x(t)| <= c exp(-alpha t) |x(0)| for every admissible p(t).
+    """Certify a decay rate: the largest alpha found such that |x(t)| <= c exp(-alpha t) |x(0)| for
+    every admissible p(t).
 
     Found by bisection, to 0.2 % of `upper` where P admits that.
 
@@ -47,7 +48,7 @@ def decay_rate(
     Returns
     -------
     Certificate
-        `alpha` (1/s) is proven, `upper` no proof can exceed: the slowest frozen mode, or growth
+        `alpha` (1/s) is proven; no proof can exceed `upper`: the slowest frozen mode, or growth
         along a trajectory.
 
     Raises

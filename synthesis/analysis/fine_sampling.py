@@ -21,7 +21,7 @@ def fine_sampling(A: Array, dt: float | None, gamma: float, lower: float) -> tup
     """A hypothesis where `gamma`, proven of a model sampled every `dt` seconds, may be loose
     because of that period; else nothing.
 
-    A (k, n, n): frozen models of the range. `lower` is what no proof can beat.
+    A (k, n, n): frozen models of the range. `lower` is the lower bound on the gain.
     """
     if dt is None or not np.isfinite(gamma) or not gamma > WORTH_SAYING * lower:
         return ()

@@ -42,8 +42,8 @@ def gain_against_rate(
     solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> GainCurve:
-    """Certified L2 gains of a model over the permitted rates of its parameter, with what no proof
-    can undercut.
+    """Certify the L2 gain of a model over a list of rate bounds of its parameter, each with a lower
+    bound.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def gain_against_rate(
     asked = _checked(rates)
     s = _parameter(model)
     if lft and not isinstance(model, LPVStateSpace):
-        raise InputError("LFT tests are of one model: leave out lft= for an uncertain one")
+        raise InputError("LFT tests do not apply to an uncertain model: leave out lft=")
     options = {"form": form, "impose": impose, "solver": solver, "search": search}
     found = [
         (CONSTANT if math.isinf(rate) else MOVING, rate, l2_gain(model, rate, **options))
@@ -120,7 +120,7 @@ def _checked(rates: Sequence[float]) -> list[float]:
 def _parameter(model: LPVStateSpace | UncertainStateSpace) -> Scheduling:
     if len(model.parameters) > 1:
         raise InputError(
-            "a curve over the rate is that of one parameter, the model has"
+            "a curve over the rate needs a model of one parameter, this one has"
             f" {', '.join(s.name for s in model.parameters)}: hold the others, .along(...)"
         )
     return model.scheduling

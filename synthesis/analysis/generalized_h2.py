@@ -23,7 +23,7 @@ def generalized_h2(
     solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> Certificate:
-    """Certified upper bound of max_t |y(t)| / |u|_2, from rest, over every admissible p(t).
+    """Certify an upper bound on max_t |y(t)| / |u|_2, from rest, over every admissible p(t).
 
     A gust of known energy then moves the outputs by at most gamma times its root.
 

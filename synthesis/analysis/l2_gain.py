@@ -23,7 +23,7 @@ def l2_gain(
     solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> Certificate:
-    """Certified upper bound of the L2 gain over every p(t) in its range within its rates.
+    """Certify an upper bound on the L2 gain over every p(t) within its range and rates.
 
     The bounded real lemma with P(p), imposed between grid points too; the gain is recomputed from P
     alone and verified. Gain and stability of one parameter by plain Bernstein coefficients take a
@@ -51,8 +51,8 @@ def l2_gain(
     Returns
     -------
     Certificate
-        `gamma` bounds the gain, in units of y per unit of u, `lower` no proof can undercut; of an
-        uncertain model that is attained by the one with `perturbation`. A failed solve is a
+        `gamma` bounds the gain, in units of y per unit of u; `lower` is a lower bound, which for
+        an uncertain model is attained by the model with `perturbation`. A failed solve is a
         certificate with gamma = inf and its reason in `status`.
 
     Raises

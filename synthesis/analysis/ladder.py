@@ -31,9 +31,7 @@ NOTHING = 1e-6
 accurate than that.
 """
 CLOSE = 1e-3
-"""A bound within this fraction of what no proof can beat is not tried to improve upon by a constant
-P.
-"""
+"""A bound within this fraction of the lower bound is not improved further by a constant P."""
 DECAY_TOLERANCE = 2e-3
 """The decay rate is found to this fraction of the frozen one."""
 
@@ -164,7 +162,7 @@ class Ladder(ABC):
         if still is None and best.proof is None and any(map(self.varies, shapes)):
             still = self._margins(self.constant(), Found(math.nan))
         if still is not None:
-            # that there is no P is said of the form that was asked for, of which a constant is one
+            # "no P exists" refers to the form requested, of which a constant P is a special case
             answer, best = best.answer, best.or_better(still, 1.0)
             best = best if best.proof is not None else best._replace(answer=answer)
         return best

@@ -23,7 +23,7 @@ def stability(
     solver: Solver | str | None = None,
     search: Search | None = THOROUGH,
 ) -> Certificate:
-    """Proof that the free state decays for every p(t) in its range within its rates.
+    """Certify that the free state decays for every p(t) within its range and rates.
 
     As `l2_gain`, without channels. Where no proof is found, a trajectory is looked for along which
     the state grows.

@@ -1,4 +1,4 @@
-"""How far above the optimum a design is made."""
+"""Back-off: the factor by which a design level exceeds the optimum."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from symheli.errors import InputError
 
 LARGEST = 1e3
-"""Beyond this nothing of the optimum is left, and the solvers' numbers run out."""
+"""Largest back-off; larger factors are meaningless and numerically unsafe."""
 
 
 def levels_above(back_off: float | Sequence[float]) -> tuple[float, ...]:
-    """The factors to try in order; raises `InputError` unless each is from 1 to `LARGEST`."""
+    """Return the factors to try in order; raise `InputError` unless each is from 1 to `LARGEST`."""
     factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
     if not factors or not all(1 <= factor <= LARGEST for factor in factors):
         raise InputError(f"back_off: expected numbers from 1 to {LARGEST:g}, got {back_off!r:.80}")

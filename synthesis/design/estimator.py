@@ -81,7 +81,8 @@ def estimator(
     back_off: float | Sequence[float] = BACK_OFF,
     divisions: int = 1,
 ) -> Estimator:
-    """An observer whose error has the least L2 gain, for every p(t) within its range and rates.
+    """Design an observer whose error has the least L2 gain, for every p(t) within its range and
+    rates.
 
     The plant may be unstable: what is estimated is seen through the error alone. L needs no rate
     of p.

@@ -30,8 +30,8 @@ def proven_around(
     tolerance: float = 0.05,
     **options: Any,
 ) -> tuple[float, float]:
-    """The interval of the parameter around `at` on which the loop of the constant controller K(at)
-    is proven stable while the parameter moves there.
+    """Find the interval of the parameter around `at` on which the loop of the constant controller
+    K(at) is proven stable while the parameter moves there.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def _one(plant: Plant, rate: Rate) -> tuple[Any, ...]:
     parameters = limits(plant.parameters, rate)
     if len(parameters) != 1:
         raise InputError(
-            "a frozen reading is that of one parameter; the plant has"
+            "a frozen reading needs a plant of one parameter, this one has"
             f" {', '.join(s.name for s in parameters)}"
         )
     return tuple(parameters)

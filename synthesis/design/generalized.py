@@ -76,8 +76,8 @@ class Generalized(NamedTuple):
             for signal, size in zip(signals, sizes, strict=True):
                 if 0 < size < SIZES[0]:
                     raise InputError(
-                        f"the {what} of {signal} is {size:.3g}, below what squares can express;"
-                        " weigh it more"
+                        f"the {what} of {signal} is {size:.3g}, whose square underflows; increase"
+                        " its weight"
                     )
         if max(np.abs(M).max(initial=0.0) for M in plant) > SIZES[1]:
             raise InputError(

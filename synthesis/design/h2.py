@@ -53,7 +53,7 @@ def h2(
     disturbances: Sequence[str] | None = None,
     performance: Sequence[str] | None = None,
 ) -> PointDesign:
-    """The H2-optimal output-feedback controller of one model, continuous or sampled.
+    """Design the H2-optimal output-feedback controller of one model, continuous or sampled.
 
     A linear-quadratic regulator on a Kalman filter. Of a continuous model the direct way from
     disturbances to performance must be one that a static gain can cancel; a sampled one may have

@@ -70,7 +70,7 @@ def hinf(
     gamma: float | None = None,
     back_off: float = 1.01,
 ) -> PointDesign:
-    """The H-infinity output-feedback controller of one model, continuous or sampled.
+    """Design the H-infinity output-feedback controller of one model, continuous or sampled.
 
     Two Riccati equations decide whether a level can be reached; the smallest is found to eight
     digits (five where noise or price are 1e-5 of the rest), and the central controller is that of a

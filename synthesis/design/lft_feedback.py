@@ -23,7 +23,8 @@ def lft_feedback(
     fastest: float = math.inf,
     divisions: int = 1,
 ) -> Controller:
-    """Output feedback for parameters that change as fast as they like, as an LFT in them.
+    """Design an output-feedback controller for parameters that change arbitrarily fast, from an LFT
+    in them.
 
     With constant X and Y the conditions of `output_feedback` need hold at every p alone. The full
     block S-procedure turns them into conditions on multipliers without losing anything (Scherer

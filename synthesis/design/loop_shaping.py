@@ -27,7 +27,7 @@ Array = np.ndarray
 def ncf(
     G: LinearModel, W1: Weight = 1.0, W2: Weight = 1.0, *, back_off: float = 1.01
 ) -> PointDesign:
-    """The controller of the largest normalized coprime stability margin of the shaped plant
+    """Design the controller of the largest normalized coprime stability margin of the shaped plant
     W2 G W1.
 
     The smallest gamma is known in closed form, sqrt(1 + rho(X Z)) with the solutions of two Riccati

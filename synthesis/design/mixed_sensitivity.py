@@ -24,7 +24,7 @@ def mixed_sensitivity(
     gamma: float | None = None,
     back_off: float = 1.01,
 ) -> PointDesign:
-    """The controller that makes the gain of [W1 S; W2 K S; W3 T] small.
+    """Design the controller that minimises the gain of [W1 S; W2 K S; W3 T].
 
     With a disturbance w at the outputs of the plant, y = G u + w and u = K y (positive feedback: to
     follow a reference, give the controller y - r): S from w to y, K S from w to u, T from w to G u.

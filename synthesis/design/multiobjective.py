@@ -64,7 +64,8 @@ def multiobjective(
     back_off: float = BACK_OFF,
     solver: Solver | str = "CLARABEL",
 ) -> Controller:
-    """A dynamic controller that minimises a weighted sum of squared gains within hard bounds.
+    """Design a dynamic controller that minimises a weighted sum of squared gains within hard
+    bounds.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class _Channel:
 
 @dataclass(frozen=True, kw_only=True)
 class L2(_Channel):
-    """The induced L2 gain (H-infinity norm where p stands still).
+    """The induced L2 gain (for frozen p the H-infinity norm).
 
     Examples
     --------
@@ -55,8 +55,8 @@ class L2(_Channel):
 
 @dataclass(frozen=True, kw_only=True)
 class H2(_Channel):
-    """The root of the output's variance in white noise of unit intensity (H2 norm); no feedthrough
-    from these disturbances to this performance may remain.
+    """The H2 norm: the root of the output's variance in white noise of unit intensity; there must
+    be no feedthrough from these disturbances to this performance.
 
     Examples
     --------
@@ -67,8 +67,8 @@ class H2(_Channel):
 
 @dataclass(frozen=True, kw_only=True)
 class EnergyToPeak(_Channel):
-    """The largest Euclidean norm of the output at any time, for a disturbance of unit energy
-    (generalized H2 norm); no feedthrough may remain.
+    """The generalized H2 norm: the largest Euclidean norm of the output at any time, for a
+    disturbance of unit energy; there must be no feedthrough.
 
     Examples
     --------
@@ -79,7 +79,7 @@ class EnergyToPeak(_Channel):
 
 @dataclass(frozen=True, kw_only=True)
 class PoleRegion:
-    """Where the poles of every frozen closed loop lie (continuous time).
+    """A region for the poles of every frozen closed loop (continuous time).
 
     Parameters
     ----------

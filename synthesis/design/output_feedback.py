@@ -69,7 +69,7 @@ def output_feedback(
     fastest: float = math.inf,
     divisions: int = 1,
 ) -> Controller:
-    """A dynamic controller from the measurements, of as many states as the plant, for every p(t)
+    """Design a dynamic controller from the measurements, of the order of the plant, for every p(t)
     within its range and rates.
 
     X(p) belongs to what the measurements tell, Y(p) to what the controls can do. While only one of

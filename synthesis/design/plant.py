@@ -105,7 +105,7 @@ class Plant:
         for name in w:
             if name in u:
                 raise InputError(
-                    f"{name} is a disturbance and a control: leave it a control, and"
+                    f"{name} is a disturbance and a control: keep it as a control, and"
                     f" .with_input_disturbance(['{name}']) adds a disturbance to it"
                 )
         known = (*model.outputs, *(s for s in (*w, *u) if s not in model.outputs))
@@ -274,7 +274,8 @@ class Plant:
             ]
             if not signals:
                 raise InputError(
-                    "no measurement is performance too: say which signals follow a reference"
+                    "no measurement is also a performance signal: give the signals that follow a"
+                    " reference"
                 )
         plant = self
         for name in _tuple(signals):

@@ -22,7 +22,7 @@ Matrices = tuple[Any, Any, Any, Any]
 
 
 class DesignStatus(Enum):
-    """How a design came out; the value is the sentence to print."""
+    """Outcome of a design; the value is the sentence to print."""
 
     SOLVED = "solved: the loop was recomputed, it is stable and keeps the level"
     IMPOSSIBLE = "no design: the problem has no solution, or none that the method can find"
@@ -32,7 +32,7 @@ class DesignStatus(Enum):
 
 @dataclass(frozen=True, eq=False)
 class PointDesign:
-    """A controller u = K y of one model, and what its loop was found to be.
+    """A controller u = K y of one model, with the verified properties of its loop.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ def certify_sampled(
     cover: bool = True,
     **options: Any,
 ) -> SampledLoop:
-    """The proven gain of a sampled plant under a controller as implemented.
+    """Certify the gain of a sampled plant under a controller as implemented.
 
     Parameters
     ----------
@@ -146,8 +146,8 @@ def certify_sampled(
     require_plant(plant)
     if plant.dt is None:
         raise InputError(
-            "what flies is sampled, and the plant is continuous:"
-            " plant.with_servo(...).sampled(dt).with_delay(dt) is what the controller meets"
+            "the plant is continuous, but the controller as implemented is sampled: use"
+            " plant.with_servo(...).sampled(dt).with_delay(dt)"
         )
     if isinstance(controller, Controller):
         promised = controller.promised if promised is None else promised
@@ -175,7 +175,7 @@ def _covered(loop: LPVStateSpace) -> tuple[LPVStateSpace | UncertainStateSpace, 
         if np.any(left):
             _, i, _ = np.argwhere(left)[0]
             raise InputError(
-                f"the performance of the plant is a fit too, {loop.outputs[i]} by"
+                f"the performance of the plant is also a fit, {loop.outputs[i]} by"
                 f" {np.abs(missed[:, i]).max():.2g}: put what varies behind a state (a servo, a"
                 " filter), or give cover=False for a proof of the fit alone"
             )

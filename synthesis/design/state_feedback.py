@@ -41,7 +41,8 @@ def state_feedback(
     back_off: float | Sequence[float] = BACK_OFF,
     divisions: int = 1,
 ) -> Controller:
-    """u = F(p) x for every p(t) within its range and rates; F needs no rate of p.
+    """Design u = F(p) x for every p(t) within its range and rates; F does not depend on the rate of
+    p.
 
     Parameters
     ----------

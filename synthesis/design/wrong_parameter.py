@@ -50,7 +50,8 @@ LOST = 0.1
 def with_wrong_parameter(
     plant: Plant, controller: Any, error: float, *, divisions: int = 8
 ) -> UncertainStateSpace:
-    """The loop of a controller that reads p + b instead of p, for every b(t) with |b| <= `error`.
+    """Return the loop of a controller that reads p + b instead of p, for every b(t) with |b| <=
+    `error`.
 
     A reading beyond the range of the parameter counts as its end. A bias of b0 and a lag of T s at
     rates |dp/dt| <= r together are within `error` = b0 + T r, whatever their motion.
@@ -105,7 +106,7 @@ def with_wrong_parameter(
         raise InputError(f"divisions: expected an integer from 1 to {FINEST}, got {divisions!r}")
     if len(plant.parameters) != 1:
         raise InputError(
-            "a wrong reading is that of one parameter; the plant has"
+            "a wrong reading needs a plant of one parameter, this one has"
             f" {', '.join(s.name for s in plant.parameters)}"
         )
     K = _scheduled(as_controller(controller, plant.controls, plant.measurements), plant)

@@ -52,7 +52,7 @@ def lft_gain(
     solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
 ) -> Certificate:
-    """Certified upper bound of the L2 gain of an LFT, p(t) in its box as fast as it likes.
+    """Certify an upper bound on the L2 gain of an LFT for arbitrarily fast p(t) in its box.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def lft_stability(
     solver: Solver | str = "CLARABEL",
     search: Search | None = THOROUGH,
 ) -> Certificate:
-    """Proof that the state of an LFT decays for every p(t) in its box, as fast as it likes.
+    """Certify that the state of an LFT decays for arbitrarily fast p(t) in its box.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ class Bandwidth(NamedTuple):
 def bandwidth(
     model: LinearModel, band: tuple[float, float] = (1.0, 60.0), points: int = 2000
 ) -> Bandwidth:
-    """ADS-33 bandwidth and phase delay of an attitude response.
+    """Compute the ADS-33 bandwidth and phase delay of an attitude response.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Margins:
-    """What a stable loop stands; every number is that of an unstable loop's onset, infinite where
+    """Stability margins of a stable loop: the smallest change that makes it unstable, infinite if
     there is none.
 
     gain: factors (below 1, above 1) between which the loop gain may be changed. phase (rad) may be
@@ -56,7 +56,7 @@ UNSTABLE = Margins(False, (1.0, 1.0), 0.0, 0.0, 0.0, ())
 
 
 def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str) -> LinearModel:
-    """The loop of u = feedback y broken at one input, as L of 1 + L (negative feedback).
+    """Return the loop of u = feedback y broken at one input, as L of 1 + L (negative feedback).
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def loop(plant: LinearModel, feedback: Mapping[tuple[str, str], float], at: str)
 
 
 def margins(loop: LinearModel) -> Margins:
-    """Gain, phase, delay and disk margins of a scalar loop L under negative feedback.
+    """Compute gain, phase, delay and disk margins of a scalar loop L under negative feedback.
 
     Without a frequency grid: unit-gain crossings are eigenvalues of a Hamiltonian matrix, phase
     crossings zeros of L(s) - L(-s), the disk an H-infinity norm. In discrete time delays count in
@@ -199,7 +199,8 @@ def margins(loop: LinearModel) -> Margins:
 
 
 def disk_margin(loop: LinearModel) -> float:
-    """alpha of the balanced disk, 1/|S - I/2| in the H-infinity norm; 0 for an unstable loop.
+    """Return alpha of the balanced disk margin, 1/|S - I/2| in the H-infinity norm; 0 for an
+    unstable loop.
 
     For a square loop of several channels all may change at once and independently, and be coupled:
     a lower bound of what a diagonal change needs.

@@ -22,7 +22,7 @@ START = 2.0**-20
 invariant.
 """
 ROOM = 1e-3
-"""The corners leave this fraction of the lag's pull unused, for the same reason."""
+"""Relative margin of the invariance condition at the corners, for the same reason."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -207,8 +207,8 @@ class SplineLyapunov:
 
 @dataclass(frozen=True, eq=False)
 class MemoryLyapunov:
-    """V = x' P(p, e) x with the lead e = p - q of p over its own lag q (see `LagRegion`), a spline
-    in both.
+    """V = x' P(p, e) x with the lag error e = p - q of p and its own lag q (see `LagRegion`), a
+    spline in both.
 
     On segment j of the region's knots P has degree `degree` in p; across, in s = (e - lower)/(upper
     - lower), degree `lead_degree` on the segments between `lead_knots` (from 0 to 1).

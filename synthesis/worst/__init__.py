@@ -1,1 +1,1 @@
-"""What no proof can beat: the worst frozen models and the worst trajectories of the parameters."""
+"""Lower bounds on the gain: the worst frozen models and the worst parameter trajectories."""

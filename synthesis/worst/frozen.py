@@ -20,8 +20,8 @@ Array = np.ndarray
 
 
 class FrozenGain(NamedTuple):
-    """The largest frozen `gain`, the `p` and frequency `omega` (rad/s) where it occurs; inf
-    and NaN where unstable.
+    """The largest frozen `gain`, with the `p` and frequency `omega` (rad/s) at which it occurs; inf
+    and NaN if unstable.
     """
 
     gain: float
@@ -30,8 +30,8 @@ class FrozenGain(NamedTuple):
 
 
 def frozen_gain(lpv: Scheduled, *, points: int = 61, tolerance: float = 1e-8) -> FrozenGain:
-    """Largest H-infinity norm of the models frozen at each p, which no gain of the LPV model can
-    undercut.
+    """Return the largest H-infinity norm of the models frozen at each p, a lower bound on the gain
+    of the LPV model.
 
     Parameters
     ----------
@@ -202,9 +202,8 @@ class _Response(NamedTuple):
             found = self.C @ X + self.D
         if not np.isfinite(found).all():
             raise AccuracyError(
-                "a frozen response exceeds the range of numbers: a pole so near the limit of"
-                " stability, or channels of such units, leave nothing to compute with; choose other"
-                " units"
+                "a frozen response overflows: a pole is too near the stability limit, or the units"
+                " of the channels are too different; choose other units"
             )
         return np.linalg.svd(found, compute_uv=False)[:, 0]
 

@@ -23,8 +23,8 @@ Array = np.ndarray
 
 
 class BoxGain(NamedTuple):
-    """The largest frozen `gain`, the `p` (m,) and frequency `omega` (rad/s) where it occurs;
-    inf and NaN where unstable.
+    """The largest frozen `gain`, with the `p` (m,) and frequency `omega` (rad/s) at which it
+    occurs; inf and NaN if unstable.
     """
 
     gain: float
@@ -33,7 +33,7 @@ class BoxGain(NamedTuple):
 
 
 def frozen_box_gain(lft: LFT, *, tolerance: float = 1e-8) -> BoxGain:
-    """Largest H-infinity norm of the frozen models over the box of an LFT.
+    """Return the largest H-infinity norm of the frozen models over the box of an LFT.
 
     Parameters
     ----------

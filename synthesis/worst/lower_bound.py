@@ -38,7 +38,7 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Search:
-    """How hard to look for bad trajectories.
+    """Effort of the search for bad trajectories.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def lower_bound(
     frozen: FrozenGain | None = None,
     search: Search | None = THOROUGH,
 ) -> LowerBound:
-    """A lower bound of the L2 gain, from the worst trajectory of p that is found.
+    """Compute a lower bound on the L2 gain, from the worst trajectory of p that is found.
 
     Deterministic as long as `search.seconds` suffice. In continuous time the error of the time
     steps, judged by halving them, is taken off.

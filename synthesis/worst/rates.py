@@ -27,7 +27,7 @@ def asked(parameters: Sequence[Scheduling], rate: Rate) -> tuple[Scheduling, ...
     except (TypeError, ValueError) as error:
         units = ", ".join(f"{s.name} ({s.unit}/s)" for s in parameters)
         raise InputError(
-            "rate must be >= 0 (math.inf: as fast as it likes), one for all, one for each of"
+            "rate must be >= 0 (math.inf: arbitrarily fast), one for all, one for each of"
             f" {units}, or by name, got {rate!r} ({error})"
         ) from error
 

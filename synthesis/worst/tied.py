@@ -94,8 +94,8 @@ def tied_lower_bound(lpv: LPVStateSpace, motion: Motion, search: Search) -> Lowe
     """
     if len(lpv.parameters) != 2:
         raise InputError(
-            "the search for bad trajectories with a rate that is a parameter knows two parameters,"
-            f" this model has {len(lpv.parameters)}: leave it out with search=None"
+            "the search for bad trajectories with a rate that is a parameter supports two"
+            f" parameters, this model has {len(lpv.parameters)}: leave it out with search=None"
         )
     ((i, j),) = motion.tied
     low, high = motion.box[j]

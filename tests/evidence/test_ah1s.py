@@ -132,7 +132,7 @@ def test_the_pilot_steps_as_it_flies(noisy):
 @pytest.mark.slow
 def test_a_lost_flight_says_when(ah1s):
     wild = Excitation({"d_lat": 3.0}, kind="prbs", band=(0.1, 0.3))
-    with pytest.raises(FlightLostError, match=r"the AH-1S was lost at .* less excitation"):
+    with pytest.raises(FlightLostError, match=r"the AH-1S was lost at .* reduce excitation"):
         flight.fly(flight.Plan(SHORT, wild))
 
 

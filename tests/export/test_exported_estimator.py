@@ -164,7 +164,7 @@ def test_what_cannot_be_written_is_refused(tmp_path):
         delay=1,
         basis=idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0),
     )
-    with pytest.raises(InputError, match="functions brought along"):
+    with pytest.raises(InputError, match="user-supplied functions"):
         write_estimator(idn.RecursiveLeastSquares(own), Everything(), tmp_path)
     with pytest.raises(InputError, match="C identifier"):
         write_estimator(CASES["longitudinal"], Everything(), tmp_path, "a b")

@@ -128,7 +128,7 @@ int main(void)
 
 def test_what_cannot_be_written_is_refused(tmp_path):
     own = idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0)
-    with pytest.raises(InputError, match="functions brought along"):
+    with pytest.raises(InputError, match="user-supplied functions"):
         write_kinematic_model(model_of(idn.KinematicARX("d_lon", "V", basis=own)), tmp_path)
     with pytest.raises(InputError, match="C identifier"):
         write_kinematic_model(model_of(STRUCTURES["airspeed"]), tmp_path, "a b")

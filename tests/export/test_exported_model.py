@@ -146,7 +146,7 @@ def test_what_cannot_be_written_is_refused(tmp_path):
         delay=1,
         basis=idn.UserFunctions((np.ones_like, np.sin), 0.0, 1.0),
     )
-    with pytest.raises(InputError, match="functions brought along"):
+    with pytest.raises(InputError, match="user-supplied functions"):
         write_model(model_of(own), tmp_path)
     with pytest.raises(InputError, match="C identifier"):
         write_model(model_of(STRUCTURES["lag"]), tmp_path, "a b")

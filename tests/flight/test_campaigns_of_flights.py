@@ -119,7 +119,7 @@ def test_other_flights_are_not_mixed_in(campaign, tmp_path):
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "thesis.tex").write_text("years of work")
-    with pytest.raises(InputError, match="is there and holds no flights"):
+    with pytest.raises(InputError, match="exists and does not hold flights"):
         campaign(mine)
     assert [p.name for p in mine.iterdir()] == ["thesis.tex"]
 

@@ -135,7 +135,7 @@ def test_airspeed_is_that_of_the_air(ideal, pilot):
 def test_a_lost_flight_says_when_and_what_to_change(ideal, pilot):
     wild = Excitation({"d_lon": 0.5, "d_lat": 0.5}, band=(0.1, 0.5))
     with pytest.raises(
-        FlightLostError, match=r"the flight was lost at .* s near .* m/s \(.*\): less excitation"
+        FlightLostError, match=r"the flight was lost at .* s near .* m/s \(.*\): reduce excitation"
     ) as lost:
         fly(ideal, AirspeedSchedule.transition(0.0, 6.0, 2.0), excitation=wild, controller=pilot)
     record = lost.value.record

@@ -185,12 +185,15 @@ def test_what_is_no_controller_is_refused(ideal, pilot):
         (3.0, "expected gains over airspeed"),
         (Mute, "expected gains over airspeed"),
         (Mute(), r"answered \[nan, nan, nan, nan\] at 0 s: expected d_lon d_lat d_col d_ped"),
-        (model(inputs=("bank",)), "must bear their names: unknown measured signal 'bank'"),
+        (
+            model(inputs=("bank",)),
+            "unknown name of a signal of the controller: unknown measured signal 'bank'",
+        ),
         (model(inputs=("a1",)), "unknown measured signal 'a1'"),
         (model(outputs=("roll",)), "unknown helicopter input 'roll'"),
         (model(height), r"this model is scheduled by height \(m\)"),
         (model(dt=0.013), "was designed for 0.013 s"),
-        (control.ss(-1, 1, 1, 0), "must bear their names"),
+        (control.ss(-1, 1, 1, 0), "unknown name of a signal of the controller"),
         (Autopilot([0.0, 5.0], np.zeros((2, 4, 1)), ["a1"], 0.02), "unknown measured signal 'a1'"),
     ):
         with pytest.raises(InputError, match=said):

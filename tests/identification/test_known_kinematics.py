@@ -97,7 +97,7 @@ def test_what_a_record_lacks_is_named(vehicle, flight):
     lengths = FlightRecord(used.time, used.columns(map(str, used.signals)), signals)
     with pytest.raises(InputError, match="u is in m; kinematics need it in m/s"):
         idn.fit(vehicle.kin, lengths)
-    with pytest.raises(InputError, match="a state of the body is no input"):
+    with pytest.raises(InputError, match="a state of the body cannot be an input"):
         idn.KinematicARX(("d_lon", "theta"), "p", basis=idn.Polynomial(1, 0.0, 1.0))
     with pytest.raises(InputError, match="at least one lag"):
         idn.KinematicARX("d_lon", "p", na={"w": 0}, basis=idn.Polynomial(1, 0.0, 1.0))

@@ -111,7 +111,9 @@ def test_wrong_covariances_are_refused():
         matrix_ellipsoid(P + np.triu(np.ones((6, 6)), 1).reshape(P.shape), 0.9)
     with pytest.raises(InputError, match="known exactly"):
         matrix_ellipsoid(0 * P, 0.9)
-    with pytest.raises(InputError, match=r"at least 270 to tell a probability of 0\.95, got 200"):
+    with pytest.raises(
+        InputError, match=r"at least 270 to estimate a probability of 0\.95, got 200"
+    ):
         matrix_ellipsoid(P, 0.95, draws=200)
     with pytest.raises(InputError, match="integer >= 0"):
         matrix_ellipsoid(P, 0.95, draws=-5)

@@ -97,7 +97,7 @@ def test_what_a_state_cannot_know_is_asked_for(vehicle, flight):
     rls = idn.RecursiveLeastSquares(vehicle.kin)
     with pytest.raises(InputError, match="need the sample period"):
         rls.online()
-    with pytest.raises(InputError, match="nothing without the one before"):
+    with pytest.raises(InputError, match="needs the sample before"):
         rls.update(rls.init(), np.zeros(8), np.zeros(4), 3.0)
 
 

@@ -115,7 +115,7 @@ def test_damaged_foreign_and_newer_files_are_refused_in_words(tmp_path):
     )
     refused(json.dumps({"theta": [1.0]}), "expected a file of 'symheli LPV-ARX model', got None")
     refused("[1, 2]", "got 'list'")
-    refused(whole, "belongs to another basis", basis=idn.Polynomial(1, 0.0, 13.0))
+    refused(whole, "has another basis", basis=idn.Polynomial(1, 0.0, 13.0))
     with pytest.raises(InputError, match="No such file"):
         idn.LPVARXModel.load(tmp_path / "nothing.json")
     own, _ = fitted("brought along")

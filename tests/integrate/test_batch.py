@@ -155,13 +155,13 @@ def test_ctrl_c_ends_a_long_batch_at_once(ideal):
     [
         (
             {"x0": np.zeros((4, 10)), "u": np.zeros((5, 3, 4))},
-            r"must say one number of flights N >= 1, got \[4, 5\]",
+            r"must agree on the number of flights N >= 1, got \[4, 5\]",
         ),
         (
             {"x0": np.zeros(10), "u": np.zeros((3, 4))},
-            "must say one number of flights N >= 1, got none",
+            "must agree on the number of flights N >= 1, got none",
         ),
-        ({"parameters": {"body.mass": np.ones(3)}}, "must say one number of flights"),
+        ({"parameters": {"body.mass": np.ones(3)}}, "must agree on the number of flights"),
         ({"parameters": {"body.mass": [1.0, np.nan, 1.0, 1.0]}}, "body.mass: entry"),
         ({"parameters": {"body.mas": 8.0}}, "did you mean 'body.mass'"),
         ({"parameters": {"body.mass": [8.0, -8.0, 8.0, 8.0]}}, "body.mass"),

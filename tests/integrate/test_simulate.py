@@ -122,7 +122,7 @@ def test_flapping_too_fast_for_explicit_steps_is_flown_by_the_implicit_method(id
     """
     x0, u = manoeuvre(ideal, n=10)
     stiff = ideal.with_parameters({"main_rotor.bar_lock_number": 800.0})
-    with pytest.raises(SymheliError, match="left the range of numbers"):
+    with pytest.raises(SymheliError, match="became NaN or infinite"):
         simulate(stiff, x0, np.repeat(u, 10, axis=0), dt=0.02)
     implicit = simulate(stiff, x0, u, dt=0.02, method="radau")
     fine = simulate(stiff, x0, u, dt=0.02, method=RungeKutta4(1e-4))

@@ -131,7 +131,7 @@ def test_the_clock_of_a_log_is_used_where_it_has_one_and_degrees_a_second_are_co
         (b"\x00\x01\x02|,", "binary"),
         (b"hello\nworld\n", "not an X-Plane log"),
         (row(1, 2).encode(), "not an X-Plane log"),
-        (HEADER.encode(), "no whole row"),
+        (HEADER.encode(), "no complete row"),
         ((HEADER + "\n" + row(1, 2) + "\n" + row(*range(8))).encode(), "line 2: expected 8 fields"),
         (
             (HEADER + "\n" + row(*range(8)).replace("3.0", "x.0")).encode(),

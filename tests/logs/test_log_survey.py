@@ -227,7 +227,7 @@ def test_an_xplane_log_without_a_clock_is_looked_at_and_with_dt_identified(look,
 @pytest.mark.parametrize("option", [("--plot", "fits.png"), ("--orders",), ("--save", "m.json")])
 def test_who_asks_for_a_fit_is_told_that_outputs_are_missing(tmp_path, capsys, option):
     assert cli.main(["identify", str(csv_log(tmp_path)), *option]) == 1
-    assert "name what is to be predicted" in capsys.readouterr().err
+    assert "give the signals to predict" in capsys.readouterr().err
 
 
 def test_a_map_alone_shows_its_signals(look, tmp_path):

@@ -228,8 +228,8 @@ def test_a_misspelt_unit_gets_the_nearest():
     ("degree", "breaks", "message"),
     [
         (-1, (0.0, 1.0), "degree: expected 0 or more"),
-        (2, (0.0,), "breaks: expected two or more that increase"),
-        (2, (0.0, 2.0, 1.0), "breaks: expected two or more that increase"),
+        (2, (0.0,), "breaks: expected at least two increasing"),
+        (2, (0.0, 2.0, 1.0), "breaks: expected at least two increasing"),
     ],
 )
 def test_patches_without_an_interval_or_a_degree_are_refused(degree, breaks, message):

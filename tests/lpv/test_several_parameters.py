@@ -286,7 +286,7 @@ def test_a_third_parameter_and_one_beside_a_line():
     third = model().with_parameter(MASS)
     for v, a in POINTS:
         np.testing.assert_array_equal(third.at(v, a, 8.0).A, model().at(v, a).A)
-    with pytest.raises(InputError, match="names of their own"):
+    with pytest.raises(InputError, match="must have different names"):
         model().with_parameter(V)
     line = model().along((0.0, -4.0), (13.0, 4.0)).with_parameter(MASS)
     np.testing.assert_allclose(line.at(0.0, 8.0).A, by_hand("A", 6.5, 0.0), atol=1e-13)
@@ -301,7 +301,7 @@ def test_wrong_use_gets_a_sentence():
         model().matrices([1.0, 2.0, 3.0])
     with pytest.raises(InputError, match=r"A: expected \{exponents: matrix\}"):
         model(A=[np.eye(3)])
-    with pytest.raises(InputError, match="names of their own"):
+    with pytest.raises(InputError, match="must have different names"):
         LPVStateSpace.polynomial(**GIVEN, scheduling=(V, V))
     with pytest.raises(InputError, match=r"basis is one of 1 parameter\(s\), the model has 2"):
         LPVStateSpace(

@@ -56,7 +56,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(
 def test_what_is_no_path_is_refused(certificate, tmp_path, monkeypatch, path):
     monkeypatch.chdir(tmp_path)
     if path.isprintable() or "\0" in path:
-        with pytest.raises(InputError, match="no path"):
+        with pytest.raises(InputError, match="not a path"):
             certificate.save(path)
     else:  # half a character is a name on this system
         assert certificate.save(path).is_file()

@@ -109,7 +109,7 @@ def test_parameters_of_a_case_are_drawn_independently_of_each_other():
         ({"grid": {"length": []}}, "needs a list of values"),
         ({"grid": {"kind": "rod"}}, "needs a list of values"),
         ({"grid": {"length": [1.0, 1.0]}}, "are the same"),
-        ({"fixed": {"length": 1.0}}, "said twice"),
+        ({"fixed": {"length": 1.0}}, "given twice"),
         ({"paired": ["seed"]}, "unknown axis"),
         ({"draws": 0}, "at least 1"),
         ({"fixed": {"seed": 3}}, "nothing is random"),
@@ -127,7 +127,7 @@ def test_a_trial_says_what_it_lacks():
     with pytest.raises(InputError, match="give length a default"):
         Trial(lacking, {"x": "1"})
     for taken in ("seconds", "length"):
-        with pytest.raises(InputError, match="names something else"):
+        with pytest.raises(InputError, match="is already a name in the dataset"):
             Trial(pendulum, {taken: "s"})
 
 
@@ -150,7 +150,7 @@ def test_a_file_declares_the_same_campaign(tmp_path):
         "trial = 'pendulums'": "unknown trial 'pendulums'",
         "trial = 'campaign_trials:NONE'": "cannot be imported",
         "trial = 'campaign_trials:pendulum'": "is no Trial",
-        "draws = 3": "lacks the trial",
+        "draws = 3": "the trial is missing",
         "trial = 'gain'\ngird = 3": "did you mean 'grid'",
         "trial = 'gain'\ngrid = 3": "is a table",
         "trial = 'gain'\n[random]\nrate = 3": "drawn evenly",
@@ -248,10 +248,10 @@ def test_other_campaigns_and_other_files_are_not_mixed_in(tmp_path):
             run(Campaign(DEADLY), path, here)
         with pytest.raises(InputError, match="with other parameters or quantities"):
             run(Campaign(other), path, here)
-        with pytest.raises(InputError, match="is there and holds no campaign"):
+        with pytest.raises(InputError, match="exists and does not hold a campaign"):
             run(asked(), mine, here)
     assert [p.name for p in mine.iterdir()] == ["thesis.tex"]
-    with pytest.raises(InputError, match="no dataset of a campaign"):
+    with pytest.raises(InputError, match="not a dataset of a campaign"):
         CampaignDataset(mine)
     with pytest.raises(UnknownNameError, match="did you mean 'period'"):
         CampaignDataset(path)["perod"]
@@ -351,7 +351,7 @@ def test_a_campaign_of_which_nothing_came_fails(declared):
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (["--seeds", "3"], "are for the campaign of the study"),
+        (["--seeds", "3"], "apply to the built-in campaign"),
         (["--show", "perod"], "did you mean 'period'"),
     ],
 )
@@ -516,7 +516,7 @@ def test_a_scheduler_that_is_gone_is_said():
             future.set_running_or_notify_cancel()
             return future
 
-    with Gone() as gone, pytest.raises(SymheliError, match="the scheduler is gone") as error:
+    with Gone() as gone, pytest.raises(SymheliError, match="the scheduler has stopped") as error:
         columns_of(asked(), gone)
     assert isinstance(error.value.__cause__, CancelledError)
 

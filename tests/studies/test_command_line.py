@@ -460,7 +460,7 @@ def test_a_failure_is_one_sentence_and_status_1(run, arguments, sentence):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--outputs", "y"], "name what is to be predicted and what drives it"),
+        (["--outputs", "y"], "give the signals to predict and the inputs that drive them"),
         (["--outputs", "y", "--inputs", "u"], "name the scheduling signal"),
         (
             ["--outputs", "y", "--inputs", "u", "--scheduling", "p"],

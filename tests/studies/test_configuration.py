@@ -146,7 +146,7 @@ def test_all_complaints_come_in_one_message(tmp_path):
 def test_what_is_no_toml_says_where(tmp_path, text):
     path = tmp_path / "my.toml"
     path.write_text(text)
-    with pytest.raises(InputError, match=r"my.toml is no TOML file: .*\(at "):
+    with pytest.raises(InputError, match=r"my.toml is not a TOML file: .*\(at "):
         Configuration.read(path, {})
 
 
@@ -161,7 +161,7 @@ def test_the_command_writes_a_file_that_it_reads(tmp_path, capsys):
     assert Configuration.read(path, {}).seed == 5
     capsys.readouterr()
     assert cli.main(["study", "--write-config", str(path)]) == 1
-    assert "is there; give another name" in capsys.readouterr().err
+    assert "already exists; give another name" in capsys.readouterr().err
     assert cli.main(["study", str(path), "--write-config"]) == 0
     assert "seed = 5 " in capsys.readouterr().out
 

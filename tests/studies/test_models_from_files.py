@@ -80,7 +80,7 @@ def test_identified_models_from_files_are_certified_and_exported(answer, run, tm
         (("certify", "--model", "FAMILY", "--channel", "gust"), "--channel"),
         (("margins", "--feedback", "d_lat=phi:-0.1"), "--feedback goes with --model"),
         (("export", "c", "--model", "FAMILY"), "c is of a vehicle"),
-        (("export", "model", "--model", "FAMILY"), "predicts nothing by itself"),
+        (("export", "model", "--model", "FAMILY"), "cannot be exported as C"),
         (("certify", "--model", "nowhere.json"), "No such file"),
     ],
 )

@@ -92,7 +92,7 @@ def test_rates_that_are_none_are_refused(loop, rates):
 
 def test_several_parameters_are_refused(loop):
     two = loop.with_parameter(Scheduling("other", "1", 0.0, 1.0))
-    with pytest.raises(InputError, match="that of one parameter"):
+    with pytest.raises(InputError, match="a model of one parameter"):
         synthesis.gain_against_rate(two, [0.0])
 
 

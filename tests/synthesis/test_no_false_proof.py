@@ -92,7 +92,7 @@ def test_a_file_whose_proof_overlooks_a_narrow_piece_is_refused(tmp_path, what, 
         values = getattr(harmful, matrix).ravel().tolist()
         content["proof"][name][matrix]["array"] = values
     (tmp_path / "proof.json").write_text(json.dumps(content))
-    with pytest.raises(CertificateError, match="does not prove the claim"):
+    with pytest.raises(CertificateError, match="does not establish the certified bound"):
         Certificate.load(tmp_path / "proof.json")
 
 

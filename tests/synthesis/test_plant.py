@@ -357,7 +357,7 @@ def test_a_reference_makes_errors_of_signals():
         np.testing.assert_allclose(H.D11[0], [0.0, 1.0, 0.0], atol=1e-15)  # gust, reference, noise
         np.testing.assert_allclose(H.D21[0], [0.0, 1.0, 0.1], atol=1e-15)
     assert noisy.with_reference("p").measurements == ("phi_error", "p_error")
-    with pytest.raises(InputError, match="say which signals follow a reference"):
+    with pytest.raises(InputError, match="give the signals that follow a reference"):
         Plant(roll(), performance=["phi"], measurements=["p"]).with_reference()
     with pytest.raises(UnknownNameError, match="performance signal or measurement 'd_lat'"):
         plant().with_reference(["d_lat"])

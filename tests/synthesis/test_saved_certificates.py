@@ -130,7 +130,7 @@ def test_a_better_bound_in_the_file_is_refused(form, tmp_path):
     for key in (name, "frozen", other):
         content[key] *= better
     path.write_text(json.dumps(content))
-    with pytest.raises(CertificateError, match="does not prove the claim"):
+    with pytest.raises(CertificateError, match="does not establish the certified bound"):
         Certificate.load(path)
     # nor where the file does not call itself verified
     content["verified"] = False
@@ -153,7 +153,7 @@ def test_a_truncated_file_is_called_damaged(share, tmp_path):
     path = genuine("spline").save(tmp_path / "proof.json")
     text = path.read_text()
     path.write_text(text[: int(share * len(text))])
-    with pytest.raises(InputError, match="damaged or none"):
+    with pytest.raises(InputError, match="another or a damaged file"):
         Certificate.load(path)
 
 
@@ -163,7 +163,7 @@ def test_other_files_are_told_apart(tmp_path):
         ("[]", "expected the schema"),
         ('{"schema": "symheli certificate", "version": 2}', "expected version 1"),
         ('{"schema": "symheli certificate", "version": 1}', "missing: "),
-        ('{"schema": NaN}', "damaged or none"),
+        ('{"schema": NaN}', "another or a damaged file"),
     ):
         path.write_text(text)
         with pytest.raises(InputError, match=said):

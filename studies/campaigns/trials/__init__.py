@@ -12,9 +12,9 @@ NAMES = ("identification", "flight", "control", "gain", "marks", "pays")
 
 
 def trial(name: str) -> Trial:
-    """The trial called `name`, one of `NAMES` or "module:NAME" of one's own.
+    """Return the trial called `name`: one of `NAMES`, or a user-defined "module:NAME".
 
-    Raises `InputError` where there is none.
+    Raises `InputError` if there is none.
 
     Examples
     --------

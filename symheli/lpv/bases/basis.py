@@ -26,8 +26,8 @@ class Basis(FunctionSpace):
         return ((self.low, self.high),)
 
     def samples(self, ranges: Sequence[Range] | None = None) -> Array:
-        """One point more than coefficients on every piece; functions brought along, which no finite
-        number of points tells apart, at four times as many as there are.
+        """Sample points of p: one more than coefficients on every piece; for user-supplied
+        functions four times their number, since no finite number of points determines them.
         """
         ((low, high),) = self.ranges if ranges is None else ranges
         try:

@@ -47,9 +47,7 @@ def basis_of(
     """
     if given is not None:
         if plain_file.as_read(described_basis(given)) != described:
-            raise InputError(
-                f"{path}: the model belongs to another basis than the one given: {described}"
-            )
+            raise InputError(f"{path}: the model has another basis than the one given: {described}")
         return given
     options = dict(described)
     kind = options.pop("kind")

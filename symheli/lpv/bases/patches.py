@@ -1,4 +1,4 @@
-"""Polynomials between breaks, with nothing that joins them: for models that jump."""
+"""Discontinuous piecewise polynomials, for models that jump at known values of p."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from symheli.values.arrays import Array
 
 @dataclass(frozen=True)
 class Patches(PiecewisePolynomial):
-    """Powers up to `degree` on each interval between the `breaks`, zero elsewhere: nothing joins
-    them, a model may jump at a break.
+    """Discontinuous piecewise polynomials: powers up to `degree` on each interval between the
+    `breaks`, zero elsewhere, so that a model may jump at a break.
     """
 
     degree: int
@@ -26,7 +26,7 @@ class Patches(PiecewisePolynomial):
         if self.degree < 0:
             raise InputError(f"degree: expected 0 or more, got {self.degree}")
         if len(self.breaks) < 2 or any(b <= a for a, b in pairwise(self.breaks)):
-            raise InputError(f"breaks: expected two or more that increase, got {self.breaks}")
+            raise InputError(f"breaks: expected at least two increasing values, got {self.breaks}")
         object.__setattr__(self, "breaks", tuple(float(b) for b in self.breaks))
 
     @property

@@ -79,7 +79,7 @@ class UserFunctions(Basis):
     def _values(self, p: Array, derivative: Any) -> Array:
         if derivative:
             raise InputError(
-                "functions brought along have no known derivative; use a polynomial or spline basis"
+                "user-supplied functions have no known derivative; use a polynomial or spline basis"
             )
         out = np.empty((*p.shape, self.size))
         with np.errstate(all="ignore"):
@@ -95,8 +95,8 @@ class UserFunctions(Basis):
         return out
 
     def pieces(self) -> tuple[Piece, ...]:
-        """Raises `InputError`: nothing says these functions are polynomials."""
+        """Raises `InputError`: these functions are not known to be polynomials."""
         raise InputError(
-            "functions brought along are not known to be piecewise polynomial; identify with a"
+            "user-supplied functions are not known to be piecewise polynomial; identify with a"
             " polynomial or spline basis"
         )

@@ -21,8 +21,8 @@ from symheli.values.signal import Signal
 
 
 def append(*systems: System) -> LFT:
-    """Side by side: states, inputs and outputs one after the other, a parameter of several systems
-    in one block.
+    """Stack systems: states, inputs and outputs one after the other, with one block for a parameter
+    that several of them share.
 
     Parameters
     ----------
@@ -129,7 +129,8 @@ def close(
 
 
 def series(first: System, second: System) -> LFT:
-    """y = second(first(u)): the outputs of `first` feed the inputs of `second` in their order.
+    """Connect two systems in series, y = second(first(u)): the outputs of `first` feed the inputs
+    of `second` in their order.
 
     Parameters
     ----------
@@ -166,7 +167,8 @@ def series(first: System, second: System) -> LFT:
 
 
 def parallel(first: System, second: System) -> LFT:
-    """y = first(u) + second(u); the signals keep the names of `first`.
+    """Connect two systems in parallel, y = first(u) + second(u); the signals keep the names of
+    `first`.
 
     Parameters
     ----------
@@ -203,7 +205,7 @@ def parallel(first: System, second: System) -> LFT:
 
 
 def feedback(plant: System, controller: System) -> LFT:
-    """Close y = plant(u + controller(y)), all outputs into all inputs, in their order.
+    """Close the loop y = plant(u + controller(y)), all outputs to all inputs, in their order.
 
     The sign is positive, as in every `.feedback(...)` of this package; MATLAB's and
     python-control's `feedback(P, K)` is `feedback(P, -K)`.

@@ -20,7 +20,8 @@ def connect(
     outputs: Sequence[str],
     sums: Mapping[str, Mapping[str, float]] | None = None,
 ) -> LFT:
-    """One system of several: an input takes the output, or the external input, that has its name.
+    """Connect several systems into one: an input takes the output, or the external input, that has
+    its name.
 
     Parameters
     ----------

@@ -274,7 +274,7 @@ class LFT:
 
         return well_posed(self, boxes)
 
-    # -- the same model in other clothes
+    # -- equivalent representations
 
     def with_scheduling(self, scheduling: Scheduling) -> LFT:
         """The same model with the parameter of that name over another range, with another rate or

@@ -17,8 +17,8 @@ from symheli.values.summary import summarized
 
 
 class Truncation(NamedTuple):
-    """A smaller `lft`, the largest `error` found on a dense grid of the box, and a proven `bound`
-    of it (inf: none known).
+    """A reduced `lft`, the largest `error` found on a dense grid of the box, and a proven `bound`
+    on it (inf: none known).
 
     Both are spectral norms of the difference of [A B; C D] after rows and columns are scaled so
     that the largest dependence in each is about one: relative errors, whatever the units.

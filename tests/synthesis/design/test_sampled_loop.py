@@ -115,7 +115,7 @@ def test_a_missed_performance_is_refused_in_any_unit_and_beside_any_other(unit, 
         controls=["d_lat"],
         measurements=["phi"],
     )
-    with pytest.raises(InputError, match="is a fit too"):
+    with pytest.raises(InputError, match="is also a fit"):
         certify_sampled(table(), plant, search=None)
 
 
