@@ -186,7 +186,7 @@ class Existence:
             np.linalg.eigvalsh(b.linear(found.coefficients) + b.constant)[:, -1]
             for b in self._halves_at(points, gamma, 0.0)
         ]
-        return np.max(values, axis=0)
+        return np.concatenate([v.reshape(-1, len(points)) for v in values]).max(axis=0)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
         """For this g the X and Y whose product is farthest from one: first within the least bound
@@ -262,13 +262,13 @@ class Existence:
             blocks.add(ahead, f, L, flow - 0.5 * L).add(now, now.values(p), own, -0.5 * own)
             return [blocks.finished(_below(constant, n) + margin * np.eye(n + N), _below(level, n))]
         L = selector(n, 0, N)
-        out = []
-        for motion in self._motions(ahead, p):
-            blocks = Blocks(N, len(f)).add(ahead, f, L, half.flow)
-            if np.any(motion):
-                blocks.add(ahead, sign * ahead.slopes(p, motion), L, 0.5 * L)
-            out.append(blocks.finished(constant + margin * np.eye(N), level))
-        return out
+        motions = np.stack(self._motions(ahead, p))
+        blocks = Blocks(N, len(f), len(motions)).add(ahead, f, L, half.flow)
+        slopes = ahead.gradient(p)
+        for i in np.flatnonzero(np.any(motions, axis=(0, 1))):
+            moved = sign * motions[..., i, None, None] * 0.5 * L
+            blocks.add(ahead, slopes[..., i], L, moved)
+        return [blocks.finished(constant + margin * np.eye(N), level)]
 
     def _motions(self, unknown: Unknown, p: Array) -> list[Array]:
         """Every extreme dp/dt (K, m) at these points, per scaled time."""

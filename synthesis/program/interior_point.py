@@ -24,12 +24,13 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from symheli.progress import Task, task
-from synthesis.polynomial.symmetric import indices, smat, svec, symmetrized
+from synthesis.polynomial.symmetric import indices, length, smat, svec, symmetrized
 from synthesis.program.block_cholesky import BlockCholesky
 from synthesis.program.cone_program import Answer, Candidate, Solver
 from synthesis.program.lyapunov_program import LyapunovBlocks, Program, Sizes
@@ -59,6 +60,9 @@ DUAL = 1e-6
 """Residual of the multipliers, of the largest of their entries, at a solution."""
 IMPOSSIBLE = 1e-7
 """Residual of multipliers, of what they show to be contradictory, that prove that there is no P."""
+
+TOGETHER = 2_000_000
+"""Entries of n^4 by place that are summed at a time: 16 MB."""
 
 
 def minimise(program: Program, solver: Solver) -> Candidate:
@@ -179,7 +183,7 @@ class _Inequalities:
         self.level = program.level if blocks.level is None else blocks.level
         self.length = 1 + program.sizes.multipliers
         x = blocks.varying
-        self.used = [np.flatnonzero(np.any(x[:, j], axis=(0, 2, 3))) for j in range(x.shape[1])]
+        self.used = [np.flatnonzero(np.any(x[:, :, a], axis=(0, 2, 3))) for a in range(x.shape[2])]
 
     def along(self, y: Array) -> Array:
         out = np.broadcast_to(y[0] * self.level, self.constant.shape)
@@ -200,29 +204,64 @@ class _Inequalities:
         np.add.at(out, self.blocks.columns, -self.blocks.adjoint(Z))
 
     def add_normal(self, H: Array, out: Normal) -> None:
-        columns, f, x = self.blocks.columns, self.blocks.fixed, self.blocks.varying
-        n = f.shape[1]
-        fH, xH = f @ H[:, None], x @ H[:, None, None]
+        columns, weights = self.blocks.columns, self.blocks.weights
+        n = self.blocks.fixed.shape[1]
+        if weights is None:
+            for a, b, each in self._of_places(H, slice(None)):
+                _add(out, (columns[a], columns[b]), each[0])
+            return
+        G, k, A = weights.shape
+        v = length(n)
+        total = np.zeros((k * k, v * v))
+        together = max(1, TOGETHER // n**4)
+        for first in range(0, G, together):
+            places = slice(first, first + together)
+            g = weights[places]
+            for a, b, each in self._of_places(H, places):
+                pairs = (g[:, :, None, a] * g[:, None, :, b]).reshape(len(g), k * k)
+                total += pairs.T @ each.reshape(len(g), v * v)
+                if a != b:
+                    pairs = (g[:, :, None, b] * g[:, None, :, a]).reshape(len(g), k * k)
+                    turned = np.swapaxes(each, 1, 2)
+                    total += pairs.T @ turned.reshape(len(g), v * v)
+        blocks = total.reshape(k, k, v, v)
+        for j in range(k):
+            for i in range(j + 1):
+                _add(out, (columns[j], columns[i]), blocks[j, i])
+
+    def _of_places(self, H: Array, places: slice) -> Iterator[tuple[int, int, Array]]:
+        """(a, b, blocks), a >= b, of the normal equations between the matrices Q_a and Q_b of each
+        of these places.
+        """
+        f, n = self.blocks.fixed, self.blocks.fixed.shape[1]
+        G, N = self.blocks.places, H.shape[1]
+        # motions, places, ...
+        H = H.reshape(-1, G, N, N)[:, places]
+        x = self.blocks.varying
+        x = x.reshape(-1, G, *x.shape[1:])[:, places]
+        fH, xH = f @ H[:, :, None], x @ H[:, :, None, None]
         f, x = np.swapaxes(f, -1, -2), np.swapaxes(x, -1, -2)
-        # by m, r and s: f_r H f_s' and, for every j, x_jr H f_s'; of the r and s that are not zero
-        ff = fH[:, :, None] @ f
-        xf = [xH[:, j][:, r, None] @ f for j, r in enumerate(self.used)]
+        # f_r H f_s' and, for every a, x_ra H f_s'; of the r and s that are not zero
+        ff = fH[:, :, :, None] @ f
+        xf = [xH[:, :, r, a][:, :, :, None] @ f for a, r in enumerate(self.used)]
 
-        def flat(M: Array) -> Array:
-            return M.reshape(-1, n * n)
+        def stacked(*each: Array) -> Array:
+            """(places, terms, n^2)."""
+            flat = np.concatenate([M.reshape(*M.shape[:2], -1, n * n) for M in each], axis=2)
+            return np.moveaxis(flat, 0, 1).reshape(flat.shape[1], -1, n * n)
 
-        for j, r in enumerate(self.used):
-            for k, s in enumerate(self.used[: j + 1]):
-                left = flat(xf[j][:, :, s])
-                right = flat(np.swapaxes(xf[k][:, :, r], 1, 2))
+        for a, r in enumerate(self.used):
+            for b, s in enumerate(self.used[: a + 1]):
+                left = [xf[a][:, :, :, s]]
+                right = [np.swapaxes(xf[b][:, :, :, r], 2, 3)]
                 if self.blocks.symmetric:  # the other half is the same
                     factor = 4.0
                 else:
-                    xx = xH[:, j][:, r, None] @ x[:, k][:, None, s]
-                    left = np.concatenate([left, flat(xx)])
-                    turned = np.swapaxes(ff[:, s][:, :, r], 1, 2)
-                    right, factor = np.concatenate([right, flat(turned)]), 2.0
-                _add(out, (columns[j], columns[k]), factor * _on_vectors(left.T @ right, n))
+                    left.append(xH[:, :, r, a][:, :, :, None] @ x[:, :, s, b][:, :, None])
+                    right.append(np.swapaxes(ff[:, :, s][:, :, :, r], 2, 3))
+                    factor = 2.0
+                K = np.swapaxes(stacked(*left), 1, 2) @ stacked(*right)
+                yield a, b, factor * _on_vectors(K, n)
 
 
 class _Bounds:
@@ -247,7 +286,7 @@ class _Bounds:
     def add_normal(self, H: Array, out: Normal) -> None:
         n = H.shape[1]
         for j, h in enumerate(H):
-            _add(out, (j, j), _on_vectors(np.outer(h, h), n))
+            _add(out, (j, j), _on_vectors(np.outer(h, h), n)[0])
 
 
 class _Multiplier:
@@ -283,14 +322,14 @@ def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
 
 
 def _on_vectors(K: Array, n: int) -> Array:
-    """Matrix on vectors of V -> the symmetric part of sum L V R, where K = sum vec(L) vec(R)' by
-    rows, (n^2, n^2).
+    """Matrices on vectors of V -> the symmetric part of sum L V R, where K = sum vec(L) vec(R)' by
+    rows, (..., n^2, n^2).
     """
     a, b, _ = indices(n)
-    K = K.reshape(n, n, n, n).transpose(3, 0, 1, 2)
-    rows = K[a, b] + K[b, a]
+    K = np.moveaxis(K.reshape(-1, n, n, n, n), -1, 1)
+    rows = K[:, a, b] + K[:, b, a]
     scale = np.where(a == b, 0.5, np.sqrt(0.5))
-    return (rows[:, a, b] + rows[:, b, a]) * scale[:, None] * scale
+    return (rows[:, :, a, b] + rows[:, :, b, a]) * scale[:, None] * scale
 
 
 class _Cones:
