@@ -65,8 +65,8 @@ class Blocks:
         self.terms: list[tuple[Array, Array, Array, Array]] = []
 
     def add(self, unknown: Unknown, weights: Array, left: Array, right: Array) -> Blocks:
-        """left (n, N)' X right, X with `weights` (K, k) of its functions, right (n, N), (K, n, N) or
-        (motions, K, n, N).
+        """left (n, N)' X right with `weights` (K, k) of the functions of X; right (n, N), (K, n, N)
+        or (motions, K, n, N).
         """
         self.terms.append((unknown.columns, weights, left, right))
         return self

@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -61,29 +62,59 @@ DUAL = 1e-6
 IMPOSSIBLE = 1e-7
 """Residual of multipliers, of what they show to be contradictory, that prove that there is no P."""
 
+EARLY = 0.1
+"""Gap of the point from which the method may start on a program that differs little."""
 TOGETHER = 2_000_000
 """Entries of n^4 by place that are summed at a time: 16 MB."""
 
 
-def minimise(program: Program, solver: Solver) -> Candidate:
+class Early(NamedTuple):
+    """A feasible P (K, n, n) and y in the middle of the cones, with the level <S, Z> / order of the
+    central path there and the least eigenvalue of a slack of every cone: where the method may start
+    on a program with more blocks.
+    """
+
+    P: Array
+    y: Array
+    level: float
+    least: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum(Candidate):
+    """Whether the gap is `reached` that was asked for; with the point at which it first was `EARLY`,
+    None where it never was.
+    """
+
+    reached: bool = False
+    early: Early | None = None
+
+
+def minimise(program: Program, solver: Solver, start: Early | None = None) -> Minimum:
     """The least level, to the tolerance of the solver or as near as rounding, iterations and time
     allow.
 
     The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
-    feasible to rounding or there is none. Never raises for a failed solve.
+    feasible to rounding or there is none. From `start`, of another program, and where that leads
+    to no solution from afar. Never raises for a failed solve.
     """
     digits = -math.log10(solver.options["tolerance"])
     with task("digits of the least level", round(digits, 1)) as solving:
-        return _minimised(program, solver, solving)
+        if start is not None:
+            found = _minimised(program, solver, solving, start)
+            if found.reached:
+                return found
+        return _minimised(program, solver, solving, None)
 
 
-def _minimised(program: Program, solver: Solver, solving: Task) -> Candidate:
+def _minimised(program: Program, solver: Solver, solving: Task, start: Early | None) -> Minimum:
     tolerance, iterations, seconds = (
         solver.options[name] for name in ("tolerance", "iterations", "seconds")
     )
     begin = time.perf_counter()
     cones = _Cones(program)
-    point, count, feasible, before, digits = cones.start(), 0, False, np.inf, 0.0
+    point = cones.start() if start is None else cones.near(start)
+    count, feasible, before, digits, early = 0, False, np.inf, 0.0, None
     while True:
         at = cones.residuals(point)
         digits = max(digits, _digits(at.gap, tolerance))
@@ -92,6 +123,9 @@ def _minimised(program: Program, solver: Solver, solving: Task) -> Candidate:
         if close and not feasible and cones.inside(point):
             feasible, point = True, point._replace(S=cones.slacks(point.P, point.y))
             at = cones.residuals(point)
+        if feasible and early is None and at.gap <= EARLY:
+            least = tuple(float(np.linalg.eigvalsh(S).min()) for S in point.S)
+            early = Early(point.P, point.y, at.product / cones.order, least)
         if close and at.gap <= tolerance and at.dual_size <= DUAL:
             word = "solved"
         elif close and at.gap <= tolerance and at.dual_size >= before:
@@ -115,7 +149,8 @@ def _minimised(program: Program, solver: Solver, solving: Task) -> Candidate:
         x = np.r_[svec(point.P).ravel(), point.y[1:], point.y[0]] if close else None
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
-        return Candidate(answer, x, time.perf_counter() - begin, message)
+        reached = close and at.gap <= tolerance
+        return Minimum(answer, x, time.perf_counter() - begin, message, reached, early)
 
 
 def _digits(gap: float, tolerance: float) -> float:
@@ -210,7 +245,7 @@ class _Inequalities:
             for a, b, each in self._of_places(H, slice(None)):
                 _add(out, (columns[a], columns[b]), each[0])
             return
-        G, k, A = weights.shape
+        G, k = weights.shape[:2]
         v = length(n)
         total = np.zeros((k * k, v * v))
         together = max(1, TOGETHER // n**4)
@@ -355,6 +390,12 @@ class _Cones:
         y = np.zeros(1 + self.sizes.multipliers)
         return _Point(np.zeros((self.sizes.unknowns, n, n)), y, S, S)
 
+    def near(self, start: Early) -> _Point:
+        """On the central path as far as a start of another program allows."""
+        slacks = self.slacks(start.P, start.y)
+        S = [_raised(slack, least) for slack, least in zip(slacks, start.least, strict=True)]
+        return _Point(start.P, start.y, S, [start.level * np.linalg.inv(s) for s in S])
+
     def change(self, P: Array, y: Array) -> list[Array]:
         """Of the slacks with P and y."""
         return [cone.along(y) + cone.linear(P) for cone in self.each]
@@ -406,6 +447,14 @@ class _Cones:
             product / max(abs(float(point.y[0])), LEAST),
             _largest(dual, level) / -constant if constant < 0 else np.inf,
         )
+
+
+def _raised(S: Array, least: float) -> Array:
+    """Matrices (m, N, N) with a multiple of the identity each that leaves no eigenvalue below the
+    least.
+    """
+    missing = np.maximum(least - np.linalg.eigvalsh(S)[:, 0], 0.0)
+    return S + missing[:, None, None] * np.eye(S.shape[-1])
 
 
 def _largest(P: Array, y: Array) -> float:
