@@ -38,7 +38,7 @@ def continuous_products(
         yield LyapunovBlocks(
             form.columns,
             state[None],
-            np.concatenate([flow + nu * drift for nu in rates])[:, :, None],
+            np.concatenate([flow + nu * drift for nu in rates])[:, None],
             np.concatenate([constant for _ in rates]),
             False,
             _supplied(form.supply, len(state.T), np.tile(np.arange(len(constant)), len(rates))),
@@ -67,7 +67,7 @@ def discrete_products(
         dM = len(M) - 1
         # of M_i' P+_j M_l in the block (q, s), symmetric in i and l
         weights = np.einsum(
-            "qm,mrx,ril,xsj->qsjil",
+            "qm,mrx,ril,xsj->qsijl",
             form.raised,
             product_weights(2 * dM, degree),
             product_weights(dM, dM),
@@ -75,11 +75,11 @@ def discrete_products(
             optimize=True,
         )
         q, s = weights.shape[:2]
-        varying = np.zeros((q, s, len(form.columns), len(M) + 1, *state.shape))
-        varying[:, :, form.next : form.next + degree + 1, :-1] = 0.5 * np.tensordot(
+        varying = np.zeros((q, s, len(M) + 1, len(form.columns), *state.shape))
+        varying[:, :, :-1, form.next : form.next + degree + 1] = 0.5 * np.tensordot(
             weights, M, axes=1
         )
-        varying[:, :, form.own : form.own + degree + 1, -1] = (
+        varying[:, :, -1, form.own : form.own + degree + 1] = (
             -0.5 * form.here[:, None, :, None, None] * state
         )
         constant = np.tensordot(form.up, form.output, axes=1)

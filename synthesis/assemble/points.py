@@ -36,7 +36,6 @@ def at_points(
     flow, state = np.concatenate([A, B], axis=2), of_state(A, B)
     seen = np.concatenate([C, D], axis=2)
     value, slopes = _spline(shape, region, points)
-    still = value[:, :, None, None] * flow[:, None]
     drifts = [
         sum(
             (
@@ -48,13 +47,17 @@ def at_points(
         )
         for drift in demand.motion.drifts(demand.moving(shape.degrees))
     ]
-    varying = np.concatenate([still + 0.5 * d[:, :, None, None] * state for d in drifts])
-    constant = np.tile(np.swapaxes(seen, 1, 2) @ seen, (len(drifts), 1, 1))
+    # of P and, where it moves, of dP/dt at every point and motion
+    weights = np.concatenate([np.stack([value, d], axis=2) for d in drifts])
+    beside = np.stack([flow, np.broadcast_to(0.5 * state, flow.shape)], axis=1)
+    if not np.any(weights[..., 1]):
+        weights, beside = weights[..., :1], beside[:, :1]
     blocks = LyapunovBlocks(
         coefficients_of(shape, region.segment).ravel(),
         state[None],
-        varying[:, :, None],
-        constant,
+        np.tile(beside, (len(drifts), 1, 1, 1))[:, None],
+        np.tile(np.swapaxes(seen, 1, 2) @ seen, (len(drifts), 1, 1)),
+        weights=weights,
     )
     return blocks.congruent(extended(weight, B.shape[2]))
 

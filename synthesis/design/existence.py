@@ -89,6 +89,7 @@ class Found(NamedTuple):
     gamma: float
     coefficients: Array
     message: str
+    early: interior_point.Early | None = None
 
 
 class Existence:
@@ -146,15 +147,17 @@ class Existence:
         """Minimise g, with points added where a block is violated between them."""
         if len(self.points) == 1:
             return self._least(solver)
+        start = None
         for _ in range(ROUNDS):
-            found = self._least(replace(solver, tolerance=COARSE))
+            found = self._least(replace(solver, tolerance=COARSE), start)
+            start = found.early
             if not np.isfinite(found.gamma) or not self._added(found, found.gamma):
                 break
-        return self._least(replace(solver, tolerance=FINE))
+        return self._least(replace(solver, tolerance=FINE), start)
 
-    def _least(self, solver: Solver) -> Found:
+    def _least(self, solver: Solver, start: interior_point.Early | None = None) -> Found:
         blocks = [*self._halves(None, MARGIN), *self._coupling(False, self.largest)]
-        return self._solved(blocks, 1.0, solver)
+        return self._solved(blocks, 1.0, solver, start)
 
     def bounded(self, found: Found) -> bool:
         """Whether the bound on X and Y decides."""
@@ -186,7 +189,7 @@ class Existence:
             np.linalg.eigvalsh(b.linear(found.coefficients) + b.constant)[:, -1]
             for b in self._halves_at(points, gamma, 0.0)
         ]
-        return np.max(values, axis=0)
+        return np.concatenate([v.reshape(-1, len(points)) for v in values]).max(axis=0)
 
     def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
         """For this g the X and Y whose product is farthest from one: first within the least bound
@@ -206,24 +209,32 @@ class Existence:
 
     def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Found:
         """The same within this bound, with points added as for the least g."""
+        start = None
         for _ in range(ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
-            found = self._solved(blocks, -1.0, solver)
+            found = self._solved(blocks, -1.0, solver, start)
+            start = found.early
             if not np.any(found.coefficients) or len(self.points) == 1:
                 break
             if not self._added(found, gamma):
                 break
         return found
 
-    def _solved(self, blocks: list[LyapunovBlocks], cost: float, solver: Solver) -> Found:
+    def _solved(
+        self,
+        blocks: list[LyapunovBlocks],
+        cost: float,
+        solver: Solver,
+        start: interior_point.Early | None,
+    ) -> Found:
         n, count = self.states, self.count
         candidate = interior_point.minimise(
-            Conditions(tuple(blocks), Sizes(n, 1, count), cost), solver
+            Conditions(tuple(blocks), Sizes(n, 1, count), cost), solver, start
         )
         if candidate.x is None:
             return Found(np.inf, np.zeros((count, n, n)), candidate.message)
         coefficients = smat(candidate.x[: count * length(n)].reshape(count, -1), n)
-        return Found(float(candidate.x[-1]), coefficients, candidate.message)
+        return Found(float(candidate.x[-1]), coefficients, candidate.message, candidate.early)
 
     def _halves(self, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
         """Those of every point, for this g or for one that is sought."""
@@ -262,13 +273,13 @@ class Existence:
             blocks.add(ahead, f, L, flow - 0.5 * L).add(now, now.values(p), own, -0.5 * own)
             return [blocks.finished(_below(constant, n) + margin * np.eye(n + N), _below(level, n))]
         L = selector(n, 0, N)
-        out = []
-        for motion in self._motions(ahead, p):
-            blocks = Blocks(N, len(f)).add(ahead, f, L, half.flow)
-            if np.any(motion):
-                blocks.add(ahead, sign * ahead.slopes(p, motion), L, 0.5 * L)
-            out.append(blocks.finished(constant + margin * np.eye(N), level))
-        return out
+        motions = np.stack(self._motions(ahead, p))
+        blocks = Blocks(N, len(f), len(motions)).add(ahead, f, L, half.flow)
+        slopes = ahead.gradient(p)
+        for i in np.flatnonzero(np.any(motions, axis=(0, 1))):
+            moved = sign * motions[..., i, None, None] * 0.5 * L
+            blocks.add(ahead, slopes[..., i], L, moved)
+        return [blocks.finished(constant + margin * np.eye(N), level)]
 
     def _motions(self, unknown: Unknown, p: Array) -> list[Array]:
         """Every extreme dp/dt (K, m) at these points, per scaled time."""

@@ -36,13 +36,15 @@ class Unknown:
         """The functions (K, k) at p (K, m)."""
         return self.basis(_own(p))
 
+    def gradient(self, p: Array) -> Array:
+        """Their derivatives (K, k, m) by each parameter."""
+        if not self.moves:
+            return np.zeros((len(p), 1, p.shape[1]))
+        return np.swapaxes(self.basis.gradient(_own(p)), 1, 2)
+
     def slopes(self, p: Array, rates: Array) -> Array:
         """Their derivatives (K, k) along the motion dp/dt = `rates` (m,) or (K, m)."""
-        if not self.moves:
-            return np.zeros((len(p), 1))
-        return np.einsum(
-            "kmj,km->kj", self.basis.gradient(_own(p)), np.broadcast_to(rates, p.shape)
-        )
+        return np.einsum("kjm,km->kj", self.gradient(p), np.broadcast_to(rates, p.shape))
 
     def at(self, coefficients: Array, p: Array) -> Array:
         """X (K, n, n) at p (K, m) from all coefficients of the program."""
@@ -54,35 +56,41 @@ class Unknown:
 
 
 class Blocks:
-    """Blocks F(p) = sum of left' X(p) right(p) and its transpose + constant - g level, one for each
-    of `count` points p, collected term by term.
+    """Blocks F(p) = sum of left' X(p) right(p) and its transpose + constant - g level, for each of
+    `motions` ways in which p may move at each of `count` points, collected term by term.
     """
 
-    def __init__(self, size: int, count: int):
-        self.shape = (count, size, size)
-        self.terms: list[tuple[Array, Array, Array]] = []
+    def __init__(self, size: int, count: int, motions: int = 1):
+        self.shape = (motions, count, size, size)
+        self.terms: list[tuple[Array, Array, Array, Array]] = []
 
     def add(self, unknown: Unknown, weights: Array, left: Array, right: Array) -> Blocks:
-        """left (n, N)' X right (K, n, N) or (n, N), X with `weights` (K, k) of its functions."""
-        wide = np.broadcast_to(right, (len(weights), *right.shape[-2:]))
-        self.terms.append((unknown.columns, left, weights[:, :, None, None] * wide[:, None]))
+        """left (n, N)' X right with `weights` (K, k) of the functions of X; right (n, N), (K, n, N)
+        or (motions, K, n, N).
+        """
+        self.terms.append((unknown.columns, weights, left, right))
         return self
 
     def finished(self, constant: Array | float, level: Array | float) -> LyapunovBlocks:
         """With what is known: (K, N, N) or (N, N)."""
+        motions, count, size, _ = self.shape
         lefts: list[Array] = []
-        where = [_place(lefts, left) for _, left, _ in self.terms]
-        columns = np.unique(np.concatenate([c for c, _, _ in self.terms]))
+        where = [_place(lefts, left) for _, _, left, _ in self.terms]
         n = lefts[0].shape[0]
-        varying = np.zeros((self.shape[0], len(columns), len(lefts), n, self.shape[1]))
-        for (own, _, values), r in zip(self.terms, where, strict=True):
-            varying[:, np.searchsorted(columns, own), r] += values
+        columns = np.unique(np.concatenate([c for c, *_ in self.terms]))
+        weights = np.zeros((count, len(columns), len(self.terms)))
+        varying = np.zeros((motions, count, len(lefts), len(self.terms), n, size))
+        for a, ((own, values, _, right), r) in enumerate(zip(self.terms, where, strict=True)):
+            weights[:, np.searchsorted(columns, own), a] = values
+            varying[:, :, r, a] = right
+        every = (motions * count, size, size)
         return LyapunovBlocks(
             columns,
             np.stack(lefts),
-            varying,
-            np.broadcast_to(constant, self.shape),
-            level=np.broadcast_to(level, self.shape),
+            varying.reshape(-1, *varying.shape[2:]),
+            np.broadcast_to(constant, self.shape).reshape(every),
+            level=np.broadcast_to(level, self.shape).reshape(every),
+            weights=weights,
         )
 
 

@@ -1,5 +1,5 @@
 """Cholesky's factorisation of a symmetric matrix of square blocks, most of which are zero: a band,
-where P is a spline.
+where P is a spline; or few of which are, where functions of P overlap all over the range.
 """
 
 from __future__ import annotations
@@ -12,6 +12,10 @@ from scipy import linalg
 Array = np.ndarray
 
 
+FULL = 0.5
+"""Part of the blocks from which on the matrix is factored as a whole."""
+
+
 class BlockCholesky:
     """M = L L' of a positive definite M by its lower blocks {(i, j): block}, i >= j, each (v, v).
 
@@ -20,7 +24,24 @@ class BlockCholesky:
 
     def __init__(self, blocks: Mapping[tuple[int, int], Array]):
         self.size = 1 + max(i for i, _ in blocks)
+        self.whole: Array | None = None
         self.columns: list[dict[int, Array]] = [{} for _ in range(self.size)]
+        if len(blocks) >= FULL * self.size * (self.size + 1) / 2:
+            self._factor_whole(blocks)
+        else:
+            self._factor_blocks(blocks)
+
+    def _factor_whole(self, blocks: Mapping[tuple[int, int], Array]) -> None:
+        v = len(next(iter(blocks.values())))
+        M = np.zeros((self.size, v, self.size, v))
+        for (i, j), block in blocks.items():
+            M[i, :, j] = block
+        # of the transpose, whose columns are contiguous, the upper triangle is factored
+        self.whole = linalg.cholesky(
+            M.reshape(self.size * v, -1).T, check_finite=False, overwrite_a=True
+        )
+
+    def _factor_blocks(self, blocks: Mapping[tuple[int, int], Array]) -> None:
         for (i, j), block in blocks.items():
             self.columns[j][i] = block
         for k, column in enumerate(self.columns):
@@ -42,6 +63,9 @@ class BlockCholesky:
 
     def solve(self, b: Array) -> Array:
         """x (size, v) with M x = b."""
+        if self.whole is not None:
+            solved = linalg.cho_solve((self.whole, False), b.ravel(), check_finite=False)
+            return solved.reshape(b.shape)
         x = b.copy()
         for k, column in enumerate(self.columns):
             x[k] = linalg.solve_triangular(column[k], x[k], lower=True, check_finite=False)

@@ -24,12 +24,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from symheli.progress import Task, task
-from synthesis.polynomial.symmetric import indices, smat, svec, symmetrized
+from synthesis.polynomial.symmetric import indices, length, smat, svec, symmetrized
 from synthesis.program.block_cholesky import BlockCholesky
 from synthesis.program.cone_program import Answer, Candidate, Solver
 from synthesis.program.lyapunov_program import LyapunovBlocks, Program, Sizes
@@ -60,26 +62,59 @@ DUAL = 1e-6
 IMPOSSIBLE = 1e-7
 """Residual of multipliers, of what they show to be contradictory, that prove that there is no P."""
 
+EARLY = 0.1
+"""Gap of the point from which the method may start on a program that differs little."""
+TOGETHER = 2_000_000
+"""Entries of n^4 by place that are summed at a time: 16 MB."""
 
-def minimise(program: Program, solver: Solver) -> Candidate:
+
+class Early(NamedTuple):
+    """A feasible P (K, n, n) and y in the middle of the cones, with the level <S, Z> / order of the
+    central path there and the least eigenvalue of a slack of every cone: where the method may start
+    on a program with more blocks.
+    """
+
+    P: Array
+    y: Array
+    level: float
+    least: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum(Candidate):
+    """Whether the gap is `reached` that was asked for; with the point at which it first was `EARLY`,
+    None where it never was.
+    """
+
+    reached: bool = False
+    early: Early | None = None
+
+
+def minimise(program: Program, solver: Solver, start: Early | None = None) -> Minimum:
     """The least level, to the tolerance of the solver or as near as rounding, iterations and time
     allow.
 
     The point has the coefficients of P as vectors, then the level; where it is not optimal, it is
-    feasible to rounding or there is none. Never raises for a failed solve.
+    feasible to rounding or there is none. From `start`, of another program, and where that leads
+    to no solution from afar. Never raises for a failed solve.
     """
     digits = -math.log10(solver.options["tolerance"])
     with task("digits of the least level", round(digits, 1)) as solving:
-        return _minimised(program, solver, solving)
+        if start is not None:
+            found = _minimised(program, solver, solving, start)
+            if found.reached:
+                return found
+        return _minimised(program, solver, solving, None)
 
 
-def _minimised(program: Program, solver: Solver, solving: Task) -> Candidate:
+def _minimised(program: Program, solver: Solver, solving: Task, start: Early | None) -> Minimum:
     tolerance, iterations, seconds = (
         solver.options[name] for name in ("tolerance", "iterations", "seconds")
     )
     begin = time.perf_counter()
     cones = _Cones(program)
-    point, count, feasible, before, digits = cones.start(), 0, False, np.inf, 0.0
+    point = cones.start() if start is None else cones.near(start)
+    count, feasible, before, digits, early = 0, False, np.inf, 0.0, None
     while True:
         at = cones.residuals(point)
         digits = max(digits, _digits(at.gap, tolerance))
@@ -88,6 +123,9 @@ def _minimised(program: Program, solver: Solver, solving: Task) -> Candidate:
         if close and not feasible and cones.inside(point):
             feasible, point = True, point._replace(S=cones.slacks(point.P, point.y))
             at = cones.residuals(point)
+        if feasible and early is None and at.gap <= EARLY:
+            least = tuple(float(np.linalg.eigvalsh(S).min()) for S in point.S)
+            early = Early(point.P, point.y, at.product / cones.order, least)
         if close and at.gap <= tolerance and at.dual_size <= DUAL:
             word = "solved"
         elif close and at.gap <= tolerance and at.dual_size >= before:
@@ -111,7 +149,8 @@ def _minimised(program: Program, solver: Solver, solving: Task) -> Candidate:
         x = np.r_[svec(point.P).ravel(), point.y[1:], point.y[0]] if close else None
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
-        return Candidate(answer, x, time.perf_counter() - begin, message)
+        reached = close and at.gap <= tolerance
+        return Minimum(answer, x, time.perf_counter() - begin, message, reached, early)
 
 
 def _digits(gap: float, tolerance: float) -> float:
@@ -179,7 +218,7 @@ class _Inequalities:
         self.level = program.level if blocks.level is None else blocks.level
         self.length = 1 + program.sizes.multipliers
         x = blocks.varying
-        self.used = [np.flatnonzero(np.any(x[:, j], axis=(0, 2, 3))) for j in range(x.shape[1])]
+        self.used = [np.flatnonzero(np.any(x[:, :, a], axis=(0, 2, 3))) for a in range(x.shape[2])]
 
     def along(self, y: Array) -> Array:
         out = np.broadcast_to(y[0] * self.level, self.constant.shape)
@@ -200,29 +239,64 @@ class _Inequalities:
         np.add.at(out, self.blocks.columns, -self.blocks.adjoint(Z))
 
     def add_normal(self, H: Array, out: Normal) -> None:
-        columns, f, x = self.blocks.columns, self.blocks.fixed, self.blocks.varying
-        n = f.shape[1]
-        fH, xH = f @ H[:, None], x @ H[:, None, None]
+        columns, weights = self.blocks.columns, self.blocks.weights
+        n = self.blocks.fixed.shape[1]
+        if weights is None:
+            for a, b, each in self._of_places(H, slice(None)):
+                _add(out, (columns[a], columns[b]), each[0])
+            return
+        G, k = weights.shape[:2]
+        v = length(n)
+        total = np.zeros((k * k, v * v))
+        together = max(1, TOGETHER // n**4)
+        for first in range(0, G, together):
+            places = slice(first, first + together)
+            g = weights[places]
+            for a, b, each in self._of_places(H, places):
+                pairs = (g[:, :, None, a] * g[:, None, :, b]).reshape(len(g), k * k)
+                total += pairs.T @ each.reshape(len(g), v * v)
+                if a != b:
+                    pairs = (g[:, :, None, b] * g[:, None, :, a]).reshape(len(g), k * k)
+                    turned = np.swapaxes(each, 1, 2)
+                    total += pairs.T @ turned.reshape(len(g), v * v)
+        blocks = total.reshape(k, k, v, v)
+        for j in range(k):
+            for i in range(j + 1):
+                _add(out, (columns[j], columns[i]), blocks[j, i])
+
+    def _of_places(self, H: Array, places: slice) -> Iterator[tuple[int, int, Array]]:
+        """(a, b, blocks), a >= b, of the normal equations between the matrices Q_a and Q_b of each
+        of these places.
+        """
+        f, n = self.blocks.fixed, self.blocks.fixed.shape[1]
+        G, N = self.blocks.places, H.shape[1]
+        # motions, places, ...
+        H = H.reshape(-1, G, N, N)[:, places]
+        x = self.blocks.varying
+        x = x.reshape(-1, G, *x.shape[1:])[:, places]
+        fH, xH = f @ H[:, :, None], x @ H[:, :, None, None]
         f, x = np.swapaxes(f, -1, -2), np.swapaxes(x, -1, -2)
-        # by m, r and s: f_r H f_s' and, for every j, x_jr H f_s'; of the r and s that are not zero
-        ff = fH[:, :, None] @ f
-        xf = [xH[:, j][:, r, None] @ f for j, r in enumerate(self.used)]
+        # f_r H f_s' and, for every a, x_ra H f_s'; of the r and s that are not zero
+        ff = fH[:, :, :, None] @ f
+        xf = [xH[:, :, r, a][:, :, :, None] @ f for a, r in enumerate(self.used)]
 
-        def flat(M: Array) -> Array:
-            return M.reshape(-1, n * n)
+        def stacked(*each: Array) -> Array:
+            """(places, terms, n^2)."""
+            flat = np.concatenate([M.reshape(*M.shape[:2], -1, n * n) for M in each], axis=2)
+            return np.moveaxis(flat, 0, 1).reshape(flat.shape[1], -1, n * n)
 
-        for j, r in enumerate(self.used):
-            for k, s in enumerate(self.used[: j + 1]):
-                left = flat(xf[j][:, :, s])
-                right = flat(np.swapaxes(xf[k][:, :, r], 1, 2))
+        for a, r in enumerate(self.used):
+            for b, s in enumerate(self.used[: a + 1]):
+                left = [xf[a][:, :, :, s]]
+                right = [np.swapaxes(xf[b][:, :, :, r], 2, 3)]
                 if self.blocks.symmetric:  # the other half is the same
                     factor = 4.0
                 else:
-                    xx = xH[:, j][:, r, None] @ x[:, k][:, None, s]
-                    left = np.concatenate([left, flat(xx)])
-                    turned = np.swapaxes(ff[:, s][:, :, r], 1, 2)
-                    right, factor = np.concatenate([right, flat(turned)]), 2.0
-                _add(out, (columns[j], columns[k]), factor * _on_vectors(left.T @ right, n))
+                    left.append(xH[:, :, r, a][:, :, :, None] @ x[:, :, s, b][:, :, None])
+                    right.append(np.swapaxes(ff[:, :, s][:, :, :, r], 2, 3))
+                    factor = 2.0
+                K = np.swapaxes(stacked(*left), 1, 2) @ stacked(*right)
+                yield a, b, factor * _on_vectors(K, n)
 
 
 class _Bounds:
@@ -247,7 +321,7 @@ class _Bounds:
     def add_normal(self, H: Array, out: Normal) -> None:
         n = H.shape[1]
         for j, h in enumerate(H):
-            _add(out, (j, j), _on_vectors(np.outer(h, h), n))
+            _add(out, (j, j), _on_vectors(np.outer(h, h), n)[0])
 
 
 class _Multiplier:
@@ -283,14 +357,14 @@ def _add(out: Normal, at: tuple[int, int], block: Array) -> None:
 
 
 def _on_vectors(K: Array, n: int) -> Array:
-    """Matrix on vectors of V -> the symmetric part of sum L V R, where K = sum vec(L) vec(R)' by
-    rows, (n^2, n^2).
+    """Matrices on vectors of V -> the symmetric part of sum L V R, where K = sum vec(L) vec(R)' by
+    rows, (..., n^2, n^2).
     """
     a, b, _ = indices(n)
-    K = K.reshape(n, n, n, n).transpose(3, 0, 1, 2)
-    rows = K[a, b] + K[b, a]
+    K = np.moveaxis(K.reshape(-1, n, n, n, n), -1, 1)
+    rows = K[:, a, b] + K[:, b, a]
     scale = np.where(a == b, 0.5, np.sqrt(0.5))
-    return (rows[:, a, b] + rows[:, b, a]) * scale[:, None] * scale
+    return (rows[:, :, a, b] + rows[:, :, b, a]) * scale[:, None] * scale
 
 
 class _Cones:
@@ -315,6 +389,12 @@ class _Cones:
         ]
         y = np.zeros(1 + self.sizes.multipliers)
         return _Point(np.zeros((self.sizes.unknowns, n, n)), y, S, S)
+
+    def near(self, start: Early) -> _Point:
+        """On the central path as far as a start of another program allows."""
+        slacks = self.slacks(start.P, start.y)
+        S = [_raised(slack, least) for slack, least in zip(slacks, start.least, strict=True)]
+        return _Point(start.P, start.y, S, [start.level * np.linalg.inv(s) for s in S])
 
     def change(self, P: Array, y: Array) -> list[Array]:
         """Of the slacks with P and y."""
@@ -367,6 +447,14 @@ class _Cones:
             product / max(abs(float(point.y[0])), LEAST),
             _largest(dual, level) / -constant if constant < 0 else np.inf,
         )
+
+
+def _raised(S: Array, least: float) -> Array:
+    """Matrices (m, N, N) with a multiple of the identity each that leaves no eigenvalue below the
+    least.
+    """
+    missing = np.maximum(least - np.linalg.eigvalsh(S)[:, 0], 0.0)
+    return S + missing[:, None, None] * np.eye(S.shape[-1])
 
 
 def _largest(P: Array, y: Array) -> float:

@@ -60,13 +60,17 @@ class Supplied(NamedTuple):
 
 
 class LyapunovBlocks(NamedTuple):
-    """LMI blocks F = sum_jr (fixed_r' P_columns[j] varying_jr + its transpose) + constant - g
-    diag(0, I).
+    """LMI blocks F = sum_ra (fixed_r' Q_a varying_ra + its transpose) + constant - g diag(0, I).
 
-    `columns` (k,) says which coefficients of P are involved; `fixed` (R, n, N) are the same in all
-    m blocks, `varying` (m, k, R, n, N) are not; `constant` (m, N, N). `symmetric`: each sum over r
-    is, without its transpose. `supply`: what a norm-bounded block adds to F, None without one.
-    `level` (m, N, N) or (N, N): where g stands instead, None for diag(0, I).
+    The Q_a are the matrices that a block is linear in: sum_j weights_ja P_columns[j], as P and its
+    derivatives at a point are, however many coefficients P has. `columns` (k,) says which
+    coefficients are involved, `weights` (G, k, A) how, at G places, None where Q_j = P_columns[j]
+    in all blocks. `fixed` (R, n, N) are the same in all m blocks, `varying` (m, R, A, n, N) are
+    not; `constant` (m, N, N). Block i stands at place i mod G.
+
+    `symmetric`: each sum over r is, without its transpose. `supply`: what a norm-bounded block adds
+    to F, None without one. `level` (m, N, N) or (N, N): where g stands instead, None for diag(0,
+    I).
     """
 
     columns: Array
@@ -76,21 +80,43 @@ class LyapunovBlocks(NamedTuple):
     symmetric: bool = False
     supply: Supplied | None = None
     level: Array | None = None
+    weights: Array | None = None
+
+    @property
+    def places(self) -> int:
+        """G, between which the matrices Q differ."""
+        return 1 if self.weights is None else len(self.weights)
 
     def linear(self, P: Array) -> Array:
         """The part (m, N, N) linear in P, at the coefficients P (k', n, n) of the whole spline."""
-        inner = P[self.columns][:, None] @ self.varying
-        half = (np.swapaxes(self.fixed, -1, -2) @ inner).sum(axis=(1, 2))
+        m, R, A, n, N = self.varying.shape
+        P = P[self.columns]
+        Q = P[None] if self.weights is None else np.tensordot(self.weights, P, axes=(1, 0))
+        beside = np.swapaxes(Q, 1, 2).reshape(-1, 1, n, A * n)  # [Q_1 Q_2 ...]
+        inner = beside @ self.varying.reshape(-1, self.places, R, A * n, N)
+        half = self.fixed.reshape(R * n, N).T @ inner.reshape(m, R * n, N)
         return half + np.swapaxes(half, -1, -2)
 
     def adjoint(self, Z: Array) -> Array:
         """Matrices (k, n, n) with sum <Z, linear(P)> = sum_j <., P_columns[j]>, Z (m, N, N)."""
-        half = (self.varying @ Z[:, None, None] @ np.swapaxes(self.fixed, -1, -2)).sum(axis=(0, 2))
+        m, R, A, n, N = self.varying.shape
+        right = (Z @ self.fixed.reshape(R * n, N).T).reshape(m, N, R, n)
+        each = self.varying.reshape(m, R, A * n, N) @ np.swapaxes(right, 1, 2)
+        half = each.reshape(-1, self.places, R, A, n, n).sum(axis=(0, 2))
+        if self.weights is None:
+            half = half[0]
+        else:
+            half = np.tensordot(self.weights, half, axes=((0, 2), (0, 1)))
         return half + np.swapaxes(half, -1, -2)
 
     def keep(self, which: Array) -> LyapunovBlocks:
         """Those blocks alone; without a `supply` or a level of their own."""
-        return self._replace(varying=self.varying[which], constant=self.constant[which])
+        weights = self.weights
+        if weights is not None:
+            weights = weights[np.arange(len(self.constant))[which] % len(weights)]
+        return self._replace(
+            varying=self.varying[which], constant=self.constant[which], weights=weights
+        )
 
     def congruent(self, W: Array) -> LyapunovBlocks:
         """W' F W for every F, W (N, N) not acting on the part with g."""
