@@ -268,5 +268,5 @@ def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> 
 def rate_text(rate: float) -> str:
     """The rate as a reader would say it."""
     return (
-        "frozen" if rate == 0 else "as fast as it likes" if math.isinf(rate) else f"{rate:g} m/s^2"
+        "frozen" if rate == 0 else "arbitrarily fast" if math.isinf(rate) else f"{rate:g} m/s^2"
     )
