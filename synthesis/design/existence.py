@@ -82,13 +82,14 @@ class Conditions:
 
 
 class Found(NamedTuple):
-    """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, and
-    what the solver said.
+    """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, what
+    the solver said, whether it `reached` its tolerance, and where it may start again.
     """
 
     gamma: float
     coefficients: Array
     message: str
+    reached: bool = False
     early: interior_point.Early | None = None
 
 
@@ -156,8 +157,20 @@ class Existence:
         return self._least(replace(solver, tolerance=FINE), start)
 
     def _least(self, solver: Solver, start: interior_point.Early | None = None) -> Found:
-        blocks = [*self._halves(None, MARGIN), *self._coupling(False, self.largest)]
+        return self._least_within(self.largest, solver, start)
+
+    def _least_within(
+        self, largest: float, solver: Solver, start: interior_point.Early | None
+    ) -> Found:
+        blocks = [*self._halves(None, MARGIN), *self._coupling(False, largest)]
         return self._solved(blocks, 1.0, solver, start)
+
+    def least_share(self, found: Found, largest: float, solver: Solver) -> float:
+        """Below this part of the g that was found there is none within a larger bound on X and Y;
+        0 where the program does not tell. At the present points alone: more of them raise g.
+        """
+        within = self._least_within(largest, replace(solver, tolerance=COARSE), found.early)
+        return (1 - COARSE) * within.gamma / found.gamma if within.reached else 0.0
 
     def bounded(self, found: Found) -> bool:
         """Whether the bound on X and Y decides."""
@@ -209,11 +222,9 @@ class Existence:
 
     def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Found:
         """The same within this bound, with points added as for the least g."""
-        start = None
         for _ in range(ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
-            found = self._solved(blocks, -1.0, solver, start)
-            start = found.early
+            found = self._solved(blocks, -1.0, solver)
             if not np.any(found.coefficients) or len(self.points) == 1:
                 break
             if not self._added(found, gamma):
@@ -225,7 +236,7 @@ class Existence:
         blocks: list[LyapunovBlocks],
         cost: float,
         solver: Solver,
-        start: interior_point.Early | None,
+        start: interior_point.Early | None = None,
     ) -> Found:
         n, count = self.states, self.count
         candidate = interior_point.minimise(
@@ -234,7 +245,13 @@ class Existence:
         if candidate.x is None:
             return Found(np.inf, np.zeros((count, n, n)), candidate.message)
         coefficients = smat(candidate.x[: count * length(n)].reshape(count, -1), n)
-        return Found(float(candidate.x[-1]), coefficients, candidate.message, candidate.early)
+        return Found(
+            float(candidate.x[-1]),
+            coefficients,
+            candidate.message,
+            candidate.reached,
+            candidate.early,
+        )
 
     def _halves(self, gamma: float | None, margin: float) -> list[LyapunovBlocks]:
         """Those of every point, for this g or for one that is sought."""

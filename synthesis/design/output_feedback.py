@@ -272,14 +272,20 @@ def _designs(
     attempts: list[Attempt],
 ) -> Iterator[tuple[Start, Design]]:
     """First of the `other`, where X and Y both move and the controller is not told how fast, which
-    serves where parameters move slowly.
+    serves where parameters move slowly; as far as it is backed off, its gamma is still lower.
     """
+    first: list[float] = []
     if other is not None:
-        for design in settled(other, factors, _recover, USUAL, attempts, neglecting=True):
+        first = [f for f in factors if f * other.gamma < min(factors) * start.gamma]
+        for design in settled(other, first, _recover, USUAL, attempts, neglecting=True):
             yield other, design
     untold = bool(start.shape.untold(plant.parameters))  # asked for by hand
     for design in settled(start, factors, _recover, USUAL, attempts, neglecting=untold):
         yield start, design
+    if other is not None:
+        rest = [f for f in factors if f not in first]
+        for design in settled(other, rest, _recover, USUAL, attempts, neglecting=True):
+            yield other, design
 
 
 def _limited(made: Controller, asked: float, fastest: float) -> tuple[str, ...]:

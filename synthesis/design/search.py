@@ -40,6 +40,7 @@ BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
 SLACK = 1e-6
 """By which the frozen gain of a controller may exceed what was promised: rounding."""
 UNKEPT = "frozen loops do not keep it"
+UNTOLD = "p moves too fast for gains that are not told dp/dt"
 SHARP = "frozen loops keep it, no functions of p do"
 FAR_ABOVE = 1.05
 """A gamma this many times the least one is said to be, one of a larger back-off that was asked for
@@ -47,6 +48,8 @@ in proportion; before it gains that turn sharply become splines with as many kno
 """
 FURTHER = 1.05
 """Of the gamma of a controller that is told dp/dt, where it is not told."""
+TOO_FAST = 1.1
+"""The same at which no other X and Y of this gamma are tried: all move about as much."""
 ROUGH = 0.3
 """Functions of p farther from the gains than this are not looked at."""
 ACCURACY = 3e-3
@@ -289,6 +292,8 @@ def best(
     for largest in LARGEST[1:]:
         if start.gamma <= CLOSE * floor or not start.existence.bounded(start.found):
             break
+        if start.existence.least_share(start.found, largest, solver) >= WORTH:
+            break
         unit = start.gamma
         wider = least(
             plant, start.shape, divisions, solver, attempts, unit, worst.p, largest=largest
@@ -372,6 +377,7 @@ def settled(
             noted(factor, found.message, outcome)
             if design is not None:
                 yield design
+            if design is not None or outcome.startswith(UNTOLD):
                 break
     yield from by_splines()
 
@@ -391,8 +397,10 @@ def _tried(
     if neglecting:
         looped = closed(coordinates, gains, points)
         reached = max(reached, level_kept(coordinates, existence, found, looped, points))
-    if reached > FURTHER * found.gamma:
-        return None, f"{reached / found.gamma:.3g} times as much as dp/dt is not known"
+    further = reached / found.gamma
+    if further > FURTHER:
+        said = UNTOLD if further > TOO_FAST else "as dp/dt is not known"
+        return None, f"{said}, {further:.3g} times as much"
     if not all(kept(coordinates, gains, loop, points, reached * (1 + SLACK))):
         return None, UNKEPT
     fit = fit_of(coordinates, gains, loop, points, reached)

@@ -64,6 +64,8 @@ IMPOSSIBLE = 1e-7
 
 EARLY = 0.1
 """Gap of the point from which the method may start on a program that differs little."""
+NEARLY = 10.0
+"""A gap this many times as large as it was asked for is no reason to start again from afar."""
 TOGETHER = 2_000_000
 """Entries of n^4 by place that are summed at a time: 16 MB."""
 
@@ -82,8 +84,8 @@ class Early(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Minimum(Candidate):
-    """Whether the gap is `reached` that was asked for; with the point at which it first was `EARLY`,
-    None where it never was.
+    """Whether the gap that was asked for is `reached`, at least nearly; with the point at which it
+    first was `EARLY`, None where it never was.
     """
 
     reached: bool = False
@@ -149,7 +151,7 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
         x = np.r_[svec(point.P).ravel(), point.y[1:], point.y[0]] if close else None
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
-        reached = close and at.gap <= tolerance
+        reached = close and at.gap <= NEARLY * tolerance
         return Minimum(answer, x, time.perf_counter() - begin, message, reached, early)
 
 
@@ -501,11 +503,11 @@ class _Scaling(NamedTuple):
         """T with (T diag + diag T)/2 = M."""
         return 2.0 * M / (self.values[:, :, None] + self.values[:, None, :])
 
-    def longest(self, scaled: Array) -> float:
-        """The longest step along `scaled` that stays in the cone."""
+    def extent(self, scaled: Array) -> tuple[float, float]:
+        """The least and the largest eigenvalue of `scaled` by the slack."""
         root = np.sqrt(self.values)
-        least = float(np.linalg.eigvalsh(scaled / (root[:, :, None] * root[:, None, :])).min())
-        return 1.0 / -least if least < 0 else np.inf
+        found = np.linalg.eigvalsh(scaled / (root[:, :, None] * root[:, None, :]))
+        return float(found.min()), float(found.max())
 
 
 class _NormalEquations:
@@ -571,6 +573,11 @@ def _inner(P: Array, y: Array, Q: Array, z: Array) -> float:
     return float(np.sum(P * Q) + y @ z)
 
 
+def _longest(least: float, share: float = 1.0) -> float:
+    """Of a step in a direction with this least eigenvalue, the part that stays in the cone."""
+    return min(1.0, share / -least) if least < 0 else 1.0
+
+
 def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Point | None:
     """The next point, None where no step is left."""
     scalings = [_Scaling.of(s, z) for s, z in zip(point.S, point.Z, strict=True)]
@@ -589,11 +596,13 @@ def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Poin
         dS = [s.of_slack(M + r) for s, M, r in zip(scalings, moved, at.primal, strict=True)]
         return dP, dy, dS, [T - s for T, s in zip(targets, dS, strict=True)]
 
-    def longest(scaled: list[Array], share: float) -> float:
-        return min(1.0, share * min(s.longest(d) for s, d in zip(scalings, scaled, strict=True)))
+    def extent(scaled: list[Array]) -> tuple[float, float]:
+        each = [s.extent(d) for s, d in zip(scalings, scaled, strict=True)]
+        return min(low for low, _ in each), max(high for _, high in each)
 
     _, _, aS, aZ = direction([-D for D in diagonals])
-    along, across = longest(aS, 1.0), longest(aZ, 1.0)
+    low, high = extent(aS)
+    along, across = _longest(low), _longest(-1.0 - high)  # both add up to minus what there is
     left = sum(
         float(np.sum((D + along * s) * (D + across * z)))
         for D, s, z in zip(diagonals, aS, aZ, strict=True)
@@ -607,7 +616,7 @@ def _step(cones: _Cones, point: _Point, at: _Residuals, feasible: bool) -> _Poin
     ]
     share = 0.9 + 0.08 * min(along, across)
     dP, dy, dS, dZ = direction(targets)
-    along, across = longest(dS, share), longest(dZ, share)
+    along, across = (_longest(extent(scaled)[0], share) for scaled in (dS, dZ))
     if max(along, across) < SMALL:
         return None
     P, y = symmetrized(point.P + along * dP), point.y + along * dy
