@@ -267,6 +267,4 @@ def gain_curve(found: Sequence[Bound], model: str, channel: str, title: str) -> 
 
 def rate_text(rate: float) -> str:
     """The rate as a reader would say it."""
-    return (
-        "frozen" if rate == 0 else "arbitrarily fast" if math.isinf(rate) else f"{rate:g} m/s^2"
-    )
+    return "frozen" if rate == 0 else "arbitrarily fast" if math.isinf(rate) else f"{rate:g} m/s^2"
