@@ -116,8 +116,8 @@ def first_order_lag(pole, gain, output, parameters):
     """x' = -pole x + gain (Wu + u), y = output x, which follows a command r and is disturbed by d.
 
     `pole`, `gain` and `output` map exponents of the parameters to coefficients. The error r - y is
-    weighted by We = (s + 25)/(5 s + 5), the disturbed control u + d/10 by Wu = (10 s + 10)/(s + 100).
-    Source: the pages on LFT models and on conversions between grids and LFTs of LPVTools'
+    weighted by We = (s + 25)/(5 s + 5), the disturbed control u + d/10 by Wu = (10 s + 10)/(s +
+    100). Source: the pages on LFT models and on conversions between grids and LFTs of LPVTools'
     documentation.
     """
     A, B, C = {}, {}, {}
