@@ -70,6 +70,8 @@ TRUSTED = 1e-3
 """Residual of the multipliers, of the largest of their entries, beyond which the gap says nothing
 of the level: there it does start again.
 """
+FEW = 10
+"""So many products of matrices by coefficient take the time of one by place."""
 TOGETHER = 2_000_000
 """Entries of n^4 by place that are summed at a time: 16 MB."""
 
@@ -219,7 +221,7 @@ class _Inequalities:
     """The blocks F < 0."""
 
     def __init__(self, blocks: LyapunovBlocks, program: Program):
-        self.blocks = blocks
+        self.blocks = blocks = blocks.by_coefficients() if _few(blocks) else blocks
         self.constant = -blocks.constant - program.back_off
         self.level = program.level if blocks.level is None else blocks.level
         self.length = 1 + program.sizes.multipliers
@@ -350,6 +352,17 @@ class _Multiplier:
 
     def add_normal(self, H: Array, out: Normal) -> None:
         pass
+
+
+def _few(blocks: LyapunovBlocks) -> bool:
+    """Whether so few coefficients are involved that their normal equations are summed over all
+    blocks sooner than those of every place are formed.
+    """
+    if blocks.weights is None:
+        return False
+    places, k, A = blocks.weights.shape
+    motions = len(blocks.constant) // places
+    return k * (k + 1) * motions <= FEW * A * (A + 1)
 
 
 def _contracted(g: Array, h: Array, blocks: Array) -> Array:

@@ -158,12 +158,15 @@ def random_blocks(rng, motions, places):
     return LyapunovBlocks(np.array([0, 1, 3, 4, 5]), fixed, varying, constant, weights=weights)
 
 
-@pytest.mark.parametrize("together", [1, 100, 2_000_000])
+@pytest.mark.parametrize(("few", "together"), [(0, 1), (0, 200), (0, 2_000_000), (100, 1)])
 @pytest.mark.parametrize("motions", [1, 3])
 def test_the_normal_equations_of_functions_are_those_of_dense_matrices(
-    monkeypatch, motions, together
+    monkeypatch, motions, few, together
 ):
-    """F and the normal equations from each coefficient of each block, one entry at a time."""
+    """F and the normal equations from each coefficient of each block, one entry at a time; by place
+    in batches of one, two and all of them, and by coefficient.
+    """
+    monkeypatch.setattr(method, "FEW", few)
     monkeypatch.setattr(method, "TOGETHER", together)
     rng = np.random.default_rng(2)
     places, n, count = 4, 3, 6
