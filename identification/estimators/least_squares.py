@@ -92,7 +92,7 @@ def white_covariance(arx: LPVARX, phi: Array, residual: Array) -> Array:
     for group in arx.groups:
         root = np.zeros((n, n))
         own = np.asarray(arx.regressors(group))
-        root[np.ix_(own, own)] = inverse_root(phi[:, own])
+        root[own[:, None], own] = inverse_root(phi[:, own])
         roots.append((np.array(group.outputs), root, phi @ root))
     for i, (rows, left, one) in enumerate(roots):
         for j, (columns, right, other) in enumerate(roots):

@@ -1,5 +1,5 @@
 """Cholesky's factorisation of a symmetric matrix of square blocks, most of which are zero: a band,
-where P is a spline; or few of which are, where functions of P overlap all over the range.
+where P is a spline; or none of which are, where functions of P overlap all over the range.
 """
 
 from __future__ import annotations
@@ -9,11 +9,13 @@ from collections.abc import Mapping
 import numpy as np
 from scipy import linalg
 
+from synthesis.polynomial.symmetric import length
+
 Array = np.ndarray
 
 
-FULL = 0.5
-"""Part of the blocks from which on the matrix is factored as a whole."""
+LARGE = 128
+"""Rows of a block from which on a matrix without a zero block is not factored as one."""
 
 
 class BlockCholesky:
@@ -26,13 +28,13 @@ class BlockCholesky:
         self.size = 1 + max(i for i, _ in blocks)
         self.whole: Array | None = None
         self.columns: list[dict[int, Array]] = [{} for _ in range(self.size)]
-        if len(blocks) >= FULL * self.size * (self.size + 1) / 2:
-            self._factor_whole(blocks)
+        rows = len(next(iter(blocks.values())))
+        if rows < LARGE and len(blocks) == length(self.size):
+            self._factor_whole(blocks, rows)
         else:
             self._factor_blocks(blocks)
 
-    def _factor_whole(self, blocks: Mapping[tuple[int, int], Array]) -> None:
-        v = len(next(iter(blocks.values())))
+    def _factor_whole(self, blocks: Mapping[tuple[int, int], Array], v: int) -> None:
         M = np.zeros((self.size, v, self.size, v))
         for (i, j), block in blocks.items():
             M[i, :, j] = block

@@ -66,6 +66,12 @@ EARLY = 0.1
 """Gap of the point from which the method may start on a program that differs little."""
 NEARLY = 10.0
 """A gap this many times as large as it was asked for is no reason to start again from afar."""
+TRUSTED = 1e-3
+"""Residual of the multipliers, of the largest of their entries, beyond which the gap says nothing
+of the level: there it does start again.
+"""
+FEW = 10
+"""So many products of matrices by coefficient take the time of one by place."""
 TOGETHER = 2_000_000
 """Entries of n^4 by place that are summed at a time: 16 MB."""
 
@@ -151,7 +157,7 @@ def _minimised(program: Program, solver: Solver, solving: Task, start: Early | N
         x = np.r_[svec(point.P).ravel(), point.y[1:], point.y[0]] if close else None
         gap = "" if word == "infeasible" else f", relative gap {at.gap:.1e}"
         message = f"{word} after {count} iterations{gap}"
-        reached = close and at.gap <= NEARLY * tolerance
+        reached = close and at.gap <= NEARLY * tolerance and at.dual_size <= TRUSTED
         return Minimum(answer, x, time.perf_counter() - begin, message, reached, early)
 
 
@@ -215,7 +221,7 @@ class _Inequalities:
     """The blocks F < 0."""
 
     def __init__(self, blocks: LyapunovBlocks, program: Program):
-        self.blocks = blocks
+        self.blocks = blocks = blocks.by_coefficients() if _few(blocks) else blocks
         self.constant = -blocks.constant - program.back_off
         self.level = program.level if blocks.level is None else blocks.level
         self.length = 1 + program.sizes.multipliers
@@ -247,20 +253,20 @@ class _Inequalities:
             for a, b, each in self._of_places(H, slice(None)):
                 _add(out, (columns[a], columns[b]), each[0])
             return
-        G, k = weights.shape[:2]
+        G, k, A = weights.shape
         v = length(n)
-        total = np.zeros((k * k, v * v))
+        # the functions of each matrix
+        own = [np.flatnonzero(np.any(weights[:, :, a], axis=0)) for a in range(A)]
+        total = np.zeros((k, k, v * v))
         together = max(1, TOGETHER // n**4)
         for first in range(0, G, together):
             places = slice(first, first + together)
-            g = weights[places]
+            g = [weights[places, j, a] for a, j in enumerate(own)]
             for a, b, each in self._of_places(H, places):
-                pairs = (g[:, :, None, a] * g[:, None, :, b]).reshape(len(g), k * k)
-                total += pairs.T @ each.reshape(len(g), v * v)
+                total[np.ix_(own[a], own[b])] += _contracted(g[a], g[b], each)
                 if a != b:
-                    pairs = (g[:, :, None, b] * g[:, None, :, a]).reshape(len(g), k * k)
                     turned = np.swapaxes(each, 1, 2)
-                    total += pairs.T @ turned.reshape(len(g), v * v)
+                    total[np.ix_(own[b], own[a])] += _contracted(g[b], g[a], turned)
         blocks = total.reshape(k, k, v, v)
         for j in range(k):
             for i in range(j + 1):
@@ -346,6 +352,23 @@ class _Multiplier:
 
     def add_normal(self, H: Array, out: Normal) -> None:
         pass
+
+
+def _few(blocks: LyapunovBlocks) -> bool:
+    """Whether so few coefficients are involved that their normal equations are summed over all
+    blocks sooner than those of every place are formed.
+    """
+    if blocks.weights is None:
+        return False
+    places, k, A = blocks.weights.shape
+    motions = len(blocks.constant) // places
+    return k * (k + 1) * motions <= FEW * A * (A + 1)
+
+
+def _contracted(g: Array, h: Array, blocks: Array) -> Array:
+    """sum_m g_mj h_mk blocks_m (j, k, v^2), the blocks (m, v, v)."""
+    pairs = (g[:, :, None] * h[:, None, :]).reshape(len(g), -1)
+    return (pairs.T @ blocks.reshape(len(g), -1)).reshape(g.shape[1], h.shape[1], -1)
 
 
 def _add(out: Normal, at: tuple[int, int], block: Array) -> None:

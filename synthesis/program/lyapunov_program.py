@@ -109,6 +109,16 @@ class LyapunovBlocks(NamedTuple):
             half = np.tensordot(self.weights, half, axes=((0, 2), (0, 1)))
         return half + np.swapaxes(half, -1, -2)
 
+    def by_coefficients(self) -> LyapunovBlocks:
+        """The same with the coefficients themselves for the matrices Q, without weights."""
+        if self.weights is None:
+            return self
+        m, R, A, n, N = self.varying.shape
+        k = len(self.columns)
+        wide = self.varying.reshape(-1, self.places, R, A, n * N)
+        wide = self.weights[:, None] @ wide
+        return self._replace(varying=wide.reshape(m, R, k, n, N), weights=None)
+
     def keep(self, which: Array) -> LyapunovBlocks:
         """Those blocks alone; without a `supply` or a level of their own."""
         weights = self.weights

@@ -37,10 +37,10 @@ from synthesis.analysis.question import question
 from synthesis.assemble.unknowns import Quadratic, scaled_problem
 from synthesis.lyapunov.spline import graded_knots
 from synthesis.polynomial import exact
-from synthesis.polynomial.symmetric import length, svec, symmetrized
+from synthesis.polynomial.symmetric import basis, length, svec, symmetrized
 from synthesis.program.block_cholesky import BlockCholesky
 from synthesis.program.cone_program import Answer
-from synthesis.program.lyapunov_program import LyapunovProgram
+from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 
 FORM = Spline(segments=2, degree=2)
 
@@ -145,9 +145,79 @@ def test_the_normal_equations_are_what_the_blocks_say_one_direction_at_a_time(mo
     assert forth == pytest.approx(np.sum(back * P) + across @ y, rel=1e-11)
 
 
+def random_blocks(rng, motions, places):
+    """Blocks with two matrices at every place, of five functions of P each or of some of them."""
+    n, N, R, A = 3, 5, 2, 2
+    weights = rng.standard_normal((places, 5, A))
+    weights[:, :2, 1] = 0.0
+    m = motions * places
+    varying = rng.standard_normal((m, R, A, n, N))
+    varying[:, 1, 0] = 0.0
+    constant = np.zeros((m, N, N))
+    fixed = rng.standard_normal((R, n, N))
+    return LyapunovBlocks(np.array([0, 1, 3, 4, 5]), fixed, varying, constant, weights=weights)
+
+
+@pytest.mark.parametrize(("few", "together"), [(0, 1), (0, 200), (0, 2_000_000), (100, 1)])
+@pytest.mark.parametrize("motions", [1, 3])
+def test_the_normal_equations_of_functions_are_those_of_dense_matrices(
+    monkeypatch, motions, few, together
+):
+    """F and the normal equations from each coefficient of each block, one entry at a time; by place
+    in batches of one, two and all of them, and by coefficient.
+    """
+    monkeypatch.setattr(method, "FEW", few)
+    monkeypatch.setattr(method, "TOGETHER", together)
+    rng = np.random.default_rng(2)
+    places, n, count = 4, 3, 6
+    blocks = random_blocks(rng, motions, places)
+    m, N = blocks.constant.shape[:2]
+    F = rng.standard_normal((m, N, N))
+    H = symmetrized(F @ np.swapaxes(F, 1, 2)) + np.eye(N)
+    entries = basis(n)
+    images = np.zeros((m, count, len(entries), N, N))
+    for i, j, a, r in np.ndindex(m, 5, 2, 2):
+        weight = blocks.weights[i % places, j, a]
+        half = weight * blocks.fixed[r].T @ entries @ blocks.varying[i, r, a]
+        images[i, blocks.columns[j]] += half + np.swapaxes(half, 1, 2)
+    dense = np.einsum("ijvab,ibc,ikwcd,ida->jvkw", images, H, images, H, optimize=True)
+    program = LyapunovProgram((blocks,), Sizes(n, N - n, count), 1e-6, 1e-6)
+    normal = {}
+    method._Inequalities(blocks, program).add_normal(H, normal)
+    found = np.zeros_like(dense)
+    for (i, j), block in normal.items():
+        found[i, :, j], found[j, :, i] = block, block.T
+    # rounding of some hundred products of numbers of order one
+    np.testing.assert_allclose(found, dense, rtol=0, atol=1e-12 * np.abs(dense).max())
+    P = symmetrized(rng.standard_normal((count, n, n)))
+    F = np.einsum("ijvab,jv->iab", images, svec(P))
+    np.testing.assert_allclose(blocks.linear(P), F, rtol=0, atol=1e-12 * np.abs(F).max())
+    back = np.zeros((count, n, n))
+    back[blocks.columns] = blocks.adjoint(H)
+    dual = np.einsum("ijvab,iab->jv", images, H)
+    np.testing.assert_allclose(svec(back), dual, rtol=0, atol=1e-12 * np.abs(dual).max())
+    kept = np.arange(m) % 3 == 0
+    np.testing.assert_allclose(blocks.keep(kept).linear(P), F[kept], rtol=0, atol=1e-12 * 100)
+
+
+def test_the_factorisation_of_a_full_matrix_solves_it():
+    rng = np.random.default_rng(0)
+    v, size = 3, 4
+    F = rng.standard_normal((size * v, size * v))
+    M = F @ F.T + np.eye(size * v)
+    blocks = {
+        (i, j): M[i * v : (i + 1) * v, j * v : (j + 1) * v].copy()
+        for i in range(size)
+        for j in range(i + 1)
+    }
+    b = rng.standard_normal((size, v))
+    found = BlockCholesky(blocks).solve(b)
+    np.testing.assert_allclose(found.ravel(), np.linalg.solve(M, b.ravel()), rtol=1e-9)
+
+
 def test_the_block_factorisation_solves_what_the_whole_matrix_does():
     rng = np.random.default_rng(0)
-    v, size, band = 3, 5, 2
+    v, size, band = 3, 5, 1
     lower = np.kron(np.tri(size) - np.tri(size, k=-band - 1), np.ones((v, v)))
     F = np.tril(rng.standard_normal((size * v, size * v)) * lower) + 4 * np.eye(size * v)
     M = F @ F.T

@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from published_plants import DEGREE, spinning_disks, wu_1996
+from published_plants import DEGREE, grid_to_lft, lft_tutorial, spinning_disks, wu_1996
 from scheduled_plants import frozen
 
 from synthesis import hinf, output_feedback
@@ -36,4 +36,21 @@ def test_the_loop_of_the_disks_is_proven_near_what_its_design_promised():
     assert made.optimum == pytest.approx(1.1299, rel=1e-3)
     certificate = made.certify(search=None)
     assert certificate.frozen <= certificate.gamma <= 1.05 * made.promised
+    assert certificate.verify()
+
+
+def test_the_least_gain_of_the_lft_tutorial_is_no_more_than_the_printed_one():
+    """LPVTools' documentation prints 2.1480, backed off by 1.2."""
+    made = output_feedback(lft_tutorial(math.inf))
+    # the least gain is found to 1e-4
+    assert made.optimum == pytest.approx(1.7877, rel=2e-4)
+    assert 1.2 * made.optimum <= 2.1480
+
+
+@pytest.mark.slow
+def test_the_loop_of_two_parameters_that_jump_is_proven_near_what_its_design_promised():
+    made = output_feedback(grid_to_lft(math.inf))
+    assert made.optimum <= 1.996
+    certificate = made.certify(search=None)
+    assert certificate.frozen <= certificate.gamma <= 1.05 * made.gamma
     assert certificate.verify()
