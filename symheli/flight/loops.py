@@ -210,7 +210,7 @@ def _four(command: object, time: float) -> Array:
         u = np.zeros(0)
     if u.shape != (4,) or not np.isfinite(u).all():
         raise InputError(
-            f" the controller returned {command!r:.80} at {time:g} s: expected d_lon d_lat d_col"
+            f"the controller returned {command!r:.80} at {time:g} s: expected d_lon d_lat d_col"
             " d_ped, four finite numbers in rad"
         )
     return u

@@ -169,7 +169,7 @@ def test_damaged_datasets_say_so(campaign, tmp_path):
         FlightDataset(path)
     with pytest.raises(InputError, match="no dataset of flights"):
         FlightDataset(tmp_path / "nowhere")
-    with pytest.raises(InputError, match="flight 7 of 3 is not there"):
+    with pytest.raises(InputError, match="flight 7 of 3 does not exist"):
         campaign(tmp_path / "other.zarr", seeds=range(3)).record(7)
 
 

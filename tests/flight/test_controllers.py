@@ -184,7 +184,7 @@ def test_what_is_no_controller_is_refused(ideal, pilot):
     for controller, said in (
         (3.0, "expected gains over airspeed"),
         (Mute, "expected gains over airspeed"),
-        (Mute(), r"answered \[nan, nan, nan, nan\] at 0 s: expected d_lon d_lat d_col d_ped"),
+        (Mute(), r"returned \[nan, nan, nan, nan\] at 0 s: expected d_lon d_lat d_col d_ped"),
         (
             model(inputs=("bank",)),
             "unknown name of a signal of the controller: unknown measured signal 'bank'",

@@ -173,7 +173,7 @@ def test_a_gap_in_the_record_is_no_fast_trim(transition):
     ("options", "error", "message"),
     [
         ({}, UnknownNameError, "true_airspeed"),
-        ({"scheduling": "elevator"}, InputError, "is nowhere within the baseline's 20 to 40"),
+        ({"scheduling": "elevator"}, InputError, "never lies within the baseline's range 20 to 40"),
         ({"scheduling": "tas", "inputs": ("elevators",)}, UnknownNameError, "elevator"),
     ],
 )

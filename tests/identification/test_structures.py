@@ -55,8 +55,8 @@ def test_free_coefficients_are_those_of_the_groups():
     ("over", "message"),
     [
         (dict(na={"a": 1, "b": 2, "z": 1}), "unknown signal in na 'z'"),
-        (dict(na={"a": 1}), "say a number for b too"),
-        (dict(nb={"a": {"u": 1}, "b": 1}), "nb of a: say a number for v too"),
+        (dict(na={"a": 1}), "give a number for b too"),
+        (dict(nb={"a": {"u": 1}, "b": 1}), "nb of a: give a number for v too"),
         (dict(nb=[[1, 2]]), "one row an output with 2 numbers"),
         (dict(delay={"u": 1, "v": -1}), "delay: expected an integer from 0"),
         (dict(na={"a": 0, "b": 1}, nb={"a": 0, "b": 1}), "nothing to identify for a"),

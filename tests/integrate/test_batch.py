@@ -165,7 +165,7 @@ def test_ctrl_c_ends_a_long_batch_at_once(ideal):
         ({"parameters": {"body.mass": [1.0, np.nan, 1.0, 1.0]}}, "body.mass: entry"),
         ({"parameters": {"body.mas": 8.0}}, "did you mean 'body.mass'"),
         ({"parameters": {"body.mass": [8.0, -8.0, 8.0, 8.0]}}, "body.mass"),
-        ({"parameters": {"controls.d_lon": 0.1}}, "controls.d_lon is no part of the equations"),
+        ({"parameters": {"controls.d_lon": 0.1}}, "controls.d_lon is not part of the equations"),
         ({"keep": 0}, 'keep must be "final" or a number of samples from 1 to 3'),
         ({"workers": 0}, "workers must be at least 1"),
         ({"wind": np.zeros((4, 2, 3))}, "wind: expected 3 numbers or 3 samples"),

@@ -70,7 +70,7 @@ def test_identified_models_from_files_are_certified_and_exported(answer, run, tm
     assert answer("export", "model", "--model", path, "--out", tmp_path / "c")["written"]
     status, _, err = run("certify", "--model", path, "--states", "y")
     assert status == 1
-    assert "those of a family" in err
+    assert "selects states of a family" in err
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_identified_models_from_files_are_certified_and_exported(answer, run, tm
         (("certify", "--states", "v"), "give --model FILE"),
         (("certify", "--model", "FAMILY", "--channel", "gust"), "--channel"),
         (("margins", "--feedback", "d_lat=phi:-0.1"), "--feedback goes with --model"),
-        (("export", "c", "--model", "FAMILY"), "c is of a vehicle"),
+        (("export", "c", "--model", "FAMILY"), "c is written for a vehicle"),
         (("export", "model", "--model", "FAMILY"), "cannot be exported as C"),
         (("certify", "--model", "nowhere.json"), "No such file"),
     ],

@@ -133,5 +133,5 @@ def test_a_certificate_without_a_proof_says_so(curve, ax):
 
 def test_stability_has_nothing_to_draw(loop, ax):
     cert = synthesis.stability(loop, 0.1, search=None)
-    with pytest.raises(InputError, match="no numbers"):
+    with pytest.raises(InputError, match="no bounds to draw"):
         cert.plot(ax)

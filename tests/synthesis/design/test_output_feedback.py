@@ -25,6 +25,7 @@ from scheduled_plants import (
     spring,
     two_parameters,
 )
+from scipy.optimize import brentq
 
 from symheli import LinearModel
 from symheli.errors import InputError, SynthesisError
@@ -44,12 +45,16 @@ def least(plant, rate=0.0, **options):
     ("a", "b", "c"), [(0, 3, 2), (1, 2, 0.5), (-1, 1, 1), (5, 1, 1), (0.3, 10, 2), (-2, 3, 4)]
 )
 def test_a_first_order_plant_has_its_optimum_in_closed_form(a, b, c):
-    """(-a + sqrt(a^2 + b^2 - q))(-a + sqrt(a^2 + c^2 - q)) = q with q = 1/gamma^2: to what the
-    solver leaves, which the slope of the left side magnifies.
+    """(-a + sqrt(a^2 + b^2 - q))(-a + sqrt(a^2 + c^2 - q)) = q with q = 1/gamma^2.
+
+    The solver stops when the gap is a few millionths of gamma.
     """
-    q = 1 / least(lag(a, b, c)) ** 2
-    left = (-a + np.sqrt(a**2 + b**2 - q)) * (-a + np.sqrt(a**2 + c**2 - q))
-    assert left == pytest.approx(q, rel=1e-5)
+
+    def difference(q):
+        return (-a + np.sqrt(a**2 + b**2 - q)) * (-a + np.sqrt(a**2 + c**2 - q)) - q
+
+    q = brentq(difference, 0.0, min(a**2 + b**2, a**2 + c**2), xtol=1e-14)
+    assert least(lag(a, b, c)) == pytest.approx(q**-0.5, rel=5e-6)
 
 
 @pytest.mark.parametrize(
