@@ -263,10 +263,10 @@ class _Inequalities:
             places = slice(first, first + together)
             g = [weights[places, j, a] for a, j in enumerate(own)]
             for a, b, each in self._of_places(H, places):
-                total[np.ix_(own[a], own[b])] += _contracted(g[a], g[b], each)
+                total[own[a][:, None], own[b]] += _contracted(g[a], g[b], each)
                 if a != b:
                     turned = np.swapaxes(each, 1, 2)
-                    total[np.ix_(own[b], own[a])] += _contracted(g[b], g[a], turned)
+                    total[own[b][:, None], own[a]] += _contracted(g[b], g[a], turned)
         blocks = total.reshape(k, k, v, v)
         for j in range(k):
             for i in range(j + 1):
