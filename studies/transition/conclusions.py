@@ -307,7 +307,7 @@ def _change(found: KnownKinematics, one: str, other: str) -> str:
     most = max(a, key=lambda y: abs(a[y] - b[y]))
     return (
         f"more than {LEVEL:g} points in {len(moved)} of {len(a)} outputs, the most by"
-        f" {a[most] - b[most]:+.0f} ({most})"
+        f" {a[most] - b[most]:+z.0f} ({most})"
     )
 
 
@@ -339,11 +339,11 @@ def _controllers(study: Outcome) -> Iterator[str]:
         change = [100 * (lpv / lft - 1) for lft, lpv in pairs]
         yield (
             "Designed from the same baseline, LPV flew with an energy ratio"
-            f" {min(change):+.0f} to {max(change):+.0f} % from the LFT's, over the sizes of the"
+            f" {min(change):+z.0f} to {max(change):+z.0f} % from the LFT's, over the sizes of the"
             " gusts: in flight the bounded rate decides little."
             if max(map(abs, change)) < 100 * CHEAP
             else "Designed from the same baseline, LPV flew with an energy ratio"
-            f" {min(change):+.0f} to {max(change):+.0f} % from the LFT's, over the sizes of the"
+            f" {min(change):+z.0f} to {max(change):+z.0f} % from the LFT's, over the sizes of the"
             " gusts."
         )
     if proofs is not None and proofs.bounds:

@@ -329,7 +329,7 @@ def _other_inputs(found: Identification) -> str:
     plain, rich = (
         found.of(axis, NOISES[0]).scores.ahead for axis in (LATERAL, LATERAL_WITH_COLLECTIVE)
     )
-    change = ", ".join(f"{rich[y] - plain[y]:+.0f} points for {y}" for y in LATERAL.outputs)
+    change = ", ".join(f"{rich[y] - plain[y]:+z.0f} points for {y}" for y in LATERAL.outputs)
     return (
         "Measuring the other inputs too (collective and pitch cyclic drive yaw through the rotor"
         f" torque) changes the 1 s fit by {change}."
