@@ -75,7 +75,6 @@ if TYPE_CHECKING:
     from symheli.lpv import (
         LFT,
         LinearFamily,
-        LinearGrid,
         LinearModel,
         LPVStateSpace,
         Scheduling,
@@ -120,8 +119,7 @@ _ROOMS = {
     "symheli.values": "NamedVector Signal",
     "symheli.records": "FlightRecord",
     "symheli.lpv": (
-        "LFT LPVStateSpace LinearFamily LinearGrid LinearModel Scheduling StepResponse"
-        " UncertainStateSpace"
+        "LFT LPVStateSpace LinearFamily LinearModel Scheduling StepResponse UncertainStateSpace"
     ),
     "symheli.progress": "Progress watched",
     "symheli.errors": (
@@ -160,7 +158,6 @@ __all__ = [
     "InputError",
     "LPVStateSpace",
     "LinearFamily",
-    "LinearGrid",
     "LinearModel",
     "NamedVector",
     "ParameterMonitor",

@@ -134,15 +134,10 @@ def _model(arguments: argparse.Namespace) -> tuple[Path, ...]:
 def _mat(arguments: argparse.Namespace) -> tuple[Path, ...]:
     """The model of --model for MATLAB."""
     from symheli.export import write_family_mat
-    from symheli.lpv import LinearFamily, LinearGrid
+    from symheli.lpv import LinearFamily
 
     given, path = given_model.read(arguments.model), arguments.out
     path = path or Path(f"{arguments.model.stem}.mat")
-    if isinstance(given, LinearGrid):
-        axes = ", ".join(given.axes)
-        raise InputError(
-            f"{arguments.model}: expected models over airspeed, got models over {axes}"
-        )
     if isinstance(given, LinearFamily):
         return write_family_mat(given, path, arguments.model.name)
     return (given.save_mat(path),)

@@ -16,9 +16,9 @@ from symheli.errors import InputError
 if TYPE_CHECKING:
     from identification import KinematicModel, LPVARXModel
     from symheli import LPVStateSpace
-    from symheli.lpv import LinearFamily, LinearGrid
+    from symheli.lpv import LinearFamily
 
-    Given = LPVARXModel | KinematicModel | LinearFamily | LinearGrid
+    Given = LPVARXModel | KinematicModel | LinearFamily
 
 FAMILY = "symheli linear models"
 KINDS = (
@@ -61,14 +61,11 @@ def configure(parser: argparse.ArgumentParser, channels: bool = True) -> None:
 def read(path: Path) -> Given:
     """The model in a file, whichever it is; raises `InputError` for another."""
     from identification import KinematicModel, LPVARXModel
-    from symheli.lpv import LinearFamily, LinearGrid
-    from symheli.lpv.family_file import read as content_of
+    from symheli.lpv import LinearFamily
 
     kind = FAMILY if path.suffix == ".npz" else _schema(path)
-    if kind == FAMILY:
-        over_airspeed = tuple(content_of(path).axes) == ("airspeed",)
-        return (LinearFamily if over_airspeed else LinearGrid).load(path)
     loaders: Mapping[str, Any] = {
+        FAMILY: LinearFamily.load,
         "symheli LPV-ARX model": LPVARXModel.load,
         "symheli model with known kinematics": KinematicModel.load,
     }
@@ -81,10 +78,10 @@ def lpv_model(arguments: argparse.Namespace) -> LPVStateSpace:
     """The LPV model of --model: a family interpolated entry by entry in --degree, an
     identified model as it is; with --states. Raises `InputError` for states of an identified model.
     """
-    from symheli.lpv import LinearFamily, LinearGrid
+    from symheli.lpv import LinearFamily
 
     given = read(arguments.model)
-    if isinstance(given, LinearFamily | LinearGrid):
+    if isinstance(given, LinearFamily):
         return given.select(arguments.states).interpolate("polynomial", arguments.degree)
     if arguments.states:
         raise InputError("--states selects states of a family; an identified model keeps its own")

@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> Output:
 def _given(asked: Asked):
     """The model of a file that is designed for."""
     from studies.commands.given_model import read
-    from symheli.lpv import LinearGrid
+    from symheli.lpv import LinearFamily
 
     if not asked.model:
         return None
@@ -85,10 +85,10 @@ def _given(asked: Asked):
             " identify --save FILE writes one"
         )
     given = read(path)
-    if isinstance(given, LinearGrid):
+    if isinstance(given, LinearFamily) and given.axes != ("airspeed",):
         over = ", ".join(f"{axis} ({axis.unit})" for axis in given.axes)
         raise InputError(
-            f"{path}: expected a family over airspeed in m/s alone, got one over {over}; of a grid,"
-            " LinearGrid.family at one value of every other axis makes one"
+            f"{path}: expected a family over airspeed in m/s alone, got one over {over};"
+            " LinearFamily.fix at one value of every other axis makes one"
         )
     return given

@@ -41,13 +41,11 @@ from symheli.lpv.lft import (
     series,
 )
 from symheli.lpv.linear_family import LinearFamily
-from symheli.lpv.linear_grid import LinearGrid
 from symheli.lpv.linear_model import LinearModel
 from symheli.lpv.linear_models import LinearModels
 from symheli.lpv.lower_feedback import lower_feedback
 from symheli.lpv.lpv_state_space import LPVStateSpace, Matrices
-from symheli.lpv.nu_gap import chordal_distance, nu_gap
-from symheli.lpv.nu_gaps import nu_gaps
+from symheli.lpv.nu_gap import chordal_distance, nu_gap, nu_gaps
 from symheli.lpv.scheduling import Scheduling
 from symheli.lpv.simulate import simulate
 from symheli.lpv.stability_margin import stability_margin
@@ -65,7 +63,6 @@ __all__ = [
     "HoldError",
     "LPVStateSpace",
     "LinearFamily",
-    "LinearGrid",
     "LinearModel",
     "LinearModels",
     "Matrices",

@@ -16,7 +16,7 @@ from symheli.values.signal import Signal
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from symheli.lpv.linear_grid import LinearGrid
+    from symheli.lpv.linear_family import LinearFamily
 
 PALEST = 0.15
 """Strength of the first of many curves."""
@@ -37,23 +37,24 @@ def plot_entries(
     return draw_scaled(axes_of(ax), over, values, _wanted(names, matrices, wanted), marker)
 
 
-def plot_grid(ax: Axes | None, grid: LinearGrid, wanted: Sequence[str] | None) -> Axes:
-    """The `wanted` entries of a grid as `plot_entries` has them, a curve a combination of the other
-    axes' values, the last one the strongest.
+def plot_family(ax: Axes | None, family: LinearFamily, wanted: Sequence[str] | None) -> Axes:
+    """The `wanted` entries of a family as `plot_entries` has them, over airspeed where that is an
+    axis; a curve for each combination of the other axes' values, the last one the strongest.
     """
-    along = grid.axes.index(AIRSPEED) if AIRSPEED in grid.axes else 0
-    values = grid.values[along]
+    along = family.axes.index(AIRSPEED) if AIRSPEED in family.axes else 0
+    values = family.values[along]
     drawn = [
         Entry(e.name, np.moveaxis(e.values, along, 0).reshape(len(values), -1))
-        for e in _wanted(grid, grid, wanted)
+        for e in _wanted(family, family, wanted)
     ]
-    ax = draw_scaled(axes_of(ax), grid.axes[along], values, drawn)
+    ax = draw_scaled(axes_of(ax), family.axes[along], values, drawn)
     others = [
         f"{axis} {nodes[0]:g} (pale) to {nodes[-1]:g}{'' if axis.unit == '1' else f' {axis.unit}'}"
-        for axis, nodes in zip(grid.axes, grid.values, strict=True)
-        if axis != grid.axes[along]
+        for axis, nodes in zip(family.axes, family.values, strict=True)
+        if axis != family.axes[along]
     ]
-    ax.set_title(", ".join(others), fontsize=9, loc="left")
+    if others:
+        ax.set_title(", ".join(others), fontsize=9, loc="left")
     return ax
 
 

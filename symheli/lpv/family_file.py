@@ -33,11 +33,12 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from symheli.errors import InputError
+from symheli.lpv.linear_family import AIRSPEED, LinearFamily
 from symheli.lpv.linear_models import LinearModels
 from symheli.values.arrays import Array, frozen
 from symheli.values.named_vector import NamedVector
@@ -48,23 +49,12 @@ from symheli.values.units import ratio
 from symheli.values.whole_files import write_bytes, write_text
 
 SCHEMA, VERSION = "symheli linear models", 1
-AIRSPEED = Signal("airspeed", "m/s")
 GROUPS = ("axes", "states", "inputs", "outputs")
 
 
-class Content(NamedTuple):
-    """What a file holds."""
-
-    axes: tuple[Signal, ...]
-    values: tuple[Array, ...]
-    models: LinearModels
-    kinks: Mapping[str, tuple[float, ...]]
-
-
-def write(content: Content, path: str | os.PathLike[str]) -> Path:
+def write(content: LinearFamily, path: str | os.PathLike[str]) -> Path:
     """Write a file, JSON or NPZ by the ending of its name; see `LinearFamily.save`."""
     path, models = Path(path), content.models
-    shape = tuple(len(v) for v in content.values)
     arrays = {name: getattr(models, name) for name in "ABCD"}
     if models.points:
         arrays |= {
@@ -75,7 +65,7 @@ def write(content: Content, path: str | os.PathLike[str]) -> Path:
         speeds = [point.airspeed for point in models.points]
         if ("airspeed", "m/s") not in [(s, s.unit) for s in content.axes] and None not in speeds:
             arrays["airspeed0"] = np.array(speeds, float)
-    arrays = {name: a.reshape(*shape, *a.shape[1:]) for name, a in arrays.items()}
+    arrays = {name: a.reshape(*content.shape, *a.shape[1:]) for name, a in arrays.items()}
     names = {"axes": content.axes} | {g: getattr(models, g) for g in GROUPS[1:]}
     match path.suffix:
         case ".json":
@@ -87,7 +77,9 @@ def write(content: Content, path: str | os.PathLike[str]) -> Path:
     raise InputError(f"{path}: expected a name that ends in .json or .npz")
 
 
-def _json(content: Content, arrays: dict[str, Array], names: Mapping[str, Sequence[Signal]]) -> str:
+def _json(
+    content: LinearFamily, arrays: dict[str, Array], names: Mapping[str, Sequence[Signal]]
+) -> str:
     axes = zip(content.axes, content.values, strict=True)
     whole = {
         "schema": SCHEMA,
@@ -101,7 +93,7 @@ def _json(content: Content, arrays: dict[str, Array], names: Mapping[str, Sequen
     return json.dumps(whole, indent=1, allow_nan=False) + "\n"
 
 
-def _labels(content: Content, names: Mapping[str, Sequence[Signal]]) -> dict[str, Any]:
+def _labels(content: LinearFamily, names: Mapping[str, Sequence[Signal]]) -> dict[str, Any]:
     labels = {g: np.array([str(s) for s in names[g]]) for g in GROUPS}
     labels |= {f"{g}_units": np.array([s.unit for s in names[g]]) for g in GROUPS}
     values = {f"values_{i}": v for i, v in enumerate(content.values)}
@@ -112,7 +104,7 @@ def _labels(content: Content, names: Mapping[str, Sequence[Signal]]) -> dict[str
     return labels | values | {"schema": SCHEMA, "version": VERSION} | ({"dt": dt} if dt else {})
 
 
-def read(path: str | os.PathLike[str]) -> Content:
+def read(path: str | os.PathLike[str]) -> LinearFamily:
     """Read a file; raise `InputError` if it is not a file of models or lacks a part."""
     path = Path(path)
     try:
@@ -165,7 +157,7 @@ def _from_npz(path: Path) -> dict[str, Any]:
     return whole | {"kinks": kinks, "version": int(whole.get("version", 0))}
 
 
-def _content(given: dict[str, Any]) -> Content:
+def _content(given: dict[str, Any]) -> LinearFamily:
     if given.get("version") != VERSION:
         raise InputError(f"version {given.get('version')!r} of the format, this reads {VERSION}")
     needed = {"axes", "states", "inputs", "A", "B"}
@@ -216,7 +208,7 @@ def _content(given: dict[str, Any]) -> Content:
     kinks = given.get("kinks") or {}
     if not isinstance(kinks, dict):
         raise InputError(f"kinks: expected {{name: [airspeeds]}}, got {kinks!r:.60}")
-    return Content(axes, values, models, {k: tuple(map(float, v)) for k, v in kinks.items()})
+    return LinearFamily(axes, values, models, {k: tuple(map(float, v)) for k, v in kinks.items()})
 
 
 def _airspeeds(axes: tuple[Signal, ...], values: tuple[Array, ...]) -> list[float] | list[None]:

@@ -38,7 +38,7 @@ def interpolated(
     rate: Rates | None,
 ) -> LPVStateSpace:
     """The models at every combination of the `values` of the `axes`, the last running fastest, as
-    one model; see `LinearFamily.interpolate` and `LinearGrid.interpolate`.
+    one model; see `LinearFamily.interpolate`.
     """
     if any(len(nodes) < 2 for nodes in values):
         few = next(axis for axis, nodes in zip(axes, values, strict=True) if len(nodes) < 2)
@@ -66,7 +66,7 @@ def interpolated(
 
 
 def _usual(axes: Sequence[Signal]) -> dict[str, float | str]:
-    """As fast as it likes, but an airspeed beside an acceleration: that is how fast it changes."""
+    """Arbitrarily fast, but an airspeed beside an acceleration: that is how fast it changes."""
     tied = "airspeed" in axes and "acceleration" in axes
     return {"airspeed": "acceleration" if tied else math.inf} if "airspeed" in axes else {}
 

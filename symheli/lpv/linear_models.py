@@ -11,6 +11,7 @@ import numpy as np
 from symheli.errors import InputError
 from symheli.lpv.linear_model import LinearModel, selected
 from symheli.values.arrays import Array, frozen
+from symheli.values.numbers import positive
 from symheli.values.operating_points import ListedPoints, OperatingPoints
 from symheli.values.signal import Signal, signals
 from symheli.values.summary import summarized
@@ -57,6 +58,8 @@ class LinearModels(Sequence[LinearModel]):
         shapes = {"A": (K, nx, nx), "B": (K, nx, nu), "C": (K, ny, nx), "D": (K, ny, nu)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(getattr(self, name), name, shape))
+        if self.dt is not None:
+            positive(self.dt, "dt")
         if len(self.points) not in (0, K):
             raise InputError(
                 f"expected {K} trims, one a model, or none at all, got {len(self.points)}"
@@ -67,6 +70,8 @@ class LinearModels(Sequence[LinearModel]):
         """These models; all with their operating point, or none."""
         if isinstance(models, LinearModels):
             return models
+        if not len(models):
+            raise InputError("expected at least one model, got none")
         first = models[0]
         names = first.states, first.inputs, first.outputs, first.dt
         for k, model in enumerate(models):
@@ -101,7 +106,7 @@ class LinearModels(Sequence[LinearModel]):
             self.points[k] if self.points else None,
         )
 
-    def at(self, which: Array) -> LinearModels:
+    def take(self, which: Array) -> LinearModels:
         """The models at these positions."""
         points = [self.points[k] for k in which.tolist()] if self.points else ()
         return replace(

@@ -1,4 +1,4 @@
-"""Vinnicombe's nu-gap between two linear models: how far apart they are for feedback."""
+"""Vinnicombe's nu-gap between linear models: how far apart they are for feedback."""
 
 from __future__ import annotations
 
@@ -22,6 +22,12 @@ it.
 
 SIZES = 1e-60, 1e60
 """Permitted channel scales; their squares neither overflow nor underflow."""
+
+AT_ONCE = 2_000_000
+"""Entries of the pencils zI - A that are solved together."""
+
+CLOSER = 12
+"""Frequencies between the neighbours of the largest distance of each model."""
 
 
 def nu_gap(
@@ -199,29 +205,123 @@ def angles(poles: np.ndarray, points: int) -> np.ndarray:
     )
 
 
-def _turns(P1: np.ndarray, P2: np.ndarray) -> np.ndarray:
-    """Angles by which det(I + P2* P1) turns from one frequency to the next."""
-    f = np.linalg.det(np.eye(P1.shape[2]) + np.conj(np.swapaxes(P2, 1, 2)) @ P1)
-    return np.angle(f[1:] / f[:-1])
+def nu_gaps(
+    model: LinearModel,
+    others: LinearModels,
+    *,
+    input_scale: object = 1.0,
+    output_scale: object = 1.0,
+    points: int = 100,
+) -> Array:
+    """Return the nu-gap from one discrete model to each of many, as `nu_gap` does for two.
+
+    All on the frequencies of the one model's poles, then closer around the largest distance of
+    each. A model in which the winding number cannot be told on these goes through `nu_gap` itself.
+
+    Parameters
+    ----------
+    model : LinearModel
+        Discrete.
+    others : LinearModels
+        K of them, with its signals and sample period; their states may be others.
+    input_scale, output_scale : float or array
+        As in `nu_gap`.
+    points : int
+        Frequencies to begin with, beside those around the poles.
+
+    Returns
+    -------
+    array (K,)
+        In [0, 1].
+
+    Raises
+    ------
+    InputError
+        As `nu_gap`.
+
+    Examples
+    --------
+    >>> ladder = lpv.LinearModels.of([spring.at(p).discretize(0.1) for p in (0.0, 0.5, 1.0)])
+    >>> lpv.nu_gaps(ladder[0], ladder).round(2)
+    array([0.  , 0.09, 0.16])
+    """
+    if model.dt is None or not same_period(model.dt, others.dt):
+        raise InputError(
+            f"nu_gaps compares discrete models with one sample period, got {model.dt} and"
+            f" {others.dt} s; discretize them"
+        )
+    require_same_signals(model, others)
+    su = channel_scales(input_scale, "input_scale", len(model.inputs))
+    sy = channel_scales(output_scale, "output_scale", len(model.outputs))
+    poles, many = model.poles(), np.linalg.eigvals(others.A)
+    if any(np.any(np.abs(np.abs(each) - 1) < ON_THE_CIRCLE) for each in (poles, many)):
+        raise InputError("nu_gaps: a pole lies on the unit circle")
+    extra = np.sum(np.abs(poles) > 1) - np.sum(np.abs(many) > 1, axis=1)
+    angle = angles(poles, points)
+    one = LinearModels.of([model])
+    P1, out = _responses(one, angle[None], su, sy), np.zeros(len(others))
+    size = others.A.shape[1] ** 2 * len(angle)
+    step = max(AT_ONCE // max(size, 1), 1)
+    for start in range(0, len(others), step):
+        rows = np.arange(start, min(start + step, len(others)))
+        part = others.take(rows)
+        P2 = _responses(part, np.broadcast_to(angle, (len(rows), len(angle))), su, sy)
+        turns = _turns(P1, P2)
+        same = -np.rint(turns.sum(axis=1) / np.pi) + extra[rows] == 0
+        distance = _chordal(P1, P2)
+        peak = distance.argmax(axis=1)
+        low, high = angle[np.maximum(peak - 1, 0)], angle[np.minimum(peak + 1, len(angle) - 1)]
+        near = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, CLOSER)
+        closer = _chordal(
+            _responses(one.take(np.zeros(len(rows), int)), near, su, sy),
+            _responses(part, near, su, sy),
+        )
+        largest = np.maximum(distance.max(axis=1), closer.max(axis=1))
+        out[rows] = np.where(same, np.minimum(largest, 1.0), 1.0)
+        for k in np.flatnonzero(np.abs(turns).max(axis=1) > np.pi / 4):
+            out[rows[k]] = nu_gap(model, part[int(k)], input_scale=su, output_scale=sy)
+    return out
 
 
-def _winding(P1: np.ndarray, P2: np.ndarray) -> int:
+def _responses(models: LinearModels, angle: Array, su: Array, sy: Array) -> Array:
+    """(K, n, ny, nu) at angles (K, n) of z, in units of the scales."""
+    z = np.exp(1j * angle)[:, :, None, None]
+    pencil = z * np.eye(models.A.shape[1]) - models.A[:, None]
+    B = np.broadcast_to(models.B[:, None], (*angle.shape, *models.B.shape[1:]))
+    G = models.C[:, None] @ np.linalg.solve(pencil, B) + models.D[:, None]
+    return G * su / sy[:, None]
+
+
+def _turns(P1: Array, P2: Array) -> Array:
+    """Angles (..., n - 1) by which det(I + P2* P1) turns from one frequency to the next."""
+    f = np.linalg.det(np.eye(P1.shape[-1]) + _adjoint(P2) @ P1)
+    return np.angle(f[..., 1:] / f[..., :-1])
+
+
+def _winding(P1: Array, P2: Array) -> int:
     """Clockwise turns about 0 of det(I + P2* P1) along the unit circle (upper half, doubled by
     symmetry): zeros less poles outside it.
     """
     return -round(float(np.sum(_turns(P1, P2)) / np.pi))  # both half circles: 2 x sum / (2 pi)
 
 
-def _chordal(P1: np.ndarray, P2: np.ndarray) -> np.ndarray:
-    """Largest singular value of (I + P2 P2*)^-1/2 (P1 - P2)(I + P1* P1)^-1/2 at each frequency."""
+def _chordal(P1: Array, P2: Array) -> Array:
+    """Largest singular value of (I + P2 P2*)^-1/2 (P1 - P2)(I + P1* P1)^-1/2 at each frequency.
 
-    def inverse_root(M: np.ndarray) -> np.ndarray:
-        values, vectors = np.linalg.eigh(M)
-        return (vectors / np.sqrt(values)[:, None, :]) @ np.conj(np.swapaxes(vectors, 1, 2))
+    A root is any factor: R of the QR decomposition of [I; P2*] has R* R = I + P2 P2*, and forms no
+    square, which at the gains near an integrator's pole would lose the identity.
+    """
+    left = _adjoint(_root(_adjoint(P2)))
+    right = _adjoint(_root(P1))
+    scaled = np.linalg.solve(right, _adjoint(np.linalg.solve(left, P1 - P2)))
+    return np.linalg.svd(scaled, compute_uv=False)[..., 0]
 
-    def adjoint(M: np.ndarray) -> np.ndarray:
-        return np.conj(np.swapaxes(M, 1, 2))
 
-    left = inverse_root(np.eye(P2.shape[1]) + P2 @ adjoint(P2))
-    right = inverse_root(np.eye(P1.shape[2]) + adjoint(P1) @ P1)
-    return np.linalg.svd(left @ (P1 - P2) @ right, compute_uv=False)[:, 0]
+def _root(P: Array) -> Array:
+    """R with R* R = I + P* P."""
+    eye = np.broadcast_to(np.eye(P.shape[-1]), (*P.shape[:-2], P.shape[-1], P.shape[-1]))
+    return np.asarray(np.linalg.qr(np.concatenate([eye, P], axis=-2), mode="r"))
+
+
+def _adjoint(M: Array) -> Array:
+    return np.conj(np.swapaxes(M, -1, -2))

@@ -11,8 +11,7 @@ import numpy as np
 
 from symheli.errors import InputError
 from symheli.helicopter import Helicopter
-from symheli.lpv.linear_family import AIRSPEED
-from symheli.lpv.linear_grid import LinearGrid
+from symheli.lpv.linear_family import AIRSPEED, LinearFamily
 from symheli.steady.airspeed_sweep import increasing
 from symheli.steady.flight_conditions import FlightConditions
 from symheli.steady.linearization import linear_models
@@ -46,7 +45,7 @@ def sweep_grid(
     mass: Sequence[float] | None = None,
     rotor_speed: Sequence[float] | None = None,
     inputs: Sequence[str] | None = None,
-) -> LinearGrid:
+) -> LinearFamily:
     """Run `sweep` at every combination of the values of one or more further axes.
 
     Parameters
@@ -63,7 +62,7 @@ def sweep_grid(
 
     Returns
     -------
-    LinearGrid
+    LinearFamily
         Axes: airspeed, then those given, in the order above. Trims start from those of the
         neighbouring value, and nothing is compiled anew.
 
@@ -117,7 +116,7 @@ def sweep_grid(
     trims = trimmed(flights, hover(flights), _after_neighbours(shape, len(speeds)))
     warn_of_trims(flights, trims)
     airspeed_first = np.arange(len(flights)).reshape(len(points), -1).T.ravel()
-    return LinearGrid(
+    return LinearFamily(
         (AIRSPEED, *(AXES[name] for name in given)),
         (speeds, *map(np.asarray, given.values())),
         linear_models(flights.at(airspeed_first), trims.at(airspeed_first), inputs),

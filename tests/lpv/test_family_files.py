@@ -8,7 +8,7 @@ import pytest
 import symheli
 from symheli.errors import InputError
 from symheli.export import write_family_mat
-from symheli.lpv import LinearFamily, LinearGrid, LinearModel, LPVStateSpace
+from symheli.lpv import LinearFamily, LinearModel, LPVStateSpace
 from symheli.values import NamedVector, OperatingPoint, Signal, signals
 
 BY_HAND = {
@@ -52,15 +52,15 @@ def test_a_family_comes_back_to_the_last_bit_with_its_trims(family, tmp_path, en
 
 
 @pytest.mark.parametrize("ending", ["json", "npz"])
-def test_a_grid_comes_back_and_is_no_family(ideal, tmp_path, ending):
+def test_a_family_over_two_axes_comes_back_and_has_no_single_parameter(ideal, tmp_path, ending):
     grid = symheli.sweep_grid(ideal, [6.0, 8.0], acceleration=[-1.0, 0.0, 1.0])
     path = grid.save(tmp_path / f"grid.{ending}")
-    back = LinearGrid.load(path)
+    back = LinearFamily.load(path)
     same(back, grid)
     assert back.axes == grid.axes
-    assert back.trim(1, 2).x["theta"] == grid.trim(1, 2).x["theta"]
-    with pytest.raises(InputError, match=r"airspeed .*acceleration .*LinearGrid\.load"):
-        LinearFamily.load(path)
+    assert back[1, 2].point.x["theta"] == grid[1, 2].point.x["theta"]
+    with pytest.raises(InputError, match=r"over airspeed, acceleration.*fix\(acceleration=-1\)"):
+        back.parameter  # noqa: B018
 
 
 def test_a_file_written_by_hand_needs_names_a_and_b(tmp_path):

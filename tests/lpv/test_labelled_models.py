@@ -45,7 +45,7 @@ def test_a_grid_keeps_its_axes(ideal, xr):
     grid = symheli.sweep_grid(ideal, [4.0, 6.0], acceleration=[-1.0, 0.0, 1.0])
     data = grid.to_xarray()
     found = data["A"].sel(airspeed=6.0, acceleration=1.0, equation="q", state="u")
-    assert float(found) == grid.at(1, 2).A[grid.states.index("q"), 0]
+    assert float(found) == grid[1, 2].A[grid.states.index("q"), 0]
     assert data["acceleration"].attrs["units"] == "m/s^2"
     frame = grid.to_frame()
     assert frame.loc[(6.0, 1.0), "A[q, u]"] == float(found)

@@ -190,7 +190,7 @@ def test_a_moving_trim_drifts_by_its_slopes_and_by_its_own_rates():
     along_a = (lpv.trim.state(at + np.array([0, h])) - lpv.trim.state(at - np.array([0, h]))) / (
         2 * h
     )
-    xdot = np.array([grid.trim(1, 3).xdot[s] for s in lpv.states])
+    xdot = np.array([grid[1, 3].point.xdot[s] for s in lpv.states])
     expected = xdot - 1.0 * along_v - 0.7 * along_a
     np.testing.assert_allclose(lpv.trim.drift(at, [1.0, 0.7]), expected, atol=1e-8)
     # the velocity of the trim moves as the trim says: only attitude and rotor are left to drift
@@ -198,7 +198,7 @@ def test_a_moving_trim_drifts_by_its_slopes_and_by_its_own_rates():
     u = lpv.states.index("u")
     assert abs(still[u]) < 0.05 * abs(xdot[u])
     # steady flight has no rates of its own
-    level = grid.family(acceleration=0.0).interpolate(degree=3)
+    level = grid.fix(acceleration=0.0).interpolate(degree=3)
     assert level.trim.xdot is None
 
 
@@ -208,7 +208,7 @@ def test_a_declared_drift_does_what_the_moving_trim_does():
     t = 0.02 * np.arange(100)
     p = np.column_stack([5 + t, np.sin(t)])
     rate = np.column_stack([p[:, 1], np.cos(t)])
-    both, alone = grid.interpolate("spline"), grid.family(acceleration=0.0).interpolate("spline")
+    both, alone = grid.interpolate("spline"), grid.fix(acceleration=0.0).interpolate("spline")
     for lpv, along, moving, size in (
         (both, p, rate, [1.0, rate[:, 1]]),
         (alone, p[:, 0], rate[:, 0], [rate[:, 0]]),
@@ -313,7 +313,7 @@ def test_wrong_use_gets_a_sentence():
             ("y",),
         )
     with pytest.raises(InputError, match="a polynomial of degree 3 needs 4 values"):
-        symheli.LinearGrid(
+        symheli.LinearFamily(
             ("airspeed", "mass"), ([0.0, 1.0], [7.0, 9.0]), [model().at(1.0, 1.0)] * 4
         ).interpolate()
 
@@ -324,7 +324,7 @@ def test_a_grid_is_met_at_its_nodes_and_its_misfit_is_known(kind):
     speeds, mass = np.linspace(0, 13, 6), np.linspace(-4, 4, 4)
     models = [model().at(v, a) for v in speeds for a in mass]
     axes = (symheli.Signal("airspeed", "m/s"), symheli.Signal("acceleration", "m/s^2"))
-    lpv = symheli.LinearGrid(axes, (speeds, mass), models).interpolate(kind, degree=(2, 1))
+    lpv = symheli.LinearFamily(axes, (speeds, mass), models).interpolate(kind, degree=(2, 1))
     for v in speeds:
         for a in mass:
             np.testing.assert_allclose(lpv.at(v, a).A, by_hand("A", v, a), atol=1e-12)

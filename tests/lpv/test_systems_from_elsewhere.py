@@ -2,6 +2,8 @@
 of this package.
 """
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
@@ -128,7 +130,7 @@ def test_a_family_of_matrices_from_elsewhere_has_no_trims_and_interpolates_all_t
     assert lpv.at(9.0).A[0, 0] == pytest.approx(-10.0, rel=1e-12)
     with pytest.raises(InputError, match="this family has none"):
         family.known_trims("a stitched model")
-    with pytest.raises(InputError, match="expected one model a value of airspeed, got 3"):
+    with pytest.raises(InputError, match="one model for each value of airspeed: 2, got 3"):
         LinearFamily.from_models([0.0, 5.0], models)
     with pytest.raises(InputError, match=r"models\[2\]: expected states"):
         LinearFamily.from_models([0.0, 5.0, 13.0], [*models[:2], PLANT])
@@ -138,15 +140,8 @@ def test_a_stitched_model_says_that_it_needs_trims(ideal):
     import symheli
 
     family = symheli.sweep(ideal, [0.0, 5.0])
-    bare = LinearFamily(
-        family.airspeeds,
-        family.A,
-        family.B,
-        family.C,
-        family.D,
-        family.states,
-        family.inputs,
-        family.outputs,
+    bare = LinearFamily.from_models(
+        family.airspeeds, [replace(model, point=None) for model in family]
     )
     with pytest.raises(InputError, match="a stitched model needs the trim at each airspeed"):
         StitchedModel.from_family(bare)

@@ -180,16 +180,16 @@ def test_a_grid_is_the_family_at_each_value(ideal, name, values, variant):
         np.testing.assert_allclose(
             grid.A[:, j], family.A, atol=1e-9
         )  # two Newton iterations from other starts
-        np.testing.assert_array_equal(grid.family(**{name: value}).A, grid.A[:, j])
-        np.testing.assert_array_equal(grid.at(1, j).A, grid.A[1, j])
-        assert grid.trim(1, j).airspeed == 8.0
+        np.testing.assert_array_equal(grid.fix(**{name: value}).A, grid.A[:, j])
+        np.testing.assert_array_equal(grid[1, j].A, grid.A[1, j])
+        assert grid[1, j].point.airspeed == 8.0
     assert not np.allclose(grid.A[:, 0], grid.A[:, 1])
 
 
 def test_a_grid_is_a_family_over_any_of_its_axes(ideal, tmp_path):
     """With its name and unit, to the file and back with the trims."""
     grid = symheli.sweep_grid(ideal, [3.0, 8.0], mass=[8.0, 9.0])
-    family = grid.family(airspeed=8.0)
+    family = grid.fix(airspeed=8.0)
     assert (family.parameter, family.parameter.unit) == ("mass", "kg")
     np.testing.assert_array_equal(family.A, grid.A[1])
     assert family.interpolate(degree=1).scheduling.name == "mass"
@@ -204,9 +204,9 @@ def test_a_grid_is_a_family_over_any_of_its_axes(ideal, tmp_path):
 def test_a_grid_refuses_what_it_does_not_hold(ideal):
     grid = symheli.sweep_grid(ideal, [3.0], mass=[8.0, 9.0])
     with pytest.raises(symheli.InputError, match=r"mass = 8\.5 kg is not on the grid: 8, 9"):
-        grid.family(mass=8.5)
+        grid.fix(mass=8.5)
     with pytest.raises(symheli.UnknownNameError, match="mass"):
-        grid.family(mas=8.0)
+        grid.fix(mas=8.0)
     with pytest.raises(symheli.InputError, match="needs one of"):
         symheli.sweep_grid(ideal, [3.0])
     with pytest.raises(symheli.InputError, match="density and altitude are one axis"):

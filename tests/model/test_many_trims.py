@@ -293,9 +293,9 @@ def test_a_grid_over_two_more_axes_is_the_sweep_at_each_pair(ideal):
             family = symheli.sweep(heavy, speeds, acceleration=push)
             np.testing.assert_allclose(grid.A[:, i, j], family.A, atol=1e-9)
             np.testing.assert_allclose(
-                grid.trim(2, i, j).x.array, family.trims[2].x.array, atol=1e-9
+                grid[2, i, j].point.x.array, family.trims[2].x.array, atol=1e-9
             )
-            assert grid.trim(2, i, j).condition.acceleration == push
+            assert grid[2, i, j].point.condition.acceleration == push
 
 
 def test_kinks_lie_where_the_trims_change_sides(heli):

@@ -215,14 +215,14 @@ def _families(folder: Path) -> list[Reader]:
 
     family = symheli.LinearFamily.from_models(speeds, models(speeds), {"stall": (3.5,)})
     axes = (Signal("airspeed"), Signal("climb_rate", "m/s"))
-    grid = symheli.LinearGrid(axes, (speeds, [0.0, 1.0]), models(np.repeat(speeds, 2)))
+    grid = symheli.LinearFamily(axes, (speeds, [0.0, 1.0]), models(np.repeat(speeds, 2)))
     family.save(folder / "family.json")
     family.save(folder / "family.npz")
     grid.save(folder / "grid.json")
     return [
         Reader("family, JSON", folder / "family.json", symheli.LinearFamily.load),
         Reader("family, NPZ", folder / "family.npz", symheli.LinearFamily.load, content=_of_family),
-        Reader("grid, JSON", folder / "grid.json", symheli.LinearGrid.load),
+        Reader("grid, JSON", folder / "grid.json", symheli.LinearFamily.load),
     ]
 
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 PACKAGES = ("symheli", "identification", "synthesis")
 EXAMPLE = "<doctest"
 INSIDE = {
-    *("symheli.LFT", "symheli.LinearFamily", "symheli.LinearGrid", "symheli.FlightRecord"),
+    *("symheli.LFT", "symheli.LinearFamily", "symheli.FlightRecord"),
     *("symheli.NamedVector", "symheli.IdentifiedModel", "symheli.StitchedModel"),
     *("symheli.TableController", "synthesis.PolynomialMatrix"),
 }

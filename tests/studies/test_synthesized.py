@@ -250,10 +250,10 @@ def test_a_file_that_holds_no_model_over_airspeed_is_refused(tmp_path, capsys, f
         assert "model.json: expected a model of symheli identify" in said_of(tmp_path, capsys)
     axes, speeds = (symheli.Signal("airspeed", "m/s"), symheli.Signal("altitude", "m")), (0.0, 8.0)
     models = [family.models[0]] * 4
-    symheli.LinearGrid(axes, (speeds, (0.0, 100.0)), models).save(path)
+    symheli.LinearFamily(axes, (speeds, (0.0, 100.0)), models).save(path)
     said = said_of(tmp_path, capsys)
     assert "got one over airspeed (m/s), altitude (m)" in said
-    assert "LinearGrid.family" in said
+    assert "LinearFamily.fix" in said
 
 
 def test_a_controller_whose_loop_does_not_stand_the_delay_is_refused_with_what_to_change(
