@@ -27,6 +27,7 @@ from symheli.lpv.bases import (
     UserFunctions,
 )
 from symheli.lpv.delay import pade_delay, sample_delay
+from symheli.lpv.interconnection import append, connect, feedback, parallel, series
 from symheli.lpv.lagged import lagged
 from symheli.lpv.lft import (
     LFT,
@@ -34,11 +35,6 @@ from symheli.lpv.lft import (
     HoldError,
     Truncation,
     WellPosedness,
-    append,
-    connect,
-    feedback,
-    parallel,
-    series,
 )
 from symheli.lpv.linear_family import LinearFamily
 from symheli.lpv.linear_model import LinearModel

@@ -19,7 +19,7 @@ from symheli.lpv.scheduling import UNSCHEDULED, Scheduling
 from symheli.lpv.uncertain_state_space import UncertainStateSpace
 from symheli.values.arrays import Array
 from symheli.values.sample_period import same_period
-from symheli.values.signal import Signal, indices
+from symheli.values.signal import Signal, distinct, indices
 from symheli.values.units import per_second, to_si
 
 PREFIX = "controller_"
@@ -185,6 +185,55 @@ def closed(
     N = np.stack([loop_inverse(each) for each in there.D @ P.D22])
     exact = (np.block([list(row) for row in rows]) for rows in _interconnected(P, there, N))
     return model.with_residuals(origin.nodes, Matrices(*exact))
+
+
+def close_static(lpv: LPVStateSpace, K: Array) -> LPVStateSpace:
+    """The model with u = K y + r; see `LPVStateSpace.feedback`. All inputs stay, as r, and all
+    outputs; only the feedthrough from the inputs that are driven to the outputs that are fed back
+    is a loop.
+    """
+    driven, fed = (np.flatnonzero(np.any(K, axis=axis)).tolist() for axis in (1, 0))
+    at = Positions(list(range(len(lpv.inputs))), driven, list(range(len(lpv.outputs))), fed)
+    return closed(lpv, at, ControllerMatrices.static(K[driven][:, fed], lpv.box))
+
+
+def append_lpv(first: LPVStateSpace, second: LPVStateSpace) -> LPVStateSpace:
+    """Both side by side, over the parameters of both; their names are made distinct."""
+    first, second = _over_the_same(first, second)
+    pairs = list(zip(functions_of(first), functions_of(second), strict=True))
+    basis, (A, B, C, D) = in_one_basis([_diagonal(*pair) for pair in pairs], first.basis.ranges)
+    x, u, y = (
+        distinct([getattr(first, group), getattr(second, group)])
+        for group in ("states", "inputs", "outputs")
+    )
+    model = LPVStateSpace(basis, A, B, C, D, first.parameters, x, u, y, first.dt)
+    origins = [one.fitted_to for one in (first, second)]
+    known = next((origin for origin in origins if origin is not None), None)
+    if known is None:
+        return model
+    M, N = (
+        known.matrices
+        if origin is known
+        else Matrices(*(M(known.nodes) for M in functions_of(one)))
+        for one, origin in zip((first, second), origins, strict=True)
+    )
+    exact = (
+        np.block(
+            [[m, np.zeros((*m.shape[:2], n.shape[2]))], [np.zeros((*n.shape[:2], m.shape[2])), n]]
+        )
+        for m, n in zip(M, N, strict=True)
+    )
+    return model.with_residuals(known.nodes, Matrices(*exact))
+
+
+def _diagonal(M: MatrixFunction, N: MatrixFunction) -> MatrixFunction:
+    zero = MatrixFunction.constant
+    return block(
+        [
+            [M, zero(np.zeros((M.shape[0], N.shape[1])), M.box)],
+            [zero(np.zeros((N.shape[0], M.shape[1])), M.box), replace(N, box=M.box)],
+        ]
+    )
 
 
 class Partition(NamedTuple):

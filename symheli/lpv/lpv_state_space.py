@@ -372,9 +372,9 @@ class LPVStateSpace:
         is fed back, the closed loop is rational and `InputError` says so:
         `to_lft().feedback(gains)` closes it exactly, as an `LFT`.
         """
-        from symheli.lpv.output_feedback import close
+        from symheli.lpv.lower_feedback import close_static
 
-        return close(self, feedback_matrix(gains, self.inputs, self.outputs))
+        return close_static(self, feedback_matrix(gains, self.inputs, self.outputs))
 
     def driven_by(self, parts: Mapping[str, LinearModel | LPVStateSpace]) -> LPVStateSpace:
         """This model behind single-input single-output `parts` {input: part}, such as actuators;

@@ -36,18 +36,33 @@ def mixed(
     straight = {name: (across or {}).get(name, {}) for name in outputs}
     through = _matrix(straight, list(inputs), "input")
 
+    return combined(lpv, into, out, through, tuple(inputs), tuple(outputs))
+
+
+def combined(
+    lpv: LPVStateSpace,
+    E: Array,
+    F: Array,
+    G: Array,
+    inputs: Sequence[Signal],
+    outputs: Sequence[Signal],
+) -> LPVStateSpace:
+    """The model with its inputs E r and the outputs F y + G r, called `inputs` (r) and
+    `outputs`.
+    """
+
     def between(A: Array, B: Array, C: Array, D: Array) -> Matrices:
-        return Matrices(A, B @ into, out @ C, out @ D @ into)
+        return Matrices(A, B @ E, F @ C, F @ D @ E)
 
     A, B, C, D = between(lpv.A, lpv.B, lpv.C, lpv.D)
-    if np.any(through):
-        D = D + np.multiply.outer(lpv.basis.constant(), through)
+    if np.any(G):
+        D = D + np.multiply.outer(lpv.basis.constant(), G)
     names = {"inputs": tuple(inputs), "outputs": tuple(outputs)}
     model = replace(lpv, A=A, B=B, C=C, D=D, trim=None, residuals=None, **names)
     if (origin := lpv.fitted_to) is None:
         return model
     exact = between(*origin.matrices)
-    return model.with_residuals(origin.nodes, exact._replace(D=exact.D + through))
+    return model.with_residuals(origin.nodes, exact._replace(D=exact.D + G))
 
 
 def turned(model: LPVStateSpace, names: Mapping[str, str]) -> LPVStateSpace:

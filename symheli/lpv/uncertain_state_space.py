@@ -146,7 +146,7 @@ class UncertainStateSpace:
         Raises `InputError` for a Delta of another shape or beyond the bound, a basis that cannot
         hold the products, and a block that is not well posed.
         """
-        from symheli.lpv.output_feedback import close
+        from symheli.lpv.lower_feedback import close_static
 
         delta = frozen(delta, "delta", self.shape)
         size = float(np.linalg.norm(delta, 2))
@@ -156,7 +156,7 @@ class UncertainStateSpace:
         rows = indices(self.perturbation_inputs, self.model.inputs, "input")
         columns = indices(self.perturbation_outputs, self.model.outputs, "output")
         K[np.ix_(rows, columns)] = delta
-        return close(self.model, K).select(inputs=self.inputs, outputs=self.outputs)
+        return close_static(self.model, K).select(inputs=self.inputs, outputs=self.outputs)
 
     def perturbations(
         self, count: int, seed: int, where: Literal["ball", "boundary"] = "ball"

@@ -62,6 +62,18 @@ def signals(names: Iterable[str], units: Mapping[str, str] | None = None) -> tup
     return out
 
 
+def distinct(groups: Sequence[Sequence[Signal]]) -> tuple[Signal, ...]:
+    """All the names, one group after the other; one that is taken gets the number of its group."""
+    out: list[Signal] = []
+    for k, group in enumerate(groups):
+        for s in group:
+            name, number = str(s), k + 1
+            while name in out:
+                name, number = f"{s}_{number}", number + 1
+            out.append(Signal(name, s.unit))
+    return tuple(out)
+
+
 def rates(names: Iterable[Signal]) -> tuple[Signal, ...]:
     """Derivatives in time: the same names, with the units per second."""
     from symheli.values.units import per_second  # which knows no signals

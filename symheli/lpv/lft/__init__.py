@@ -1,9 +1,7 @@
-"""Linear fractional transformations: the value, its algebra, reduction, sampling, and the way from
+"""Linear fractional transformations: the value, reduction, sampling, and the way from
 and to polynomials.
 """
 
-from symheli.lpv.lft.algebra import append, feedback, parallel, series
-from symheli.lpv.lft.interconnection import connect
 from symheli.lpv.lft.model import LFT, Block
 from symheli.lpv.lft.polynomial import expanded
 from symheli.lpv.lft.sampling import HoldError
@@ -16,10 +14,5 @@ __all__ = [
     "HoldError",
     "Truncation",
     "WellPosedness",
-    "append",
-    "connect",
     "expanded",
-    "feedback",
-    "parallel",
-    "series",
 ]

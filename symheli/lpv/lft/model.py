@@ -364,7 +364,7 @@ class LFT:
 
         States are kept side by side, a parameter of both is one block.
         """
-        from symheli.lpv.lft.algebra import star
+        from symheli.lpv.interconnection import star
 
         return star(self, other, outputs, inputs)
 
