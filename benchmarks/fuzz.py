@@ -4,7 +4,7 @@ often what came back, and what failed.
     python benchmarks/fuzz.py --write
 
 The inputs are the same ones every time, others with each --seed. --write keeps a table a package in
-docs/reliability.md.
+docs/checks.md.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def main() -> None:
     )
     parser.add_argument("--quick", action="store_true", help="a few of each, under 40 s")
     parser.add_argument("--json", action="store_true", help="print the counts by entry")
-    parser.add_argument("--write", action="store_true", help="keep them in docs/reliability.md")
+    parser.add_argument("--write", action="store_true", help="keep them in docs/checks.md")
     parser.add_argument(
         "--only", choices=(*PACKAGES, "readers"), action="append", help="default: all"
     )
@@ -99,7 +99,7 @@ def main() -> None:
         for package in options.only or (*PACKAGES, "readers"):
             one = rows(package, options.quick, options.seed)
             if options.write:
-                keep(DOCS / "reliability.md", f"fuzzing {package}", table(one))
+                keep(DOCS / "checks.md", f"fuzzing {package}", table(one))
             found |= one
         os.chdir(home)
     faults = [str(fault) for tally in found.values() for fault in tally.faults]

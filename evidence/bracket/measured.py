@@ -184,7 +184,7 @@ def main() -> None:
     parser.add_argument(
         "--figure", type=Path, metavar="FILE", help="draw gain against acceleration"
     )
-    options = parsed(parser, "bracket.md")
+    options = parsed(parser, "gains.md")
     heli = Helicopter.load("xcell60", governor="ideal")
     if options.model == "identified":
         bounds = measure_servo(heli, options.quick)
@@ -197,7 +197,7 @@ def main() -> None:
         curves = [curve(found, f"Lateral: gust to yaw rate and roll, {options.model} model")]
     print(as_json(found) if options.json else text)
     if options.write:
-        keep(DOCS / "bracket.md", options.model, table)
+        keep(DOCS / "gains.md", options.model, table)
     if options.figure:
         save([one.plot for one in curves], options.figure)
 

@@ -63,7 +63,7 @@ def main() -> None:
     )
     parser.add_argument("--json", action="store_true", help="print what a program would read")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw gain over acceleration")
-    options = parsed(parser, "jerk.md", timed=False)
+    options = parsed(parser, "gains.md", timed=False)
     if options.quick and options.write:
         parser.error("--write keeps the whole tables: leave out --quick")
     heli = Helicopter.load("xcell60", governor="ideal")
@@ -80,8 +80,8 @@ def main() -> None:
         print("\n\n".join([*(f"{name}\n{text}" for name, text in texts.items()), fastest_of_each]))
     if options.write:
         for name, text in texts.items():
-            keep(DOCS / "jerk.md", name, text)
-        keep(DOCS / "jerk.md", "flights", fastest_of_each)
+            keep(DOCS / "gains.md", name, text)
+        keep(DOCS / "gains.md", "flights", fastest_of_each)
     for path in {options.figure, DOCS / "gain-against-jerk.png" if options.write else None} - {
         None
     }:

@@ -125,7 +125,7 @@ def main() -> None:
     parser.add_argument("--seeds", default="0-59")
     parser.add_argument("--aggressive-alone", action="store_true", help="without the gentle flight")
     parser.add_argument("--processes", type=int, help="default: one a core")
-    options = parsed(parser, "marks.md", timed=False)
+    options = parsed(parser, "identified.md", timed=False)
     seeds = seeds_of(options.seeds)
     proof = exact_gain(Helicopter.load(options.truth, governor="ideal"))
     exact = proof.gamma, proof.lower
@@ -149,7 +149,7 @@ def main() -> None:
     text = table(options.truth, exact, found)
     print(text)
     if options.write:
-        keep(DOCS / "marks.md", f"guarantee {options.truth}", text)
+        keep(DOCS / "identified.md", f"guarantee {options.truth}", text)
 
 
 if __name__ == "__main__":

@@ -199,7 +199,7 @@ def measure(setting: Setting, seeds: Sequence[int]) -> tuple[list[Marks], dict[s
 
 
 def main() -> None:
-    """Print the marks of a vehicle, and keep them in docs/marks.md."""
+    """Print the marks of a vehicle, and keep them in docs/identified.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--truth", default="xcell60", choices=sorted(PAIRS))
     parser.add_argument("--simulator", help="default: the other vehicle")
@@ -208,7 +208,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="the first two seeds")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--turbulent", action="store_true", help="breeze and light turbulence")
-    options = parsed(parser, "marks.md", timed=False)
+    options = parsed(parser, "identified.md", timed=False)
     setting = Setting(
         options.truth,
         options.simulator or PAIRS[options.truth],
@@ -224,7 +224,7 @@ def main() -> None:
         section = setting.truth + (
             " with servos" if setting.servos else " in turbulence" if setting.turbulent else ""
         )
-        keep(DOCS / "marks.md", section, text)
+        keep(DOCS / "identified.md", section, text)
 
 
 def _plain(marks: Sequence[Marks]) -> list[dict[str, Any]]:

@@ -407,7 +407,7 @@ def scheduling(found: KnownKinematics) -> Table:
     table.remarks.append(
         f"A difference of less than {LEVEL:g} points is what another seed changes. Where the rotor"
         " has no stabilizer bar scheduling is worth tens of points in nearly every output (AH-1S,"
-        " docs/ah1s.md, not run here)."
+        " docs/identified.md, not run here)."
     )
     return table
 

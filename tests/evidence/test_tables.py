@@ -96,7 +96,7 @@ def test_the_bracket_as_a_table():
 
 
 def test_the_page_has_the_marks_of_every_table_that_is_written():
-    page = (tables.DOCS / "bracket.md").read_text(encoding="utf-8")
+    page = (tables.DOCS / "gains.md").read_text(encoding="utf-8")
     for model in ("interpolated", "exact", "identified"):
         assert (
             page.count(f"<!-- {model}: written by its command -->")

@@ -74,13 +74,13 @@ def worst(cell):
 
 
 def marks_of_the_worst_seed(section, truth="xcell60", turbulent=False):
-    shown, seed = worst(KEPT["marks.md", section].cells("worst nu-gap, lateral")[2])
+    shown, seed = worst(KEPT["identified.md", section].cells("worst nu-gap, lateral")[2])
     setting = measured.Setting(truth, measured.PAIRS[truth], False, turbulent)
     assert same(shown, measured.of_seed(setting, seed).gaps["lateral"][0])
 
 
 def guarantee_of_the_worst_seed():
-    section = KEPT["marks.md", "guarantee xcell60"]
+    section = KEPT["identified.md", "guarantee xcell60"]
     shown, seed = worst(section.cells("worst (seed)")[0])
     proof = guarantee.exact_gain(Helicopter.load("xcell60", governor="ideal"))
     exact = proof.gamma, proof.lower
@@ -91,7 +91,7 @@ def guarantee_of_the_worst_seed():
 
 def proven_by_p_alone(section, loop):
     found = bracket(loop, 1.0, GAINS[1.0], search=synthesis.Search(seconds=1.0))
-    shown = KEPT["bracket.md", section].cells("1")
+    shown = KEPT["gains.md", section].cells("1")
     assert same(shown[1], found.memory)
     assert same(shown[2], found.plain)
     assert found.exact
@@ -99,20 +99,20 @@ def proven_by_p_alone(section, loop):
 
 def frozen_gain_of_the_exact_servo_loop():
     loop = scaled(ExactLateral.of(_xcell(), 0.0, TOP).loop("inputs", PERIOD))
-    text = KEPT["bracket.md", "identified"].text
+    text = KEPT["gains.md", "identified"].text
     row = next(line for line in text.splitlines() if line.split()[:2] == ["exact", "frozen"])
     assert same(row.split()[3], synthesis.frozen_gain(loop).gain)
 
 
 def gain_with_any_jerk(section, loop):
-    shown = KEPT["jerk.md", section].cells("1")
+    shown = KEPT["gains.md", section].cells("1")
     assert same(shown[-1], synthesis.l2_gain(loop, 1.0, search=None).gamma)
 
 
 def fastest_of_the_test_flight():
     heli = _xcell()
     found = fastest(TransitionPlan().test(heli, autopilot_for(heli)))
-    shown = KEPT["jerk.md", "flights"].cells("test")
+    shown = KEPT["gains.md", "flights"].cells("test")
     assert same(shown[0], found.acceleration)
     assert same(shown[1], found.jerk)
 
@@ -132,7 +132,7 @@ def faults_of_one_entry(package, entry):
         " print(tally.outcomes.total(), len(tally.faults))"
     )
     inputs, faults = _ran("-c", code).split()
-    shown = KEPT["reliability.md", f"fuzzing {package}"].cells(f"`{entry}`")
+    shown = KEPT["checks.md", f"fuzzing {package}"].cells(f"`{entry}`")
     assert [inputs, faults] == [shown[0], shown[-1] or "0"]
 
 
@@ -144,7 +144,7 @@ def outcomes_of_one_reader():
         " tally = fuzz.damaged_files.tally(reader, fuzz.damaged_files.USUAL, first=0);"
         " print(*fuzz._row('`CSV`', tally.outcomes, len(tally.faults)), sep=' | ')"
     )
-    assert _ran("-c", code).strip() in KEPT["reliability.md", "fuzzing readers"].text
+    assert _ran("-c", code).strip() in KEPT["checks.md", "fuzzing readers"].text
 
 
 def _xcell():
@@ -165,35 +165,35 @@ def _ran(*arguments):
 
 
 ROWS = {
-    ("bracket.md", "interpolated"): lambda: proven_by_p_alone(
+    ("gains.md", "interpolated"): lambda: proven_by_p_alone(
         "interpolated", lateral_loop(_xcell())
     ),
-    ("bracket.md", "exact"): lambda: proven_by_p_alone("exact", ExactLateral.of(_xcell()).loop()),
-    ("bracket.md", "identified"): frozen_gain_of_the_exact_servo_loop,
-    ("jerk.md", "lateral"): lambda: gain_with_any_jerk("lateral", lateral_loop(_xcell())),
-    ("jerk.md", "longitudinal"): lambda: gain_with_any_jerk(
+    ("gains.md", "exact"): lambda: proven_by_p_alone("exact", ExactLateral.of(_xcell()).loop()),
+    ("gains.md", "identified"): frozen_gain_of_the_exact_servo_loop,
+    ("gains.md", "lateral"): lambda: gain_with_any_jerk("lateral", lateral_loop(_xcell())),
+    ("gains.md", "longitudinal"): lambda: gain_with_any_jerk(
         "longitudinal", longitudinal_loop(_xcell())
     ),
-    ("jerk.md", "flights"): fastest_of_the_test_flight,
+    ("gains.md", "flights"): fastest_of_the_test_flight,
     ("lft.md", "reach"): gains_on_a_narrow_range,
-    ("marks.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
-    ("marks.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(
+    ("identified.md", "xcell60"): lambda: marks_of_the_worst_seed("xcell60"),
+    ("identified.md", "xcell_kahn_hudson"): lambda: marks_of_the_worst_seed(
         "xcell_kahn_hudson", "xcell_kahn_hudson"
     ),
-    ("marks.md", "xcell60 in turbulence"): lambda: marks_of_the_worst_seed(
+    ("identified.md", "xcell60 in turbulence"): lambda: marks_of_the_worst_seed(
         "xcell60 in turbulence", turbulent=True
     ),
-    ("marks.md", "guarantee xcell60"): guarantee_of_the_worst_seed,
-    ("reliability.md", "fuzzing symheli"): lambda: faults_of_one_entry(
+    ("identified.md", "guarantee xcell60"): guarantee_of_the_worst_seed,
+    ("checks.md", "fuzzing symheli"): lambda: faults_of_one_entry(
         "symheli", "symheli.Scheduling"
     ),
-    ("reliability.md", "fuzzing identification"): lambda: faults_of_one_entry(
+    ("checks.md", "fuzzing identification"): lambda: faults_of_one_entry(
         "identification", "identification.theil"
     ),
-    ("reliability.md", "fuzzing synthesis"): lambda: faults_of_one_entry(
+    ("checks.md", "fuzzing synthesis"): lambda: faults_of_one_entry(
         "synthesis", "synthesis.PoleRegion"
     ),
-    ("reliability.md", "fuzzing readers"): outcomes_of_one_reader,
+    ("checks.md", "fuzzing readers"): outcomes_of_one_reader,
 }
 """How a row of each is computed again."""
 

@@ -1,4 +1,4 @@
-"""The recursion over a hundred million samples (docs/reliability.md)."""
+"""The recursion over a hundred million samples (docs/checks.md)."""
 
 import json
 import subprocess

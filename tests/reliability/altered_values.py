@@ -1,6 +1,6 @@
 """What a caller may give instead of a good value: strategies of (kind of change, changed value).
 
-Kinds are the words of docs/reliability.md. "another type" is the only kind that Python itself may
+Kinds are the words of docs/checks.md. "another type" is the only kind that Python itself may
 answer (see verdict.py).
 """
 

@@ -31,7 +31,7 @@ DOCUMENTED = tuple(
 
 
 class Verdict(NamedTuple):
-    """`outcome` is a word of docs/reliability.md, `fault` what is wrong with it, or empty."""
+    """`outcome` is a word of docs/checks.md, `fault` what is wrong with it, or empty."""
 
     outcome: str
     fault: str = ""

@@ -1,5 +1,5 @@
 """Published and closed-form gains and limits of stability, each from both sides;
-docs/reference_cases.md has the table.
+docs/checks.md has the table.
 
 Where a number was printed its source stands with the test; where none was, the reference is derived
 here and computed by a route that shares nothing with `synthesis`: quadrature, a scalar differential

@@ -1,5 +1,5 @@
 """Closed forms of energy-to-peak gains and of two parameters, each from both sides; rows of
-docs/reference_cases.md.
+docs/checks.md.
 
 The references are derived here, by quadrature or by sums that share nothing with `synthesis`.
 """

@@ -1,5 +1,5 @@
 """No proof of a random plant near the limit is false: some in every run, ten thousand in all
-(docs/reliability.md).
+(docs/checks.md).
 """
 
 import sys
