@@ -15,12 +15,12 @@ from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial import structure
 from synthesis.polynomial.exact import Number, exact, positive_definite, rational
-from synthesis.polynomial.pieces import ModelPiece, model_pieces, same_pieces
+from synthesis.polynomial.pieces import ModelPiece, joined, model_pieces, same_pieces
 from synthesis.polynomial.symmetric import extended, symmetrized
 from synthesis.polynomial.symmetric_power import generator, monomials
 from synthesis.program.scaling import Scaling
 from synthesis.proof import pointwise
-from synthesis.proof.claim import Claim, lmi_polynomials
+from synthesis.proof.inequalities import Claim, lmi_polynomials
 
 Array = np.ndarray
 
@@ -314,7 +314,8 @@ class Evidence(NamedTuple):
         scaled = units.of_pieces(self.pieces, self.block)
         back = P.in_units(units.right, units.channel**-2, units.time, 1.0 / units.multiplier)
         rate = self.rate * units.time if self.lpv.dt is None else self.rate
-        claim = Claim(scaled, back, rate, self.lpv.dt, self.elevation, self.block)
+        model = joined(self.lpv, scaled)
+        claim = Claim(model, back, rate, self.elevation, self.block)
         findings = examine(claim, units.weight)
         if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
             return math.inf, math.inf
@@ -382,4 +383,5 @@ class Evidence(NamedTuple):
         return True
 
     def _claim(self, P: Lyapunov) -> Claim:
-        return Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation, self.block)
+        model = joined(self.lpv, self.pieces)
+        return Claim(model, P, self.rate, self.elevation, self.block)
