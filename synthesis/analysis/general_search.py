@@ -27,7 +27,7 @@ from synthesis.program import interior_point
 from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, general_solver, solve
 from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 from synthesis.program.scaling import Scaling, dissipative, model_scaling
-from synthesis.proof.box import Evidence, Units
+from synthesis.proof.box import Evidence
 from synthesis.worst.frozen import norm
 
 Array = np.ndarray
@@ -66,10 +66,10 @@ class General(Ladder):
         """Set the units; the unit of gains."""
         model, kind = self.problem.model, self.problem.demand.kind
         frozen, scale = _scaling(model, kind, bound)
-        self.choices = [_units(scale, kind)]
+        self.choices = [scale]
         other = dissipative(scale, frozen, bound) if kind == "l2 gain" else None
         if other is not None:
-            self.choices.insert(0, _units(other, kind))
+            self.choices.insert(0, other)
         self.rounding = math.inf
         return self._in_units(self.choices[-1])
 
@@ -91,7 +91,7 @@ class General(Ladder):
         self.spent[1] += time.perf_counter() - start
         return self._in_units(self.choices[best])
 
-    def _in_units(self, units: Units) -> float:
+    def _in_units(self, units: Scaling) -> float:
         self.evidence = Evidence(self.problem.model, units, self.problem.demand)
         searched = self.evidence._replace(model=self.problem.model.rounded)
         self.scaled, self.scaled_demand = searched.scaled
@@ -288,7 +288,7 @@ class General(Ladder):
         n, free = self.problem.model.sizes[0], shape.free
         values = smat(x[: free.shape[1] * length(n)].reshape(free.shape[1], -1), n)
         tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
-        return BoxLyapunov(shape.knots, shape.degrees, self.evidence.units.to_physical(tensor))
+        return BoxLyapunov(shape.knots, shape.degrees, self.evidence.to_physical(tensor))
 
     def _verified(self, candidate: Candidate, shape: Shape) -> Found:
         start = time.perf_counter()
@@ -336,21 +336,3 @@ def _scaling(model: Pieces, kind: Kind, expected: float) -> tuple[LinearModel, S
     every = model.at(low + np.linspace(0.0, 1.0, 9)[:, None] * (high - low))
     frozen = LinearModel(*_frozen(model), *names, dt=model.dt)  # type: ignore[arg-type]
     return frozen, model_scaling(frozen, expected if kind.endswith("gain") else 1.0, every)
-
-
-def _units(scale: Scaling, kind: Kind) -> Units:
-    root = math.sqrt(scale.time)
-    if kind == "energy-to-peak gain":
-        # outputs are peaks, not energies
-        return Units(
-            scale.left, scale.right, 1 / root, scale.channel, scale.time, 1.0, scale.weight
-        )
-    return Units(
-        scale.left,
-        scale.right,
-        1 / root,
-        scale.channel / root,
-        scale.time,
-        scale.channel**2,
-        scale.weight,
-    )

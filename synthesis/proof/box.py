@@ -26,7 +26,7 @@ from synthesis.polynomial.exact import Number, exact, positive_definite, rationa
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import convert, regions
-from synthesis.polynomial.symmetric import symmetrized
+from synthesis.program.scaling import Scaling
 from synthesis.proof import pointwise
 from synthesis.proof.inequalities import Demand, Pair, decrease, growth_of, peak, positivity
 
@@ -48,37 +48,13 @@ TINY = 1e-8
 """Least g in scaled units: a model without response is given a small gain rather than none."""
 
 
-class Units(NamedTuple):
-    """x = right z, left = right^-1; units of inputs, outputs, time (s) and of V in which the
-    numbers are of order one.
-
-    `weight` as in `Scaling`.
-    """
-
-    left: Array
-    right: Array
-    inputs: float
-    outputs: float
-    time: float
-    storage: float
-    weight: Array
-
-    def to_physical(self, P: Array) -> Array:
-        """P of V in physical units from that in z."""
-        return symmetrized(self.storage * self.left.T @ P @ self.left)
-
-    def to_scaled(self, P: Array) -> Array:
-        """The inverse."""
-        return symmetrized(self.right.T @ P @ self.right / self.storage)
-
-
 class Evidence(NamedTuple):
     """A model and what is asked of it, against which any P and bound can be checked; `demand.shift`
     is left to the bound.
     """
 
     model: Pieces
-    units: Units
+    units: Scaling
     demand: Demand
 
     @property
@@ -106,35 +82,44 @@ class Evidence(NamedTuple):
             return "the pieces are not those of the model"
         if kind == "energy-to-peak gain" and self.model.passes_peaks:
             return "the energy-to-peak gain of a continuous model needs D = 0"
-        u = self.units
         return structure.first(
             P.fault_for([(s.low, s.high) for s in self.model.parameters], self.model.sizes[0]),
-            structure.coordinates(
-                u.left, u.right, (u.inputs, u.outputs, u.time, u.storage), self.model.sizes[0]
-            ),
-            structure.symmetric(np.asarray(u.weight), (self.model.sizes[0],) * 2, "the weight"),
+            self.units.fault(self.model.sizes[0]),
         )
 
     @property
     def scaled(self) -> tuple[Pieces, Demand]:
-        """Model and demand in the scaled units."""
-        u = self.units
-        time = u.time if self.model.dt is None else 1.0
-        return self.model.scaled(
-            u.left, u.right, u.inputs, u.outputs, u.time
-        ), self.demand._replace(time=time)
+        """Model and demand in the scaled units; outputs per root of time where their energy counts,
+        and as they are where their peaks do.
+        """
+        u, root = self.units, math.sqrt(self.units.time)
+        outputs = u.channel if self._peaks else u.channel / root
+        model = self.model.scaled(u.left, u.right, 1 / root, outputs, u.time)
+        return model, self.demand._replace(time=u.time if model.dt is None else 1.0)
+
+    @property
+    def _peaks(self) -> bool:
+        return self.demand.kind == "energy-to-peak gain"
 
     def in_units(self, value: float) -> float:
         """A physical gain (decay rate, 1/s) in the scaled units."""
-        u = self.units
         if self.demand.kind == "decay rate":
-            return value * u.time if self.model.dt is None else value
-        channel = (
-            u.outputs
-            if self.demand.kind == "energy-to-peak gain"
-            else u.outputs * math.sqrt(u.time)
-        )
-        return value / channel
+            return value * self.units.time if self.model.dt is None else value
+        return value / self.units.channel
+
+    def to_physical(self, P: Array) -> Array:
+        """Lyapunov matrices of V in physical units, squared outputs times seconds or, where peaks
+        count, squared inputs times seconds, from those in scaled ones.
+        """
+        return self.units.to_physical(P) / self._input_energy
+
+    def to_scaled(self, P: Array) -> Array:
+        """The inverse of `to_physical`."""
+        return self.units.to_scaled(P) * self._input_energy
+
+    @property
+    def _input_energy(self) -> float:
+        return self.units.channel**2 if self._peaks else 1.0
 
     def sampled(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float]:
         """(P, the bound it admits at `points` values of each parameter in every region); inf
@@ -143,11 +128,11 @@ class Evidence(NamedTuple):
         For the energy-to-peak gain P is scaled so that its first inequality just holds; NaN for
         stability.
         """
-        kind, units = self.demand.kind, self.units
+        kind = self.demand.kind
         model, demand = self.scaled
         if not demand.meaningful(model.dt, P.degrees):
             return P, -math.inf if kind == "decay rate" else math.inf
-        back = BoxLyapunov(P.knots, P.degrees, units.to_scaled(P.coefficients))
+        back = BoxLyapunov(P.knots, P.degrees, self.to_scaled(P.coefficients))
         if kind == "stability":
             return P, math.nan
         samples = _samples(model, back, demand, points)
@@ -159,7 +144,7 @@ class Evidence(NamedTuple):
             return P, math.sqrt(g) / self.in_units(1.0)
         factor = 1.0 / (g * (1 + LADDER[0]))
         P = BoxLyapunov(P.knots, P.degrees, P.coefficients * factor)
-        back = BoxLyapunov(P.knots, P.degrees, units.to_scaled(P.coefficients))
+        back = BoxLyapunov(P.knots, P.degrees, self.to_scaled(P.coefficients))
         return P, math.sqrt(_samples(model, back, demand, points).peak()) / self.in_units(1.0)
 
     def least(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float] | None:
@@ -200,7 +185,7 @@ class Evidence(NamedTuple):
         between; inf where P is not positive.
         """
         axes = [np.unique([np.linspace(a, b, 5) for a, b in pairwise(k)]) for k in P.knots]
-        values = np.linalg.eigvalsh(self.units.to_scaled(P.at(np.array(list(product(*axes))))))
+        values = np.linalg.eigvalsh(self.to_scaled(P.at(np.array(list(product(*axes))))))
         return float((values[:, -1] / values[:, 0]).max()) if values.min() > 0 else math.inf
 
     def floating(self, P: BoxLyapunov, bound: float) -> bool:
@@ -208,7 +193,7 @@ class Evidence(NamedTuple):
         model, demand = self.scaled
         if not demand.meaningful(model.dt, P.degrees) or math.isinf(bound):
             return False
-        back = BoxLyapunov(P.knots, P.degrees, self.units.to_scaled(P.coefficients))
+        back = BoxLyapunov(P.knots, P.degrees, self.to_scaled(P.coefficients))
         if not all(
             map(negative_definite, polynomials(model, back, demand, self.in_units(bound), float))
         ):
