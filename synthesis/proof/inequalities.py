@@ -31,7 +31,7 @@ import numpy as np
 from synthesis.certificate import Kind
 from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.norm_bounded import NormBounded
-from synthesis.polynomial.exact import Number, exact
+from synthesis.polynomial.exact import Number, exact, growth_of
 from synthesis.polynomial.matrix import PolynomialMatrix, block
 from synthesis.polynomial.motion import Drift, Motion
 from synthesis.polynomial.pieces import Pieces
@@ -81,17 +81,6 @@ class Pair(NamedTuple):
 
     here: PolynomialMatrix
     there: PolynomialMatrix
-
-
-def growth_of(alpha: float, dt: float) -> float:
-    """exp(2 alpha dt) or a few units in the last place more: what is proven with it holds for
-    alpha, however exp and its argument are rounded.
-    """
-    if alpha == 0.0:
-        return 1.0
-    exponent = 2.0 * alpha * dt
-    exponent += 4.0 * math.ulp(exponent)
-    return math.exp(exponent) * (1.0 + 8.0 * math.ulp(1.0))
 
 
 def positivity(P: PolynomialMatrix) -> PolynomialMatrix:

@@ -154,7 +154,7 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     # the witness in floating point is kept out, so that what the mutant believes becomes a
     # certificate
     with monkeypatch.context() as blind:
-        blind.setattr(verify, "holds_on_grid", lambda *args: True)
+        blind.setattr(verify.Evidence, "on_grid", lambda *args: True)
         blind.setattr(proof.Evidence, "on_grid", lambda *args: True)
         try:
             cert = ANALYSES[analysis](model())
