@@ -24,7 +24,7 @@ from symheli.lpv import LPVStateSpace, Scheduling
 from symheli.lpv.exponential import expm
 from synthesis import Solver, Spline, SumOfSquares, l2_gain, lft_gain, stability
 from synthesis.analysis.certify import route as searching
-from synthesis.analysis.question import question
+from synthesis.analysis.problem import pose
 
 ROUTES = (
     "stability by splines",
@@ -83,7 +83,7 @@ def judge(seed: int) -> tuple[str, bool, str]:
     route = ROUTES[seed % len(ROUTES)]
     gamma = math.inf
     if route == "past the frozen poles":
-        asked = question(lpv, None, "stability", COARSE, None, Solver(), None)
+        asked = pose(lpv, None, "stability", COARSE, None, Solver(), None)
         proven = searching(asked).search(math.inf).proof is not None
     else:
         if route.endswith("LFT"):

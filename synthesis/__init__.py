@@ -34,11 +34,8 @@ from typing import TYPE_CHECKING
 from symheli.lazy import lazily
 
 if TYPE_CHECKING:
-    from synthesis.analysis.decay_rate import decay_rate
     from synthesis.analysis.gain_against_rate import gain_against_rate
-    from synthesis.analysis.generalized_h2 import generalized_h2
-    from synthesis.analysis.l2_gain import l2_gain
-    from synthesis.analysis.stability import stability
+    from synthesis.analysis.questions import decay_rate, generalized_h2, l2_gain, stability
     from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
     from synthesis.design.controller import Controller
     from synthesis.design.estimator import Estimator, estimator
@@ -74,11 +71,8 @@ if TYPE_CHECKING:
     from synthesis.worst.trajectory import SchedulingTrajectory
 
 _ROOMS = {
-    "synthesis.analysis.decay_rate": "decay_rate",
     "synthesis.analysis.gain_against_rate": "gain_against_rate",
-    "synthesis.analysis.generalized_h2": "generalized_h2",
-    "synthesis.analysis.l2_gain": "l2_gain",
-    "synthesis.analysis.stability": "stability",
+    "synthesis.analysis.questions": "decay_rate generalized_h2 l2_gain stability",
     "synthesis.certificate": "Attempt Certificate Proof Seconds Status",
     "synthesis.design.controller": "Controller",
     "synthesis.design.estimator": "Estimator estimator",

@@ -44,11 +44,21 @@ from synthesis.worst.trajectory import SchedulingTrajectory
 SCHEMA = "symheli certificate"
 VERSION = 1
 
+
+def _former_units(
+    left: Any, right: Any, inputs: Any, outputs: Any, time: Any, storage: Any, weight: Any
+) -> Scaling:
+    """The scaling that older files hold as units of inputs, outputs and V: that of V is the square
+    of the channel's, or 1 where V is compared with the energy of inputs.
+    """
+    return Scaling(left, right, outputs if storage == 1.0 else math.sqrt(storage), time, weight)
+
+
 TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
         *(Attempt, Seconds, Scheduling, Block, LFT, LPVStateSpace),
-        *(PolynomialMatrix, Motion, Scaling, box.Units, Demand, Coordinates, NormBounded),
+        *(PolynomialMatrix, Motion, Scaling, Demand, Coordinates, NormBounded),
         *(SplineLyapunov, MemoryLyapunov, LagRegion, BoxLyapunov),
         *(Multiplier, lft_proof.Quadratic),
         *(
@@ -60,7 +70,7 @@ TYPES: dict[str, Any] = {
             bases.Patches,
         ),
     )
-} | {"Trajectory": SchedulingTrajectory}
+} | {"Trajectory": SchedulingTrajectory, "Units": _former_units}
 """What a file may contain, by its word there, which outlives the name of a class."""
 WORDS = {kind: word for word, kind in TYPES.items()}
 
@@ -198,7 +208,7 @@ def _decoded_proof(content: Any) -> Proof:
     else:
         _a(LFT, own["lft"])
     for name, kind in (
-        ("units", Scaling if route == "one parameter" else box.Units),
+        ("units", Scaling),
         ("demand", Demand),
         ("coordinates", Coordinates),
     ):

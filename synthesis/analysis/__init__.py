@@ -1,1 +1,1 @@
-"""The questions one can ask: gains, stability and decay of a model, from search to certificate."""
+"""Certified gains, stability and decay rates of a model: from the problem to its certificate."""

@@ -19,7 +19,7 @@ from synthesis.analysis.general_search import General
 from synthesis.analysis.hypotheses import VERIFIED, hypotheses
 from synthesis.analysis.ladder import CLOSE, Found, Ladder
 from synthesis.analysis.one_parameter_search import OneParameter
-from synthesis.analysis.question import Question
+from synthesis.analysis.problem import Problem
 from synthesis.certificate import Certificate, Seconds, Status
 from synthesis.impose import Grid
 from synthesis.polynomial.pieces import Pieces, pieces
@@ -51,14 +51,14 @@ class Beaten(NamedTuple):
     perturbation: Array | None = None
 
 
-def certify(asked: Question) -> Certificate:
-    """The answer to the question."""
-    demand, search = asked.demand, asked.search
-    sign = 1.0 if asked.gains else -1.0
+def certify(problem: Problem) -> Certificate:
+    """Search a lower bound and a proof, and write the certificate."""
+    demand, search = problem.demand, problem.search
+    sign = 1.0 if problem.gains else -1.0
     start = time.perf_counter()
-    model, frozen, delta, unstable = _worst_member(asked)
-    report = _Report(asked)
-    if math.isinf(frozen.value) if asked.gains else frozen.value >= 0:
+    model, frozen, delta, unstable = _worst_member(problem)
+    report = _Report(problem)
+    if math.isinf(frozen.value) if problem.gains else frozen.value >= 0:
         at = unstable or unstable_at(model, frozen.p or ())
         if at is not None:
             p = np.array(at) if len(at) == 1 else np.array([at])
@@ -71,7 +71,7 @@ def certify(asked: Question) -> Certificate:
             )
             return report.nothing(Status.UNSTABLE, beaten)
         # stable or not to rounding: nothing is known from below
-        frozen, search = Worst(0.0 if asked.gains else -ROUNDED, frozen.p), None
+        frozen, search = Worst(0.0 if problem.gains else -ROUNDED, frozen.p), None
     stability = demand.kind == "stability"
     limit = frozen if stability else worst_moving(model.source, demand, frozen, search)
     beaten = Beaten(
@@ -81,9 +81,9 @@ def certify(asked: Question) -> Certificate:
         time.perf_counter() - start,
         delta,
     )
-    if math.isinf(limit.value) if asked.gains else limit.value >= 0:
+    if math.isinf(limit.value) if problem.gains else limit.value >= 0:
         return report.nothing(Status.GROWING, beaten)
-    ladder = route(asked)
+    ladder = route(problem)
     best = ladder.search(math.inf if stability else abs(frozen.value))
     if best.proof is None and stability:
         start = time.perf_counter()
@@ -108,31 +108,31 @@ class _Member(NamedTuple):
     unstable: tuple[float, ...] | None = None
 
 
-def _worst_member(asked: Question) -> _Member:
-    unc, size = asked.uncertain, measure(asked.demand, asked.model.dt)
+def _worst_member(problem: Problem) -> _Member:
+    unc, size = problem.uncertain, measure(problem.demand, problem.model.dt)
     if unc is None:
-        return _Member(asked.model, worst_frozen(asked.model, size))
-    found = worst_perturbation(unc, gains=asked.gains)
+        return _Member(problem.model, worst_frozen(problem.model, size))
+    found = worst_perturbation(unc, gains=problem.gains)
     try:
         model = pieces(unc.perturbed(found.delta))
     except InputError:
         at = (found.p,)
         return _Member(
-            asked.model, Worst(found.value, at), found.delta, at if found.unstable else None
+            problem.model, Worst(found.value, at), found.delta, at if found.unstable else None
         )
     return _Member(model, worst_frozen(model, size), found.delta)
 
 
-def route(asked: Question) -> Ladder:
+def route(problem: Problem) -> Ladder:
     """The search for a proof alone."""
-    return (OneParameter if asked.one_parameter else General)(asked)
+    return (OneParameter if problem.one_parameter else General)(problem)
 
 
 @dataclass(frozen=True, eq=False)
 class _Report:
     """How a certificate is written down."""
 
-    asked: Question
+    problem: Problem
 
     def nothing(self, status: Status, beaten: Beaten, ladder: Ladder | None = None) -> Certificate:
         """Nothing is proven, and it is known why."""
@@ -143,13 +143,13 @@ class _Report:
         if best.proof is None:
             status = Status.without_proof(best.answer)
         else:
-            status = Status.UNPROVEN if isinstance(self.asked.impose, Grid) else Status.PROVEN
+            status = Status.UNPROVEN if isinstance(self.problem.impose, Grid) else Status.PROVEN
         return self._made(best, beaten, ladder, status)
 
     def _made(
         self, best: Found, beaten: Beaten, ladder: Ladder | None, status: Status
     ) -> Certificate:
-        asked, kind, proven = self.asked, self.asked.demand.kind, status is Status.PROVEN
+        problem, kind, proven = self.problem, self.problem.demand.kind, status is Status.PROVEN
         nothing = -math.inf if kind == "decay rate" else math.inf
         names = {"stability": (), "decay rate": ("alpha", "upper", "frozen")}.get(
             kind, ("gamma", "lower", "frozen")
@@ -162,16 +162,16 @@ class _Report:
             **bounds,
             status=status,
             verified=proven,
-            rates=asked.demand.rates,
+            rates=problem.demand.rates,
             hypotheses=hypotheses(
                 kind,
-                asked.model.parameters,
-                asked.demand.rates,
-                asked.uncertain or asked.model.source,
+                problem.model.parameters,
+                problem.demand.rates,
+                problem.uncertain or problem.model.source,
                 (*self._how(best, status, ladder), *self._distance(bounds, best, ladder)),
             ),
-            method=f"{type(asked.form).__name__}, {(ladder or asked.impose).found_by}",
-            solver=str(asked.solver),
+            method=f"{type(problem.form).__name__}, {(ladder or problem.impose).found_by}",
+            solver=str(problem.solver),
             seconds=Seconds(*(float(s) for s in spent), bounds=beaten.seconds),
             conditioning=best.conditioning,
             attempts=tuple(ladder.attempts) if ladder else (),
@@ -182,14 +182,14 @@ class _Report:
         )
 
     def _how(self, best: Found, status: Status, ladder: Ladder | None) -> tuple[str, ...]:
-        if status is Status.UNPROVEN and isinstance(self.asked.impose, Grid):
+        if status is Status.UNPROVEN and isinstance(self.problem.impose, Grid):
             return (
-                f"the inequalities hold at {self.asked.impose.points} values of each parameter in"
+                f"the inequalities hold at {self.problem.impose.points} values of each parameter in"
                 " every region: no guarantee",
             )
         if best.proof is None or ladder is None:
             return ()
-        if self.asked.one_parameter:
+        if self.problem.one_parameter:
             what, shared = (
                 "every coefficient, and a grid of p",
                 "pieces, cells, strips and blossoms",
@@ -216,7 +216,7 @@ class _Report:
     def _sampling(self, bounds: dict[str, float]) -> tuple[str, ...]:
         if "gamma" not in bounds:
             return ()
-        points = 41 if len(self.asked.model.parameters) == 1 else 3
-        grid = product(*(np.linspace(s.low, s.high, points) for s in self.asked.model.parameters))
-        A = self.asked.model.at(np.array(list(grid))).A
-        return fine_sampling(A, self.asked.model.dt, bounds["gamma"], bounds["lower"])
+        points = 41 if len(self.problem.model.parameters) == 1 else 3
+        grid = product(*(np.linspace(s.low, s.high, points) for s in self.problem.model.parameters))
+        A = self.problem.model.at(np.array(list(grid))).A
+        return fine_sampling(A, self.problem.model.dt, bounds["gamma"], bounds["lower"])

@@ -12,7 +12,7 @@ from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.labelled import per
 from symheli.values.signal import Signal
-from synthesis.analysis.l2_gain import l2_gain
+from synthesis.analysis.questions import l2_gain
 from synthesis.forms import LyapunovForm
 from synthesis.gain_curve import GainCurve
 from synthesis.impose import Imposed

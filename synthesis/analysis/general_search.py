@@ -11,7 +11,7 @@ import numpy as np
 
 from symheli.lpv import LinearModel, Matrices
 from synthesis.analysis.ladder import CLOSE, NOTHING, Found, Ladder
-from synthesis.analysis.question import Question
+from synthesis.analysis.problem import Problem
 from synthesis.assemble.box import Shape, affine_inequalities, assemble
 from synthesis.assemble.points import at_points, points_of
 from synthesis.certificate import Attempt, Kind, Proof
@@ -27,7 +27,7 @@ from synthesis.program import interior_point
 from synthesis.program.cone_program import LYAPUNOV, Answer, Candidate, general_solver, solve
 from synthesis.program.lyapunov_program import LyapunovBlocks, LyapunovProgram, Sizes
 from synthesis.program.scaling import Scaling, dissipative, model_scaling
-from synthesis.proof.box import Evidence, Units
+from synthesis.proof.box import Evidence
 from synthesis.worst.frozen import norm
 
 Array = np.ndarray
@@ -57,19 +57,19 @@ inside holds between the points too.
 class General(Ladder):
     """Splines P(p) over a box, in the scaled units of the `evidence`."""
 
-    def __init__(self, asked: Question):
-        if asked.solver.name == LYAPUNOV and not asked.by_points:  # of stability, for a gain
-            asked = asked._replace(solver=general_solver("CLARABEL"))
-        super().__init__(asked)
+    def __init__(self, problem: Problem):
+        if problem.solver.name == LYAPUNOV and not problem.by_points:  # of stability, for a gain
+            problem = problem._replace(solver=general_solver("CLARABEL"))
+        super().__init__(problem)
 
     def expect(self, bound: float) -> float:
         """Set the units; the unit of gains."""
-        model, kind = self.asked.model, self.asked.demand.kind
+        model, kind = self.problem.model, self.problem.demand.kind
         frozen, scale = _scaling(model, kind, bound)
-        self.choices = [_units(scale, kind)]
+        self.choices = [scale]
         other = dissipative(scale, frozen, bound) if kind == "l2 gain" else None
         if other is not None:
-            self.choices.insert(0, _units(other, kind))
+            self.choices.insert(0, other)
         self.rounding = math.inf
         return self._in_units(self.choices[-1])
 
@@ -77,10 +77,10 @@ class General(Ladder):
         """Programs are solved in the first units in which the gain of the model frozen at mid-range
         is found, or nearly; the unit of gains.
         """
-        if self.asked.demand.kind != "l2 gain" or len(self.choices) == 1:
+        if self.problem.demand.kind != "l2 gain" or len(self.choices) == 1:
             return self.unit
         start, found = time.perf_counter(), []
-        gain = norm(*_frozen(self.asked.model), self.asked.model.dt)[0]
+        gain = norm(*_frozen(self.problem.model), self.problem.model.dt)[0]
         for units in self.choices:
             self._in_units(units)
             found.append(self._frozen_gain() / gain - 1 if gain > 0 else 0.0)
@@ -91,25 +91,25 @@ class General(Ladder):
         self.spent[1] += time.perf_counter() - start
         return self._in_units(self.choices[best])
 
-    def _in_units(self, units: Units) -> float:
-        self.evidence = Evidence(self.asked.model, units, self.asked.demand)
-        searched = self.evidence._replace(model=self.asked.model.rounded)
+    def _in_units(self, units: Scaling) -> float:
+        self.evidence = Evidence(self.problem.model, units, self.problem.demand)
+        searched = self.evidence._replace(model=self.problem.model.rounded)
         self.scaled, self.scaled_demand = searched.scaled
         return 1.0 / self.evidence.in_units(1.0)
 
     def _frozen_gain(self) -> float:
         """What a program in these units finds of the gain of the model frozen at mid-range."""
         whole, scaled = self.evidence, self.scaled
-        box = tuple((s.low, s.high) for s in self.asked.model.parameters)
+        box = tuple((s.low, s.high) for s in self.problem.model.parameters)
         still = {
             (0,) * len(box): tuple(
-                PolynomialMatrix.constant(M, box) for M in _frozen(self.asked.model)
+                PolynomialMatrix.constant(M, box) for M in _frozen(self.problem.model)
             )
         }
-        model = self.asked.model._replace(breaks=box, models=still)
+        model = self.problem.model._replace(breaks=box, models=still)
         self.evidence = whole._replace(model=model)
         self.scaled = self.evidence.scaled[0]
-        shape, margin = self.constant(), self.asked.impose.tried[0]
+        shape, margin = self.constant(), self.problem.impose.tried[0]
         candidate = self._solve(shape, margin)
         P = candidate.x is not None and self._lyapunov(candidate.x, shape)
         bound = self.evidence.sampled(P, 2)[1] if P else math.inf
@@ -119,13 +119,13 @@ class General(Ladder):
     @property
     def found_by(self) -> str:
         """How the inequalities were imposed in the search."""
-        if self.asked.by_points:
+        if self.problem.by_points:
             return "LMIs at single p, added where they were violated"
         return super().found_by
 
     def constant(self) -> Shape:
         """One matrix for the whole box."""
-        parameters = self.asked.model.parameters
+        parameters = self.problem.model.parameters
         ends = tuple(np.array([s.low, s.high]) for s in parameters)
         return Shape(ends, (0,) * len(parameters))
 
@@ -135,8 +135,8 @@ class General(Ladder):
 
     def shapes(self) -> list[Shape]:
         """The P of the form that was asked for."""
-        model, form, m = self.asked.model, self.asked.form, len(self.asked.model.parameters)
-        motion = self.asked.demand.motion
+        model, form, m = self.problem.model, self.problem.form, len(self.problem.model.parameters)
+        motion = self.problem.demand.motion
         # a parameter whose rate is another is one of its own, graded towards its lower end
         alone = [m == 1 or tie is not None for tie in motion.ties]
         usual = [(3 if a else 2) if model.dt is None else (2 if a else 1) for a in alone]
@@ -144,7 +144,7 @@ class General(Ladder):
             0 if model.dt is None and math.isinf(rate) else d if own is None else own
             for rate, own, d in zip(motion.rates, form.degrees(m), usual, strict=True)
         )
-        steps = self.asked.demand.steps(model.dt, degrees)
+        steps = self.problem.demand.steps(model.dt, degrees)
         total = form.total_degree if isinstance(form, Spline) else None
         out: list[Shape] = []
         coarse = (4, 8) if any(alone) else (1,)
@@ -176,11 +176,11 @@ class General(Ladder):
 
     def attempt(self, shape: Shape, margin: float, alpha: float = 0.0) -> Found:
         """One P and one margin, or one decay rate."""
-        asked = self.asked
+        problem = self.problem
         demand = self.scaled_demand
         shift = self.evidence.in_units(alpha) if alpha else 0.0
         self.scaled_demand = demand._replace(shift=shift)
-        if asked.by_points:
+        if problem.by_points:
             found, message = self._by_points(shape, margin)
         else:
             candidate = self._solve(shape, margin)
@@ -194,8 +194,8 @@ class General(Ladder):
 
     def _solve(self, shape: Shape, margin: float) -> Candidate:
         """A program of every inequality."""
-        asked, start = self.asked, time.perf_counter()
-        if asked.by_points:
+        problem, start = self.problem, time.perf_counter()
+        if problem.by_points:
             every = self._inequalities(shape)
             return self._of_points(every, [np.ones(len(b.constant), bool) for b in every], margin)
         inequalities = affine_inequalities(
@@ -203,13 +203,13 @@ class General(Ladder):
             self.scaled_demand,
             shape,
             margin,
-            asked.impose.least,
+            problem.impose.least,
             self.evidence.units.weight,
         )
-        n = asked.model.sizes[0]
-        program = assemble(inequalities, shape, n, asked.impose, maximise=not asked.gains)
+        n = problem.model.sizes[0]
+        program = assemble(inequalities, shape, n, problem.impose, maximise=not problem.gains)
         built = time.perf_counter()
-        candidate = solve(program, asked.solver)
+        candidate = solve(program, problem.solver)
         self.spent += (built - start, time.perf_counter() - built, 0.0)
         return candidate
 
@@ -217,7 +217,7 @@ class General(Ladder):
         """Programs of few inequalities, which those that came out violated join, until the bound
         proven of the whole box is near their level; in a word what became of them.
         """
-        best, n, nu = Found(math.inf), *self.asked.model.sizes[:2]
+        best, n, nu = Found(math.inf), *self.problem.model.sizes[:2]
         every, rounds = self._inequalities(shape), 0
         active = [self._first(shape, block) for block in every]
         while True:
@@ -266,13 +266,13 @@ class General(Ladder):
     def _of_points(
         self, every: list[LyapunovBlocks], active: list[Array], margin: float
     ) -> Candidate:
-        n, nu, _ = self.asked.model.sizes
+        n, nu, _ = self.problem.model.sizes
         chosen = [b.keep(which) for b, which in zip(every, active, strict=True) if which.any()]
         unknowns = 1 + max(int(b.columns.max()) for b in every)
         program = LyapunovProgram(
-            tuple(chosen), Sizes(n, nu, unknowns), margin, self.asked.impose.least
+            tuple(chosen), Sizes(n, nu, unknowns), margin, self.problem.impose.least
         )
-        given = self.asked.solver
+        given = self.problem.solver
         coarse = max(COARSE, given.options["tolerance"])
         candidate = interior_point.minimise(program, replace(given, tolerance=coarse))
         self.spent[1] += candidate.seconds
@@ -285,10 +285,10 @@ class General(Ladder):
 
     def _lyapunov(self, x: Array, shape: Shape) -> BoxLyapunov:
         """P at the solver's point x, as it is stored: in physical units."""
-        n, free = self.asked.model.sizes[0], shape.free
+        n, free = self.problem.model.sizes[0], shape.free
         values = smat(x[: free.shape[1] * length(n)].reshape(free.shape[1], -1), n)
         tensor = np.tensordot(free, values, axes=1).reshape(*shape.counts, n, n)
-        return BoxLyapunov(shape.knots, shape.degrees, self.evidence.units.to_physical(tensor))
+        return BoxLyapunov(shape.knots, shape.degrees, self.evidence.to_physical(tensor))
 
     def _verified(self, candidate: Candidate, shape: Shape) -> Found:
         start = time.perf_counter()
@@ -300,15 +300,15 @@ class General(Ladder):
         """What P itself gives, whatever the solver said."""
         if candidate.x is None:
             return Found(math.inf, None, candidate.answer)
-        n, free, gains = self.asked.model.sizes[0], shape.free, self.asked.gains
+        n, free, gains = self.problem.model.sizes[0], shape.free, self.problem.gains
         # a margin of nothing is an answer; a larger one that cannot be verified, or a gain that
         # cannot, is the solver's trouble
         margin = 1.0 if gains else candidate.x[free.shape[1] * length(n)]
         none = candidate.answer is Answer.SOLVED and margin <= NOTHING
         nothing = Found(math.inf, None, Answer.INFEASIBLE if none else Answer.FAILED)
         P = self._lyapunov(candidate.x, shape)
-        if isinstance(self.asked.impose, Grid):
-            P, bound = self.evidence.sampled(P, self.asked.impose.points)
+        if isinstance(self.problem.impose, Grid):
+            P, bound = self.evidence.sampled(P, self.problem.impose.points)
             if math.isinf(bound):
                 return nothing
         else:
@@ -336,21 +336,3 @@ def _scaling(model: Pieces, kind: Kind, expected: float) -> tuple[LinearModel, S
     every = model.at(low + np.linspace(0.0, 1.0, 9)[:, None] * (high - low))
     frozen = LinearModel(*_frozen(model), *names, dt=model.dt)  # type: ignore[arg-type]
     return frozen, model_scaling(frozen, expected if kind.endswith("gain") else 1.0, every)
-
-
-def _units(scale: Scaling, kind: Kind) -> Units:
-    root = math.sqrt(scale.time)
-    if kind == "energy-to-peak gain":
-        # outputs are peaks, not energies
-        return Units(
-            scale.left, scale.right, 1 / root, scale.channel, scale.time, 1.0, scale.weight
-        )
-    return Units(
-        scale.left,
-        scale.right,
-        1 / root,
-        scale.channel / root,
-        scale.time,
-        scale.channel**2,
-        scale.weight,
-    )

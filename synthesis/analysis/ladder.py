@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symheli.progress import task
-from synthesis.analysis.question import Question
+from synthesis.analysis.problem import Problem
 from synthesis.certificate import Attempt, Proof
 from synthesis.program.cone_program import Answer
 from synthesis.program.scaling import in_its_own_scale
@@ -61,20 +61,20 @@ class Ladder(ABC):
     build, solve and verify (`spent`).
     """
 
-    def __init__(self, asked: Question):
-        self.asked = asked
+    def __init__(self, problem: Problem):
+        self.problem = problem
         self.attempts: list[Attempt] = []
         self.spent = np.zeros(3)
         self.rounding = math.nan
         """By which fraction a gain of a frozen model was missed in the units of the programs, NaN
-        where that was not asked.
+        where that was not computed.
         """
         self.unit = self.expect(1.0)
 
     @property
     def found_by(self) -> str:
         """How the inequalities were imposed in the search."""
-        return self.asked.impose.found_by
+        return self.problem.impose.found_by
 
     @abstractmethod
     def expect(self, bound: float) -> float:
@@ -117,9 +117,9 @@ class Ladder(ABC):
             return self._searched(limit)
 
     def _searched(self, limit: float) -> Found:
-        if self.asked.demand.kind == "decay rate":
+        if self.problem.demand.kind == "decay rate":
             return self._decay(limit)
-        if not self.asked.gains:
+        if not self.problem.gains:
             return self._least(limit)
 
         def found(expected: float) -> tuple[Found, float, float]:
@@ -136,20 +136,20 @@ class Ladder(ABC):
         """Whether there is a P at all is a question with a bounded answer, which solvers handle
         better than an infinite gain.
         """
-        asked = self.asked
-        other = type(self)(asked._replace(demand=asked.demand._replace(kind="stability")))
+        problem = self.problem
+        other = type(self)(problem._replace(demand=problem.demand._replace(kind="stability")))
         stable = other.search(math.inf)
         self.attempts += other.attempts
         self.spent += other.spent
         return Answer.INFEASIBLE if stable.answer is Answer.INFEASIBLE else answer
 
     def _least(self, limit: float) -> Found:
-        gains = self.asked.gains
+        gains = self.problem.gains
         best = self.proposed() if gains else Found(math.nan)
         if best.proof is not None and best.bound <= (1 + CLOSE) * limit:
             return best
         self.unit = self.settle() if gains else self.unit
-        shapes, near, still = self.shapes(), self.asked.form.near, None
+        shapes, near, still = self.shapes(), self.problem.form.near, None
         if gains and any(map(self.varies, shapes)):
             # cheapest, and enough where p changes little
             still = self._margins(self.constant(), Found(math.inf))
@@ -169,7 +169,7 @@ class Ladder(ABC):
 
     def _margins(self, shape: Any, best: Found) -> Found:
         # without a gain the margin itself is what is maximised
-        for margin in self.asked.impose.tried if self.asked.gains else (0.0,):
+        for margin in self.problem.impose.tried if self.problem.gains else (0.0,):
             found = self._tried(shape, margin)
             best = best.or_better(found, 1.0)
             if found.proof is not None or found.answer in (Answer.INFEASIBLE, Answer.UNTRIED):
@@ -189,7 +189,7 @@ class Ladder(ABC):
         tolerance = DECAY_TOLERANCE * limit
         for shape in self.shapes():
             best = self._bisected(shape, best, limit - tolerance, limit)
-            if best.proof is not None and best.bound * self.asked.form.near >= limit:
+            if best.proof is not None and best.bound * self.problem.form.near >= limit:
                 break
         if shape is not None and self.varies(shape) and best.bound < limit - 2 * tolerance:
             # asked first whether a constant P proves more

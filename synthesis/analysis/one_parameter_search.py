@@ -11,8 +11,8 @@ import numpy as np
 from synthesis.analysis.ladder import CLOSE, NOTHING, Found, Ladder, inflated
 from synthesis.assemble.bounded_real import assemble
 from synthesis.assemble.unknowns import (
-    Problem,
     Quadratic,
+    ScaledProblem,
     Unknown,
     constant,
     scaled_problem,
@@ -42,31 +42,36 @@ larger.
 
 
 class OneParameter(Ladder):
-    """Splines P(p), with a memory of p or of higher order in x, in the scaled units of a
-    `problem`.
+    """Splines P(p), with a memory of p or of higher order in x, in scaled
+    units.
     """
 
     def expect(self, bound: float) -> float:
         """Set the units; the unit of gains."""
-        model, (rate,) = self.asked.uncertain or self.asked.model.source, self.asked.demand.rates
-        self.problem = scaled_problem(model, rate, bound, with_gain=self.asked.gains)
-        self.dissipating: Problem | None = None
+        model, (rate,) = (
+            self.problem.uncertain or self.problem.model.source,
+            self.problem.demand.rates,
+        )
+        self.scaled = scaled_problem(model, rate, bound, with_gain=self.problem.gains)
+        self.dissipating: ScaledProblem | None = None
         self.rounding = math.inf
-        lpv, units = self.problem.lpv, self.problem.units
-        if self.asked.gains and self.problem.block is None:
+        lpv, units = self.scaled.lpv, self.scaled.units
+        if self.problem.gains and self.scaled.block is None:
             other = dissipative(units, lpv.at(lpv.scheduling.middle), bound)
-            self.dissipating = None if other is None else self.problem.in_units(other)
+            self.dissipating = None if other is None else self.scaled.in_units(other)
         return units.channel
 
     def shapes(self) -> list[Unknown]:
         """Those of the form, each number of knots once."""
         return list(
-            {len(u.knots): u for u in reversed([*unknowns(self.problem, self.asked.form)])}.values()
+            {
+                len(u.knots): u for u in reversed([*unknowns(self.scaled, self.problem.form)])
+            }.values()
         )[::-1]
 
     def constant(self) -> Unknown:
         """A constant P of that form."""
-        return constant(self.problem, self.asked.form)
+        return constant(self.scaled, self.problem.form)
 
     def varies(self, shape: Unknown) -> bool:
         """Whether P depends on p."""
@@ -75,16 +80,13 @@ class OneParameter(Ladder):
     @property
     def elevation(self) -> int:
         """How far the degree of the Bernstein forms is raised."""
-        assert isinstance(self.asked.impose, Bernstein)  # noqa: S101 - see `Question`
-        return self.asked.impose.elevation
+        assert isinstance(self.problem.impose, Bernstein)  # noqa: S101 - see `Problem`
+        return self.problem.impose.elevation
 
     def attempt(self, shape: Unknown, margin: float, alpha: float = 0.0) -> Found:
         """One P and one margin."""
         start = time.perf_counter()
-        if self.asked.solver.name == LYAPUNOV:
-            candidate = self._solve_by_products(shape, margin)
-        else:
-            candidate = self._solve_by_rounds(shape, margin)
+        candidate = self._solve(shape, margin)
         solved = time.perf_counter()
         found = self._judged(candidate, shape)
         self.spent += (
@@ -94,26 +96,31 @@ class OneParameter(Ladder):
         )
         verified = "verified" if found.proof is not None else "not verified"
         words = f"{candidate.message}, {verified}"
-        if self.asked.gains and found.proof is not None:
+        if self.problem.gains and found.proof is not None:
             words += f", gamma {found.bound:.6g}"
         program = f"{len(shape.knots) - 1} segments of degree {shape.degree}"
         self.attempts.append(Attempt(program, margin, words, found.bound))
         return found
 
+    def _solve(self, shape: Unknown, margin: float) -> Candidate:
+        if self.problem.solver.name == LYAPUNOV:
+            return self._solve_by_products(shape, margin)
+        return self._solve_by_rounds(shape, margin)
+
     def _solve_by_products(self, form: Unknown, margin: float) -> Candidate:
         """Solve with all blocks, kept as products with P."""
-        assert isinstance(form, Quadratic)  # noqa: S101 - see `Question`
-        blocks = form.products(self.problem, self.elevation)
-        sizes, floor = self.problem.sizes(form), self.asked.impose.least
+        assert isinstance(form, Quadratic)  # noqa: S101 - see `Problem`
+        blocks = form.products(self.scaled, self.elevation)
+        sizes, floor = self.scaled.sizes(form), self.problem.impose.least
         program = LyapunovProgram(blocks, sizes, margin, floor)
-        return interior_point.minimise(program, self.asked.solver)
+        return interior_point.minimise(program, self.problem.solver)
 
     def _solve_by_rounds(self, form: Unknown, margin: float) -> Candidate:
         """Solve with the blocks likely to bind, add those that came out violated, and so on: far
         fewer blocks in all.
         """
-        blocks = form.weighed(self.problem, self.elevation)
-        sizes = self.problem.sizes(form)
+        blocks = form.weighed(self.scaled, self.elevation)
+        sizes = self.scaled.sizes(form)
         active = [np.full(len(block.constant), block.likely) for block in blocks]
         seconds, rounds = 0.0, 0
         while True:
@@ -124,8 +131,8 @@ class OneParameter(Ladder):
                 if which.any()
             ]
             candidate = solve(
-                assemble(chosen, sizes, margin, self.asked.impose.least, form.null),
-                self.asked.solver,
+                assemble(chosen, sizes, margin, self.problem.impose.least, form.null),
+                self.problem.solver,
             )
             seconds += candidate.seconds
             if candidate.x is None or rounds == ROUNDS or all(which.all() for which in active):
@@ -134,7 +141,7 @@ class OneParameter(Ladder):
             level = candidate.x[-1]
             target = (
                 np.diag(np.r_[np.zeros(sizes.strict), np.full(sizes.inputs, level)])
-                if self.asked.gains
+                if self.problem.gains
                 else -level * np.eye(sizes.rows)
             )
             added = 0
@@ -153,19 +160,19 @@ class OneParameter(Ladder):
 
     def proposed(self) -> Found:
         """What a constant P proves, a storage function of the model at mid-range."""
-        start, problem, best = time.perf_counter(), self.dissipating, Found(math.inf)
-        if problem is not None:
-            knots, middle = self.constant().knots, problem.lpv.at(problem.lpv.scheduling.middle)
+        start, scaled, best = time.perf_counter(), self.dissipating, Found(math.inf)
+        if scaled is not None:
+            knots, middle = self.constant().knots, scaled.lpv.at(scaled.lpv.scheduling.middle)
             for above in ABOVE:
-                P = problem.units.storage(middle, above)
+                P = scaled.units.storage(middle, above)
                 if P is None:
                     continue
                 lyapunov = SplineLyapunov(knots, 0, P[None])
-                best = self._proven(problem, lyapunov, Answer.UNTRIED)
+                best = self._proven(scaled, lyapunov, Answer.UNTRIED)
                 if best.proof is not None:
                     word = f"verified, gamma {best.bound:.6g}"
                     self.attempts.append(Attempt("a Riccati equation", 0.0, word, best.bound))
-                    self.unit = problem.units.channel
+                    self.unit = scaled.units.channel
                     break
         self.spent[2] += time.perf_counter() - start
         return best
@@ -174,27 +181,29 @@ class OneParameter(Ladder):
         """Programs are solved in the first units in which the gain of the model frozen at mid-range
         is found, or nearly: whether numbers limit a bound is told by that.
         """
-        start, shape, p = time.perf_counter(), self.constant(), self.problem.lpv.scheduling.middle
+        start, shape, p = time.perf_counter(), self.constant(), self.scaled.lpv.scheduling.middle
         if self.dissipating is not None and isinstance(shape, Quadratic):
-            gain = norm(*self.problem.lpv.matrices(p), self.problem.lpv.dt)[0]
-            for problem in (self.problem, self.dissipating):
-                excess = self._frozen_gain(problem, shape, p) / gain - 1 if gain > 0 else 0.0
+            gain = norm(*self.scaled.lpv.matrices(p), self.scaled.lpv.dt)[0]
+            for scaled in (self.scaled, self.dissipating):
+                excess = self._frozen_gain(scaled, shape, p) / gain - 1 if gain > 0 else 0.0
                 if not excess >= self.rounding:
-                    self.problem, self.rounding = problem, excess
+                    self.scaled, self.rounding = scaled, excess
                 if excess <= CLOSE:
                     break
         self.spent[1] += time.perf_counter() - start
-        return self.problem.units.channel
+        return self.scaled.units.channel
 
-    def _frozen_gain(self, problem: Problem, shape: Quadratic, p: float) -> float:
-        """What is proven of the model frozen at p by a program in the units of this problem."""
-        whole, self.problem = self.problem, problem.frozen(p)
-        margin = self.asked.impose.tried[0]
+    def _frozen_gain(self, scaled: ScaledProblem, shape: Quadratic, p: float) -> float:
+        """What is proven of the model frozen at p by a program in these units."""
+        whole, self.scaled = self.scaled, scaled.frozen(p)
+        margin = self.problem.impose.tried[0]
         solve = (
-            self._solve_by_products if self.asked.solver.name == LYAPUNOV else self._solve_by_rounds
+            self._solve_by_products
+            if self.problem.solver.name == LYAPUNOV
+            else self._solve_by_rounds
         )
         found = self._judged(solve(shape, margin), shape)
-        self.problem = whole
+        self.scaled = whole
         return found.bound
 
     def _judged(self, candidate: Candidate, shape: Unknown) -> Found:
@@ -203,22 +212,22 @@ class OneParameter(Ladder):
         if candidate.x is None:
             return Found(math.inf, None, answer)
         # a largest margin of nothing, for fewer blocks or for all of them: there is no P
-        if not self.asked.gains and candidate.x[-1] <= NOTHING and answer is Answer.SOLVED:
+        if not self.problem.gains and candidate.x[-1] <= NOTHING and answer is Answer.SOLVED:
             answer = Answer.INFEASIBLE
         P = shape.lyapunov(candidate.x)
-        found = self._proven(self.problem, P, answer)
-        if self.problem is self.dissipating:
+        found = self._proven(self.scaled, P, answer)
+        if self.scaled is self.dissipating:
             # nearer to P = I, which has margins of one, where rounding leaves this one none
             for share in TOWARDS:
                 if found.proof is not None:
                     break
                 inner = (1 - share) * P.coefficients + share * np.eye(P.coefficients.shape[-1])
-                found = self._proven(self.problem, replace(P, coefficients=inner), answer)
+                found = self._proven(self.scaled, replace(P, coefficients=inner), answer)
         return found
 
-    def _proven(self, problem: Problem, P: Lyapunov, answer: Answer) -> Found:
+    def _proven(self, scaled: ScaledProblem, P: Lyapunov, answer: Answer) -> Found:
         """What P in scaled units proves, judged as it is stored: in physical units."""
-        units, evidence = problem.units, problem.evidence(self.elevation)
+        units, evidence = scaled.units, scaled.evidence(self.elevation)
         P = P.in_units(units.left, units.channel**2, 1.0 / units.time, units.multiplier)
         least, conditioning = evidence.least_gain(P)
         gamma = inflated(least, units.channel)

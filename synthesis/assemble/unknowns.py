@@ -38,7 +38,7 @@ from synthesis.proof.one_parameter import Evidence
 Array = np.ndarray
 
 
-class Problem(NamedTuple):
+class ScaledProblem(NamedTuple):
     """What every attempt shares: the model in physical units for the proof, in scaled ones for the
     search.
     """
@@ -65,11 +65,11 @@ class Problem(NamedTuple):
         d = 0 if self.block is None else self.block.inputs
         return Sizes(form.size, len(self.lpv.inputs) - d, form.unknowns, d, form.multipliers)
 
-    def in_units(self, units: Scaling) -> Problem:
+    def in_units(self, units: Scaling) -> ScaledProblem:
         """The same in other units."""
         return self._replace(units=units, scaled=units.of_pieces(self.pieces, self.block))
 
-    def frozen(self, p: float) -> Problem:
+    def frozen(self, p: float) -> ScaledProblem:
         """That of the model frozen at p, without a block, in the same units."""
         lpv = LPVStateSpace.constant(self.lpv.at(p), self.lpv.scheduling)
         return self._replace(lpv=lpv, rate=0.0, pieces=model_pieces(lpv)).in_units(self.units)
@@ -82,7 +82,7 @@ class Problem(NamedTuple):
 
 def scaled_problem(
     model: LPVStateSpace | UncertainStateSpace, rate: float, gain: float, *, with_gain: bool
-) -> Problem:
+) -> ScaledProblem:
     """The model scaled for an expected `gain`; without channels where only stability is asked."""
     if isinstance(model, UncertainStateSpace):
         lpv, block = open_block(model, channels=with_gain)
@@ -92,7 +92,7 @@ def scaled_problem(
         units = scaling(lpv, gain)
     pieces = model_pieces(lpv)
     searched = units.of_pieces(rounded(lpv, pieces), block)
-    return Problem(lpv, rate, pieces, searched, units, with_gain, block)
+    return ScaledProblem(lpv, rate, pieces, searched, units, with_gain, block)
 
 
 class Unknown(ABC):
@@ -114,14 +114,14 @@ class Unknown(ABC):
         """Number of coefficients of P."""
 
     @abstractmethod
-    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
+    def blocks(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
         """The LMIs, their Bernstein degree raised by `extra`."""
 
     @abstractmethod
     def lyapunov(self, x: Array) -> Lyapunov:
         """V at the solver's point x, in scaled units."""
 
-    def weighed(self, problem: Problem, extra: int) -> list[Blocks]:
+    def weighed(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
         """The same in coordinates in which slow and fast states count alike."""
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return [block.congruent(W) for block in self.blocks(problem, extra)]
@@ -159,7 +159,7 @@ class Quadratic(Unknown):
         e = self.multiplier_degree
         return 0 if e is None else (len(self.knots) - 1) * e + 1
 
-    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
+    def blocks(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
         """One block per Bernstein coefficient, cell or strip, and sign of the rate."""
         own = self._multiplier(problem)
         if problem.lpv.dt is None:
@@ -168,11 +168,11 @@ class Quadratic(Unknown):
             return list(continuous_blocks(regions, self.knots, self.degree, rate, extra, own))
         return list(discrete_blocks(self._strips(problem), self.knots, self.degree, extra, own))
 
-    def _multiplier(self, problem: Problem) -> Multiplier | None:
+    def _multiplier(self, problem: ScaledProblem) -> Multiplier | None:
         e, block = self.multiplier_degree, problem.block
         return None if e is None or block is None else Multiplier(block, e)
 
-    def products(self, problem: Problem, extra: int) -> tuple[LyapunovBlocks, ...]:
+    def products(self, problem: ScaledProblem, extra: int) -> tuple[LyapunovBlocks, ...]:
         """The same blocks as products with P, in coordinates in which slow and fast states count
         alike.
         """
@@ -186,7 +186,7 @@ class Quadratic(Unknown):
         W = extended(problem.units.weight, len(problem.lpv.inputs))
         return tuple(block.congruent(W) for block in every)
 
-    def _strips(self, problem: Problem) -> tuple[Strip, ...]:
+    def _strips(self, problem: ScaledProblem) -> tuple[Strip, ...]:
         step = problem.step if self.degree else 0.0
         return strips(problem.scaled, self.knots, (-step, step))
 
@@ -214,7 +214,7 @@ class OfMonomials(Quadratic):
         for name, value in {"states": states, "order": order, "null": svec(matrices)}.items():
             object.__setattr__(self, name, value)
 
-    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
+    def blocks(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
         """As for a quadratic V, of the linear system that the monomials follow."""
         N = self.size
         lifted = tuple(
@@ -228,7 +228,7 @@ class OfMonomials(Quadratic):
         )
         return super().blocks(problem._replace(scaled=lifted), extra)
 
-    def weighed(self, problem: Problem, extra: int) -> list[Blocks]:
+    def weighed(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
         """The blocks as they are: what is added to them is in the coordinates of P."""
         return self.blocks(problem, extra)
 
@@ -266,7 +266,7 @@ class Remembering(Unknown):
         """Number of coefficients of P."""
         return ((len(self.knots) - 1) * self.degree + 1) * self._across
 
-    def blocks(self, problem: Problem, extra: int) -> list[Blocks]:
+    def blocks(self, problem: ScaledProblem, extra: int) -> list[Blocks]:
         """One block per Bernstein coefficient in p and across, patch, and sign of the rate."""
         regions = cells(problem.scaled, self.knots)
         return list(
@@ -287,7 +287,7 @@ class Remembering(Unknown):
         return MemoryLyapunov(self.region, self.degree, self.lead_knots, self.lead_degree, P)
 
 
-def unknowns(problem: Problem, form: LyapunovForm) -> Iterator[Unknown]:
+def unknowns(problem: ScaledProblem, form: LyapunovForm) -> Iterator[Unknown]:
     """The finer and finer P to try in turn."""
     n, sampled = len(problem.lpv.states), problem.lpv.dt is not None
     many = isinstance(form, Spline) and n > MANY
@@ -316,14 +316,14 @@ def unknowns(problem: Problem, form: LyapunovForm) -> Iterator[Unknown]:
             yield Quadratic(knots, degree, n, _multiplier_degree(problem, degree))
 
 
-def _multiplier_degree(problem: Problem, degree: int) -> int | None:
+def _multiplier_degree(problem: ScaledProblem, degree: int) -> int | None:
     """That of P, which then alone says of which degree the LMIs are, at least 1: a constant P says
     nothing of where the block weighs most.
     """
     return None if problem.block is None else max(degree, 1)
 
 
-def constant(problem: Problem, form: LyapunovForm) -> Unknown:
+def constant(problem: ScaledProblem, form: LyapunovForm) -> Unknown:
     """A constant P, which proves for every rate what it proves for jumps."""
     n, knots = len(problem.lpv.states), _knots(problem, form, 8, 0)
     if isinstance(form, HigherOrder):
@@ -331,7 +331,7 @@ def constant(problem: Problem, form: LyapunovForm) -> Unknown:
     return Quadratic(knots, 0, n, _multiplier_degree(problem, 0))
 
 
-def _knots(problem: Problem, form: LyapunovForm, segments: int, degree: int) -> Array:
+def _knots(problem: ScaledProblem, form: LyapunovForm, segments: int, degree: int) -> Array:
     low, high = problem.pieces[0].low, problem.pieces[-1].high
     breaks = [piece.low for piece in problem.pieces[1:]]
     if degree and 2.5 * problem.step >= high - low:

@@ -158,7 +158,7 @@ class Controller:
         so, with the misfit of the sampled plant. `synthesis.certify_sampled` proves that of a plant
         with servos and delay as they are.
         """
-        from synthesis.analysis.l2_gain import l2_gain
+        from synthesis.analysis.questions import l2_gain
 
         loop = self.closed()
         rests = [SAMPLED.format(dt=self.dt)] if self.loop_plant is not self.plant else []

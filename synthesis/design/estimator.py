@@ -67,7 +67,7 @@ class Estimator:
 
     def certify(self, rate: Any = None, **options: Any) -> Certificate:
         """The proven gain of the error: `synthesis.l2_gain`."""
-        from synthesis.analysis.l2_gain import l2_gain
+        from synthesis.analysis.questions import l2_gain
 
         return l2_gain(self.error, rate, **options)
 

@@ -9,7 +9,7 @@ from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace
 from symheli.lpv.linear_model import LinearModel
 from symheli.threads import with_one_thread
-from synthesis.analysis.stability import stability
+from synthesis.analysis.questions import stability
 from synthesis.design.as_controller import as_controller
 from synthesis.design.largest import largest
 from synthesis.design.plant import Plant, require_plant

@@ -16,7 +16,7 @@ from symheli.errors import InputError
 from symheli.lpv import LPVStateSpace, UncertainStateSpace
 from symheli.threads import with_one_thread
 from symheli.values.summary import summarized
-from synthesis.analysis.l2_gain import l2_gain
+from synthesis.analysis.questions import l2_gain
 from synthesis.certificate import Certificate
 from synthesis.cover import Remainder, covering
 from synthesis.design.controller import Controller

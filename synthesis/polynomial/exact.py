@@ -106,6 +106,17 @@ def _pivots_are_positive(M: Array) -> bool:
     return True
 
 
+def growth_of(alpha: float, dt: float) -> float:
+    """exp(2 alpha dt) or a few units in the last place more: what is proven with it holds for
+    alpha, however exp and its argument are rounded.
+    """
+    if alpha == 0.0:
+        return 1.0
+    exponent = 2.0 * alpha * dt
+    exponent += 4.0 * math.ulp(exponent)
+    return math.exp(exponent) * (1.0 + 8.0 * math.ulp(1.0))
+
+
 def exact(values: Any, number: Number) -> Array:
     """The doubles as numbers of the arithmetic."""
     values = np.asarray(values, dtype=float)

@@ -257,16 +257,7 @@ def pieces(model: LPVStateSpace) -> Pieces:
     """The model in polynomial pieces over its box."""
     s = model.parameters
     if len(s) == 1:
-        parts = model_pieces(model)
-        models = {
-            (k,): tuple(
-                PolynomialMatrix(((piece.low, piece.high),), M)
-                for M in (piece.A, piece.B, piece.C, piece.D)
-            )
-            for k, piece in enumerate(parts)
-        }
-        breaks = ((parts[0].low, *(piece.high for piece in parts)),)
-        return Pieces(model, s, breaks, models, model.dt)
+        return joined(model, model_pieces(model))
     basis = model.basis
     if not isinstance(basis, Product):
         raise InputError(
@@ -284,6 +275,16 @@ def pieces(model: LPVStateSpace) -> Pieces:
         )
     breaks = tuple((axis[0].low, *(piece.high for piece in axis)) for axis in axes)
     return Pieces(model, s, breaks, models, model.dt)
+
+
+def joined(model: LPVStateSpace, parts: Sequence[ModelPiece]) -> Pieces:
+    """The `parts` of a model of one parameter, in any units."""
+    models = {
+        (k,): tuple(PolynomialMatrix(((piece.low, piece.high),), M) for M in piece[2:])
+        for k, piece in enumerate(parts)
+    }
+    breaks = ((parts[0].low, *(piece.high for piece in parts)),)
+    return Pieces(model, model.parameters, breaks, models, model.dt)
 
 
 def _along_axes(

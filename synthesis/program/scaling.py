@@ -106,8 +106,12 @@ class Scaling(NamedTuple):
 
     def of_model(self, model: LinearModel) -> Matrices:
         """A frozen model in these units."""
-        pieces = [ModelPiece(0.0, 1.0, *(M[None] for M in (model.A, model.B, model.C, model.D)))]
-        return Matrices(*(M[0] for M in self.of_pieces(pieces)[0][2:]))
+        every = self.of_matrices(Matrices(*(M[None] for M in (model.A, model.B, model.C, model.D))))
+        return Matrices(*(M[0] for M in every))
+
+    def of_matrices(self, model: Matrices, block: NormBounded | None = None) -> Matrices:
+        """The matrices (K, ...) of a model in these units, as `of_pieces`."""
+        return Matrices(*self.of_pieces([ModelPiece(0.0, 1.0, *model)], block)[0][2:])
 
     def to_physical(self, P: Array) -> Array:
         """Lyapunov matrices in physical units from those in z."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise, product
 from typing import NamedTuple
 
@@ -22,13 +23,13 @@ from symheli.progress import tracked
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.polynomial import structure
 from synthesis.polynomial.definite import negative_definite, negative_definite_exactly
-from synthesis.polynomial.exact import Number, exact, positive_definite, rational
+from synthesis.polynomial.exact import Number, exact, rational
 from synthesis.polynomial.matrix import PolynomialMatrix
 from synthesis.polynomial.pieces import Pieces
 from synthesis.polynomial.regions import convert, regions
-from synthesis.polynomial.symmetric import symmetrized
+from synthesis.program.scaling import Scaling
 from synthesis.proof import pointwise
-from synthesis.proof.inequalities import Demand, Pair, decrease, growth_of, peak, positivity
+from synthesis.proof.inequalities import Demand, Pair, decrease, peak, positivity
 
 Array = np.ndarray
 
@@ -39,6 +40,9 @@ LADDER = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 FURTHER = (1e2, 1e4, 1e6)
 """Steps beyond, where the model has no response to compare rounding with."""
 
+GRID = 100
+"""Values of p at which a proof is checked in floating point."""
+
 WITNESSES = 40
 """Values of several parameters at which a proof is checked once more, through the model's own
 matrices.
@@ -48,37 +52,13 @@ TINY = 1e-8
 """Least g in scaled units: a model without response is given a small gain rather than none."""
 
 
-class Units(NamedTuple):
-    """x = right z, left = right^-1; units of inputs, outputs, time (s) and of V in which the
-    numbers are of order one.
-
-    `weight` as in `Scaling`.
-    """
-
-    left: Array
-    right: Array
-    inputs: float
-    outputs: float
-    time: float
-    storage: float
-    weight: Array
-
-    def to_physical(self, P: Array) -> Array:
-        """P of V in physical units from that in z."""
-        return symmetrized(self.storage * self.left.T @ P @ self.left)
-
-    def to_scaled(self, P: Array) -> Array:
-        """The inverse."""
-        return symmetrized(self.right.T @ P @ self.right / self.storage)
-
-
 class Evidence(NamedTuple):
     """A model and what is asked of it, against which any P and bound can be checked; `demand.shift`
     is left to the bound.
     """
 
     model: Pieces
-    units: Units
+    units: Scaling
     demand: Demand
 
     @property
@@ -106,35 +86,47 @@ class Evidence(NamedTuple):
             return "the pieces are not those of the model"
         if kind == "energy-to-peak gain" and self.model.passes_peaks:
             return "the energy-to-peak gain of a continuous model needs D = 0"
-        u = self.units
         return structure.first(
             P.fault_for([(s.low, s.high) for s in self.model.parameters], self.model.sizes[0]),
-            structure.coordinates(
-                u.left, u.right, (u.inputs, u.outputs, u.time, u.storage), self.model.sizes[0]
-            ),
-            structure.symmetric(np.asarray(u.weight), (self.model.sizes[0],) * 2, "the weight"),
+            self.units.fault(self.model.sizes[0]),
         )
 
     @property
     def scaled(self) -> tuple[Pieces, Demand]:
-        """Model and demand in the scaled units."""
-        u = self.units
-        time = u.time if self.model.dt is None else 1.0
-        return self.model.scaled(
-            u.left, u.right, u.inputs, u.outputs, u.time
-        ), self.demand._replace(time=time)
+        """Model and demand in the scaled units; outputs per root of time where their energy counts,
+        and as they are where their peaks do.
+        """
+        u, root = self.units, math.sqrt(self.units.time)
+        outputs = u.channel if self._peaks else u.channel / root
+        model = self.model.scaled(u.left, u.right, 1 / root, outputs, u.time)
+        return model, self.demand._replace(time=u.time if model.dt is None else 1.0)
+
+    @property
+    def _peaks(self) -> bool:
+        return self.demand.kind == "energy-to-peak gain"
 
     def in_units(self, value: float) -> float:
         """A physical gain (decay rate, 1/s) in the scaled units."""
-        u = self.units
         if self.demand.kind == "decay rate":
-            return value * u.time if self.model.dt is None else value
-        channel = (
-            u.outputs
-            if self.demand.kind == "energy-to-peak gain"
-            else u.outputs * math.sqrt(u.time)
-        )
-        return value / channel
+            return value * self.units.time if self.model.dt is None else value
+        return value / self.units.channel
+
+    def to_physical(self, P: Array) -> Array:
+        """Lyapunov matrices of V in physical units, squared outputs times seconds or, where peaks
+        count, squared inputs times seconds, from those in scaled ones.
+        """
+        return self.units.to_physical(P) / self._input_energy
+
+    def to_scaled(self, P: Array) -> Array:
+        """The inverse of `to_physical`."""
+        return self.units.to_scaled(P) * self._input_energy
+
+    def _back(self, P: BoxLyapunov) -> BoxLyapunov:
+        return replace(P, coefficients=self.to_scaled(P.coefficients))
+
+    @property
+    def _input_energy(self) -> float:
+        return self.units.channel**2 if self._peaks else 1.0
 
     def sampled(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float]:
         """(P, the bound it admits at `points` values of each parameter in every region); inf
@@ -143,11 +135,11 @@ class Evidence(NamedTuple):
         For the energy-to-peak gain P is scaled so that its first inequality just holds; NaN for
         stability.
         """
-        kind, units = self.demand.kind, self.units
+        kind = self.demand.kind
         model, demand = self.scaled
         if not demand.meaningful(model.dt, P.degrees):
             return P, -math.inf if kind == "decay rate" else math.inf
-        back = BoxLyapunov(P.knots, P.degrees, units.to_scaled(P.coefficients))
+        back = self._back(P)
         if kind == "stability":
             return P, math.nan
         samples = _samples(model, back, demand, points)
@@ -158,8 +150,8 @@ class Evidence(NamedTuple):
         if kind == "l2 gain" or not 0 < g < math.inf:
             return P, math.sqrt(g) / self.in_units(1.0)
         factor = 1.0 / (g * (1 + LADDER[0]))
-        P = BoxLyapunov(P.knots, P.degrees, P.coefficients * factor)
-        back = BoxLyapunov(P.knots, P.degrees, units.to_scaled(P.coefficients))
+        P = replace(P, coefficients=P.coefficients * factor)
+        back = self._back(P)
         return P, math.sqrt(_samples(model, back, demand, points).peak()) / self.in_units(1.0)
 
     def least(self, P: BoxLyapunov, points: int) -> tuple[BoxLyapunov, float] | None:
@@ -185,7 +177,7 @@ class Evidence(NamedTuple):
                 )
             )
             if kind == "energy-to-peak gain":
-                trial = BoxLyapunov(P.knots, P.degrees, P.coefficients / (1 + fraction))
+                trial = replace(P, coefficients=P.coefficients / (1 + fraction))
                 bound *= math.sqrt(1 + fraction)
             else:
                 trial = P
@@ -200,7 +192,7 @@ class Evidence(NamedTuple):
         between; inf where P is not positive.
         """
         axes = [np.unique([np.linspace(a, b, 5) for a, b in pairwise(k)]) for k in P.knots]
-        values = np.linalg.eigvalsh(self.units.to_scaled(P.at(np.array(list(product(*axes))))))
+        values = np.linalg.eigvalsh(self.to_scaled(P.at(np.array(list(product(*axes))))))
         return float((values[:, -1] / values[:, 0]).max()) if values.min() > 0 else math.inf
 
     def floating(self, P: BoxLyapunov, bound: float) -> bool:
@@ -208,7 +200,7 @@ class Evidence(NamedTuple):
         model, demand = self.scaled
         if not demand.meaningful(model.dt, P.degrees) or math.isinf(bound):
             return False
-        back = BoxLyapunov(P.knots, P.degrees, self.units.to_scaled(P.coefficients))
+        back = self._back(P)
         if not all(
             map(negative_definite, polynomials(model, back, demand, self.in_units(bound), float))
         ):
@@ -230,75 +222,51 @@ class Evidence(NamedTuple):
         """The pieces are the model, and the inequalities hold at some p without them; see
         `pointwise`.
         """
-        model, demand, dt = self.model, self.demand, self.model.dt
-        box = [(s.low, s.high) for s in model.parameters]
-        # the breaks of the model's own functions, whatever the pieces say
-        axes = [
-            pointwise.inside(
-                [*knots, *(q.low for q in factor.pieces() if s.low < q.low < s.high), *breaks]
+        points = self._points(P, 1, WITNESSES)
+        own = self.model.at(points)
+        if not all(self._reproduced(p, [M[k] for M in own]) for k, p in enumerate(points)):
+            return False
+        every = (
+            F
+            for k, p in enumerate(points)
+            for F in pointwise.inequalities(
+                *(P, p, Matrices(*(exact(M[k], number) for M in own)), self.demand),
+                *(self.model.dt, bound, number),
             )
-            for factor, s, breaks, knots in zip(
-                factors_of(model.source.basis), model.parameters, model.breaks, P.knots, strict=True
-            )
-        ]
-        # all of a single axis, of several a diagonal through their product
-        count = WITNESSES if len(axes) > 1 else len(axes[0])
-        points = np.array(
-            [
-                [axis[(k * (3 * i + 1)) % len(axis)] for i, axis in enumerate(axes)]
-                for k in range(count)
-            ]
         )
-        points = points[[demand.motion.reaches([(q, q) for q in p]) for p in points]]
-        own = model.at(points)
-        alpha = number(bound) if demand.kind == "decay rate" else number(0.0)
-        g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
-        for k, p in enumerate(points):
-            if not self._reproduced(p, [M[k] for M in own]):
-                return False
-            A, B, C, D = (exact(M[k], number) for M in own)
-            here, slopes = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, p, number)
-            forms: list[Array] = [-here]
-            through = Matrices(A, B, C, D)
-            if demand.kind == "energy-to-peak gain":
-                # V grows by at most the energy of the input, and the outputs are seen by it
-                through = Matrices(A, B, C * 0, D * 0)
-                if dt is None:
-                    forms.append(-np.block([[here, C.T], [C, np.eye(len(C), dtype=int) * g]]))
-                else:
-                    eye, zero = (
-                        np.eye(B.shape[1], dtype=int) * number(1.0),
-                        np.zeros((A.shape[0], B.shape[1]), dtype=int) * number(1.0),
-                    )
-                    forms.append(
-                        -np.block(
-                            [
-                                [here, zero, C.T],
-                                [zero.T, eye, D.T],
-                                [C, D, np.eye(len(C), dtype=int) * g],
-                            ]
-                        )
-                    )
-            level = number(1.0) if demand.kind == "energy-to-peak gain" else g
-            if dt is None:
-                for pace in pointwise.paces(p, demand.rates, demand.motion.ties, P.degrees, number):
-                    drift = 2 * alpha * here
-                    for nu, slope in zip(pace, slopes, strict=True):
-                        drift = drift + nu * slope
-                    forms.append(pointwise.dissipation(through, here, drift, None, level))
-            else:
-                growth = (
-                    number(growth_of(bound, dt)) if demand.kind == "decay rate" else number(1.0)
-                )
-                spans = pointwise.spans(p, demand.rates, demand.motion.ties, P.degrees, box, dt)
-                for q in pointwise.reached(p, spans, box):
-                    after = pointwise.tensor_spline(P.knots, P.degrees, P.coefficients, q, number)[
-                        0
-                    ]
-                    forms.append(pointwise.dissipation(through, here, None, after * growth, level))
-            if not all(positive_definite(-F) for F in forms):
-                return False
-        return True
+        return pointwise.negative(every, number)
+
+    def on_grid(self, P: BoxLyapunov, bound: float) -> bool:
+        """The same in floating point at more p, in scaled units."""
+        u, points, (_, demand) = self.units, self._points(P, GRID, GRID), self.scaled
+        model = u.of_matrices(self.model.at(points))
+        if self._peaks:
+            C, D = (M / math.sqrt(u.time) for M in (model.C, model.D))
+            model = model._replace(C=C, D=D)
+        back, bound = self._back(P), self.in_units(bound)
+        every = (
+            F
+            for k, p in enumerate(points)
+            for F in pointwise.inequalities(
+                *(back, p, Matrices(*(M[k] for M in model)), demand, self.model.dt, bound, float),
+            )
+        )
+        return pointwise.negative(every, float, u.weight)
+
+    def _points(self, P: BoxLyapunov, least: int, count: int) -> Array:
+        """Values of p that it can take for good, on every stretch between knots of P and breaks of
+        the model's own functions, whatever the pieces say.
+        """
+        axes = []
+        for factor, s, breaks, knots in zip(
+            factors_of(self.model.source.basis),
+            *(self.model.parameters, self.model.breaks, P.knots),
+            strict=True,
+        ):
+            own = (q.low for q in factor.pieces() if s.low < q.low < s.high)
+            axes.append(pointwise.inside([*knots, *own, *breaks], least))
+        points = pointwise.combined(axes, count)
+        return points[[self.demand.motion.reaches([(q, q) for q in p]) for p in points]]
 
     def _reproduced(self, p: Array, own: list[Array]) -> bool:
         index = tuple(
@@ -312,72 +280,6 @@ class Evidence(NamedTuple):
             ):
                 return False
         return True
-
-    def on_grid(self, P: BoxLyapunov, bound: float) -> bool:
-        """The inequalities at a grid of p and the corners of what p may do next, written out
-        without polynomials.
-        """
-        m = len(self.model.parameters)
-        count = {1: 101, 2: 11}.get(m, 4)
-        grid = np.array(
-            list(product(*(np.linspace(s.low, s.high, count) for s in self.model.parameters)))
-        )
-        grid = grid[[self.demand.motion.reaches([(q, q) for q in p]) for p in grid]]
-        A, B, C, D = self.model.at(grid)
-        T = self.units.right @ self.units.weight
-        here = P.at(grid)
-        if np.linalg.eigvalsh(T.T @ here @ T).min() <= 0:
-            return False
-        kind, nx, nu = self.demand.kind, T.shape[0], B.shape[2]
-        alpha = bound if kind == "decay rate" else 0.0
-        g = bound**2
-        for move in self._moves(P, grid, here, A, B, alpha):
-            F = move
-            if kind == "l2 gain":
-                Y = np.concatenate([C, D], axis=2)
-                F = F + np.swapaxes(Y, 1, 2) @ Y
-            if kind in ("l2 gain", "energy-to-peak gain"):
-                F[:, nx:, nx:] -= (g if kind == "l2 gain" else 1.0) * np.eye(nu)
-            else:
-                F = F[:, :nx, :nx]
-            W = np.eye(F.shape[1])
-            W[:nx, :nx] = T
-            if np.linalg.eigvalsh(W.T @ F @ W).max() >= 0:
-                return False
-        if kind == "energy-to-peak gain":
-            size = C @ np.linalg.solve(here, np.swapaxes(C, 1, 2)) + D @ np.swapaxes(D, 1, 2)
-            return bool(np.linalg.eigvalsh(size).max() < g)
-        return True
-
-    def _moves(
-        self, P: BoxLyapunov, grid: Array, here: Array, A: Array, B: Array, alpha: float
-    ) -> Iterator[Array]:
-        nx, nu, dt = A.shape[1], B.shape[2], self.model.dt
-        M = np.concatenate([A, B], axis=2)
-        E = np.concatenate([np.eye(nx), np.zeros((nx, nu))], axis=1)
-        if dt is None:
-            still = E.T @ here @ M + np.swapaxes(M, 1, 2) @ here @ E + 2 * alpha * E.T @ here @ E
-            for drift in self.demand.motion.drifts(self.demand.moving(P.degrees)):
-                move = still.copy()
-                for i, (rate, tie) in enumerate(zip(drift.rates, drift.ties, strict=True)):
-                    if rate == 0 and tie is None:
-                        continue
-                    pace = rate if tie is None else grid[:, tie, None, None]
-                    move += pace * (E.T @ P.derivative(grid, i) @ E)
-                yield move
-            return
-        low, high = np.array([(s.low, s.high) for s in self.model.parameters]).T
-        motion, moving = self.demand.motion, self.demand.moving(P.degrees)
-        back, on = np.zeros_like(grid), np.zeros_like(grid)
-        for k, p in enumerate(grid):
-            for i in np.flatnonzero(moving).tolist():
-                back[k, i], on[k, i] = motion.span(i, [(q, q) for q in p], dt)
-        back, on = np.maximum(back, low - high), np.minimum(on, high - low)
-        for shares in product((0.0, 0.5, 1.0), repeat=sum(moving)):
-            share = np.zeros(len(low))
-            share[moving] = shares
-            there = P.at(np.clip(grid + back + share * (on - back), low, high))
-            yield math.exp(2 * alpha * dt) * np.swapaxes(M, 1, 2) @ there @ M - E.T @ here @ E
 
 
 def polynomials(

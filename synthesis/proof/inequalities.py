@@ -23,16 +23,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from synthesis.certificate import Kind
-from synthesis.polynomial.exact import Number, exact
+from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
+from synthesis.norm_bounded import NormBounded
+from synthesis.polynomial.exact import Number, exact, growth_of
 from synthesis.polynomial.matrix import PolynomialMatrix, block
 from synthesis.polynomial.motion import Drift, Motion
 from synthesis.polynomial.pieces import Pieces
-from synthesis.polynomial.regions import Region, model_on, now, successor
+from synthesis.polynomial.regions import Region, convert, model_on, now, regions, successor
+from synthesis.polynomial.symmetric_power import generator, null_matrix
 
 Array = np.ndarray
 
@@ -79,17 +83,6 @@ class Pair(NamedTuple):
     there: PolynomialMatrix
 
 
-def growth_of(alpha: float, dt: float) -> float:
-    """exp(2 alpha dt) or a few units in the last place more: what is proven with it holds for
-    alpha, however exp and its argument are rounded.
-    """
-    if alpha == 0.0:
-        return 1.0
-    exponent = 2.0 * alpha * dt
-    exponent += 4.0 * math.ulp(exponent)
-    return math.exp(exponent) * (1.0 + 8.0 * math.ulp(1.0))
-
-
 def positivity(P: PolynomialMatrix) -> PolynomialMatrix:
     """-P, which must be negative definite."""
     return -P
@@ -102,32 +95,42 @@ def decrease(
     rates.
     """
     m = len(model.parameters)
-    A, B, C, D = model_on(model, region, number)
-    here = now(P.here, region, number)
-    gain = demand.kind == "l2 gain"
-    channels = demand.kind in ("l2 gain", "energy-to-peak gain")
+    system, here = model_on(model, region, number), now(P.here, region, number)
+    moving = demand.moving(here.degrees)
     if model.dt is not None:
-        moving = demand.moving(P.here.degrees)
         there = successor(P.there, region, number, moving)
-        unit = there.box[m:]
-        A, B, C, D, here = (M.extend(unit) for M in (A, B, C, D, here))
+        system, here = [M.extend(there.box[m:]) for M in system], here.extend(there.box[m:])
         growth = number(growth_of(demand.shift, model.dt))
-        top = there.congruence(A) * growth - here
-        side, corner = A.T @ there @ B, there.congruence(B)
-        drifts: list[Any] = [None]
+        yield from dissipation(system, here, demand.kind, after=there * growth)
+        return
+    drifts = [_slope(here, drift, demand.time, number) for drift in demand.motion.drifts(moving)]
+    if demand.shift:
+        rising = here * (2 * number(demand.shift))
+        drifts = [rising if drift is None else rising + drift for drift in drifts]
+    yield from dissipation(system, here, demand.kind, drifts)
+
+
+def dissipation(
+    system: Sequence[PolynomialMatrix],
+    P: PolynomialMatrix,
+    kind: Kind,
+    drifts: Sequence[PolynomialMatrix | None] = (None,),
+    after: PolynomialMatrix | None = None,
+) -> Iterator[PolynomialMatrix]:
+    """The blocks of the table above without the term in g for the `system` A, B, C, D; one for each
+    of the `drifts` dP/dt (None: 0), or in discrete time for P+ = `after`.
+    """
+    A, B, C, D = system
+    if after is not None:
+        top, side, corner = after.congruence(A) - P, A.T @ after @ B, after.congruence(B)
     else:
-        PA = here @ A
-        top = PA + PA.T + here * (2 * number(demand.shift)) if demand.shift else PA + PA.T
-        side, corner = here @ B, B.T @ B * 0
-        drifts = [
-            _slope(here, drift, demand.time, number)
-            for drift in demand.motion.drifts(demand.moving(here.degrees))
-        ]
-    if gain:
+        PA = P @ A
+        top, side, corner = PA + PA.T, P @ B, B.T @ B * 0
+    if kind == "l2 gain":
         top, side, corner = top + C.T @ C, side + C.T @ D, corner + D.T @ D
     for drift in drifts:
         whole = top if drift is None else top + drift
-        yield block([[whole, side], [side.T, corner]]) if channels else whole
+        yield block([[whole, side], [side.T, corner]]) if kind.endswith("gain") else whole
 
 
 def peak(model: Pieces, region: Region, P: PolynomialMatrix, number: Number) -> PolynomialMatrix:
@@ -140,6 +143,188 @@ def peak(model: Pieces, region: Region, P: PolynomialMatrix, number: Number) -> 
     eye = PolynomialMatrix.constant(exact(np.eye(nu), number), here.box)
     zero = PolynomialMatrix.constant(exact(np.zeros((nx, nu)), number), here.box)
     return -block([[here, zero, C.T], [zero.T, eye, D.T], [C, D, C @ C.T * 0]])
+
+
+class Form(NamedTuple):
+    """A block with g = 0, and the positive weight of g, (1, 1)."""
+
+    block: PolynomialMatrix
+    weight: PolynomialMatrix
+
+
+class Claim(NamedTuple):
+    """What is to be verified of a model of one parameter: P, and the rate (units of p per second).
+
+    `elevation` raises the degree of the Bernstein forms, which brings their coefficients closer to
+    the values.
+    """
+
+    model: Pieces
+    P: Lyapunov
+    rate: float
+    elevation: int = 0
+    block: NormBounded | None = None
+
+    @property
+    def strict(self) -> int:
+        """Rows of a block of the LMI to which g does not belong."""
+        return self.P.coefficients.shape[-1] + (0 if self.block is None else self.block.inputs)
+
+    @property
+    def meaningful(self) -> bool:
+        """False where a P that varies meets a p that may jump in continuous time: dV/dt has no
+        bound then.
+
+        False also where this form of V is not written for the model: a memory or a higher order in
+        discrete time or with channels, or a multiplier without a block and a block without one.
+        """
+        if (self.block is None) != (self.P.multiplier is None):
+            return False
+        if isinstance(self.P, MemoryLyapunov):
+            return self.model.dt is None and math.isfinite(self.rate)
+        if self.P.order > 1 and (self.model.dt is not None or any(self.model.sizes[1:])):
+            return False
+        return self.model.dt is not None or self.P.degree == 0 or math.isfinite(self.rate)
+
+    def invariant(self, number: Number) -> bool:
+        """Whether p, with its lag where P has one, stays where the claim is made."""
+        return not isinstance(self.P, MemoryLyapunov) or self.P.region.invariant(self.rate, number)
+
+
+def lmi_polynomials(claim: Claim, number: Number) -> Iterator[Form]:
+    """Every block over the whole range, with g = 0. `number` turns a double into the arithmetic of
+    the proof.
+    """
+    P, used = claim.P, 0
+    slack = (
+        None
+        if P.slack is None
+        else null_matrix(exact(P.slack, number), claim.model.sizes[0], P.order)
+    )
+    for F, weight in _polynomials(claim, number):
+        F = F.elevate((F.degrees[0] + claim.elevation, *F.degrees[1:]))
+        if slack is not None:
+            c = F.coefficients
+            own = slack[used : used + len(c)]
+            # where P carries too little of it the blocks stand as they are
+            c, used = np.concatenate([c[: len(own)] + own, c[len(own) :]]), used + len(own)
+            F = PolynomialMatrix(F.box, c)
+        yield Form(F, weight.elevate(F.degrees))
+
+
+def _polynomials(
+    claim: Claim, number: Number
+) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
+    model, P, rate, _, channel = claim
+    assert claim.meaningful  # noqa: S101 - checked by the callers
+    ends = ((model.breaks[0][0], model.breaks[0][-1]),)
+    demand = Demand("l2 gain", Motion(ends, (rate,), (None,)))
+    one, own = np.array([[number(1.0)]]), _observed(model, P.order, channel)
+    for region in regions(model, [P.knots], demand.motion, demand.moving([P.degree])):
+        if isinstance(P, MemoryLyapunov):
+            yield from _remembering(model_on(model, region, number), region, P, rate, number)
+            continue
+        pair = Pair(
+            *(
+                convert(_on_segment(P.knots, P.segment(j), j), number)
+                for (j,) in (region.segment, region.next_segment)
+            )
+        )
+        supply = None if channel is None else _supply(model, region, P, channel, number)
+        for F in decrease(own, region, pair, demand, number):
+            if supply is not None:
+                F = F + supply.extend(F.box[1:])
+            yield F, PolynomialMatrix.constant(one, F.box)
+
+
+def _on_segment(knots: Array, coefficients: Array, j: int) -> PolynomialMatrix:
+    return PolynomialMatrix(((float(knots[j]), float(knots[j + 1])),), coefficients)
+
+
+def _observed(model: Pieces, order: int, channel: NormBounded | None) -> Pieces:
+    """The model without the outputs v of a norm-bounded block; for `order` > 1 the linear system
+    that the monomials follow.
+    """
+    if order == 1 and channel is None:
+        return model
+    y = slice(None, None if channel is None else -channel.outputs)
+    models = {}
+    for key, (A, B, C, D) in model.models.items():
+        A, C, D = (
+            PolynomialMatrix(A.box, M)
+            for M in (
+                generator(A.coefficients, order),
+                C.coefficients[..., y, :],
+                D.coefficients[..., y, :],
+            )
+        )
+        if order > 1:
+            N = A.shape[0]
+            B, C = (PolynomialMatrix.constant(np.zeros(n), A.box) for n in ((N, 0), (0, N)))
+        models[key] = (A, B, C, D)
+    return model._replace(models=models)
+
+
+def _supply(
+    model: Pieces, region: Region, P: SplineLyapunov, channel: NormBounded, number: Number
+) -> PolynomialMatrix:
+    """lambda (bound^2 [G J H]'[G J H] - diag(0, I, 0)) on a region for a block d = Delta v, v = G x
+    + J d + H u.
+    """
+    _, _, C, D = (M.T for M in model_on(model, region, number))
+    v, bound = slice(-channel.outputs, None), number(channel.bound)
+    rows = block([[PolynomialMatrix(M.box, M.coefficients[..., v])] for M in (C, D)])
+    nx, nu, _ = model.sizes
+    of_d = np.diag(np.r_[np.zeros(nx), np.ones(channel.inputs), np.zeros(nu - channel.inputs)])
+    (j,) = region.segment
+    factor = _on_segment(P.knots, P.multiplier_segment(j)[:, None, None], j)
+    factor = now(convert(factor, number), region, number)
+    whole = rows @ rows.T * (bound * bound)
+    return _scaled(factor, whole - PolynomialMatrix.constant(exact(of_d, number), whole.box))
+
+
+def _remembering(
+    system: Sequence[PolynomialMatrix],
+    region: Region,
+    P: MemoryLyapunov,
+    rate: float,
+    number: Number,
+) -> Iterator[tuple[PolynomialMatrix, PolynomialMatrix]]:
+    """Blocks times height(p) = upper - lower, in p and the share of the lead, e = lower + share
+    height.
+    """
+    (j,), lag, (cell,) = region.segment, P.region, system[0].box
+    lower, upper = (
+        now(convert(_on_segment(P.knots, v[j : j + 2, None, None], j), number), region, number)
+        for v in (lag.lower, lag.upper)
+    )
+    for i, ends in enumerate(pairwise(P.lead_knots)):
+        share = tuple(number(float(s)) for s in ends)
+        segment = tuple(number(float(p)) for p in P.knots[j : j + 2])
+        here = PolynomialMatrix((segment, share), exact(P.patch(j, i), number))
+        here = here.restrict((cell, share))
+        model = [M.extend((share,)) for M in system]
+        low, height = lower.extend((share,)), (upper - lower).extend((share,))
+        s = PolynomialMatrix(here.box, np.array(share)[None, :, None, None])
+        slopes = [nu * here.derivative(0) for nu in (-number(rate), number(rate))]
+        for nu, F in zip(
+            (-number(rate), number(rate)), dissipation(model, here, "l2 gain", slopes), strict=True
+        ):
+            # height ds/dt = de/dt - dp/dt (lower' + s height')
+            lead = (low + height @ s) * (number(1.0) / number(lag.time))
+            steeper = low.derivative(0) + height.derivative(0) @ s
+            drift = PolynomialMatrix.constant(np.array([[nu]]), here.box) - lead - steeper * nu
+            corner = _scaled(drift, here.derivative(1))
+            side = model[1] * 0
+            yield (
+                _scaled(height, F) + block([[corner, side], [side.T, side.T @ side]]),
+                height,
+            )
+
+
+def _scaled(f: PolynomialMatrix, F: PolynomialMatrix) -> PolynomialMatrix:
+    """f F for a scalar polynomial f."""
+    return PolynomialMatrix(f.box, f.coefficients * np.eye(F.shape[0], dtype=int)) @ F
 
 
 def _slope(
@@ -161,6 +346,4 @@ def _times(F: PolynomialMatrix, axis: int) -> PolynomialMatrix:
     low, high = F.box[axis]
     shape = [1] * len(F.box)
     shape[axis] = 2
-    eye = np.eye(F.shape[0], dtype=int)
-    ends = np.stack([low * eye, high * eye]).reshape(*shape, *eye.shape)
-    return F @ PolynomialMatrix(F.box, ends)
+    return _scaled(PolynomialMatrix(F.box, np.array([low, high]).reshape(*shape, 1, 1)), F)

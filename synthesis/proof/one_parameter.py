@@ -5,6 +5,7 @@ arithmetic.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,14 +16,17 @@ from synthesis.lyapunov.spline import Lyapunov, MemoryLyapunov, SplineLyapunov
 from synthesis.norm_bounded import NormBounded
 from synthesis.polynomial import structure
 from synthesis.polynomial.exact import Number, exact, positive_definite, rational
-from synthesis.polynomial.pieces import ModelPiece, model_pieces, same_pieces
+from synthesis.polynomial.motion import Motion
+from synthesis.polynomial.pieces import ModelPiece, joined, model_pieces, same_pieces
 from synthesis.polynomial.symmetric import extended, symmetrized
-from synthesis.polynomial.symmetric_power import generator, monomials
 from synthesis.program.scaling import Scaling
 from synthesis.proof import pointwise
-from synthesis.proof.claim import Claim, lmi_polynomials
+from synthesis.proof.inequalities import Claim, Demand, lmi_polynomials
 
 Array = np.ndarray
+
+GRID = 100
+"""Least number of values of p at which a P(p) is checked in floating point."""
 
 
 class Findings(NamedTuple):
@@ -76,140 +80,6 @@ def examine(claim: Claim, weight: Array) -> Findings:
 
 def _rounding(n: int) -> float:
     return 20 * n * np.finfo(float).eps
-
-
-def holds_on_grid(
-    lpv: LPVStateSpace,
-    P: Lyapunov,
-    rate: float,
-    gamma: float,
-    units: Scaling,
-    block: NormBounded | None = None,
-) -> bool:
-    """The LMI at some hundred points and the extreme rates, from the model's own matrices; g =
-    gamma^2.
-
-    In the coordinates of the `units` for the sake of rounding; gamma NaN tests stability alone.
-    """
-    transform = units.right @ units.weight
-    if isinstance(P, MemoryLyapunov):
-        return _holds_with_memory(lpv, P, rate, gamma, transform)
-    if P.order > 1:
-        return _decreases_on_states(lpv, P, rate, transform)
-    return _holds_in_p(lpv, P, rate, gamma, units, block)
-
-
-def _holds_in_p(
-    lpv: LPVStateSpace,
-    P: SplineLyapunov,
-    rate: float,
-    gamma: float,
-    units: Scaling,
-    block: NormBounded | None,
-) -> bool:
-    low, high = lpv.scheduling.low, lpv.scheduling.high
-    grid = np.unique(np.concatenate([np.linspace(low, high, 201), P.knots]))
-    A, B, C, D = lpv.matrices(grid)
-    # in these coordinates from the start: rounding is relative to what is computed
-    A, B, C, P = (
-        units.left @ A @ units.right,
-        units.left @ B,
-        C @ units.right,
-        P.in_units(units.right),
-    )
-    whole = extended(units.weight, B.shape[2])
-    now = P.at(grid)
-    if np.linalg.eigvalsh(now).min() <= 0:
-        return False
-    moving = P.degree > 0 and rate > 0
-    outer = np.concatenate([C, D], 2)
-    M = np.concatenate([A, B], 2)
-    nx, own = A.shape[1], 0 if block is None else block.inputs
-    state, d, inputs = np.split(np.eye(M.shape[2]), [nx, nx + own])
-    supply = np.zeros((M.shape[2], M.shape[2]))
-    if block is not None:
-        outer, v = np.split(outer, [-block.outputs], axis=1)
-        lam = P.multiplier_at(grid)[:, None, None]
-        supply = lam * (block.bound**2 * np.swapaxes(v, -1, -2) @ v - d.T @ d)
-    if lpv.dt is None:
-        slopes = [nu * P.derivative(grid) for nu in ((-rate, rate) if moving else (0.0,))]
-        moves = [
-            state.T @ now @ M + np.swapaxes(M, -1, -2) @ now @ state + state.T @ slope @ state
-            for slope in slopes
-        ]
-    else:
-        step = min(rate * lpv.dt, high - low) if moving else 0.0
-        after = [P.at(np.clip(grid + side, low, high)) for side in (-step, 0.0, step)]
-        moves = [np.swapaxes(M, -1, -2) @ Q @ M - state.T @ now @ state for Q in after]
-    for move in moves:
-        move = move + supply
-        F = (
-            move
-            if math.isnan(gamma)
-            else move + np.swapaxes(outer, -1, -2) @ outer - gamma**2 * inputs.T @ inputs
-        )
-        if np.linalg.eigvalsh(symmetrized(whole.T @ symmetrized(F) @ whole)).max() >= 0:
-            return False
-    return True
-
-
-def _holds_with_memory(
-    lpv: LPVStateSpace, P: MemoryLyapunov, rate: float, gamma: float, transform: Array
-) -> bool:
-    low, high = lpv.scheduling.low, lpv.scheduling.high
-    nu = lpv.B.shape[2]
-    whole = np.block(
-        [[transform, np.zeros((len(transform), nu))], [np.zeros((nu, len(transform))), np.eye(nu)]]
-    )
-    for p in np.unique(np.concatenate([np.linspace(low, high, 41), P.knots])):
-        A, B, C, D = lpv.matrices(float(p))
-        outer = np.concatenate([C, D], 1)
-        lower, height, _, _ = (float(v) for v in P.region.locate(np.array(p)))
-        for share in np.linspace(0.0, 1.0, 9):
-            now, in_p, in_lead = P.at(float(p), float(share))
-            if np.linalg.eigvalsh(transform.T @ now @ transform)[0] <= 0:
-                return False
-            for slope in (-rate, rate):
-                top = (
-                    A.T @ now
-                    + now @ A
-                    + slope * in_p
-                    + (slope - (lower + share * height) / P.region.time) * in_lead
-                )
-                F = np.block([[top, now @ B], [B.T @ now, np.zeros((nu, nu))]])
-                if not math.isnan(gamma):
-                    F = (
-                        F
-                        + outer.T @ outer
-                        - gamma**2 * np.diag(np.concatenate([np.zeros(len(A)), np.ones(nu)]))
-                    )
-                if np.linalg.eigvalsh(whole.T @ F @ whole)[-1] >= 0:
-                    return False
-    return True
-
-
-def _decreases_on_states(
-    lpv: LPVStateSpace, P: SplineLyapunov, rate: float, transform: Array
-) -> bool:
-    """V > 0 > dV/dt at states in all directions: what the slack cannot change."""
-    directions = transform @ np.random.default_rng(0).standard_normal((lpv.A.shape[1], 400))
-    z = np.array(
-        [
-            np.prod(directions[list(factors)], axis=0)
-            for factors in monomials(len(directions), P.order)
-        ]
-    )
-    grid = np.unique(
-        np.concatenate([np.linspace(lpv.scheduling.low, lpv.scheduling.high, 101), P.knots])
-    )
-    for A, now, slope in zip(
-        generator(lpv.matrices(grid).A, P.order), P.at(grid), P.derivative(grid), strict=True
-    ):
-        flow = 2 * np.sum(z * (now @ (A @ z)), axis=0)
-        drift = rate * np.abs(np.sum(z * (slope @ z), axis=0)) if P.degree else 0.0
-        if np.any(np.sum(z * (now @ z), axis=0) <= 0) or np.any(flow + drift >= 0):
-            return False
-    return True
 
 
 def proven(claim: Claim, gamma: float) -> bool:
@@ -310,17 +180,24 @@ class Evidence(NamedTuple):
         """(gain that P admits, conditioning of P); inf where P proves nothing, NaN without
         channels. Floating point.
         """
-        units = self.units
-        scaled = units.of_pieces(self.pieces, self.block)
-        back = P.in_units(units.right, units.channel**-2, units.time, 1.0 / units.multiplier)
-        rate = self.rate * units.time if self.lpv.dt is None else self.rate
-        claim = Claim(scaled, back, rate, self.lpv.dt, self.elevation, self.block)
+        units, scaled = self.units, self.units.of_pieces(self.pieces, self.block)
+        model = joined(self.lpv, scaled)
+        claim = Claim(model, self._scaled(P), self._rate, self.elevation, self.block)
         findings = examine(claim, units.weight)
         if not (findings.positive and findings.decreasing and math.isfinite(findings.g)):
             return math.inf, math.inf
         own = 0 if self.block is None else self.block.inputs
         gains = len(self.lpv.inputs) > own
         return (units.channel * math.sqrt(findings.g) if gains else math.nan), findings.conditioning
+
+    def _scaled(self, P: Lyapunov) -> Lyapunov:
+        u = self.units
+        return P.in_units(u.right, u.channel**-2, u.time, 1.0 / u.multiplier)
+
+    @property
+    def _rate(self) -> float:
+        """Of p, per scaled unit of time."""
+        return self.rate * self.units.time if self.lpv.dt is None else self.rate
 
     def floating(self, P: Lyapunov, gamma: float) -> bool:
         """Every Bernstein coefficient and a grid of p, in floating point."""
@@ -329,7 +206,18 @@ class Evidence(NamedTuple):
         claim = self._claim(P)
         if not (enough and claim.meaningful and claim.invariant(rational())):
             return False
-        return holds_on_grid(self.lpv, P, self.rate, gamma, self.units, self.block)
+        return self.on_grid(P, gamma)
+
+    def on_grid(self, P: Lyapunov, gamma: float) -> bool:
+        """The inequalities at many p, from the model's own matrices in scaled units."""
+        plain = isinstance(P, SplineLyapunov) and P.order == 1
+        u, points = self.units, pointwise.inside(self._ends(P), GRID if plain else 1)
+        model = u.of_matrices(self.lpv.matrices(np.array(points)), self.block)
+        every = _at_points(
+            *(self._scaled(P), points, model, self._demand(self._rate, gamma), self.lpv.dt),
+            *(gamma / u.channel, u.weight, float, self.block),
+        )
+        return pointwise.negative(every, float, u.weight)
 
     def exact(self, P: Lyapunov, gamma: float) -> bool:
         """The same over the whole interval in rational arithmetic, and again at some p through the
@@ -341,30 +229,26 @@ class Evidence(NamedTuple):
         """The pieces are the model, and the inequalities hold at some p without them; see
         `pointwise`.
         """
-        lpv, g = self.lpv, None if math.isnan(gamma) else number(gamma) * number(gamma)
-        s = lpv.scheduling
-        breaks = [
-            b for piece in lpv.basis.pieces() for b in (piece.low, piece.high) if s.low < b < s.high
-        ]
-        points = pointwise.inside([s.low, s.high, *P.knots, *breaks])
-        if not all(self._reproduced(p) for p in pointwise.inside([s.low, s.high, *breaks])):
+        if not all(self._reproduced(p) for p in pointwise.inside(self._ends())):
             return False
-        for p in points:
-            model = Matrices(*(exact(M, number) for M in lpv.matrices(p)))
-            if isinstance(P, SplineLyapunov) and P.order > 1:
-                if not pointwise.decreases(P, p, model.A, self.rate, self.units.right, number):
-                    return False
-                continue
-            every = (
-                pointwise.memory_inequalities(P, p, model, self.rate, g, number)
-                if isinstance(P, MemoryLyapunov)
-                else pointwise.spline_inequalities(
-                    P, p, model, self.rate, lpv.dt, g, (s.low, s.high), number, self.block
-                )
-            )
-            if not all(positive_definite(-F) for F in every):
-                return False
-        return True
+        points = pointwise.inside(self._ends(P))
+        every = _at_points(
+            *(P, points, self.lpv.matrices(np.array(points)), self._demand(self.rate, gamma)),
+            *(self.lpv.dt, gamma, self.units.right, number, self.block),
+        )
+        return pointwise.negative(every, number)
+
+    def _demand(self, rate: float, gamma: float) -> Demand:
+        s = self.lpv.scheduling
+        kind = "stability" if math.isnan(gamma) else "l2 gain"
+        return Demand(kind, Motion(((s.low, s.high),), (rate,), (None,)))
+
+    def _ends(self, P: Lyapunov | None = None) -> list[float]:
+        """Of the stretches on which model and P are polynomial, by the model's own breaks."""
+        s = self.lpv.scheduling
+        breaks = [b for piece in self.lpv.basis.pieces() for b in (piece.low, piece.high)]
+        knots = [] if P is None else P.knots.tolist()
+        return [s.low, s.high, *knots, *(b for b in breaks if s.low < b < s.high)]
 
     def _reproduced(self, p: float) -> bool:
         piece = next(piece for piece in self.pieces if p <= piece.high)
@@ -382,4 +266,29 @@ class Evidence(NamedTuple):
         return True
 
     def _claim(self, P: Lyapunov) -> Claim:
-        return Claim(self.pieces, P, self.rate, self.lpv.dt, self.elevation, self.block)
+        model = joined(self.lpv, self.pieces)
+        return Claim(model, P, self.rate, self.elevation, self.block)
+
+
+def _at_points(
+    P: Lyapunov,
+    points: Sequence[float],
+    model: Matrices,
+    demand: Demand,
+    dt: float | None,
+    gamma: float,
+    transform: Array,
+    number: Number,
+    channel: NormBounded | None,
+) -> Iterator[Array]:
+    """What must be negative definite at the points, where the model has these matrices (K, ...)."""
+    (rate,) = demand.rates
+    for k, p in enumerate(points):
+        own = Matrices(*(exact(M[k], number) for M in model))
+        if isinstance(P, MemoryLyapunov):
+            g = None if math.isnan(gamma) else number(gamma) * number(gamma)
+            yield from pointwise.memory_inequalities(P, p, own, rate, g, number)
+        elif P.order > 1:
+            yield from pointwise.monomial_inequalities(P, p, own.A, rate, transform, number)
+        else:
+            yield from pointwise.inequalities(P, (p,), own, demand, dt, gamma, number, channel)

@@ -10,17 +10,22 @@ where it matters.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations_with_replacement, pairwise, product
 from math import comb
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from symheli.lpv import Matrices
+from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.lyapunov.spline import MemoryLyapunov, SplineLyapunov
 from synthesis.norm_bounded import NormBounded
-from synthesis.polynomial.exact import Number, exact
+from synthesis.polynomial.exact import Number, exact, growth_of, positive_definite
+from synthesis.polynomial.symmetric import extended, symmetrized
+
+if TYPE_CHECKING:
+    from synthesis.proof.inequalities import Demand
 
 Array = np.ndarray
 
@@ -34,10 +39,43 @@ its terms add up to in size.
 """
 
 
-def inside(points: Any) -> list[float]:
-    """Values of p within each stretch between `points`."""
+def inside(points: Any, least: int = 1) -> list[float]:
+    """Values of p within each stretch between `points`, which are cut so that there are `least`
+    values or more.
+    """
     ends = sorted(set(map(float, points)))
-    return [a + share * (b - a) for a, b in pairwise(ends) for share in INSIDE]
+    parts = -(-least // (len(INSIDE) * (len(ends) - 1)))
+    finer = np.interp(np.arange(parts * (len(ends) - 1) + 1) / parts, np.arange(len(ends)), ends)
+    return [a + share * (b - a) for a, b in pairwise(finer.tolist()) for share in INSIDE]
+
+
+def combined(axes: Sequence[Sequence[float]], count: int) -> Array:
+    """Points (k, m): all values of a single axis, of several a diagonal of `count` points through
+    their product.
+    """
+    count = count if len(axes) > 1 else len(axes[0])
+    return np.array(
+        [[axis[(k * (3 * i + 1)) % len(axis)] for i, axis in enumerate(axes)] for k in range(count)]
+    )
+
+
+def negative(forms: Iterable[Array], number: Number, weight: Array | None = None) -> bool:
+    """Whether all forms are negative definite: exactly, or by eigenvalues with the states in the
+    coordinates of `weight`.
+    """
+    if number is not float:
+        return all(positive_definite(-F) for F in forms)
+    by_size: dict[int, list[Array]] = {}
+    for F in forms:
+        by_size.setdefault(len(F), []).append(F)
+    for size, every in by_size.items():
+        stack = symmetrized(np.array(every))
+        if weight is not None and size >= len(weight):
+            W = extended(weight, size - len(weight))
+            stack = symmetrized(W.T @ stack @ W)
+        if not np.linalg.eigvalsh(stack).max(initial=-math.inf) < 0:
+            return False
+    return True
 
 
 def bernstein(coefficients: Array, t: Any) -> Array:
@@ -121,46 +159,30 @@ def dissipation(
     drift: Array | None,
     after: Array | None,
     g: Any,
-    supplied: Supplied | None = None,
+    block: Supplied | None = None,
 ) -> Array:
-    """The bounded real inequality at one p; `drift` dP/dt, or `after` P(p(k+1)) in discrete time. g
-    None: the state block, with that of d where there is a block.
-    """
-    if supplied is not None:
-        return _around(model, P, drift, after, g, supplied)
-    A, B, C, D = model
-    if after is None:
-        top, side, corner = A.T @ P + P @ A, P @ B, D.T @ D
-        top = top if drift is None else top + drift
-    else:
-        top, side, corner = A.T @ after @ A - P, A.T @ after @ B, D.T @ D + B.T @ after @ B
-    if g is None:
-        return top
-    top, side = top + C.T @ C, side + C.T @ D
-    return np.block([[top, side], [side.T, corner - np.eye(len(corner), dtype=int) * g]])
+    """The bounded real inequality at one p as a quadratic form in x, d and u: dV/dt + |y|^2 - g
+    |u|^2 + multiplier (bound^2 |v|^2 - |d|^2), the last term around a `block` d = Delta v.
 
-
-def _around(
-    model: Matrices, P: Array, drift: Array | None, after: Array | None, g: Any, block: Supplied
-) -> Array:
-    """The inequality around a block: dV/dt + |y|^2 - g |u|^2 + multiplier (bound^2 |v|^2 - |d|^2),
-    as a quadratic form in x, d and u, from the equations of each.
+    `drift` is dP/dt, `after` P(p(k+1)) in discrete time. g None: dV/dt and the last term alone, in
+    x and d.
     """
     A, B, C, D = model
-    n, m, y = len(A), B.shape[1], len(C) - block.outputs
+    inputs, outputs = (0, 0) if block is None else (block.inputs, block.outputs)
+    n, m, y = len(A), B.shape[1], len(C) - outputs
     one = np.eye(n + m, dtype=int)
-    x, d, u = one[:n], one[n : n + block.inputs], one[n + block.inputs :]
-    move, out = A @ x + B @ np.vstack([d, u]), C @ x + D @ np.vstack([d, u])
+    x, d, u = one[:n], one[n : n + inputs], one[n + inputs :]
+    move, out = np.hstack([A, B]), np.hstack([C, D])
     if after is None:
         change = x.T @ (P @ move) + (x.T @ (P @ move)).T
         change = change if drift is None else change + x.T @ (drift @ x)
     else:
         change = move.T @ (after @ move) - x.T @ (P @ x)
-    v = out[y:]
-    change = change + block.multiplier * (block.bound * block.bound * (v.T @ v) - d.T @ d)
+    if block is not None:
+        v = out[y:]
+        change = change + block.multiplier * (block.bound * block.bound * (v.T @ v) - d.T @ d)
     if g is None:
-        strict = n + block.inputs
-        return change[:strict, :strict]
+        return change[: n + inputs, : n + inputs]
     return change + out[:y].T @ out[:y] - g * (u.T @ u)
 
 
@@ -222,39 +244,59 @@ def reached(
     return product(*each)
 
 
-def spline_inequalities(
-    P: SplineLyapunov,
-    p: float,
+def inequalities(
+    P: SplineLyapunov | BoxLyapunov,
+    p: Any,
     model: Matrices,
-    rate: float,
+    demand: Demand,
     dt: float | None,
-    g: Any,
-    ends: tuple[float, float],
+    bound: float,
     number: Number,
-    block: NormBounded | None = None,
+    channel: NormBounded | None = None,
 ) -> Iterator[Array]:
-    """What must be negative definite at p for V = x'P(p)x, the multiplier of a `block` too."""
-    here, slope = spline(P.knots, P.degree, P.coefficients, p, number)
-    yield -here
-    supplied = None
-    if block is not None and P.multiplier is not None:
-        e = P.multiplier_degree
-        value, _ = spline(P.knots, e, np.reshape(P.multiplier, (-1, 1, 1)), p, number)
-        yield -value
-        bound = number(block.bound)
-        supplied = Supplied(block.inputs, block.outputs, bound, value[0, 0])
-    if dt is not None:
-        step = rate * dt if P.degree else 0.0
-        for (q,) in reached((p,), [(-step, step)], (ends,)):
-            after = spline(P.knots, P.degree, P.coefficients, q, number)[0]
-            yield dissipation(model, here, None, after, g, supplied)
-    elif P.degree == 0 or rate == 0:
-        yield dissipation(model, here, None, None, g, supplied)
+    """What must be negative definite at p (m,) for V = x'P(p)x: P, the multiplier of a norm-bounded
+    `channel`, and the inequalities of the `demand` with this `bound`.
+    """
+    if isinstance(P, SplineLyapunov):
+        knots, degrees = (P.knots,), (P.degree,)
     else:
-        yield from (
-            dissipation(model, here, sign * number(rate) * slope, None, g, supplied)
-            for sign in (-1, 1)
-        )
+        knots, degrees = P.knots, P.degrees
+    here, slopes = tensor_spline(knots, degrees, P.coefficients, p, number)
+    yield -here
+    g = number(bound) * number(bound) if demand.kind.endswith("gain") else None
+    if demand.kind == "energy-to-peak gain":
+        # V grows by at most the energy of the input, and the outputs are seen by it
+        yield -_seen(here, model, dt, g)
+        model, g = model._replace(C=model.C * 0, D=model.D * 0), number(1.0)
+    supplied = None
+    if channel is not None and isinstance(P, SplineLyapunov) and P.multiplier is not None:
+        values = np.reshape(P.multiplier, (-1, 1, 1))
+        multiplier, _ = spline(P.knots, P.multiplier_degree, values, p[0], number)
+        yield -multiplier
+        limit = number(channel.bound)
+        supplied = Supplied(channel.inputs, channel.outputs, limit, multiplier[0, 0])
+    decay, motion = demand.kind == "decay rate", demand.motion
+    if dt is None:
+        for pace in paces(p, demand.rates, motion.ties, degrees, number):
+            drift = here * (2 * number(bound)) if decay else here * 0
+            for nu, slope in zip(pace, slopes, strict=True):
+                drift = drift + number(demand.time) * nu * slope
+            yield dissipation(model, here, drift, None, g, supplied)
+        return
+    growth = number(growth_of(bound, dt)) if decay else number(1.0)
+    for q in reached(p, spans(p, demand.rates, motion.ties, degrees, motion.box, dt), motion.box):
+        after = tensor_spline(knots, degrees, P.coefficients, q, number)[0] * growth
+        yield dissipation(model, here, None, after, g, supplied)
+
+
+def _seen(P: Array, model: Matrices, dt: float | None, g: Any) -> Array:
+    """What must be positive definite for |y|^2 < g V, or < g (V + |u|^2) in discrete time."""
+    _, B, C, D = model
+    corner = np.eye(len(C), dtype=int) * g
+    if dt is None:
+        return np.block([[P, C.T], [C, corner]])
+    one = np.eye(B.shape[1], dtype=int) + D[:0].T @ D[:0]
+    return np.block([[P, B * 0, C.T], [B.T * 0, one, D.T], [C, D, corner]])
 
 
 def memory_inequalities(
@@ -292,11 +334,11 @@ def memory_inequalities(
             yield dissipation(model, here, nu * in_p + pace * in_share, None, g)
 
 
-def decreases(
+def monomial_inequalities(
     P: SplineLyapunov, p: float, A: Array, rate: float, transform: Array, number: Number
-) -> bool:
-    """V > 0 > dV/dt for V of higher degree, at states in all directions: dV/dt = sum_i (A x)_i
-    dV/dx_i from the monomials themselves.
+) -> Iterator[Array]:
+    """V > 0 > dV/dt as numbers (1, 1) below zero for V of higher degree, at states in all
+    directions: dV/dt = sum_i (A x)_i dV/dx_i from the monomials themselves.
     """
     here, slope = spline(P.knots, P.degree, P.coefficients, p, number)
     for direction in np.random.default_rng(0).standard_normal((20, len(A))):
@@ -313,9 +355,8 @@ def decreases(
             )
         zs, dzs = np.array(z), np.array(dz)
         drift = number(rate) * abs(zs @ slope @ zs) if P.degree else 0
-        if not (zs @ here @ zs > 0 and 2 * (zs @ here @ dzs) + drift < 0):
-            return False
-    return True
+        yield np.array([[-(zs @ here @ zs)]])
+        yield np.array([[2 * (zs @ here @ dzs) + drift]])
 
 
 def same_entries(found: Array, expected: Array, size: Array) -> bool:

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from symheli.lpv import LPVStateSpace, Scheduling, UncertainStateSpace
 from synthesis.analysis.certify import route
-from synthesis.analysis.question import question
+from synthesis.analysis.problem import pose
 
 
 def lag(rate=1.0):
@@ -156,4 +156,4 @@ def forged(cert, **parts):
 
 def searched(model, rate, kind, form=None, impose=None, solver="CLARABEL"):
     """What the search for a proof finds without the look at frozen poles."""
-    return route(question(model, rate, kind, form, impose, solver, None)).search(math.inf)
+    return route(pose(model, rate, kind, form, impose, solver, None)).search(math.inf)

@@ -14,9 +14,9 @@ from synthesis.lyapunov.spline import graded_knots
 from synthesis.polynomial.bernstein import blossom, composition, restriction
 from synthesis.polynomial.cells import strips
 from synthesis.polynomial.matrix import PolynomialMatrix
-from synthesis.polynomial.pieces import ModelPiece, model_pieces
+from synthesis.polynomial.pieces import ModelPiece, model_pieces, pieces
 from synthesis.polynomial.symmetric import smat, svec
-from synthesis.proof.claim import Claim, lmi_polynomials
+from synthesis.proof.inequalities import Claim, lmi_polynomials
 
 
 def value(F, x, s=0.0):
@@ -129,31 +129,24 @@ def test_lmi_polynomials_are_the_lmi_at_every_point(dt):
     P = SplineLyapunov(
         np.array([0.0, 0.25, 1.0]), 2, coefficients + np.swapaxes(coefficients, 1, 2)
     )
-    forms = [
-        form.block.coefficients
-        for form in lmi_polynomials(Claim(model_pieces(lpv), P, 0.7, dt), float)
-    ]
+    forms = [form.block for form in lmi_polynomials(Claim(pieces(lpv), P, 0.7), float)]
     p = 0.6
     A, B, C, D = lpv.matrices(p)
     Y = np.hstack([C, D])
     if dt is None:
         assert len(forms) == 4
-        x = (p - 0.25) / 0.75
         for form, nu in zip(forms[2:], (-0.7, 0.7), strict=True):
             top = A.T @ P.at(p) + P.at(p) @ A + nu * P.derivative(p)
             expected = np.block([[top, P.at(p) @ B], [B.T @ P.at(p), np.zeros((2, 2))]]) + Y.T @ Y
-            assert np.allclose(value(form, x), expected, atol=1e-10)
+            assert np.allclose(form([p]), expected, atol=1e-10)
     else:
         M, corner = np.hstack([A, B]), np.zeros((5, 5))
         corner[:3, :3] = P.at(p)
         regions = strips(model_pieces(lpv), P.knots, (-0.07, 0.07))
         k = next(i for i, s in enumerate(regions) if s.cell.low < p < s.cell.high)
-        cell = regions[k].cell
-        x, s = (p - cell.low) / (cell.high - cell.low), 0.8
+        s = 0.8
         after = (1 - s) * (p - 0.07) + s * (p + 0.07)
-        assert np.allclose(
-            value(forms[k], x, s), M.T @ P.at(after) @ M - corner + Y.T @ Y, atol=1e-9
-        )
+        assert np.allclose(forms[k]([p, s]), M.T @ P.at(after) @ M - corner + Y.T @ Y, atol=1e-9)
 
 
 def test_graded_knots_move_onto_breaks_of_the_model_and_keep_their_distance():

@@ -33,7 +33,7 @@ from synthesis import (
     lft_gain,
     stability,
 )
-from synthesis.analysis.question import question
+from synthesis.analysis.problem import pose
 from synthesis.assemble.unknowns import Quadratic, scaled_problem
 from synthesis.lyapunov.spline import graded_knots
 from synthesis.polynomial import exact
@@ -292,7 +292,7 @@ def test_many_states_take_it_unless_told_otherwise(tmp_path):
     few = springs(4, 0.2)
     assert l2_gain(few, form=Spline(degree=0), search=None).solver.startswith("CLARABEL")
     for form, impose in ((Memory(0.5, segments=1), None), (None, SumOfSquares())):
-        asked = question(lpv, None, "l2 gain", form, impose, None, None)
+        asked = pose(lpv, None, "l2 gain", form, impose, None, None)
         assert asked.solver.name == "CLARABEL"
 
 

@@ -16,8 +16,8 @@ from synthesis.assemble.unknowns import scaled_problem
 from synthesis.lyapunov.box import BoxLyapunov
 from synthesis.polynomial.motion import Motion
 from synthesis.polynomial.pieces import model_pieces, pieces
+from synthesis.program.scaling import Scaling
 from synthesis.proof import box, one_parameter
-from synthesis.proof.box import Units
 from synthesis.proof.inequalities import Demand
 
 PLACE = 0.5123
@@ -173,7 +173,7 @@ def test_a_slope_in_the_last_places_counts_among_several_parameters():
     for least, holds in ((-last, False), (last, True)):
         model = nearly_cancelling([80 * last, least, 80 * last, least], basis)
         demand = Demand("stability", Motion.of(model.parameters))
-        units = Units(np.eye(2), np.eye(2), 1.0, 1.0, 1.0, 1.0, np.eye(2))
+        units = Scaling(np.eye(2), np.eye(2), 1.0, 1.0, np.eye(2))
         evidence = box.Evidence(pieces(model), units, demand)
         assert evidence.fault(P, "stability", (0.0, 0.0)) is None
         assert evidence.exact(P, np.nan) is holds
@@ -186,7 +186,7 @@ def test_a_decay_rate_in_the_last_places_is_not_rounded_up():
     nothing = [np.zeros((1, 0))], [np.zeros((0, 1))], [np.zeros((0, 0))]
     slow = LPVStateSpace.polynomial([[[pole]]], *nothing, p, dt=1.0)
     P = BoxLyapunov((np.array([0.0, 1.0]),), (0,), np.ones((1, 1, 1)))
-    units = Units(np.eye(1), np.eye(1), 1.0, 1.0, 1.0, 1.0, np.eye(1))
+    units = Scaling(np.eye(1), np.eye(1), 1.0, 1.0, np.eye(1))
     demand = Demand("decay rate", Motion.of(slow.parameters))
     evidence = box.Evidence(pieces(slow), units, demand)
     assert evidence.exact(P, 0.0)

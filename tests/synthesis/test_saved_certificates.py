@@ -52,6 +52,23 @@ def test_a_file_gives_back_the_certificate_and_its_exact_proof(saved):
     assert again.save(path.with_name("again.json")).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.parametrize("form", ["box", "box stability", "decay", "energy to peak"])
+def test_files_with_units_of_inputs_outputs_and_storage_are_read(form, tmp_path):
+    cert = genuine(form)
+    path = cert.save(tmp_path / "proof.json")
+    content = json.loads(path.read_text())
+    units = content["proof"]["units"]
+    channel, root = units.pop("channel"), math.sqrt(units["time"])
+    del units["multiplier"]
+    peaks = form == "energy to peak"
+    units |= {"type": "Units", "inputs": 1 / root, "storage": 1.0 if peaks else channel**2}
+    units["outputs"] = channel if peaks else channel / root
+    path.write_text(json.dumps(content))
+    again = Certificate.load(path)
+    assert again.proof.evidence.units.channel == pytest.approx(channel, rel=1e-12)
+    assert again.verify(rigorous=True)
+
+
 def test_a_trajectory_has_the_word_that_it_always_had_in_files(tmp_path):
     worst = SchedulingTrajectory(np.array([0.0, 0.5]), np.array([1.0, 2.0]))
     path = replace(genuine("spline"), worst=worst).save(tmp_path / "proof.json")

@@ -25,7 +25,7 @@ from synthesis.assemble import box as program
 from synthesis.assemble import unknowns as forms
 from synthesis.polynomial import pieces, regions
 from synthesis.proof import box as proof
-from synthesis.proof import claim
+from synthesis.proof import inequalities
 from synthesis.proof import one_parameter as verify
 
 COARSE = Spline(segments=4, degree=2, grading=1.0)
@@ -54,30 +54,30 @@ def everywhere(monkeypatch, name, mutant, *modules):
 
 def forget_the_rate(monkeypatch):
     """dP/dt left out of assembly and proof."""
-    blocks, block, decrease = forms.continuous_blocks, claim._continuous, program.decrease
+    blocks, decrease = forms.continuous_blocks, program.decrease
     monkeypatch.setattr(
         forms,
         "continuous_blocks",
         lambda cells, knots, degree, rate, *rest: blocks(cells, knots, degree, 0.0, *rest),
-    )
-    monkeypatch.setattr(
-        claim, "_continuous", lambda cell, P, rate, *rest: block(cell, P, 0.0, *rest)
     )
 
     def still(model, region, P, demand, number):
         resting = demand.motion._replace(rates=tuple(0.0 for _ in demand.rates))
         return decrease(model, region, P, demand._replace(motion=resting), number)
 
-    everywhere(monkeypatch, "decrease", still, program, proof)
+    everywhere(monkeypatch, "decrease", still, inequalities, program, proof)
 
 
 def flip_a_sign(monkeypatch):
     """The drift has one sign only."""
-    blocks, block = forms.continuous_blocks, claim._continuous
+    blocks, decrease = forms.continuous_blocks, program.decrease
     monkeypatch.setattr(forms, "continuous_blocks", lambda *args: list(blocks(*args))[::2])
-    monkeypatch.setattr(claim, "_continuous", lambda *args: list(block(*args))[:1])
-    decrease = program.decrease
-    everywhere(monkeypatch, "decrease", lambda *args: list(decrease(*args))[:1], program, proof)
+    everywhere(
+        monkeypatch,
+        "decrease",
+        lambda *args: list(decrease(*args))[:1],
+        *(inequalities, program, proof),
+    )
 
 
 def drop_strips(monkeypatch):
@@ -89,15 +89,13 @@ def drop_strips(monkeypatch):
             s for s in strips(pieces, knots, span, cuts) if s.next_segment == s.cell.segment
         )
 
-    everywhere(monkeypatch, "strips", fewer, forms, claim, regions)
+    everywhere(monkeypatch, "strips", fewer, forms, regions)
 
 
 def drop_cells(monkeypatch):
     """The second half of the range is not looked at."""
     cells, strips = forms.cells, regions.strips
-    everywhere(
-        monkeypatch, "cells", lambda *args: cells(*args)[: len(cells(*args)) // 2], forms, claim
-    )
+    monkeypatch.setattr(forms, "cells", lambda *args: cells(*args)[: len(cells(*args)) // 2])
     monkeypatch.setattr(regions, "strips", lambda *args: strips(*args)[: len(strips(*args)) // 2])
 
 
@@ -156,7 +154,7 @@ def test_an_error_shared_by_assembly_and_proof_is_found(case, analysis, monkeypa
     # the witness in floating point is kept out, so that what the mutant believes becomes a
     # certificate
     with monkeypatch.context() as blind:
-        blind.setattr(verify, "holds_on_grid", lambda *args: True)
+        blind.setattr(verify.Evidence, "on_grid", lambda *args: True)
         blind.setattr(proof.Evidence, "on_grid", lambda *args: True)
         try:
             cert = ANALYSES[analysis](model())

@@ -28,8 +28,7 @@ from synthesis import (
     stability,
 )
 from synthesis.lyapunov.lag import LagRegion
-from synthesis.polynomial.bernstein import blossom
-from synthesis.polynomial.pieces import model_pieces
+from synthesis.polynomial.pieces import pieces
 from synthesis.polynomial.symmetric_power import (
     generator,
     monomials,
@@ -38,7 +37,7 @@ from synthesis.polynomial.symmetric_power import (
     null_weights,
     power,
 )
-from synthesis.proof.claim import Claim, lmi_polynomials
+from synthesis.proof.inequalities import Claim, lmi_polynomials
 
 MEMORY = Memory(1.5, segments=8, degree=2, grading=1.0, across_segments=2)
 QUARTIC = HigherOrder(2, segments=4)
@@ -107,10 +106,9 @@ def test_memory_polynomials_are_the_lmi_at_every_point():
     region = LagRegion.reached(np.array([0.0, 0.25, 1.0]), rate, 0.4)
     M = rng.standard_normal((5, 5, 3, 3))
     P = MemoryLyapunov(region, 2, np.array([0.0, 0.3, 1.0]), 2, M + np.swapaxes(M, -1, -2))
-    forms = list(lmi_polynomials(Claim(model_pieces(lpv), P, rate, None), float))
+    forms = list(lmi_polynomials(Claim(pieces(lpv), P, rate), float))
     assert len(forms) == 2 * 2 * 2
     p, share = 0.6, 0.8
-    x, y = (p - 0.25) / 0.75, (share - 0.3) / 0.7
     lower, height, _, _ = (float(v) for v in region.locate(np.array(p)))
 
     def at(p, e):
@@ -125,15 +123,11 @@ def test_memory_polynomials_are_the_lmi_at_every_point():
     A, B, C, D = lpv.matrices(p)
     Y = np.hstack([C, D])
 
-    def polynomial(F):
-        a, b = (blossom([t] * (size - 1)) for size, t in zip(F.shape[:2], (x, y), strict=True))
-        return np.tensordot(a, np.tensordot(b, F, axes=(0, 1)), axes=1)
-
     for form, nu in zip(forms[6:], (-rate, rate), strict=True):
         top = A.T @ value + value @ A + nu * in_p + (nu - e / 0.4) * in_e
         expected = np.block([[top, value @ B], [B.T @ value, np.zeros((2, 2))]]) + Y.T @ Y
-        assert np.allclose(polynomial(form.block.coefficients), height * expected, atol=1e-10)
-        assert polynomial(form.weight.coefficients) == pytest.approx(height)
+        assert np.allclose(form.block([p, share]), height * expected, atol=1e-10)
+        assert form.weight([p, share]).item() == pytest.approx(height)
 
 
 def test_higher_degrees_close_in_on_the_damping_that_a_jumping_spring_needs():

@@ -28,7 +28,7 @@ from synthesis import (
     stability,
 )
 from synthesis.assemble import bounded_real
-from synthesis.proof import claim, one_parameter
+from synthesis.proof import inequalities, one_parameter
 from synthesis.worst.frozen import norm
 
 COARSE = Spline(segments=2, degree=2)
@@ -282,7 +282,7 @@ def test_half_a_block_in_search_and_proof_is_found_by_the_second_witness(monkeyp
     """An error that both would believe."""
     unc = random_uncertain(2, 1.0)
     assert l2_gain(unc, form=COARSE, search=None).verify(rigorous=True)
-    terms, squares = bounded_real.supply_terms, claim._squares
+    terms, supply = bounded_real.supply_terms, inequalities._supply
 
     def halved(block):
         return block and block._replace(bound=0.5 * block.bound)
@@ -293,10 +293,12 @@ def test_half_a_block_in_search_and_proof_is_found_by_the_second_witness(monkeyp
         lambda cell, m: terms(cell, m and m._replace(block=halved(m.block))),
     )
     monkeypatch.setattr(
-        claim, "_squares", lambda piece, block, number: squares(piece, halved(block), number)
+        inequalities,
+        "_supply",
+        lambda model, region, P, block, number: supply(model, region, P, halved(block), number),
     )
     with monkeypatch.context() as blind:
-        blind.setattr(one_parameter, "holds_on_grid", lambda *args: True)
+        blind.setattr(one_parameter.Evidence, "on_grid", lambda *args: True)
         # the worst model is known, and would contradict it
         found = searched(unc, 0.3, "l2 gain", form=COARSE)
     assert found.proof.evidence.floating(found.proof.lyapunov, found.bound) is False

@@ -1,4 +1,4 @@
-"""What is asked of a model, checked and complete."""
+"""The analysis problem: a model, the kind of bound, and the means, checked against one another."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from synthesis.worst.rates import asked as limits
 Model = LPVStateSpace | LFT | UncertainStateSpace
 
 
-class Question(NamedTuple):
-    """A model in polynomial pieces, what is asked of it, and by which means; `uncertain` where it
-    is asked of a whole set, of which the model then is the nominal one.
+class Problem(NamedTuple):
+    """A model in polynomial pieces, the kind of bound and the means to certify it; `uncertain`: the
+    set of models for which it must hold, of which `model` then is the nominal one.
     """
 
     model: Pieces
@@ -70,11 +70,11 @@ class Question(NamedTuple):
 
     @property
     def gains(self) -> bool:
-        """Whether a gain is asked for."""
+        """Whether the bound is one of a gain."""
         return self.demand.kind.endswith("gain")
 
 
-def question(
+def pose(
     model: Model,
     rate: Rate,
     kind: Kind,
@@ -82,10 +82,10 @@ def question(
     impose: Imposed | None,
     solver: Solver | str | None,
     search: Search | None,
-) -> Question:
-    """The question, its options checked against one another and against the model.
+) -> Problem:
+    """State the problem, its options checked against one another and against the model.
 
-    Raises `InputError` for an option that has no meaning for the question.
+    Raises `InputError` for an option that has no meaning for the problem.
     """
     form, impose = form or Spline(), impose or Bernstein()
     if not isinstance(form, Spline | Memory | HigherOrder):
@@ -108,17 +108,19 @@ def question(
     if uncertain is not None:
         uncertain = uncertain.with_scheduling(model.parameters)
     demand = Demand(kind, motion)
-    asked = Question(pieces(model), demand, form, impose, Solver("CLARABEL"), search, uncertain)
-    _check_channels(asked)
-    _check_options(asked)
-    _check_block(asked)
-    return asked._replace(solver=_solver(asked, solver))
+    problem = Problem(pieces(model), demand, form, impose, Solver("CLARABEL"), search, uncertain)
+    _check_channels(problem)
+    _check_options(problem)
+    _check_block(problem)
+    return problem._replace(solver=_solver(problem, solver))
 
 
-def _solver(asked: Question, solver: Solver | str | None) -> Solver:
-    by_products = (asked.one_parameter and isinstance(asked.form, Spline)) or asked.points_serve
+def _solver(problem: Problem, solver: Solver | str | None) -> Solver:
+    by_products = (
+        problem.one_parameter and isinstance(problem.form, Spline)
+    ) or problem.points_serve
     if solver is None:
-        return Solver(LYAPUNOV if by_products and asked.model.sizes[0] > GENERAL else "CLARABEL")
+        return Solver(LYAPUNOV if by_products and problem.model.sizes[0] > GENERAL else "CLARABEL")
     if by_products:
         return solver if isinstance(solver, Solver) else Solver(solver)
     return general_solver(solver)
@@ -154,25 +156,25 @@ def _check_rest(motion: Motion, moving: Sequence[Scheduling]) -> None:
             )
 
 
-def _check_channels(asked: Question) -> None:
-    nx, nu, ny = asked.model.sizes
+def _check_channels(problem: Problem) -> None:
+    nx, nu, ny = problem.model.sizes
     if nx == 0:
         raise InputError("the model has no states; its gain is the largest norm of D(p)")
-    if asked.gains and not (nu and ny):
+    if problem.gains and not (nu and ny):
         raise InputError(
             f"a gain needs inputs and outputs, got {nu} and {ny}; use stability() without channels"
         )
-    if asked.demand.kind == "energy-to-peak gain" and asked.model.passes_peaks:
+    if problem.demand.kind == "energy-to-peak gain" and problem.model.passes_peaks:
         raise InputError(
             "the energy-to-peak gain of a continuous model needs D = 0: feedthrough passes peaks of"
             " any height"
         )
 
 
-def _check_block(asked: Question) -> None:
-    if asked.uncertain is None:
+def _check_block(problem: Problem) -> None:
+    if problem.uncertain is None:
         return
-    if not asked.one_parameter or not isinstance(asked.form, Spline):
+    if not problem.one_parameter or not isinstance(problem.form, Spline):
         raise InputError(
             "an UncertainStateSpace is for l2_gain and stability of one scheduling parameter with"
             " form=Spline(...) by plain Bernstein coefficients; for anything else take models of"
@@ -180,11 +182,11 @@ def _check_block(asked: Question) -> None:
         )
 
 
-def _check_options(asked: Question) -> None:
-    form, kind, dt = asked.form, asked.demand.kind, asked.model.dt
+def _check_options(problem: Problem) -> None:
+    form, kind, dt = problem.form, problem.demand.kind, problem.model.dt
     if not isinstance(form, Spline):
         name = type(form).__name__
-        if kind not in ("l2 gain", "stability") or not asked.one_parameter:
+        if kind not in ("l2 gain", "stability") or not problem.one_parameter:
             raise InputError(
                 f"{name} is a form for l2_gain and stability of an LPVStateSpace in one parameter"
                 " by plain Bernstein coefficients; take form=Spline(...) here"
@@ -194,14 +196,14 @@ def _check_options(asked: Question) -> None:
                 f"{name} is for continuous time; this model is sampled every {dt:g} s: leave it"
                 " out, or analyse the model before discretize(), as one in continuous time"
             )
-        if asked.gains and isinstance(form, HigherOrder):
+        if problem.gains and isinstance(form, HigherOrder):
             raise InputError(
                 "HigherOrder proves stability only: a V of that degree does not balance energies;"
                 " for a gain use Memory"
             )
     if kind == "stability" and form.accept is not None:
         raise InputError("accept compares bounds, and stability has none: leave it out")
-    if not asked.gains and (asked.impose.margins, asked.impose.floor) != (None, None):
+    if not problem.gains and (problem.impose.margins, problem.impose.floor) != (None, None):
         raise InputError(
             f"margins and floor are for gains; for the {kind} the margin itself is maximised:"
             " leave them out"
