@@ -52,10 +52,9 @@ if TYPE_CHECKING:
     from synthesis.loops.sampled_loop import SampledLoop, certify_sampled
     from synthesis.loops.wrong_parameter import with_wrong_parameter
     from synthesis.lpv.estimator import Estimator, estimator
-    from synthesis.lpv.lft_feedback import lft_feedback
     from synthesis.lpv.multiobjective import multiobjective
     from synthesis.lpv.objectives import H2, L2, EnergyToPeak, PoleRegion
-    from synthesis.lpv.output_feedback import output_feedback
+    from synthesis.lpv.output_feedback import lft_feedback, output_feedback
     from synthesis.lpv.state_feedback import state_feedback
     from synthesis.lti.h2 import h2
     from synthesis.lti.hinf import hinf
@@ -82,10 +81,9 @@ _ROOMS = {
     "synthesis.certificate": "Attempt Certificate Proof Seconds Status",
     "synthesis.loops.controller": "Controller",
     "synthesis.lpv.estimator": "Estimator estimator",
-    "synthesis.lpv.lft_feedback": "lft_feedback",
     "synthesis.lpv.multiobjective": "multiobjective",
     "synthesis.lpv.objectives": "H2 L2 EnergyToPeak PoleRegion",
-    "synthesis.lpv.output_feedback": "output_feedback",
+    "synthesis.lpv.output_feedback": "lft_feedback output_feedback",
     "synthesis.lpv.state_feedback": "state_feedback",
     "synthesis.loops.sampled_loop": "SampledLoop certify_sampled",
     "synthesis.loops.frozen_reading": "proven_around",

@@ -37,8 +37,7 @@ from symheli.lpv.bases import PiecewiseLinear
 from synthesis import Plant
 from synthesis.loops.controller import Controller
 from synthesis.loops.reduction import fewest
-from synthesis.lpv.lft_feedback import lft_feedback
-from synthesis.lpv.output_feedback import output_feedback
+from synthesis.lpv.output_feedback import lft_feedback, output_feedback
 from synthesis.lti.hinf import hinf
 from synthesis.worst.frozen import norm
 

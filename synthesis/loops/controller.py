@@ -15,8 +15,8 @@ from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
 from synthesis.forms import Spline
 from synthesis.impose import Bernstein
-from synthesis.plant.conditions import conditions
 from synthesis.plant.diagnosis import decided
+from synthesis.plant.refusals import conditions
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import asked as limits
 

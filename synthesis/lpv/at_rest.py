@@ -12,12 +12,11 @@ import numpy as np
 
 from symheli.progress import tracked
 from synthesis.certificate import Attempt
-from synthesis.lpv.coordinates import Coordinates, coordinates_of
 from synthesis.lpv.fitted import Fitted
-from synthesis.lpv.in_plant_units import packed
 from synthesis.lpv.recovery import Gains
+from synthesis.lpv.scaled_plant import ScaledPlant, scaled_plant_of
 from synthesis.lpv.search import closed, judged, simplest, with_knots
-from synthesis.lpv.worst_optimum import Worst
+from synthesis.lpv.worst_optimum import FrozenOptimum
 from synthesis.lti.hinf import central_gains
 from synthesis.plant.generalized import Generalized
 
@@ -30,23 +29,23 @@ Array = np.ndarray
 class AtRest(NamedTuple):
     """Gains as functions of p that keep `gamma` at every p at rest."""
 
-    coordinates: Coordinates
+    scaled: ScaledPlant
     fit: Fitted
     gamma: float
 
 
 def at_rest(
-    plant: Plant, worst: Worst, factors: Sequence[float], attempts: list[Attempt]
+    plant: Plant, worst: FrozenOptimum, factors: Sequence[float], attempts: list[Attempt]
 ) -> Iterator[AtRest]:
     """Of these multiples of the `worst` frozen optimum."""
-    coordinates = coordinates_of(plant, worst.level)
+    scaled = scaled_plant_of(plant, worst.level)
     points = judged(plant.parameters, worst.p)
     for factor in tracked("central controllers of frozen models", factors):
-        gains = partial(_central, coordinates, factor)
+        gains = partial(_central, scaled, factor)
         fit, outcome = None, "no functions of p keep it"
         try:
             for fit_of in (simplest, with_knots):
-                fit = fit or fit_of(coordinates, gains, closed, points, factor)
+                fit = fit or fit_of(scaled, gains, closed, points, factor)
         except np.linalg.LinAlgError:
             outcome = "not every frozen model has such a controller"
         if fit is not None:
@@ -54,17 +53,17 @@ def at_rest(
         name = f"central controllers at {factor:g} of the worst frozen optimum"
         attempts.append(Attempt(name, 0.0, outcome, factor * worst.level))
         if fit is not None:
-            yield AtRest(coordinates, fit, factor * worst.level)
+            yield AtRest(scaled, fit, factor * worst.level)
 
 
-def _central(coordinates: Coordinates, level: float, p: Array) -> Array:
+def _central(scaled: ScaledPlant, level: float, p: Array) -> Array:
     """[A B; C D] (K, ..) of the models frozen at p (K, m); raises `LinAlgError` where one has none
     of this level.
     """
     out = []
-    for each in zip(*coordinates.at(p), strict=True):
-        found = central_gains(Generalized(*each), level, coordinates.dt)
+    for each in zip(*scaled.at(p), strict=True):
+        found = central_gains(Generalized(*each), level, scaled.dt)
         if found is None:
             raise np.linalg.LinAlgError
         out.append(Gains(*found))
-    return packed(Gains(*(np.array(M) for M in zip(*out, strict=True))))
+    return Gains(*(np.array(M) for M in zip(*out, strict=True))).packed

@@ -15,17 +15,16 @@ from symheli.threads import with_one_thread
 from symheli.values.signal import Signal
 from symheli.values.summary import as_table, summarized
 from synthesis.certificate import Attempt, Certificate
-from synthesis.lpv.coordinates import Coordinates, depends
-from synthesis.lpv.existence import Existence, Found
+from synthesis.lpv.bases import Bases, Dependence, dependence
+from synthesis.lpv.existence import Existence, Solution
 from synthesis.lpv.fitted import Fitted
 from synthesis.lpv.frozen_stability import frozen_stability
 from synthesis.lpv.output_feedback import USUAL
-from synthesis.lpv.recovery import control_gain
-from synthesis.lpv.sampled_recovery import state_gain
-from synthesis.lpv.search import BACK_OFF, Dependence, Gains, Shape, best, dependence, settled
-from synthesis.plant.back_off import levels_above
+from synthesis.lpv.recovery import control_gain, state_gain
+from synthesis.lpv.scaled_plant import ScaledPlant, depends
+from synthesis.lpv.search import BACK_OFF, Gains, best, settled
 from synthesis.plant.plant import Plant, require_plant
-from synthesis.plant.refusals import failed, least_ranks
+from synthesis.plant.refusals import failed, least_ranks, levels_above
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
@@ -130,13 +129,13 @@ def estimator(
     attempts: list[Attempt] = []
     matters, still = depends(plant), plant.dt is not None
 
-    def every(degree: int) -> list[Shape]:
-        return [Shape(dependence(X, parameters, "X", matters, degree, still=still), None)]
+    def every(degree: int) -> list[Bases]:
+        return [Bases(dependence(X, parameters, "X", matters, degree, still=still), None)]
 
     start = best(plant, every, divisions, USUAL, attempts)
     factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts, _error):
-        model, error = _observer(plant, design.coordinates, design.fit)
+        model, error = _observer(plant, design.scaled, design.fit)
         if frozen_stability(error).stable is not False:
             return Estimator(
                 model=model,
@@ -148,14 +147,14 @@ def estimator(
     raise failed(plant, attempts)
 
 
-def _recover(coordinates: Coordinates, existence: Existence, found: Found) -> Gains:
+def _recover(scaled: ScaledPlant, existence: Existence, found: Solution) -> Gains:
     X = existence.X
     assert X is not None  # noqa: S101
 
     def gains(p: Array) -> Array:
         """L (K, n, ny)."""
-        at, x = coordinates.at(p).dual, X.at(found.coefficients, p)
-        if coordinates.dt is not None:
+        at, x = scaled.at(p).dual, X.at(found.coefficients, p)
+        if scaled.dt is not None:
             F = state_gain(at, x, x, found.gamma)
         else:
             nothing = np.zeros((len(p), at.B2.shape[-1], at.D21.shape[-2]))
@@ -165,13 +164,13 @@ def _recover(coordinates: Coordinates, existence: Existence, found: Found) -> Ga
     return gains
 
 
-def _error(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:
+def _error(scaled: ScaledPlant, gains: Gains, p: Array) -> tuple[Array, ...]:
     """Of the estimate."""
-    at, L = coordinates.at(p), gains(p)
+    at, L = scaled.at(p), gains(p)
     return at.A - L @ at.C2, at.B1 - L @ at.D21, at.C1, at.D11
 
 
-def _observer(plant: Plant, c: Coordinates, fit: Fitted) -> tuple[LPVStateSpace, LPVStateSpace]:
+def _observer(plant: Plant, c: ScaledPlant, fit: Fitted) -> tuple[LPVStateSpace, LPVStateSpace]:
     """The observer and its error."""
     rows, columns = c.right / math.sqrt(c.time), c.measurements
     basis, coefficients = fit.basis, rows @ fit.coefficients * columns

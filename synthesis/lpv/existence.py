@@ -21,9 +21,9 @@ from symheli.lpv import FunctionSpace
 from symheli.lpv.bases.function_space import tensor_grid
 from symheli.lpv.bases.polynomials import factors_of, piecewise_lobatto
 from symheli.values.numbers import whole
-from synthesis.lpv.coordinates import Coordinates
+from synthesis.lpv.bases import moves, used
 from synthesis.lpv.elimination import Half, controlled, observed
-from synthesis.lpv.motions import motions, moves, used
+from synthesis.lpv.scaled_plant import ScaledPlant
 from synthesis.lpv.unknown import Blocks, Unknown, selector, unknowns
 from synthesis.polynomial.symmetric import length, smat
 from synthesis.program import interior_point
@@ -70,7 +70,7 @@ ROUNDING = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
+class ExistenceProgram:
     """minimise cost g subject to blocks <= 0, for `interior_point.minimise`."""
 
     blocks: tuple[LyapunovBlocks, ...]
@@ -81,7 +81,7 @@ class Conditions:
     bounds: tuple[tuple[float, float], ...] = ()
 
 
-class Found(NamedTuple):
+class Solution(NamedTuple):
     """Coefficients of X, Y (and of the bound of Y at the next sample) with the g they admit, what
     the solver said, whether it `reached` its tolerance, and where it may start again.
     """
@@ -100,7 +100,7 @@ class Existence:
 
     def __init__(
         self,
-        plant: Coordinates,
+        plant: ScaledPlant,
         X: FunctionSpace | None,
         Y: FunctionSpace | None,
         divisions: int = 1,
@@ -144,7 +144,7 @@ class Existence:
             axes.append(piecewise_lobatto(knots, count))
         return tensor_grid(axes)
 
-    def least_gamma(self, solver: Solver) -> Found:
+    def least_gamma(self, solver: Solver) -> Solution:
         """Minimise g, with points added where a block is violated between them."""
         if len(self.points) == 1:
             return self._least(solver)
@@ -156,28 +156,28 @@ class Existence:
                 break
         return self._least(replace(solver, tolerance=FINE), start)
 
-    def _least(self, solver: Solver, start: interior_point.Early | None = None) -> Found:
+    def _least(self, solver: Solver, start: interior_point.Early | None = None) -> Solution:
         return self._least_within(self.largest, solver, start)
 
     def _least_within(
         self, largest: float, solver: Solver, start: interior_point.Early | None
-    ) -> Found:
+    ) -> Solution:
         blocks = [*self._halves(None, MARGIN), *self._coupling(False, largest)]
         return self._solved(blocks, 1.0, solver, start)
 
-    def least_share(self, found: Found, largest: float, solver: Solver) -> float:
+    def least_share(self, found: Solution, largest: float, solver: Solver) -> float:
         """Below this part of the g that was found there is none within a larger bound on X and Y;
         0 where the program does not tell. At the present points alone: more of them raise g.
         """
         within = self._least_within(largest, replace(solver, tolerance=COARSE), found.early)
         return (1 - COARSE) * within.gamma / found.gamma if within.reached else 0.0
 
-    def bounded(self, found: Found) -> bool:
+    def bounded(self, found: Solution) -> bool:
         """Whether the bound on X and Y decides."""
         each = (u.at(found.coefficients, self.points) for u in (self.X, self.Y) if u is not None)
         return any(np.linalg.eigvalsh(M).max() > NEAR * self.largest for M in each)
 
-    def _added(self, found: Found, gamma: float) -> bool:
+    def _added(self, found: Solution, gamma: float) -> bool:
         """Whether a block is violated between the points at this g: then there are more of them,
         where it is most, one in each cell of the present ones.
         """
@@ -196,7 +196,7 @@ class Existence:
         self.points = np.concatenate([self.points, *(p[None] for p in chosen.values())])
         return bool(chosen)
 
-    def _excess(self, points: Array, found: Found, gamma: float) -> Array:
+    def _excess(self, points: Array, found: Solution, gamma: float) -> Array:
         """The largest eigenvalue (K,) of any half at each point."""
         values = [
             np.linalg.eigvalsh(b.linear(found.coefficients) + b.constant)[:, -1]
@@ -204,12 +204,12 @@ class Existence:
         ]
         return np.concatenate([v.reshape(-1, len(points)) for v in values]).max(axis=0)
 
-    def widest(self, gamma: float, solver: Solver) -> Iterator[Found]:
+    def widest(self, gamma: float, solver: Solver) -> Iterator[Solution]:
         """For this g the X and Y whose product is farthest from one: first within the least bound
         beyond which that hardly grows, then within larger ones.
         """
         for margin in SETTLED:
-            before: Found | None = None
+            before: Solution | None = None
             for largest in WIDE:
                 found = self._widest(gamma, margin, largest, replace(solver, tolerance=CENTRAL))
                 if not np.any(found.coefficients):
@@ -220,7 +220,7 @@ class Existence:
             if before is not None:
                 yield before._replace(gamma=gamma)
 
-    def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Found:
+    def _widest(self, gamma: float, margin: float, largest: float, solver: Solver) -> Solution:
         """The same within this bound, with points added as for the least g."""
         for _ in range(ROUNDS):
             blocks = [*self._halves(gamma, margin), *self._coupling(True, largest)]
@@ -237,15 +237,15 @@ class Existence:
         cost: float,
         solver: Solver,
         start: interior_point.Early | None = None,
-    ) -> Found:
+    ) -> Solution:
         n, count = self.states, self.count
         candidate = interior_point.minimise(
-            Conditions(tuple(blocks), Sizes(n, 1, count), cost), solver, start
+            ExistenceProgram(tuple(blocks), Sizes(n, 1, count), cost), solver, start
         )
         if candidate.x is None:
-            return Found(np.inf, np.zeros((count, n, n)), candidate.message)
+            return Solution(np.inf, np.zeros((count, n, n)), candidate.message)
         coefficients = smat(candidate.x[: count * length(n)].reshape(count, -1), n)
-        return Found(
+        return Solution(
             float(candidate.x[-1]),
             coefficients,
             candidate.message,
@@ -302,7 +302,7 @@ class Existence:
         """Every extreme dp/dt (K, m) at these points, per scaled time."""
         if not unknown.moves:
             return [np.zeros(p.shape)]
-        return motions(self.plant.parameters, p, self.plant.time, used(unknown.basis))
+        return self.plant.motions(p, used(unknown.basis))
 
     def _next(self, p: Array, margin: float) -> list[LyapunovBlocks]:
         """S(p) <= Y(p(k+1)) to first order in the step, at its ends."""

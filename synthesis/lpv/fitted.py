@@ -1,14 +1,20 @@
-"""Gains known at some p as functions of p."""
+"""Gains known at some p as functions of p, and as a controller in the units of its plant."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from symheli.lpv import BSpline, FunctionSpace, Scheduling
+from symheli.lpv import BSpline, FunctionSpace, LPVStateSpace, Scheduling
 from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto, polynomials
+from synthesis.loops.controller import Controller
+from synthesis.lpv.scaled_plant import ScaledPlant
+
+if TYPE_CHECKING:
+    from synthesis.plant.plant import Plant
 
 Array = np.ndarray
 
@@ -115,3 +121,30 @@ def fitted(
             break
     assert best is not None  # noqa: S101 - some basis is always tried
     return best
+
+
+def in_plant_units(
+    plant: Plant, c: ScaledPlant, fit: Fitted, gamma: float, method: str
+) -> Controller:
+    """The controller in the units of the plant, of gains in the scaled ones as functions of p."""
+    basis, M, misfit = fit
+    ny = len(plant.measurements)
+    n = M.shape[-1] - ny
+    pace = np.full(n, 1 / math.sqrt(c.time))
+    rows = np.concatenate([pace, c.controls])
+    columns = np.concatenate([pace, c.measurements])
+    M = rows[:, None] * M * columns
+    names = tuple(f"k{i + 1}" for i in range(n))
+    model = LPVStateSpace(
+        basis,
+        M[:, :n, :n],
+        M[:, :n, n:],
+        M[:, n:, :n],
+        M[:, n:, n:],
+        plant.parameters,
+        names,  # type: ignore[arg-type]
+        plant.measurements,
+        plant.controls,
+        plant.dt,
+    )
+    return Controller(model=model, plant=plant, promised=gamma, method=method, misfit=misfit)

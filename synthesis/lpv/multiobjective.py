@@ -20,18 +20,16 @@ from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from synthesis.certificate import Attempt
 from synthesis.loops.controller import Controller
+from synthesis.lpv.bases import Dependence, functions, limited, used
 from synthesis.lpv.cells import Cell, cells, degrees_of
-from synthesis.lpv.coordinates import Coordinates, coordinates_of
-from synthesis.lpv.fitted import fitted
-from synthesis.lpv.in_plant_units import in_plant_units, packed
-from synthesis.lpv.motions import motions, used
+from synthesis.lpv.fitted import fitted, in_plant_units
 from synthesis.lpv.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
 from synthesis.lpv.recovery import Transformed, controller
-from synthesis.lpv.search import ACCURACY, Dependence, functions, limited
-from synthesis.plant.back_off import levels_above
+from synthesis.lpv.scaled_plant import ScaledPlant, scaled_plant_of
+from synthesis.lpv.search import ACCURACY
 from synthesis.plant.generalized import Generalized
 from synthesis.plant.plant import Plant, require_plant
-from synthesis.plant.refusals import failed, require_channels
+from synthesis.plant.refusals import failed, levels_above, require_channels
 from synthesis.program.cone_program import Solver
 from synthesis.program.panic import no_panic
 from synthesis.worst.rates import Rate
@@ -133,7 +131,7 @@ def multiobjective(
     solver = solver if isinstance(solver, Solver) else Solver(solver)
     (factor,) = levels_above(float(back_off))
     problem = _Problem(
-        plant, coordinates_of(plant, 1.0), bases[0], bases[1], gains, every, region, direct
+        plant, scaled_plant_of(plant, 1.0), bases[0], bases[1], gains, every, region, direct
     )
     attempts: list[Attempt] = []
     values = problem.best(solver, attempts)
@@ -147,7 +145,7 @@ def multiobjective(
     least = total / factor
     words = ", ".join(type(o).__name__ for o in every)
     fit = fitted(found, plant.parameters, ACCURACY)
-    made = in_plant_units(plant, problem.coordinates, fit, total, f"output feedback for {words}")
+    made = in_plant_units(plant, problem.scaled, fit, total, f"output feedback for {words}")
     return replace(made, optimum=least, attempts=tuple(attempts))
 
 
@@ -167,7 +165,7 @@ class _Problem:
     def __init__(
         self,
         plant: Plant,
-        coordinates: Coordinates,
+        scaled: ScaledPlant,
         X: FunctionSpace,
         Y: FunctionSpace,
         gains: Dependence | None,
@@ -177,21 +175,21 @@ class _Problem:
     ):
         import cvxpy as cp
 
-        self.plant, self.coordinates, self.objectives = plant, coordinates, objectives
-        self.region = region and _in_time(region, coordinates.time)
-        root = math.sqrt(coordinates.time)  # energies and variances are per unit of time
+        self.plant, self.scaled, self.objectives = plant, scaled, objectives
+        self.region = region and _in_time(region, scaled.time)
+        root = math.sqrt(scaled.time)  # energies and variances are per unit of time
         self.pace = [1.0 if isinstance(o, L2) else root for o in objectives]
         self.sizes = [o.bound or 1.0 for o in objectives]
         """Of the gains in the scaled loop: outputs are measured in them."""
         m = len(plant.parameters)
-        breaks = coordinates.breaks
-        own = degrees_of(lambda p: list(coordinates.at(p)), breaks)
+        breaks = scaled.breaks
+        own = degrees_of(lambda p: list(scaled.at(p)), breaks)
         most = np.maximum(*(np.array(b.degrees or (4,) * m) for b in (X, Y)))
         given = tuple(int(d) for d in np.array(own) + most) if gains is None else gains
         self.basis = {"X": X, "Y": Y, "K": functions(given, plant.parameters, "gains")}
         degrees = np.array(own) + np.maximum(most, self.basis["K"].degrees or (4,) * m)
         self.cells = cells(breaks, [int(d) for d in degrees])
-        sample = coordinates.at(np.array([[s.middle for s in plant.parameters]]))
+        sample = scaled.at(np.array([[s.middle for s in plant.parameters]]))
         self.n, self.nu, self.ny = sample.A.shape[-1], sample.B2.shape[-1], sample.C2.shape[-2]
         n = self.n
         self.X = [cp.Variable((n, n), symmetric=True) for _ in range(X.size)]
@@ -266,12 +264,12 @@ class _Problem:
             return None
 
         def gains(p: Array) -> Any:
-            at, q = self.coordinates.at(p), p[:, 0] if p.shape[1] == 1 else p
+            at, q = self.scaled.at(p), p[:, 0] if p.shape[1] == 1 else p
             X, Y = (_value(self.basis[k](q), v) for k, v in (("X", self.X), ("Y", self.Y)))
             K = Transformed(
                 *(_value(self.basis["K"](q), v) for v in (self.A, self.B, self.C, self.D))
             )
-            return packed(controller(at, X, Y, K, constant_x=not any(used(self.basis["X"]))))
+            return controller(at, X, Y, K, constant_x=not any(used(self.basis["X"]))).packed
 
         return gains
 
@@ -286,7 +284,7 @@ class _Problem:
                 cp.Variable((len(rows), len(rows)), symmetric=True) if isinstance(o, H2) else None
             )
         for cell in self.cells:
-            plants = self.coordinates.at(cell.nodes)
+            plants = self.scaled.at(cell.nodes)
             each = [Generalized(*(M[k] for M in plants)) for k in range(len(cell.nodes))]
             loops = [self._loop(each[k], cell.nodes[k]) for k in range(len(each))]
             coupled = [self._coupled(q, 1.0 if apart is None else apart) for q in cell.nodes]
@@ -339,7 +337,7 @@ class _Problem:
                 ],
             )
         top = bound * np.eye(z) if slack is None else slack
-        if self.coordinates.dt is None:
+        if self.scaled.dt is None:
             yield from _positive(
                 cell, [cp.bmat([[loop.P, loop.C.T], [loop.C, top]]) for loop in loops]
             )
@@ -363,7 +361,7 @@ class _Problem:
         import cvxpy as cp
 
         w, N = gw.shape[0], 2 * self.n
-        if self.coordinates.dt is None:
+        if self.scaled.dt is None:
             F = [[loop.A + loop.A.T + drift, loop.B], [loop.B.T, -gw]]
             if gz is not None:
                 F = [[*F[0], loop.C.T], [*F[1], loop.D.T], [loop.C, loop.D, -gz]]
@@ -387,12 +385,12 @@ class _Problem:
         """What the motion of p adds to the block of the state, at every node."""
         import cvxpy as cp
 
-        n, parameters = self.n, self.plant.parameters
+        n = self.n
         moving = [a or b for a, b in zip(used(self.basis["X"]), used(self.basis["Y"]), strict=True)]
-        if self.coordinates.dt is not None or not any(moving):
+        if self.scaled.dt is not None or not any(moving):
             yield [np.zeros((2 * n, 2 * n))] * len(cell.nodes)
             return
-        for motion in motions(parameters, cell.nodes, self.coordinates.time, moving):
+        for motion in self.scaled.motions(cell.nodes, moving):
             out = []
             for q, v in zip(cell.nodes, motion, strict=True):
                 dX, dY = (self._slope(k, u, q, v) for k, u in (("X", self.X), ("Y", self.Y)))

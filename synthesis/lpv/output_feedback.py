@@ -14,35 +14,28 @@ from symheli.threads import with_one_thread
 from synthesis.certificate import Attempt
 from synthesis.loops.controller import Controller
 from synthesis.lpv.at_rest import at_rest
-from synthesis.lpv.coordinates import Coordinates, depends
-from synthesis.lpv.existence import LARGEST, Existence, Found
+from synthesis.lpv.bases import DEGREES, Bases, Dependence, both_moving, candidates, used
+from synthesis.lpv.existence import LARGEST, Existence, Solution
+from synthesis.lpv.fitted import in_plant_units
 from synthesis.lpv.frozen_stability import frozen_stability
-from synthesis.lpv.in_plant_units import in_plant_units, packed
-from synthesis.lpv.motions import motions, used
-from synthesis.lpv.recovery import controller, split
-from synthesis.lpv.robust import scaled_plant
-from synthesis.lpv.sampled_recovery import joined
+from synthesis.lpv.recovery import controller, sampled_controller, split
+from synthesis.lpv.robust import robust_plant
+from synthesis.lpv.scaled_plant import ScaledPlant, depends
 from synthesis.lpv.search import (
     BACK_OFF,
     CHECKED,
     CLOSE,
-    DEGREES,
     FAR_ABOVE,
     WORTH,
-    Dependence,
     Design,
-    Shape,
     Start,
     best,
-    both_moving,
     least,
     settled,
-    shapes,
 )
-from synthesis.lpv.worst_optimum import Worst, worst_optimum
-from synthesis.plant.back_off import levels_above
+from synthesis.lpv.worst_optimum import FrozenOptimum, worst_optimum
 from synthesis.plant.plant import Plant, require_plant
-from synthesis.plant.refusals import NOTHING_WRONG, failed, least_ranks
+from synthesis.plant.refusals import NOTHING_WRONG, failed, least_ranks, levels_above
 from synthesis.program.cone_program import LYAPUNOV, Solver
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
@@ -137,10 +130,10 @@ def output_feedback(
     attempts: list[Attempt] = []
     matters = depends(plant)
 
-    def every(degree: int) -> list[Shape]:
-        return shapes(parameters, X, Y, plant.dt is not None, matters, degree)
+    def every(degree: int) -> list[Bases]:
+        return candidates(parameters, X, Y, plant.dt is not None, matters, degree)
 
-    def both(degree: int) -> list[Shape]:
+    def both(degree: int) -> list[Bases]:
         free = X is None and Y is None and plant.dt is None
         return both_moving(parameters, matters, degree) if free else []
 
@@ -150,9 +143,56 @@ def output_feedback(
     return _nominal(plant, every, both, factors, fastest, divisions, attempts, free=free)
 
 
+@with_one_thread
+def lft_feedback(
+    plant: Plant,
+    *,
+    back_off: float | Sequence[float] = BACK_OFF,
+    fastest: float = math.inf,
+    divisions: int = 1,
+) -> Controller:
+    """Design an output-feedback controller for parameters that change arbitrarily fast, from an LFT
+    in them.
+
+    With constant X and Y the conditions of `output_feedback` need hold at every p alone. The full
+    block S-procedure turns them into conditions on multipliers without losing anything (Scherer
+    2001, theorem 8); here they are imposed on p itself, by Bernstein coefficients. The controller
+    is polynomial in p: `controller.model.to_lft().reduce()`.
+
+    Parameters
+    ----------
+    plant : Plant
+        As for `output_feedback`.
+    back_off, fastest, divisions
+        As for `output_feedback`.
+
+    Returns
+    -------
+    Controller
+        `certify(math.inf)` or `lft_gain(controller.closed().to_lft().reduce())` prove its gain.
+
+    Raises
+    ------
+    InputError, SynthesisError
+        As `output_feedback`; where p may jump there often is no controller.
+
+    References
+    ----------
+    Scherer, "LPV control and full block multipliers", Automatica 37 (2001).
+
+    Examples
+    --------
+    >>> made = synthesis.lft_feedback(plant)
+    >>> proof = made.certify(math.inf, search=None)
+    >>> proof.verified, bool(proof.gamma <= made.promised)
+    (True, True)
+    """
+    return output_feedback(plant, math.inf, back_off=back_off, fastest=fastest, divisions=divisions)
+
+
 def _robust(
     plant: Plant,
-    every: Sequence[Shape],
+    every: Sequence[Bases],
     factors: Sequence[float],
     fastest: float,
     divisions: int,
@@ -161,7 +201,7 @@ def _robust(
     """For all models of the set, by the one of the shapes that serves the nominal one best."""
     starts = [least(plant, shape, divisions, USUAL, attempts) for shape in every]
     start = min(starts, key=lambda each: each.gamma)
-    found = scaled_plant(
+    found = robust_plant(
         plant, start.gamma, lambda p: least(p, start.shape, divisions, USUAL, attempts).gamma
     )
     if found is None:
@@ -174,8 +214,8 @@ def _robust(
 
 def _nominal(
     plant: Plant,
-    every: Callable[[int], Sequence[Shape]],
-    both: Callable[[int], Sequence[Shape]],
+    every: Callable[[int], Sequence[Bases]],
+    both: Callable[[int], Sequence[Bases]],
     factors: Sequence[float],
     fastest: float,
     divisions: int,
@@ -208,9 +248,9 @@ def _nominal(
 def _controllers(
     plant: Plant,
     start: Start,
-    both: Callable[[int], Sequence[Shape]],
+    both: Callable[[int], Sequence[Bases]],
     factors: Sequence[float],
-    worst: Worst,
+    worst: FrozenOptimum,
     divisions: int,
     attempts: list[Attempt],
     *,
@@ -225,7 +265,7 @@ def _controllers(
 
     def central() -> Iterator[tuple[Controller, tuple[str, ...]]]:
         for each in at_rest(plant, worst, factors, attempts):
-            made = in_plant_units(plant, each.coordinates, each.fit, each.gamma, CENTRAL)
+            made = in_plant_units(plant, each.scaled, each.fit, each.gamma, CENTRAL)
             yield replace(made, optimum=floor), ()
 
     def other() -> Start | None:
@@ -240,7 +280,7 @@ def _controllers(
             still = False
         told = ", their rates neglected" if own.shape.untold(plant.parameters) else ""
         method = f"output feedback, {own.shape}{told}"
-        made = in_plant_units(plant, design.coordinates, design.fit, design.gamma, method)
+        made = in_plant_units(plant, design.scaled, design.fit, design.gamma, method)
         made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
         decides = own.existence.bounded(own.found) and own.existence.largest >= LARGEST[-1]
         yield made, (BOUND_DECIDES.format(own.existence.largest),) if decides else ()
@@ -306,19 +346,19 @@ def _limited(made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
 
 
 def _recover(
-    coordinates: Coordinates, existence: Existence, found: Found
+    scaled: ScaledPlant, existence: Existence, found: Solution
 ) -> Callable[[Array], Array]:
     X, Y, S = existence.X, existence.Y, existence.S
     assert X is not None  # noqa: S101 - all were asked for
     assert Y is not None  # noqa: S101
     assert S is not None  # noqa: S101
-    parameters = coordinates.parameters
+    parameters = scaled.parameters
 
     def gains(p: Array) -> Array:
-        at = coordinates.at(p)
+        at = scaled.at(p)
         x, y, s = (u.at(found.coefficients, p) for u in (X, Y, S))
-        if coordinates.dt is not None:
-            return packed(joined(at, x, y, s, found.gamma))
+        if scaled.dt is not None:
+            return sampled_controller(at, x, y, s, found.gamma).packed
         transformed = split(at, x, y, found.gamma)
         moving = None
         if X.moves and Y.moves:
@@ -327,9 +367,9 @@ def _recover(
                 m and isinstance(s.rate, str)
                 for m, s in zip(used(X.basis), parameters, strict=True)
             ]
-            (motion,) = motions(parameters, p, coordinates.time, known)
+            (motion,) = scaled.motions(p, known)
             moving = X.moving(found.coefficients, p, motion)
-        return packed(controller(at, x, y, transformed, constant_x=not X.moves, moving_x=moving))
+        return controller(at, x, y, transformed, constant_x=not X.moves, moving_x=moving).packed
 
     return gains
 

@@ -12,6 +12,12 @@ The state of the controller is an estimate of the plant's, in whose coordinates 
 of the size of the plant's even where X or Y tend to infinity, as X does where the measurements
 tell the disturbance: N = -X with M' = Y - X^-1, or M' = Y with N = Y^-1 - X. The last two terms
 cancel in the first case if X is constant, in the second if Y is.
+
+In discrete time the state of the controller is an estimate of the plant's, too: in the coordinates
+(x - x_k, x_k) the storage function is that of X and of W^-1, W = Y - X^-1. Where these are
+identities, with S <= Y(p(k+1)) in place of Y after the step, and gains in units of gamma, the
+inequality of the closed loop says that [A B; C D] of the loop, which is known but for left K right,
+is a contraction.
 """
 
 from __future__ import annotations
@@ -20,11 +26,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synthesis.lpv.contraction import contraction
 from synthesis.lti.linear_quadratic import given_direct_way
 from synthesis.plant.generalized import Generalized
 
 Array = np.ndarray
+ROUNDING = 1e-6
+"""By this part a level is kept above the least one, at which the formula has no digits."""
 
 
 class Gains(NamedTuple):
@@ -34,6 +41,12 @@ class Gains(NamedTuple):
     B: Array
     C: Array
     D: Array
+
+    @property
+    def packed(self) -> Array:
+        """[A B; C D] (K, ..)."""
+        top, bottom = (np.concatenate(pair, axis=-1) for pair in (self[:2], self[2:]))
+        return np.concatenate([top, bottom], axis=-2)
 
 
 class Transformed(NamedTuple):
@@ -112,6 +125,87 @@ def controller(
     back = np.linalg.inv(M)
     gains = np.linalg.solve(N, inner @ back), np.linalg.solve(N, into), out @ back, D
     return Gains(*given_direct_way(plant.D22, *gains))
+
+
+def sampled_controller(plant: Generalized, X: Array, Y: Array, S: Array, gamma: float) -> Gains:
+    """The controller of the whole inequality, in discrete time."""
+    A, B1, B2, C1, C2, D11, D12, D21, D22 = plant
+    K, n = len(A), A.shape[-1]
+    inverse = np.linalg.inv(X)
+    root = np.linalg.cholesky(X)
+    now, after = (np.linalg.cholesky(Z - inverse) for Z in (Y, S))
+    error, ahead = _t(root), np.linalg.inv(after)  # of x - x_k and of x_k after the step
+    before = np.concatenate([np.linalg.inv(error), now], axis=-1)  # x of both before it
+    zero, none = np.zeros((K, n, n)), np.zeros((K, n, B2.shape[-1]))
+    found = _central(
+        np.concatenate([error @ A @ before, np.zeros((K, n, 2 * n))], axis=-2),
+        np.concatenate([error @ B1, np.zeros((K, n, B1.shape[-1]))], axis=-2),
+        C1 @ before,
+        D11,
+        np.block([[-error, error @ B2], [ahead, none]]),
+        np.concatenate([np.zeros((K, C1.shape[-2], n)), D12], axis=-1),
+        np.concatenate([np.concatenate([zero, now], axis=-1), C2 @ before], axis=-2),
+        np.concatenate([np.zeros((K, n, B1.shape[-1])), D21], axis=-2),
+        gamma,
+    )
+    gains = found[:, :n, :n], found[:, :n, n:], found[:, n:, :n], found[:, n:, n:]
+    return Gains(*given_direct_way(D22, *gains))
+
+
+def state_gain(plant: Generalized, Y: Array, S: Array, gamma: float) -> Array:
+    """F (K, nu, n) of u = F x, in discrete time."""
+    A, B1, B2, C1, _, D11, D12, *_ = plant
+    now, ahead = np.linalg.cholesky(Y), np.linalg.inv(np.linalg.cholesky(S))
+    blind = np.zeros((len(A), A.shape[-1], B1.shape[-1]))
+    return _central(ahead @ A @ now, ahead @ B1, C1 @ now, D11, ahead @ B2, D12, now, blind, gamma)
+
+
+def _central(
+    A: Array,
+    B: Array,
+    C: Array,
+    D: Array,
+    left: Array,
+    left_z: Array,
+    right: Array,
+    right_w: Array,
+    gamma: float,
+) -> Array:
+    """K of the loop A + left K right, B + left K right_w, C + left_z K right, D + left_z K right_w,
+    the storage before and after the step the identity.
+    """
+    root = np.sqrt(gamma)
+    return contraction(
+        np.block([[A, B / root], [C / root, D / gamma]]),
+        np.concatenate([left, left_z / root], axis=-2),
+        np.concatenate([right, right_w / root], axis=-1),
+        1.0,
+    )
+
+
+def contraction(M: Array, left: Array, right: Array, level: float) -> Array:
+    """K (N, k, l) with |M + left K right| <= level, or nearly the least that can be, if that is
+    more; `left` (N, r, k) of full column, `right` (N, l, c) of full row rank.
+
+    References
+    ----------
+    Davis, Kahan and Weinberger, SIAM J. Numerical Analysis 19 (1982), the central solution.
+    """
+    k, l = left.shape[-1], right.shape[-2]
+    P, into = np.linalg.qr(left, mode="complete")
+    Q, out = np.linalg.qr(_t(right), mode="complete")
+    inner = _t(P) @ M @ Q
+    above, beside, corner = inner[:, :k, l:], inner[:, k:, :l], inner[:, k:, l:]
+    least = np.maximum(_norm(inner[:, k:]), _norm(inner[:, :, l:]))
+    bound = np.maximum(level, least * (1 + ROUNDING))[:, None, None]
+    room = bound**2 * np.eye(corner.shape[-1]) - _t(corner) @ corner
+    best = -above @ np.linalg.solve(room, _t(corner) @ beside)
+    gain = best - inner[:, :k, :l]
+    return np.linalg.solve(into[:, :k], gain) @ np.linalg.inv(_t(out[:, :l]))
+
+
+def _norm(M: Array) -> Array:
+    return np.linalg.svd(M, compute_uv=False).max(axis=-1, initial=0.0)
 
 
 def _identity(factor: float, n: int, like: Array) -> Array:

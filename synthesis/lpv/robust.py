@@ -25,7 +25,7 @@ SETTLED = 2e-3
 """Changes of gamma, relative, that end them."""
 
 
-def scaled_plant(plant: Plant, start: float, least: Callable[[Plant], float]) -> Plant | None:
+def robust_plant(plant: Plant, start: float, least: Callable[[Plant], float]) -> Plant | None:
     """The open plant whose gain gamma, once reached, is that of every model of the set.
 
     With d = Delta v, |Delta| <= beta, channels d = gamma beta/s d', v' = s v among disturbances and

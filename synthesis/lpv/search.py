@@ -1,5 +1,13 @@
 """From a plant to X(p), Y(p) and the gains they promise: which of them moves and of what degree,
 how far from the least gamma, in a stated order.
+
+Where X and Y both move with p the controller is not told dp/dt. With N = -X its state estimates
+that of the plant, and
+
+    V = e' X e + x_k' (Y - X^-1)^-1 x_k,  e = x - x_k,
+
+is the storage function that X and Y promise. Of the controller only the term -dX/dt X^-1 of A_k is
+left out (`recovery`), so V proves the loop for a gamma that is larger the faster p moves.
 """
 
 from __future__ import annotations
@@ -12,18 +20,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError
-from symheli.lpv import FunctionSpace, Scheduling
+from symheli.lpv import Scheduling
 from symheli.lpv.bases.function_space import tensor_grid
-from symheli.lpv.bases.polynomials import polynomials
 from symheli.progress import tracked
 from synthesis.certificate import Attempt
-from synthesis.lpv.coordinates import Coordinates, coordinates_of
-from synthesis.lpv.existence import LARGEST, Existence, Found
+from synthesis.lpv.bases import DEGREES, Bases, used
+from synthesis.lpv.existence import LARGEST, Existence, Solution
 from synthesis.lpv.fitted import Fitted, cut_to_serve, fits
-from synthesis.lpv.motions import used
-from synthesis.lpv.neglected_rate import level_kept
-from synthesis.lpv.worst_optimum import Worst
+from synthesis.lpv.scaled_plant import ScaledPlant, scaled_plant_of
+from synthesis.lpv.worst_optimum import FrozenOptimum
 from synthesis.program.cone_program import Solver
 from synthesis.worst.frozen import below
 
@@ -32,8 +37,6 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-Dependence = int | tuple[int, ...] | FunctionSpace
-"""Of X or Y on the parameters: a degree for all, one each, or the functions themselves."""
 
 BACK_OFF = (1.02, 1.04, 1.01, 1.1, 1.2, 1.5)
 """Multiples of the least gamma at which X and Y are settled, tried in turn."""
@@ -60,163 +63,32 @@ CHECKED = {1: 97, 2: 7}
 """Values of each parameter at which frozen loops are judged, beside those where the inequalities
 were imposed (more parameters: 3).
 """
-DEGREES = {1: (2, 4, 6, 8), 2: (2, 4)}
-"""Of the one that moves, tried in turn while gamma falls (more parameters: 2)."""
 CLOSE = 1.01
 """A gamma within this factor of what no controller can beat is not worth another program."""
-NOTHING_KNOWN = Worst()
+NOTHING_KNOWN = FrozenOptimum()
 WORTH = 0.995
 """Part of gamma to which a richer program must lower it to be worth another."""
 FAR = 30.0
 """A gamma this many times larger or smaller than the unit of performance asks for another unit."""
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """Functions of X and of Y, either None where the problem has only the other."""
-
-    X: FunctionSpace | None
-    Y: FunctionSpace | None
-
-    @property
-    def size(self) -> int:
-        """Number of functions of both."""
-        return sum(basis.size for basis in (self.X, self.Y) if basis is not None)
-
-    @property
-    def by_y(self) -> bool:
-        """Whether Y alone depends on p."""
-        moving = [basis is not None and basis.size > 1 for basis in (self.X, self.Y)]
-        return moving == [False, True]
-
-    def untold(self, parameters: Sequence[Scheduling]) -> list[str]:
-        """Parameters of a rate that is a number > 0 with which X and Y both move: a controller
-        would have to be told dp/dt.
-        """
-        if self.X is None or self.Y is None:
-            return []
-        both = zip(parameters, used(self.X), used(self.Y), strict=True)
-        return [s.name for s, x, y in both if x and y and not _known(s)]
-
-    def __str__(self) -> str:
-        said = [
-            f"{name} {_said(basis)}"
-            for name, basis in (("X", self.X), ("Y", self.Y))
-            if basis is not None
-        ]
-        return ", ".join(said)
-
-
-def _said(basis: FunctionSpace) -> str:
-    if basis.size == 1:
-        return "constant"
-    return f"of degree {'x'.join(map(str, basis.degrees))}" if basis.degrees else f"in {basis.size}"
-
-
-def functions(given: Dependence, parameters: Sequence[Scheduling], name: str) -> FunctionSpace:
-    """The basis that was asked for; `InputError` for a degree below zero, a wrong number of them,
-    or functions of another range.
-    """
-    box = [(s.low, s.high) for s in parameters]
-    if isinstance(given, FunctionSpace):
-        if given.dimension != len(box):
-            raise InputError(f"{name}: expected functions of {len(box)} parameter(s), got {given}")
-        return given
-    degrees = given if isinstance(given, tuple) else (given,) * len(box)
-    whole = all(isinstance(d, int) and not isinstance(d, bool) and d >= 0 for d in degrees)
-    if len(degrees) != len(box) or not whole:
-        raise InputError(
-            f"{name}: expected a degree >= 0, one for each of"
-            f" {', '.join(s.name for s in parameters)}, or functions of them; got {given!r:.60}"
-        )
-    return polynomials(degrees, box)
-
-
-def limited(basis: FunctionSpace, parameters: Sequence[Scheduling], name: str) -> FunctionSpace:
-    """The basis, checked: what may jump must not be in it."""
-    for s, moves in zip(parameters, used(basis), strict=True):
-        if moves and not isinstance(s.rate, str) and math.isinf(s.rate):
-            raise InputError(
-                f"{name} cannot depend on {s.name}, which may jump: give its rate, or degree 0"
-            )
-    return basis
-
-
-def shapes(
-    parameters: Sequence[Scheduling],
-    X: Dependence | None,
-    Y: Dependence | None,
-    sampled: bool,
-    matters: Sequence[bool],
-    degree: int = DEGREES[1][0],
-) -> list[Shape]:
-    """The pairs that are tried: what was asked for, else one of the two moving, of this degree,
-    then the other, with the parameters that the plant depends on.
-
-    Both may move with a parameter that stands still, and with one whose rate is another parameter:
-    then the controller knows how they move. Where both were asked for they may move with others too
-    (`Shape.untold`), of which dp/dt is then neglected. Raises `InputError` where that has no proof:
-    in discrete time, and beside a rate that is another parameter.
-    """
-    free = [_known(s) for s in parameters]
-    jumps = [not isinstance(s.rate, str) and math.isinf(s.rate) for s in parameters]
-    both = tuple(degree if f and m else 0 for f, m in zip(free, matters, strict=True))
-    one = tuple(degree if m and not j else 0 for j, m in zip(jumps, matters, strict=True))
-    pairs: list[tuple[Dependence, Dependence]] = []
-    if X is not None or Y is not None:
-        pairs = [(both if X is None else X, both if Y is None else Y)]
-    elif sampled and any(isinstance(s.rate, str) or s.rate > 0 for s in parameters):
-        pairs = [(0, one)]
-    elif both == one:
-        pairs = [(one, one)]
-    else:
-        pairs = [(both, one), (one, both)]
-    out = []
-    for x, y in pairs:
-        bases = [
-            limited(functions(d, parameters, n), parameters, n) for d, n in ((x, "X"), (y, "Y"))
-        ]
-        for s, in_x in zip(parameters, used(bases[0]), strict=True):
-            if sampled and in_x and (isinstance(s.rate, str) or s.rate > 0):
-                raise InputError(
-                    f"in discrete time X cannot depend on {s.name}: the controller would need its"
-                    " next value; let Y depend on it"
-                )
-        shape = Shape(*bases)
-        untold = shape.untold(parameters)
-        if untold and any(isinstance(s.rate, str) for s in parameters):
-            raise InputError(
-                f"X and Y both depend on {', '.join(untold)}: the controller would need its rate,"
-                " which can be neglected only where no rate is another parameter; let one of X and"
-                f" Y be of degree 0 in {', '.join(untold)}, or give numbers as rates,"
-                " .with_rate(...)"
-            )
-        out.append(shape)
-    return out
-
-
-def _known(s: Scheduling) -> bool:
-    """Whether a controller knows dp/dt."""
-    return isinstance(s.rate, str) or s.rate == 0
-
-
 Gains = Callable[[Array], Array]
-Loop = Callable[[Coordinates, Gains, Array], tuple[Array, ...]]
+Loop = Callable[[ScaledPlant, Gains, Array], tuple[Array, ...]]
 """A, B, C, D (K, ..) of what is judged, at p (K, m)."""
 
 
 class Start(NamedTuple):
     """The least gamma of a shape."""
 
-    coordinates: Coordinates
+    scaled: ScaledPlant
     existence: Existence
-    found: Found
-    shape: Shape
+    found: Solution
+    shape: Bases
 
     @property
     def gamma(self) -> float:
         """In the units of the plant; inf where none was found."""
-        return self.coordinates.channel * self.found.gamma
+        return self.scaled.channel * self.found.gamma
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,42 +97,27 @@ class Design:
     (K, m), scaled, as functions of p.
     """
 
-    coordinates: Coordinates
+    scaled: ScaledPlant
     existence: Existence
-    found: Found
+    found: Solution
     fit: Fitted
 
     @property
     def gamma(self) -> float:
         """In the units of the plant."""
-        return self.found.gamma * self.coordinates.channel
+        return self.found.gamma * self.scaled.channel
 
 
-Recover = Callable[[Coordinates, Existence, Found], Gains]
-
-
-def both_moving(
-    parameters: Sequence[Scheduling], matters: Sequence[bool], degree: int
-) -> list[Shape]:
-    """X and Y of this degree in every parameter of a limited rate; nothing where none moves, or
-    one whose rate is another.
-    """
-    rates = [s.rate for s in parameters if not isinstance(s.rate, str)]
-    if len(rates) < len(parameters) or not any(0 < rate < math.inf for rate in rates):
-        return []
-    degrees = tuple(
-        degree if m and rate != math.inf else 0 for rate, m in zip(rates, matters, strict=True)
-    )
-    return [Shape(*(functions(degrees, parameters, name) for name in ("X", "Y")))]
+Recover = Callable[[ScaledPlant, Existence, Solution], Gains]
 
 
 def best(
     plant: Plant,
-    every: Callable[[int], Sequence[Shape]],
+    every: Callable[[int], Sequence[Bases]],
     divisions: int,
     solver: Solver,
     attempts: list[Attempt],
-    worst: Worst = NOTHING_KNOWN,
+    worst: FrozenOptimum = NOTHING_KNOWN,
 ) -> Start:
     """The shape of the least gamma: of those of the lowest degree the best, then of higher degrees
     while that lowers it, then with a larger bound on X and Y where that decides. No controller has
@@ -306,7 +163,7 @@ def best(
 
 def least(
     plant: Plant,
-    shape: Shape,
+    shape: Bases,
     divisions: int,
     solver: Solver,
     attempts: list[Attempt],
@@ -319,7 +176,7 @@ def least(
     the inequalities at this p (m,), too.
     """
     for _ in tracked(f"least gamma, {shape}", range(3)):
-        own = coordinates_of(plant, channel)
+        own = scaled_plant_of(plant, channel)
         existence = Existence(own, shape.X, shape.Y, divisions, largest, p)
         found = existence.least_gamma(solver)
         gamma = channel * found.gamma
@@ -342,14 +199,14 @@ def settled(
     """Designs at these multiples of the least gamma, whose frozen `loop` keeps it with the gains
     as functions of p; `neglecting`: at most `FURTHER` above, where the gains are not told dp/dt.
     """
-    coordinates, existence, lowest, _ = start
+    scaled, existence, lowest, _ = start
     if not math.isfinite(lowest.gamma):
         return
     judged = loop or closed
-    sharp: dict[float, tuple[Found, Gains]] = {}
+    sharp: dict[float, tuple[Solution, Gains]] = {}
 
     def noted(factor: float, message: str, outcome: str) -> None:
-        gamma = factor * lowest.gamma * coordinates.channel
+        gamma = factor * lowest.gamma * scaled.channel
         attempts.append(Attempt(f"back-off {factor:g}", 0.0, f"{message}, {outcome}", gamma))
 
     def by_splines() -> Iterator[Design]:
@@ -370,7 +227,7 @@ def settled(
             # X and Y of a solver that stopped short may be nothing, or not positive
             with contextlib.suppress(np.linalg.LinAlgError):
                 if np.any(found.coefficients):
-                    gains = recover(coordinates, existence, found)
+                    gains = recover(scaled, existence, found)
                     design, outcome = _tried(start, found, gains, judged, neglecting, simplest)
                     if outcome == SHARP:
                         sharp.setdefault(factor, (found, gains))
@@ -384,63 +241,63 @@ def settled(
 
 def _tried(
     start: Start,
-    found: Found,
+    found: Solution,
     gains: Gains,
     loop: Loop,
     neglecting: bool,
-    fit_of: Callable[[Coordinates, Gains, Loop, Array, float], Fitted | None],
+    fit_of: Callable[[ScaledPlant, Gains, Loop, Array, float], Fitted | None],
 ) -> tuple[Design | None, str]:
     """The design of these gains, None where their loop does not keep gamma; and what came of it."""
-    coordinates, existence, *_ = start
+    scaled, existence, *_ = start
     reached = found.gamma
     points = judged(existence.plant.parameters, existence.points)
     if neglecting:
-        looped = closed(coordinates, gains, points)
-        reached = max(reached, level_kept(coordinates, existence, found, looped, points))
+        looped = closed(scaled, gains, points)
+        reached = max(reached, level_kept(scaled, existence, found, looped, points))
     further = reached / found.gamma
     if further > FURTHER:
         said = UNTOLD if further > TOO_FAST else "as dp/dt is not known"
         return None, f"{said}, {further:.3g} times as much"
-    if not all(kept(coordinates, gains, loop, points, reached * (1 + SLACK))):
+    if not all(kept(scaled, gains, loop, points, reached * (1 + SLACK))):
         return None, UNKEPT
-    fit = fit_of(coordinates, gains, loop, points, reached)
+    fit = fit_of(scaled, gains, loop, points, reached)
     if fit is None:
         return None, SHARP
     said = f"frozen loops keep it, functions of p within {fit.misfit:.1e}"
-    return Design(coordinates, existence, found._replace(gamma=reached), fit), said
+    return Design(scaled, existence, found._replace(gamma=reached), fit), said
 
 
 def simplest(
-    coordinates: Coordinates, gains: Gains, loop: Loop, points: Array, gamma: float
+    scaled: ScaledPlant, gains: Gains, loop: Loop, points: Array, gamma: float
 ) -> Fitted | None:
     """The simplest functions that are accurate and keep gamma, else the most accurate of those that
     keep it, splines only where polynomials are far off; None where none does.
     """
-    every = list(fits(gains, coordinates.parameters))
+    every = list(fits(gains, scaled.parameters))
     polynomials = [fit for fit in every if fit.basis.degrees]
     near = any(fit.misfit <= NEAR for fit in polynomials)
     accurate = [fit for fit in every if fit.misfit <= ACCURACY]
     rest = [fit for fit in (polynomials if near else every) if ACCURACY < fit.misfit <= ROUGH]
     for fit in (*accurate, *sorted(rest, key=lambda fit: fit.misfit)):
-        if all(kept(coordinates, fit, loop, points, gamma * (1 + SLACK))):
+        if all(kept(scaled, fit, loop, points, gamma * (1 + SLACK))):
             return fit
     return None
 
 
 def with_knots(
-    coordinates: Coordinates, gains: Gains, loop: Loop, points: Array, gamma: float
+    scaled: ScaledPlant, gains: Gains, loop: Loop, points: Array, gamma: float
 ) -> Fitted | None:
     """Splines of one parameter with knots where gamma would not be kept without; None where they
     do not come to an end.
     """
-    if len(coordinates.parameters) != 1:
+    if len(scaled.parameters) != 1:
         return None
     limit = gamma * (1 + SLACK)
 
     def serves(fit: Fitted, p: Array) -> Array:
-        return np.fromiter(kept(coordinates, fit, loop, p, limit), bool, len(p))
+        return np.fromiter(kept(scaled, fit, loop, p, limit), bool, len(p))
 
-    fit = cut_to_serve(gains, coordinates.parameters[0], serves)
+    fit = cut_to_serve(gains, scaled.parameters[0], serves)
     return fit if fit is not None and serves(fit, points).all() else None
 
 
@@ -457,44 +314,68 @@ def judged(parameters: Sequence[Scheduling], more: Array | None = None) -> Array
     return np.unique(p, axis=0)
 
 
-def kept(
-    coordinates: Coordinates, gains: Gains, loop: Loop, p: Array, gamma: float
-) -> Iterator[bool]:
+def kept(scaled: ScaledPlant, gains: Gains, loop: Loop, p: Array, gamma: float) -> Iterator[bool]:
     """Whether the loop frozen at each p (K, m), scaled, is stable and its gain below gamma."""
-    for A, B, C, D in zip(*loop(coordinates, gains, p), strict=True):
-        yield below(A, B, C, D, gamma, coordinates.dt)
+    for A, B, C, D in zip(*loop(scaled, gains, p), strict=True):
+        yield below(A, B, C, D, gamma, scaled.dt)
 
 
-def closed(coordinates: Coordinates, gains: Gains, p: Array) -> tuple[Array, ...]:
+def closed(scaled: ScaledPlant, gains: Gains, p: Array) -> tuple[Array, ...]:
     """The plant under [A B; C D]."""
-    plants, K = coordinates.at(p), gains(p)
+    plants, K = scaled.at(p), gains(p)
     k = K.shape[-1] - plants.C2.shape[-2]
     return plants.closed(K[:, :k, :k], K[:, :k, k:], K[:, k:, :k], K[:, k:, k:])
 
 
-def dependence(
-    given: Dependence | None,
-    parameters: Sequence[Scheduling],
-    name: str,
-    matters: Sequence[bool],
-    degree: int = DEGREES[1][0],
-    *,
-    still: bool = False,
-) -> FunctionSpace:
-    """Functions of X or Y where there is only one of them: by default of this degree in what the
-    plant depends on and may not jump; `still`: nor move.
+def level_kept(
+    scaled: ScaledPlant,
+    existence: Existence,
+    found: Solution,
+    loop: tuple[Array, ...],
+    p: Array,
+) -> float:
+    """The least gamma, scaled, for which V proves the loop A, B, C, D (K, ..) at every p (K, m) and
+    extreme dp/dt; inf where there is none.
     """
-    degrees = tuple(
-        degree if m and (s.rate == 0 if still else s.rate != math.inf) else 0
-        for s, m in zip(parameters, matters, strict=True)
+    X, Y = existence.X, existence.Y
+    assert X is not None  # noqa: S101 - both move
+    assert Y is not None  # noqa: S101
+    x, y = (u.at(found.coefficients, p) for u in (X, Y))
+    back = np.linalg.inv(x)
+    w = np.linalg.inv(y - back)
+    worst = 0.0
+    matters = [a or b for a, b in zip(used(X.basis), used(Y.basis), strict=True)]
+    for motion in scaled.motions(p, matters):
+        dx, dy = (u.moving(found.coefficients, p, motion) for u in (X, Y))
+        dw = -w @ (dy + back @ dx @ back) @ w
+        worst = max(worst, _least_level(loop, _joined(x, w), _joined(dx, dw)))
+    return worst
+
+
+def _joined(x: Array, w: Array) -> Array:
+    """[x -x; -x x + w] (K, 2n, 2n)."""
+    return np.concatenate(
+        [np.concatenate([x, -x], axis=2), np.concatenate([-x, x + w], axis=2)], axis=1
     )
-    basis = limited(
-        functions(degrees if given is None else given, parameters, name), parameters, name
-    )
-    for s, moves in zip(parameters, used(basis), strict=True):
-        if still and moves and s.rate != 0:
-            raise InputError(
-                f"in discrete time {name} cannot depend on {s.name}: the gains would need its next"
-                " value"
-            )
-    return basis
+
+
+def _least_level(loop: tuple[Array, ...], P: Array, moving: Array) -> float:
+    """Of [A'P + PA + dP/dt, PB, C'; B'P, -g, D'; C, D, -g] <= 0, in coordinates where P is one."""
+    A, B, C, D = loop
+    try:
+        R = np.linalg.inv(np.linalg.cholesky(P))
+    except np.linalg.LinAlgError:
+        return math.inf
+    T = np.swapaxes(R, 1, 2)
+    PA = R @ P @ A @ T
+    flow = PA + np.swapaxes(PA, 1, 2) + R @ moving @ T
+    into, out = R @ P @ B, C @ T
+    values, vectors = np.linalg.eigh(flow)
+    if not values.max() < 0:
+        return math.inf
+    sides = np.concatenate([np.swapaxes(into, 1, 2), out], axis=1) @ vectors
+    nw, nz = B.shape[2], C.shape[1]
+    corner = np.zeros((len(A), nw + nz, nw + nz))
+    corner[:, :nw, nw:], corner[:, nw:, :nw] = np.swapaxes(D, 1, 2), D
+    size = corner + (sides / -values[:, None, :]) @ np.swapaxes(sides, 1, 2)
+    return float(np.linalg.eigvalsh(size).max())

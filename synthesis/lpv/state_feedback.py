@@ -11,18 +11,16 @@ from symheli.errors import InputError
 from symheli.threads import with_one_thread
 from synthesis.certificate import Attempt
 from synthesis.loops.controller import Controller
-from synthesis.lpv.coordinates import Coordinates, depends
-from synthesis.lpv.existence import Existence, Found
+from synthesis.lpv.bases import Bases, Dependence, dependence
+from synthesis.lpv.existence import Existence, Solution
+from synthesis.lpv.fitted import in_plant_units
 from synthesis.lpv.frozen_stability import frozen_stability
-from synthesis.lpv.in_plant_units import in_plant_units
 from synthesis.lpv.output_feedback import USUAL
-from synthesis.lpv.recovery import control_gain
-from synthesis.lpv.sampled_recovery import state_gain
-from synthesis.lpv.search import BACK_OFF, Dependence, Shape, best, dependence, settled
-from synthesis.plant.back_off import levels_above
-from synthesis.plant.conditions import conditions
+from synthesis.lpv.recovery import control_gain, state_gain
+from synthesis.lpv.scaled_plant import ScaledPlant, depends
+from synthesis.lpv.search import BACK_OFF, best, settled
 from synthesis.plant.plant import Plant, require_plant
-from synthesis.plant.refusals import failed, least_ranks
+from synthesis.plant.refusals import conditions, failed, least_ranks, levels_above
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
@@ -90,14 +88,14 @@ def state_feedback(
     attempts: list[Attempt] = []
     matters = depends(plant)
 
-    def every(degree: int) -> list[Shape]:
-        return [Shape(None, dependence(Y, parameters, "Y", matters, degree))]
+    def every(degree: int) -> list[Bases]:
+        return [Bases(None, dependence(Y, parameters, "Y", matters, degree))]
 
     start = best(plant, every, divisions, USUAL, attempts)
     factors = levels_above(back_off)
     for design in settled(start, factors, _recover, USUAL, attempts):
         method = f"state feedback, {start.shape}"
-        made = in_plant_units(plant, design.coordinates, design.fit, design.gamma, method)
+        made = in_plant_units(plant, design.scaled, design.fit, design.gamma, method)
         made = replace(made, optimum=start.gamma)
         if frozen_stability(made.closed()).stable is not False:
             return replace(made, attempts=tuple(attempts))
@@ -117,15 +115,15 @@ def _check_measured(plant: Plant) -> None:
 
 
 def _recover(
-    coordinates: Coordinates, existence: Existence, found: Found
+    scaled: ScaledPlant, existence: Existence, found: Solution
 ) -> Callable[[Array], Array]:
     Y, S = existence.Y, existence.S
     assert Y is not None  # noqa: S101 - it was asked for
     assert S is not None  # noqa: S101
 
     def gains(p: Array) -> Array:
-        at, y = coordinates.at(p), Y.at(found.coefficients, p)
-        if coordinates.dt is not None:
+        at, y = scaled.at(p), Y.at(found.coefficients, p)
+        if scaled.dt is not None:
             F = state_gain(at, y, S.at(found.coefficients, p), found.gamma)
         else:
             nothing = np.zeros((len(p), at.B2.shape[-1], at.D21.shape[-2]))

@@ -26,7 +26,7 @@ level that is looked for rises.
 """
 
 
-class Worst(NamedTuple):
+class FrozenOptimum(NamedTuple):
     """A level that no scheduled controller beats, and the p (m,) of the model that decides it; 0
     and None where nothing is known.
     """
@@ -35,7 +35,7 @@ class Worst(NamedTuple):
     p: Array | None = None
 
 
-def worst_optimum(plant: Plant) -> Worst:
+def worst_optimum(plant: Plant) -> FrozenOptimum:
     """The largest optimum of H-infinity output feedback over models of the range, to a part in a
     thousand; of level 0 where the Riccati equations of none have a solution.
 
@@ -49,11 +49,11 @@ def worst_optimum(plant: Plant) -> Worst:
         (each,) = zip(*plant.matrices(q[None] if len(box) > 1 else q), strict=True)
         return Generalized(*each)
 
-    worst = Worst()
+    worst = FrozenOptimum()
 
-    def raised(q: Array) -> Worst:
+    def raised(q: Array) -> FrozenOptimum:
         level = optimum_above(at(q), worst.level, plant.dt)
-        return Worst(level, q) if level > worst.level else worst
+        return FrozenOptimum(level, q) if level > worst.level else worst
 
     for q in tracked("worst frozen optimum", list(p)):
         worst = raised(q)

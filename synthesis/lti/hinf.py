@@ -23,10 +23,9 @@ from synthesis.lti.point_design import (
     as_model,
     checked,
 )
-from synthesis.plant.back_off import levels_above
-from synthesis.plant.bilinear import continuous_plant, sampled_controller
 from synthesis.plant.diagnosis import decided_by, reasons
-from synthesis.plant.generalized import Channels, Generalized
+from synthesis.plant.generalized import Channels, Generalized, continuous_plant, sampled_controller
+from synthesis.plant.refusals import levels_above
 from synthesis.worst.frozen import norm
 
 Array = np.ndarray

@@ -16,7 +16,7 @@ Array = np.ndarray
 Matrices = tuple[Array, Array, Array, Array]
 
 
-class Gains(NamedTuple):
+class Regulator(NamedTuple):
     """Of the control that minimises |z| with the states known: u = F x + F0 w, X the solution, R
     the weight of u.
 
@@ -30,12 +30,12 @@ class Gains(NamedTuple):
     R: Array
 
 
-def control_gains(P: Generalized, dt: float | None) -> Gains | None:
+def control_gains(P: Generalized, dt: float | None) -> Regulator | None:
     """None where the equation has no stabilising solution."""
     return _continuous(P) if dt is None else _sampled(P)
 
 
-def _continuous(P: Generalized) -> Gains | None:
+def _continuous(P: Generalized) -> Regulator | None:
     R = P.D12.T @ P.D12
     S = P.D12.T @ P.C1
     inverse = np.linalg.inv(R)
@@ -46,10 +46,10 @@ def _continuous(P: Generalized) -> Gains | None:
     X = stabilising(P.A - P.B2 @ inverse @ S, -P.B2 @ inverse @ P.B2.T, Q)
     if X is None:
         return None
-    return Gains(-inverse @ (S + P.B2.T @ X), np.zeros((len(R), P.B1.shape[1])), X, R)
+    return Regulator(-inverse @ (S + P.B2.T @ X), np.zeros((len(R), P.B1.shape[1])), X, R)
 
 
-def _sampled(P: Generalized) -> Gains | None:
+def _sampled(P: Generalized) -> Regulator | None:
     try:
         X = linalg.solve_discrete_are(P.A, P.B2, P.C1.T @ P.C1, P.D12.T @ P.D12, s=P.C1.T @ P.D12)
         R = P.D12.T @ P.D12 + P.B2.T @ X @ P.B2
@@ -59,7 +59,7 @@ def _sampled(P: Generalized) -> Gains | None:
         return None
     if np.abs(np.linalg.eigvals(P.A + P.B2 @ F)).max(initial=0.0) >= 1:
         return None
-    return Gains(F, F0, X, R)
+    return Regulator(F, F0, X, R)
 
 
 def lqg(P: Generalized, dt: float | None) -> Matrices | None:

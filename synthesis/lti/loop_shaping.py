@@ -15,10 +15,9 @@ from symheli.values.signal import Signal
 from synthesis.lti.point_design import DesignStatus, PointDesign, as_model, checked
 from synthesis.lti.riccati import stabilising
 from synthesis.lti.weights import Weight, as_weight, series
-from synthesis.plant.back_off import levels_above
-from synthesis.plant.bilinear import sampled_controller
 from synthesis.plant.diagnosis import reasons
-from synthesis.plant.generalized import Channels, Generalized
+from synthesis.plant.generalized import Channels, Generalized, sampled_controller
+from synthesis.plant.refusals import levels_above
 from synthesis.worst.frozen import to_continuous
 
 Array = np.ndarray

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from symheli.lpv.equilibration import equilibrate
-from synthesis.plant.bilinear import continuous_plant
-from synthesis.plant.generalized import Channels, Generalized
+from synthesis.plant.generalized import Channels, Generalized, continuous_plant
 from synthesis.plant.modes import Mode, hidden_modes, on_the_axis, unstable
 from synthesis.plant.unreachable import Unreachable, unreachable_gain
 from synthesis.worst.frozen import norm

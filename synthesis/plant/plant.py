@@ -29,7 +29,7 @@ from symheli.values.units import per_second
 from synthesis.plant import parts
 from synthesis.plant.as_controller import as_controller
 from synthesis.plant.generalized import Channels, Generalized
-from synthesis.plant.rows import DISTURBANCE, Model, disturbed, new_name, on, passing, with_row
+from synthesis.plant.parts import DISTURBANCE, Model, disturbed, new_name, on, passing, with_row
 
 TRUE, WEIGHTED = "true_", "weighted_"
 """Before the name of a performance signal of which the measurement is another: without its noise

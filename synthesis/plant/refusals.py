@@ -1,4 +1,4 @@
-"""What a scheduled synthesis refuses, and why one has failed: with the names of the plant."""
+"""What a synthesis refuses, and why one has failed: with the names of the plant."""
 
 from __future__ import annotations
 
@@ -9,19 +9,44 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from symheli.errors import InputError, SynthesisError
+from symheli.lpv.bases.polynomials import lobatto_points
 from synthesis.certificate import Attempt
-from synthesis.plant.conditions import conditions
 from synthesis.plant.diagnosis import reasons, unpriced
 
 if TYPE_CHECKING:
     from synthesis.plant.generalized import Channels
     from synthesis.plant.plant import Plant
 
+Array = np.ndarray
 
 NOTHING_WRONG = (
     "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"
     " more divisions may help"
 )
+LARGEST_BACK_OFF = 1e3
+"""Largest back-off; larger factors are meaningless and numerically unsafe."""
+
+
+def levels_above(back_off: float | Sequence[float]) -> tuple[float, ...]:
+    """Return the factors to try in order; raise `InputError` unless each is from 1 to
+    `LARGEST_BACK_OFF`.
+    """
+    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
+    if not factors or not all(1 <= factor <= LARGEST_BACK_OFF for factor in factors):
+        raise InputError(
+            f"back_off: expected numbers from 1 to {LARGEST_BACK_OFF:g}, got {back_off!r:.80}"
+        )
+    return factors
+
+
+def conditions(plant: Plant) -> tuple[Array, list[str]]:
+    """Some p all over the box, as `Plant.matrices` takes them, and what to call each."""
+    p = lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.nominal.box)
+    names = [s.name for s in plant.parameters]
+    said = [
+        ", ".join(f"{n} = {v:g}" for n, v in zip(names, np.atleast_1d(q), strict=True)) for q in p
+    ]
+    return p, said
 
 
 def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +33,7 @@ cost, or known exactly, have a scale too.
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinates:
+class ScaledPlant:
     """x = right z (left = right^-1), time in units of `time` (s; 1 in discrete time), performance
     in units of `channel`, u = controls u~ and y~ = measurements y.
     """
@@ -56,7 +57,7 @@ class Coordinates:
         basis: FunctionSpace,
         dt: float | None,
         channel: float = 1.0,
-    ) -> Coordinates:
+    ) -> ScaledPlant:
         """Balanced: in the mean over p the LQG controller's cost of a state and the error of its
         estimate are the same diagonal matrix (Jonckheere and Silverman 1983). X and Y of the
         inequalities are near the inverses of these two. A control of unit size is one that costs a
@@ -95,7 +96,7 @@ class Coordinates:
         )
         return own._in(_balancing(own.at(line), dt))
 
-    def _in(self, T: Array | None) -> Coordinates:
+    def _in(self, T: Array | None) -> ScaledPlant:
         """With T z for z."""
         if T is None:
             return self
@@ -117,6 +118,23 @@ class Coordinates:
             y * D21,
             y * D22 * u,
         )
+
+    def motions(self, p: Array, matters: Sequence[bool]) -> list[Array]:
+        """Every extreme dp/dt (K, m) at p (K, m) per unit of time: of a parameter whose rate is
+        another the value of that, of the others both signs of their limit; zero of those that do
+        not matter.
+        """
+        names = [s.name for s in self.parameters]
+        choices: list[list[Array]] = []
+        for s, counts in zip(self.parameters, matters, strict=True):
+            if not counts:
+                choices.append([np.zeros(len(p))])
+            elif isinstance(s.rate, str):
+                choices.append([self.time * p[:, names.index(s.rate)]])
+            else:
+                rates = (-s.rate, s.rate) if s.rate > 0 else (0.0,)
+                choices.append([np.full(len(p), self.time * r) for r in rates])
+        return [np.stack(choice, axis=1) for choice in product(*choices)]
 
     @property
     def breaks(self) -> list[list[float]]:
@@ -173,10 +191,10 @@ def _priced(D: Array) -> bool:
     return D.shape[1] == 0 or np.linalg.matrix_rank(D) == D.shape[1]
 
 
-def coordinates_of(plant: Plant, channel: float) -> Coordinates:
-    """Coordinates of the plant with performance in units of `channel`."""
+def scaled_plant_of(plant: Plant, channel: float) -> ScaledPlant:
+    """ScaledPlant of the plant with performance in units of `channel`."""
     one = len(plant.parameters) == 1
-    return Coordinates.of(
+    return ScaledPlant.of(
         lambda p: plant.matrices(p[:, 0] if one else p),
         plant.parameters,
         plant.basis,
@@ -187,5 +205,5 @@ def coordinates_of(plant: Plant, channel: float) -> Coordinates:
 
 def depends(plant: Plant) -> list[bool]:
     """On which parameters."""
-    c = coordinates_of(plant, 1.0)
+    c = scaled_plant_of(plant, 1.0)
     return [d > 0 for d in degrees_of(lambda p: list(c.at(p)), c.breaks)]
