@@ -7,13 +7,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import reduce
 from itertools import pairwise, product
-from math import comb
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from symheli.lpv.bases.function_space import tensor_grid
+from synthesis.polynomial.bernstein import blossom
 
 Array = np.ndarray
 
@@ -25,7 +25,7 @@ SMALL = 1e-10
 """A Chebyshev coefficient below this fraction of the largest entry of its own is rounding."""
 
 
-class Cell(NamedTuple):
+class BernsteinCell(NamedTuple):
     """A box `low`, `high` (m,) of the parameters; `nodes` (K, m) inside it, and `to_bernstein`
     (q, K) from values there to Bernstein coefficients of degrees that take them exactly.
     """
@@ -36,14 +36,14 @@ class Cell(NamedTuple):
     to_bernstein: Array
 
 
-def cells(breaks: Sequence[Sequence[float]], degrees: Sequence[int]) -> list[Cell]:
+def cells(breaks: Sequence[Sequence[float]], degrees: Sequence[int]) -> list[BernsteinCell]:
     """One cell between every two breaks of each parameter, for polynomials of these degrees."""
     out = []
     for sides in product(*(list(pairwise(b)) for b in breaks)):
         axes = [_nodes(*side, d) for side, d in zip(sides, degrees, strict=True)]
-        maps = [np.linalg.inv(_bernstein(_unit(d), d)) for d in degrees]
+        maps = [np.linalg.inv([blossom([x] * d) for x in _unit(d)]) for d in degrees]
         low, high = np.array(sides).T
-        out.append(Cell(low, high, tensor_grid(axes), reduce(np.kron, maps)))
+        out.append(BernsteinCell(low, high, tensor_grid(axes), reduce(np.kron, maps)))
     return out
 
 
@@ -78,9 +78,3 @@ def _unit(degree: int) -> Array:
 
 def _nodes(low: float, high: float, degree: int) -> Array:
     return low + (high - low) * _unit(degree)
-
-
-def _bernstein(x: Array, degree: int) -> Array:
-    k = np.arange(degree + 1)
-    weights = np.array([comb(degree, i) for i in k], dtype=float)
-    return weights * x[:, None] ** k * (1 - x[:, None]) ** (degree - k)

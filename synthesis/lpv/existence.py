@@ -24,7 +24,7 @@ from symheli.values.numbers import whole
 from synthesis.lpv.bases import moves, used
 from synthesis.lpv.elimination import Half, controlled, observed
 from synthesis.lpv.scaled_plant import ScaledPlant
-from synthesis.lpv.unknown import Blocks, Unknown, selector, unknowns
+from synthesis.lpv.unknown import BlockTerms, UnknownFunction, selector, unknowns
 from synthesis.polynomial.symmetric import length, smat
 from synthesis.program import interior_point
 from synthesis.program.cone_program import Solver
@@ -112,9 +112,9 @@ class Existence:
         if plant.dt is not None and Y is not None and Y.size > 1 and moves(plant.parameters):
             both.append(Y)  # the bound of Y at the next sample
         each = unknowns(both)
-        self.X: Unknown | None = each.pop(0) if X is not None else None
-        self.Y: Unknown | None = each.pop(0) if Y is not None else None
-        self.S: Unknown | None = each.pop(0) if each else self.Y
+        self.X: UnknownFunction | None = each.pop(0) if X is not None else None
+        self.Y: UnknownFunction | None = each.pop(0) if Y is not None else None
+        self.S: UnknownFunction | None = each.pop(0) if each else self.Y
         self.count = sum(b.size for b in both)
         self.states = plant.at(np.array([[s.middle for s in plant.parameters]])).A.shape[-1]
         first = self._first(divisions)
@@ -272,8 +272,8 @@ class Existence:
         self,
         p: Array,
         half: Half,
-        ahead: Unknown,
-        now: Unknown,
+        ahead: UnknownFunction,
+        now: UnknownFunction,
         sign: float,
         gamma: float | None,
         margin: float,
@@ -286,19 +286,19 @@ class Existence:
         if self.plant.dt is not None:
             L, own = selector(n, 0, n + N), selector(n, n, n + N)
             flow = np.concatenate([np.zeros((len(f), n, n)), half.flow], axis=-1)
-            blocks = Blocks(n + N, len(f))
+            blocks = BlockTerms(n + N, len(f))
             blocks.add(ahead, f, L, flow - 0.5 * L).add(now, now.values(p), own, -0.5 * own)
             return [blocks.finished(_below(constant, n) + margin * np.eye(n + N), _below(level, n))]
         L = selector(n, 0, N)
         motions = np.stack(self._motions(ahead, p))
-        blocks = Blocks(N, len(f), len(motions)).add(ahead, f, L, half.flow)
+        blocks = BlockTerms(N, len(f), len(motions)).add(ahead, f, L, half.flow)
         slopes = ahead.gradient(p)
         for i in np.flatnonzero(np.any(motions, axis=(0, 1))):
             moved = sign * motions[..., i, None, None] * 0.5 * L
             blocks.add(ahead, slopes[..., i], L, moved)
         return [blocks.finished(constant + margin * np.eye(N), level)]
 
-    def _motions(self, unknown: Unknown, p: Array) -> list[Array]:
+    def _motions(self, unknown: UnknownFunction, p: Array) -> list[Array]:
         """Every extreme dp/dt (K, m) at these points, per scaled time."""
         if not unknown.moves:
             return [np.zeros(p.shape)]
@@ -312,7 +312,7 @@ class Existence:
         for motion in self._motions(self.Y, p):
             step = motion * (self.plant.dt or 0.0)
             there = self.Y.values(p) + self.Y.slopes(p, step)
-            blocks = Blocks(self.states, len(there))
+            blocks = BlockTerms(self.states, len(there))
             blocks.add(self.S, self.S.values(p), one, 0.5 * one)
             blocks.add(self.Y, there, one, -0.5 * one)
             out.append(blocks.finished(margin * one, 0.0 * one))
@@ -328,18 +328,18 @@ class Existence:
         every = list({id(u): u for u in (self.X, self.Y, self.S) if u is not None}.values())
         out = []
         for unknown in every:
-            blocks = Blocks(n, K).add(unknown, unknown.values(p), one, 0.5 * one)
+            blocks = BlockTerms(n, K).add(unknown, unknown.values(p), one, 0.5 * one)
             out.append(blocks.finished(-largest * one, 0 * one))
         if self.X is None or self.Y is None:
             for unknown in every:
-                blocks = Blocks(n, K).add(unknown, unknown.values(p), one, -0.5 * one)
+                blocks = BlockTerms(n, K).add(unknown, unknown.values(p), one, -0.5 * one)
                 out.append(blocks.finished((0.0 if apart else 1 / largest) * one, -one * apart))
             return out
         first, second = selector(n, 0, 2 * n), selector(n, n, 2 * n)
         cross = first.T @ second
         cross = cross + cross.T
         for Y in every[1:]:
-            blocks = Blocks(2 * n, K)
+            blocks = BlockTerms(2 * n, K)
             blocks.add(self.X, self.X.values(p), first, -0.5 * first)
             blocks.add(Y, Y.values(p), second, -0.5 * second)
             out.append(blocks.finished(cross * (not apart), -cross * apart))

@@ -7,31 +7,30 @@ than it need be. Every inequality is written as in the paper and imposed by Bern
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from symheli.errors import InputError, SolverError
+from symheli.errors import InputError
 from symheli.lpv import FunctionSpace
 from symheli.threads import with_one_thread
 from symheli.values.signal import indices
 from synthesis.certificate import Attempt
 from synthesis.loops.controller import Controller
+from synthesis.lpv.affine_program import AffineProgram, Variable, from_lower
 from synthesis.lpv.bases import Dependence, functions, limited, used
-from synthesis.lpv.cells import Cell, cells, degrees_of
+from synthesis.lpv.cells import BernsteinCell, cells, degrees_of
 from synthesis.lpv.fitted import fitted, in_plant_units
 from synthesis.lpv.objectives import H2, L2, EnergyToPeak, Objective, PoleRegion
 from synthesis.lpv.recovery import Transformed, controller
-from synthesis.lpv.scaled_plant import ScaledPlant, scaled_plant_of
+from synthesis.lpv.scaled_plant import scaled_plant_of
 from synthesis.lpv.search import ACCURACY
-from synthesis.plant.generalized import Generalized
+from synthesis.plant.generalized import Generalized, blocks
 from synthesis.plant.plant import Plant, require_plant
 from synthesis.plant.refusals import failed, levels_above, require_channels
-from synthesis.program.cone_program import Solver
-from synthesis.program.panic import no_panic
+from synthesis.program.cone_program import Answer, Solver, general_solver
 from synthesis.worst.rates import Rate
 from synthesis.worst.rates import asked as limits
 
@@ -43,9 +42,11 @@ NEAR = 3.0
 """Gains so many times larger or smaller than the units of the program ask for other units."""
 ROUNDS = 3
 """Most changes of units."""
-MARGIN = 1e-8
-LARGEST = 1e5
-WIDE = 1e3
+LARGEST, WIDE = 1e5, 1e3
+"""X and Y are kept below this multiple of the identity, in scaled coordinates; the second once the
+gains are settled.
+"""
+ONE = np.eye(1)
 
 
 @with_one_thread
@@ -84,7 +85,7 @@ def multiobjective(
     back_off : float
         By which every gain is loosened before X and Y are settled.
     solver : Solver or str
-        For the programs, by cvxpy.
+        For the programs.
 
     Returns
     -------
@@ -128,11 +129,9 @@ def multiobjective(
                 f"X and Y depend on {s.name}, and the controller would need its rate: let one of"
                 " them be of degree 0 (in discrete time both)"
             )
-    solver = solver if isinstance(solver, Solver) else Solver(solver)
+    solver = general_solver(solver)
     (factor,) = levels_above(float(back_off))
-    problem = _Problem(
-        plant, scaled_plant_of(plant, 1.0), bases[0], bases[1], gains, every, region, direct
-    )
+    problem = _Problem(plant, bases[0], bases[1], gains, every, region, direct)
     attempts: list[Attempt] = []
     values = problem.best(solver, attempts)
     if values is None:
@@ -150,22 +149,32 @@ def multiobjective(
 
 
 class _Loop(NamedTuple):
-    """The closed loop in the new variables at one p: expressions of cvxpy."""
+    """The closed loop in the new variables, as arrays of an `AffineProgram`."""
 
-    A: Any
-    P: Any
-    B: Any
-    C: Any
-    D: Any
+    A: Array
+    P: Array
+    B: Array
+    C: Array
+    D: Array
+
+
+class _Unknowns(NamedTuple):
+    """The variables: X, Y, those of the controller, and one for each gain squared or, where these
+    are given, for how far X Y is from I.
+    """
+
+    X: Variable
+    Y: Variable
+    K: tuple[Variable, ...]
+    scalars: tuple[Variable, ...]
 
 
 class _Problem:
-    """The inequalities, with their unknowns."""
+    """The inequalities of a plant and its objectives."""
 
     def __init__(
         self,
         plant: Plant,
-        scaled: ScaledPlant,
         X: FunctionSpace,
         Y: FunctionSpace,
         gains: Dependence | None,
@@ -173,33 +182,25 @@ class _Problem:
         region: PoleRegion | None,
         direct: bool,
     ):
-        import cvxpy as cp
-
-        self.plant, self.scaled, self.objectives = plant, scaled, objectives
-        self.region = region and _in_time(region, scaled.time)
-        root = math.sqrt(scaled.time)  # energies and variances are per unit of time
-        self.pace = [1.0 if isinstance(o, L2) else root for o in objectives]
+        self.X, self.Y, self.objectives, self.direct = X, Y, objectives, direct
+        self.scaled = scaled_plant_of(plant, 1.0)
+        time = self.scaled.time
+        self.region = region and replace(
+            region, decay=region.decay * time, radius=region.radius * time
+        )
+        # energies and variances are per unit of time
+        self.pace = [1.0 if isinstance(o, L2) else math.sqrt(time) for o in objectives]
         self.sizes = [o.bound or 1.0 for o in objectives]
         """Of the gains in the scaled loop: outputs are measured in them."""
-        m = len(plant.parameters)
-        breaks = scaled.breaks
-        own = degrees_of(lambda p: list(scaled.at(p)), breaks)
+        m, breaks = len(plant.parameters), self.scaled.breaks
+        own = degrees_of(lambda p: list(self.scaled.at(p)), breaks)
         most = np.maximum(*(np.array(b.degrees or (4,) * m) for b in (X, Y)))
         given = tuple(int(d) for d in np.array(own) + most) if gains is None else gains
-        self.basis = {"X": X, "Y": Y, "K": functions(given, plant.parameters, "gains")}
-        degrees = np.array(own) + np.maximum(most, self.basis["K"].degrees or (4,) * m)
+        self.K = functions(given, plant.parameters, "gains")
+        self.constant = functions(0, plant.parameters, "a number")
+        degrees = np.array(own) + np.maximum(most, self.K.degrees or (4,) * m)
         self.cells = cells(breaks, [int(d) for d in degrees])
-        sample = scaled.at(np.array([[s.middle for s in plant.parameters]]))
-        self.n, self.nu, self.ny = sample.A.shape[-1], sample.B2.shape[-1], sample.C2.shape[-2]
-        n = self.n
-        self.X = [cp.Variable((n, n), symmetric=True) for _ in range(X.size)]
-        self.Y = [cp.Variable((n, n), symmetric=True) for _ in range(Y.size)]
-        count = self.basis["K"].size
-        self.A = [cp.Variable((n, n)) for _ in range(count)]
-        self.B = [cp.Variable((n, self.ny)) for _ in range(count)]
-        self.C = [cp.Variable((self.nu, n)) for _ in range(count)]
-        nothing = np.zeros((self.nu, self.ny))
-        self.D = [cp.Variable((self.nu, self.ny)) if direct else nothing for _ in range(count)]
+        self.moving = [a or b for a, b in zip(used(X), used(Y), strict=True)]
         self.channels = [
             (
                 _places(o.disturbances, plant.disturbances, "disturbance"),
@@ -228,258 +229,161 @@ class _Problem:
 
     def least(self, solver: Solver, attempts: list[Attempt]) -> list[float] | None:
         """Gains that minimise the sum; None where there are none."""
-        import cvxpy as cp
-
-        squares = [cp.Variable(nonneg=True) for _ in self.objectives]
-        constraints = list(self._constraints(squares, None))
-        cost = 0.0
-        for o, v, unit in zip(self.objectives, squares, self.units, strict=True):
+        program, unknowns = self._program(None)
+        cost, cell = np.zeros(program.count), self.cells[0]
+        squares = [int(v.columns.item()) for v in unknowns.scalars]
+        for o, v, column, unit in zip(
+            self.objectives, unknowns.scalars, squares, self.units, strict=True
+        ):
+            square = program.value(v)
+            program.nonnegative(cell, square)
             if o.bound is not None:
-                constraints.append(v <= (o.bound * unit) ** 2)
-            if o.soft > 0:
-                cost = cost + o.soft / unit**2 * v
-        word, value = _solve(cp.Problem(cp.Minimize(cost), constraints), solver)
-        attempts.append(Attempt("least sum of gains", 0.0, word, value))
-        if squares[0].value is None or not math.isfinite(value):
+                program.nonnegative(cell, program.known((o.bound * unit) ** 2 * ONE) - square)
+            cost[column] = o.soft / unit**2
+        found = program.minimise(cost, solver)
+        value = math.inf if found.x is None else float(cost @ found.x)
+        attempts.append(Attempt("least sum of gains", 0.0, found.message, value))
+        if found.x is None or found.answer is not Answer.SOLVED:
             return None
-        return [
-            math.sqrt(max(float(np.asarray(v.value)), 0.0)) / unit
-            for v, unit in zip(squares, self.units, strict=True)
-        ]
+        values = np.sqrt(np.maximum(found.x[squares], 0.0)) / self.units
+        return [float(v) for v in values]
 
-    def settled(self, values: Sequence[float], solver: Solver, attempts: list[Attempt]) -> Any:
+    def settled(
+        self, values: Sequence[float], solver: Solver, attempts: list[Attempt]
+    ) -> Callable[[Array], Array] | None:
         """For these gains the X and Y whose product stays farthest from one: their gains at p."""
-        import cvxpy as cp
-
-        fixed = [(v * unit) ** 2 for v, unit in zip(values, self.units, strict=True)]
-        apart = cp.Variable()
-        word, value = _solve(
-            cp.Problem(cp.Maximize(apart), list(self._constraints(fixed, apart))), solver
+        program, unknowns = self._program(
+            [(v * unit) ** 2 for v, unit in zip(values, self.units, strict=True)]
         )
+        cost, apart = np.zeros(program.count), int(unknowns.scalars[0].columns.item())
+        cost[apart] = -1.0
+        found = program.minimise(cost, solver)
         attempts += [
-            Attempt(f"{type(o).__name__} settled", 0.0, word, v)
+            Attempt(f"{type(o).__name__} settled", 0.0, found.message, v)
             for o, v in zip(self.objectives, values, strict=True)
         ]
-        if not math.isfinite(value) or value <= 1.0:
+        x = found.x
+        if x is None or found.answer is not Answer.SOLVED or x[apart] <= 1.0:
             return None
 
-        def gains(p: Array) -> Any:
-            at, q = self.scaled.at(p), p[:, 0] if p.shape[1] == 1 else p
-            X, Y = (_value(self.basis[k](q), v) for k, v in (("X", self.X), ("Y", self.Y)))
-            K = Transformed(
-                *(_value(self.basis["K"](q), v) for v in (self.A, self.B, self.C, self.D))
-            )
-            return controller(at, X, Y, K, constant_x=not any(used(self.basis["X"]))).packed
+        def gains(p: Array) -> Array:
+            X, Y = unknowns.X.at(x, p), unknowns.Y.at(x, p)
+            K = Transformed(*(v.at(x, p) for v in unknowns.K))
+            return controller(self.scaled.at(p), X, Y, K, constant_x=self.X.size == 1).packed
 
         return gains
 
-    def _constraints(self, bounds: Sequence[Any], apart: Any) -> Iterator[Any]:
-        import cvxpy as cp
-
-        one = np.eye(self.n)
-        widest = LARGEST if apart is None else WIDE
-        slacks: list[Any] = []
-        for o, (_, rows) in zip(self.objectives, self.channels, strict=True):
-            slacks.append(
-                cp.Variable((len(rows), len(rows)), symmetric=True) if isinstance(o, H2) else None
-            )
+    def _program(self, squares: Sequence[float] | None) -> tuple[AffineProgram, _Unknowns]:
+        """The inequalities of unknown gains, or of these, squared and in units of the program."""
+        program = AffineProgram()
+        plant = self.scaled.at(self.cells[0].nodes)
+        n, nu, ny = plant.A.shape[-1], plant.B2.shape[-1], plant.C2.shape[-2]
+        shapes = (n, n), (n, ny), (nu, n)
+        K = [program.full(*shape, self.K) for shape in shapes]
+        count = len(self.objectives) if squares is None else 1
+        D = np.eye(nu * ny if self.direct else 0, nu * ny).reshape(-1, nu, ny)
+        unknowns = _Unknowns(
+            program.symmetric(n, self.X),
+            program.symmetric(n, self.Y),
+            (*K, program.variable(D, self.K)),
+            tuple(program.full(1, 1, self.constant) for _ in range(count)),
+        )
+        slacks = [
+            program.symmetric(len(rows), self.constant) if isinstance(o, H2) else None
+            for o, (_, rows) in zip(self.objectives, self.channels, strict=True)
+        ]
+        each = [program.value(v) for v in unknowns.scalars]
+        if squares is None:
+            bounds, apart, widest = each, program.known(ONE), LARGEST
+        else:
+            bounds = [program.known(s * ONE) for s in squares]
+            (apart,), widest = each, WIDE
+        X, Y = program.value(unknowns.X), program.value(unknowns.Y)
+        one = np.eye(n)
         for cell in self.cells:
-            plants = self.scaled.at(cell.nodes)
-            each = [Generalized(*(M[k] for M in plants)) for k in range(len(cell.nodes))]
-            loops = [self._loop(each[k], cell.nodes[k]) for k in range(len(each))]
-            coupled = [self._coupled(q, 1.0 if apart is None else apart) for q in cell.nodes]
-            yield from _positive(cell, coupled)
-            for name, unknowns in (("X", self.X), ("Y", self.Y)):
-                yield from _positive(
-                    cell, [widest * one - self._sum(name, unknowns, q) for q in cell.nodes]
-                )
+            loop = self._loop(program, self.scaled.at(cell.nodes), unknowns)
+            program.positive(cell, from_lower([[Y], [apart * one, X]]))
+            for M in (X, Y):
+                program.positive(cell, program.known(widest * one) - M)
             for o, (columns, rows), bound, slack, size in zip(
                 self.objectives, self.channels, bounds, slacks, self.sizes, strict=True
             ):
-                parts = [
-                    loop._replace(
-                        B=loop.B[:, columns],
-                        C=loop.C[rows] / size,
-                        D=loop.D[rows][:, columns] / size,
-                    )
-                    for loop in loops
-                ]
-                yield from self._objective(cell, o, parts, bound, slack)
-            if self.region is not None:
-                for F in _region(self.region, loops):
-                    yield from _positive(cell, [-f for f in F])
+                part = loop._replace(
+                    B=loop.B[..., columns],
+                    C=loop.C[..., rows, :] / size,
+                    D=loop.D[..., rows, :][..., columns] / size,
+                )
+                top = bound * np.eye(len(rows)) if slack is None else program.value(slack)
+                self._objective(program, cell, o, part, unknowns, top)
+            for F in () if self.region is None else _region(self.region, loop):
+                program.positive(cell, -F)
         for slack, bound in zip(slacks, bounds, strict=True):
             if slack is not None:
-                yield cp.trace(slack) <= bound
+                trace = np.trace(program.value(slack), axis1=-2, axis2=-1)[..., None, None]
+                program.nonnegative(self.cells[0], bound - trace)
+        return program, unknowns
 
     def _objective(
-        self, cell: Cell, o: Objective, loops: Sequence[_Loop], bound: Any, slack: Any
-    ) -> Iterator[Any]:
-        import cvxpy as cp
-
-        w, z = loops[0].B.shape[1], loops[0].C.shape[0]
-        if isinstance(o, L2):
-            for drift in self._drifts(cell):
-                yield from _positive(
-                    cell,
-                    [
-                        -self._bounded_real(loop, d, np.eye(w), bound * np.eye(z))
-                        for loop, d in zip(loops, drift, strict=True)
-                    ],
-                )
-            return
-        for drift in self._drifts(cell):
-            yield from _positive(
-                cell,
-                [
-                    -self._bounded_real(loop, d, np.eye(w), None)
-                    for loop, d in zip(loops, drift, strict=True)
-                ],
-            )
-        top = bound * np.eye(z) if slack is None else slack
-        if self.scaled.dt is None:
-            yield from _positive(
-                cell, [cp.bmat([[loop.P, loop.C.T], [loop.C, top]]) for loop in loops]
-            )
-            yield from (loop.D == 0 for loop in loops if not _is_zero(loop.D))
+        self,
+        program: AffineProgram,
+        cell: BernsteinCell,
+        o: Objective,
+        loop: _Loop,
+        unknowns: _Unknowns,
+        top: Array,
+    ) -> None:
+        """Its inequalities: of the gain, or of the variance and of what is seen of it."""
+        one = program.known(np.eye(loop.B.shape[-1]))
+        sampled = self.scaled.dt is not None
+        gain = isinstance(o, L2)
+        if sampled:
+            F = [[-loop.P], [_t(loop.A), -loop.P], [_t(loop.B), None, -one]]
+            rows = [*F, [None, loop.C, loop.D, -top]] if gain else F
+            program.positive(cell, -from_lower(rows))
         else:
-            yield from _positive(
-                cell,
-                [
-                    cp.bmat(
-                        [
-                            [loop.P, np.zeros((2 * self.n, w)), loop.C.T],
-                            [np.zeros((w, 2 * self.n)), np.eye(w), loop.D.T],
-                            [loop.C, loop.D, top],
-                        ]
-                    )
-                    for loop in loops
-                ],
-            )
+            zero = np.zeros((program.values, 1, *unknowns.X.entries.shape[1:]))
+            drift = from_lower([[-program.slope(unknowns.Y)], [zero, program.slope(unknowns.X)]])
+            F = [[loop.A + _t(loop.A) + drift], [_t(loop.B), -one]]
+            rows = [*F, [loop.C, loop.D, -top]] if gain else F
+            for motion in self.scaled.motions(cell.nodes, self.moving):
+                program.positive(cell, -from_lower(rows), motion)
+        if not gain:
+            seen = [[loop.P], [None, one], [loop.C, loop.D, top]]
+            program.positive(cell, from_lower(seen if sampled else [[loop.P], [loop.C, top]]))
+            if not sampled:
+                program.zero(cell, loop.D)
 
-    def _bounded_real(self, loop: _Loop, drift: Any, gw: Any, gz: Any) -> Any:
-        import cvxpy as cp
-
-        w, N = gw.shape[0], 2 * self.n
-        if self.scaled.dt is None:
-            F = [[loop.A + loop.A.T + drift, loop.B], [loop.B.T, -gw]]
-            if gz is not None:
-                F = [[*F[0], loop.C.T], [*F[1], loop.D.T], [loop.C, loop.D, -gz]]
-        else:
-            F = [
-                [-loop.P, loop.A, loop.B],
-                [loop.A.T, -loop.P, np.zeros((N, w))],
-                [loop.B.T, np.zeros((w, N)), -gw],
-            ]
-            if gz is not None:
-                zero = np.zeros((gz.shape[0], N))
-                F = [
-                    [*F[0], zero.T],
-                    [*F[1], loop.C.T],
-                    [*F[2], loop.D.T],
-                    [zero, loop.C, loop.D, -gz],
-                ]
-        return cp.bmat(F)
-
-    def _drifts(self, cell: Cell) -> Iterator[list[Any]]:
-        """What the motion of p adds to the block of the state, at every node."""
-        import cvxpy as cp
-
-        n = self.n
-        moving = [a or b for a, b in zip(used(self.basis["X"]), used(self.basis["Y"]), strict=True)]
-        if self.scaled.dt is not None or not any(moving):
-            yield [np.zeros((2 * n, 2 * n))] * len(cell.nodes)
-            return
-        for motion in self.scaled.motions(cell.nodes, moving):
-            out = []
-            for q, v in zip(cell.nodes, motion, strict=True):
-                dX, dY = (self._slope(k, u, q, v) for k, u in (("X", self.X), ("Y", self.Y)))
-                out.append(cp.bmat([[-dY, np.zeros((n, n))], [np.zeros((n, n)), dX]]))
-            yield out
-
-    def _loop(self, plant: Generalized, q: Array) -> _Loop:
-        import cvxpy as cp
-
-        A, B1, B2, C1, C2, D11, D12, D21, _ = plant
-        X, Y = self._sum("X", self.X, q), self._sum("Y", self.Y, q)
-        At, Bt, Ct, D = (self._sum("K", v, q) for v in (self.A, self.B, self.C, self.D))
+    def _loop(self, program: AffineProgram, plant: Generalized, unknowns: _Unknowns) -> _Loop:
+        _, B1, B2, C1, C2, D11, D12, D21, _ = plant
+        X, Y = program.value(unknowns.X), program.value(unknowns.Y)
+        At, Bt, Ct, D = (program.value(v) for v in unknowns.K)
+        A = program.known(plant.A)
+        corner = program.known(np.eye(plant.A.shape[-1]))
         return _Loop(
-            cp.bmat([[A @ Y + B2 @ Ct, A + B2 @ D @ C2], [At, X @ A + Bt @ C2]]),
-            cp.bmat([[Y, np.eye(self.n)], [np.eye(self.n), X]]),
-            cp.vstack([B1 + B2 @ D @ D21, X @ B1 + Bt @ D21]),
-            cp.hstack([C1 @ Y + D12 @ Ct, C1 + D12 @ D @ C2]),
-            D11 + D12 @ D @ D21,
+            blocks([[plant.A @ Y + B2 @ Ct, A + B2 @ D @ C2], [At, X @ plant.A + Bt @ C2]]),
+            from_lower([[Y], [corner, X]]),
+            blocks([[program.known(B1) + B2 @ D @ D21], [X @ B1 + Bt @ D21]]),
+            blocks([[C1 @ Y + D12 @ Ct, program.known(C1) + D12 @ D @ C2]]),
+            program.known(D11) + D12 @ D @ D21,
         )
 
-    def _coupled(self, q: Array, apart: Any) -> Any:
-        import cvxpy as cp
 
-        one = apart * np.eye(self.n)
-        return cp.bmat([[self._sum("Y", self.Y, q), one], [one, self._sum("X", self.X, q)]])
-
-    def _sum(self, name: str, unknowns: Sequence[Any], q: Array) -> Any:
-        f = self.basis[name](q[0] if len(q) == 1 else q)
-        return sum((float(w) * v for w, v in zip(f, unknowns, strict=True)), 0.0 * unknowns[0])
-
-    def _slope(self, name: str, unknowns: Sequence[Any], q: Array, motion: Array) -> Any:
-        if len(unknowns) == 1:
-            return np.zeros((self.n, self.n))
-        f = self.basis[name].gradient(q[0] if len(q) == 1 else q)
-        along = motion @ f
-        return sum((float(w) * v for w, v in zip(along, unknowns, strict=True)), 0.0 * unknowns[0])
-
-
-def _region(region: PoleRegion, loops: Sequence[_Loop]) -> Iterator[list[Any]]:
-    """The inequalities of a region (Chilali and Gahinet 1996), each at every node."""
-    import cvxpy as cp
-
+def _region(region: PoleRegion, loop: _Loop) -> Iterator[Array]:
+    """The inequalities of a region (Chilali and Gahinet 1996)."""
+    A, P = loop.A, loop.P
     if region.decay > 0:
-        yield [loop.A + loop.A.T + 2 * region.decay * loop.P for loop in loops]
+        yield A + _t(A) + 2 * region.decay * P
     if math.isfinite(region.radius):
-        r = region.radius
-        yield [cp.bmat([[-r * loop.P, loop.A], [loop.A.T, -r * loop.P]]) for loop in loops]
+        yield from_lower([[-region.radius * P], [_t(A), -region.radius * P]])
     if region.damping > 0:
         s, c = region.damping, math.sqrt(1 - region.damping**2)
-        out = []
-        for loop in loops:
-            along, across = c * (loop.A + loop.A.T), s * (loop.A - loop.A.T)
-            out.append(cp.bmat([[along, across], [across.T, along]]))
-        yield out
-
-
-def _positive(cell: Cell, F: Sequence[Any]) -> Iterator[Any]:
-    """F(p) >= margin on the cell, by its Bernstein coefficients."""
-    n = F[0].shape[0]
-    for row in cell.to_bernstein:
-        total: Any = sum((float(t) * f for t, f in zip(row, F, strict=True)), np.zeros((n, n)))
-        yield 0.5 * (total + total.T) >> MARGIN * np.eye(n)
-
-
-def _solve(problem: Any, solver: Solver) -> tuple[str, float]:
-    from cvxpy.error import SolverError as CvxpyError
-
-    try:
-        with warnings.catch_warnings(), no_panic():
-            warnings.simplefilter("ignore", UserWarning)  # the status says that it is inaccurate
-            problem.solve(solver=solver.name, **solver.options)
-    except (CvxpyError, SolverError) as error:
-        return str(error), math.inf
-    solved = problem.status in ("optimal", "optimal_inaccurate")
-    return str(problem.status), float(problem.value) if solved else math.inf
-
-
-def _value(weights: Array, unknowns: Sequence[Any]) -> Array:
-    values = np.stack([u if isinstance(u, np.ndarray) else np.asarray(u.value) for u in unknowns])
-    return np.tensordot(weights, values, axes=1)
-
-
-def _in_time(region: PoleRegion, time: float) -> PoleRegion:
-    return replace(region, decay=region.decay * time, radius=region.radius * time)
+        along, across = c * (A + _t(A)), s * (A - _t(A))
+        yield from_lower([[along], [_t(across), along]])
 
 
 def _places(given: Sequence[str] | None, known: Sequence[str], kind: str) -> list[int]:
     return list(range(len(known))) if given is None else indices(given, known, kind)  # type: ignore[arg-type]
 
 
-def _is_zero(D: Any) -> bool:
-    return isinstance(D, np.ndarray) and not np.any(D)
+def _t(M: Array) -> Array:
+    return np.swapaxes(M, -1, -2)

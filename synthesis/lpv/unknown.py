@@ -14,7 +14,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Unknown:
+class UnknownFunction:
     """X(p) = sum_j f_j(p) X_j with the functions of `basis`; X_0 is unknown number `first` of the
     program.
     """
@@ -55,7 +55,7 @@ class Unknown:
         return np.tensordot(self.slopes(p, rates), coefficients[self.columns], axes=1)
 
 
-class Blocks:
+class BlockTerms:
     """Blocks F(p) = sum of left' X(p) right(p) and its transpose + constant - g level, for each of
     `motions` ways in which p may move at each of `count` points, collected term by term.
     """
@@ -64,7 +64,9 @@ class Blocks:
         self.shape = (motions, count, size, size)
         self.terms: list[tuple[Array, Array, Array, Array]] = []
 
-    def add(self, unknown: Unknown, weights: Array, left: Array, right: Array) -> Blocks:
+    def add(
+        self, unknown: UnknownFunction, weights: Array, left: Array, right: Array
+    ) -> BlockTerms:
         """left (n, N)' X right with `weights` (K, k) of the functions of X; right (n, N), (K, n, N)
         or (motions, K, n, N).
         """
@@ -113,7 +115,7 @@ def selector(rows: int, start: int, size: int) -> Array:
     return out
 
 
-def unknowns(bases: Sequence[FunctionSpace]) -> list[Unknown]:
+def unknowns(bases: Sequence[FunctionSpace]) -> list[UnknownFunction]:
     """One after the other in a program."""
     firsts = np.cumsum([0, *(b.size for b in bases)])
-    return [Unknown(b, int(f)) for b, f in zip(bases, firsts, strict=False)]
+    return [UnknownFunction(b, int(f)) for b, f in zip(bases, firsts, strict=False)]

@@ -106,9 +106,9 @@ class Generalized(NamedTuple):
         """A, B, C, D from (w, u) to (z, y)."""
         return (
             self.A,
-            _blocks([[self.B1, self.B2]]),
-            _blocks([[self.C1], [self.C2]]),
-            _blocks([[self.D11, self.D12], [self.D21, self.D22]]),
+            blocks([[self.B1, self.B2]]),
+            blocks([[self.C1], [self.C2]]),
+            blocks([[self.D11, self.D12], [self.D21, self.D22]]),
         )
 
     @property
@@ -134,9 +134,9 @@ class Generalized(NamedTuple):
         x_k, k_x, k_w, z_k = (np.zeros(s) for s in ((n, nk), (nk, n), (nk, nw), (nz, nk)))
         y_k = np.zeros((self.C2.shape[-2], nk))
         # each of x', xk', z, and u and y before them, from (x, xk, w)
-        u = np.linalg.inv(through) @ _blocks([[Dk @ self.C2, Ck, Dk @ self.D21]])
-        y = _blocks([[self.C2, y_k, self.D21]]) + self.D22 @ u
-        loop = _blocks([[self.B2 @ u], [Bk @ y], [self.D12 @ u]]) + _blocks(
+        u = np.linalg.inv(through) @ blocks([[Dk @ self.C2, Ck, Dk @ self.D21]])
+        y = blocks([[self.C2, y_k, self.D21]]) + self.D22 @ u
+        loop = blocks([[self.B2 @ u], [Bk @ y], [self.D12 @ u]]) + blocks(
             [[self.A, x_k, self.B1], [k_x, Ak, k_w], [self.C1, z_k, self.D11]]
         )
         states = slice(n + nk)
@@ -233,7 +233,7 @@ def sampled_controller(
     return inverse @ (eye + A), root * inverse @ B, root * C @ inverse, D + C @ inverse @ B
 
 
-def _blocks(rows: Sequence[Sequence[Array]]) -> Array:
+def blocks(rows: Sequence[Sequence[Array]]) -> Array:
     """A block matrix of blocks that may have leading axes, which are made alike."""
     leading = np.broadcast_shapes(*(M.shape[:-2] for row in rows for M in row))
     return np.concatenate(
