@@ -37,32 +37,31 @@ if TYPE_CHECKING:
     from synthesis.analysis.gain_against_rate import gain_against_rate
     from synthesis.analysis.questions import decay_rate, generalized_h2, l2_gain, stability
     from synthesis.certificate import Attempt, Certificate, Proof, Seconds, Status
-    from synthesis.design.controller import Controller
-    from synthesis.design.estimator import Estimator, estimator
-    from synthesis.design.frozen_reading import proven_around
-    from synthesis.design.generalized import Generalized
-    from synthesis.design.h2 import h2
-    from synthesis.design.hinf import hinf
-    from synthesis.design.lft_feedback import lft_feedback
-    from synthesis.design.loop_shaping import ncf
-    from synthesis.design.mixed_sensitivity import mixed_sensitivity
-    from synthesis.design.multiobjective import multiobjective
-    from synthesis.design.objectives import H2, L2, EnergyToPeak, PoleRegion
-    from synthesis.design.output_feedback import output_feedback
-    from synthesis.design.plant import Plant
-    from synthesis.design.point_design import DesignStatus, PointDesign
-    from synthesis.design.sampled_loop import SampledLoop, certify_sampled
-    from synthesis.design.state_feedback import state_feedback
-    from synthesis.design.wrong_parameter import with_wrong_parameter
     from synthesis.forms import HigherOrder, Memory, Spline
     from synthesis.gain_curve import GainCurve
     from synthesis.impose import Bernstein, Grid, SumOfSquares, Vertices
     from synthesis.lft.gain import lft_gain, lft_stability
     from synthesis.lft.multipliers import SCALINGS, Multiplier
+    from synthesis.loops.controller import Controller
+    from synthesis.loops.frozen_reading import proven_around
     from synthesis.loops.handling_qualities import Bandwidth, bandwidth
     from synthesis.loops.margins import Margins, disk_margin, loop, margins
+    from synthesis.loops.sampled_loop import SampledLoop, certify_sampled
+    from synthesis.loops.wrong_parameter import with_wrong_parameter
+    from synthesis.lpv.estimator import Estimator, estimator
+    from synthesis.lpv.multiobjective import multiobjective
+    from synthesis.lpv.objectives import H2, L2, EnergyToPeak, PoleRegion
+    from synthesis.lpv.output_feedback import lft_feedback, output_feedback
+    from synthesis.lpv.state_feedback import state_feedback
+    from synthesis.lti.h2 import h2
+    from synthesis.lti.hinf import hinf
+    from synthesis.lti.loop_shaping import ncf
+    from synthesis.lti.mixed_sensitivity import mixed_sensitivity
+    from synthesis.lti.point_design import DesignStatus, PointDesign
     from synthesis.lyapunov.box import BoxLyapunov
     from synthesis.lyapunov.spline import MemoryLyapunov, SplineLyapunov
+    from synthesis.plant.generalized import Generalized
+    from synthesis.plant.plant import Plant
     from synthesis.polynomial.matrix import PolynomialMatrix
     from synthesis.program.cone_program import Solver, installed_solvers
     from synthesis.worst.frozen import FrozenGain, frozen_gain
@@ -74,23 +73,22 @@ _ROOMS = {
     "synthesis.analysis.gain_against_rate": "gain_against_rate",
     "synthesis.analysis.questions": "decay_rate generalized_h2 l2_gain stability",
     "synthesis.certificate": "Attempt Certificate Proof Seconds Status",
-    "synthesis.design.controller": "Controller",
-    "synthesis.design.estimator": "Estimator estimator",
-    "synthesis.design.lft_feedback": "lft_feedback",
-    "synthesis.design.multiobjective": "multiobjective",
-    "synthesis.design.objectives": "H2 L2 EnergyToPeak PoleRegion",
-    "synthesis.design.output_feedback": "output_feedback",
-    "synthesis.design.state_feedback": "state_feedback",
-    "synthesis.design.sampled_loop": "SampledLoop certify_sampled",
-    "synthesis.design.frozen_reading": "proven_around",
-    "synthesis.design.generalized": "Generalized",
-    "synthesis.design.plant": "Plant",
-    "synthesis.design.h2": "h2",
-    "synthesis.design.hinf": "hinf",
-    "synthesis.design.loop_shaping": "ncf",
-    "synthesis.design.mixed_sensitivity": "mixed_sensitivity",
-    "synthesis.design.point_design": "DesignStatus PointDesign",
-    "synthesis.design.wrong_parameter": "with_wrong_parameter",
+    "synthesis.loops.controller": "Controller",
+    "synthesis.lpv.estimator": "Estimator estimator",
+    "synthesis.lpv.multiobjective": "multiobjective",
+    "synthesis.lpv.objectives": "H2 L2 EnergyToPeak PoleRegion",
+    "synthesis.lpv.output_feedback": "lft_feedback output_feedback",
+    "synthesis.lpv.state_feedback": "state_feedback",
+    "synthesis.loops.sampled_loop": "SampledLoop certify_sampled",
+    "synthesis.loops.frozen_reading": "proven_around",
+    "synthesis.plant.generalized": "Generalized",
+    "synthesis.plant.plant": "Plant",
+    "synthesis.lti.h2": "h2",
+    "synthesis.lti.hinf": "hinf",
+    "synthesis.lti.loop_shaping": "ncf",
+    "synthesis.lti.mixed_sensitivity": "mixed_sensitivity",
+    "synthesis.lti.point_design": "DesignStatus PointDesign",
+    "synthesis.loops.wrong_parameter": "with_wrong_parameter",
     "synthesis.forms": "HigherOrder Memory Spline",
     "synthesis.gain_curve": "GainCurve",
     "synthesis.impose": "Bernstein Grid SumOfSquares Vertices",

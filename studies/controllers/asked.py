@@ -24,7 +24,7 @@ from symheli import Servo
 from symheli.errors import InputError
 from symheli.flight import XCELL_SERVOS
 from symheli.values.whole_files import write_text
-from synthesis.design.rows import DISTURBANCE
+from synthesis.plant.parts import DISTURBANCE
 
 TOP, RATE = 13.0, 3.0
 """Of the airspeed, m/s, and of its change, m/s^2."""

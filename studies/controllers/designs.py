@@ -35,11 +35,10 @@ from symheli.errors import SymheliError, SynthesisError
 from symheli.flight import XCELL_SERVOS, gain_scheduled_lqr
 from symheli.lpv.bases import PiecewiseLinear
 from synthesis import Plant
-from synthesis.design.controller import Controller
-from synthesis.design.hinf import hinf
-from synthesis.design.lft_feedback import lft_feedback
-from synthesis.design.output_feedback import output_feedback
-from synthesis.design.reduction import fewest
+from synthesis.loops.controller import Controller
+from synthesis.loops.reduction import fewest
+from synthesis.lpv.output_feedback import lft_feedback, output_feedback
+from synthesis.lti.hinf import hinf
 from synthesis.worst.frozen import norm
 
 LQR, HINF, LFT = "LQR schedule", "H-infinity schedule", "LFT"

@@ -15,7 +15,7 @@ from symheli import Helicopter, LinearFamily, LinearModel, LPVStateSpace
 from symheli.flight import Servo
 from symheli.values.signal import Signal, indices, signals
 from synthesis import Plant
-from synthesis.design import rows
+from synthesis.plant import parts
 
 STUDY = Asked()
 
@@ -40,7 +40,7 @@ def disturbed(model: LPVStateSpace, asked: Asked) -> LPVStateSpace:
     if not both:
         return model
     own = [model.inputs[i] for i in indices(both, model.inputs, "input")]
-    return replace(rows.disturbed(model, own), residuals=None)
+    return replace(parts.disturbed(model, own), residuals=None)
 
 
 def actuator(servo: Servo, name: str, late: float) -> LinearModel:

@@ -61,7 +61,7 @@ from symheli.values.named_vector import NamedVector
 from symheli.values.signal import indices
 from symheli.values.units import ratio
 from synthesis import Plant, SampledLoop
-from synthesis.design.reduction import fewest
+from synthesis.loops.reduction import fewest
 from synthesis.worst.frozen import norm
 
 KNOTS = (2, 3, 5, 9, 17, 33)

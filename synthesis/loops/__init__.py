@@ -1,1 +1,1 @@
-"""Classical measures of one loop: margins, bandwidth, phase delay."""
+"""A controller and its loop: margins, and what is left of a proof once it is implemented."""

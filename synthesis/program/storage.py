@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from synthesis.design.riccati import stabilising
+from synthesis.lti.riccati import stabilising
 from synthesis.polynomial.symmetric import powered, symmetrized
 from synthesis.worst.frozen import to_continuous
 

@@ -165,9 +165,7 @@ def _ran(*arguments):
 
 
 ROWS = {
-    ("gains.md", "interpolated"): lambda: proven_by_p_alone(
-        "interpolated", lateral_loop(_xcell())
-    ),
+    ("gains.md", "interpolated"): lambda: proven_by_p_alone("interpolated", lateral_loop(_xcell())),
     ("gains.md", "exact"): lambda: proven_by_p_alone("exact", ExactLateral.of(_xcell()).loop()),
     ("gains.md", "identified"): frozen_gain_of_the_exact_servo_loop,
     ("gains.md", "lateral"): lambda: gain_with_any_jerk("lateral", lateral_loop(_xcell())),
@@ -184,9 +182,7 @@ ROWS = {
         "xcell60 in turbulence", turbulent=True
     ),
     ("identified.md", "guarantee xcell60"): guarantee_of_the_worst_seed,
-    ("checks.md", "fuzzing symheli"): lambda: faults_of_one_entry(
-        "symheli", "symheli.Scheduling"
-    ),
+    ("checks.md", "fuzzing symheli"): lambda: faults_of_one_entry("symheli", "symheli.Scheduling"),
     ("checks.md", "fuzzing identification"): lambda: faults_of_one_entry(
         "identification", "identification.theil"
     ),

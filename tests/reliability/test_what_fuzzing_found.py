@@ -24,7 +24,7 @@ from symheli.errors import (
 from symheli.lpv import LinearModel, LinearModels
 from symheli.values import plain_file
 from symheli.values.text_file import text_of
-from synthesis.design.back_off import levels_above
+from synthesis.plant.refusals import levels_above
 from synthesis.program.panic import no_panic
 from synthesis.worst.frozen import norm
 

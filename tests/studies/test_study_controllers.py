@@ -65,7 +65,7 @@ from symheli import (
 )
 from symheli.errors import SynthesisError
 from symheli.flight import XCELL_SERVOS
-from synthesis.design.sampling import tustin
+from synthesis.plant.sampling import tustin
 from synthesis.worst.frozen import norm
 
 

@@ -17,7 +17,7 @@ from synthesis import (
     lower_bound,
     output_feedback,
 )
-from synthesis.design.controller import ADJOINT
+from synthesis.loops.controller import ADJOINT
 
 GLANCE = Search(levels=6, dwells=5, starts=1, nodes=30, evaluations=8, samples=5000)
 

@@ -10,8 +10,8 @@ from scipy import linalg
 
 from symheli import LinearModel
 from synthesis import DesignStatus, h2
-from synthesis.design.generalized import Generalized
-from synthesis.design.h2 import h2_norm
+from synthesis.lti.h2 import h2_norm
+from synthesis.plant.generalized import Generalized
 
 SEEDS = range(10)
 

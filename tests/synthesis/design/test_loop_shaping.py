@@ -8,7 +8,7 @@ from symheli import LinearModel
 from symheli.errors import InputError
 from symheli.lpv import stability_margin
 from synthesis import hinf, mixed_sensitivity, ncf
-from synthesis.design.generalized import Generalized
+from synthesis.plant.generalized import Generalized
 from synthesis.worst.frozen import norm
 
 

@@ -96,9 +96,9 @@ def test_energy_to_peak_is_kept():
 @pytest.mark.parametrize(
     "region",
     [
-        pytest.param(PoleRegion(decay=0.5), marks=pytest.mark.slow),
-        pytest.param(PoleRegion(radius=6.0), marks=pytest.mark.slow),
-        pytest.param(PoleRegion(decay=0.3, radius=8.0, damping=0.7), marks=pytest.mark.slow),
+        PoleRegion(decay=0.5),
+        PoleRegion(radius=6.0),
+        PoleRegion(decay=0.3, radius=8.0, damping=0.7),
     ],
     ids=["decay", "radius", "all"],
 )
@@ -137,7 +137,7 @@ def test_of_a_constant_plant_it_is_the_optimum_by_riccati_equations():
 
 @pytest.mark.parametrize(
     ("plant", "back_off"),
-    [(lag(1.0, 2.0, 0.5), 1.02), pytest.param(spring(0.0), 1.02, marks=pytest.mark.slow)],
+    [(lag(1.0, 2.0, 0.5), 1.02), (spring(0.0), 1.02)],
 )
 def test_what_is_promised_is_what_the_frozen_loops_keep(plant, back_off):
     made = multiobjective(plant, L2(), back_off=back_off)

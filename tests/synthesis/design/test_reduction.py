@@ -10,7 +10,7 @@ from scheduled_plants import frozen, spring
 from symheli import LinearModel, LPVStateSpace
 from symheli.errors import InputError, SynthesisError
 from synthesis import hinf, output_feedback
-from synthesis.design.reduction import frozen_gain
+from synthesis.loops.reduction import frozen_gain
 from synthesis.worst.frozen import norm
 
 

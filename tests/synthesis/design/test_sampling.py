@@ -12,8 +12,8 @@ from symheli.errors import InputError
 from symheli.flight.controller import SCHEDULING
 from symheli.values.named_vector import NamedVector
 from synthesis import Plant, output_feedback, state_feedback
-from synthesis.design.controller import SAMPLED
-from synthesis.design.sampling import tustin
+from synthesis.loops.controller import SAMPLED
+from synthesis.plant.sampling import tustin
 from synthesis.worst.frozen import norm
 
 

@@ -1,0 +1,169 @@
+"""Semidefinite programs in matrices that are unknown functions of p, imposed by Bernstein
+coefficients.
+
+At each p an inequality is affine in the values of these matrices there. It is kept as an array
+(1 + e, K, N, N): its known part, then the factor of each entry of the values, at the K nodes of a
+cell. Sums, products with known matrices (K, ., .) and block matrices of such arrays are NumPy's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy import sparse
+
+from symheli.lpv import FunctionSpace
+from synthesis.lpv.cells import BernsteinCell
+from synthesis.lpv.unknown import UnknownFunction
+from synthesis.polynomial.symmetric import basis as symmetric_basis
+from synthesis.polynomial.symmetric import svec, symmetrized
+from synthesis.program.cone_program import Candidate, ConeProgram, Solver, solve
+
+Array = np.ndarray
+
+MARGIN = 1e-8
+"""Every inequality is kept above this multiple of the identity."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """A matrix that is an unknown function of p.
+
+    Its value at p is a sum of `entries` (e, a, b), whose factors are the functions of `unknown`;
+    `columns` (k, e) are the numbers of their coefficients in the program. `here` and `along` are
+    the places of the factors and of their derivatives among the values at p.
+    """
+
+    unknown: UnknownFunction
+    entries: Array
+    columns: Array
+    here: slice
+    along: slice
+
+    def coefficients(self, x: Array) -> Array:
+        """Coefficients (k, a, b) of the functions at the solver's point x."""
+        return np.tensordot(x[self.columns], self.entries, axes=1)
+
+    def at(self, x: Array, p: Array) -> Array:
+        """Values (K, a, b) at p (K, m)."""
+        return self.unknown.at(self.coefficients(x), p)
+
+
+class AffineProgram:
+    """minimise c' x subject to inequalities in the values of variables, which are all declared
+    before the first of these.
+    """
+
+    def __init__(self) -> None:
+        self.variables: list[Variable] = []
+        self.count, self.values = 0, 1
+        self._zero: list[tuple[sparse.csr_matrix, Array]] = []
+        self._positive: list[tuple[sparse.csr_matrix, Array]] = []
+        self._sizes: list[int] = []
+
+    def variable(self, entries: Array, basis: FunctionSpace) -> Variable:
+        """A matrix that is a sum of `entries` (e, a, b), each times functions of this basis."""
+        e = len(entries)
+        columns = self.count + np.arange(basis.size * e).reshape(basis.size, e)
+        here = slice(self.values, self.values + e)
+        along = slice(here.stop, here.stop + (e if basis.size > 1 else 0))
+        made = Variable(UnknownFunction(basis, 0), entries, columns, here, along)
+        self.count, self.values = self.count + columns.size, along.stop
+        self.variables.append(made)
+        return made
+
+    def symmetric(self, n: int, basis: FunctionSpace) -> Variable:
+        """A symmetric matrix (n, n)."""
+        return self.variable(symmetric_basis(n), basis)
+
+    def full(self, rows: int, columns: int, basis: FunctionSpace) -> Variable:
+        """A matrix (rows, columns) without structure."""
+        return self.variable(np.eye(rows * columns).reshape(-1, rows, columns), basis)
+
+    def known(self, M: Array) -> Array:
+        """A known matrix (..., a, b) as such an array."""
+        M = M if M.ndim > 2 else M[None]
+        out = np.zeros((self.values, *M.shape))
+        out[0] = M
+        return out
+
+    def value(self, variable: Variable) -> Array:
+        """The variable at p."""
+        return self._placed(variable.entries, variable.here)
+
+    def slope(self, variable: Variable) -> Array:
+        """Its derivative along the motion of p that the inequality is imposed for."""
+        moving = variable.along.stop - variable.along.start
+        return self._placed(variable.entries[:moving], variable.along)
+
+    def _placed(self, entries: Array, where: slice) -> Array:
+        out = np.zeros((self.values, 1, *entries.shape[1:]))
+        out[where, 0] = entries
+        return out
+
+    def positive(self, cell: BernsteinCell, F: Array, motion: Array | None = None) -> None:
+        """F(p) >= `MARGIN` on the cell, by its Bernstein coefficients, for the motion dp/dt (K, m)
+        at its nodes.
+        """
+        v = svec(symmetrized(np.broadcast_to(F, (len(F), len(cell.nodes), *F.shape[-2:]))))
+        v[0] -= MARGIN * svec(np.eye(F.shape[-1]))
+        for weights in cell.to_bernstein:
+            self._positive.append(self._row(weights, v, cell, motion))
+            self._sizes.append(F.shape[-1])
+
+    def zero(self, cell: BernsteinCell, F: Array) -> None:
+        """F(p) = 0 at the nodes of the cell."""
+        v = np.broadcast_to(F, (len(F), len(cell.nodes), *F.shape[-2:]))
+        v = v.reshape(*v.shape[:2], -1)
+        for weights in np.eye(len(cell.nodes)):
+            A, b = self._row(weights, v, cell, None)
+            there = np.diff(A.indptr) + (b != 0) > 0
+            self._zero.append((A[there], b[there]))
+
+    def nonnegative(self, cell: BernsteinCell, F: Array) -> None:
+        """The number F >= 0, which is the same all over the cell."""
+        v = np.broadcast_to(F[..., 0], (len(F), len(cell.nodes), 1))
+        self._positive.append(self._row(cell.to_bernstein[0], v, cell, None))
+        self._sizes.append(1)
+
+    def _row(
+        self, weights: Array, v: Array, cell: BernsteinCell, motion: Array | None
+    ) -> tuple[sparse.csr_matrix, Array]:
+        """The sum of the values v (1 + e, K, L) at the nodes with these weights (K,): factors
+        (L, count) of x and the constant (L,).
+        """
+        out = np.zeros((v.shape[-1], self.count))
+        for each in self.variables:
+            functions = [(each.here, each.unknown.values(cell.nodes))]
+            if motion is not None:
+                functions.append((each.along, each.unknown.slopes(cell.nodes, motion)))
+            for where, f in functions:
+                if np.any(v[where]):
+                    part = np.tensordot(weights[:, None] * f, v[where], axes=(0, 1))
+                    out[:, each.columns] += np.moveaxis(part, -1, 0)
+        return sparse.csr_matrix(out), weights @ v[0]
+
+    def minimise(self, cost: Array, solver: Solver) -> Candidate:
+        """The solver's candidate for the least cost' x."""
+        rows = [*self._zero, *self._positive]
+        A = sparse.csc_matrix(sparse.vstack([-A for A, _ in rows]))
+        b = np.concatenate([b for _, b in rows])
+        equalities = sum(len(b) for _, b in self._zero)
+        return solve(ConeProgram(cost, A, b, tuple(self._sizes), equalities), solver)
+
+
+def from_lower(rows: Sequence[Sequence[Array | None]]) -> Array:
+    """A symmetric block matrix of its lower triangle, None for a block of zeros."""
+    ends = np.cumsum([0, *(row[-1].shape[-1] for row in rows)])  # type: ignore[union-attr]
+    at = [slice(a, b) for a, b in pairwise(ends)]
+    there = [(i, j, M) for i, row in enumerate(rows) for j, M in enumerate(row) if M is not None]
+    leading = np.broadcast_shapes(*(M.shape[:-2] for _, _, M in there))
+    out = np.zeros((*leading, ends[-1], ends[-1]))
+    for i, j, M in there:
+        out[..., at[i], at[j]] = M
+        if i != j:
+            out[..., at[j], at[i]] = np.swapaxes(M, -1, -2)
+    return out

@@ -1,0 +1,150 @@
+"""Gains known at some p as functions of p, and as a controller in the units of its plant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from symheli.lpv import BSpline, FunctionSpace, LPVStateSpace, Scheduling
+from symheli.lpv.bases.polynomials import lobatto_points, piecewise_lobatto, polynomials
+from synthesis.loops.controller import Controller
+from synthesis.lpv.scaled_plant import ScaledPlant
+
+if TYPE_CHECKING:
+    from synthesis.plant.plant import Plant
+
+Array = np.ndarray
+
+DEGREES = {1: (0, 1, 2, 3, 4, 5, 6, 8, 10), 2: (0, 1, 2, 3, 4, 5, 6, 8)}
+"""Of the polynomials that are tried in turn (more parameters: up to 4)."""
+SEGMENTS = (4, 8, 16, 32)
+"""Of the cubic splines of one parameter that are tried after them."""
+NEGLIGIBLE = 0.01
+"""Of the geometric mean of the largest entries of its row and column an entry matters from here."""
+NODES = {1: 129, 2: 17}
+"""Values of each parameter at which the gains are computed (more parameters: 7)."""
+MOST, SHORTEST = 256, 1e-6
+"""Segments of a spline that are not cut further; nor is one of this part of the range."""
+IN_EACH, AT_LAST = 9, 33
+"""Values of p in each of them at which it must serve, at every other one the gains are computed;
+and once it serves at these.
+"""
+
+
+class Fitted(NamedTuple):
+    """Gains (r, c) as functions of p: sum_j f_j(p) coefficients[j].
+
+    `misfit` is the largest error of an entry relative to that entry, one that is small in its row
+    and column relative to `NEGLIGIBLE` of those.
+    """
+
+    basis: FunctionSpace
+    coefficients: Array
+    misfit: float
+
+    def __call__(self, p: Array) -> Array:
+        """The gains (K, r, c) at p (K, m)."""
+        values = self.basis(p[:, 0] if p.shape[1] == 1 else p)
+        return np.tensordot(values, self.coefficients, axes=1)
+
+
+def fits(gains: Callable[[Array], Array], parameters: Sequence[Scheduling]) -> Iterator[Fitted]:
+    """`gains` (K, r, c) at p (K, m) as polynomials of rising degree, then as splines."""
+    m = len(parameters)
+    box = [(s.low, s.high) for s in parameters]
+    p = lobatto_points(NODES.get(m, 7), box)
+    values = gains(p.reshape(len(p), -1))
+    for basis in _bases(box):
+        yield _fit(basis, p, values)
+
+
+def cut_to_serve(
+    gains: Callable[[Array], Array],
+    parameter: Scheduling,
+    serves: Callable[[Fitted, Array], Array],
+) -> Fitted | None:
+    """`gains` of one parameter as a cubic spline whose segments are halved where it does not serve
+    ((K,) at p (K, 1)); None where that takes more than `MOST` or ones too short.
+    """
+    known: dict[float, Array] = {}
+    knots = np.linspace(parameter.low, parameter.high, SEGMENTS[0] + 1)
+    shortest = SHORTEST * (parameter.high - parameter.low)
+    while len(knots) <= MOST and np.diff(knots).min() > shortest:
+        p = np.unique(piecewise_lobatto(knots.tolist(), IN_EACH))
+        nodes = p[::2]
+        new = np.array([q for q in nodes if q not in known])
+        if len(new):
+            known.update(zip(new, gains(new[:, None]), strict=True))
+        fit = _fit(BSpline(3, tuple(knots)), nodes, np.array([known[q] for q in nodes]))
+        bad = p[~serves(fit, p[:, None])]
+        if not len(bad):
+            p = np.unique(piecewise_lobatto(knots.tolist(), AT_LAST))
+            bad = p[~serves(fit, p[:, None])]
+        if not len(bad):
+            return fit
+        cut = np.unique(np.searchsorted(knots[1:-1], bad, side="right"))
+        knots = np.sort(np.concatenate([knots, 0.5 * (knots[cut] + knots[cut + 1])]))
+    return None
+
+
+def _fit(basis: FunctionSpace, p: Array, values: Array) -> Fitted:
+    """To these values (K, r, c)."""
+    size = np.abs(values).max(axis=0)
+    rows, columns = (size.max(axis=k, keepdims=True, initial=0.0) for k in (1, 0))
+    size = np.maximum(size, NEGLIGIBLE * np.sqrt(rows * columns))
+    size[size == 0] = 1.0
+    coefficients = basis.fit(p, values)
+    off = np.abs(np.tensordot(basis(p), coefficients, axes=1) - values)
+    return Fitted(basis, coefficients, float((off / size).max(initial=0.0)))
+
+
+def _bases(box: Sequence[tuple[float, float]]) -> Iterator[FunctionSpace]:
+    m = len(box)
+    for degree in DEGREES.get(m, tuple(range(5))):
+        yield polynomials([degree] * m, box)
+    if m == 1:
+        for segments in SEGMENTS:
+            yield BSpline(3, tuple(np.linspace(*box[0], segments + 1)))
+
+
+def fitted(
+    gains: Callable[[Array], Array], parameters: Sequence[Scheduling], accuracy: float
+) -> Fitted:
+    """The first of the `fits` that is within `accuracy` of every gain, or the nearest of all."""
+    best: Fitted | None = None
+    for fit in fits(gains, parameters):
+        best = fit if best is None or fit.misfit < best.misfit else best
+        if fit.misfit <= accuracy:
+            break
+    assert best is not None  # noqa: S101 - some basis is always tried
+    return best
+
+
+def in_plant_units(
+    plant: Plant, c: ScaledPlant, fit: Fitted, gamma: float, method: str
+) -> Controller:
+    """The controller in the units of the plant, of gains in the scaled ones as functions of p."""
+    basis, M, misfit = fit
+    ny = len(plant.measurements)
+    n = M.shape[-1] - ny
+    pace = np.full(n, 1 / math.sqrt(c.time))
+    rows = np.concatenate([pace, c.controls])
+    columns = np.concatenate([pace, c.measurements])
+    M = rows[:, None] * M * columns
+    names = tuple(f"k{i + 1}" for i in range(n))
+    model = LPVStateSpace(
+        basis,
+        M[:, :n, :n],
+        M[:, :n, n:],
+        M[:, n:, :n],
+        M[:, n:, n:],
+        plant.parameters,
+        names,  # type: ignore[arg-type]
+        plant.measurements,
+        plant.controls,
+        plant.dt,
+    )
+    return Controller(model=model, plant=plant, promised=gamma, method=method, misfit=misfit)

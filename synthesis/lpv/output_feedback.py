@@ -1,0 +1,384 @@
+"""Gain-scheduled output feedback by two linear matrix inequalities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from symheli.lpv import UncertainStateSpace
+from symheli.lpv.bases.polynomials import lobatto_points
+from symheli.threads import with_one_thread
+from synthesis.certificate import Attempt
+from synthesis.loops.controller import Controller
+from synthesis.lpv.at_rest import at_rest
+from synthesis.lpv.bases import DEGREES, Bases, Dependence, both_moving, candidates, used
+from synthesis.lpv.existence import LARGEST, Existence, Solution
+from synthesis.lpv.fitted import in_plant_units
+from synthesis.lpv.frozen_stability import frozen_stability
+from synthesis.lpv.recovery import controller, sampled_controller, split
+from synthesis.lpv.robust import robust_plant
+from synthesis.lpv.scaled_plant import ScaledPlant, depends
+from synthesis.lpv.search import (
+    BACK_OFF,
+    CHECKED,
+    CLOSE,
+    FAR_ABOVE,
+    WORTH,
+    Design,
+    Start,
+    best,
+    least,
+    settled,
+)
+from synthesis.lpv.worst_optimum import FrozenOptimum, worst_optimum
+from synthesis.plant.plant import Plant, require_plant
+from synthesis.plant.refusals import NOTHING_WRONG, failed, least_ranks, levels_above
+from synthesis.program.cone_program import LYAPUNOV, Solver
+from synthesis.worst.rates import Rate
+from synthesis.worst.rates import asked as limits
+
+Array = np.ndarray
+
+CENTRAL = "output feedback, central controllers of the frozen models"
+BOUND_DECIDES = (
+    "the bound {:g} on X and Y decides gamma: some measurement is almost free of noise or some"
+    " control almost free of cost; give it more"
+)
+
+USUAL = Solver(LYAPUNOV, tolerance=1e-7, iterations=100)
+
+
+@with_one_thread
+def output_feedback(
+    plant: Plant,
+    rate: Rate = None,
+    *,
+    X: Dependence | None = None,
+    Y: Dependence | None = None,
+    back_off: float | Sequence[float] = BACK_OFF,
+    fastest: float = math.inf,
+    divisions: int = 1,
+) -> Controller:
+    """Design a dynamic controller from the measurements, of the order of the plant, for every p(t)
+    within its range and rates.
+
+    X(p) belongs to what the measurements tell, Y(p) to what the controls can do. While only one of
+    them moves with a parameter the controller needs no rate of it; both pairs are tried. Both may
+    move with a parameter whose rate is another one (`plant.lagged`), or that stands still. Where
+    one of them moving does not come near the worst frozen optimum both do, and the controller is
+    not told dp/dt: `gamma` is then what the storage function of X and Y proves of that, and is
+    taken where it is at most 1.05 times what a controller could have that is told. Where parameters
+    stand still and the inequalities find nothing near that optimum, the gains are those of the
+    central H-infinity controllers of the frozen models.
+
+    Parameters
+    ----------
+    plant : Plant
+        With disturbances, performance, controls and measurements; every control must cost (D12 of
+        full column rank), every measurement be disturbed (D21 of full row rank).
+    rate : float, sequence or mapping, optional
+        Largest |dp/dt|, as for `l2_gain`; by default the plant's own; math.inf: p may jump.
+    X, Y : int, tuple or FunctionSpace, optional
+        Degree in every parameter, one each, or functions; by default one of the two moves, with a
+        degree that rises from 2 while that lowers gamma and gamma is above the worst optimum of the
+        frozen models, which no controller can beat. Where both are given and move with a parameter
+        of a bounded rate, the controller is not told dp/dt, as above.
+    back_off : float or sequence
+        Multiples of the least gamma at which X and Y are settled, tried in turn until the gains are
+        smooth functions of p: at the least itself a controller has poles without limit.
+    fastest : float
+        Largest modulus of a pole of the controller, rad/s (continuous time): a reason to try other
+        values of `back_off`.
+    divisions : int
+        In so many parts every range is cut at first where the inequalities are imposed; where they
+        are violated between, points are added.
+
+    Returns
+    -------
+    Controller
+        Its `gamma` is what the inequalities promise; `certify` proves what the controller does.
+
+    Raises
+    ------
+    InputError
+        Signals, ranks, rates or degrees that do not fit, with what to do.
+    SynthesisError
+        There is no such controller, or none was found; `reasons` say which mode, direction or
+        weight decides.
+
+    References
+    ----------
+    Wu, Yang, Packard and Becker, Int. J. Robust and Nonlinear Control 6 (1996); Apkarian and Adams,
+    IEEE Trans. Control Systems Technology 6 (1998).
+
+    Examples
+    --------
+    >>> slow, fast = (synthesis.output_feedback(plant, rate) for rate in (0.1, 10.0))
+    >>> bool(slow.promised < fast.promised)
+    True
+    >>> slow.certify(0.1, search=None).verified
+    True
+    """
+    require_plant(plant)
+    parameters = limits(plant.parameters, rate)
+    plant = plant.with_scheduling(parameters)
+    least_ranks(plant)
+    factors = levels_above(back_off)
+    attempts: list[Attempt] = []
+    matters = depends(plant)
+
+    def every(degree: int) -> list[Bases]:
+        return candidates(parameters, X, Y, plant.dt is not None, matters, degree)
+
+    def both(degree: int) -> list[Bases]:
+        free = X is None and Y is None and plant.dt is None
+        return both_moving(parameters, matters, degree) if free else []
+
+    if isinstance(plant.model, UncertainStateSpace):
+        return _robust(plant, every(DEGREES[1][0]), factors, fastest, divisions, attempts)
+    free = X is None and Y is None
+    return _nominal(plant, every, both, factors, fastest, divisions, attempts, free=free)
+
+
+@with_one_thread
+def lft_feedback(
+    plant: Plant,
+    *,
+    back_off: float | Sequence[float] = BACK_OFF,
+    fastest: float = math.inf,
+    divisions: int = 1,
+) -> Controller:
+    """Design an output-feedback controller for parameters that change arbitrarily fast, from an LFT
+    in them.
+
+    With constant X and Y the conditions of `output_feedback` need hold at every p alone. The full
+    block S-procedure turns them into conditions on multipliers without losing anything (Scherer
+    2001, theorem 8); here they are imposed on p itself, by Bernstein coefficients. The controller
+    is polynomial in p: `controller.model.to_lft().reduce()`.
+
+    Parameters
+    ----------
+    plant : Plant
+        As for `output_feedback`.
+    back_off, fastest, divisions
+        As for `output_feedback`.
+
+    Returns
+    -------
+    Controller
+        `certify(math.inf)` or `lft_gain(controller.closed().to_lft().reduce())` prove its gain.
+
+    Raises
+    ------
+    InputError, SynthesisError
+        As `output_feedback`; where p may jump there often is no controller.
+
+    References
+    ----------
+    Scherer, "LPV control and full block multipliers", Automatica 37 (2001).
+
+    Examples
+    --------
+    >>> made = synthesis.lft_feedback(plant)
+    >>> proof = made.certify(math.inf, search=None)
+    >>> proof.verified, bool(proof.gamma <= made.promised)
+    (True, True)
+    """
+    return output_feedback(plant, math.inf, back_off=back_off, fastest=fastest, divisions=divisions)
+
+
+def _robust(
+    plant: Plant,
+    every: Sequence[Bases],
+    factors: Sequence[float],
+    fastest: float,
+    divisions: int,
+    attempts: list[Attempt],
+) -> Controller:
+    """For all models of the set, by the one of the shapes that serves the nominal one best."""
+    starts = [least(plant, shape, divisions, USUAL, attempts) for shape in every]
+    start = min(starts, key=lambda each: each.gamma)
+    found = robust_plant(
+        plant, start.gamma, lambda p: least(p, start.shape, divisions, USUAL, attempts).gamma
+    )
+    if found is None:
+        raise failed(plant, attempts)
+    made = _nominal(
+        found, lambda _: [start.shape], lambda _: [], factors, fastest, divisions, attempts
+    )
+    return replace(made, plant=plant, method=f"robust {made.method}")
+
+
+def _nominal(
+    plant: Plant,
+    every: Callable[[int], Sequence[Bases]],
+    both: Callable[[int], Sequence[Bases]],
+    factors: Sequence[float],
+    fastest: float,
+    divisions: int,
+    attempts: list[Attempt],
+    *,
+    free: bool = False,
+) -> Controller:
+    """For one model, by the best of the shapes; those are `free` where none was asked for."""
+    worst = worst_optimum(plant)
+    if worst.level == 0 and (refusal := failed(plant, attempts)).reasons != (NOTHING_WRONG,):
+        raise refusal  # no frozen model has a controller, and it is known why
+    start = best(plant, every, divisions, USUAL, attempts, worst)
+    slowest = None
+    for found, notes in _controllers(
+        plant, start, both, factors, worst, divisions, attempts, free=free
+    ):
+        frozen = frozen_stability(found.closed())
+        if frozen.stable is False:
+            attempts.append(Attempt("frozen loop", 0.0, f"not stable at {frozen.p}", math.inf))
+            continue
+        if slowest is None or _fastest(found) < _fastest(slowest):
+            slowest = replace(found, notes=(*notes, *_limited(found, min(factors), fastest)))
+        if _fastest(found) <= fastest:
+            break
+    if slowest is None:
+        raise failed(plant, attempts, _both_asked(start.shape.untold(plant.parameters)))
+    return replace(slowest, attempts=tuple(attempts))
+
+
+def _controllers(
+    plant: Plant,
+    start: Start,
+    both: Callable[[int], Sequence[Bases]],
+    factors: Sequence[float],
+    worst: FrozenOptimum,
+    divisions: int,
+    attempts: list[Attempt],
+    *,
+    free: bool,
+) -> Iterator[tuple[Controller, tuple[str, ...]]]:
+    """Those of the inequalities with what kept them from a lower gamma; where every parameter
+    stands still and X and Y are `free`, the central ones of the frozen models before those that are
+    far from it. Where X or Y moving stays above what no controller can beat, both move first.
+    """
+    floor = worst.level
+    still = free and floor > 0 and all(s.rate == 0 for s in plant.parameters)
+
+    def central() -> Iterator[tuple[Controller, tuple[str, ...]]]:
+        for each in at_rest(plant, worst, factors, attempts):
+            made = in_plant_units(plant, each.scaled, each.fit, each.gamma, CENTRAL)
+            yield replace(made, optimum=floor), ()
+
+    def other() -> Start | None:
+        if start.gamma <= CLOSE * floor or not both(DEGREES[1][0]):
+            return None
+        found = best(plant, both, divisions, USUAL, attempts, worst)
+        return found if found.gamma < WORTH * start.gamma else None
+
+    for own, design in _designs(plant, start, other(), factors, attempts):
+        if still and design.gamma > _far(min(factors)) * floor:
+            yield from central()
+            still = False
+        told = ", their rates neglected" if own.shape.untold(plant.parameters) else ""
+        method = f"output feedback, {own.shape}{told}"
+        made = in_plant_units(plant, design.scaled, design.fit, design.gamma, method)
+        made = replace(made, optimum=own.gamma, by_adjoint=own.shape.by_y)
+        decides = own.existence.bounded(own.found) and own.existence.largest >= LARGEST[-1]
+        yield made, (BOUND_DECIDES.format(own.existence.largest),) if decides else ()
+    if still:
+        yield from central()
+
+
+def _far(asked: float) -> float:
+    """A gamma so many times the least one is far from it, where the least back-off is `asked`."""
+    return FAR_ABOVE * max(1.0, asked / BACK_OFF[0])
+
+
+def _both_asked(untold: Sequence[str]) -> tuple[str, ...]:
+    """What to write instead of X and Y that both move with these."""
+    if not untold:
+        return ()
+    return (
+        f"X and Y both depend on {', '.join(untold)}, and a controller that is not told its rate"
+        " keeps no gamma near theirs: let X or Y be of degree 0 in it, as X=0, or give the plant a"
+        " lagged parameter, plant.lagged(...)",
+    )
+
+
+def _designs(
+    plant: Plant,
+    start: Start,
+    other: Start | None,
+    factors: Sequence[float],
+    attempts: list[Attempt],
+) -> Iterator[tuple[Start, Design]]:
+    """First of the `other`, where X and Y both move and the controller is not told how fast, which
+    serves where parameters move slowly; as far as it is backed off, its gamma is still lower.
+    """
+    first: list[float] = []
+    if other is not None:
+        first = [f for f in factors if f * other.gamma < min(factors) * start.gamma]
+        for design in settled(other, first, _recover, USUAL, attempts, neglecting=True):
+            yield other, design
+    untold = bool(start.shape.untold(plant.parameters))  # asked for by hand
+    for design in settled(start, factors, _recover, USUAL, attempts, neglecting=untold):
+        yield start, design
+    if other is not None:
+        rest = [f for f in factors if f not in first]
+        for design in settled(other, rest, _recover, USUAL, attempts, neglecting=True):
+            yield other, design
+
+
+def _limited(made: Controller, asked: float, fastest: float) -> tuple[str, ...]:
+    """What may have kept the controller from a lower gamma, or from its limits, a sentence each."""
+    out = []
+    if made.optimum and made.promised > _far(asked) * made.optimum:
+        out.append(
+            f"gamma is {made.promised / made.optimum:.2f} times the least one of the"
+            " inequalities: no nearer controller had gains that are smooth in the scheduling"
+            " parameters"
+        )
+    if _fastest(made) > fastest:
+        out.append(
+            f"the fastest pole of the controller is at {_fastest(made):.4g} rad/s, asked was"
+            f" {fastest:g}: give larger values of back_off, or weights that ask for less bandwidth"
+        )
+    return tuple(out)
+
+
+def _recover(
+    scaled: ScaledPlant, existence: Existence, found: Solution
+) -> Callable[[Array], Array]:
+    X, Y, S = existence.X, existence.Y, existence.S
+    assert X is not None  # noqa: S101 - all were asked for
+    assert Y is not None  # noqa: S101
+    assert S is not None  # noqa: S101
+    parameters = scaled.parameters
+
+    def gains(p: Array) -> Array:
+        at = scaled.at(p)
+        x, y, s = (u.at(found.coefficients, p) for u in (X, Y, S))
+        if scaled.dt is not None:
+            return sampled_controller(at, x, y, s, found.gamma).packed
+        transformed = split(at, x, y, found.gamma)
+        moving = None
+        if X.moves and Y.moves:
+            # dX/dt along the known motion; zero where p stands still
+            known = [
+                m and isinstance(s.rate, str)
+                for m, s in zip(used(X.basis), parameters, strict=True)
+            ]
+            (motion,) = scaled.motions(p, known)
+            moving = X.moving(found.coefficients, p, motion)
+        return controller(at, x, y, transformed, constant_x=not X.moves, moving_x=moving).packed
+
+    return gains
+
+
+def _fastest(made: Controller) -> float:
+    """The largest modulus of a pole, rad/s, of a continuous controller; 0 of another."""
+    model = made.model
+    if model.dt is not None:
+        return 0.0
+    p = lobatto_points(CHECKED.get(len(model.parameters), 3), model.box)
+    A = model.matrices(p).A
+    return float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))

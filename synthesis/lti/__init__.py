@@ -1,0 +1,1 @@
+"""Controllers of one linear model: H-infinity, H2, mixed sensitivity and loop shaping."""

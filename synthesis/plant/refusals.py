@@ -1,0 +1,98 @@
+"""What a synthesis refuses, and why one has failed: with the names of the plant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from symheli.errors import InputError, SynthesisError
+from symheli.lpv.bases.polynomials import lobatto_points
+from synthesis.certificate import Attempt
+from synthesis.plant.diagnosis import reasons, unpriced
+
+if TYPE_CHECKING:
+    from synthesis.plant.generalized import Channels
+    from synthesis.plant.plant import Plant
+
+Array = np.ndarray
+
+NOTHING_WRONG = (
+    "nothing is wrong with the plant at frozen p: a lower rate, other functions for X and Y, or"
+    " more divisions may help"
+)
+LARGEST_BACK_OFF = 1e3
+"""Largest back-off; larger factors are meaningless and numerically unsafe."""
+
+
+def levels_above(back_off: float | Sequence[float]) -> tuple[float, ...]:
+    """Return the factors to try in order; raise `InputError` unless each is from 1 to
+    `LARGEST_BACK_OFF`.
+    """
+    factors = (back_off,) if isinstance(back_off, int | float) else tuple(back_off)
+    if not factors or not all(1 <= factor <= LARGEST_BACK_OFF for factor in factors):
+        raise InputError(
+            f"back_off: expected numbers from 1 to {LARGEST_BACK_OFF:g}, got {back_off!r:.80}"
+        )
+    return factors
+
+
+def conditions(plant: Plant) -> tuple[Array, list[str]]:
+    """Some p all over the box, as `Plant.matrices` takes them, and what to call each."""
+    p = lobatto_points(5 if len(plant.parameters) == 1 else 3, plant.nominal.box)
+    names = [s.name for s in plant.parameters]
+    said = [
+        ", ".join(f"{n} = {v:g}" for n, v in zip(names, np.atleast_1d(q), strict=True)) for q in p
+    ]
+    return p, said
+
+
+def least_ranks(plant: Plant, *, controls: bool = True, measurements: bool = True) -> None:
+    """Raises `InputError` where a control costs nothing or a measurement is free of disturbances at
+    some p, and where the plant has none.
+    """
+    named = require_channels(plant, controls=controls, measurements=measurements)
+    at = plant.matrices(conditions(plant)[0])
+    found: list[str] = []
+    if controls:
+        found += unpriced(at.D12, named.controls)
+    if measurements:
+        found += unpriced(np.swapaxes(at.D21, 1, 2), named.measurements, dual=True)
+    if found:
+        raise InputError("; ".join(found))
+
+
+def require_channels(plant: Plant, *, controls: bool = True, measurements: bool = True) -> Channels:
+    """The channels of a plant; raises `InputError` where a group has none."""
+    named = plant.channels
+    for wanted, group in (
+        (True, "disturbances"),
+        (True, "performance"),
+        (controls, "controls"),
+        (measurements, "measurements"),
+    ):
+        if wanted and not getattr(named, group):
+            raise InputError(f"the plant has no {group}: name them, Plant(model, {group}=[...])")
+    return named
+
+
+def failed(plant: Plant, attempts: Sequence[Attempt], asked: Sequence[str] = ()) -> SynthesisError:
+    """The error that says why: what was `asked` for, modes, directions and weights, and every
+    program that was tried.
+    """
+    p, said = conditions(plant)
+    # what a solve that ran out of digits left is no level of this plant
+    least = min((a.bound for a in attempts if a.answer.startswith("solved")), default=math.inf)
+    why = reasons(
+        plant.matrices(p),
+        plant.channels,
+        dt=plant.dt,
+        at=said,
+        gamma=least if math.isfinite(least) else None,
+    )
+    lines = (*asked, *why) or (NOTHING_WRONG,)
+    return SynthesisError(
+        "no controller was found:\n  " + "\n  ".join([*lines, *map(str, attempts)]), tuple(lines)
+    )
