@@ -58,7 +58,7 @@ def test_central_controllers_keep_their_level_between_the_points(seed):
     level = found.gamma / worst.level
     assert min(abs(level - factor) for factor in BACK_OFF) < 1e-12
     p = np.append(np.random.default_rng(seed).uniform(-1, 1, 40), worst.p)[:, None]
-    plants, K = found.coordinates.at(p), found.fit(p)
+    plants, K = found.scaled.at(p), found.fit(p)
     n = plants.A.shape[-1]
     loop = plants.closed(K[:, :n, :n], K[:, :n, n:], K[:, n:, :n], K[:, n:, n:])
     w = np.logspace(-4, 4, 400)
